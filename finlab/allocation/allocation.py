@@ -1,0 +1,117 @@
+"""What every allocation method answers: commands, what they give, and what is left undone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.energy import command_energy
+from finlab.layout import Layout
+
+Array = NDArray[np.float64]
+
+
+class Candidates(NamedTuple):
+    """Several commands for one target, best first. Failed fins hold NaN."""
+
+    command: Array
+    """Commands (K, n, 3): amplitude [rad], frequency [Hz], zero direction [rad]."""
+    wrench: Array
+    """Wrench (K, 6) that the method's own model expects [N, N m]."""
+    err_norm: Array
+    """Normalized error (K,) of that wrench."""
+    energy: Array
+    """Energy proxy (K,)."""
+    source: tuple[str, ...]
+    """Where each one comes from, in words."""
+
+
+class Solution(NamedTuple):
+    """What a method's solver returns for N targets on the n healthy fins of one layout."""
+
+    command: Array
+    """Chosen commands (N, n, 3)."""
+    wrench_surrogate: Array | None = None
+    """Wrench (N, 6) that the method itself believed, where it used a model of its own."""
+    candidates: Candidates | None = None
+    """Refined candidates, for a single target."""
+    samples: Candidates | None = None
+    """Raw candidates before refinement, for a single target."""
+
+
+@dataclass(frozen=True)
+class Allocation:
+    """The answer to one allocation problem; it can judge itself with the analytic fin model."""
+
+    layout: Layout
+    """The whole layout, failed fins included."""
+    failed: tuple[str, ...]
+    """Names of the fins that were left out."""
+    target: Array
+    """Desired wrench (6,), [N, N m], body frame."""
+    command: Array
+    """Command (n, 3) of every fin: amplitude [rad], frequency [Hz], zero direction [rad]; NaN for a failed one."""
+    sigma: Array
+    """Per-axis standard deviation (6,) of the error measure."""
+    method: str
+    """Name of the method that answered."""
+    solve_ms: float
+    """Time spent solving [ms], scoring by the plant not included."""
+    checkpoint: str | None = None
+    """Name of the checkpoint that was used, if any."""
+    wrench_surrogate: Array | None = None
+    """Wrench (6,) that the method itself expected, if it used a learned model."""
+    candidates: Candidates | None = None
+    """Refined candidates, best first."""
+    samples: Candidates | None = None
+    """Raw candidates before refinement."""
+
+    @property
+    def fins(self) -> tuple[str, ...]:
+        """Names of the fins, in the order of `command`."""
+        return self.layout.names
+
+    @cached_property
+    def fin_forces(self) -> Array:
+        """Force of each fin (n, 3) in the body frame [N], by the analytic fin model."""
+        from finlab.physics import Plant  # torch is loaded only where the plant is asked
+
+        return Plant(self.layout).fin_forces(self.command)
+
+    @cached_property
+    def wrench(self) -> Array:
+        """Delivered wrench (6,) by the analytic fin model [N, N m]."""
+        force = self.fin_forces
+        position = np.array([fin.position for fin in self.layout.fins])
+        return np.concatenate([force.sum(0), np.cross(position, force).sum(0)])
+
+    @property
+    def unallocated(self) -> Array:
+        """What the robot does not deliver: target minus delivered wrench (6,)."""
+        return self.target - self.wrench
+
+    @property
+    def err_norm(self) -> float:
+        """Normalized error of the delivered wrench, scored by the analytic fin model."""
+        return float(np.linalg.norm(self.unallocated / self.sigma))
+
+    @cached_property
+    def energy(self) -> float:
+        """Energy proxy of the command."""
+        upper = np.array([fin.limits.upper for fin in self.layout.fins])
+        return float(command_energy(self.command, upper))
+
+
+class BatchAllocation(NamedTuple):
+    """Answers to N targets on one layout."""
+
+    command: Array
+    """Commands (N, n, 3), NaN for failed fins."""
+    wrench_surrogate: Array | None
+    """Wrenches (N, 6) that the method itself expected, if it used a learned model."""
+    solve_ms: Array
+    """Time per target (N,) [ms]; the whole time divided by N where targets were solved together."""

@@ -1,0 +1,152 @@
+"""The one interface of every allocation method: check the problem, solve it, answer with an `Allocation`."""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from finlab.allocation.allocation import Allocation, BatchAllocation, Candidates, Solution
+from finlab.data.normalization import Normalization
+from finlab.errors import AllocationError, CommandError
+from finlab.layout import Layout
+
+Array = NDArray[np.float64]
+
+AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+MAX_WRENCH = 1e6
+"""Largest magnitude of a target component [N, N m]; beyond it something is wrong upstream."""
+
+
+class Allocator(ABC):
+    """Turns a target wrench into one command per fin.
+
+    A method implements `_solve` for the healthy fins of one layout; failed fins are removed before
+    and put back (as NaN) after, so no method can use one.
+    """
+
+    name: str
+    normalization: Normalization
+    checkpoint: str | None = None
+
+    @abstractmethod
+    def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
+        """Solve for targets (N, 6) on a layout whose fins are all healthy.
+
+        Args:
+            layout: the healthy fins.
+            targets: desired wrenches (N, 6).
+            seed: makes the answer repeatable.
+            previous: command (n, 3) of the previous tick, or None.
+        """
+
+    def allocate(
+        self,
+        layout: Layout,
+        wrench: ArrayLike,
+        *,
+        failed: Sequence[str] = (),
+        previous: ArrayLike | None = None,
+        seed: int = 0,
+    ) -> Allocation:
+        """Commands for one target.
+
+        Args:
+            layout: the robot.
+            wrench: desired wrench (6,) [N, N m] in the body frame.
+            failed: names of fins that do not work; they leave the graph.
+            previous: command (n, 3) of the previous tick, or the `Allocation` field of one.
+            seed: the same target, layout and seed give the same answer.
+
+        Raises:
+            CommandError: the wrench is not six finite numbers, or `previous` has another shape.
+            LayoutError: an unknown fin, or none left.
+        """
+        target = check_wrenches(wrench, single=True)
+        healthy, alive = remove_failed(layout, failed)
+        before = None if previous is None else check_previous(previous, layout)[alive]
+        start = time.perf_counter()
+        solution = self._solve(healthy, target[None], seed=seed, previous=before)
+        solve_ms = (time.perf_counter() - start) * 1e3
+        return Allocation(
+            layout=layout,
+            failed=tuple(failed),
+            target=target,
+            command=_with_failed(solution.command[0], alive),
+            sigma=self.normalization.std,
+            method=self.name,
+            solve_ms=solve_ms,
+            checkpoint=self.checkpoint,
+            wrench_surrogate=None if solution.wrench_surrogate is None else solution.wrench_surrogate[0],
+            candidates=_candidates_with_failed(solution.candidates, alive),
+            samples=_candidates_with_failed(solution.samples, alive),
+        )
+
+    def allocate_batch(
+        self, layout: Layout, wrenches: ArrayLike, *, failed: Sequence[str] = (), seed: int = 0
+    ) -> BatchAllocation:
+        """Commands for many targets (N, 6) on one layout; errors as in `allocate`."""
+        targets = check_wrenches(wrenches, single=False)
+        healthy, alive = remove_failed(layout, failed)
+        start = time.perf_counter()
+        solution = self._solve(healthy, targets, seed=seed, previous=None)
+        elapsed_ms = (time.perf_counter() - start) * 1e3
+        return BatchAllocation(
+            _with_failed(solution.command, alive),
+            solution.wrench_surrogate,
+            np.full(len(targets), elapsed_ms / max(len(targets), 1)),
+        )
+
+
+def check_wrenches(wrench: ArrayLike, *, single: bool) -> Array:
+    """One wrench (6,) or many (N, 6) as finite float64, or a `CommandError` that says what is wrong."""
+    expected = "six numbers [Fx, Fy, Fz, Tx, Ty, Tz]" if single else "an array of shape (N, 6)"
+    try:
+        array = np.array(wrench, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise CommandError(f"wrench: expected {expected} in N and N m, got {wrench!r}") from error
+    if array.shape != (6,) if single else (array.ndim != 2 or array.shape[1] != 6):
+        raise CommandError(f"wrench: expected {expected} in N and N m, got an array of shape {array.shape}")
+    bad = ~(np.abs(array) <= MAX_WRENCH)
+    if bad.any():
+        axis = AXES[int(np.argwhere(bad)[0][-1])]
+        value = array[bad][0]
+        raise CommandError(f"wrench: {axis} must be finite and at most {MAX_WRENCH:g} in size, got {value}")
+    return array
+
+
+def check_previous(previous: ArrayLike, layout: Layout) -> Array:
+    """The previous command (n, 3), failed fins may hold NaN."""
+    array = np.array(previous, dtype=np.float64)
+    if array.shape != (layout.n_fins, 3):
+        raise CommandError(
+            f"previous: expected a command of shape ({layout.n_fins}, 3) for layout {layout.name!r}, "
+            f"got shape {array.shape}; pass the `command` of the last allocation"
+        )
+    return array
+
+
+def remove_failed(layout: Layout, failed: Sequence[str]) -> tuple[Layout, NDArray[np.bool_]]:
+    """The layout without its failed fins, and the mask (n,) of the healthy ones."""
+    if isinstance(failed, str):
+        raise AllocationError(f"failed: expected a list of fin names, got the text {failed!r}; write [{failed!r}]")
+    if not failed:
+        return layout, np.ones(layout.n_fins, dtype=bool)
+    alive = np.array([name not in set(failed) for name in layout.names])
+    return layout.without(failed), alive
+
+
+def _with_failed(command: Array, alive: NDArray[np.bool_]) -> Array:
+    """Put the healthy fins' commands (..., m, 3) back among all n fins; the failed ones are NaN."""
+    if alive.all():
+        return command
+    full = np.full((*command.shape[:-2], len(alive), 3), np.nan)
+    full[..., alive, :] = command
+    return full
+
+
+def _candidates_with_failed(candidates: Candidates | None, alive: NDArray[np.bool_]) -> Candidates | None:
+    return None if candidates is None else candidates._replace(command=_with_failed(candidates.command, alive))

@@ -1,0 +1,53 @@
+"""All allocation methods by name."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from finlab.allocation.allocator import Allocator
+from finlab.errors import AllocationError
+
+METHODS: dict[str, tuple[str, str]] = {
+    "learned": ("finlab.allocation.learned", "LearnedAllocator"),
+    "paper": ("finlab.allocation.paper", "PaperAllocator"),
+    "qp": ("finlab.allocation.qp", "Qp"),
+    "sqp": ("finlab.allocation.sqp", "Sqp"),
+    "analytic": ("finlab.allocation.analytic", "Analytic"),
+    "multistart": ("finlab.allocation.multistart", "Multistart"),
+    "trf": ("finlab.allocation.trf", "Trf"),
+    "slsqp": ("finlab.allocation.slsqp", "Slsqp"),
+    "ipopt": ("finlab.allocation.ipopt", "Ipopt"),
+}
+"""Name -> module and class; modules are loaded only when their method is asked for."""
+
+LEARNED = ("learned", "paper")
+"""Methods that need a trained network; the others take only the normalization from a checkpoint."""
+
+
+def load_allocator(
+    checkpoint: str | Path | None = None, method: str = "learned", **options: Any
+) -> Allocator:
+    """The allocator of a method, ready to answer.
+
+    Args:
+        checkpoint: a checkpoint folder or the name of a shipped one; by default `paper` for the
+            method `paper` and `default` for all others.
+        method: one of `METHODS`.
+        options: passed to the method's class.
+
+    Raises:
+        AllocationError: unknown method.
+        CheckpointError: missing, corrupt or foreign checkpoint.
+    """
+    if method not in METHODS:
+        raise AllocationError(f"method: expected one of {', '.join(METHODS)}, got {method!r}")
+    from finlab.model.checkpoint import load_allocator_checkpoint, load_normalization, resolve_checkpoint
+
+    path = resolve_checkpoint(checkpoint or ("paper" if method == "paper" else "default"))
+    module, name = METHODS[method]
+    kind = getattr(import_module(module), name)
+    if method in LEARNED:
+        return kind(load_allocator_checkpoint(path), **options)
+    return kind(load_normalization(path), **options)

@@ -1,0 +1,1 @@
+"""Sampling, features and normalization of training data."""
