@@ -1,0 +1,61 @@
+# `make app` and `make test` do everything on a fresh Debian or Ubuntu machine with Python 3.11.
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+BIN := .venv/bin
+STAMP := .venv/.ready
+HOST_PORT ?= 8080
+
+# Tests and benchmarks share few cores with a browser; one thread each is faster than many that wait.
+THREADS := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+
+.DEFAULT_GOAL := help
+.PHONY: help setup app test test-fast check format bench wheel wheel-check clean
+
+help:
+	@echo "make setup        make .venv with everything pinned in constraints.txt"
+	@echo "make app          serve the app on http://127.0.0.1:$(HOST_PORT)"
+	@echo "make test         every test, browser tests included"
+	@echo "make test-fast    every test but those of the browser and the packaging"
+	@echo "make check        ruff, ruff format and mypy"
+	@echo "make format       let ruff mend what it can"
+	@echo "make bench        print data throughput, accuracy and latency"
+	@echo "make wheel-check  build the wheel, install it in an empty environment and try it there"
+
+setup: $(STAMP)
+
+$(STAMP): pyproject.toml constraints.txt
+	@test -n "$(PYTHON)" || { echo "finlab needs Python 3.11 or newer: apt-get install python3"; exit 1; }
+	test -x $(BIN)/pip || $(PYTHON) -m venv .venv || { tools/apt-install python3-venv && $(PYTHON) -m venv .venv; }
+	$(BIN)/pip install --disable-pip-version-check -c constraints.txt -e '.[app,ipopt,test,dev]'
+	@touch $@
+
+app: setup
+	$(BIN)/finlab app --port $(HOST_PORT)
+
+test: setup
+	@tools/find-browser || tools/apt-install chromium fonts-dejavu-core || tools/no-browser
+	$(THREADS) $(BIN)/python -m pytest -n 2 --dist loadfile --ignore tests/browser
+	$(THREADS) $(BIN)/python -m pytest tests/browser
+
+test-fast: setup
+	$(THREADS) $(BIN)/python -m pytest -n 2 --dist loadfile --ignore tests/browser --ignore tests/packaging
+
+check: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+format: setup
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: setup
+	tools/bench
+
+wheel: setup
+	$(BIN)/python -m pip wheel --disable-pip-version-check --no-deps --no-build-isolation -w dist .
+
+wheel-check: wheel
+	tools/wheel-check
+
+clean:
+	rm -rf dist build test-results .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -1,0 +1,44 @@
+"""Layout-independent control allocation for fin-actuated underwater robots.
+
+A layout says where the fins of a robot sit. A wrench says what the body should feel. An allocator turns
+both into one command per fin:
+
+    layout = finlab.load_layout("layouts/A.yaml")
+    result = finlab.load_allocator().allocate(layout, [1, 0, 0.5, 0, 0, 0.1])
+
+Names are imported on first use, so that `import finlab` needs neither torch nor the time to load it.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from finlab.allocation.allocation import Allocation as Allocation
+    from finlab.allocation.allocator import Allocator as Allocator
+    from finlab.allocation.methods import load_allocator as load_allocator
+    from finlab.errors import FinlabError as FinlabError
+    from finlab.layout.file import load_layout as load_layout
+    from finlab.layout.file import save_layout as save_layout
+    from finlab.layout.layout import Layout as Layout
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "Allocation": "finlab.allocation.allocation",
+    "Allocator": "finlab.allocation.allocator",
+    "load_allocator": "finlab.allocation.methods",
+    "FinlabError": "finlab.errors",
+    "load_layout": "finlab.layout.file",
+    "save_layout": "finlab.layout.file",
+    "Layout": "finlab.layout.layout",
+}
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOME:
+        raise AttributeError(f"module 'finlab' has no attribute {name!r}; it has {', '.join(sorted(_HOME))}")
+    return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOME])

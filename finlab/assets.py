@@ -1,0 +1,49 @@
+"""Where the shipped layouts and checkpoints lie: at the top of a source tree, inside the package of a wheel."""
+
+from pathlib import Path
+
+from finlab.errors import CheckpointError
+
+_PACKAGE = Path(__file__).resolve().parent
+
+
+def _shipped(folder: str) -> Path:
+    """A folder of the source tree, or its copy in an installed wheel."""
+    in_wheel = _PACKAGE / "shipped" / folder
+    return in_wheel if in_wheel.is_dir() else _PACKAGE.parent / folder
+
+
+def layouts_dir() -> Path:
+    """The folder of the shipped layout files."""
+    return _shipped("layouts")
+
+
+def checkpoints_dir() -> Path:
+    """The folder of the shipped checkpoints, one folder in it for each."""
+    return _shipped("checkpoints")
+
+
+def shipped_layouts() -> dict[str, Path]:
+    """Shipped layouts: file name without its ending, to path; sorted by name."""
+    return {path.stem: path for path in sorted(layouts_dir().glob("*.yaml"))}
+
+
+def shipped_checkpoints() -> dict[str, Path]:
+    """Shipped checkpoints: name to folder; sorted by name."""
+    return {path.parent.name: path.parent for path in sorted(checkpoints_dir().glob("*/config.json"))}
+
+
+def checkpoint_path(name: str = "default") -> Path:
+    """The folder of a shipped checkpoint.
+
+    Raises:
+        CheckpointError: none of that name is shipped.
+    """
+    found = shipped_checkpoints()
+    if name not in found:
+        names = ", ".join(found) or "none"
+        raise CheckpointError(
+            f"checkpoint {name!r} is not among the shipped ones ({names}) in {checkpoints_dir()}; "
+            "name one of them, or pass the folder of your own"
+        )
+    return found[name]
