@@ -1,0 +1,106 @@
+"""`finlab allocate`: one target wrench in, one command per fin out, as a table or as JSON."""
+
+from __future__ import annotations
+
+import json as json_format
+import math
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, UseAppendAction, arg
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from finlab.allocation import Allocation
+
+Wrench = tuple[float, float, float, float, float, float]
+
+
+def allocate(
+    layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
+    wrench: Annotated[Wrench, arg(metavar="FX FY FZ TX TY TZ")],
+    failed: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = (),
+    method: Annotated[str, arg(metavar="NAME")] = "learned",
+    checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
+    seed: Annotated[int, arg(metavar="N")] = 0,
+    json: bool = False,
+) -> None:
+    """Find the command of each fin that gives a target wrench.
+
+    Args:
+        layout: layout file, layout graph file, or the name of a shipped layout.
+        wrench: target in the body frame [N, N m].
+        failed: name of a fin that does not work.
+        method: learned, paper, qp, sqp, analytic, multistart, trf, slsqp or ipopt.
+        checkpoint: trained checkpoint; the shipped one of the method by default.
+        seed: same target, layout and seed, same answer.
+        json: print one JSON object instead of a table.
+    """
+    from finlab.allocation import load_allocator
+    from finlab.cli.inputs import open_robot
+
+    robot = open_robot(layout)
+    allocator = load_allocator(checkpoint, method)
+    result = allocator.allocate(robot.layout, wrench, failed=robot.with_failed(failed), seed=seed)
+    if json:
+        print(json_format.dumps(allocation_record(result), allow_nan=False))
+    else:
+        print(allocation_text(result))
+
+
+def allocation_record(result: Allocation) -> dict[str, object]:
+    """The JSON object of `finlab allocate --json`; its keys are a contract."""
+    surrogate = result.wrench_surrogate
+    return {
+        "fins": list(result.fins),
+        "failed": list(result.failed),
+        "command": [
+            None if name in result.failed else _numbers(row)
+            for name, row in zip(result.fins, result.command, strict=True)
+        ],
+        "target": _numbers(result.target),
+        "wrench_surrogate": None if surrogate is None else _numbers(surrogate),
+        "wrench_plant": _numbers(result.wrench),
+        "unallocated": _numbers(result.unallocated),
+        "err_norm": result.err_norm,
+        "energy": result.energy,
+        "sigma": _numbers(result.sigma),
+        "solve_ms": result.solve_ms,
+        "method": result.method,
+        "checkpoint": result.checkpoint,
+    }
+
+
+def allocation_text(result: Allocation) -> str:
+    """The answer as two small tables, for people: angles in degrees, three digits."""
+    width = max(len("fin"), *(len(name) for name in result.fins))
+    lines = [f"{'fin':<{width}}  A [rad]  f [Hz]  zero direction [deg]  force [N]"]
+    for name, command, force in zip(result.fins, result.command, result.fin_forces, strict=True):
+        if name in result.failed:
+            lines.append(f"{name:<{width}}   failed")
+            continue
+        amplitude, frequency, direction = command
+        lines.append(
+            f"{name:<{width}}  {amplitude:7.3f}  {frequency:6.3f}  {math.degrees(direction):20.1f}"
+            f"  {math.hypot(*force):9.3f}"
+        )
+    lines += ["", f"{'':9}  Fx [N]  Fy [N]  Fz [N]  Tx [N m]  Ty [N m]  Tz [N m]"]
+    rows = {"asked": result.target, "delivered": result.wrench, "missing": result.unallocated}
+    for label, row in rows.items():
+        # `+ 0.0` turns a rounded -0.0 into 0.0.
+        cells = [f"{round(value, 3) + 0.0:{size}.3f}" for value, size in zip(row, _AXIS_WIDTHS, strict=True)]
+        lines.append(f"{label:<9}  " + "  ".join(cells))
+    source = f", checkpoint {result.checkpoint}" if result.checkpoint else ""
+    lines += [
+        "",
+        f"err_norm {result.err_norm:.2e}   energy {result.energy:.3f}   {result.solve_ms:.1f} ms   "
+        f"method {result.method}{source}",
+    ]
+    return "\n".join(lines)
+
+
+_AXIS_WIDTHS = (6, 6, 6, 8, 8, 8)
+
+
+def _numbers(row: np.ndarray) -> list[float]:
+    return [float(value) for value in row]

@@ -1,0 +1,31 @@
+"""`finlab export`: write the layout graph file that a robot takes home."""
+
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, UseAppendAction, arg
+
+
+def export(
+    layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
+    output: Annotated[Path, arg(metavar="FILE.graph.json", aliases=["-o"])],
+    failed: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = (),
+    checkpoint: Annotated[str, arg(metavar="NAME|FOLDER")] = "default",
+) -> None:
+    """Write the layout graph for deployment: fins, features, normalization and a self-test.
+
+    Args:
+        layout: layout file, layout graph file, or the name of a shipped layout.
+        output: file to write; its name ends in .graph.json.
+        failed: name of a fin that does not work.
+        checkpoint: trained checkpoint the graph is made for.
+    """
+    from finlab.cli.inputs import open_robot
+    from finlab.deploy.graph_file import check_graph_path, write_graph
+
+    check_graph_path(output)
+    from finlab.allocation import load_allocator
+
+    robot = open_robot(layout)
+    graph = write_graph(robot.layout, load_allocator(checkpoint), output, failed=robot.with_failed(failed))
+    print(f"{output}: {graph.layout.n_fins} fins, {len(graph.self_test)} self-test wrenches, {graph.checksum}")

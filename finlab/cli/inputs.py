@@ -1,0 +1,68 @@
+"""What a user may name at the command line: a layout file, a layout graph file or a shipped layout."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from finlab.deploy.graph_file import LayoutGraph
+    from finlab.layout import Layout
+
+GRAPH_SUFFIX = ".graph.json"
+"""Ending of the name of a layout graph file."""
+
+
+class Robot(NamedTuple):
+    """A layout, the fins of it that do not work, and the graph file that said so, if it was one."""
+
+    layout: Layout
+    """All fins."""
+    failed: tuple[str, ...] = ()
+    """Names of fins that a graph file marks as failed."""
+    graph: LayoutGraph | None = None
+    """The graph file, if the layout came from one."""
+
+    def with_failed(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        """Names of all failed fins: those of the file and those named now, each once."""
+        return tuple(dict.fromkeys([*self.failed, *names]))
+
+
+def open_robot(text: str) -> Robot:
+    """The layout (and failed fins) in a file, or the shipped layout of that name.
+
+    Raises:
+        LayoutError: neither a readable file nor a shipped layout.
+    """
+    path = layout_path(text)
+    if path.name.endswith(GRAPH_SUFFIX):
+        from finlab.deploy.graph_file import read_graph
+
+        graph = read_graph(path)
+        return Robot(graph.layout, graph.failed, graph)
+    from finlab.layout import load_layout
+
+    return Robot(load_layout(path))
+
+
+def layout_path(text: str) -> Path:
+    """The path that a user means: the file if there is one, else the shipped layout of that name.
+
+    Raises:
+        LayoutError: there is no such file and no such shipped layout.
+    """
+    from finlab.assets import shipped_layouts
+    from finlab.errors import LayoutError
+
+    path = Path(text)
+    try:
+        if path.exists():
+            return path
+    except (OSError, ValueError) as error:  # a name that is too long, or holds a NUL byte
+        raise LayoutError(f"layout {text[:80]!r} cannot be a path: {error}") from error
+    shipped = shipped_layouts()
+    if text in shipped:
+        return shipped[text]
+    raise LayoutError(
+        f"layout {text!r} is neither a file nor a shipped layout; shipped are {', '.join(shipped) or 'none'}"
+    )
