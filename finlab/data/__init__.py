@@ -1,1 +1,1 @@
-"""Sampling, features and normalization of training data."""
+"""Training data: seeded sampling, shards on disk, features and normalization."""

@@ -1,0 +1,46 @@
+"""Every error a user can cause, under one base class.
+
+A message is one plain sentence that says what was got, what was expected, where, and what to do. The command
+line prints it behind `finlab: error: ` and exits with status 2; the app shows it as a notification.
+"""
+
+
+class FinlabError(Exception):
+    """Base of all errors that finlab raises on purpose. Its text is meant to be read by a user."""
+
+
+class LayoutError(FinlabError):
+    """A layout, or the file that describes it, is not acceptable.
+
+    The parts are kept apart so that a check deep inside (which knows the problem and the key) and the reader of
+    the file (which knows where that key lies) can each add what they know.
+    """
+
+    def __init__(self, problem: str, key: str = "", source: str = "") -> None:
+        """Joins the parts to `source: key: problem`, leaving out empty ones."""
+        super().__init__(": ".join(part for part in (source, key, problem) if part))
+        self.problem = problem
+        self.key = key
+        self.source = source
+
+    def under(self, prefix: str, source: str = "") -> "LayoutError":
+        """Returns the same error seen from further out: `prefix` goes before the key."""
+        if prefix and self.key and not self.key.startswith("["):
+            prefix += "."
+        return LayoutError(self.problem, prefix + self.key, source or self.source)
+
+
+class CommandError(FinlabError):
+    """A command or wrench has the wrong length, shape or values."""
+
+
+class CheckpointError(FinlabError):
+    """A checkpoint is missing, corrupt, of another format, or made for something else."""
+
+
+class AllocationError(FinlabError):
+    """A method cannot answer the question it was asked."""
+
+
+class DataError(FinlabError):
+    """A data set, a table of forces or a shard on disk is missing, corrupt or inconsistent."""

@@ -1,0 +1,20 @@
+"""What a robot is: its fins, their limits and its body, as frozen values, files and padded arrays. numpy only."""
+
+from finlab.layout.arrays import LayoutArrays as LayoutArrays
+from finlab.layout.arrays import layout_effectiveness as layout_effectiveness
+from finlab.layout.arrays import planar_effectiveness as planar_effectiveness
+from finlab.layout.arrays import stack_layouts as stack_layouts
+from finlab.layout.body import Body as Body
+from finlab.layout.body import Hull as Hull
+from finlab.layout.file import layout_to_dict as layout_to_dict
+from finlab.layout.file import load_layout as load_layout
+from finlab.layout.file import parse_layout as parse_layout
+from finlab.layout.file import save_layout as save_layout
+from finlab.layout.fin import Fin as Fin
+from finlab.layout.fin import Limits as Limits
+from finlab.layout.fin_model import FinModelSpec as FinModelSpec
+from finlab.layout.layout import MAX_FINS as MAX_FINS
+from finlab.layout.layout import Layout as Layout
+from finlab.layout.random import layout_from_arrays as layout_from_arrays
+from finlab.layout.random import random_layout as random_layout
+from finlab.layout.random import random_layouts as random_layouts

@@ -1,0 +1,98 @@
+"""Layouts as padded arrays, and the geometry of their forces. numpy only."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.errors import LayoutError
+from finlab.layout.fin import Limits
+from finlab.layout.layout import Layout
+
+Array = NDArray[np.float64]
+
+
+class LayoutArrays(NamedTuple):
+    """A batch of B layouts padded to n fins, float64. Padding is a fin at the origin with nominal limits."""
+
+    position: Array
+    """Where each fin's force acts, body frame [m], (B, n, 3)."""
+
+    mounting_angle: Array
+    """Azimuth of each shaft [rad], (B, n)."""
+
+    lower: Array
+    """Least (amplitude [rad], frequency [Hz], zero direction [rad]), (B, n, 3)."""
+
+    upper: Array
+    """Greatest (amplitude [rad], frequency [Hz], zero direction [rad]), (B, n, 3)."""
+
+    mask: NDArray[np.bool_]
+    """True where there is a fin, False where there is padding, (B, n)."""
+
+
+def empty_arrays(n_layouts: int, n_fins: int) -> LayoutArrays:
+    """Returns a batch of nothing but padding, to be filled in."""
+    nominal = Limits()
+    return LayoutArrays(
+        position=np.zeros((n_layouts, n_fins, 3)),
+        mounting_angle=np.zeros((n_layouts, n_fins)),
+        lower=np.tile(np.array(nominal.lower), (n_layouts, n_fins, 1)),
+        upper=np.tile(np.array(nominal.upper), (n_layouts, n_fins, 1)),
+        mask=np.zeros((n_layouts, n_fins), dtype=bool),
+    )
+
+
+def stack_layouts(layouts: Sequence[Layout], n_fins: int | None = None) -> LayoutArrays:
+    """Returns the layouts as one padded batch.
+
+    Args:
+        layouts: at least one.
+        n_fins: width to pad to; the largest layout's fin count when None.
+
+    Raises:
+        LayoutError: there are no layouts, or one has more than `n_fins` fins.
+    """
+    if len(layouts) == 0:
+        raise LayoutError("expected at least one layout to stack, got none")
+    widest = max(layouts, key=lambda layout: layout.n_fins)
+    width = widest.n_fins if n_fins is None else n_fins
+    if widest.n_fins > width:
+        raise LayoutError(f"layout {widest.name} has {widest.n_fins} fins, more than the {width} there is room for")
+    arrays = empty_arrays(len(layouts), width)
+    for b, layout in enumerate(layouts):
+        for i, fin in enumerate(layout.fins):
+            arrays.position[b, i] = fin.position
+            arrays.mounting_angle[b, i] = fin.mounting_angle
+            arrays.lower[b, i] = fin.limits.lower
+            arrays.upper[b, i] = fin.limits.upper
+        arrays.mask[b, : layout.n_fins] = True
+    return arrays
+
+
+def planar_effectiveness(position: Array, mounting_angle: Array) -> Array:
+    """Returns what one newton along each fin's two thrust axes does to the robot.
+
+    Args:
+        position: (..., n, 3), body frame [m].
+        mounting_angle: (..., n) [rad].
+
+    Returns:
+        (..., n, 6, 2): wrench [Fx, Fy, Fz, Tx, Ty, Tz] of 1 N along e_h (column 0) and along e_z (column 1).
+    """
+    position = np.asarray(position, dtype=np.float64)
+    angle = np.asarray(mounting_angle, dtype=np.float64)
+    axes = np.zeros((*angle.shape, 2, 3))
+    axes[..., 0, 0] = -np.sin(angle)
+    axes[..., 0, 1] = np.cos(angle)
+    axes[..., 1, 2] = 1.0
+    wrenches = np.concatenate([axes, np.cross(position[..., None, :], axes)], axis=-1)
+    return np.swapaxes(wrenches, -1, -2)
+
+
+def layout_effectiveness(layout: Layout) -> Array:
+    """Returns one layout's planar effectiveness as a matrix (6, 2 n), fins side by side, for rank and inverses."""
+    arrays = stack_layouts([layout])
+    blocks = planar_effectiveness(arrays.position[0], arrays.mounting_angle[0])
+    return np.concatenate(list(blocks), axis=1)

@@ -1,0 +1,193 @@
+"""Layout files, version 1: YAML for people, JSON accepted. Angles of shafts in degrees, all else SI and radians.
+
+Every error names the file and the key, such as
+`layouts/x.yaml: fins[2].limits.amplitude_rad: minimum 0.6 is above maximum 0.05; swap them`.
+"""
+
+import json
+import math
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from finlab.errors import LayoutError
+from finlab.layout.body import BODY_KEYS, HULL_KEYS, Body, Hull
+from finlab.layout.fin import Fin, Limits
+from finlab.layout.fin_model import FinModelSpec
+from finlab.layout.layout import MAX_FINS, Layout
+from finlab.layout.reading import parse_json, parse_yaml, read_text
+from finlab.layout.rules import mapping, number, shown, text
+
+FORMAT = "finlab-layout"
+VERSION = 1
+FRAME = {"convention": "FLU", "origin": "center_of_gravity"}
+"""The only frame there is; a file may leave it out but not contradict it."""
+
+_LIMIT_FIELDS = {"amplitude_rad": "amplitude", "frequency_hz": "frequency", "zero_direction_rad": "zero_direction"}
+
+
+def load_layout(path: str | os.PathLike[str]) -> Layout:
+    """Returns the layout in a YAML or JSON file.
+
+    Relative paths inside it (a force table, a hull mesh) are taken from the file's own folder.
+
+    Raises:
+        LayoutError: the file cannot be read or is not a valid layout; the message names file and key.
+    """
+    file = Path(path)
+    source = str(path)
+    content = read_text(file, source)
+    parse = parse_json if file.suffix.lower() == ".json" else parse_yaml
+    return parse_layout(parse(content, source), source=source, folder=file.resolve().parent)
+
+
+def parse_layout(data: Any, source: str = "layout", folder: Path | None = None) -> Layout:
+    """Returns the layout that plain values (as read from a file) describe.
+
+    Args:
+        data: mappings, lists, numbers and text, as in a layout file.
+        source: what to call it in error messages.
+        folder: where relative paths start; the working directory when None.
+
+    Raises:
+        LayoutError: something is missing, unknown or out of range.
+    """
+    folder = Path.cwd() if folder is None else folder
+    try:
+        return _layout(data, folder)
+    except LayoutError as error:
+        raise error.under("", source) from None
+
+
+def layout_to_dict(layout: Layout) -> dict[str, Any]:
+    """Returns the layout as the plain values of a layout file; `parse_layout` gives the same layout back."""
+    data: dict[str, Any] = {"format": FORMAT, "version": VERSION, "name": layout.name}
+    if layout.description:
+        data["description"] = layout.description
+    data["frame"] = dict(FRAME)
+    data["fins"] = [_fin_to_dict(fin) for fin in layout.fins]
+    if layout.body is not None:
+        body = {key: _plain(getattr(layout.body, key)) for key in BODY_KEYS if key != "hull"}
+        data["body"] = {key: value for key, value in body.items() if value is not None}
+        if layout.body.hull is not None:
+            hull = {key: _plain(getattr(layout.body.hull, key)) for key in HULL_KEYS}
+            data["body"] = {"hull": {k: v for k, v in hull.items() if v is not None}, **data["body"]}
+    return data
+
+
+def save_layout(layout: Layout, path: str | os.PathLike[str]) -> None:
+    """Writes a layout file, JSON if the name ends in `.json`, else YAML; an existing file is replaced whole.
+
+    Raises:
+        LayoutError: the file cannot be written.
+    """
+    file = Path(path)
+    data = layout_to_dict(layout)
+    if file.suffix.lower() == ".json":
+        content = json.dumps(data, indent=2) + "\n"
+    else:
+        content = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
+    try:
+        # Written beside and renamed, so that a kill or a full disk never leaves half a layout.
+        with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=file.parent, delete=False) as temporary:
+            temporary.write(content)
+        os.chmod(temporary.name, 0o644)
+        os.replace(temporary.name, file)
+    except OSError as error:
+        raise LayoutError(f"cannot be written: {error.strerror}", source=str(path)) from None
+
+
+@contextmanager
+def _under(key: str) -> Iterator[None]:
+    """Puts `key` before the keys of errors raised inside."""
+    try:
+        yield
+    except LayoutError as error:
+        raise error.under(key) from None
+
+
+def _layout(data: Any, folder: Path) -> Layout:
+    keys = ("format", "version", "name", "description", "frame", "fins", "body")
+    # Format and version first: in a file of another kind or version, unknown keys are not the news.
+    if isinstance(data, dict) and "format" in data and data["format"] != FORMAT:
+        raise LayoutError(f"expected {FORMAT}, got {shown(data['format'])}", "format")
+    if isinstance(data, dict) and "version" in data and (data["version"] != VERSION or data["version"] is True):
+        raise LayoutError(f"this finlab reads version {VERSION}, got {shown(data['version'])}", "version")
+    data = mapping(data, "", keys, required=("format", "version", "name", "fins"))
+    if "frame" in data:
+        frame = mapping(data["frame"], "frame", tuple(FRAME))
+        for key, value in frame.items():
+            if value != FRAME[key]:
+                raise LayoutError(f"expected {FRAME[key]}, got {shown(value)}", f"frame.{key}")
+    fins = data["fins"]
+    if not isinstance(fins, list):
+        raise LayoutError(f"expected a list of fins, got {shown(fins)}", "fins")
+    if not 1 <= len(fins) <= MAX_FINS:
+        raise LayoutError(f"expected 1 to {MAX_FINS} fins, got {len(fins)}", "fins")
+    parsed = []
+    for i, fin in enumerate(fins):
+        with _under(f"fins[{i}]"):
+            parsed.append(_fin(fin, folder))
+    with _under("body"):
+        body = None if data.get("body") is None else _body(data["body"], folder)
+    return Layout(name=data["name"], fins=tuple(parsed), description=data.get("description") or "", body=body)
+
+
+def _fin(data: Any, folder: Path) -> Fin:
+    keys = ("name", "position_m", "mounting_angle_deg", "limits", "model")
+    data = mapping(data, "", keys, required=("name", "position_m", "mounting_angle_deg"))
+    degrees = number(data["mounting_angle_deg"], "mounting_angle_deg", -360.0, 360.0)
+    with _under("limits"):
+        given = mapping({} if data.get("limits") is None else data["limits"], "", tuple(_LIMIT_FIELDS))
+        limits = Limits(**{_LIMIT_FIELDS[key]: value for key, value in given.items()})
+    with _under("model"):
+        model = _model({"type": "drag"} if data.get("model") is None else data["model"], folder)
+    return Fin(data["name"], data["position_m"], math.radians(degrees), limits, model)
+
+
+def _model(data: Any, folder: Path) -> FinModelSpec:
+    if not isinstance(data, dict):
+        raise LayoutError(f"expected keys and values such as {{type: drag}}, got {shown(data)}")
+    if "type" not in data:
+        raise LayoutError("required key is missing", "type")
+    parameters = {text(key, "", 200): value for key, value in data.items() if key != "type"}
+    spec = FinModelSpec(text(data["type"], "type", 200), tuple(parameters.items()))
+    located = tuple((k, _absolute(str(v), folder) if k == "path" else v) for k, v in spec.parameters)
+    return replace(spec, parameters=located)
+
+
+def _body(data: Any, folder: Path) -> Body:
+    data = dict(mapping(data, "", BODY_KEYS))
+    if data.get("hull") is not None:
+        with _under("hull"):
+            hull = dict(mapping(data["hull"], "", HULL_KEYS))
+            if hull.get("mesh") is not None:
+                hull["mesh"] = _absolute(text(hull["mesh"], "mesh", 4096), folder)
+            data["hull"] = Hull(**hull)
+    return Body(**data)
+
+
+def _absolute(path: str, folder: Path) -> str:
+    return os.path.normpath(folder / path)
+
+
+def _fin_to_dict(fin: Fin) -> dict[str, Any]:
+    limits = {key: list(getattr(fin.limits, field)) for key, field in _LIMIT_FIELDS.items()}
+    return {
+        "name": fin.name,
+        "position_m": list(fin.position),
+        # Degrees from radians carry a rounding error of 1e-14; twelve digits give back what people wrote.
+        "mounting_angle_deg": round(math.degrees(fin.mounting_angle), 12),
+        "limits": limits,
+        "model": {"type": fin.model.type, **dict(fin.model.parameters)},
+    }
+
+
+def _plain(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value

@@ -1,0 +1,87 @@
+"""A layout: the fins of one robot, in order, and optionally its body."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from finlab.errors import LayoutError
+from finlab.layout.body import Body
+from finlab.layout.fin import Fin
+from finlab.layout.rules import MAX_DESCRIPTION_LENGTH, MAX_NAME_LENGTH, text
+
+MAX_FINS = 16
+"""Most fins a layout may have."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The fins of one robot. Immutable and comparable; every change returns a new layout."""
+
+    name: str
+    """What the layout is called."""
+
+    fins: tuple[Fin, ...]
+    """The fins, 1 to 16, with unique names. Commands and arrays follow this order."""
+
+    description: str = ""
+    """What there is to know about it, for people."""
+
+    body: Body | None = None
+    """Hull, mass and hydrodynamics, where known."""
+
+    def __post_init__(self) -> None:
+        text(self.name, "name", MAX_NAME_LENGTH)
+        text(self.description, "description", MAX_DESCRIPTION_LENGTH, allow_empty=True, one_line=False)
+        object.__setattr__(self, "fins", tuple(self.fins))
+        if not 1 <= len(self.fins) <= MAX_FINS:
+            raise LayoutError(f"expected 1 to {MAX_FINS} fins, got {len(self.fins)}", "fins")
+        first_use: dict[str, int] = {}
+        for i, fin in enumerate(self.fins):
+            if fin.name in first_use:
+                raise LayoutError(
+                    f"{fin.name!r} is already the name of fins[{first_use[fin.name]}]", f"fins[{i}].name"
+                )
+            first_use[fin.name] = i
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the fins, in order."""
+        return tuple(fin.name for fin in self.fins)
+
+    @property
+    def n_fins(self) -> int:
+        """How many fins there are."""
+        return len(self.fins)
+
+    def index(self, name: str) -> int:
+        """Returns the place of the fin called `name`.
+
+        Raises:
+            LayoutError: there is no such fin; the message lists those there are.
+        """
+        if name not in self.names:
+            raise LayoutError(f"layout {self.name} has no fin {name!r:.60}, it has {', '.join(self.names)}")
+        return self.names.index(name)
+
+    def indices(self, names: Sequence[str]) -> tuple[int, ...]:
+        """Returns the places of several fins, in the order asked for; one unknown name is an error."""
+        return tuple(self.index(name) for name in names)
+
+    def without(self, names: Iterable[str]) -> "Layout":
+        """Returns the layout that is left when the fins called `names` are lost.
+
+        Raises:
+            LayoutError: a name is unknown, or no fin is left.
+        """
+        names = [names] if isinstance(names, str) else list(names)
+        lost = set(self.indices(names))
+        if len(lost) == self.n_fins:
+            raise LayoutError(f"layout {self.name} has no fin left once {', '.join(names)} are lost; keep one")
+        return replace(self, fins=tuple(fin for i, fin in enumerate(self.fins) if i not in lost))
+
+    def replace_fin(self, name: str, **changes: Any) -> "Layout":
+        """Returns the layout with some fields of one fin changed, such as `position=(0.1, 0, 0)`."""
+        i = self.index(name)
+        fins = list(self.fins)
+        fins[i] = replace(fins[i], **changes)
+        return replace(self, fins=tuple(fins))
