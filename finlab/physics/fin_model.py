@@ -30,4 +30,11 @@ def make_fin_model(spec: FinModelSpec) -> FinModel:
     return _MAKERS[spec.type](**spec.values())
 
 
-_MAKERS: dict[str, Callable[..., Any]] = {"drag": Drag, "lighthill": Lighthill}
+def _table(path: str) -> FinModel:
+    # Imported late because a table can be written from any other model, so it knows this interface.
+    from finlab.physics.table import TableFinModel
+
+    return TableFinModel(path)
+
+
+_MAKERS: dict[str, Callable[..., Any]] = {"drag": Drag, "lighthill": Lighthill, "table": _table}
