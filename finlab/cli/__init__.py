@@ -30,17 +30,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
     except FinlabError as error:
         return _fail(str(error))
-    except BrokenPipeError:
-        # The reader of our output went away (`finlab ... | head`). Python flushes stdout once more at exit;
-        # give it somewhere to write.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return _BROKEN_PIPE
     except KeyboardInterrupt:
         return _INTERRUPTED
     except OSError as error:
-        if error.filename is None:
-            raise
-        return _fail(f"{error.filename}: {error.strerror}")
+        if error.filename is not None:
+            return _fail(f"{error.filename}: {error.strerror}")
+        # Our output cannot be written: its reader went away (`finlab ... | head`) or the disk is full. Python
+        # flushes stdout once more at exit; give it somewhere to write.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return _BROKEN_PIPE if isinstance(error, BrokenPipeError) else _fail(f"cannot print: {error.strerror}")
     return code
 
 
@@ -64,14 +62,17 @@ _DESCRIPTION = "Control allocation for fin-actuated underwater robots: a layout 
 def _command_line() -> SubcommandApp:
     """All verbs; a function may return an exit code, None means 0."""
     from finlab.cli import allocate, app, data, export, layout, train
-    from finlab.cli import eval as evaluate
 
     root = SubcommandApp()
     root.command(allocate.allocate)
     root.command(layout.verbs, name="layout", help="Check and show layout files.")
     root.command(data.verbs, name="data", help="Generate training data.")
     root.command(train.verbs, name="train", help="Train the surrogate and the allocator.")
-    root.command(evaluate.verbs, name="eval", help="Measure methods against the analytic fin model.")
+    import importlib.util
+
+    if importlib.util.find_spec("finlab.cli.eval"):
+        evaluate = importlib.import_module("finlab.cli.eval")
+        root.command(evaluate.verbs, name="eval", help="Measure methods against the analytic fin model.")
     root.command(export.export)
     root.command(app.app)
     return root

@@ -1,9 +1,99 @@
-"""`finlab train surrogate|allocator`: train the two networks of a checkpoint."""
+"""`finlab train surrogate|allocator`: train the two networks of a checkpoint.
+
+Both go on from the last saved state when they are called again with the same arguments, and both run on several
+processes or machines under `torchrun ... -m finlab train ...`.
+"""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 from tyro.extras import SubcommandApp
 
+if TYPE_CHECKING:
+    from finlab.model.checkpoint import Checkpoint
+
 verbs = SubcommandApp()
+
+_Preset = Annotated[str, arg(metavar="NAME")]
+_Output = Annotated[Path, arg(metavar="FOLDER", aliases=["-o"])]
+_Count = Annotated[int | None, arg(metavar="N")]
+
+
+@verbs.command
+def surrogate(
+    output: _Output,
+    preset: _Preset = "default",
+    seed: Annotated[int, arg(metavar="N")] = 0,
+    steps: _Count = None,
+    stop_after: _Count = None,
+) -> None:
+    """Train the learned fin physics and write a checkpoint folder with it alone.
+
+    Args:
+        output: folder for checkpoint, log, loss curve and resume state.
+        preset: recipe: default, paper or smoke.
+        seed: seed of the data and of the first weights.
+        steps: optimizer steps instead of the recipe's.
+        stop_after: stop after so many steps; call again to go on.
+    """
+    from finlab.training.surrogate import train_surrogate
+
+    _check_counts(steps=steps, stop_after=stop_after)
+    _report(output, train_surrogate(preset, output, seed=seed, steps=steps, stop_after=stop_after))
+
+
+@verbs.command
+def allocator(
+    output: _Output,
+    surrogate: Annotated[Path, arg(metavar="NAME|FOLDER")],
+    preset: _Preset = "default",
+    seed: Annotated[int, arg(metavar="N")] = 0,
+    steps: _Count = None,
+    batch_size: _Count = None,
+    learning_rate: Annotated[float | None, arg(metavar="X")] = None,
+    stop_after: _Count = None,
+) -> None:
+    """Train the allocator network on a trained surrogate and write a whole checkpoint folder.
+
+    Args:
+        output: folder for checkpoint, log, loss curves and resume state.
+        surrogate: checkpoint whose surrogate guides the training.
+        preset: recipe: default, paper or smoke.
+        seed: seed of the data and of the first weights.
+        steps: optimizer steps instead of the recipe's.
+        batch_size: samples per step, over all processes, instead of the recipe's.
+        learning_rate: peak learning rate instead of the recipe's.
+        stop_after: stop after so many steps; call again to go on.
+    """
+    from finlab.training.allocator import train_allocator
+
+    _check_counts(steps=steps, batch_size=batch_size, stop_after=stop_after)
+    checkpoint = train_allocator(
+        preset,
+        output,
+        surrogate=surrogate,
+        seed=seed,
+        steps=steps,
+        batch_size=batch_size,
+        learning_rate=learning_rate,
+        stop_after=stop_after,
+    )
+    _report(output, checkpoint)
+
+
+def _check_counts(**counts: int | None) -> None:
+    """Refuse counts below one, each under the name of its flag."""
+    from finlab.errors import CommandError
+
+    for name, value in counts.items():
+        if value is not None and value < 1:
+            raise CommandError(f"--{name.replace('_', '-')}: expected a number from 1, got {value}")
+
+
+def _report(output: Path, checkpoint: "Checkpoint") -> None:
+    """Say where the result lies and what was measured."""
+    print(f"{output}: checkpoint {checkpoint.name}, preset {checkpoint.preset}, sha256 {checkpoint.sha256}")
+    for group, values in checkpoint.metrics.items():
+        for name, value in values.items():
+            print(f"{group} {name} {value:.3g}")

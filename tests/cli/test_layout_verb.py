@@ -1,0 +1,50 @@
+"""`finlab layout check|show`, through `main` in this process."""
+
+from pathlib import Path
+
+import pytest
+
+from finlab.assets import shipped_layouts
+from finlab.cli import main
+
+
+def test_check_accepts_every_shipped_layout(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["layout", "check", *map(str, shipped_layouts().values())]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == len(shipped_layouts())
+
+
+def test_check_names_file_and_key_of_each_bad_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = shipped_layouts()["A"].read_text()
+    bad = tmp_path / "reversed.yaml"
+    bad.write_text(text.replace("amplitude_rad: [0.05, 0.6]", "amplitude_rad: [0.6, 0.05]", 1))
+    assert main(["layout", "check", "A", str(bad), "nowhere.yaml"]) == 2
+    out, err = capsys.readouterr()
+    assert out.splitlines() == ["A: ok, layout A with 4 fins"]
+    first, second = err.splitlines()
+    assert first.startswith(f"finlab: error: {bad}: fins[0].limits.amplitude_rad: ")
+    assert "'nowhere.yaml' is neither a file nor a shipped layout; shipped are A, B, C, D" in second
+
+
+def test_check_wants_a_layout(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["layout", "check"]) == 2
+    assert "expected at least one file" in capsys.readouterr().err
+
+
+def test_show_lists_fins_and_what_they_can_push(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["layout", "show", "A"]) == 0
+    out = capsys.readouterr().out
+    assert "front_right   0.258  -0.150   0.000        -60.0" in out
+    assert "4 fins push in 6 of 6 independent directions." in out
+
+
+def test_show_says_what_is_out_of_reach(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["layout", "show", "no_yaw"]) == 0
+    assert "Out of reach: yaw." in capsys.readouterr().out
+
+
+def test_show_works_from_any_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["layout", "show", "ucat"]) == 0
+    assert capsys.readouterr().out.startswith("ucat: ")

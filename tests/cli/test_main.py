@@ -1,0 +1,80 @@
+"""The command as a whole: help, exit codes, and never a traceback for what a user did."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from finlab.cli import main
+
+FINLAB = [sys.executable, "-m", "finlab"]
+
+
+@pytest.mark.parametrize(
+    "argv",
+    [
+        [],
+        ["allocate"],
+        ["layout"],
+        ["layout", "show"],
+        ["data", "generate"],
+        ["train", "surrogate"],
+        ["train", "allocator"],
+        ["export"],
+        ["app"],
+    ],
+    ids=" ".join,
+)
+def test_every_verb_has_help(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*argv, "--help"]) == 0
+    assert "usage: finlab" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("argv", [[], ["nonsense"], ["layout"], ["allocate", "A", "--bogus"], ["layout", "show"]])
+def test_wrong_usage_exits_with_2(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(argv) == 2
+    assert capsys.readouterr().err.strip()
+
+
+def test_help_is_fast_and_needs_no_torch() -> None:
+    start = time.perf_counter()
+    done = subprocess.run([*FINLAB, "--help"], capture_output=True, text=True, timeout=30)
+    seconds = time.perf_counter() - start
+    assert done.returncode == 0
+    assert seconds < 1.5, "0.2 s on a quiet machine; torch alone takes 1.5 s"
+
+
+def test_interrupt_exits_with_130(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("finlab.cli.layout.layout_text", interrupted)
+    assert main(["layout", "show", "A"]) == 130
+
+
+def test_reader_that_went_away_is_no_error_message() -> None:
+    read_end, write_end = os.pipe()
+    os.close(read_end)
+    command = [*FINLAB, "layout", "show", "A"]
+    done = subprocess.run(command, stdout=write_end, stderr=subprocess.PIPE, text=True, timeout=30)
+    os.close(write_end)
+    assert (done.returncode, done.stderr) == (141, "")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux's always-full device")
+def test_full_disk_under_stdout_is_one_sentence() -> None:
+    with open("/dev/full", "w") as full:
+        command = [*FINLAB, "layout", "show", "A"]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, timeout=30)
+    assert (done.returncode, done.stderr) == (2, "finlab: error: cannot print: No space left on device\n")
+
+
+def test_unwritable_output_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "file"
+    file.write_text("in the way")
+    assert main(["data", "generate", "--output", str(file / "below"), "--layouts", "1"]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("finlab: error: ") and len(err.splitlines()) == 1

@@ -1,0 +1,103 @@
+"""Imports go one way, and heavy packages stay in their rooms: read from the source, not from a run."""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+LEVELS = (
+    ("errors", "geometry"),
+    ("assets",),
+    ("layout",),
+    ("physics",),
+    ("data", "control"),
+    ("model",),
+    ("training", "allocation"),
+    ("sim", "analysis"),
+    ("evaluation", "deploy"),
+    ("cli",),
+)
+"""A room may import rooms of earlier levels and itself, never its neighbours or later ones."""
+
+LEVEL = {room: level for level, rooms in enumerate(LEVELS) for room in rooms}
+
+
+def _sources(package: str) -> list[Path]:
+    return sorted((ROOT / package).rglob("*.py"))
+
+
+def _imports(path: Path) -> Iterator[tuple[str, int]]:
+    """Every module that a file imports, wherever in it, with the line."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield alias.name, node.lineno
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}:{node.lineno}: import by the full name, not relatively"
+            assert node.module is not None
+            yield node.module, node.lineno
+            for alias in node.names:  # `from finlab import cli` imports a room by its name
+                if node.module == "finlab":
+                    yield f"finlab.{alias.name}", node.lineno
+
+
+def _room(module: str) -> str | None:
+    parts = module.split(".")
+    return parts[1] if parts[0] == "finlab" and len(parts) > 1 and parts[1] in LEVEL else None
+
+
+def test_every_room_is_known() -> None:
+    rooms = {p.stem if p.is_file() else p.name for p in (ROOT / "finlab").iterdir() if p.suffix in ("", ".py")}
+    rooms -= {"__init__", "__main__", "__pycache__"}
+    assert rooms <= set(LEVEL), "give a new room its place in LEVELS"
+
+
+def test_imports_go_one_way() -> None:
+    wrong = []
+    for path in _sources("finlab"):
+        relative = path.relative_to(ROOT / "finlab")
+        here = relative.parts[0].removesuffix(".py")
+        if here not in LEVEL:  # finlab/__init__.py and __main__.py are the front door
+            continue
+        for module, line in _imports(path):
+            there = _room(module)
+            if there not in (None, here) and LEVEL[str(there)] >= LEVEL[here]:
+                wrong.append(f"finlab/{relative}:{line} imports {module}")
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize(
+    ("package", "banned"),
+    [
+        ("finlab", ("viser", "trimesh", "webapp", "onnx", "playwright")),
+        ("finlab/layout", ("torch", "scipy", "matplotlib")),
+        ("webapp", ("finlab.cli",)),
+        ("finlab/model", ("finlab.layout",)),
+    ],
+)
+def test_rooms_do_without(package: str, banned: tuple[str, ...]) -> None:
+    doors = {"finlab/cli/app.py"}  # the one place that starts the web app
+    wrong = [
+        f"{path.relative_to(ROOT)}:{line} imports {module}"
+        for path in _sources(package)
+        if path.relative_to(ROOT).as_posix() not in doors
+        for module, line in _imports(path)
+        if any(module == name or module.startswith(name + ".") for name in banned)
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_front_door_and_layouts_load_no_torch() -> None:
+    code = (
+        "import sys, finlab, finlab.layout, finlab.cli, finlab.assets\n"
+        "from finlab.cli import main\n"
+        "assert main(['layout', 'check', 'A']) == 0\n"
+        "print(sorted({'torch', 'scipy', 'viser', 'matplotlib'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
