@@ -1,4 +1,4 @@
-"""Where the shipped layouts and checkpoints lie: at the top of a source tree, inside the package of a wheel."""
+"""Where shipped layouts and checkpoints lie: at the top of a source tree, inside the package of a wheel."""
 
 from pathlib import Path
 

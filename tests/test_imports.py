@@ -52,7 +52,8 @@ def _room(module: str) -> str | None:
 
 
 def test_every_room_is_known() -> None:
-    rooms = {p.stem if p.is_file() else p.name for p in (ROOT / "finlab").iterdir() if p.suffix in ("", ".py")}
+    paths = [path for path in (ROOT / "finlab").iterdir() if path.suffix in ("", ".py")]
+    rooms = {path.stem if path.is_file() else path.name for path in paths}
     rooms -= {"__init__", "__main__", "__pycache__"}
     assert rooms <= set(LEVEL), "give a new room its place in LEVELS"
 
@@ -99,5 +100,7 @@ def test_front_door_and_layouts_load_no_torch() -> None:
         "assert main(['layout', 'check', 'A']) == 0\n"
         "print(sorted({'torch', 'scipy', 'viser', 'matplotlib'} & set(sys.modules)))"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
+    )
     assert done.stdout.splitlines()[-1] == "[]"

@@ -38,7 +38,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         # Our output cannot be written: its reader went away (`finlab ... | head`) or the disk is full. Python
         # flushes stdout once more at exit; give it somewhere to write.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return _BROKEN_PIPE if isinstance(error, BrokenPipeError) else _fail(f"cannot print: {error.strerror}")
+        if isinstance(error, BrokenPipeError):
+            return _BROKEN_PIPE
+        return _fail(f"cannot print: {error.strerror}")
     return code
 
 
@@ -56,7 +58,7 @@ def _fail(sentence: str) -> int:
     return 2
 
 
-_DESCRIPTION = "Control allocation for fin-actuated underwater robots: a layout and a target wrench in, commands out."
+_DESCRIPTION = "Control allocation for fin-actuated underwater robots: a target wrench in, commands out."
 
 
 def _command_line() -> SubcommandApp:

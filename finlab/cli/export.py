@@ -21,11 +21,13 @@ def export(
         checkpoint: trained checkpoint the graph is made for.
     """
     from finlab.cli.inputs import open_robot
-    from finlab.deploy.graph_file import check_graph_path, write_graph
+    from finlab.deploy import build_graph, write_graph
+    from finlab.deploy.graph_file import check_graph_name
 
-    check_graph_path(output)
+    check_graph_name(output)  # before the seconds it takes to load the network
+    robot = open_robot(layout)
     from finlab.allocation import load_allocator
 
-    robot = open_robot(layout)
-    graph = write_graph(robot.layout, load_allocator(checkpoint), output, failed=robot.with_failed(failed))
-    print(f"{output}: {graph.layout.n_fins} fins, {len(graph.self_test)} self-test wrenches, {graph.checksum}")
+    graph = build_graph(robot.layout, load_allocator(checkpoint), failed=robot.with_failed(failed))
+    write_graph(graph, output)
+    print(f"{output}: {graph.layout.n_fins} fins, {len(graph.self_test)} self-tests, checkpoint {checkpoint}")

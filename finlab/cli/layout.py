@@ -87,8 +87,9 @@ def authority_text(layout: Layout) -> list[str]:
     alone = np.abs(projector - np.eye(6)).max(axis=0) < 1e-6
     names = list(_AXES.values())
     lines = [f"{layout.n_fins} fins push in {rank} of 6 independent directions."]
-    if not pushed.all():
-        lines.append("Out of reach: " + ", ".join(n for n, p in zip(names, pushed, strict=True) if not p) + ".")
+    missing = [n for n, p in zip(names, pushed, strict=True) if not p]
+    if missing:
+        lines.append("Out of reach: " + ", ".join(missing) + ".")
     coupled = [n for n, p, a in zip(names, pushed, alone, strict=True) if p and not a]
     if coupled:
         lines.append("Only together with other axes: " + ", ".join(coupled) + ".")

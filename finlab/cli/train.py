@@ -1,7 +1,7 @@
 """`finlab train surrogate|allocator`: train the two networks of a checkpoint.
 
-Both go on from the last saved state when they are called again with the same arguments, and both run on several
-processes or machines under `torchrun ... -m finlab train ...`.
+Both go on from the last saved state when they are called again with the same arguments, and both run on
+several processes or machines under `torchrun ... -m finlab train ...`.
 """
 
 from pathlib import Path

@@ -13,7 +13,9 @@ def test_check_accepts_every_shipped_layout(capsys: pytest.CaptureFixture[str]) 
     assert len(capsys.readouterr().out.splitlines()) == len(shipped_layouts())
 
 
-def test_check_names_file_and_key_of_each_bad_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_names_file_and_key_of_each_bad_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     text = shipped_layouts()["A"].read_text()
     bad = tmp_path / "reversed.yaml"
     bad.write_text(text.replace("amplitude_rad: [0.05, 0.6]", "amplitude_rad: [0.6, 0.05]", 1))

@@ -33,7 +33,9 @@ def test_every_verb_has_help(argv: list[str], capsys: pytest.CaptureFixture[str]
     assert "usage: finlab" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("argv", [[], ["nonsense"], ["layout"], ["allocate", "A", "--bogus"], ["layout", "show"]])
+@pytest.mark.parametrize(
+    "argv", [[], ["nonsense"], ["layout"], ["allocate", "A", "--bogus"], ["layout", "show"]]
+)
 def test_wrong_usage_exits_with_2(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(argv) == 2
     assert capsys.readouterr().err.strip()

@@ -1,0 +1,34 @@
+"""Write the layout graph that goes to the robot, read it back, and look at it with networkx.
+
+You will see the file's checksum, its first self-test, and the fins and edges that are left once one fin is lost.
+"""
+
+import json
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import networkx
+
+import finlab
+from finlab.assets import shipped_layouts
+from finlab.deploy import build_graph, read_graph, write_graph
+
+
+def main() -> None:
+    layout = finlab.load_layout(shipped_layouts()["A"])
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "A.graph.json"
+        write_graph(build_graph(layout, finlab.load_allocator(), failed=("back_left",)), path)
+        document = json.loads(path.read_text())
+        graph = read_graph(path)
+    assert graph.layout == layout
+    print(document["checksum"])
+    print("target", graph.self_test[0].wrench)
+    print("command", graph.self_test[0].command)
+    fins = networkx.node_link_graph(document["graph"], edges="edges")
+    print("fins", list(fins.nodes))
+    print("edges", [f"{a}-{b}" for a, b in fins.edges if a != b])
+
+
+if __name__ == "__main__":
+    main()

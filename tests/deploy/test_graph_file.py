@@ -1,0 +1,177 @@
+"""Layout graph files: lossless, deterministic, readable by others, and refused once they are changed."""
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import networkx
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from finlab.assets import shipped_layouts
+from finlab.data.normalization import Normalization
+from finlab.deploy import LayoutGraph, SelfTest, graph_bytes, parse_graph, read_graph, write_graph
+from finlab.deploy.graph_file import _checksum
+from finlab.errors import FinlabError, LayoutError
+from finlab.layout import Fin, Layout, load_layout
+
+SCHEMA = json.loads((Path(__file__).parents[2] / "finlab/deploy/graph.schema.json").read_text())
+
+
+def make_graph(layout: Layout, failed: tuple[str, ...] = ()) -> LayoutGraph:
+    """A graph with made-up numbers; only its shape matters here."""
+
+    def rows(*values: float) -> tuple[tuple[float, ...] | None, ...]:
+        return tuple(None if name in failed else values for name in layout.names)
+
+    case = SelfTest((1.0, 0.0, 0.5, 0.0, 0.0, 0.1), rows(0.3, 1.0, -0.5), (0.9,) * 6, rows(0.1, 0.2, 0.3))
+    normalization = Normalization(np.zeros(6), np.array([1.0, 1.0, 1.0, 0.2, 0.2, 0.3]))
+    return LayoutGraph(
+        layout, failed, "fin_frame", rows(0.1, 0.2), normalization, "default", "0" * 64, (case, case)
+    )
+
+
+def same(a: LayoutGraph, b: LayoutGraph) -> bool:
+    """Equality of two graphs; numpy arrays have none of their own."""
+    plain = Normalization(np.zeros(6), np.ones(6))
+    arrays = all(map(np.array_equal, a.normalization, b.normalization))
+    return arrays and replace(a, normalization=plain) == replace(b, normalization=plain)
+
+
+def edited(change: Callable[[dict[str, Any]], None], fix_checksum: bool = True) -> str:
+    """The text of a graph file after a change, with a checksum that fits it (a careful forger's) or not."""
+    document = json.loads(graph_bytes(make_graph(load_layout(shipped_layouts()["A"]))))
+    change(document)
+    if fix_checksum:
+        document["checksum"] = _checksum(document)
+    return json.dumps(document)
+
+
+@pytest.mark.parametrize("name", sorted(shipped_layouts()))
+def test_shipped_layouts_come_back_as_they_were(name: str, tmp_path: Path) -> None:
+    layout = load_layout(shipped_layouts()[name])
+    graph = make_graph(layout, failed=layout.names[:1])
+    path = tmp_path / f"{name}.graph.json"
+    write_graph(graph, path)
+    back = read_graph(path)
+    assert same(back, graph)
+    assert back.layout == layout, "not even the last bit of an angle may differ"
+    assert list(tmp_path.iterdir()) == [path], "no temporary file is left"
+
+
+@given(angle=st.floats(-math.pi, math.pi), x=st.floats(-10, 10), name=st.text(min_size=1, max_size=20))
+def test_any_fin_comes_back_or_is_refused(angle: float, x: float, name: str) -> None:
+    try:
+        layout = Layout("any", (Fin(name, (x, 0.0, 0.0), angle),))
+    except FinlabError:
+        return
+    assert parse_graph(graph_bytes(make_graph(layout)).decode()).layout == layout
+
+
+@pytest.mark.parametrize("name", sorted(shipped_layouts()))
+def test_file_fits_the_published_schema(name: str) -> None:
+    layout = load_layout(shipped_layouts()[name])
+    for failed in ((), layout.names[:1]):
+        jsonschema.validate(json.loads(graph_bytes(make_graph(layout, failed))), SCHEMA)
+
+
+def test_schema_is_itself_valid() -> None:
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+
+
+def test_same_graph_same_bytes() -> None:
+    layout = load_layout(shipped_layouts()["ucat"])
+    assert graph_bytes(make_graph(layout)) == graph_bytes(make_graph(load_layout(shipped_layouts()["ucat"])))
+
+
+def test_networkx_reads_nodes_and_edges() -> None:
+    layout = load_layout(shipped_layouts()["A"])
+    document = json.loads(graph_bytes(make_graph(layout, failed=("back_left",))))
+    graph = networkx.node_link_graph(document["graph"], edges="edges")
+    assert tuple(graph.nodes) == layout.names
+    assert graph.nodes["front_left"]["position_m"] == [0.25753, 0.1502, 0.0]
+    assert not graph.nodes["back_left"]["healthy"]
+    assert graph.degree("back_left") == 0
+    healthy = graph.subgraph(n for n in graph if n != "back_left")
+    assert healthy.number_of_edges() == 3 + 3, "every pair and every fin with itself"
+
+
+def test_edited_file_is_refused() -> None:
+    def move_a_fin(document: dict[str, Any]) -> None:
+        document["graph"]["nodes"][0]["position_m"][0] = 0.3
+
+    with pytest.raises(LayoutError, match="x.graph.json: checksum: does not fit the contents"):
+        parse_graph(edited(move_a_fin, fix_checksum=False), "x.graph.json")
+
+
+def test_white_space_and_order_of_keys_do_not_matter() -> None:
+    text = edited(lambda document: None)
+    document = json.loads(text)
+    turned = json.dumps(dict(reversed(document.items())), indent=7)
+    assert same(parse_graph(text), parse_graph(turned))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda d: d.update(version=2), "version: this finlab reads version 1, got 2"),
+        (lambda d: d.update(format="finlab-layout"), "format: expected finlab-graph, got 'finlab-layout'"),
+        (lambda d: d.update(surprise=1), "surprise: unknown key"),
+        (lambda d: d.pop("normalization"), "normalization: required key is missing"),
+        (
+            lambda d: d["normalization"].update(std=[1.0]),
+            "normalization.std: expected a list of 6 numbers, got 1",
+        ),
+        (lambda d: d["graph"].update(nodes=[]), "expected 1 to 16 fins, got 0"),
+        (lambda d: d["graph"].update(nodes={}), "graph.nodes: expected a list of fins"),
+        (lambda d: d["graph"]["nodes"][1].pop("limits"), r"graph.nodes\[1\].limits: required key is missing"),
+        (
+            lambda d: d["graph"]["nodes"][1].update(healthy=1),
+            r"graph.nodes\[1\].healthy: expected true or false",
+        ),
+        (lambda d: d["graph"]["nodes"][1].update(features=3), r"graph.nodes\[1\].features: expected"),
+        (lambda d: d["graph"]["nodes"][1].update(position_m=[math.nan, 0, 0]), "expected a finite number"),
+        (lambda d: d["graph"]["edges"].pop(), "graph.edges: expected every pair of healthy fins"),
+        (lambda d: d["self_test"].update(cases={}), "self_test.cases: expected a list"),
+        (
+            lambda d: d["self_test"]["cases"][0]["command"].pop(),
+            r"cases\[0\].command: expected a list of 4 rows",
+        ),
+        (lambda d: d["frame"].update(convention="NED"), "frame.convention: expected FLU"),
+    ],
+)
+def test_refusals_name_the_key(change: Callable[[dict[str, Any]], None], message: str) -> None:
+    with pytest.raises(LayoutError, match=message):
+        parse_graph(edited(change), "x.graph.json")
+
+
+@given(data=st.binary(max_size=400))
+def test_bytes_of_any_kind_end_in_an_error_of_ours(data: bytes) -> None:
+    with pytest.raises(FinlabError):
+        parse_graph(data.decode("utf-8", "replace"))
+
+
+@given(position=st.integers(0, 10_000), replacement=st.characters(max_codepoint=0x2FF))
+def test_one_changed_character_never_passes_as_another_robot(position: int, replacement: str) -> None:
+    graph = make_graph(load_layout(shipped_layouts()["D"]))
+    text = graph_bytes(graph).decode()
+    position %= len(text)
+    try:
+        back = parse_graph(text[:position] + replacement + text[position + 1 :])
+    except FinlabError:
+        return
+    assert same(back, graph)
+
+
+def test_wrong_name_and_missing_folder_are_refused(tmp_path: Path) -> None:
+    graph = make_graph(load_layout(shipped_layouts()["A"]))
+    with pytest.raises(LayoutError, match=r"expected a file name that ends in .graph.json"):
+        write_graph(graph, tmp_path / "A.json")
+    with pytest.raises(LayoutError, match="cannot be written: No such file or directory"):
+        write_graph(graph, tmp_path / "nowhere" / "A.graph.json")

@@ -1,0 +1,92 @@
+"""The wheel carries everything a user needs, and works from any folder. Building needs no network."""
+
+import email
+import os
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+CORE = {"numpy", "torch", "scipy", "pyyaml", "safetensors", "tyro", "tqdm"}
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A wheel built from the tree."""
+    folder = tmp_path_factory.mktemp("dist")
+    command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return next(folder.glob("finlab-*.whl"))
+
+
+@pytest.fixture(scope="module")
+def unpacked(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel's contents in a folder of their own, as an installation would place them."""
+    folder = tmp_path_factory.mktemp("site")
+    zipfile.ZipFile(wheel).extractall(folder)
+    return folder
+
+
+def run(unpacked: Path, cwd: Path, *argv: str) -> subprocess.CompletedProcess[str]:
+    """Run the unpacked package, not the tree's, in another folder."""
+    environment = os.environ | {"PYTHONPATH": str(unpacked)}
+    command = [sys.executable, *argv]
+    return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, timeout=120)
+
+
+def test_carries_library_app_layouts_and_checkpoints(wheel: Path) -> None:
+    names = set(zipfile.ZipFile(wheel).namelist())
+    for path in ROOT.glob("layouts/*.yaml"):
+        assert f"finlab/shipped/layouts/{path.name}" in names
+    for name in ("model.safetensors", "config.json"):
+        assert f"finlab/shipped/checkpoints/default/{name}" in names
+    for name in ("finlab/py.typed", "finlab/deploy/graph.schema.json", "finlab/layout/layout.schema.json"):
+        assert name in names
+    assert "webapp/app.py" in names
+
+
+def test_carries_nothing_else(wheel: Path) -> None:
+    archive = zipfile.ZipFile(wheel)
+    tops = {name.split("/")[0] for name in archive.namelist()}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {"finlab", "webapp"}
+    assert not [n for n in archive.namelist() if n.endswith((".pt", ".pth", ".pkl", ".pyc"))]
+    assert sum(info.file_size for info in archive.infolist()) < 40 * 2**20
+
+
+def test_asks_for_the_core_and_offers_extras(wheel: Path) -> None:
+    archive = zipfile.ZipFile(wheel)
+    name = next(n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
+    metadata = email.message_from_bytes(archive.read(name))
+    required = [line for line in metadata.get_all("Requires-Dist", []) if "extra ==" not in line]
+    assert {line.split(">")[0].strip().lower() for line in required} == CORE
+    assert {"app", "ipopt", "plot", "test", "dev"} <= set(metadata.get_all("Provides-Extra", []))
+
+
+def test_installed_package_finds_its_own_layouts_and_checkpoints(unpacked: Path, tmp_path: Path) -> None:
+    code = "from finlab.assets import *; print(layouts_dir()); print(checkpoint_path())"
+    done = run(unpacked, tmp_path, "-c", code)
+    assert done.returncode == 0, done.stderr
+    assert all(line.startswith(str(unpacked)) for line in done.stdout.splitlines())
+
+
+def test_installed_package_allocates_from_any_folder(unpacked: Path, tmp_path: Path) -> None:
+    wrench = ["--wrench", "1", "0", "0.5", "0", "0", "0.1"]
+    done = run(unpacked, tmp_path, "-m", "finlab", "allocate", "A", *wrench, "--json")
+    assert done.returncode == 0, done.stderr
+    assert '"checkpoint": "default"' in done.stdout
+
+
+def test_constraints_pin_everything_exactly() -> None:
+    lines = (ROOT / "constraints.txt").read_text().splitlines()
+    pins = dict(line.split("==") for line in lines if line and not line.startswith("#"))
+    assert pins["torch"] == "2.13.0"
+    assert pins["viser"] == "1.1.1"
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    wanted = [*project["dependencies"], *(r for rs in project["optional-dependencies"].values() for r in rs)]
+    names = {line.split(">")[0].split("<")[0].strip().lower().replace("_", "-") for line in wanted}
+    assert names <= set(pins)
