@@ -12,8 +12,8 @@ class FinlabError(Exception):
 class LayoutError(FinlabError):
     """A layout, or the file that describes it, is not acceptable.
 
-    The parts are kept apart so that a check deep inside (which knows the problem and the key) and the reader of
-    the file (which knows where that key lies) can each add what they know.
+    The parts are kept apart so that a check deep inside (which knows the problem and the key) and the reader
+    of the file (which knows where that key lies) can each add what they know.
     """
 
     def __init__(self, problem: str, key: str = "", source: str = "") -> None:

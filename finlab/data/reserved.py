@@ -53,8 +53,8 @@ class ReservedLayouts:
     ) -> NDArray[np.bool_]:
         """Returns which layouts of a batch are reserved.
 
-        A layout is one of the reserved ones when it has as many fins, each of its fins lies at one of theirs, and
-        each of theirs at one of its own.
+        A layout is one of the reserved ones when it has as many fins, each of its fins lies at one of
+        theirs, and each of theirs at one of its own.
 
         Args:
             position: (B, n, 3) [m].

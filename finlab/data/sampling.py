@@ -1,7 +1,7 @@
 """Forward sampling: random layouts, random commands within their limits, and the wrenches these cause.
 
-This is all the knowledge of physics that training needs: no inverse is ever solved for. Everything happens in torch
-on one device, fast enough to draw fresh samples for each step instead of reading them.
+This is all the knowledge of physics that training needs: no inverse is ever solved for. Everything happens
+in torch on one device, fast enough to draw fresh samples for each step instead of reading them.
 """
 
 import math
@@ -131,8 +131,8 @@ def sample_commands(generator: torch.Generator, lower: Tensor, upper: Tensor) ->
 class ForwardSampler:
     """An endless stream of fresh training batches.
 
-    Batch k depends on (seed, k) alone, so a run that resumes at step k sees what it would have seen, and processes
-    that share the work take every n-th batch. Streams differ between kinds of device.
+    Batch k depends on (seed, k) alone, so a run that resumes at step k sees what it would have seen, and
+    processes that share the work take every n-th batch. Streams differ between kinds of device.
     """
 
     def __init__(
@@ -181,7 +181,7 @@ def _between(ends: tuple[float, float], draw: Tensor) -> Tensor:
 
 
 def _avoid(position: Tensor, mounting_angle: Tensor, mask: Tensor, reserved: ReservedLayouts) -> None:
-    """Moves, in place, the first fin of any reserved layout to the body's opposite side, which keeps it uniform.
+    """Moves, in place, the first fin of any reserved layout to the body's other side; it stays uniform.
 
     Such a layout is all but impossible to draw. So a sieve looks at the first fin's place alone, and the few
     layouts left are compared in full.

@@ -59,7 +59,9 @@ def stack_layouts(layouts: Sequence[Layout], n_fins: int | None = None) -> Layou
     widest = max(layouts, key=lambda layout: layout.n_fins)
     width = widest.n_fins if n_fins is None else n_fins
     if widest.n_fins > width:
-        raise LayoutError(f"layout {widest.name} has {widest.n_fins} fins, more than the {width} there is room for")
+        raise LayoutError(
+            f"layout {widest.name} has {widest.n_fins} fins, more than the {width} there is room for"
+        )
     arrays = empty_arrays(len(layouts), width)
     for b, layout in enumerate(layouts):
         for i, fin in enumerate(layout.fins):
@@ -92,7 +94,7 @@ def planar_effectiveness(position: Array, mounting_angle: Array) -> Array:
 
 
 def layout_effectiveness(layout: Layout) -> Array:
-    """Returns one layout's planar effectiveness as a matrix (6, 2 n), fins side by side, for rank and inverses."""
+    """Returns one layout's planar effectiveness as a matrix (6, 2 n), fins side by side."""
     arrays = stack_layouts([layout])
     blocks = planar_effectiveness(arrays.position[0], arrays.mounting_angle[0])
     return np.concatenate(list(blocks), axis=1)

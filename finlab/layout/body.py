@@ -1,8 +1,9 @@
 """The hull and the mass, drag and buoyancy of the robot that carries the fins. All of it is optional.
 
-Allocation needs none of this; the app draws the hull, and a simulation takes the dynamics. Derivatives are given as
-positive magnitudes on the diagonal, in the order surge, sway, heave, roll, pitch, yaw; a diagonal is the same in
-FLU and in the NED frame of most publications, because turning about x by half a turn only flips signs in pairs.
+Allocation needs none of this; the app draws the hull, and a simulation takes the dynamics. Derivatives are
+given as positive magnitudes on the diagonal, in the order surge, sway, heave, roll, pitch, yaw; a diagonal
+is the same in FLU and in the NED frame of most publications, because turning about x by half a turn only
+flips signs in pairs.
 """
 
 from dataclasses import dataclass, fields
@@ -25,7 +26,7 @@ class Hull:
     shape: str | None = None
     """One of `HULL_SHAPES`; None when a mesh is given."""
 
-    size_m: tuple[float, float, float] | None = None
+    size_m: tuple[float, ...] | None = None
     """Length (x), width (y), height (z) [m] of a parametric shape; None when a mesh is given."""
 
     mesh: str | None = None
@@ -34,7 +35,7 @@ class Hull:
     scale: float = 1.0
     """Metres per unit of the mesh file (0.001 for millimetres)."""
 
-    center_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    center_m: tuple[float, ...] = (0.0, 0.0, 0.0)
     """The hull's centre as seen from the centre of gravity, body frame [m]."""
 
     def __post_init__(self) -> None:
@@ -42,11 +43,12 @@ class Hull:
             raise LayoutError("give either a shape with its size_m, or a mesh, not both or neither")
         if self.shape is not None:
             if self.shape not in HULL_SHAPES:
-                raise LayoutError(f"expected one of {', '.join(HULL_SHAPES)}, got {self.shape!r:.60}", "shape")
+                raise LayoutError(
+                    f"expected one of {', '.join(HULL_SHAPES)}, got {self.shape!r:.60}", "shape"
+                )
             if self.size_m is None:
                 raise LayoutError("required key is missing beside shape", "size_m")
-            l, w, h = numbers(self.size_m, "size_m", 3, 0.01, 20.0)
-            object.__setattr__(self, "size_m", (l, w, h))
+            object.__setattr__(self, "size_m", numbers(self.size_m, "size_m", 3, 0.01, 20.0))
         else:
             if self.size_m is not None:
                 raise LayoutError("a mesh has its own size; use scale instead", "size_m")

@@ -1,4 +1,4 @@
-"""Layout files, version 1: YAML for people, JSON accepted. Angles of shafts in degrees, all else SI and radians.
+"""Layout files, version 1: YAML for people, JSON accepted. Shaft angles in degrees, the rest SI and radians.
 
 Every error names the file and the key, such as
 `layouts/x.yaml: fins[2].limits.amplitude_rad: minimum 0.6 is above maximum 0.05; swap them`.
@@ -29,7 +29,11 @@ VERSION = 1
 FRAME = {"convention": "FLU", "origin": "center_of_gravity"}
 """The only frame there is; a file may leave it out but not contradict it."""
 
-_LIMIT_FIELDS = {"amplitude_rad": "amplitude", "frequency_hz": "frequency", "zero_direction_rad": "zero_direction"}
+_LIMIT_FIELDS = {
+    "amplitude_rad": "amplitude",
+    "frequency_hz": "frequency",
+    "zero_direction_rad": "zero_direction",
+}
 
 
 def load_layout(path: str | os.PathLike[str]) -> Layout:
@@ -92,7 +96,9 @@ def save_layout(layout: Layout, path: str | os.PathLike[str]) -> None:
     if file.suffix.lower() == ".json":
         content = json.dumps(data, indent=2) + "\n"
     else:
-        content = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110)
+        content = yaml.safe_dump(
+            data, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110
+        )
     try:
         # Written beside and renamed, so that a kill or a full disk never leaves half a layout.
         with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=file.parent, delete=False) as temporary:
@@ -117,8 +123,10 @@ def _layout(data: Any, folder: Path) -> Layout:
     # Format and version first: in a file of another kind or version, unknown keys are not the news.
     if isinstance(data, dict) and "format" in data and data["format"] != FORMAT:
         raise LayoutError(f"expected {FORMAT}, got {shown(data['format'])}", "format")
-    if isinstance(data, dict) and "version" in data and (data["version"] != VERSION or data["version"] is True):
-        raise LayoutError(f"this finlab reads version {VERSION}, got {shown(data['version'])}", "version")
+    if isinstance(data, dict) and "version" in data:
+        version = data["version"]
+        if isinstance(version, bool) or version != VERSION:
+            raise LayoutError(f"this finlab reads version {VERSION}, got {shown(version)}", "version")
     data = mapping(data, "", keys, required=("format", "version", "name", "fins"))
     if "frame" in data:
         frame = mapping(data["frame"], "frame", tuple(FRAME))
@@ -136,7 +144,8 @@ def _layout(data: Any, folder: Path) -> Layout:
             parsed.append(_fin(fin, folder))
     with _under("body"):
         body = None if data.get("body") is None else _body(data["body"], folder)
-    return Layout(name=data["name"], fins=tuple(parsed), description=data.get("description") or "", body=body)
+    description = "" if data.get("description") is None else data["description"]
+    return Layout(name=data["name"], fins=tuple(parsed), description=description, body=body)
 
 
 def _fin(data: Any, folder: Path) -> Fin:

@@ -1,8 +1,9 @@
 """One fin: where it sits, how its shaft points, what it may be asked to do.
 
-The fin frame is right-handed: x' = shaft = (cos a, sin a, 0) out of the hull, y' = e_h = (-sin a, cos a, 0) the
-horizontal thrust axis, z' = e_z = (0, 0, 1), with a the mounting angle. A command is (half amplitude [rad],
-frequency [Hz], zero direction [rad]); the mean force is T [cos(zero direction) e_h + sin(zero direction) e_z].
+The fin frame is right-handed: x' = shaft = (cos a, sin a, 0) out of the hull, y' = e_h = (-sin a, cos a, 0)
+the horizontal thrust axis, z' = e_z = (0, 0, 1), with a the mounting angle. A command is (half amplitude
+[rad], frequency [Hz], zero direction [rad]); the mean force is T [cos(zero direction) e_h + sin(zero
+direction) e_z].
 """
 
 import math
@@ -39,9 +40,13 @@ class Limits:
         zero_direction = interval(self.zero_direction, "zero_direction_rad", -2 * math.pi, 2 * math.pi)
         # The energy proxy divides by these two maxima.
         if amplitude[1] <= 0.0:
-            raise LayoutError("the maximum must be above 0; leave the fin out if it never moves", "amplitude_rad")
+            raise LayoutError(
+                "the maximum must be above 0; leave the fin out if it never moves", "amplitude_rad"
+            )
         if frequency[1] <= 0.0:
-            raise LayoutError("the maximum must be above 0; leave the fin out if it never moves", "frequency_hz")
+            raise LayoutError(
+                "the maximum must be above 0; leave the fin out if it never moves", "frequency_hz"
+            )
         width = zero_direction[1] - zero_direction[0]
         if width > 2 * math.pi + 1e-6:
             raise LayoutError(f"must span at most one turn (6.2832), got {width:.4f}", "zero_direction_rad")

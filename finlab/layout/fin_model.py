@@ -8,9 +8,11 @@ from finlab.layout.rules import number, text
 
 MODEL_DEFAULTS: MappingProxyType[str, MappingProxyType[str, float]] = MappingProxyType(
     {
-        # U-CAT's on-board thrust law: density [kg/m^3], drag coefficient, fin area [m^2], lever to its centre [m].
+        # U-CAT's on-board thrust law: density [kg/m^3], drag coefficient, fin area [m^2], lever to its
+        # centre [m].
         "drag": MappingProxyType({"density": 1000.0, "drag_coefficient": 0.15, "area": 0.02, "lever": 0.1}),
-        # Lighthill's large-amplitude elongated body: density [kg/m^3], fin length [m], trailing-edge width [m].
+        # Lighthill's large-amplitude elongated body: density [kg/m^3], fin length [m], trailing-edge width
+        # [m].
         "lighthill": MappingProxyType({"density": 1000.0, "length": 0.20, "width": 0.10}),
         # A table of measured or computed forces; its one parameter, `path`, is text and has no default.
         "table": MappingProxyType({}),

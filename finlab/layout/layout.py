@@ -76,7 +76,9 @@ class Layout:
         names = [names] if isinstance(names, str) else list(names)
         lost = set(self.indices(names))
         if len(lost) == self.n_fins:
-            raise LayoutError(f"layout {self.name} has no fin left once {', '.join(names)} are lost; keep one")
+            raise LayoutError(
+                f"layout {self.name} has no fin left once {', '.join(names)} are lost; keep one"
+            )
         return replace(self, fins=tuple(fin for i, fin in enumerate(self.fins) if i not in lost))
 
     def replace_fin(self, name: str, **changes: Any) -> "Layout":

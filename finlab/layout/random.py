@@ -1,6 +1,7 @@
 """Random layouts, in numpy: for held-out splits, tests and data on disk.
 
-The numbers that define the training distribution (box, fin counts, spread of limits) are here and nowhere else.
+The numbers that define the training distribution (box, fin counts, spread of limits) are here and nowhere
+else.
 """
 
 import math
@@ -40,8 +41,8 @@ def random_layouts(
 ) -> LayoutArrays:
     """Returns n random layouts as one padded batch.
 
-    Positions are uniform in the box and angles in [-pi, pi). With `limits="varied"` every fin gets its own limits as
-    in split `limits`; with `"mixed"` every layout is varied or nominal with equal chance.
+    Positions are uniform in the box and angles in [-pi, pi). With `limits="varied"` every fin gets its own
+    limits as in split `limits`; with `"mixed"` every layout is varied or nominal with equal chance.
 
     Args:
         rng: source of randomness.
@@ -90,7 +91,7 @@ def random_layout(
 
 def layout_from_arrays(arrays: LayoutArrays, row: int = 0, name: str = "random") -> Layout:
     """Returns row `row` of a padded batch as a layout with fins `fin_1`, `fin_2`, ..."""
-    fins = []
+    fins: list[Fin] = []
     for i in np.flatnonzero(arrays.mask[row]):
         x, y, z = arrays.position[row, i].tolist()
         pairs = [tuple(p) for p in np.stack([arrays.lower[row, i], arrays.upper[row, i]], axis=1).tolist()]
@@ -101,8 +102,7 @@ def layout_from_arrays(arrays: LayoutArrays, row: int = 0, name: str = "random")
 
 def _any_outside(arrays: LayoutArrays, box: tuple[float, float, float]) -> np.ndarray:
     beyond = (np.abs(arrays.position) > np.array(box)).any(axis=-1)
-    result: np.ndarray = (beyond & arrays.mask).any(axis=-1)
-    return result
+    return np.asarray((beyond & arrays.mask).any(axis=-1))
 
 
 def _vary_limits(rng: np.random.Generator, arrays: LayoutArrays, varied: np.ndarray) -> None:

@@ -1,6 +1,7 @@
 """Untrusted YAML or JSON text to plain Python values, safely and quickly.
 
-A layout file may come from anywhere, so nothing in it may run code, expand without bound or silently drop a key.
+A layout file may come from anywhere, so nothing in it may run code, expand without bound or silently drop a
+key.
 """
 
 import json
@@ -23,7 +24,7 @@ MAX_DEPTH = 20
 _Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
-class _Loader(_Base):  # type: ignore[misc]
+class _Loader(_Base):
     """Safe YAML loader that refuses a key given twice and reads `1e-3` as the number it is."""
 
     def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
@@ -32,14 +33,18 @@ class _Loader(_Base):  # type: ignore[misc]
             if not isinstance(key_node, yaml.ScalarNode):
                 raise LayoutError(f"line {key_node.start_mark.line + 1}: a key must be plain text")
             if key_node.value in seen:
-                raise LayoutError(f"line {key_node.start_mark.line + 1}: key {key_node.value!r:.60} is given twice")
+                raise LayoutError(
+                    f"line {key_node.start_mark.line + 1}: key {key_node.value!r:.60} is given twice"
+                )
             seen.add(key_node.value)
         result: dict[Any, Any] = super().construct_mapping(node, deep=deep)
         return result
 
 
 _Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float", re.compile(r"^[-+]?[0-9][0-9_]*(\.[0-9_]*)?[eE][-+]?[0-9]+$"), list("-+0123456789")
+    "tag:yaml.org,2002:float",
+    re.compile(r"^[-+]?[0-9][0-9_]*(\.[0-9_]*)?[eE][-+]?[0-9]+$"),
+    list("-+0123456789"),
 )
 
 
@@ -59,9 +64,13 @@ def read_text(path: Path, source: str) -> str:
         with path.open("rb") as file:
             raw = file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
-        raise LayoutError(f"cannot be read: {getattr(error, 'strerror', None) or error}", source=source) from None
+        raise LayoutError(
+            f"cannot be read: {getattr(error, 'strerror', None) or error}", source=source
+        ) from None
     if len(raw) > MAX_BYTES:
-        raise LayoutError(f"is larger than {MAX_BYTES:,} bytes; a layout file has a few thousand", source=source)
+        raise LayoutError(
+            f"is larger than {MAX_BYTES:,} bytes; a layout file has a few thousand", source=source
+        )
     try:
         content = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -106,20 +115,24 @@ def parse_json(content: str, source: str) -> Any:
 
 
 def _inspect(content: str) -> None:
-    """Walks the YAML events, which costs time in proportion to the text, before anything is built from them."""
+    """Walks the YAML events, at a cost in proportion to the text, before anything is built from them."""
     depth = 0
     for count, event in enumerate(yaml.parse(content, Loader=_Loader)):
-        line = event.start_mark.line + 1
+        line = event.start_mark.line + 1 if event.start_mark else 0
         if count > MAX_EVENTS:
             raise LayoutError(f"line {line}: has more than {MAX_EVENTS} entries, too many for a layout")
         if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
-            raise LayoutError(f"line {line}: anchors and aliases (& and *) are not allowed; write the value out")
+            raise LayoutError(
+                f"line {line}: anchors and aliases (& and *) are not allowed; write the value out"
+            )
         if getattr(event, "tag", None):
             raise LayoutError(f"line {line}: tags (!) are not allowed; write plain keys and values")
         if isinstance(event, yaml.CollectionStartEvent):
             depth += 1
             if depth > MAX_DEPTH:
-                raise LayoutError(f"line {line}: is nested deeper than {MAX_DEPTH} levels, too deep for a layout")
+                raise LayoutError(
+                    f"line {line}: is nested deeper than {MAX_DEPTH} levels, too deep for a layout"
+                )
         elif isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
 

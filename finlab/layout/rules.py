@@ -1,7 +1,7 @@
 """The small checks that every part of a layout is made of.
 
-Each takes a value that may be anything (a file or a page sent it), the key it stands under, and returns it in its
-final type or raises a `LayoutError` that names the key, the value and the expectation.
+Each takes a value that may be anything (a file or a page sent it), the key it stands under, and returns it
+in its final type or raises a `LayoutError` that names the key, the value and the expectation.
 """
 
 from collections.abc import Mapping, Sequence
@@ -42,7 +42,9 @@ def number(value: Any, key: str, low: float = -np.inf, high: float = np.inf, pos
     return result
 
 
-def numbers(value: Any, key: str, count: int, low: float = -np.inf, high: float = np.inf) -> tuple[float, ...]:
+def numbers(
+    value: Any, key: str, count: int, low: float = -np.inf, high: float = np.inf
+) -> tuple[float, ...]:
     """Returns `value` as a tuple of exactly `count` finite floats within `[low, high]`."""
     if isinstance(value, np.ndarray):
         value = value.tolist()
@@ -54,7 +56,7 @@ def numbers(value: Any, key: str, count: int, low: float = -np.inf, high: float 
 
 
 def interval(value: Any, key: str, low: float, high: float) -> tuple[float, float]:
-    """Returns `value` as (minimum, maximum) with low <= minimum <= maximum <= high; equal ends are allowed."""
+    """Returns `value` as (minimum, maximum) within `[low, high]`; the two may be equal."""
     ends = numbers(value, key, 2, low, high)
     if ends[0] > ends[1]:
         raise LayoutError(f"minimum {ends[0]:g} is above maximum {ends[1]:g}; swap them", key)
@@ -62,7 +64,7 @@ def interval(value: Any, key: str, low: float, high: float) -> tuple[float, floa
 
 
 def text(value: Any, key: str, max_length: int, allow_empty: bool = False, one_line: bool = True) -> str:
-    """Returns `value` as text without control characters, stripped of nothing and no longer than `max_length`."""
+    """Returns `value` if it is printable text of at most `max_length` characters, with no outer spaces."""
     if not isinstance(value, str):
         raise LayoutError(f"expected text, got {shown(value)}; put it in quotes if it is meant as text", key)
     if not value.strip() and not allow_empty:

@@ -16,7 +16,9 @@ def direct_thrust(thrust: Tensor, zero_direction: Tensor) -> Tensor:
     A flapping fin's mean force lies in the plane its tip sweeps: nothing acts along the shaft.
     """
     along_shaft = torch.zeros_like(thrust)
-    return torch.stack([along_shaft, thrust * torch.cos(zero_direction), thrust * torch.sin(zero_direction)], dim=-1)
+    return torch.stack(
+        [along_shaft, thrust * torch.cos(zero_direction), thrust * torch.sin(zero_direction)], dim=-1
+    )
 
 
 class Drag:
@@ -31,7 +33,7 @@ class Drag:
         area: float = _DEFAULT["area"],
         lever: float = _DEFAULT["lever"],
     ) -> None:
-        """Takes water density [kg/m^3], rotational drag coefficient, fin area [m^2] and lever to its centre [m]."""
+        """Takes water density [kg/m^3], drag coefficient, fin area [m^2] and lever to its centre [m]."""
         # 1 - cos 2A = 2 sin^2 A is written as the latter below: it keeps its digits at small amplitudes.
         self.coefficient = 4.0 * density * drag_coefficient * area * lever**2 * (2.0 * math.pi) ** 2
         """Thrust over f^2 sin^2(A) [N s^2]; 4.737 for the defaults."""

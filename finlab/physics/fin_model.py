@@ -11,7 +11,7 @@ from finlab.physics.lighthill import Lighthill
 
 
 class FinModel(Protocol):
-    """Command to mean force of one fin, batched and differentiable, in float32 or float64 as the command is."""
+    """Command to mean force of one fin, batched and differentiable, float32 or float64 as the command is."""
 
     name: str
     """Type name, as in a layout file."""

@@ -10,9 +10,9 @@ from finlab.physics.drag import direct_thrust
 
 _DEFAULT = MODEL_DEFAULTS["lighthill"]
 
-# J1(x) = x/2 sum_k (-1)^k (x/2)^(2k) / (k! (k+1)!). An amplitude is at most pi/2, where the terms fall below 1e-17
-# after k = 11; a few more keep float64 exact to |x| = 4. A polynomial differentiates to any order, which
-# torch.special.bessel_j1 does not.
+# J1(x) = x/2 sum_k (-1)^k (x/2)^(2k) / (k! (k+1)!). An amplitude is at most pi/2, where the terms fall below
+# 1e-17 after k = 11; a few more keep float64 exact to |x| = 4. A polynomial differentiates to any order,
+# which torch.special.bessel_j1 does not.
 _J1_COEFFICIENTS = tuple((-1) ** k / (math.factorial(k) * math.factorial(k + 1)) for k in range(17))
 
 
@@ -26,7 +26,7 @@ def bessel_j1(x: Tensor) -> Tensor:
 
 
 class Lighthill:
-    """T = 1/2 m L^2 (2 pi f)^2 A J1(A) with m = pi/4 rho W^2, the water that one metre of trailing edge carries."""
+    """T = 1/2 m L^2 (2 pi f)^2 A J1(A) with m = pi/4 rho W^2, the water moved per metre of trailing edge."""
 
     name = "lighthill"
 

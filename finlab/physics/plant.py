@@ -58,7 +58,7 @@ class Plant:
         return np.asarray(force.numpy())
 
     def effectiveness(self, command: ArrayLike | Tensor) -> NDArray[np.float64]:
-        """Returns d wrench / d command (..., 6, n, 3) per rad, Hz and rad; a failed fin's columns are zero."""
+        """Returns d wrench / d command (..., 6, n, 3) per rad, Hz, rad; a failed fin's columns are zero."""
         values, alive = self._checked(command)
         result = values.new_zeros((*values.shape[:-2], 6, *values.shape[-2:]))
         for model, members in self._groups:
@@ -78,7 +78,7 @@ class Plant:
         n_fins = self.layout.n_fins
         if values.ndim < 2 or values.shape[-2:] != (n_fins, 3):
             raise CommandError(
-                f"expected commands (..., {n_fins}, 3) for layout {self.layout.name}, got shape {values.shape}"
+                f"expected commands (..., {n_fins}, 3) for layout {self.layout.name}, got {values.shape}"
             )
         failed = np.isnan(values).all(axis=-1)
         if not np.isfinite(values[~failed]).all():

@@ -1,11 +1,11 @@
 """A fin model that is a table of forces, measured in a tank or computed by CFD.
 
-The CSV file has the columns A [rad], f [Hz], phi [rad], Fx, Fy, Fz [N] under a header line; A is the half amplitude,
-phi the zero direction, forces are cycle means in the fin frame (x' shaft, y' horizontal thrust axis, z' up). Rows
-come in any order but must fill a grid: every amplitude with every frequency with every zero direction. Spacing is
-free. Between the points a cubic Hermite polynomial is used along each axis, so forces and their derivatives are
-continuous. When the zero directions cover the circle the table is periodic. Amplitudes and frequencies beyond the
-table count as its edge.
+The CSV file has the columns A [rad], f [Hz], phi [rad], Fx, Fy, Fz [N] under a header line; A is the half
+amplitude, phi the zero direction, forces are cycle means in the fin frame (x' shaft, y' horizontal thrust
+axis, z' up). Rows come in any order but must fill a grid: every amplitude with every frequency with every
+zero direction. Spacing is free. Between the points a cubic Hermite polynomial is used along each axis, so
+forces and their derivatives are continuous. When the zero directions cover the circle the table is periodic.
+Amplitudes and frequencies beyond the table count as its edge.
 """
 
 import csv
@@ -38,8 +38,8 @@ class TableFinModel:
         """Reads and checks the table at `path`.
 
         Raises:
-            DataError: the file is missing, lacks a column, holds something that is not a finite number, or its
-                rows do not fill a grid with at least two points per axis.
+            DataError: the file is missing, lacks a column, holds something that is not a finite number,
+                or its rows do not fill a grid with at least two points per axis.
         """
         self.path = str(path)
         rows = _read_rows(Path(path))
@@ -47,7 +47,9 @@ class TableFinModel:
         self.periodic, axes[2], forces = _close_circle(axes[2], forces, self.path)
         for name, axis in zip(COLUMNS, axes, strict=False):
             if len(axis) < 2:
-                raise DataError(f"{self.path}: column {name} has one value, expected at least 2 to interpolate")
+                raise DataError(
+                    f"{self.path}: column {name} has one value, expected at least 2 to interpolate"
+                )
         self._axes = [torch.from_numpy(axis) for axis in axes]
         self._forces = torch.from_numpy(forces).reshape(-1, 3)
         self._strides = (forces.shape[1] * forces.shape[2], forces.shape[2], 1)
@@ -60,10 +62,10 @@ class TableFinModel:
         # 4 x 4 x 4 neighbours, each weighted by the product of three one-dimensional weights.
         for steps in itertools.product(range(4), repeat=3):
             weight = torch.ones_like(command[..., 0])
-            place = torch.zeros_like(corners[0].index[0])
+            place = torch.zeros_like(corners[0].place[0])
             for axis, step in enumerate(steps):
                 weight = weight * corners[axis].weight[step]
-                place = place + corners[axis].index[step] * self._strides[axis]
+                place = place + corners[axis].place[step] * self._strides[axis]
             total = total + weight.unsqueeze(-1) * table[place]
         return total
 
@@ -79,7 +81,9 @@ class TableFinModel:
             middle = (knots[0] + knots[-1]) / 2
             value = middle + torch.remainder(value - middle + math.pi, 2 * math.pi) - math.pi
         value = value.clamp(knots[0], knots[-1])
-        cell = (torch.searchsorted(knots, value.detach().contiguous(), right=True) - 1).clamp(0, len(knots) - 2)
+        cell = (torch.searchsorted(knots, value.detach().contiguous(), right=True) - 1).clamp(
+            0, len(knots) - 2
+        )
         x1, x2 = knots[cell], knots[cell + 1]
         if axis == 2 and self.periodic:
             gaps = knots.diff()
@@ -99,7 +103,7 @@ class TableFinModel:
 
 
 class _Stencil(NamedTuple):
-    index: list[Tensor]
+    place: list[Tensor]
     """Four grid indices, each of the command's batch shape."""
 
     weight: list[Tensor]
@@ -113,7 +117,7 @@ def write_table(
     frequency: NDArray[np.float64],
     zero_direction: NDArray[np.float64],
 ) -> None:
-    """Writes the forces of `model` on a grid of amplitudes [rad], frequencies [Hz] and zero directions [rad]."""
+    """Writes the forces of `model` on a grid of amplitude [rad], frequency [Hz] and zero direction [rad]."""
     axes = [np.asarray(axis, dtype=np.float64) for axis in (amplitude, frequency, zero_direction)]
     command = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     with torch.no_grad():
@@ -137,7 +141,9 @@ def _read_rows(path: Path) -> NDArray[np.float64]:
     header = [cell.strip() for cell in lines[0]] if lines else []
     missing = [name for name in COLUMNS if name not in header]
     if missing:
-        raise DataError(f"{path}: column {missing[0]} is missing, expected a header with {', '.join(COLUMNS)}")
+        raise DataError(
+            f"{path}: column {missing[0]} is missing, expected a header with {', '.join(COLUMNS)}"
+        )
     if len(set(header)) < len(header):
         raise DataError(f"{path}: a column name appears twice in the header")
     order = [header.index(name) for name in COLUMNS]
@@ -152,7 +158,9 @@ def _read_rows(path: Path) -> NDArray[np.float64]:
         except ValueError:
             raise DataError(f"{path}: line {line} holds something that is not a number") from None
         if not all(map(math.isfinite, row)):
-            raise DataError(f"{path}: line {line} holds a value that is not finite; leave no gaps in the table")
+            raise DataError(
+                f"{path}: line {line} holds a value that is not finite; leave no gaps in the table"
+            )
         rows.append(row)
     if not rows:
         raise DataError(f"{path}: has no rows below its header")
@@ -169,8 +177,9 @@ def _grid(rows: NDArray[np.float64], source: str) -> tuple[list[NDArray[np.float
         raise DataError(f"{source}: the same A, f, phi appears in two rows; keep one")
     if len(place) != math.prod(shape):
         raise DataError(
-            f"{source}: {len(rows)} rows do not fill the grid of {shape[0]} amplitudes, {shape[1]} frequencies and "
-            f"{shape[2]} zero directions, expected {math.prod(shape)}; write repeated values with the same digits"
+            f"{source}: {len(rows)} rows do not fill the grid of {shape[0]} amplitudes, {shape[1]} "
+            f"frequencies and {shape[2]} zero directions, expected {math.prod(shape)}; "
+            "write equal values with equal digits"
         )
     forces = np.empty((math.prod(shape), 3))
     forces[place] = rows[:, 3:]
@@ -187,7 +196,9 @@ def _close_circle(
     if abs(span - 2 * math.pi) <= 1e-3:
         scale = np.abs(forces).max()
         if not np.allclose(forces[:, :, 0], forces[:, :, -1], rtol=0.0, atol=0.05 * scale + 1e-12):
-            raise DataError(f"{source}: forces at phi = {angle[0]:.4g} and one turn later differ; they are the same")
+            raise DataError(
+                f"{source}: forces at phi = {angle[0]:.4g} and one turn later differ; they are the same"
+            )
         return True, angle[:-1], forces[:, :, :-1]
     # A full circle given without its end point leaves a last gap like the others.
     closes = len(angle) > 2 and 2 * math.pi - span <= 1.5 * np.diff(angle).max()

@@ -86,7 +86,8 @@ def effectiveness_matrix(
         variable = command.detach().requires_grad_(True)
         force = body_force(masked_force(model, variable, mask), mounting_angle.detach())
         rows = [
-            torch.autograd.grad(force[..., axis].sum(), variable, retain_graph=axis < 2)[0] for axis in range(3)
+            torch.autograd.grad(force[..., axis].sum(), variable, retain_graph=axis < 2)[0]
+            for axis in range(3)
         ]
     jacobian = torch.stack(rows, dim=-3)  # (..., 3 force axes, n, 3 command entries)
     columns = jacobian.movedim(-3, -1)  # (..., n, 3 command entries, 3 force axes)
