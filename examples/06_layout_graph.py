@@ -1,6 +1,6 @@
 """Write the layout graph that goes to the robot, read it back, and look at it with networkx.
 
-You will see the file's checksum, its first self-test, and the fins and edges that are left once one fin is lost.
+You will see the file's checksum, its first self-test, and the edges that are left once a fin is lost.
 """
 
 import json

@@ -64,17 +64,14 @@ _DESCRIPTION = "Control allocation for fin-actuated underwater robots: a target 
 def _command_line() -> SubcommandApp:
     """All verbs; a function may return an exit code, None means 0."""
     from finlab.cli import allocate, app, data, export, layout, train
+    from finlab.cli import eval as evaluate
 
     root = SubcommandApp()
     root.command(allocate.allocate)
     root.command(layout.verbs, name="layout", help="Check and show layout files.")
     root.command(data.verbs, name="data", help="Generate training data.")
     root.command(train.verbs, name="train", help="Train the surrogate and the allocator.")
-    import importlib.util
-
-    if importlib.util.find_spec("finlab.cli.eval"):
-        evaluate = importlib.import_module("finlab.cli.eval")
-        root.command(evaluate.verbs, name="eval", help="Measure methods against the analytic fin model.")
+    root.command(evaluate.verbs, name="eval", help="Measure methods against the analytic fin model.")
     root.command(export.export)
     root.command(app.app)
     return root

@@ -4,6 +4,9 @@ from typing import Annotated
 
 from tyro.conf import arg
 
+_EXTRA = ("viser", "trimesh", "matplotlib")
+"""What the extra `app` installs."""
+
 
 def app(
     layout: Annotated[str, arg(metavar="LAYOUT")] = "ucat",
@@ -24,6 +27,8 @@ def app(
     try:
         from webapp.app import serve
     except ModuleNotFoundError as error:
+        if error.name not in _EXTRA:
+            raise
         raise FinlabError(
             f"the web app needs {error.name!r}, which is not installed; run: pip install 'finlab[app]'"
         ) from error
