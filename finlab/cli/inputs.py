@@ -59,7 +59,8 @@ def layout_path(text: str) -> Path:
         if path.exists():
             return path
     except (OSError, ValueError) as error:  # a name that is too long, or holds a NUL byte
-        raise LayoutError(f"layout {text[:80]!r} cannot be a path: {error}") from error
+        reason = getattr(error, "strerror", None) or error
+        raise LayoutError(f"layout {text[:80]!r} cannot be a path: {reason}") from error
     shipped = shipped_layouts()
     if text in shipped:
         return shipped[text]

@@ -1,0 +1,205 @@
+"""`finlab allocate`: the JSON contract, the table, and bad input of every kind."""
+
+import copy
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from finlab.assets import shipped_layouts
+from finlab.cli import main
+
+WRENCH = ["--wrench", "1", "0", "-0.5", "0", "0", "1e-1"]
+KEYS = [
+    "fins",
+    "failed",
+    "command",
+    "target",
+    "wrench_surrogate",
+    "wrench_plant",
+    "unallocated",
+    "err_norm",
+    "energy",
+    "sigma",
+    "solve_ms",
+    "method",
+    "checkpoint",
+]
+
+
+def refuse_constant(name: str) -> float:
+    raise AssertionError(f"{name} is not JSON")
+
+
+@pytest.fixture
+def allocate(checkpoint: str, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    """Runs `finlab allocate` and returns exit code, stdout and stderr."""
+
+    def run(*argv: str) -> tuple[int, str, str]:
+        code = main(["allocate", *argv, "--checkpoint", checkpoint])
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return run
+
+
+def answer(run: tuple[int, str, str]) -> dict[str, Any]:
+    code, out, err = run
+    assert code == 0, err
+    result: dict[str, Any] = json.loads(out, parse_constant=refuse_constant)
+    return result
+
+
+def test_json_has_the_keys_of_the_contract(allocate: Callable[..., tuple[int, str, str]]) -> None:
+    result = answer(allocate("A", *WRENCH, "--json"))
+    assert list(result) == KEYS
+    assert result["fins"] == ["front_right", "front_left", "back_left", "back_right"]
+    assert result["failed"] == []
+    assert [len(row) for row in result["command"]] == [3, 3, 3, 3]
+    assert result["target"] == [1.0, 0.0, -0.5, 0.0, 0.0, 0.1]
+    assert result["method"] == "learned" and result["checkpoint"] == "untrained"
+    gap = [t - w for t, w in zip(result["target"], result["wrench_plant"], strict=True)]
+    assert result["unallocated"] == pytest.approx(gap)
+    scaled = sum((g / s) ** 2 for g, s in zip(gap, result["sigma"], strict=True)) ** 0.5
+    assert result["err_norm"] == pytest.approx(scaled)
+
+
+def test_failed_fins_have_no_command(allocate: Callable[..., tuple[int, str, str]]) -> None:
+    flags = ["--failed", "front_right", "--failed", "back_left"]
+    result = answer(allocate("A", *WRENCH, *flags, "--json"))
+    assert result["failed"] == ["front_right", "back_left"]
+    assert [row is None for row in result["command"]] == [True, False, True, False]
+
+
+def test_same_seed_same_answer(allocate: Callable[..., tuple[int, str, str]]) -> None:
+    first, second = (answer(allocate("A", *WRENCH, "--seed", "3", "--json")) for _ in range(2))
+    assert first["command"] == second["command"]
+
+
+def test_methods_without_a_network(allocate: Callable[..., tuple[int, str, str]]) -> None:
+    result = answer(allocate("A", *WRENCH, "--method", "analytic", "--json"))
+    assert result["method"] == "analytic" and result["wrench_surrogate"] is None
+
+
+def test_table_for_people(allocate: Callable[..., tuple[int, str, str]]) -> None:
+    code, out, _ = allocate("A", *WRENCH, "--failed", "front_left")
+    assert code == 0
+    lines = out.splitlines()
+    assert lines[0].split() == "fin A [rad] f [Hz] zero direction [deg] force [N]".split()
+    assert lines[2].split() == ["front_left", "failed"]
+    labels = [line.split()[0] for line in lines if line]
+    assert labels[5:] == ["Fx", "asked", "delivered", "missing", "err_norm"]
+    assert "1.000   0.000  -0.500     0.000     0.000     0.100" in out
+
+
+def test_shipped_name_works_from_any_folder(
+    allocate: Callable[..., tuple[int, str, str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert answer(allocate("ucat", *WRENCH, "--json"))["err_norm"] >= 0
+
+
+@pytest.mark.parametrize(
+    ("argv", "message"),
+    [
+        (["A", "--wrench", "nan", "0", "0", "0", "0", "0"], "wrench: Fx must be finite"),
+        (["A", "--wrench", "0", "0", "0", "0", "0", "-inf"], "wrench: Tz must be finite"),
+        (["A", "--wrench", "1e300", "0", "0", "0", "0", "0"], "wrench: Fx must be finite and at most"),
+        (["A", "--wrench", "1", "0", "0"], "Expected 6 values"),
+        (["A", "--wrench", "1", "0", "0", "0", "0", "0", "0"], "Unrecognized options: 0"),
+        (["A", "--wrench", "1", "0", "0", "0", "0", "up"], "Error parsing --wrench"),
+        (["A"], "--wrench"),
+        (["A", *WRENCH, "--failed", "nobody"], "has no fin 'nobody', it has front_right"),
+        (["D", *WRENCH, *"--failed bow --failed port --failed starboard".split()], "no fin"),
+        (["A", *WRENCH, "--method", "magic"], "method: expected one of learned, paper"),
+        (["A", *WRENCH, "--seed", "x"], "--seed"),
+        (["missing.yaml", *WRENCH], "neither a file nor a shipped layout"),
+        ([".", *WRENCH], "is a folder"),
+        (["x" * 5000, *WRENCH], "cannot be a path: File name too long"),
+        (["", *WRENCH], "is a folder"),
+    ],
+)
+def test_bad_arguments_are_one_plain_message(
+    argv: list[str], message: str, allocate: Callable[..., tuple[int, str, str]]
+) -> None:
+    code, out, err = allocate(*argv)
+    assert code == 2 and out == ""
+    assert message in " ".join(err.replace("│", " ").split())
+
+
+def test_missing_checkpoint_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["allocate", "A", *WRENCH, "--checkpoint", "elsewhere/"]) == 2
+    assert "elsewhere: no such checkpoint folder" in capsys.readouterr().err
+
+
+def hostile_files() -> dict[str, bytes]:
+    """Layout files that should not have been written, by what is wrong with them."""
+    base = yaml.safe_load(shipped_layouts()["A"].read_text())
+
+    def changed(change: Callable[[dict[str, Any]], Any]) -> bytes:
+        layout = copy.deepcopy(base)
+        change(layout)
+        return yaml.safe_dump(layout).encode()
+
+    chain = zip("abcdefgh", "bcdefghi", strict=True)
+    bomb = "a: &a [x,x,x,x,x,x,x,x,x]\n" + "".join(
+        f"{c}: &{c} [{','.join(['*' + p] * 9)}]\n" for p, c in chain
+    )
+    fins = [{**base["fins"][0], "name": f"f{i}"} for i in range(5000)]
+    return {
+        "no fins": changed(lambda o: o.update(fins=[])),
+        "version": changed(lambda o: o.update(version=99)),
+        "tag": b'!!python/object/apply:os.system ["touch pwned"]\n',
+        "nan": changed(lambda o: o["fins"][0].update(position_m=[float("nan"), 0, 0])),
+        "huge": changed(lambda o: o["fins"][0].update(position_m=[1e308, 0, 0])),
+        "short": changed(lambda o: o["fins"][0].update(position_m=[0.1, 0.2])),
+        "text": changed(lambda o: o["fins"][0].update(mounting_angle_deg="north")),
+        "duplicate": changed(lambda o: [fin.update(name="same") for fin in o["fins"]]),
+        "unknown": changed(lambda o: o.update(surprise=1)),
+        "reversed": changed(lambda o: o["fins"][0]["limits"].update(amplitude_rad=[0.6, 0.05])),
+        "many": changed(lambda o: o.update(fins=fins)),
+        "bomb": bomb.encode(),
+        "binary": bytes(range(256)) * 50,
+        "big": b"a" * 3_000_000,
+        "empty": b"",
+    }
+
+
+@pytest.mark.parametrize("name", sorted(hostile_files()))
+def test_hostile_files_end_in_one_sentence(
+    name: str,
+    allocate: Callable[..., tuple[int, str, str]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "hostile.yaml"
+    path.write_bytes(hostile_files()[name])
+    code, out, err = allocate(str(path), *WRENCH)
+    assert code == 2 and out == ""
+    assert err.startswith(f"finlab: error: {path}: ")
+    assert len(err.splitlines()) == 1 and len(err) < 600
+    assert not (tmp_path / "pwned").exists()
+
+
+def test_whole_program(checkpoint: str, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "finlab", "allocate", "A", "--checkpoint", checkpoint, "--json"]
+    environment = os.environ | {"OMP_NUM_THREADS": "1"}
+
+    def run(*argv: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [*command, *argv], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60
+        )
+
+    good = run(*WRENCH)
+    assert (good.returncode, good.stderr) == (0, "")
+    assert list(json.loads(good.stdout)) == KEYS
+    bad = run("--wrench", "nan", "0", "0", "0", "0", "0")
+    assert (bad.returncode, bad.stdout) == (2, "")
+    assert bad.stderr.startswith("finlab: error: ") and "Traceback" not in bad.stderr
