@@ -38,7 +38,7 @@ def wrench(
         split: id, ood, ood-fins, limits, failure or near-singular.
         layouts: layouts of the split.
         targets: targets on each layout.
-        methods: names with commas between, from learned, paper, qp, sqp, analytic, multistart, trf, slsqp, ipopt.
+        methods: names with commas between: learned, paper, qp, sqp, analytic, multistart, trf, slsqp, ipopt.
         seed: draws layouts and targets; same numbers, same cases.
         single: solve only the first N targets of each layout, one call each, and time the calls.
         checkpoint: trained checkpoint; the shipped one of each method by default.
@@ -134,9 +134,7 @@ def _load(methods: str, checkpoint: str | None) -> dict[str, Allocator]:
 
     names = list(dict.fromkeys(name.strip() for name in methods.split(",") if name.strip()))
     if not names:
-        raise AllocationError(
-            f"methods: expected names with commas between, such as learned,paper, got {methods!r}"
-        )
+        raise AllocationError(f"methods: expected names with commas between (learned,paper), got {methods!r}")
     return {name: load_allocator(checkpoint, name) for name in names}
 
 

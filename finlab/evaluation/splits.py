@@ -1,0 +1,134 @@
+"""Held-out test cases: seeded layouts and reachable targets, one definition per split name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.errors import DataError
+from finlab.layout import Layout, random_layout
+from finlab.layout.random import TRAINING_BOX
+from finlab.physics import Plant
+
+OOD_BOX = (0.45, 0.45, 0.20)
+"""Largest |x|, |y|, |z| of a fin in split `ood` [m]; at least one fin lies outside the training box."""
+OOD_FINS = (6, 8)
+"""Least and most fins in split `ood-fins`."""
+NEAR_ANGLE = math.radians(2.0)
+"""Nearly parallel shafts of split `near-singular` differ by at most this; opposite counts as parallel."""
+NEAR_POSITION = 0.005
+"""Nearly coincident fins of split `near-singular` lie within this of each other along each axis [m]."""
+DOMAIN = 0x7E57
+"""Leads the seed of every test case; training seeds begin otherwise."""
+
+
+class Case(NamedTuple):
+    """One layout with its targets."""
+
+    layout: Layout
+    """All fins, failed ones included."""
+    targets: NDArray[np.float64]
+    """Desired wrenches (N, 6) [N, N m], each caused by a command of the healthy fins."""
+    failed: tuple[str, ...]
+    """Names of the fins that do not work."""
+
+
+def make_split(name: str, n_layouts: int, n_targets: int, seed: int) -> list[Case]:
+    """The test cases of a split.
+
+    Layout k and its first targets depend on the split, the seed and k alone, so that a small run is the
+    beginning of a large one.
+
+    Args:
+        name: one of `SPLITS`.
+        n_layouts: how many layouts, at least 1.
+        n_targets: targets per layout, at least 1.
+        seed: not negative.
+
+    Raises:
+        DataError: unknown split, or a number out of range.
+    """
+    if name not in SPLITS:
+        raise DataError(f"split: expected one of {', '.join(SPLITS)}, got {name!r}")
+    for value, what, least in ((n_layouts, "layouts", 1), (n_targets, "targets", 1), (seed, "seed", 0)):
+        if value < least:
+            raise DataError(f"{what}: expected a number of at least {least}, got {value}")
+    return [_make_case(name, n_targets, seed, k) for k in range(n_layouts)]
+
+
+def _make_case(split: str, n_targets: int, seed: int, k: int) -> Case:
+    entropy = (DOMAIN, list(SPLITS).index(split), seed, k)
+    layout_seed, target_seed = np.random.SeedSequence(entropy).spawn(2)
+    layout, failed = SPLITS[split](np.random.default_rng(layout_seed), f"{split}-{seed}-{k}")
+    healthy = layout.without(failed) if failed else layout
+    lower = np.array([fin.limits.lower for fin in healthy.fins])
+    upper = np.array([fin.limits.upper for fin in healthy.fins])
+    rng = np.random.default_rng(target_seed)
+    command = lower + rng.uniform(size=(n_targets, healthy.n_fins, 3)) * (upper - lower)
+    return Case(layout, Plant(healthy).wrench(command), failed)
+
+
+Drawn = tuple[Layout, tuple[str, ...]]
+
+
+def _id(rng: np.random.Generator, name: str) -> Drawn:
+    return random_layout(rng, name), ()
+
+
+def _ood(rng: np.random.Generator, name: str) -> Drawn:
+    return random_layout(rng, name, box=OOD_BOX, outside=TRAINING_BOX), ()
+
+
+def _ood_fins(rng: np.random.Generator, name: str) -> Drawn:
+    return random_layout(rng, name, n_fins=OOD_FINS), ()
+
+
+def _limits(rng: np.random.Generator, name: str) -> Drawn:
+    return random_layout(rng, name, limits="varied"), ()
+
+
+def _failure(rng: np.random.Generator, name: str) -> Drawn:
+    """One or two fins lost, never all."""
+    layout = random_layout(rng, name)
+    n_lost = min(int(rng.integers(1, 3)), layout.n_fins - 1)
+    lost = sorted(rng.choice(layout.n_fins, size=n_lost, replace=False))
+    return layout, tuple(layout.names[i] for i in lost)
+
+
+def _near_singular(rng: np.random.Generator, name: str) -> Drawn:
+    """Half of the layouts have nearly parallel shafts, half have a nearly coincident pair of fins."""
+    layout = random_layout(rng, name)
+    first, *others = layout.fins
+    if rng.uniform() < 0.5:
+        turns = rng.uniform(-NEAR_ANGLE, NEAR_ANGLE, len(others)) / 2
+        turns += math.pi * rng.integers(0, 2, len(others))
+        fins = [
+            replace(fin, mounting_angle=_wrap(first.mounting_angle + float(turn)))
+            for fin, turn in zip(others, turns, strict=True)
+        ]
+    else:
+        x, y, z = (np.array(first.position) + rng.uniform(-NEAR_POSITION, NEAR_POSITION, 3)).tolist()
+        turned = _wrap(first.mounting_angle + float(rng.uniform(-NEAR_ANGLE, NEAR_ANGLE)))
+        fins = [replace(others[0], position=(x, y, z), mounting_angle=turned), *others[1:]]
+    return replace(layout, fins=(first, *fins)), ()
+
+
+def _wrap(angle: float) -> float:
+    """The same angle in [-pi, pi)."""
+    return (angle + math.pi) % (2 * math.pi) - math.pi
+
+
+SPLITS: dict[str, Callable[[np.random.Generator, str], Drawn]] = {
+    "id": _id,
+    "ood": _ood,
+    "ood-fins": _ood_fins,
+    "limits": _limits,
+    "failure": _failure,
+    "near-singular": _near_singular,
+}
+"""Name -> how a layout and its failed fins are drawn. The order is part of the seed: append only."""
