@@ -1,7 +1,41 @@
-"""Settings that all tests share."""
+"""What all tests share: settings, and a small untrained checkpoint that is made in a moment."""
 
+from pathlib import Path
+
+import pytest
 from hypothesis import settings
 
 # Machines that run tests also run browsers and trainings: an example that takes long is no failure.
 settings.register_profile("finlab", deadline=None)
 settings.load_profile("finlab")
+
+
+@pytest.fixture(scope="session")
+def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a checkpoint of the preset `smoke` with random weights, for all that is the same whatever
+    the network has learned."""
+    # Here, so that tests of layouts do not wait for torch.
+    import numpy as np
+    import torch
+
+    from finlab.data.features import SIZES
+    from finlab.data.normalization import Normalization
+    from finlab.model.allocator_network import AllocatorNetwork
+    from finlab.model.checkpoint import Checkpoint, save_checkpoint
+    from finlab.model.surrogate import make_surrogate
+    from finlab.training.presets import get_preset
+
+    preset = get_preset("smoke")
+    folder = tmp_path_factory.mktemp("checkpoints") / "untrained"
+    with torch.random.fork_rng():
+        torch.manual_seed(0)
+        checkpoint = Checkpoint(
+            name=folder.name,
+            surrogate=make_surrogate(preset.surrogate),
+            normalization=Normalization(np.zeros(6), np.array([1.0, 1.0, 1.0, 0.1, 0.2, 0.3])),
+            fin_model={"type": "drag"},
+            network=AllocatorNetwork(preset.network, SIZES[preset.network.features]),
+            preset=preset.name,
+        )
+    save_checkpoint(folder, checkpoint)
+    return folder

@@ -38,11 +38,13 @@ def refuse_constant(name: str) -> float:
 
 
 @pytest.fixture
-def allocate(checkpoint: str, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+def allocate(
+    untrained_checkpoint: Path, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., tuple[int, str, str]]:
     """Runs `finlab allocate` and returns exit code, stdout and stderr."""
 
     def run(*argv: str) -> tuple[int, str, str]:
-        code = main(["allocate", *argv, "--checkpoint", checkpoint])
+        code = main(["allocate", *argv, "--checkpoint", str(untrained_checkpoint)])
         captured = capsys.readouterr()
         return code, captured.out, captured.err
 
@@ -188,8 +190,17 @@ def test_hostile_files_end_in_one_sentence(
     assert not (tmp_path / "pwned").exists()
 
 
-def test_whole_program(checkpoint: str, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "finlab", "allocate", "A", "--checkpoint", checkpoint, "--json"]
+def test_whole_program(untrained_checkpoint: Path, tmp_path: Path) -> None:
+    command = [
+        sys.executable,
+        "-m",
+        "finlab",
+        "allocate",
+        "A",
+        "--checkpoint",
+        str(untrained_checkpoint),
+        "--json",
+    ]
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
 
     def run(*argv: str) -> subprocess.CompletedProcess[str]:
