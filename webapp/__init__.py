@@ -1,0 +1,6 @@
+"""The finlab app in the browser: a robot whose fins move as they are allocated.
+
+What a browser shows is one `Session` (no viser in it). An event becomes an intent, the session checks it and
+changes, the view writes the difference to the page, and a worker solves the newest question. All sessions and
+widgets belong to viser's event loop; only the solving happens elsewhere.
+"""

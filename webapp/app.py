@@ -1,0 +1,167 @@
+"""The server: one `View` for each browser that connects, and the clock that lets the fins flap."""
+
+import asyncio
+import json
+import signal
+import socket
+import threading
+import time
+from pathlib import Path
+
+import viser
+
+from finlab.assets import shipped_layouts
+from finlab.errors import FinlabError
+from finlab.layout import Layout, load_layout
+from webapp.session import Display, Session
+from webapp.solver import Solver
+from webapp.state import State
+from webapp.store import SessionStore
+from webapp.view import View
+from webapp.viser_internals import disable_sharing
+from webapp.worker import Worker
+
+FIRST_LAYOUT = "ucat"
+"""The shipped layout that a new session opens."""
+FRAME_S = 1 / 25
+"""Time between two poses of the fins [s]."""
+STORAGE_KEY = "finlab-sessions"
+"""Where a browser keeps the keys of its sessions."""
+MAX_KEYS = 8
+"""Sessions that one browser remembers."""
+
+
+class App:
+    """Connects browsers to sessions on a running viser server."""
+
+    def __init__(
+        self, server: viser.ViserServer, solver: Solver, layout: Layout, display: Display | None = None
+    ) -> None:
+        """Take over a server.
+
+        Args:
+            server: where browsers connect.
+            solver: answers their questions.
+            layout: what a new session opens.
+            display: how a new session looks.
+        """
+        self._server = server
+        self._solver = solver
+        self._worker = Worker()
+        self._store = SessionStore(lambda: Session(layout, display))
+        self.views: dict[int, View] = {}
+        """The pages that are open, by client."""
+        self._keys: dict[int, str] = {}
+        self._loop = server.get_event_loop()
+        server.scene.world_axes.visible = False
+        disable_sharing(server)
+        server.on_client_connect(self._connected)
+        server.on_client_disconnect(self._disconnected)
+        self._clock = asyncio.run_coroutine_threadsafe(self._animate(), self._loop)
+
+    def stop(self) -> None:
+        """Stop the clock and the worker; the server is stopped by its owner."""
+        self._clock.cancel()
+        self._worker.stop()
+
+    def _connected(self, client: viser.ClientHandle) -> None:
+        # Plain `def`: viser runs it on a thread of its pool, where waiting for the page is allowed.
+        try:
+            remembered = _session_keys(client.local_storage.get_item(STORAGE_KEY, timeout=5.0))
+        except (RuntimeError, TimeoutError):  # gone already, or a browser that forbids storage
+            remembered = []
+        self._loop.call_soon_threadsafe(self._open, client, remembered)
+
+    def _open(self, client: viser.ClientHandle, remembered: list[str]) -> None:
+        if client.client_id not in self._server.get_clients():
+            return
+        key, session = self._store.enter(remembered)
+        self._keys[client.client_id] = key
+        if key not in remembered:
+            remembered = [key, *remembered]
+        client.local_storage.set_item(STORAGE_KEY, json.dumps(remembered[:MAX_KEYS]))
+        self.views[client.client_id] = View(client, session, self._solver, self._worker, self._loop)
+
+    async def _disconnected(self, client: viser.ClientHandle) -> None:
+        view = self.views.pop(client.client_id, None)
+        if view is not None:
+            view.close()
+            self._store.leave(self._keys.pop(client.client_id))
+
+    async def _animate(self) -> None:
+        before = time.monotonic()
+        while True:
+            await asyncio.sleep(FRAME_S)
+            now = time.monotonic()
+            for view in list(self.views.values()):
+                # A long pause (a busy machine) must not become a leap of the fins.
+                view.scene.animate(min(now - before, 0.2))
+            before = now
+
+
+def serve(
+    host: str = "127.0.0.1", port: int = 8080, layout: str | None = None, checkpoint: str | Path | None = None
+) -> None:
+    """Serve the app until SIGTERM or Ctrl-C.
+
+    Args:
+        host: address to listen on; only this machine can reach the default.
+        port: port to listen on; 0 takes a free one.
+        layout: file, or name of a shipped layout, that a new session opens; None for the U-CAT.
+        checkpoint: folder or name of a checkpoint; None for the shipped one.
+
+    Raises:
+        FinlabError: the port is taken, or layout or checkpoint cannot be read.
+    """
+    first = _first_layout(layout or FIRST_LAYOUT)
+    _check_port(host, port)
+    solver = Solver(checkpoint)
+    solver.allocator(State(first))  # a missing checkpoint is reported now, not in the browser
+    server = viser.ViserServer(host=host, port=port, label="finlab", verbose=False)
+    app = App(server, solver, first)
+    try:
+        if port not in (0, server.get_port()):
+            raise FinlabError(f"port {port} was taken while the app started; choose another --port")
+        print(f"finlab app: http://{host}:{server.get_port()}  (Ctrl-C stops it)", flush=True)
+        _wait_for_signal()
+    finally:
+        app.stop()
+        server.stop()
+
+
+def _first_layout(text: str) -> Layout:
+    shipped = shipped_layouts()
+    return load_layout(shipped[text] if text in shipped and not Path(text).exists() else text)
+
+
+def _check_port(host: str, port: int) -> None:
+    """Viser moves to the next port by itself when one is taken; the user would look at the wrong page."""
+    if not 0 <= port <= 65535:
+        raise FinlabError(f"port: expected a number from 0 to 65535, got {port}")
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, kind, protocol) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(address)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise FinlabError(
+            f"cannot listen on {host}:{port}: {reason}; choose another --port or --host"
+        ) from None
+
+
+def _session_keys(text: str | None) -> list[str]:
+    """The keys in a browser's storage, which may hold anything."""
+    try:
+        keys = json.loads(text or "[]")
+    except ValueError:
+        return []
+    return [key for key in keys if isinstance(key, str)][:MAX_KEYS] if isinstance(keys, list) else []
+
+
+def _wait_for_signal() -> None:
+    stop = threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stop.set())
+    while not stop.wait(0.5):  # a plain wait would keep Python from seeing the signal
+        pass

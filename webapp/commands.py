@@ -1,0 +1,42 @@
+"""Keyboard and command palette (Ctrl+K). The camera owns W A S D Q E and the arrow keys."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import viser
+
+from webapp.panels.host import Host
+
+
+def add_commands(gui: viser.GuiApi, host: Host) -> None:
+    """Register the commands of one browser."""
+    session = host.session
+
+    def add(label: str, act: Callable[[], object], hotkey: Any = None, modifier: Any = None) -> None:
+        command = gui.add_command(label, hotkey=hotkey, modifier=modifier)
+
+        @command.on_trigger
+        async def _triggered(_event: Any) -> None:
+            host.do(act)
+
+    def fail_selected() -> None:
+        session.toggle_failure(session.selected or session.state.layout.names[0])
+
+    def toggle(key: str) -> None:
+        session.set_display(key, not getattr(session.display, key))
+
+    add("Undo", session.undo, "Z", "cmd/ctrl")
+    add("Redo", session.redo, "Z", "cmd/ctrl+shift")
+    add("Select the next fin", session.select_next, "N")
+    add("Select nothing", lambda: session.select(None), "X")
+    add("Fail or repair the selected fin", fail_selected, "F")
+    add("Mirror the selected fin", session.mirror_fin, "M")
+    add("Duplicate the selected fin", session.duplicate_fin)
+    add("Delete the selected fin", session.delete_fin)
+    add("Add a fin", session.add_fin)
+    add("Freeze or move the fins", lambda: toggle("frozen"), "P")
+    add("Show or hide the fin graph", lambda: toggle("graph"))
+    add("Dark or light theme", lambda: toggle("dark"))
+    for view, key in (("3D", "1"), ("Top", "2"), ("Side", "3"), ("Front", "4")):
+        add(f"Camera: {view}", partial(host.look_from, view), key)

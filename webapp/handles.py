@@ -1,0 +1,43 @@
+"""Writing to viser's handles, and hearing from them."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import viser
+
+
+def put(handle: Any, **values: Any) -> None:
+    """Set properties of a handle, but only those that differ, so that an unchanged page gets no message."""
+    for key, value in values.items():
+        if not _same(getattr(handle, key), value):
+            setattr(handle, key, value)
+
+
+def _same(old: Any, new: Any) -> bool:
+    if isinstance(old, np.ndarray) or isinstance(new, np.ndarray):
+        return np.array_equal(np.asarray(old), np.asarray(new))
+    if isinstance(old, tuple) and len(old) and isinstance(old[0], np.ndarray):
+        return len(old) == len(new) and all(_same(a, b) for a, b in zip(old, new, strict=True))
+    return bool(old == new)
+
+
+def on_user_change(handle: Any, act: Callable[[Any], None]) -> None:
+    """Call `act(value)` on the event loop when the user changes an input; our own writes are not heard."""
+
+    async def changed(event: Any) -> None:
+        if event.client is not None:
+            act(event.target.value)
+
+    # A group of buttons is an input whose value is the button that was pressed last.
+    listen = handle.on_click if isinstance(handle, viser.GuiButtonGroupHandle) else handle.on_update
+    listen(changed)
+
+
+def on_user_click(handle: Any, act: Callable[[], None]) -> None:
+    """Call `act()` on viser's event loop when the user presses a button."""
+
+    @handle.on_click
+    async def _clicked(event: Any) -> None:
+        if event.client is not None:
+            act()

@@ -1,0 +1,54 @@
+"""What lies over the 3D view: the status line, and the legend of colours and scales."""
+
+import math
+from html import escape
+
+from finlab.allocation.allocation import Allocation
+from webapp.state import State
+from webapp.theme import ASKED, DELIVERED, MISSING, TORQUE_SCALE, css
+from webapp.words import is_reached, reach_sentence
+
+
+def corner(state: State, newtons: float, allocation: Allocation | None, busy: bool, error: str | None) -> str:
+    """Legend and status line in the lower left corner of the page."""
+    return (
+        f"<div class='fl-corner'><div class='fl fl-card fl-legend-card'>{_legend(newtons)}</div>"
+        f"<div class='fl fl-card fl-status'>{_status(state, allocation, busy, error)}</div></div>"
+    )
+
+
+def _legend(newtons: float) -> str:
+    arrows = [("asked", ASKED, 0.5), ("delivered", DELIVERED, 1.0), ("missing", MISSING, 1.0)]
+    rows = [f"{_arrow(css(color, alpha))}<span>{word}</span>" for word, color, alpha in arrows]
+    turn = math.degrees(TORQUE_SCALE)
+    return (
+        f"<div class='fl-legend'>{''.join(rows)}</div><div class='dim' style='margin-top:4px'>"
+        f"arrow 0.1 m = {newtons:g} N<br>ring {turn:.0f}° = 1 N m</div>"
+    )
+
+
+def _arrow(color: str) -> str:
+    return (
+        f"<svg width='44' height='10'><rect x='0' y='3' width='33' height='4' fill='{color}'/>"
+        f"<path d='M32 0 L44 5 L32 10 Z' fill='{color}'/></svg>"
+    )
+
+
+def _status(state: State, allocation: Allocation | None, busy: bool, error: str | None) -> str:
+    fins = f"{len(state.healthy)} of {state.layout.n_fins} fins"
+    parts = [f"<b>{escape(state.layout.name)}</b>", f"<span>{fins}</span>"]
+    if error is not None:
+        parts.append(f"<span class='missing'>{escape(error)}</span>")
+    elif allocation is None:
+        parts.append("<span class='dim'>computing …</span>")
+    else:
+        color = DELIVERED if is_reached(allocation) else MISSING
+        parts += [
+            f"<span><span class='dim'>error</span> <b class='err'>{allocation.err_norm:.3f}</b></span>",
+            f"<span><span class='dim'>energy</span> <b class='energy'>{allocation.energy:.3f}</b></span>",
+            f"<span><span class='dim'>{escape(allocation.method)}</span> {allocation.solve_ms:.0f} ms</span>",
+            f"<span class='pill' style='background:{css(color)}'>{escape(reach_sentence(allocation))}</span>",
+        ]
+        if busy:
+            parts.append("<span class='dim'>computing …</span>")
+    return "".join(parts)

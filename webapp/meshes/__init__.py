@@ -1,0 +1,1 @@
+"""Shapes as plain triangle meshes: numpy in, numpy out. Metres, body or fin frame."""

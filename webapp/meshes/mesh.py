@@ -1,0 +1,99 @@
+"""A triangle mesh, and the surfaces that the shapes are made of."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Mesh(NamedTuple):
+    """Triangles with outward normals."""
+
+    vertices: Array
+    """Points (V, 3) [m]."""
+    faces: NDArray[np.int32]
+    """Corners of the triangles (F, 3), counter-clockwise from outside."""
+
+
+def joined(*meshes: Mesh) -> Mesh:
+    """Several meshes as one."""
+    vertices, faces, offset = [], [], 0
+    for mesh in meshes:
+        vertices.append(mesh.vertices)
+        faces.append(mesh.faces + offset)
+        offset += len(mesh.vertices)
+    return Mesh(np.concatenate(vertices), np.concatenate(faces).astype(np.int32))
+
+
+def tube(path: Array, radius: Array | float, sides: int = 16, across: Array | None = None) -> Mesh:
+    """A closed round tube along a path (P, 3); `radius` may change along it.
+
+    Args:
+        path: points (P, 3) of the axis, no two neighbours equal.
+        radius: one radius, or one per point (P,) [m].
+        sides: corners of the cross-section.
+        across: a direction (3,) that is never along the path; chosen from the path if left out.
+    """
+    radius = np.broadcast_to(np.asarray(radius, dtype=float), (len(path),))
+    tangent = np.gradient(path, axis=0)
+    # Where the path stands still (a step of the radius) the direction of travel is taken from its whole.
+    still = np.linalg.norm(tangent, axis=1) < 1e-12
+    tangent[still] = path[-1] - path[0]
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    if across is None:
+        across = np.eye(3)[np.argmin(np.abs(tangent).max(axis=0))]
+    first = np.cross(tangent, across)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    second = np.cross(tangent, first)
+    turn = np.linspace(0, 2 * np.pi, sides, endpoint=False)
+    ring = np.cos(turn)[None, :, None] * first[:, None] + np.sin(turn)[None, :, None] * second[:, None]
+    points = path[:, None] + radius[:, None, None] * ring
+    vertices = np.concatenate([points.reshape(-1, 3), path[:1], path[-1:]])
+    faces = list(_grid_faces(len(path), sides))
+    start, end = len(vertices) - 2, len(vertices) - 1
+    last = (len(path) - 1) * sides
+    for k in range(sides):
+        n = (k + 1) % sides
+        faces += [(start, n, k), (end, last + k, last + n)]
+    return Mesh(vertices, np.array(faces, dtype=np.int32))
+
+
+def _grid_faces(rows: int, columns: int) -> list[tuple[int, int, int]]:
+    """Triangles between neighbouring rings of points; the columns close on themselves."""
+    faces = []
+    for r in range(rows - 1):
+        for k in range(columns):
+            a, b = r * columns + k, r * columns + (k + 1) % columns
+            faces += [(a, b, a + columns), (b, b + columns, a + columns)]
+    return faces
+
+
+def revolved(x: Array, radius_y: Array, radius_z: Array, power: float = 2.0, sides: int = 48) -> Mesh:
+    """A closed body along the x axis whose cross-section at `x` is a superellipse.
+
+    Args:
+        x: stations (P,), falling or rising [m].
+        radius_y: half width (P,) at each station [m].
+        radius_z: half height (P,) at each station [m].
+        power: 2 is an ellipse, larger is boxier.
+        sides: corners of the cross-section.
+    """
+    turn = np.linspace(0, 2 * np.pi, sides, endpoint=False)
+    cos, sin = np.cos(turn), np.sin(turn)
+    unit_y = np.sign(cos) * np.abs(cos) ** (2 / power)
+    unit_z = np.sign(sin) * np.abs(sin) ** (2 / power)
+    points = np.stack(
+        [
+            np.broadcast_to(x[:, None], (len(x), sides)),
+            radius_y[:, None] * unit_y[None],
+            radius_z[:, None] * unit_z[None],
+        ],
+        axis=-1,
+    )
+    vertices = points.reshape(-1, 3)
+    faces = np.array(_grid_faces(len(x), sides), dtype=np.int32)
+    if x[-1] < x[0]:
+        faces = faces[:, ::-1].copy()
+    return Mesh(vertices, faces)

@@ -1,0 +1,53 @@
+"""What a panel may ask of the page it stands in."""
+
+from collections.abc import Callable
+from typing import Protocol
+
+import viser
+
+from finlab.allocation.allocation import Allocation
+from webapp.session import Session
+
+
+class Host(Protocol):
+    """The page of one browser, as a panel sees it."""
+
+    client: viser.ClientHandle
+    """The browser."""
+    session: Session
+    """What it shows."""
+
+    @property
+    def best(self) -> Allocation | None:
+        """The newest answer; it may be older than the state."""
+
+    @property
+    def shown(self) -> Allocation | None:
+        """The answer with the chosen candidate's command."""
+
+    @property
+    def busy(self) -> bool:
+        """True while a newer answer is being computed."""
+
+    @property
+    def error(self) -> str | None:
+        """Why there is no answer to the present state, if there is none."""
+
+    def do(self, act: Callable[[], object]) -> None:
+        """Carry out an intent: show what changed, or tell the user why not."""
+
+    def notify(self, title: str, body: str, *, good: bool = False) -> None:
+        """Show a note to the user."""
+
+    def look_from(self, view: str) -> None:
+        """Move the camera."""
+
+    def export_graph(self) -> None:
+        """Make the layout graph file and send it to the browser."""
+
+
+class Panel(Protocol):
+    """A group of widgets."""
+
+    def refresh(self) -> None:
+        """Write the session and the answer into the widgets."""

@@ -1,0 +1,107 @@
+"""The layout: pick one, and place its fins by numbers or by hand."""
+
+import math
+from functools import partial
+from html import escape
+
+import viser
+
+from finlab.assets import shipped_layouts
+from finlab.layout import Layout, load_layout
+from webapp.handles import on_user_change, on_user_click, put
+from webapp.panels.host import Host
+from webapp.session import ANGLE_STEPS, POSITION_STEPS
+from webapp.state import MAX_FINS
+
+NONE = "none"
+"""Entry of the list of fins that selects nothing."""
+OWN = "(edited)"
+"""Entry of the list of layouts while the robot is none of them."""
+
+
+class LayoutPanel:
+    """Choose, place, copy and remove."""
+
+    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+        """Build the widgets."""
+        self._host = host
+        self._shipped: dict[str, Layout] = {
+            name: load_layout(path) for name, path in shipped_layouts().items()
+        }
+        self._layouts = gui.add_dropdown(
+            "Layout", (*self._shipped, OWN), hint="Shipped layouts to start from."
+        )
+        on_user_change(self._layouts, self._open)
+        self._about = gui.add_html("")
+        self._fins = gui.add_dropdown("Fin", (NONE,), hint="Or click a fin in the view.")
+        on_user_change(
+            self._fins, lambda name: host.do(partial(host.session.select, None if name == NONE else name))
+        )
+        with gui.add_folder("Place"):
+            self._position = gui.add_vector3(
+                "Position [m]", (0.0, 0.0, 0.0), step=0.005, hint="x forward, y left, z up."
+            )
+            on_user_change(self._position, self._move)
+            self._angle = gui.add_slider(
+                "Shaft [°]", -180.0, 180.0, 1.0, 0.0, hint="Azimuth of the shaft, 0 is ahead."
+            )
+            on_user_change(self._angle, self._turn)
+            self._snap_m = gui.add_button_group("Snap place", tuple(POSITION_STEPS))
+            on_user_change(self._snap_m, partial(self._set_display, "position_snap"))
+            self._snap_deg = gui.add_button_group("Snap turn", tuple(ANGLE_STEPS))
+            on_user_change(self._snap_deg, partial(self._set_display, "angle_snap"))
+            self._snaps = gui.add_html("")
+        self._edit = gui.add_button_group("Selected fin", ("Mirror", "Duplicate", "Delete"))
+        on_user_change(self._edit, self._edit_fin)
+        self._add = gui.add_button("Add a fin", icon=viser.Icon.PLUS, hint=f"Up to {MAX_FINS} fins.")
+        on_user_click(self._add, lambda: host.do(host.session.add_fin))
+
+    def _open(self, name: str) -> None:
+        if name in self._shipped:
+            self._host.do(partial(self._host.session.open_layout, self._shipped[name]))
+        else:
+            self.refresh()
+
+    def _move(self, position: tuple[float, float, float]) -> None:
+        if self._host.session.selected is not None:
+            self._host.do(partial(self._host.session.move_fin, self._host.session.selected, position))
+
+    def _turn(self, degrees: float) -> None:
+        if self._host.session.selected is not None:
+            self._host.do(
+                partial(self._host.session.turn_fin, self._host.session.selected, math.radians(degrees))
+            )
+
+    def _set_display(self, key: str, value: str) -> None:
+        self._host.do(partial(self._host.session.set_display, key, value))
+
+    def _edit_fin(self, button: str) -> None:
+        session = self._host.session
+        acts = {
+            "Mirror": session.mirror_fin,
+            "Duplicate": session.duplicate_fin,
+            "Delete": session.delete_fin,
+        }
+        if button in acts:
+            self._host.do(acts[button])
+
+    def refresh(self) -> None:
+        """Write the layout and the selected fin."""
+        session, layout = self._host.session, self._host.session.state.layout
+        match = next((name for name, known in self._shipped.items() if known == layout), OWN)
+        put(self._layouts, value=match)
+        put(self._fins, options=(NONE, *layout.names))
+        put(self._fins, value=session.selected or NONE)
+        selected = session.selected is not None
+        put(self._position, disabled=not selected)
+        put(self._angle, disabled=not selected)
+        if session.selected is not None:
+            fin = layout.fins[layout.index(session.selected)]
+            put(self._position, value=tuple(round(v, 4) for v in fin.position))
+            put(self._angle, value=round(math.degrees(fin.mounting_angle), 1))
+        display = session.display
+        snaps = f"snap {display.position_snap} · turn {display.angle_snap}"
+        hint = "" if selected else "Click a fin to select it. "
+        put(self._snaps, content=f"<div class='fl dim'>{hint}{snaps}</div>")
+        first = layout.description.strip().split("\n")[0]
+        put(self._about, content=f"<div class='fl dim'>{escape(first)}</div>")

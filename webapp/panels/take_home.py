@@ -1,0 +1,64 @@
+"""Files: open and save a layout, export the graph for deployment, copy the command line."""
+
+import shlex
+from functools import partial
+from html import escape
+from typing import Any
+
+import viser
+
+from webapp import files
+from webapp.handles import on_user_click, put
+from webapp.panels.host import Host
+
+
+class TakeHomePanel:
+    """Buttons for files, and the same question as a command."""
+
+    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+        """Build the widgets."""
+        self._host = host
+        self._open = gui.add_upload_button(
+            "Open a layout file", icon=viser.Icon.FOLDER_OPEN, mime_type=".yaml,.yml,.json"
+        )
+        self._save = gui.add_button("Save the layout", icon=viser.Icon.DOWNLOAD, hint="A YAML layout file.")
+        self._export = gui.add_button(
+            "Export the graph file", icon=viser.Icon.FILE_EXPORT, hint="For deployment on the robot."
+        )
+        self._candidates = gui.add_button("Save the candidates (CSV)", icon=viser.Icon.TABLE_EXPORT)
+        on_user_click(self._save, partial(host.do, self._send_layout))
+        on_user_click(self._export, partial(host.do, host.export_graph))
+        on_user_click(self._candidates, partial(host.do, self._send_candidates))
+        self._command = gui.add_html("")
+
+        @self._open.on_upload
+        async def _opened(event: Any) -> None:
+            upload = event.target.value
+            host.do(lambda: host.session.open_layout(files.read_layout(upload.name, upload.content)))
+
+    def _send_layout(self) -> None:
+        layout = self._host.session.state.layout
+        self._host.client.send_file_download(
+            f"{files.file_stem(layout.name)}.yaml", files.layout_bytes(layout), save_immediately=True
+        )
+
+    def _send_candidates(self) -> None:
+        self._host.client.send_file_download(
+            "candidates.csv", files.candidates_csv(self._host.best), save_immediately=True
+        )
+
+    def refresh(self) -> None:
+        """Write the command that asks the same question."""
+        state = self._host.session.state
+        words = ["finlab", "allocate", f"{files.file_stem(state.layout.name)}.yaml", "--wrench"]
+        words += [f"{value:g}" for value in state.target]
+        for name in state.failed:
+            words += ["--failed", name]
+        if state.method != "learned":
+            words += ["--method", state.method]
+        text = escape(shlex.join(words))
+        put(
+            self._command,
+            content=f"<div class='fl'><span class='dim'>The same question on the command line:</span>"
+            f"<pre class='command'>{text}</pre></div>",
+        )

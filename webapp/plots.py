@@ -1,0 +1,71 @@
+"""Data of the candidates' plot, in the shape that uPlot wants: one rising x, and a column per series."""
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+from viser import uplot
+
+from finlab.allocation.allocation import Allocation, Candidates
+from webapp.handles import put
+from webapp.theme import DELIVERED, SKY, VERMILLION, css
+
+Array = NDArray[np.float64]
+SMALLEST_ERROR = 1e-5
+"""Errors below this are drawn here; the axis is logarithmic."""
+FONT = "11px sans-serif"
+
+
+def add_candidate_plot(gui: viser.GuiApi, height: int) -> viser.GuiUplotHandle:
+    """A plot of energy against error, empty; `height` in pixels."""
+
+    def dots(label: str, color: str, size: int, filled: bool = True) -> uplot.Series:
+        points = uplot.Series_Points(show=True, size=size, stroke=color, width=1.5)
+        if filled:
+            points["fill"] = color
+        return uplot.Series(label=label, stroke=color, width=0, points=points)
+
+    def axis(label: str, size: int) -> uplot.Axis:
+        return uplot.Axis(label=label, labelSize=18, size=size, labelFont=FONT, font=FONT)
+
+    return gui.add_uplot(
+        candidate_data(None, None, 0),
+        (
+            uplot.Series(label="energy"),
+            dots("sampled", css(SKY, 0.75), 5),
+            dots("refined", css(DELIVERED), 8),
+            dots("shown", css(VERMILLION), 15, filled=False),
+        ),
+        scales={"x": uplot.Scale(time=False), "y": uplot.Scale(distr=3)},
+        axes=(axis("energy", 30), axis("error", 46)),
+        height=height,
+    )
+
+
+def refresh_candidate_plot(plot: viser.GuiUplotHandle, answer: Allocation | None, shown: int) -> None:
+    """Put an answer's samples and candidates into the plot; `shown` is the one on the robot."""
+    if answer is None:
+        return
+    put(plot, data=candidate_data(answer.samples, answer.candidates, shown))
+
+
+def candidate_data(samples: Candidates | None, refined: Candidates | None, shown: int) -> tuple[Array, ...]:
+    """Columns: energy, then the errors of samples, refined ones and the shown one; NaN means no dot."""
+    groups = [(1, samples), (2, refined)]
+    rows = [
+        (energy, column, error)
+        for column, group in groups
+        if group is not None
+        for energy, error in zip(group.energy, group.err_norm, strict=True)
+    ]
+    if refined is not None and shown < len(refined.energy):
+        rows.append((refined.energy[shown], 3, refined.err_norm[shown]))
+    rows = [row for row in rows if np.isfinite(row[0]) and np.isfinite(row[2])]
+    if not rows:
+        rows = [(0.0, 0, 0.0)]
+    rows.sort(key=lambda row: row[0])
+    data = np.full((4, len(rows)), np.nan)
+    for k, (energy, column, error) in enumerate(rows):
+        data[0, k] = energy
+        if column > 0:
+            data[column, k] = max(error, SMALLEST_ERROR)
+    return tuple(np.ascontiguousarray(column) for column in data)

@@ -1,0 +1,1 @@
+"""What stands in the 3D view. Every node has a fixed name and is changed in place, never added again."""

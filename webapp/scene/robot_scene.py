@@ -1,0 +1,129 @@
+"""The whole 3D view of one browser."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from finlab.allocation.allocation import Allocation
+from webapp.meshes.hull import hull_of
+from webapp.scene.fin_node import FinNode
+from webapp.scene.lines import Lines
+from webapp.scene.stage import Stage
+from webapp.scene.wrench_nodes import WrenchNodes
+from webapp.session import Session
+from webapp.words import is_reached
+
+CAMERAS = {
+    "3D": (0.72, 0.70, 0.52),
+    "Top": (-0.001, 0.0, 1.35),
+    "Side": (0.0, -1.3, 0.1),
+    "Front": (1.3, 0.0, 0.1),
+}
+"""Where the camera stands in each view [m]."""
+
+
+class RobotScene:
+    """Draws a session; tells of clicks and drags through two callbacks."""
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        session: Session,
+        on_select: Callable[[str | None], None],
+        on_drag: Callable[[str, str, tuple[float, float, float], float], None],
+    ) -> None:
+        """Build the nodes of a client's scene.
+
+        Args:
+            client: the browser.
+            session: what it shows.
+            on_select: called with the name of a clicked fin.
+            on_drag: called with name, phase, position [m] and mounting angle [rad] while a fin is dragged.
+        """
+        self._client = client
+        self._session = session
+        self._on_select = on_select
+        self._on_drag = on_drag
+        scene = client.scene
+        self._stage = Stage(scene, hull_of(session.state.layout))
+        self._wrench = WrenchNodes(scene)
+        self._lines = Lines(scene)
+        self._fins: list[FinNode] = []
+        self._dragged: int | None = None
+        self._phase: NDArray[np.float64] = np.zeros(0)
+        self._command: NDArray[np.float64] = np.zeros((0, 3))
+        self.look_from("3D")
+
+    def look_from(self, view: str) -> None:
+        """Move the camera to one of `CAMERAS`."""
+        camera = self._client.camera
+        with self._client.atomic():
+            camera.up_direction = (0.0, 0.0, 1.0)
+            camera.position = CAMERAS[view]
+            camera.look_at = (0.0, 0.0, 0.03)
+
+    def refresh(self, allocation: Allocation | None) -> None:
+        """Show the session's layout, and the answer to it if there is one for this very layout."""
+        state, display = self._session.state, self._session.display
+        hull = hull_of(state.layout)
+        if self._dragged is None:  # a hull that breathes with the fin one drags is hard to aim at
+            self._stage.refresh(hull, display.dark, display.shadows)
+        while len(self._fins) < state.layout.n_fins:
+            self._fins.append(FinNode(self._client.scene, len(self._fins), self._clicked, self._drag))
+        for node in self._fins[state.layout.n_fins :]:
+            node.hide()
+        scale = display.arrow_scale
+        fits = allocation is not None and allocation.layout.names == state.layout.names
+        for i, fin in enumerate(state.layout.fins):
+            selected = fin.name == self._session.selected
+            label = None if not display.labels else f"{i + 1} {fin.name}" if selected else str(i + 1)
+            self._fins[i].place(fin, hull, selected, label, i == self._dragged)
+            if fin.name in state.failed:
+                self._fins[i].command(None, np.zeros(3), 0.0, False)
+            elif fits and allocation is not None and np.isfinite(allocation.command[i, 0]):
+                force = allocation.fin_forces[i]
+                # The force belongs to the answer's own mounting angle, which a drag may have left behind.
+                angle = allocation.layout.fins[i].mounting_angle
+                self._fins[i].command(allocation.command[i], force * scale, angle, display.fans)
+        if fits and allocation is not None:
+            self._take_command(allocation.command)
+        target = np.array(state.target)
+        given = allocation.wrench if allocation is not None else None
+        missing = allocation is not None and not is_reached(allocation)
+        self._wrench.refresh(target, given, missing, hull.center[2] + hull.half[2], scale)
+        shown = self._session.selected if display.dimensions else None
+        self._lines.refresh(state.layout, state.healthy, shown, display.graph)
+
+    def _take_command(self, command: NDArray[np.float64]) -> None:
+        if len(command) != len(self._command):
+            # Different phases look alive; the mean force does not depend on them.
+            self._phase = np.arange(len(command)) * 1.9
+        self._command = command
+
+    def animate(self, elapsed: float) -> None:
+        """Let the fins flap for some time [s] of the clock on the wall."""
+        display = self._session.display
+        alive = np.isfinite(self._command[:, 0])
+        if not display.frozen:
+            frequency = np.where(alive, self._command[:, 1], 0.0)
+            turned = self._phase + 2 * np.pi * frequency * elapsed * display.speed
+            self._phase = np.asarray(turned % (2 * np.pi), dtype=np.float64)
+        for i in range(min(len(self._command), self._session.state.layout.n_fins)):
+            if not alive[i]:
+                angle = math.pi / 2  # a limp fin hangs down
+            else:
+                swing = 0.0 if display.frozen else self._command[i, 0] * math.sin(self._phase[i])
+                angle = float(self._command[i, 2] + swing)
+            self._fins[i].pose_blade(angle)
+
+    def _clicked(self, index: int) -> None:
+        self._on_select(self._session.state.layout.names[index])
+
+    def _drag(self, index: int, phase: str, position: tuple[float, float, float], angle: float) -> None:
+        if index >= self._session.state.layout.n_fins:
+            return
+        self._dragged = None if phase == "end" else index
+        self._on_drag(self._session.state.layout.names[index], phase, position, angle)

@@ -1,0 +1,69 @@
+"""The water, the floor, the hull and its axes."""
+
+import numpy as np
+import viser
+
+from webapp.handles import put
+from webapp.meshes.hull import Hull
+from webapp.theme import Look, look
+
+FLOOR_SIZE = 6.0
+"""Side of the floor's grid [m]."""
+
+
+class Stage:
+    """Everything that stays where it is while fins are edited."""
+
+    def __init__(self, scene: viser.SceneApi, hull: Hull) -> None:
+        """Build the stage around a hull."""
+        self._scene = scene
+        self._dark: bool | None = None
+        self._shadows: bool | None = None
+        self._hull = hull
+        mesh, bow = hull.mesh(), hull.bow()
+        self._body = scene.add_mesh_simple("/hull", mesh.vertices, mesh.faces, side="double")
+        self._bow = scene.add_mesh_simple(
+            "/hull/bow", bow.vertices, bow.faces, side="double", cast_shadow=False
+        )
+        scene.add_frame(
+            "/axes", axes_length=0.09, axes_radius=0.004, origin_radius=0.009, origin_color=(40, 40, 40)
+        )
+        self._grid = scene.add_grid(
+            "/floor",
+            FLOOR_SIZE,
+            FLOOR_SIZE,
+            cell_size=0.1,
+            section_size=0.5,
+            cell_thickness=0.6,
+            section_thickness=1.0,
+            fade_distance=5.0,
+            fade_strength=1.6,
+            shadow_opacity=0.22,
+        )
+
+    def refresh(self, hull: Hull, dark: bool, shadows: bool) -> None:
+        """Show another hull, theme or quality."""
+        if hull != self._hull:
+            self._hull = hull
+            for node, mesh in ((self._body, hull.mesh()), (self._bow, hull.bow())):
+                put(node, vertices=mesh.vertices.astype(np.float32), faces=mesh.faces.astype(np.uint32))
+        put(self._grid, position=np.array([0.0, 0.0, self.floor_height(hull)]))
+        if shadows != self._shadows:
+            self._shadows = shadows
+            self._scene.configure_default_lights(cast_shadow=shadows)
+        if dark != self._dark:
+            self._dark = dark
+            self._paint(look(dark))
+
+    @staticmethod
+    def floor_height(hull: Hull) -> float:
+        """Height of the floor: a hand below the keel [m]."""
+        return hull.center[2] - hull.half[2] - 0.22
+
+    def _paint(self, colors: Look) -> None:
+        fade = np.linspace(0, 1, 64)[:, None, None]
+        water = (1 - fade) * np.array(colors.water_top) + fade * np.array(colors.water_bottom)
+        self._scene.set_background_image(np.repeat(water, 8, axis=1).astype(np.uint8), format="png")
+        put(self._grid, cell_color=colors.grid, section_color=colors.grid_section)
+        put(self._body, color=colors.hull)
+        put(self._bow, color=colors.glass)

@@ -1,0 +1,67 @@
+"""The whole robot's wrench above the hull: asked, delivered, and what is missing."""
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from webapp.handles import put
+from webapp.meshes.arrows import NOTHING, RING_RADIUS, force_arrow, torque_ring
+from webapp.meshes.mesh import Mesh, tube
+from webapp.theme import ASKED, DELIVERED, LIGHT, MISSING
+
+Array = NDArray[np.float64]
+HEIGHT = 0.16
+"""How far above the hull the arrows begin [m]; inside it they could not be seen."""
+
+
+class WrenchNodes:
+    """Arrows and rings over a stalk that stands on the centre of gravity."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        """Build the nodes, showing nothing."""
+        self._root = scene.add_frame("/wrench", show_axes=False)
+        stalk = tube(np.array([[0, 0, -HEIGHT - 0.2], [0, 0, 0.0]]), 0.0025, 10)
+        scene.add_mesh_simple(
+            "/wrench/stalk", stalk.vertices, stalk.faces, color=LIGHT.line, cast_shadow=False
+        )
+        self._hub = scene.add_icosphere("/wrench/hub", 0.012, color=(70, 78, 86), cast_shadow=False)
+
+        def node(name: str, color: tuple[int, int, int], opacity: float | None) -> viser.MeshHandle:
+            return scene.add_mesh_simple(
+                f"/wrench/{name}",
+                NOTHING.vertices,
+                NOTHING.faces,
+                color=color,
+                opacity=opacity,
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+
+        self._asked = node("asked_force", ASKED, 0.4), node("asked_torque", ASKED, 0.4)
+        self._given = node("delivered_force", DELIVERED, None), node("delivered_torque", DELIVERED, None)
+        self._missing = node("missing_force", MISSING, None), node("missing_torque", MISSING, None)
+
+    def refresh(self, target: Array, wrench: Array | None, missing: bool, top: float, scale: float) -> None:
+        """Show a target (6,) and what is delivered of it (6,), None while unknown.
+
+        Args:
+            target: asked wrench [N, N m].
+            wrench: delivered wrench.
+            missing: whether the difference matters enough to be drawn.
+            top: height of the hull's top [m].
+            scale: length of a force arrow per newton [m/N].
+        """
+        put(self._root, position=np.array([0.0, 0.0, top + HEIGHT]))
+        zero = np.zeros(3)
+        _show(self._asked[0], force_arrow(target[:3] * scale, zero, 0.011))
+        _show(self._asked[1], torque_ring(target[3:], zero, 0.0085))
+        given = np.zeros(6) if wrench is None else wrench
+        _show(self._given[0], force_arrow(given[:3] * scale, zero, 0.0065))
+        _show(self._given[1], torque_ring(given[3:], zero, 0.005))
+        rest = target - given if missing and wrench is not None else np.zeros(6)
+        _show(self._missing[0], force_arrow(rest[:3] * scale, given[:3] * scale, 0.006))
+        _show(self._missing[1], torque_ring(rest[3:], zero, 0.005, radius=1.35 * RING_RADIUS))
+
+
+def _show(node: viser.MeshHandle, mesh: Mesh) -> None:
+    put(node, vertices=mesh.vertices.astype(np.float32), faces=mesh.faces.astype(np.uint32))

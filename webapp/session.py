@@ -1,0 +1,215 @@
+"""One browser's session: its state with undo, and how it is looked at. Knows nothing of pages and widgets.
+
+Every method is an intent of the user. It either changes the session as a whole, or raises a `FinlabError`
+with a sentence for the user and changes nothing.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+from finlab.errors import FinlabError
+from finlab.layout import Layout
+from webapp import editing
+from webapp.history import History
+from webapp.state import AXES, State, number
+from webapp.targets import FIRST, PRESETS
+
+POSITION_STEPS = {"off": 0.0, "5 mm": 0.005, "1 cm": 0.01, "5 cm": 0.05}
+"""Grids [m] that a fin's position can snap to."""
+ARROW_NEWTONS = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
+"""Scales to choose from: what an arrow of 0.1 m stands for [N]."""
+ANGLE_STEPS = {"off": 0.0, "5°": 5.0, "15°": 15.0, "45°": 45.0}
+"""Grids [deg] that a mounting angle can snap to."""
+
+
+@dataclass(frozen=True)
+class Display:
+    """How the robot is shown. Not part of undo."""
+
+    frozen: bool = False
+    """Fins hold still at their zero direction."""
+    speed: float = 0.5
+    """Time of the animation per real time."""
+    fans: bool = True
+    """Show the sweep of each fin."""
+    labels: bool = True
+    """Show the numbers of the fins."""
+    graph: bool = False
+    """Show the edges of the graph that the network sees."""
+    dimensions: bool = True
+    """Show the selected fin's distance from the centre of gravity."""
+    shadows: bool = True
+    """Cast shadows; slow without a graphics card."""
+    dark: bool = False
+    """Dark theme."""
+    newtons: float = 1.0
+    """Force that an arrow of 0.1 m stands for [N]."""
+    position_snap: str = "off"
+    """Key of `POSITION_STEPS`."""
+    angle_snap: str = "off"
+    """Key of `ANGLE_STEPS`."""
+
+    @property
+    def arrow_scale(self) -> float:
+        """Length of a force arrow per newton [m/N]."""
+        return 0.1 / self.newtons
+
+
+class Session:
+    """What one browser has made so far."""
+
+    def __init__(self, layout: Layout, display: Display | None = None) -> None:
+        """Start with a layout, no failures, and a gentle wrench forward and to the left."""
+        self.history: History[State] = History(State(layout, target=FIRST))
+        self.display = display or Display()
+        self.selected: str | None = None
+        self.candidate = 0
+        """Which of the answer's candidates is shown; 0 is the best one."""
+        self.revision = 0
+        """Grows with every change of the state; an answer carries the revision it was made for."""
+
+    @property
+    def state(self) -> State:
+        """The present state."""
+        return self.history.state
+
+    def _commit(self, name: str, state: State, merge_key: str | None = None, timed: bool = True) -> None:
+        if state != self.state:
+            self.history.commit(name, state, merge_key, timed)
+            self._settled()
+
+    def _settled(self) -> None:
+        """After any change of the state: a choice of candidate is void, a lost fin is not selected."""
+        self.revision += 1
+        self.candidate = 0
+        if self.selected not in self.state.layout.names:
+            self.selected = None
+
+    # The question.
+
+    def set_target(self, axis: int, value: Any) -> None:
+        """One component of the target wrench [N or N m]."""
+        self._commit(f"Set {AXES[axis]}", self.state.with_target(axis, value), f"target{axis}")
+
+    def set_preset(self, name: str) -> None:
+        """The target wrench of a preset."""
+        if name not in PRESETS:
+            raise FinlabError(f"there is no preset {name!r:.40}")
+        self._commit(f"Preset {name}", replace(self.state, target=PRESETS[name]))
+
+    def set_setting(self, key: str, value: Any) -> None:
+        """K, T, gamma or the method; `key` is the field of `State`."""
+        self._commit(f"Set {key.replace('_', ' ')}", self.state.with_setting(key, value), key)
+
+    def toggle_failure(self, name: str) -> None:
+        """A fin fails, or is repaired."""
+        verb = "Repair" if name in self.state.failed else "Fail"
+        self._commit(f"{verb} {name}", self.state.with_failure_toggled(name))
+
+    # The layout.
+
+    def open_layout(self, layout: Layout) -> None:
+        """Another layout; the target stays, failures are forgotten."""
+        self._commit(f"Open {layout.name}", replace(self.state, layout=layout, failed=()))
+
+    def move_fin(self, name: str, position: tuple[float, float, float]) -> None:
+        """A fin at another place [m], snapped."""
+        step = POSITION_STEPS[self.display.position_snap]
+        self._edit(f"Move {name}", editing.moved(self.state.layout, name, position, step), f"move {name}")
+
+    def turn_fin(self, name: str, angle: float) -> None:
+        """A fin with another mounting angle [rad], snapped."""
+        step = math.radians(ANGLE_STEPS[self.display.angle_snap])
+        self._edit(f"Turn {name}", editing.turned(self.state.layout, name, angle, step), f"turn {name}")
+
+    def drag_fin(self, name: str, position: tuple[float, float, float], angle: float) -> None:
+        """A fin on its way in the user's hand: not snapped yet, and one step of undo for the whole drag."""
+        layout = editing.turned(editing.moved(self.state.layout, name, position), name, angle)
+        self._commit(f"Move {name}", self.state.with_layout(layout), f"drag {name}", timed=False)
+
+    def end_drag(self, name: str, position: tuple[float, float, float], angle: float) -> None:
+        """A drag is over: snap, and let the next change be a step of its own."""
+        snap_m = POSITION_STEPS[self.display.position_snap]
+        snap_rad = math.radians(ANGLE_STEPS[self.display.angle_snap])
+        layout = editing.turned(
+            editing.moved(self.state.layout, name, position, snap_m), name, angle, snap_rad
+        )
+        self._commit(f"Move {name}", self.state.with_layout(layout), f"drag {name}", timed=False)
+        self.history.end_merge()
+
+    def add_fin(self) -> None:
+        """One more fin; it is selected."""
+        layout, name = editing.added(self.state.layout)
+        self._edit(f"Add {name}", layout)
+        self.selected = name
+
+    def duplicate_fin(self) -> None:
+        """A copy of the selected fin; it is selected."""
+        source = self._selected_name()
+        layout, name = editing.duplicated(self.state.layout, source)
+        self._edit(f"Duplicate {source}", layout)
+        self.selected = name
+
+    def mirror_fin(self) -> None:
+        """The selected fin's image on the other side; it is selected."""
+        source = self._selected_name()
+        layout, name = editing.mirrored(self.state.layout, source)
+        self._edit(f"Mirror {source}", layout)
+        self.selected = name
+
+    def delete_fin(self) -> None:
+        """The selected fin goes."""
+        name = self._selected_name()
+        self._edit(f"Delete {name}", editing.deleted(self.state.layout, name))
+
+    def _edit(self, name: str, layout: Layout, merge_key: str | None = None) -> None:
+        self._commit(name, self.state.with_layout(layout), merge_key)
+
+    def _selected_name(self) -> str:
+        if self.selected is None:
+            raise FinlabError("no fin is selected; click one, or choose it in the list")
+        return self.selected
+
+    # Looking.
+
+    def select(self, name: str | None) -> None:
+        """Select a fin, or none."""
+        if name is not None:
+            self.state.layout.index(name)
+        self.selected = name
+        self.history.end_merge()
+
+    def select_next(self) -> None:
+        """Select the fin after the selected one."""
+        names = self.state.layout.names
+        self.select(names[(names.index(self.selected) + 1) % len(names)] if self.selected else names[0])
+
+    def show_candidate(self, index: int) -> None:
+        """Show one of the answer's candidates on the robot."""
+        self.candidate = max(0, int(index))
+
+    def set_display(self, key: str, value: Any) -> None:
+        """One field of `Display`."""
+        choices = {"position_snap": POSITION_STEPS, "angle_snap": ANGLE_STEPS}
+        if key in choices and value not in choices[key]:
+            raise FinlabError(f"{key}: expected one of {', '.join(choices[key])}, got {value!r:.40}")
+        if key == "newtons" and value not in ARROW_NEWTONS:
+            raise FinlabError(f"arrow scale: expected one of {ARROW_NEWTONS} N per 0.1 m, got {value!r:.40}")
+        if key == "speed":
+            value = number(value, "speed of the animation", 0.02, 1.0)
+        self.display = replace(self.display, **{key: value})
+
+    def undo(self) -> str:
+        """Take back the last step; returns its name."""
+        return self._stepped(self.history.undo(), "undo")
+
+    def redo(self) -> str:
+        """Bring back the step taken back last; returns its name."""
+        return self._stepped(self.history.redo(), "redo")
+
+    def _stepped(self, name: str | None, verb: str) -> str:
+        if name is None:
+            raise FinlabError(f"there is nothing to {verb}")
+        self._settled()
+        return name

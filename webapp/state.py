@@ -1,0 +1,101 @@
+"""What a browser works on: one immutable, checked value that undo can put back."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from finlab.allocation.methods import METHODS
+from finlab.errors import FinlabError
+from finlab.layout import Layout
+
+AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+"""Names of the wrench's components, in the order of the library."""
+AXIS_WORDS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+"""What a pilot calls them."""
+AXIS_UNITS = ("N", "N", "N", "N m", "N m", "N m")
+"""Their units."""
+
+MAX_TARGET = 1000.0
+"""Largest target component that the page may ask for [N, N m]."""
+MAX_FINS = 8
+"""Most fins that can be placed in the browser; files may hold more."""
+CANDIDATE_RANGE = (4, 256)
+"""How many candidates K the mixture may be asked for."""
+TEMPERATURE_RANGE = (0.0, 2.0)
+"""Temperatures T of the mixture."""
+GAMMA_RANGE = (0.0, 1.0)
+"""Weights gamma of the energy in the ranking."""
+
+
+@dataclass(frozen=True)
+class State:
+    """A layout, its failures and the question asked of it."""
+
+    layout: Layout
+    """The robot."""
+    failed: tuple[str, ...] = ()
+    """Names of failed fins, in the order of the layout."""
+    target: tuple[float, float, float, float, float, float] = (0.0,) * 6
+    """Desired wrench [N, N m], body frame."""
+    n_candidates: int = 64
+    """K, how many candidates are drawn from the mixture."""
+    temperature: float = 0.02
+    """T, how far the draws may stray from the mixture's means."""
+    gamma: float = 0.01
+    """Weight of the energy in the ranking."""
+    method: str = "learned"
+    """Name of the allocation method."""
+
+    @property
+    def healthy(self) -> tuple[str, ...]:
+        """Names of the fins that work."""
+        return tuple(name for name in self.layout.names if name not in self.failed)
+
+    def with_target(self, axis: int, value: Any) -> "State":
+        """One component of the target changed."""
+        checked = number(value, f"{AXES[axis]} [{AXIS_UNITS[axis]}]", -MAX_TARGET, MAX_TARGET)
+        target = list(self.target)
+        target[axis] = checked
+        fx, fy, fz, tx, ty, tz = target
+        return replace(self, target=(fx, fy, fz, tx, ty, tz))
+
+    def with_failure_toggled(self, name: str) -> "State":
+        """One fin failed or repaired; the last working fin cannot fail."""
+        self.layout.index(name)
+        lost = set(self.failed) ^ {name}
+        if len(lost) == self.layout.n_fins:
+            raise FinlabError(
+                f"{name} is the last fin that works, so it cannot fail too; repair another one first"
+            )
+        return replace(self, failed=tuple(n for n in self.layout.names if n in lost))
+
+    def with_layout(self, layout: Layout) -> "State":
+        """Another layout; failures of fins that still exist stay, unless none would work."""
+        failed = tuple(name for name in layout.names if name in self.failed)
+        return replace(self, layout=layout, failed=() if len(failed) == layout.n_fins else failed)
+
+    def with_setting(self, key: str, value: Any) -> "State":
+        """K, T, gamma or the method changed: `key` is the field's name."""
+        if key == "method":
+            if value not in METHODS:
+                raise FinlabError(f"method: expected one of {', '.join(METHODS)}, got {value!r:.60}")
+            return replace(self, method=value)
+        if key == "n_candidates":
+            return replace(self, n_candidates=round(number(value, "candidates K", *CANDIDATE_RANGE)))
+        if key == "temperature":
+            return replace(self, temperature=number(value, "temperature T", *TEMPERATURE_RANGE))
+        if key == "gamma":
+            return replace(self, gamma=number(value, "energy weight gamma", *GAMMA_RANGE))
+        raise FinlabError(f"there is no setting {key!r:.40}")
+
+
+def number(value: Any, name: str, low: float, high: float) -> float:
+    """A finite number within limits, or a sentence that says what is wrong; the page may send anything.
+
+    Raises:
+        FinlabError: `value` is not such a number.
+    """
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise FinlabError(f"{name}: expected a number, got {value!r:.60}")
+    if not low <= value <= high:  # a NaN compares false as well
+        raise FinlabError(f"{name}: expected a number from {low:g} to {high:g}, got {value:g}")
+    return float(value)

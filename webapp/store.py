@@ -1,0 +1,49 @@
+"""Sessions by key. A browser keeps keys, the server keeps what they stand for."""
+
+import secrets
+import time
+from collections.abc import Callable, Iterable
+
+from webapp.session import Session
+
+MAX_SESSIONS = 64
+"""Sessions that are kept; beyond it the ones left longest ago are forgotten."""
+
+
+class SessionStore:
+    """All sessions of this server, each shown in one tab at a time."""
+
+    def __init__(self, make: Callable[[], Session]) -> None:
+        """`make` gives a fresh session."""
+        self._make = make
+        self._sessions: dict[str, Session] = {}
+        self._open: set[str] = set()
+        self._left: dict[str, float] = {}
+
+    def enter(self, keys: Iterable[str]) -> tuple[str, Session]:
+        """The session for a tab, and its key.
+
+        Args:
+            keys: what this browser remembers. The first one that no other tab shows is taken, so that a
+                reload finds its work again and a second tab gets a session of its own.
+        """
+        key = next((k for k in keys if k in self._sessions and k not in self._open), None)
+        if key is None:
+            key = secrets.token_urlsafe(12)
+            self._sessions[key] = self._make()
+            self._forget_old()
+        self._open.add(key)
+        return key, self._sessions[key]
+
+    def leave(self, key: str) -> None:
+        """The tab has gone; its session waits for the next one."""
+        self._open.discard(key)
+        self._left[key] = time.monotonic()
+
+    def _forget_old(self) -> None:
+        waiting = sorted(
+            (k for k in self._sessions if k not in self._open), key=lambda k: self._left.get(k, 0.0)
+        )
+        for key in waiting[: max(0, len(self._sessions) - MAX_SESSIONS)]:
+            del self._sessions[key]
+            self._left.pop(key, None)

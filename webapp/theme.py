@@ -1,0 +1,97 @@
+"""Colours and sizes of everything that is drawn: the Okabe-Ito palette, safe for colour-blind eyes."""
+
+import math
+from dataclasses import dataclass
+
+Rgb = tuple[int, int, int]
+
+BLUE: Rgb = (0, 114, 178)
+GREEN: Rgb = (0, 158, 115)
+VERMILLION: Rgb = (213, 94, 0)
+ORANGE: Rgb = (230, 159, 0)
+SKY: Rgb = (86, 180, 233)
+PURPLE: Rgb = (204, 121, 167)
+YELLOW: Rgb = (240, 228, 66)
+
+ASKED = BLUE
+"""The target wrench, wherever it is drawn."""
+DELIVERED = GREEN
+"""The wrench that the fins give."""
+MISSING = VERMILLION
+"""What is left undone, and every warning."""
+DEAD: Rgb = (150, 154, 158)
+"""A failed fin."""
+
+FIN_COLORS: tuple[Rgb, ...] = (
+    ORANGE,
+    SKY,
+    PURPLE,
+    YELLOW,
+    (153, 97, 0),  # darker relatives of the first four, for robots with many fins
+    (35, 112, 160),
+    (140, 66, 105),
+    (150, 140, 20),
+)
+"""One colour per fin, in order; asked, delivered and missing keep their three colours to themselves."""
+
+TORQUE_SCALE = math.pi
+"""Angle of a torque ring per newton metre [rad/(N m)]: 1 N m is half a turn."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What differs between the light and the dark theme."""
+
+    water_top: Rgb
+    """Colour of the water at the top of the view."""
+    water_bottom: Rgb
+    """Colour of the water at the bottom of the view."""
+    grid: Rgb
+    """Fine lines of the floor."""
+    grid_section: Rgb
+    """Strong lines of the floor."""
+    hull: Rgb
+    """The hull."""
+    glass: Rgb
+    """The window that marks the bow."""
+    metal: Rgb
+    """Shafts and struts."""
+    line: Rgb
+    """Thin lines: the graph, dimension lines, stalks."""
+
+
+LIGHT = Look(
+    water_top=(241, 247, 250),
+    water_bottom=(190, 218, 232),
+    grid=(176, 203, 216),
+    grid_section=(142, 176, 193),
+    hull=(226, 230, 233),
+    glass=(44, 62, 78),
+    metal=(98, 108, 118),
+    line=(84, 104, 118),
+)
+DARK = Look(
+    water_top=(24, 42, 54),
+    water_bottom=(9, 18, 26),
+    grid=(30, 54, 68),
+    grid_section=(48, 80, 98),
+    hull=(176, 184, 190),
+    glass=(20, 30, 40),
+    metal=(120, 130, 140),
+    line=(150, 170, 184),
+)
+
+
+def look(dark: bool) -> Look:
+    """The look of the dark or the light theme."""
+    return DARK if dark else LIGHT
+
+
+def fin_color(index: int) -> Rgb:
+    """Colour of the fin at this place in the layout."""
+    return FIN_COLORS[index % len(FIN_COLORS)]
+
+
+def css(color: Rgb, alpha: float = 1.0) -> str:
+    """The colour as CSS."""
+    return f"rgba({color[0]},{color[1]},{color[2]},{alpha:g})"

@@ -1,0 +1,215 @@
+"""One browser's page: turns intents into changes of the session, and answers into what the page shows.
+
+Everything here runs on viser's event loop; only the solver's work is handed to the worker's thread.
+"""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import viser
+
+from finlab.allocation.allocation import Allocation
+from finlab.errors import FinlabError
+from webapp import files
+from webapp.commands import add_commands
+from webapp.panels.display import DisplayPanel
+from webapp.panels.header import Header
+from webapp.panels.host import Panel
+from webapp.panels.layout import LayoutPanel
+from webapp.panels.modes import ModesPanel
+from webapp.panels.take_home import TakeHomePanel
+from webapp.panels.wrench import WrenchPanel
+from webapp.scene.robot_scene import RobotScene
+from webapp.session import Session
+from webapp.solver import Solver
+from webapp.theme import BLUE, GREEN, VERMILLION
+from webapp.worker import Worker
+
+PANEL_WIDTH = 410
+"""Width of the panel beside the view [px]."""
+
+
+class View:
+    """Panels and scene of one client around its session."""
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        session: Session,
+        solver: Solver,
+        worker: Worker,
+        loop: asyncio.AbstractEventLoop,
+    ) -> None:
+        """Build the page and ask for a first answer."""
+        self.client = client
+        self.session = session
+        self._solver = solver
+        self._worker = worker
+        self._loop = loop
+        self._closed = False
+        self._asked = -1
+        self._best: Allocation | None = None
+        self._best_revision = -1
+        self._error: str | None = None
+        self._error_revision = -1
+        self._shown: tuple[Allocation, int, Allocation] | None = None
+        self._dark: bool | None = None
+        self._panels: list[Panel] = []
+        self._build()
+        self._apply_theme()
+        self._refresh()
+        self._ask()
+
+    def _build(self) -> None:
+        gui = self.client.gui
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(PANEL_WIDTH)
+        gui.set_panel_label("finlab")
+        self.scene = RobotScene(
+            self.client, self.session, lambda name: self.do(partial(self.session.select, name)), self._drag
+        )
+        self._panels.append(Header(gui, self))
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Wrench", icon=viser.Icon.ARROWS_MOVE):
+            self._panels.append(WrenchPanel(gui, self))
+        with tabs.add_tab("Layout", icon=viser.Icon.FISH):
+            self._panels.append(LayoutPanel(gui, self))
+        with tabs.add_tab("Modes", icon=viser.Icon.CHART_DOTS):
+            self._panels.append(ModesPanel(gui, self))
+        with tabs.add_tab("View", icon=viser.Icon.EYE):
+            self._panels.append(DisplayPanel(gui, self))
+        with tabs.add_tab("Files", icon=viser.Icon.DOWNLOAD):
+            self._panels.append(TakeHomePanel(gui, self))
+        add_commands(gui, self)
+
+    # What panels and scene may ask for.
+
+    @property
+    def best(self) -> Allocation | None:
+        """The newest answer."""
+        return self._best
+
+    @property
+    def shown(self) -> Allocation | None:
+        """The newest answer, with the chosen candidate's command."""
+        best, index = self._best, self.session.candidate
+        if best is None or best.candidates is None or not 0 < index < len(best.candidates.energy):
+            return best
+        if self._shown is None or self._shown[0] is not best or self._shown[1] != index:
+            other = replace(best, command=best.candidates.command[index], wrench_surrogate=None)
+            self._shown = (best, index, other)
+        return self._shown[2]
+
+    @property
+    def busy(self) -> bool:
+        """True while the newest answer is older than the state."""
+        return max(self._best_revision, self._error_revision) != self.session.revision
+
+    @property
+    def error(self) -> str | None:
+        """Why the present state has no answer."""
+        return self._error if self._error_revision == self.session.revision else None
+
+    def do(self, act: Callable[[], object]) -> None:
+        """Carry out an intent; a refusal becomes a note, and the page goes back to what the session holds."""
+        try:
+            act()
+        except FinlabError as error:
+            self.notify("Not possible", str(error))
+        self._apply_theme()
+        self._refresh()
+        self._ask()
+
+    def notify(self, title: str, body: str, *, good: bool = False) -> None:
+        """Show a note to the user."""
+        self.client.add_notification(title, body, auto_close_seconds=8.0, color=GREEN if good else VERMILLION)
+
+    def look_from(self, view: str) -> None:
+        """Move the camera."""
+        self.scene.look_from(view)
+
+    def export_graph(self) -> None:
+        """Make the layout graph file on the worker's thread and send it."""
+        state = self.session.state
+
+        def job() -> None:
+            try:
+                content = files.graph_bytes(state.layout, state.failed, self._solver.allocator(state))
+            except FinlabError as error:
+                self._post(partial(self.notify, "Not exported", str(error)))
+                return
+            name = f"{files.file_stem(state.layout.name)}.graph.json"
+            self._post(partial(self.client.send_file_download, name, content, save_immediately=True))
+
+        self._worker.submit(("export", id(self)), job)
+
+    # From the session to the page.
+
+    def _refresh(self) -> None:
+        with self.client.atomic():
+            for panel in self._panels:
+                panel.refresh()
+            self.scene.refresh(self.shown)
+
+    def _apply_theme(self) -> None:
+        if self.session.display.dark != self._dark:
+            self._dark = self.session.display.dark
+            self.client.gui.configure_theme(
+                dark_mode=self._dark, show_logo=False, show_share_button=False, brand_color=BLUE
+            )
+
+    def _drag(self, name: str, phase: str, position: tuple[float, float, float], angle: float) -> None:
+        if phase == "start":
+            self.session.history.end_merge()
+        elif phase == "end":
+            self.do(partial(self.session.end_drag, name, position, angle))
+        else:
+            self.do(partial(self.session.drag_fin, name, position, angle))
+
+    # From the session to the solver and back.
+
+    def _ask(self) -> None:
+        """Have the worker answer the present state, unless it was asked already."""
+        if self._asked == self.session.revision:
+            return
+        self._asked = self.session.revision
+        state, revision = self.session.state, self.session.revision
+
+        def job() -> None:
+            try:
+                allocation = self._solver.solve(state)
+                _ = allocation.wrench, allocation.energy  # the plant's part belongs to this thread too
+            except FinlabError as error:
+                self._post(partial(self._take_error, revision, str(error)))
+            except Exception as error:  # a fault of a method must not take the page with it
+                self._post(partial(self._take_error, revision, f"{state.method} failed: {error}"))
+                raise
+            else:
+                self._post(partial(self._take, revision, allocation))
+
+        self._worker.submit(id(self), job)
+
+    def _post(self, act: Callable[[], object]) -> None:
+        """Run `act` on the event loop, unless the browser has gone."""
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(lambda: None if self._closed else act())
+
+    def _take(self, revision: int, allocation: Allocation) -> None:
+        if revision < self._best_revision:
+            return
+        self._best, self._best_revision = allocation, revision
+        self._error = None
+        self._refresh()
+
+    def _take_error(self, revision: int, text: str) -> None:
+        if text != self._error:
+            self.notify("No answer", text)
+        self._error, self._error_revision = text, revision
+        self._refresh()
+
+    def close(self) -> None:
+        """The browser has gone."""
+        self._closed = True
+        self._worker.forget(id(self))

@@ -1,0 +1,98 @@
+"""Sentences about an answer, for people."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.allocation import Allocation, Candidates
+from finlab.layout import Layout
+from webapp.state import AXIS_UNITS, AXIS_WORDS
+
+REACHED = 0.05
+"""Normalized error below which a target counts as reached."""
+AT_LIMIT = 0.995
+"""Share of the upper limit from which a command counts as saturated."""
+
+
+def listed(items: Sequence[str]) -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    items = list(items)
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
+
+
+def is_reached(allocation: Allocation) -> bool:
+    """True if the target is delivered closely enough to call it reached."""
+    return allocation.err_norm <= REACHED
+
+
+def reach_sentence(allocation: Allocation) -> str:
+    """One sentence: reachable, or what is missing most and which fins are at their limits."""
+    if is_reached(allocation):
+        return "Reachable"
+    axis = int(np.argmax(np.abs(allocation.unallocated / allocation.sigma)))
+    target, given = allocation.target[axis], allocation.wrench[axis]
+    kind = "force" if axis < 3 else "torque"
+    if abs(target) > 1e-3 and 0.0 <= given / target < 1.0:
+        sentence = f"Not reachable: {100 * given / target:.0f} % of the {AXIS_WORDS[axis]} {kind}"
+    else:
+        sentence = (
+            f"Not reachable: {abs(given - target):.2g} {AXIS_UNITS[axis]} of {AXIS_WORDS[axis]} too much"
+        )
+    full = [str(i + 1) for i, at_limit in enumerate(saturated(allocation)) if at_limit.any()]
+    if not full:
+        return sentence
+    return f"{sentence}; fin{'s' if len(full) > 1 else ''} {listed(full)} at the limit"
+
+
+def rest_sentence(allocation: Allocation) -> str:
+    """One sentence on the unallocated wrench, axis by axis, leaving out what does not matter."""
+    rest = allocation.unallocated
+    parts = [
+        f"{abs(rest[k]):.2g} {AXIS_UNITS[k]} of {AXIS_WORDS[k]}"
+        for k in np.argsort(-np.abs(rest / allocation.sigma))
+        if abs(rest[k] / allocation.sigma[k]) > REACHED / 2
+    ]
+    if not parts:
+        return "Nothing is left undone."
+    return f"{listed(parts)} {'is' if len(parts) == 1 else 'are'} left undone."
+
+
+def authority_sentence(layout: Layout, failed: tuple[str, ...], reach: NDArray[np.float64]) -> str | None:
+    """Which axes the working fins cannot act on at all, given their reach (6,); None if there is none."""
+    blind = [AXIS_WORDS[k] for k in range(6) if reach[k] < 1e-6]
+    if not blind:
+        return None
+    numbers = [str(layout.index(name) + 1) for name in failed]
+    without = f"Without fin {listed(numbers)} this" if numbers else "This"
+    return f"{without} robot cannot {listed(blind)}."
+
+
+def saturated(allocation: Allocation) -> NDArray[np.bool_]:
+    """Which amplitudes and frequencies (n, 2) are at their upper limits."""
+    upper = np.array([fin.limits.upper[:2] for fin in allocation.layout.fins])
+    with np.errstate(invalid="ignore"):
+        return np.asarray(allocation.command[:, :2] >= AT_LIMIT * upper)
+
+
+def mode_names(candidates: Candidates) -> list[str]:
+    """What each candidate does: who rests, and who pushes another way than in the best one."""
+    return [_mode_name(command, candidates.command[0]) for command in candidates.command]
+
+
+def _mode_name(command: NDArray[np.float64], best: NDArray[np.float64]) -> str:
+    push = np.nan_to_num(np.sin(command[:, 0]) ** 2 * command[:, 1] ** 2)
+    resting = [
+        str(i + 1) for i in range(len(push)) if push[i] < 0.15 * push.max() and np.isfinite(command[i, 0])
+    ]
+    turned = [
+        str(i + 1)
+        for i in range(len(push))
+        if str(i + 1) not in resting and np.cos(command[i, 2] - best[i, 2]) < 0.0
+    ]
+    parts = []
+    if resting:
+        parts.append(f"fin {resting[0]} rests" if len(resting) == 1 else f"fins {listed(resting)} rest")
+    if turned:
+        parts.append(f"fin{'s' if len(turned) > 1 else ''} {listed(turned)} reversed")
+    return ", ".join(parts) or "all fins push"
