@@ -7,9 +7,8 @@ Every error names the file and the key, such as
 import json
 import math
 import os
-import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -99,13 +98,14 @@ def save_layout(layout: Layout, path: str | os.PathLike[str]) -> None:
         content = yaml.safe_dump(
             data, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110
         )
+    # Written beside and renamed, so that a kill or a full disk never leaves half a layout.
+    part = file.with_name(f".{file.name}.{os.getpid()}.part")
     try:
-        # Written beside and renamed, so that a kill or a full disk never leaves half a layout.
-        with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=file.parent, delete=False) as temporary:
-            temporary.write(content)
-        os.chmod(temporary.name, 0o644)
-        os.replace(temporary.name, file)
+        part.write_text(content, encoding="utf-8")
+        os.replace(part, file)
     except OSError as error:
+        with suppress(OSError):
+            part.unlink()
         raise LayoutError(f"cannot be written: {error.strerror}", source=str(path)) from None
 
 

@@ -81,7 +81,7 @@ class Layout:
             )
         return replace(self, fins=tuple(fin for i, fin in enumerate(self.fins) if i not in lost))
 
-    def replace_fin(self, name: str, **changes: Any) -> "Layout":
+    def replace_fin(self, name: str, /, **changes: Any) -> "Layout":
         """Returns the layout with some fields of one fin changed, such as `position=(0.1, 0, 0)`."""
         i = self.index(name)
         fins = list(self.fins)

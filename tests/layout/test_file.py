@@ -1,0 +1,277 @@
+"""Layout files: what is accepted, and how each refusal names file, key and expectation."""
+
+import copy
+import json
+import math
+import time
+
+import pytest
+import yaml
+
+from finlab.errors import LayoutError
+from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout, parse_layout, save_layout
+
+GOOD = {
+    "format": "finlab-layout",
+    "version": 1,
+    "name": "good",
+    "description": "two fins",
+    "frame": {"convention": "FLU", "origin": "center_of_gravity"},
+    "fins": [
+        {
+            "name": "left",
+            "position_m": [0.0, 0.2, 0.0],
+            "mounting_angle_deg": 90,
+            "limits": {
+                "amplitude_rad": [0.05, 0.6],
+                "frequency_hz": [0.1, 2.1],
+                "zero_direction_rad": [-1, 2],
+            },
+            "model": {"type": "drag", "area": 0.03},
+        },
+        {"name": "right", "position_m": [0, -0.2, 0], "mounting_angle_deg": -90.0},
+    ],
+    "body": {"hull": {"shape": "box", "size_m": [0.4, 0.2, 0.2]}, "mass_kg": 4.5},
+}
+
+
+def edited(*path, value):
+    """A copy of GOOD with the value at a path replaced, or removed if the value is `...`."""
+    data = copy.deepcopy(GOOD)
+    inner = data
+    for key in path[:-1]:
+        inner = inner[key]
+    if value is ...:
+        del inner[path[-1]]
+    else:
+        inner[path[-1]] = value
+    return data
+
+
+BAD = [
+    ("fins", edited("fins", value=[]), "expected 1 to 16 fins, got 0"),
+    ("fins", edited("fins", value="left"), "expected a list of fins"),
+    ("fins", edited("fins", value=...), "required key is missing"),
+    ("version", edited("version", value=99), "this finlab reads version 1, got 99"),
+    ("version", edited("version", value="1"), "this finlab reads version 1"),
+    ("version", edited("version", value=True), "this finlab reads version 1"),
+    ("format", edited("format", value="urdf"), "expected finlab-layout, got 'urdf'"),
+    ("name", edited("name", value=...), "required key is missing"),
+    ("name", edited("name", value=7), "expected text, got 7"),
+    ("name", edited("name", value=""), "must not be empty"),
+    ("name", edited("name", value="a\nb"), "printable"),
+    ("description", edited("description", value=["x"]), "expected text"),
+    ("surprise", edited("surprise", value=1), "unknown key"),
+    ("frame.convention", edited("frame", "convention", value="NED"), "expected FLU, got 'NED'"),
+    ("frame.up", edited("frame", "up", value="z"), "unknown key"),
+    ("fins[1]", edited("fins", 1, value=3), "expected keys and values"),
+    ("fins[1].name", edited("fins", 1, "name", value="left"), "already the name of fins[0]"),
+    ("fins[1].name", edited("fins", 1, "name", value="x" * 65), "at most 64 characters"),
+    ("fins[1].nmae", edited("fins", 1, "nmae", value="x"), "unknown key"),
+    ("fins[1].position_m", edited("fins", 1, "position_m", value=[0.1, 0.2]), "a list of 3 numbers, got 2"),
+    ("fins[1].position_m", edited("fins", 1, "position_m", value=...), "required key is missing"),
+    (
+        "fins[1].position_m[0]",
+        edited("fins", 1, "position_m", value=[math.nan, 0, 0]),
+        "finite number, got nan",
+    ),
+    (
+        "fins[1].position_m[2]",
+        edited("fins", 1, "position_m", value=[0, 0, 1e308]),
+        "must lie within -10 .. 10",
+    ),
+    (
+        "fins[1].position_m[1]",
+        edited("fins", 1, "position_m", value=[0, True, 0]),
+        "expected a number, got True",
+    ),
+    ("fins[1].position_m[1]", edited("fins", 1, "position_m", value=[0, 10**400, 0]), "ordinary size"),
+    ("fins[1].mounting_angle_deg", edited("fins", 1, "mounting_angle_deg", value="north"), "got 'north'"),
+    ("fins[1].mounting_angle_deg", edited("fins", 1, "mounting_angle_deg", value=math.inf), "finite"),
+    (
+        "fins[1].mounting_angle_deg",
+        edited("fins", 1, "mounting_angle_deg", value=720),
+        "-360 .. 360, got 720",
+    ),
+    ("fins[0].limits", edited("fins", 0, "limits", value=[1, 2]), "expected keys and values"),
+    ("fins[0].limits.amplitude", edited("fins", 0, "limits", "amplitude", value=[0, 1]), "unknown key"),
+    (
+        "fins[0].limits.amplitude_rad",
+        edited("fins", 0, "limits", "amplitude_rad", value=[0.6, 0.05]),
+        "minimum 0.6 is above maximum 0.05; swap them",
+    ),
+    (
+        "fins[0].limits.amplitude_rad",
+        edited("fins", 0, "limits", "amplitude_rad", value=[]),
+        "2 numbers, got 0",
+    ),
+    (
+        "fins[0].limits.amplitude_rad[1]",
+        edited("fins", 0, "limits", "amplitude_rad", value=[0, 2]),
+        "must lie within",
+    ),
+    (
+        "fins[0].limits.amplitude_rad",
+        edited("fins", 0, "limits", "amplitude_rad", value=[0, 0]),
+        "the maximum must be above 0",
+    ),
+    (
+        "fins[0].limits.frequency_hz[0]",
+        edited("fins", 0, "limits", "frequency_hz", value=[-1, 2]),
+        "must lie within",
+    ),
+    (
+        "fins[0].limits.zero_direction_rad",
+        edited("fins", 0, "limits", "zero_direction_rad", value=[-4, 4]),
+        "one turn",
+    ),
+    ("fins[0].model", edited("fins", 0, "model", value="drag"), "such as {type: drag}"),
+    (
+        "fins[0].model.type",
+        edited("fins", 0, "model", value={"type": "jet"}),
+        "expected one of drag, lighthill, table",
+    ),
+    ("fins[0].model.type", edited("fins", 0, "model", value={"area": 1}), "required key is missing"),
+    ("fins[0].model.area", edited("fins", 0, "model", "area", value=-1), "must be above 0, got -1"),
+    ("fins[0].model.width", edited("fins", 0, "model", "width", value=1), "drag takes density"),
+    ("fins[0].model.path", edited("fins", 0, "model", value={"type": "table"}), "name the CSV file"),
+    ("body.mass_kg", edited("body", "mass_kg", value=0), "must be above 0"),
+    ("body.weight", edited("body", "weight", value=1), "unknown key"),
+    ("body.added_mass", edited("body", "added_mass", value=[1, 2, 3]), "6 numbers, got 3"),
+    ("body.added_mass[5]", edited("body", "added_mass", value=[1, 2, 3, 4, 5, -6]), "must lie within"),
+    ("body.inertia_kgm2[0]", edited("body", "inertia_kgm2", value=[0, 1, 1]), "must be above 0"),
+    ("body.hull.shape", edited("body", "hull", "shape", value="sphere"), "expected one of box"),
+    ("body.hull.size_m", edited("body", "hull", "size_m", value=...), "missing beside shape"),
+    ("body.hull.size_m[1]", edited("body", "hull", "size_m", value=[1, -1, 1]), "must lie within"),
+    ("body.hull", edited("body", "hull", value={"scale": 2}), "either a shape"),
+    ("body.hull.mesh", edited("body", "hull", value={"mesh": "hull.exe"}), "expected a .stl"),
+]
+
+
+@pytest.mark.parametrize(("key", "data", "why"), BAD, ids=[f"{key}-{i}" for i, (key, *_) in enumerate(BAD)])
+def test_a_bad_value_is_refused_with_file_key_and_reason(key, data, why, tmp_path):
+    path = tmp_path / "bad.yaml"
+    path.write_text(yaml.safe_dump(data))
+    with pytest.raises(LayoutError) as caught:
+        load_layout(path)
+    assert str(caught.value).startswith(f"{path}: {key}: "), caught.value
+    assert why in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+ALIAS_BOMB = "a: &a [x,x,x,x,x,x,x,x,x]\n" + "".join(
+    f"{this}: &{this} [{','.join(['*' + last] * 9)}]\n"
+    for last, this in zip("abcdefgh", "bcdefghi", strict=True)
+)
+HOSTILE = {
+    "bomb": (ALIAS_BOMB, "anchors and aliases"),
+    "anchor": ("a: &x 1\n", "anchors and aliases"),
+    "python": ('!!python/object/apply:os.system ["touch pwned"]\n', "tags (!) are not allowed"),
+    "tag": ("name: !custom x\n", "tags (!) are not allowed"),
+    "binary": (bytes(range(256)) * 50, "not UTF-8 text"),
+    "nul": (b"name: a\0b", "binary"),
+    "big": ("a" * 3_000_000, "larger than 1,000,000 bytes"),
+    "deep": ("[" * 400_000, "nested deeper"),
+    "wide": ("[" + "1," * 400_000 + "1]", "too many for a layout"),
+    "many": (
+        yaml.safe_dump(edited("fins", value=[{"name": f"f{i}"} for i in range(5000)])),
+        "1 to 16 fins, got 5000",
+    ),
+    "twice": ("name: a\nversion: 1\nname: b\n", "line 3: key 'name' is given twice"),
+    "list_key": ("? [1, 2]\n: 3\n", "a key must be plain text"),
+    "syntax": ("fins: [1, 2\nname: x\n", "is not valid YAML: line 2"),
+    "control": ("name: \x07\n", "is not valid YAML"),
+    "two_documents": ("a: 1\n---\nb: 2\n", "is not valid YAML"),
+    "empty": ("", "expected keys and values"),
+    "scalar": ("just words", "expected keys and values"),
+    "date": ("2026-13-45", ""),
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_file_is_refused_quickly_and_runs_nothing(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    content, why = HOSTILE[name]
+    path = tmp_path / f"{name}.yaml"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    start = time.perf_counter()
+    with pytest.raises(LayoutError) as caught:
+        load_layout(path)
+    assert time.perf_counter() - start < 5.0
+    assert str(caught.value).startswith(f"{path}: ")
+    assert why in str(caught.value)
+    assert len(str(caught.value)) < 600
+    assert not (tmp_path / "pwned").exists()
+
+
+def test_json_is_accepted_and_its_errors_are_as_plain(tmp_path):
+    path = tmp_path / "layout.json"
+    path.write_text(json.dumps(GOOD))
+    assert load_layout(path) == parse_layout(GOOD)
+    for content, why in [
+        ('{"name": "a", "name": "b"}', "key 'name' is given twice"),
+        ('{"name": ', "is not valid JSON: line 1"),
+        ("[" * 200_000, "nested too deeply"),
+        (
+            json.dumps(edited("fins", 0, "position_m", value=[math.nan, 0, 0])),
+            "fins[0].position_m[0]: expected a finite",
+        ),
+        ('{"version": ' + "9" * 5000 + "}", ""),
+    ]:
+        path.write_text(content)
+        with pytest.raises(LayoutError) as caught:
+            load_layout(path)
+        assert why in str(caught.value)
+
+
+def test_missing_file_folder_and_device_are_refused(tmp_path):
+    for path, why in [
+        (tmp_path / "no.yaml", "no such file"),
+        (tmp_path, "is a folder"),
+        ("/dev/zero", "not a regular file"),
+        (tmp_path / ("x" * 300), ""),
+        ("nul\0byte.yaml", ""),
+    ]:
+        with pytest.raises(LayoutError) as caught:
+            load_layout(path)
+        assert why in str(caught.value)
+
+
+def test_what_a_file_may_leave_out_has_the_nominal_value():
+    layout = parse_layout(GOOD)
+    assert layout.fins[1].limits == Limits() == Limits((0.05, 0.6), (0.1, 2.1), (-math.pi, math.pi))
+    assert layout.fins[1].model == FinModelSpec("drag")
+    assert layout.fins[0].limits.zero_direction == (-1.0, 2.0)
+    assert layout.fins[0].model.values()["area"] == 0.03
+    assert layout.fins[0].mounting_angle == pytest.approx(math.pi / 2)
+
+
+def test_numbers_written_in_any_usual_way_are_numbers(tmp_path):
+    path = tmp_path / "x.yaml"
+    text = yaml.safe_dump(GOOD).replace("mass_kg: 4.5", "mass_kg: 45e-1")
+    path.write_text(text)
+    assert load_layout(path).body.mass_kg == 4.5
+
+
+def test_limits_of_zero_width_are_allowed():
+    data = edited("fins", 0, "limits", value={"frequency_hz": [2, 2], "zero_direction_rad": [0, 0]})
+    assert parse_layout(data).fins[0].limits.frequency == (2.0, 2.0)
+
+
+def test_relative_paths_start_at_the_layout_file(tmp_path):
+    data = edited("fins", 0, "model", value={"type": "table", "path": "tables/fin.csv"})
+    data["body"]["hull"] = {"mesh": "hull.stl", "scale": 0.001}
+    (tmp_path / "x.json").write_text(json.dumps(data))
+    layout = load_layout(tmp_path / "x.json")
+    assert dict(layout.fins[0].model.parameters)["path"] == str(tmp_path / "tables" / "fin.csv")
+    assert layout.body.hull.mesh == str(tmp_path / "hull.stl")
+
+
+def test_a_layout_that_cannot_be_written_leaves_nothing_behind(tmp_path):
+    layout = Layout("x", (Fin("a", (0, 0, 0), 0.0),))
+    (tmp_path / "folder.yaml").mkdir()
+    with pytest.raises(LayoutError, match="cannot be written"):
+        save_layout(layout, tmp_path / "folder.yaml")
+    with pytest.raises(LayoutError, match="cannot be written"):
+        save_layout(layout, tmp_path / "missing" / "x.yaml")
+    assert [p.name for p in tmp_path.iterdir()] == ["folder.yaml"]

@@ -1,0 +1,126 @@
+"""Layouts as values: names, losses, changes; and as padded arrays."""
+
+import math
+
+import numpy as np
+import pytest
+
+from finlab.errors import LayoutError
+from finlab.layout import (
+    Fin,
+    Layout,
+    Limits,
+    layout_effectiveness,
+    layout_from_arrays,
+    planar_effectiveness,
+    random_layout,
+    random_layouts,
+    stack_layouts,
+)
+from finlab.layout.random import TRAINING_BOX
+
+THREE = Layout(
+    "three", tuple(Fin(name, (0.1 * i, 0.2, -0.1), 0.5 * i) for i, name in enumerate(["a", "b", "c"]))
+)
+
+
+def test_fins_are_found_by_name_and_an_unknown_name_lists_those_there_are():
+    assert THREE.names == ("a", "b", "c")
+    assert THREE.index("b") == 1
+    assert THREE.indices(["c", "a"]) == (2, 0)
+    with pytest.raises(LayoutError, match="layout three has no fin 'nobody', it has a, b, c"):
+        THREE.index("nobody")
+
+
+def test_without_leaves_the_rest_in_order_and_never_nothing():
+    assert THREE.without(["b"]).names == ("a", "c")
+    assert THREE.without([]) == THREE
+    assert THREE.n_fins == 3
+    with pytest.raises(LayoutError, match="no fin left"):
+        THREE.without(["a", "b", "c"])
+    with pytest.raises(LayoutError, match="no fin 'x'"):
+        THREE.without(["x"])
+
+
+def test_layouts_are_values():
+    moved = THREE.replace_fin("b", position=(0.3, 0.0, 0.0))
+    assert moved.fins[1].position == (0.3, 0.0, 0.0)
+    assert THREE.fins[1].position == (0.1, 0.2, -0.1)
+    assert hash(THREE) == hash(Layout("three", THREE.fins))
+    with pytest.raises(LayoutError, match="already the name"):
+        THREE.replace_fin("b", name="a")
+
+
+def test_numpy_numbers_become_plain_ones():
+    fin = Fin("f", np.array([0.1, 0.2, 0.3]), np.float64(1.0), Limits(np.array([0.1, 0.2])))
+    assert all(type(value) is float for value in (*fin.position, fin.mounting_angle, *fin.limits.amplitude))
+
+
+def test_stacking_pads_with_nothing():
+    arrays = stack_layouts([THREE, THREE.without(["a"])], n_fins=5)
+    assert arrays.mask.tolist() == [[True] * 3 + [False] * 2, [True] * 2 + [False] * 3]
+    assert arrays.position[1, 0].tolist() == list(THREE.fins[1].position)
+    assert not arrays.position[1, 2:].any()
+    assert arrays.upper[0, 4].tolist() == list(Limits().upper)
+    assert layout_from_arrays(arrays, 1).fins[0].position == THREE.fins[1].position
+    with pytest.raises(LayoutError, match="more than the 2"):
+        stack_layouts([THREE], n_fins=2)
+    with pytest.raises(LayoutError, match="at least one layout"):
+        stack_layouts([])
+
+
+def test_planar_effectiveness_is_force_and_moment_of_a_newton():
+    rng = np.random.default_rng(0)
+    position, angle = rng.normal(size=(7, 3, 3)), rng.uniform(-4, 4, (7, 3))
+    blocks = planar_effectiveness(position, angle)
+    assert blocks.shape == (7, 3, 6, 2)
+    for b in range(7):
+        for i in range(3):
+            horizontal = np.array([-math.sin(angle[b, i]), math.cos(angle[b, i]), 0.0])
+            for column, axis in enumerate([horizontal, np.array([0.0, 0.0, 1.0])]):
+                expected = np.concatenate([axis, np.cross(position[b, i], axis)])
+                np.testing.assert_allclose(blocks[b, i, :, column], expected, atol=1e-14)
+
+
+def test_layout_effectiveness_sets_the_blocks_side_by_side():
+    matrix = layout_effectiveness(THREE)
+    assert matrix.shape == (6, 6)
+    np.testing.assert_array_equal(matrix[:, 5], [0, 0, 1, 0.2, -0.2, 0])
+
+
+def test_random_layouts_keep_to_box_counts_and_limits():
+    rng = np.random.default_rng(0)
+    arrays = random_layouts(rng, 4000, limits="varied")
+    box = np.array(TRAINING_BOX)
+    assert (np.abs(arrays.position) <= box).all()
+    assert np.unique(arrays.mask.sum(1)).tolist() == [2, 3, 4, 5]
+    assert not arrays.position[~arrays.mask].any() and not arrays.mounting_angle[~arrays.mask].any()
+    upper, lower = arrays.upper[arrays.mask], arrays.lower[arrays.mask]
+    assert 0.3 <= upper[:, 0].min() < 0.31 and 0.79 < upper[:, 0].max() <= 0.8
+    assert 1.0 <= upper[:, 1].min() < 1.02 and 2.98 < upper[:, 1].max() <= 3.0
+    width = upper[:, 2] - lower[:, 2]
+    arc = width < 2 * math.pi - 1e-9
+    assert arc.mean() == pytest.approx(1 / 3, abs=0.02)
+    assert width[arc].min() >= math.pi / 2 - 1e-9 and width[arc].max() <= 1.5 * math.pi + 1e-9
+    assert (np.abs(upper[:, 2]) <= math.pi + 1e-9).all() and (np.abs(lower[:, 2]) <= math.pi + 1e-9).all()
+
+
+def test_random_layouts_outside_a_box_have_a_fin_there():
+    arrays = random_layouts(
+        np.random.default_rng(1), 500, n_fins=(6, 8), box=(0.45, 0.45, 0.2), outside=TRAINING_BOX, pad_to=9
+    )
+    beyond = (np.abs(arrays.position) > np.array(TRAINING_BOX)).any(-1) & arrays.mask
+    assert beyond.any(1).all()
+    assert arrays.mask.shape == (500, 9) and set(arrays.mask.sum(1)) == {6, 7, 8}
+
+
+def test_half_of_mixed_layouts_keep_nominal_limits():
+    arrays = random_layouts(np.random.default_rng(2), 4000, limits="mixed")
+    nominal = (arrays.upper == np.array(Limits().upper)).all(axis=(1, 2))
+    assert nominal.mean() == pytest.approx(0.5, abs=0.03)
+
+
+def test_a_random_layout_is_seeded():
+    layout = random_layout(np.random.default_rng(3), n_fins=4, limits="varied")
+    assert layout == random_layout(np.random.default_rng(3), n_fins=4, limits="varied")
+    assert layout.names == ("fin_1", "fin_2", "fin_3", "fin_4")

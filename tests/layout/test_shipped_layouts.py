@@ -1,0 +1,97 @@
+"""Every layout in `layouts/`: loads, keeps what its description promises, survives a round trip."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from finlab.assets import shipped_layouts
+from finlab.layout import layout_effectiveness, layout_to_dict, load_layout, parse_layout, save_layout
+
+SHIPPED = shipped_layouts()
+AXES = ["Fx", "Fy", "Fz", "Tx", "Ty", "Tz"]
+
+
+def rank(layout):
+    return int(np.linalg.matrix_rank(layout_effectiveness(layout), tol=1e-6))
+
+
+def missing_axes(layout):
+    rows = layout_effectiveness(layout)
+    return [axis for axis, row in zip(AXES, rows, strict=True) if np.abs(row).max() < 1e-9]
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_file_name_description_and_round_trip(name, tmp_path):
+    layout = load_layout(SHIPPED[name])
+    assert layout.name == name
+    assert len(layout.description) > 60
+    assert parse_layout(layout_to_dict(layout)) == layout
+    for suffix in (".yaml", ".json"):
+        save_layout(layout, tmp_path / f"copy{suffix}")
+        assert load_layout(tmp_path / f"copy{suffix}") == layout
+
+
+def test_there_is_something_to_teach():
+    counts = {load_layout(path).n_fins for path in SHIPPED.values()}
+    assert counts >= {2, 3, 4, 5, 6, 8}
+    assert {"A", "B", "C", "D", "ucat"} <= set(SHIPPED)
+
+
+@pytest.mark.parametrize(
+    ("name", "expected", "missing"),
+    [
+        ("A", 6, []),
+        ("B", 6, []),
+        ("C", 6, []),
+        ("D", 5, ["Fy"]),
+        ("pair", 4, ["Fy", "Ty"]),
+        ("penta", 6, []),
+        ("hexa", 6, []),
+        ("octo", 6, []),
+        ("asymmetric", 6, []),
+        ("mixed", 6, []),
+        ("restricted", 6, []),
+        ("no_yaw", 5, ["Tz"]),
+        ("ucat", 6, []),
+    ],
+)
+def test_rank_and_missing_axes(name, expected, missing):
+    layout = load_layout(SHIPPED[name])
+    assert rank(layout) == expected
+    assert missing_axes(layout) == missing
+
+
+def test_every_rank_above_is_of_a_shipped_layout_and_none_is_forgotten():
+    tested = test_rank_and_missing_axes.pytestmark[0].args[1]
+    assert {name for name, _, _ in tested} == set(SHIPPED)
+
+
+def test_hexa_keeps_all_six_axes_after_any_two_losses():
+    layout = load_layout(SHIPPED["hexa"])
+    for lost in itertools.combinations(layout.names, 2):
+        assert rank(layout.without(lost)) == 6, lost
+
+
+def test_ucat_is_layout_a_with_a_body():
+    ucat, a = load_layout(SHIPPED["ucat"]), load_layout(SHIPPED["A"])
+    assert ucat.fins == a.fins
+    assert ucat.body.mass_kg == 19.0
+    assert ucat.body.hull.shape == "ucat"
+    assert all(
+        len(getattr(ucat.body, key)) == 6 for key in ("added_mass", "linear_damping", "quadratic_damping")
+    )
+
+
+def test_restricted_zero_directions_confine_the_force_as_described():
+    from finlab.physics import Plant
+
+    layout = load_layout(SHIPPED["restricted"])
+    rng = np.random.default_rng(0)
+    lower = np.array([fin.limits.lower for fin in layout.fins])
+    upper = np.array([fin.limits.upper for fin in layout.fins])
+    force = Plant(layout).fin_forces(rng.uniform(lower, upper, (500, 4, 3)))
+    i = layout.index
+    assert force[:, [i("front_left"), i("front_right")], 0].min() >= -1e-9
+    assert force[:, i("back_left"), 2].min() > 0.0
+    assert force[:, i("back_right"), 2].max() < 0.0
