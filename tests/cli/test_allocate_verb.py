@@ -93,7 +93,18 @@ def test_table_for_people(allocate: Callable[..., tuple[int, str, str]]) -> None
     code, out, _ = allocate("A", *WRENCH, "--failed", "front_left")
     assert code == 0
     lines = out.splitlines()
-    assert lines[0].split() == "fin A [rad] f [Hz] zero direction [deg] force [N]".split()
+    assert lines[0].split() == [
+        "fin",
+        "A",
+        "[rad]",
+        "f",
+        "[Hz]",
+        "zero",
+        "direction",
+        "[deg]",
+        "force",
+        "[N]",
+    ]
     assert lines[2].split() == ["front_left", "failed"]
     labels = [line.split()[0] for line in lines if line]
     assert labels[5:] == ["Fx", "asked", "delivered", "missing", "err_norm"]
@@ -118,7 +129,10 @@ def test_shipped_name_works_from_any_folder(
         (["A", "--wrench", "1", "0", "0", "0", "0", "up"], "Error parsing --wrench"),
         (["A"], "--wrench"),
         (["A", *WRENCH, "--failed", "nobody"], "has no fin 'nobody', it has front_right"),
-        (["D", *WRENCH, *"--failed bow --failed port --failed starboard".split()], "no fin"),
+        (
+            ["D", *WRENCH, *["--failed", "front_right", "--failed", "back", "--failed", "front_left"]],
+            "has no fin left",
+        ),
         (["A", *WRENCH, "--method", "magic"], "method: expected one of learned, paper"),
         (["A", *WRENCH, "--seed", "x"], "--seed"),
         (["missing.yaml", *WRENCH], "neither a file nor a shipped layout"),

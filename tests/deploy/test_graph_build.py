@@ -102,8 +102,6 @@ def test_edited_export_is_refused(
     path.write_text(path.read_text().replace("0.25753", "0.35753", 1))
     capsys.readouterr()
     assert main(["allocate", str(path), *WRENCH]) == 2
-    err = capsys.readouterr().err
-    assert (
-        err
-        == f"finlab: error: {path}: checksum: does not fit the contents; the file was changed, export it again\n"
+    assert capsys.readouterr().err == (
+        f"finlab: error: {path}: checksum: does not fit the contents; the file was changed, export it again\n"
     )
