@@ -74,7 +74,12 @@ class Plant:
     def _checked(self, command: ArrayLike | Tensor) -> tuple[Tensor, Tensor]:
         """Returns finite float64 commands (..., n, 3) and which fins are alive (..., n)."""
         raw = command.detach().cpu().numpy() if isinstance(command, Tensor) else command
-        values = np.array(raw, dtype=np.float64)
+        try:
+            values = np.array(raw, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise CommandError(
+                "expected commands as numbers [rad, Hz, rad] per fin, got something else"
+            ) from None
         n_fins = self.layout.n_fins
         if values.ndim < 2 or values.shape[-2:] != (n_fins, 3):
             raise CommandError(

@@ -1,0 +1,111 @@
+"""The plant against the contract's formula written out in numpy, and what it makes of odd commands."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from scipy.special import j1
+
+from finlab.assets import shipped_layouts
+from finlab.errors import CommandError
+from finlab.layout import Fin, FinModelSpec, Layout, load_layout
+from finlab.physics import Plant
+
+
+def wrench_by_hand(layout, command):
+    """The contract's text, one fin at a time."""
+    total = np.zeros(6)
+    for fin, (amplitude, frequency, direction) in zip(layout.fins, command, strict=True):
+        p, rate = fin.model.values(), 2 * math.pi * frequency
+        if fin.model.type == "drag":
+            inertia = 2 * p["density"] * p["drag_coefficient"] * p["area"] * p["lever"] ** 2
+            thrust = inertia * rate**2 * (1 - math.cos(2 * amplitude))
+        else:
+            mass = math.pi / 4 * p["density"] * p["width"] ** 2
+            thrust = 0.5 * mass * p["length"] ** 2 * rate**2 * amplitude * j1(amplitude)
+        horizontal = np.array([-math.sin(fin.mounting_angle), math.cos(fin.mounting_angle), 0.0])
+        force = thrust * (math.cos(direction) * horizontal + math.sin(direction) * np.array([0.0, 0.0, 1.0]))
+        total += np.concatenate([force, np.cross(fin.position, force)])
+    return total
+
+
+def random_commands(layout, n, seed=0):
+    lower = np.array([fin.limits.lower for fin in layout.fins])
+    upper = np.array([fin.limits.upper for fin in layout.fins])
+    return np.random.default_rng(seed).uniform(lower, upper, (n, *lower.shape))
+
+
+@pytest.mark.parametrize("name", shipped_layouts())
+def test_the_plant_is_the_contract(name):
+    layout = load_layout(shipped_layouts()[name])
+    commands = random_commands(layout, 20)
+    expected = [wrench_by_hand(layout, command) for command in commands]
+    got = Plant(layout).wrench(commands)
+    assert got.dtype == np.float64 and got.shape == (20, 6)
+    np.testing.assert_allclose(got, expected, rtol=1e-10, atol=1e-12)
+
+
+def test_forces_sum_to_the_wrench_and_are_in_the_body_frame():
+    layout = load_layout(shipped_layouts()["mixed"])
+    command = random_commands(layout, 1)[0]
+    plant = Plant(layout)
+    force = plant.fin_forces(command)
+    np.testing.assert_allclose(force.sum(0), plant.wrench(command)[:3], atol=1e-12)
+    shaft = np.array(
+        [[math.cos(fin.mounting_angle), math.sin(fin.mounting_angle), 0.0] for fin in layout.fins]
+    )
+    np.testing.assert_allclose((force * shaft).sum(-1), 0.0, atol=1e-12)
+
+
+def test_a_row_of_nan_is_a_failed_fin():
+    layout = load_layout(shipped_layouts()["A"])
+    command = random_commands(layout, 7)
+    command[:, 1] = np.nan
+    rest = layout.without(["front_left"])
+    np.testing.assert_allclose(
+        Plant(layout).wrench(command), Plant(rest).wrench(command[:, [0, 2, 3]]), atol=1e-12
+    )
+    assert not Plant(layout).fin_forces(command)[:, 1].any()
+    assert not Plant(layout).effectiveness(command)[:, :, 1].any()
+
+
+def test_effectiveness_of_mixed_models_agrees_with_differences():
+    layout = load_layout(shipped_layouts()["mixed"])
+    plant, command = Plant(layout), random_commands(layout, 3)
+    matrix = plant.effectiveness(command)
+    assert matrix.shape == (3, 6, 4, 3)
+    for fin in range(4):
+        for entry in range(3):
+            offset = np.zeros_like(command)
+            offset[:, fin, entry] = 1e-6
+            slope = (plant.wrench(command + offset) - plant.wrench(command - offset)) / 2e-6
+            np.testing.assert_allclose(matrix[:, :, fin, entry], slope, rtol=1e-6, atol=1e-7)
+
+
+def test_tensors_lists_and_leading_shapes_are_welcome_and_left_alone():
+    layout = Layout("one", (Fin("a", (0.1, 0.0, 0.0), 0.0, model=FinModelSpec("lighthill")),))
+    plant = Plant(layout)
+    single = plant.wrench([[0.3, 1.0, 0.2]])
+    assert single.shape == (6,)
+    command = torch.full((2, 5, 1, 3), 0.3, requires_grad=True)
+    assert plant.wrench(command).shape == (2, 5, 6)
+    failed = np.full((1, 3), np.nan)
+    plant.wrench(failed)
+    assert np.isnan(failed).all()
+    assert plant.wrench(np.zeros((0, 1, 3))).shape == (0, 6)
+
+
+@pytest.mark.parametrize(
+    ("command", "why"),
+    [
+        (np.zeros((3, 3)), r"expected commands \(..., 4, 3\) for layout A, got \(3, 3\)"),
+        (np.zeros(12), "expected commands"),
+        ([[1, 2, 3], [4]], "expected commands as numbers"),
+        (np.full((4, 3), np.inf), "NaN or infinite"),
+        ([[0.1, np.nan, 0.0]] * 4, "a failed fin has NaN in all three"),
+    ],
+)
+def test_a_command_that_does_not_fit_is_refused(command, why):
+    with pytest.raises(CommandError, match=why):
+        Plant(load_layout(shipped_layouts()["A"])).wrench(command)
