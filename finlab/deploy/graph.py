@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.data.normalization import Normalization
+from finlab.errors import AllocationError
 from finlab.layout import Layout, stack_layouts
 
 if TYPE_CHECKING:
-    from finlab.allocation.learned import LearnedAllocator
+    from finlab.allocation import Allocator
 
 N_SELF_TEST = 4
 """Self-test wrenches in a graph file: enough to notice a wrong file, few enough to read."""
@@ -65,7 +66,7 @@ class LayoutGraph:
         return tuple((a, b) for i, a in enumerate(alive) for b in alive[i:])
 
 
-def build_graph(layout: Layout, allocator: LearnedAllocator, failed: tuple[str, ...] = ()) -> LayoutGraph:
+def build_graph(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = ()) -> LayoutGraph:
     """Prepare a layout for deployment with the checkpoint of an allocator.
 
     The self-test's targets are wrenches of random commands, so each can be reached; they and everything
@@ -73,11 +74,16 @@ def build_graph(layout: Layout, allocator: LearnedAllocator, failed: tuple[str, 
 
     Raises:
         LayoutError: an unknown failed fin, or none left.
+        AllocationError: the allocator's method has no network.
     """
     from finlab.physics import Plant
 
     healthy = layout.without(failed) if failed else layout
-    checkpoint = allocator.trained
+    checkpoint = getattr(allocator, "trained", None)
+    if checkpoint is None or checkpoint.network is None:
+        raise AllocationError(
+            f"method {allocator.name!r} has no trained network to make a graph for; use learned"
+        )
     features = NodeFeatures(checkpoint.network.config.features, healthy, checkpoint.normalization)
     lower = np.array([fin.limits.lower for fin in healthy.fins])
     upper = np.array([fin.limits.upper for fin in healthy.fins])

@@ -68,6 +68,12 @@ def test_same_input_same_bytes(allocator: Allocator, untrained_checkpoint: Path)
     assert graph_bytes(build_graph(layout, allocator)) == graph_bytes(build_graph(layout, again))
 
 
+def test_method_without_a_network_is_refused(untrained_checkpoint: Path) -> None:
+    analytic = finlab.load_allocator(untrained_checkpoint, method="analytic")
+    with pytest.raises(FinlabError, match="method 'analytic' has no trained network"):
+        build_graph(finlab.load_layout(shipped_layouts()["A"]), analytic)
+
+
 def test_unknown_failed_fin_is_refused(allocator: Allocator) -> None:
     with pytest.raises(FinlabError, match="no fin 'nobody'"):
         build_graph(finlab.load_layout(shipped_layouts()["A"]), allocator, ("nobody",))
