@@ -38,7 +38,7 @@ class ForceInverse:
 
     def command(self, targets: Array) -> Array:
         """Commands (N, n, 3) for targets (N, 6)."""
-        force = (targets @ self.inverse).reshape(len(targets), -1, 2)
+        force = (targets @ self.inverse).reshape(len(targets), self.actuation.n_fins, 2)
         horizontal, vertical = force[..., 0], force[..., 1]
         thrust = np.hypot(horizontal, vertical)
         direction = np.arctan2(vertical, horizontal)
@@ -73,7 +73,7 @@ class Analytic(ModelBased):
 
     name = "analytic"
 
-    def __init__(self, normalization: Normalization, *, rcond: float = 1e-2) -> None:
+    def __init__(self, normalization: Normalization, *, rcond: float = 1e-3) -> None:
         super().__init__(normalization)
         self.rcond = rcond
         self._inverse: ForceInverse | None = None

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-MAX_STEPS = 40
+MAX_STEPS = 60
 TOLERANCE = 1e-10
 """Largest projected gradient, relative to the size of the gradient at zero, of a solved problem."""
-SEARCH_HALVINGS = 12
+SEARCH_HALVINGS = 40
 SUFFICIENT_DECREASE = 1e-4
 
 
@@ -54,19 +54,24 @@ def solve_box_quadratics(hessian: Array, gradient: Array, lower: Array, upper: A
 
 
 def _search(h: Array, slope: Array, at: Array, step: Array, low: Array, high: Array) -> Array:
-    """The first point on the projected path `clip(at + t step)`, t = 1, 1/2, ..., that falls enough."""
-    best = at.copy()
-    open_ = np.arange(len(at))
+    """The first point on the projected path `clip(at + t step)`, t = 1, 1/2, ..., that falls enough.
+
+    Where none does, because a variable that is only just free blocks the way, a projected gradient step, which
+    always falls.
+    """
+    lipschitz = np.abs(h).sum(axis=2).max(axis=1, keepdims=True)
+    best = np.clip(at - slope / lipschitz, low, high)
+    pending = np.arange(len(at))
     length = 1.0
     for _ in range(SEARCH_HALVINGS):
-        trial = np.clip(at[open_] + length * step[open_], low[open_], high[open_])
-        move = trial - at[open_]
-        linear = np.einsum("bi,bi->b", slope[open_], move)
-        change = linear + 0.5 * np.einsum("bi,bij,bj->b", move, h[open_], move)
-        good = change <= SUFFICIENT_DECREASE * linear
-        best[open_[good]] = trial[good]
-        open_ = open_[~good]
-        if not len(open_):
+        trial = np.clip(at[pending] + length * step[pending], low[pending], high[pending])
+        move = trial - at[pending]
+        linear = np.einsum("bi,bi->b", slope[pending], move)
+        change = linear + 0.5 * np.einsum("bi,bij,bj->b", move, h[pending], move)
+        good = (change <= SUFFICIENT_DECREASE * linear) & (linear < 0)
+        best[pending[good]] = trial[good]
+        pending = pending[~good]
+        if not len(pending):
             break
         length /= 2
     return best

@@ -20,9 +20,9 @@ from finlab.allocation.energy import DEFAULT_WEIGHTS, EnergyWeights, command_ene
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-HELD = 1e12
+HELD = 1e30
 """Damping that keeps a variable where it is."""
-MIN_DAMPING, MAX_DAMPING = 1e-12, 1e3
+MIN_DAMPING, MAX_DAMPING = 1e-12, 1e9
 PASSES = 2
 """Times a step is solved: once freely, then with the limits it crossed."""
 
@@ -36,7 +36,7 @@ class LevenbergOptions:
     energy_weight: float = 0.0
     """Weight of the energy proxy beside the squared normalized error."""
     damping: float = 1e-2
-    """Damping of the first step, relative to a full range of each command."""
+    """Damping of the first step for a full range of each command, times one plus the objective."""
     tolerance: float = 1e-9
     """A row whose objective is below, or whose step lowers it by less than this share of itself, is done."""
     energy_weights: EnergyWeights = DEFAULT_WEIGHTS
@@ -70,7 +70,7 @@ def descend(
     command = actuation.feasible(start)
     wrench, slope = actuation.linearize(command)
     objective = _objective(actuation, command, wrench, target, sigma, options)
-    damping = np.full(len(command), options.damping)
+    damping = options.damping * (1.0 + objective)
     busy = np.arange(len(command))
     slope = slope * energy.width / sigma[:, None]
     for _ in range(options.n_steps):
@@ -86,7 +86,7 @@ def descend(
         command[rows], wrench[rows] = trial[better], trial_wrench[better]
         slope[rows] = trial_slope[better] * energy.width / sigma[:, None]
         objective[rows] = trial_objective[better]
-        damping[busy] = np.clip(damping[busy] * np.where(better, 0.2, 6.0), MIN_DAMPING, 10 * MAX_DAMPING)
+        damping[busy] = np.clip(damping[busy] * np.where(better, 0.2, 6.0), MIN_DAMPING, MAX_DAMPING)
         settled = better & (gain <= options.tolerance * np.maximum(objective[busy], options.tolerance))
         busy = busy[~settled & (objective[busy] > options.tolerance**2) & (damping[busy] < MAX_DAMPING)]
         if not len(busy):

@@ -48,7 +48,7 @@ class Qp(ModelBased):
 
     name = "qp"
 
-    def __init__(self, normalization: Normalization, *, regularization: float = 0.1) -> None:
+    def __init__(self, normalization: Normalization, *, regularization: float = 1.0) -> None:
         super().__init__(normalization)
         self.regularization = regularization
         self._map: LinearMap | None = None

@@ -1,0 +1,178 @@
+"""Every model-based method on small problems with known answers, at its limits and on degenerate layouts."""
+
+import math
+
+import numpy as np
+import pytest
+
+from finlab.allocation import Allocator
+from finlab.allocation.analytic import Analytic
+from finlab.allocation.ipopt import Ipopt
+from finlab.allocation.multistart import Multistart
+from finlab.allocation.qp import Qp
+from finlab.allocation.slsqp import Slsqp
+from finlab.allocation.sqp import Sqp
+from finlab.allocation.trf import Trf
+from finlab.data.normalization import Normalization
+from finlab.errors import AllocationError, LayoutError
+from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
+from finlab.physics import Plant
+
+NORMALIZATION = Normalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35]))
+EXACT = ("analytic", "sqp", "multistart", "trf", "slsqp", "ipopt")
+ALL = (*EXACT, "qp")
+THRUST = 4.737410112522892
+"""Thrust of the default fin over f^2 sin^2(A) [N s^2]."""
+
+
+def make(method: str) -> Allocator:
+    """A method, the slow ones with few starts."""
+    if method == "ipopt":
+        pytest.importorskip("casadi", reason="method ipopt is an optional extra")
+    kinds = {"analytic": Analytic, "qp": Qp, "sqp": Sqp, "multistart": Multistart}
+    if method in kinds:
+        return kinds[method](NORMALIZATION)
+    return {"trf": Trf, "slsqp": Slsqp, "ipopt": Ipopt}[method](NORMALIZATION, n_starts=4)
+
+
+def one_fin(**changes: object) -> Layout:
+    """A fin at the origin whose shaft points forward: it pushes along y and z and turns nothing."""
+    return Layout("one", (Fin("fin", (0.0, 0.0, 0.0), 0.0, **changes),))  # type: ignore[arg-type]
+
+
+def within(command: np.ndarray, layout: Layout) -> bool:
+    lower = np.array([fin.limits.lower for fin in layout.fins])
+    upper = np.array([fin.limits.upper for fin in layout.fins])
+    return bool(np.isfinite(command).all() and (command >= lower).all() and (command <= upper).all())
+
+
+@pytest.mark.parametrize("method", EXACT)
+@pytest.mark.parametrize("direction", [0.0, math.pi / 2, 2.5, -1.0])
+def test_one_fin_pushes_where_it_is_asked(method: str, direction: float) -> None:
+    target = [0.0, 1.5 * math.cos(direction), 1.5 * math.sin(direction), 0.0, 0.0, 0.0]
+    result = make(method).allocate(one_fin(), target)
+    amplitude, frequency, zero_direction = result.command[0]
+    assert THRUST * (frequency * math.sin(amplitude)) ** 2 == pytest.approx(1.5, abs=2e-3)
+    assert math.remainder(zero_direction - direction, 2 * math.pi) == pytest.approx(0.0, abs=2e-3)
+    assert result.err_norm < 2e-3
+
+
+@pytest.mark.parametrize("method", ALL)
+def test_asked_too_much_one_fin_gives_all_it_has(method: str) -> None:
+    command = make(method).allocate(one_fin(), [0.0, 50.0, 0.0, 0.0, 0.0, 0.0]).command[0]
+    np.testing.assert_allclose(command, [0.6, 2.1, 0.0], atol=1e-3)
+
+
+@pytest.mark.parametrize("method", EXACT)
+def test_two_fins_turn_the_robot(method: str) -> None:
+    layout = Layout(
+        "pair", (Fin("left", (0.0, 0.2, 0.0), math.pi / 2), Fin("right", (0.0, -0.2, 0.0), -math.pi / 2))
+    )
+    result = make(method).allocate(layout, [0.0, 0.0, 0.0, 0.0, 0.0, 0.4])
+    # Each gives 1 N: the left one backward, the right one forward. Shafts point outwards, so that a positive
+    # zero direction 0 pushes the left fin backward and the right one forward.
+    np.testing.assert_allclose(Plant(layout).fin_forces(result.command), [[-1, 0, 0], [1, 0, 0]], atol=3e-3)
+
+
+@pytest.mark.parametrize("method", EXACT)
+def test_every_reachable_target_is_met(method: str) -> None:
+    layout = random_layout(np.random.default_rng(3), n_fins=4)
+    command = np.random.default_rng(4).uniform([0.05, 0.1, -3], [0.6, 2.1, 3], (3, 4, 3))
+    targets = Plant(layout).wrench(command)
+    answer = make(method).allocate_batch(layout, targets)
+    assert NORMALIZATION.error(Plant(layout).wrench(answer.command), targets).max() < 5e-3
+
+
+def test_qp_returns_its_reference_where_that_is_the_answer() -> None:
+    layout = random_layout(np.random.default_rng(1), n_fins=3)
+    reference = np.tile([0.325, 1.1, 0.0], (3, 1))
+    result = make("qp").allocate(layout, Plant(layout).wrench(reference))
+    np.testing.assert_allclose(result.command, reference, atol=1e-9)
+
+
+@pytest.mark.parametrize("method", ALL)
+@pytest.mark.parametrize("scale", [1.0, 30.0, 1e5])
+def test_limits_hold_bit_for_bit(method: str, scale: float) -> None:
+    rng = np.random.default_rng(5)
+    layout = random_layout(rng, n_fins=3, limits="varied")
+    targets = scale * rng.normal(size=(2, 6))
+    assert all(within(command, layout) for command in make(method).allocate_batch(layout, targets).command)
+
+
+@pytest.mark.parametrize("method", ALL)
+def test_same_seed_same_answer(method: str) -> None:
+    layout = random_layout(np.random.default_rng(8), n_fins=3)
+    target = [1.0, 0.2, -0.5, 0.1, 0.0, 0.05]
+    first, second = (make(method).allocate(layout, target, seed=2).command for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+
+
+@pytest.mark.parametrize("method", ALL)
+def test_a_failed_fin_is_a_removed_fin(method: str) -> None:
+    layout = random_layout(np.random.default_rng(9), n_fins=3)
+    target = [0.5, 0.2, -0.5, 0.0, 0.0, 0.05]
+    failed = make(method).allocate(layout, target, failed=["fin_2"]).command
+    removed = make(method).allocate(layout.without(["fin_2"]), target).command
+    assert np.isnan(failed[1]).all()
+    np.testing.assert_array_equal(failed[[0, 2]], removed)
+
+
+@pytest.mark.parametrize("method", ALL)
+def test_degenerate_layouts_answer_within_their_limits(method: str) -> None:
+    here = (0.1, 0.1, 0.0)
+    fixed = Limits((0.3, 0.3), (1.0, 1.0), (0.5, 0.5))
+    coincident = Layout("coincident", (Fin("a", here, 0.3), Fin("b", here, 0.3)))
+    rigid = Layout("rigid", (Fin("a", here, 0.3, fixed), Fin("b", (0.0, 0.1, 0.0), 0.3, fixed)))
+    half_rigid = Layout("half", (Fin("a", here, 0.3, fixed), Fin("b", (0.0, 0.1, 0.0), 1.3)))
+    for layout in (coincident, rigid, half_rigid):
+        result = make(method).allocate(layout, [1.0, 0.0, 0.5, 0.0, 0.0, 0.1])
+        assert within(result.command, layout), layout.name
+
+
+@pytest.mark.parametrize("method", ALL)
+def test_no_targets_give_no_commands(method: str) -> None:
+    assert make(method).allocate_batch(one_fin(), np.empty((0, 6))).command.shape == (0, 1, 3)
+
+
+@pytest.mark.parametrize("method", EXACT)
+def test_other_fin_models_and_mixtures_of_them(method: str) -> None:
+    lighthill = FinModelSpec("lighthill")
+    layout = Layout(
+        "mixed", (Fin("a", (0.2, 0.1, 0.0), 0.5, model=lighthill), Fin("b", (-0.1, 0.1, 0.0), -1.0))
+    )
+    target = Plant(layout).wrench([[0.4, 1.5, 0.7], [0.5, 1.2, -2.0]])
+    assert make(method).allocate(layout, target).err_norm < 5e-3
+
+
+def test_ipopt_says_which_fin_models_it_knows(force_table: str) -> None:
+    table = one_fin(model=FinModelSpec("table", (("path", force_table),)))
+    with pytest.raises(AllocationError, match="knows the fin models drag and lighthill, got 'table'"):
+        make("ipopt").allocate(table, [0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("method", ["analytic", "qp", "sqp", "multistart", "trf", "slsqp"])
+def test_a_table_of_forces_will_do(method: str, force_table: str) -> None:
+    table = one_fin(model=FinModelSpec("table", (("path", force_table),)))
+    result = make(method).allocate(table, [0.0, 1.0, 0.5, 0.0, 0.0, 0.0])
+    assert within(result.command, table)
+    assert method == "qp" or result.err_norm < 0.02
+
+
+@pytest.mark.parametrize("method", ALL)
+def test_unknown_and_last_fins_cannot_fail(method: str) -> None:
+    with pytest.raises(LayoutError):
+        make(method).allocate(one_fin(), np.zeros(6), failed=["fin"])
+    with pytest.raises(LayoutError, match="nobody"):
+        make(method).allocate(one_fin(), np.zeros(6), failed=["nobody"])
+
+
+def test_multistart_needs_less_energy_than_sqp() -> None:
+    layout = random_layout(np.random.default_rng(21), n_fins=5)
+    targets = Plant(layout).wrench(
+        np.random.default_rng(22).uniform([0.05, 0.1, -3], [0.6, 2.1, 3], (20, 5, 3))
+    )
+    cheap, any_ = (
+        np.mean([make(method).allocate(layout, target).energy for target in targets])
+        for method in ("multistart", "sqp")
+    )
+    assert cheap < 0.9 * any_

@@ -1,0 +1,136 @@
+"""The numerical parts of the model-based methods against independent references."""
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from finlab.allocation.actuation import Actuation
+from finlab.allocation.box_least_squares import solve_box_quadratics
+from finlab.allocation.energy import command_energy
+from finlab.allocation.levenberg import LevenbergOptions, descend
+from finlab.allocation.single_target import Problem
+from finlab.layout import Fin, FinModelSpec, Layout, random_layout
+from finlab.physics import Plant
+
+SIGMA = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35])
+
+
+def _layout(*specs: FinModelSpec) -> Layout:
+    rng = np.random.default_rng(len(specs))
+    return Layout(
+        "mixed",
+        tuple(
+            Fin(f"fin_{i}", tuple(rng.uniform(-0.3, 0.3, 3).tolist()), float(rng.uniform(-3, 3)), model=spec)
+            for i, spec in enumerate(specs)
+        ),
+    )
+
+
+@pytest.mark.parametrize("kinds", [("drag",) * 3, ("lighthill",) * 2, ("drag", "lighthill", "table", "drag")])
+def test_actuation_is_the_plant(kinds: tuple[str, ...], force_table: str) -> None:
+    layout = _layout(*(FinModelSpec(k, (("path", force_table),) if k == "table" else ()) for k in kinds))
+    actuation, plant = Actuation(layout), Plant(layout)
+    command = np.random.default_rng(0).uniform([0.06, 0.2, -3.0], [0.59, 2.0, 3.0], (20, layout.n_fins, 3))
+    wrench, jacobian = actuation.linearize(command)
+    np.testing.assert_allclose(wrench, plant.wrench(command), atol=1e-12)
+    np.testing.assert_allclose(actuation.wrench(command), wrench, atol=1e-12)
+    expected = plant.effectiveness(command).reshape(jacobian.shape)
+    np.testing.assert_allclose(jacobian, expected, atol=1e-6)
+    forward = command.copy()
+    forward[..., 2] = 0.0
+    size = np.linalg.norm(plant.fin_forces(forward), axis=-1)
+    np.testing.assert_allclose(actuation.thrust(forward[..., 0], forward[..., 1]), size, atol=1e-9)
+
+
+def test_feasible_wraps_full_turns_and_clips_the_rest() -> None:
+    rng = np.random.default_rng(1)
+    layout = random_layout(rng, n_fins=5, limits="varied")
+    actuation = Actuation(layout)
+    wild = rng.normal(scale=20.0, size=(100, 5, 3))
+    tame = actuation.feasible(wild)
+    assert (tame >= actuation.lower).all() and (tame <= actuation.upper).all()
+    turns = (tame - wild)[:, actuation.full_turn, 2] / (2 * np.pi)
+    np.testing.assert_allclose(turns, np.round(turns), atol=1e-9)
+    np.testing.assert_array_equal(actuation.feasible(tame), tame)
+
+
+@pytest.mark.parametrize("n_variables", [1, 6, 15, 48])
+def test_box_quadratics_agree_with_scipy(n_variables: int) -> None:
+    rng = np.random.default_rng(n_variables)
+    matrix = rng.normal(size=(40, 6, n_variables))
+    right = 3.0 * rng.normal(size=(40, 6))
+    lower, upper = -rng.uniform(0, 1, (40, n_variables)), rng.uniform(0, 1, (40, n_variables))
+    weight = 1e-2
+    hessian = np.einsum("bki,bkj->bij", matrix, matrix) + weight * np.eye(n_variables)
+    gradient = -np.einsum("bki,bk->bi", matrix, right)
+    found = solve_box_quadratics(hessian, gradient, lower, upper)
+    assert (found >= lower).all() and (found <= upper).all()
+    for i in range(len(found)):
+        stacked = np.vstack([matrix[i], np.sqrt(weight) * np.eye(n_variables)])
+        padded = np.concatenate([right[i], np.zeros(n_variables)])
+        expected = lsq_linear(stacked, padded, (lower[i], upper[i]), method="bvls", tol=1e-14).x
+        np.testing.assert_allclose(found[i], expected, atol=1e-6)
+
+
+def test_box_quadratics_meet_their_optimality_conditions() -> None:
+    rng = np.random.default_rng(2)
+    matrix = rng.normal(size=(500, 6, 12))
+    hessian = np.einsum("bki,bkj->bij", matrix, matrix) + 1e-4 * np.eye(12)
+    gradient = 5.0 * rng.normal(size=(500, 12))
+    x = solve_box_quadratics(hessian, gradient, -np.ones((500, 12)), np.ones((500, 12)))
+    slope = np.einsum("bij,bj->bi", hessian, x) + gradient
+    assert np.abs(x - np.clip(x - slope, -1, 1)).max() < 1e-7
+
+
+def test_a_fixed_variable_stays() -> None:
+    x = solve_box_quadratics(
+        np.eye(2)[None], np.array([[-1.0, -1.0]]), np.zeros((1, 2)), np.array([[0.0, 5.0]])
+    )
+    np.testing.assert_allclose(x, [[0.0, 1.0]])
+
+
+@pytest.mark.parametrize("energy_weight", [0.0, 1e-3])
+def test_descent_lowers_its_objective_and_reports_it(energy_weight: float) -> None:
+    rng = np.random.default_rng(3)
+    actuation = Actuation(random_layout(rng, n_fins=4, limits="varied"))
+    start = actuation.sample(rng, (50,))
+    target = actuation.wrench(actuation.sample(rng, (50,)))
+
+    def objective(command: np.ndarray) -> np.ndarray:
+        error = (((actuation.wrench(command) - target) / SIGMA) ** 2).sum(-1)
+        return error + energy_weight * command_energy(command, actuation.upper)
+
+    end = descend(actuation, start, target, SIGMA, LevenbergOptions(energy_weight=energy_weight))
+    np.testing.assert_allclose(end.objective, objective(end.command), rtol=1e-9)
+    assert (end.objective <= objective(start)).all()
+    assert np.median(objective(end.command)) < 0.05 * np.median(objective(start))
+
+
+def test_energy_in_the_descent_finds_cheaper_commands() -> None:
+    rng = np.random.default_rng(4)
+    actuation = Actuation(random_layout(rng, n_fins=5))
+    start, target = actuation.sample(rng, (50,)), actuation.wrench(actuation.sample(rng, (50,)))
+    plain, cheap = (
+        descend(actuation, start, target, SIGMA, LevenbergOptions(energy_weight=weight, n_steps=60)).command
+        for weight in (0.0, 1e-4)
+    )
+    assert (
+        command_energy(cheap, actuation.upper).mean() < 0.95 * command_energy(plain, actuation.upper).mean()
+    )
+
+
+def test_single_target_derivatives_match_finite_differences() -> None:
+    rng = np.random.default_rng(5)
+    actuation = Actuation(random_layout(rng, n_fins=3, limits="varied"))
+    problem = Problem(actuation, rng.normal(size=6), SIGMA)
+    x = rng.uniform(0.2, 0.8, problem.n_free)
+    step = 1e-6 * np.eye(problem.n_free)
+    numeric = np.array([(problem.residual(x + d) - problem.residual(x - d)) / 2e-6 for d in step]).T
+    np.testing.assert_allclose(problem.residual_slope(x), numeric, atol=1e-6)
+    value, gradient = problem.objective(x)
+    numeric = np.array([(problem.objective(x + d)[0] - problem.objective(x - d)[0]) / 2e-6 for d in step])
+    np.testing.assert_allclose(gradient, numeric, rtol=1e-4, atol=1e-5)
+    command = problem.command(x)
+    expected = (problem.residual(x) ** 2).sum() + 1e-4 * command_energy(command, actuation.upper)
+    assert value == pytest.approx(float(expected))
+    np.testing.assert_allclose(problem.position(command), x)

@@ -1,0 +1,80 @@
+"""Rows and tables from records made by hand."""
+
+import numpy as np
+import pytest
+
+from finlab.evaluation.metrics import Records, join_records, make_records, rows_by_fin_count, wrench_row
+from finlab.evaluation.paper_figures import paper_figures, paper_wrench_rows
+from finlab.evaluation.tables import format_cell, markdown_table, text_table
+
+KEYS = [
+    *("split", "method", "n", "scored_by"),
+    *("err_norm_mean", "err_norm_median", "err_norm_p95", "err_norm_max", "err_phys_mean"),
+    *("success_0.01", "success_0.05", "success_0.5", "success_1.0"),
+    *("energy_mean", "solve_ms_p50", "solve_ms_p99"),
+]
+"""Keys of a row, in the order that users rely on."""
+
+
+def _records(err_norm: list[float], n_fins: int = 3) -> Records:
+    error = np.array(err_norm)
+    return Records(
+        error, 2 * error, error + 1, np.arange(len(error), dtype=float), np.full(len(error), n_fins)
+    )
+
+
+def test_errors_from_wrenches() -> None:
+    target = np.zeros((2, 6))
+    wrench = np.array([[3.0, 4, 0, 0, 0, 0], [0, 0, 0, 0, 0, 2.0]])
+    sigma = np.array([3.0, 4, 1, 1, 1, 0.5])
+    records = make_records(wrench, target, sigma, np.ones(2), np.ones(2), 4)
+    np.testing.assert_allclose(records.err_phys, [5.0, 2.0])
+    np.testing.assert_allclose(records.err_norm, [np.sqrt(2), 4.0])
+    assert records.n_fins.tolist() == [4, 4]
+
+
+def test_row_of_known_errors() -> None:
+    row = wrench_row(_records([0.01, 0.05, 0.5, 1.0, 3.44]), split="id", method="qp")
+    assert list(row) == KEYS
+    assert (row["split"], row["method"], row["n"], row["scored_by"]) == ("id", "qp", 5, "plant")
+    assert row["err_norm_mean"] == pytest.approx(1.0)
+    assert row["err_norm_median"] == 0.5
+    assert row["err_norm_max"] == 3.44
+    assert row["err_norm_p95"] == pytest.approx(1.0 + 0.8 * 2.44)
+    assert row["err_phys_mean"] == pytest.approx(2.0)
+    assert [row[f"success_{level}"] for level in (0.01, 0.05, 0.5, 1.0)] == [0.2, 0.4, 0.6, 0.8]
+    assert row["energy_mean"] == pytest.approx(2.0)
+    assert (row["solve_ms_p50"], row["solve_ms_p99"]) == (2.0, pytest.approx(3.96))
+
+
+def test_rows_by_fin_count() -> None:
+    both = join_records([_records([0.0, 0.02], 2), _records([1.0], 5)])
+    rows = rows_by_fin_count(both, method="qp")
+    assert [(row["fins"], row["n"], row["success_0.01"]) for row in rows] == [(2, 2, 0.5), (5, 1, 0.0)]
+
+
+def test_paper_rows_have_our_columns() -> None:
+    for split in ("id", "ood"):
+        rows = paper_wrench_rows(split)
+        assert len(rows) == 3
+        assert all(set(row) <= set(KEYS) for row in rows)
+    assert paper_wrench_rows("limits") == []
+    assert paper_wrench_rows("id")[0]["err_norm_mean"] == 0.0857
+    assert paper_figures()["ablation"]["ours"]["err_norm_mean"] == 3.03e-4
+
+
+def test_text_table_aligns_and_leaves_gaps() -> None:
+    lines = text_table([{"name": "a", "value": 1.5}, {"name": "long", "other": 12}]).splitlines()
+    assert lines == ["name   value  other", "----  ------  -----", "a     1.5000", "long             12"]
+
+
+def test_markdown_table() -> None:
+    assert markdown_table([{"a": 1, "b": 0.5}]) == "| a | b |\n| --- | --- |\n| 1 | 0.5000 |"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0, "0.0000"), (0.5, "0.5000"), (1.234e-5, "1.23e-05"), (2e7, "2.00e+07"), (None, "")],
+)
+def test_cells(value: object, text: str) -> None:
+    assert format_cell(value) == text

@@ -1,0 +1,139 @@
+"""Whole runs: a method over a split, latency, and the command line."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finlab.allocation.allocation import Solution
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.analytic import Analytic
+from finlab.cli import main
+from finlab.data.normalization import Normalization
+from finlab.evaluation.ablation import VARIANTS, ablation_report, paper_ablation_rows
+from finlab.evaluation.latency import latency_report, latency_rows, machine
+from finlab.evaluation.splits import make_split
+from finlab.evaluation.wrench import run_method, wrench_report, wrench_rows
+from finlab.layout import Layout
+from finlab.physics import Plant
+
+NORMALIZATION = Normalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35]))
+
+
+class Idle(Allocator):
+    """Answers every target with the least command."""
+
+    name = "idle"
+    normalization = NORMALIZATION
+
+    def _solve(
+        self, layout: Layout, targets: np.ndarray, *, seed: int, previous: np.ndarray | None
+    ) -> Solution:
+        least = np.array([fin.limits.lower for fin in layout.fins])
+        return Solution(np.tile(least, (len(targets), 1, 1)))
+
+
+@pytest.fixture
+def statistics(tmp_path: Path) -> str:
+    """A checkpoint folder of which only the wrench statistics are there, enough for the baselines."""
+    config = {"format": "finlab-checkpoint", "version": 1}
+    statistics = {"mean": NORMALIZATION.mean.tolist(), "std": NORMALIZATION.std.tolist()}
+    folder = tmp_path / "statistics"
+    folder.mkdir()
+    (folder / "config.json").write_text(json.dumps({**config, "normalization": statistics}))
+    return str(folder)
+
+
+@pytest.mark.parametrize("single", [None, 2])
+def test_the_plant_scores(single: int | None) -> None:
+    cases = make_split("failure", 3, 4, 11)
+    records = run_method(Idle(), cases, single=single)
+    expected = []
+    for case in cases:
+        command = np.array([fin.limits.lower for fin in case.layout.fins])
+        command[[name in case.failed for name in case.layout.names]] = np.nan
+        expected.append(NORMALIZATION.error(Plant(case.layout).wrench(command), case.targets[:single]))
+    np.testing.assert_allclose(records.err_norm, np.concatenate(expected))
+    assert (records.solve_ms > 0).all()
+
+
+def test_report_shows_the_papers_figures_beside() -> None:
+    records = {"idle": run_method(Idle(), make_split("id", 3, 4, 11))}
+    report = wrench_report(records, "id")
+    assert "ours (printed in the paper)" in report and "0.0857" in report and "time of all targets" in report
+    assert wrench_rows(records, "id")[0]["n"] == 12
+    assert "one call at a time" in wrench_report(records, "limits", single=3)
+
+
+def test_latency_compares_with_learned() -> None:
+    cases = make_split("id", 3, 4, 11)
+    slow, fast = Analytic(NORMALIZATION), Idle()
+    rows = latency_rows({"learned": fast, "analytic": slow}, cases, n_calls=7)
+    assert [row["calls"] for row in rows] == [7, 7]
+    assert rows[0]["p50_over_learned"] == 1.0
+    assert all(0 < row["p50_ms"] <= row["p99_ms"] for row in rows)
+    assert "p50_over_learned" not in latency_rows({"analytic": slow}, cases, n_calls=1)[0]
+    assert latency_rows({"analytic": slow}, cases, n_calls=1000, budget_s=0.0)[0]["calls"] == 1
+    assert machine()["processor"] in latency_report(rows, machine())
+
+
+def test_ablation_has_the_papers_rows() -> None:
+    assert [row["variant"] for row in paper_ablation_rows()] == list(VARIANTS)
+    ours = [{"variant": name, "scored_by": "plant", "err_norm_mean": 0.5} for name in VARIANTS]
+    lines = ablation_report(ours).splitlines()[2:12]
+    assert [line.split()[0] for line in lines] == [name for name in VARIANTS for _ in range(2)]
+
+
+def test_eval_wrench(statistics: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "rows.json"
+    arguments = [
+        "eval",
+        "wrench",
+        "--split",
+        "limits",
+        "--layouts",
+        "2",
+        "--targets",
+        "3",
+        "--methods",
+        "analytic,qp",
+        "--seed",
+        "1000",
+    ]
+    assert main(arguments) == 0
+    rows = json.loads(file.read_text())["rows"]
+    assert [(row["split"], row["method"], row["n"]) for row in rows] == [
+        ("limits", "analytic", 6),
+        ("limits", "qp", 6),
+    ]
+    assert "scored by the plant" in capsys.readouterr().out
+
+
+def test_eval_latency(statistics: str, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["eval", "latency", "--methods", "analytic", "--calls", "3", "--checkpoint", statistics]
+    assert main(arguments) == 0
+    assert "p99_ms" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("wrench --methods nobody", "method: expected one of"),
+        ("wrench --methods ,", "methods: expected names with commas between"),
+        ("wrench --split nowhere --methods qp", "split: expected one of id, ood"),
+        ("wrench --layouts 0 --methods qp", "layouts: expected a number of at least 1, got 0"),
+        ("wrench --single 0 --methods qp", "single: expected a number of at least 1, got 0"),
+        (
+            "wrench --methods qp --json missing/folder/rows.json",
+            "json: expected a file in an existing",
+        ),
+        ("latency --fins 9 --methods qp", "fins: expected 2 to 5"),
+    ],
+)
+def test_bad_input_is_one_sentence(
+    arguments: str, message: str, statistics: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["eval", *arguments.split(), "--checkpoint", statistics]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("finlab: error: ") and message in error and error.count("\n") == 1
