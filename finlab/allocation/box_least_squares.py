@@ -56,8 +56,8 @@ def solve_box_quadratics(hessian: Array, gradient: Array, lower: Array, upper: A
 def _search(h: Array, slope: Array, at: Array, step: Array, low: Array, high: Array) -> Array:
     """The first point on the projected path `clip(at + t step)`, t = 1, 1/2, ..., that falls enough.
 
-    Where none does, because a variable that is only just free blocks the way, a projected gradient step, which
-    always falls.
+    Where none does, because a variable that is only just free blocks the way, a projected gradient step,
+    which always falls.
     """
     lipschitz = np.abs(h).sum(axis=2).max(axis=1, keepdims=True)
     best = np.clip(at - slope / lipschitz, low, high)

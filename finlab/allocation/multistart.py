@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.actuation import Actuation
-from finlab.allocation.levenberg import LevenbergOptions, descend
+from finlab.allocation.actuation_descent import DescentOptions, descend
 from finlab.allocation.model_based import ENERGY_WEIGHT, ModelBased
 from finlab.data.normalization import Normalization
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 CHUNK_ROWS = 2048
 """Commands refined together; more would not fit the caches."""
-POLISH = LevenbergOptions(n_steps=20, damping=1e-6)
+POLISH = DescentOptions(n_steps=20, damping=1e-6)
 """Last steps of the winner, on the error alone."""
 
 
@@ -42,7 +42,7 @@ class Multistart(ModelBased):
     ) -> None:
         super().__init__(normalization)
         self.n_candidates = n_candidates
-        self.options = LevenbergOptions(n_steps=n_steps, energy_weight=energy_weight)
+        self.options = DescentOptions(n_steps=n_steps, energy_weight=energy_weight)
 
     def _commands(self, actuation: Actuation, targets: Array, rng: np.random.Generator) -> Array:
         start = actuation.sample(rng, (self.n_candidates,))

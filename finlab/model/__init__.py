@@ -1,0 +1,1 @@
+"""Networks only: they see tensors, never a layout."""

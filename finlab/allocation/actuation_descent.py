@@ -28,7 +28,7 @@ PASSES = 2
 
 
 @dataclass(frozen=True)
-class LevenbergOptions:
+class DescentOptions:
     """How long and how carefully to descend."""
 
     n_steps: int = 30
@@ -55,7 +55,7 @@ class Descent(NamedTuple):
 
 
 def descend(
-    actuation: Actuation, start: Array, target: Array, sigma: Array, options: LevenbergOptions
+    actuation: Actuation, start: Array, target: Array, sigma: Array, options: DescentOptions
 ) -> Descent:
     """Minimize J from B start commands.
 
@@ -64,7 +64,7 @@ def descend(
         start: commands (B, n, 3), within the limits.
         target: desired wrench of each row (B, 6).
         sigma: per-axis standard deviation (6,).
-        options: see `LevenbergOptions`.
+        options: see `DescentOptions`.
     """
     energy = _EnergyForm(actuation, options)
     command = actuation.feasible(start)
@@ -97,7 +97,7 @@ def descend(
 class _EnergyForm:
     """The energy as a quadratic form in positions between the limits (0 at the lower, 1 at the upper one)."""
 
-    def __init__(self, actuation: Actuation, options: LevenbergOptions) -> None:
+    def __init__(self, actuation: Actuation, options: DescentOptions) -> None:
         self.width = actuation.width.ravel()
         self.safe_width = np.where(actuation.width > 0, actuation.width, 1.0)
         scale = energy_scale(actuation.upper)
@@ -188,7 +188,7 @@ def _objective(
     wrench: Array,
     target: Array,
     sigma: Array,
-    options: LevenbergOptions,
+    options: DescentOptions,
 ) -> Array:
     error = (((wrench - target) / sigma) ** 2).sum(axis=-1)
     if options.energy_weight == 0:

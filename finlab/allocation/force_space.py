@@ -1,0 +1,161 @@
+"""The search for the cheapest exact allocation, in the space of planar fin forces.
+
+Each fin gives a force y_i in its thrust plane (horizontal and vertical component), so the wrench is
+linear: w = sum_i B_i y_i. The least energy for a thrust T, e_i(T), is known from the thrust curve and
+grows like the square root of T: it is concave in the force, so the cheapest allocation tends to let
+some fins rest, and it has many local minima. Each seed is driven to the one next to it by iterated
+reweighting: e_i is replaced by the quadratic |y|^2 / (2 m_i) that touches it, with mobility
+m_i = T / e_i'(T), and the resulting convex problem
+
+    min sum_i |y_i|^2 / (2 m_i)   s.t.   sum_i B_i y_i = w,   T_min <= |y_i| <= T_max, direction in its arc
+
+is solved through its dual: given the multiplier l in R^6, fin i answers with the projection of
+m_i B_i^T l on what it can do, and a semismooth Newton step on l removes the wrench error.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.thrust_curve import ThrustCurves
+
+Array = NDArray[np.float64]
+
+RIDGE = 1e-9
+"""Relative regularization of the 6 x 6 systems."""
+REST = 1e-3
+"""Share of the largest thrust below which a fin's mobility no longer shrinks; it can still come back."""
+
+
+class PlanarProblem(NamedTuple):
+    """One layout as the planar search sees it."""
+
+    columns: Array
+    """Normalized wrench per newton (n, 2, 6) of each fin's horizontal and vertical force."""
+    curves: ThrustCurves
+    """What thrust each fin can give, and at what energy."""
+    middle: Array
+    """Middle of the arc of zero directions (n,) [rad]."""
+    half: Array
+    """Half of the arc (n,) [rad]; pi and more for a full circle."""
+    direction_cost: Array
+    """Energy per squared zero direction (n,) [1/rad^2]."""
+
+    @property
+    def turns_fully(self) -> bool:
+        """Whether every fin may point anywhere."""
+        return bool((self.half >= np.pi - 1e-6).all())
+
+
+class Planar(NamedTuple):
+    """Planar forces of R rows."""
+
+    thrust: Array
+    """(R, n) [N]."""
+    direction: Array
+    """Zero direction (R, n) [rad], inside its arc."""
+    residual: Array
+    """Target minus wrench, normalized (R, 6)."""
+
+
+def mobility(problem: PlanarProblem, thrust: Array) -> Array:
+    """m = T / e'(T) up to a constant, for thrusts (R, n): e grows like sqrt(T / T_max)."""
+    top = problem.curves.maximum
+    kept = np.maximum(thrust, REST * top)
+    return kept * np.sqrt(kept * top)
+
+
+def descend(problem: PlanarProblem, target: Array, thrust: Array, steps: int) -> Planar:
+    """Follow each seed to a cheap, exact allocation.
+
+    Args:
+        problem: the layout.
+        target: normalized wrenches (R, 6).
+        thrust: seeds (R, n) [N]; only the sizes matter, directions follow from the target.
+        steps: reweighting steps; two more remove the last of the wrench error.
+    """
+    weight = mobility(problem, thrust)
+    multiplier = np.linalg.solve(_gram(problem.columns, weight), target[..., None])[..., 0]
+    for step in range(steps + 2):
+        wanted = _answer(problem, weight, multiplier)
+        planar, slope = _project(problem, wanted, target)
+        gram = _gram(problem.columns, weight, slope)
+        multiplier = multiplier + np.linalg.solve(gram, planar.residual[..., None])[..., 0]
+        if step < steps:
+            size = np.linalg.norm(_answer(problem, weight, multiplier), axis=-1)
+            weight = mobility(problem, np.minimum(size, problem.curves.maximum))
+    return _project(problem, _answer(problem, weight, multiplier), target)[0]
+
+
+def energy(problem: PlanarProblem, planar: Planar) -> Array:
+    """Energy (R,) of planar forces."""
+    thrust = problem.curves.lookup(planar.thrust)[..., 2]
+    return (thrust + problem.direction_cost * _cheap_direction(problem, planar) ** 2).sum(-1)
+
+
+def commands(problem: PlanarProblem, planar: Planar) -> Array:
+    """Commands (R, n, 3) that give planar forces at the least energy."""
+    looked_up = problem.curves.lookup(planar.thrust)
+    return np.concatenate([looked_up[..., :2], _cheap_direction(problem, planar)[..., None]], axis=-1)
+
+
+def _cheap_direction(problem: PlanarProblem, planar: Planar) -> Array:
+    """Zero directions (R, n); a fin at rest points where that costs least."""
+    resting = planar.thrust <= problem.curves.minimum * (1.0 + 1e-6)
+    idle = np.clip(0.0, problem.middle - problem.half, problem.middle + problem.half)
+    return np.where(resting, idle, planar.direction)
+
+
+def _answer(problem: PlanarProblem, weight: Array, multiplier: Array) -> Array:
+    """Each fin's unconstrained answer m_i B_i^T l: (R, n, 2)."""
+    n = problem.columns.shape[0]
+    pull = multiplier @ problem.columns.reshape(2 * n, 6).T
+    return pull.reshape(len(multiplier), n, 2) * weight[..., None]
+
+
+def _gram(columns: Array, weight: Array, slope: Array | None = None) -> Array:
+    """sum_i m_i B_i D_i B_i^T (R, 6, 6), slightly regularized; D_i (R, n, 2, 2) is the slope of the projection."""
+    n = columns.shape[0]
+    if slope is None:
+        outer = np.einsum("nci,ncj->nij", columns, columns)
+        gram = (weight @ outer.reshape(n, 36)).reshape(-1, 6, 6)
+    else:
+        pairs = np.einsum("nci,ndj->ncdij", columns, columns).reshape(n * 4, 36)
+        gram = ((weight[..., None, None] * slope).reshape(len(weight), n * 4) @ pairs).reshape(-1, 6, 6)
+    trace = np.einsum("rii->r", gram)
+    diagonal = np.arange(6)
+    gram[:, diagonal, diagonal] += (RIDGE * trace + 1e-12)[:, None]
+    return gram
+
+
+def _project(problem: PlanarProblem, wanted: Array, target: Array) -> tuple[Planar, Array]:
+    """What the fins can do nearest to `wanted` (R, n, 2), and the slope (R, n, 2, 2) of that projection."""
+    low, high = problem.curves.minimum, problem.curves.maximum
+    size = np.sqrt((wanted * wanted).sum(-1)) + 1e-12
+    unit = wanted / size[..., None]
+    direction = np.arctan2(wanted[..., 1], wanted[..., 0])
+    along = size
+    outside = np.zeros(size.shape, dtype=bool)
+    if not problem.turns_fully:
+        offset = np.mod(direction - problem.middle + np.pi, 2 * np.pi) - np.pi
+        inside = np.clip(offset, -problem.half, problem.half)
+        excess = np.abs(offset - inside)
+        outside = excess > 0
+        along = size * np.where(excess < np.pi / 2, np.cos(excess), 0.0)
+        direction = np.where(outside | (problem.half < np.pi - 1e-6), problem.middle + inside, direction)
+        unit = np.where(outside[..., None], np.stack([np.cos(direction), np.sin(direction)], axis=-1), unit)
+    thrust = np.minimum(np.maximum(along, low), high)
+    free = along == thrust
+    force = unit * thrust[..., None]
+    n = wanted.shape[1]
+    reached = force.reshape(len(force), 2 * n) @ problem.columns.reshape(2 * n, 6)
+    # Inside its limits a fin follows freely; at a thrust limit it only turns; at an end of its arc it
+    # only pushes harder; at both it is stuck.
+    radial = unit[..., :, None] * unit[..., None, :]
+    turn = np.where(outside, 0.0, thrust / np.maximum(size, 1e-12))
+    push = free.astype(np.float64)
+    slope = radial * (push - turn)[..., None, None] + np.eye(2) * turn[..., None, None]
+    return Planar(thrust, direction, target - reached), slope

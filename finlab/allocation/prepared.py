@@ -1,0 +1,82 @@
+"""What the learned allocator needs to know of a layout, computed once and kept."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.energy import DEFAULT_WEIGHTS, energy_scale
+from finlab.allocation.force_space import PlanarProblem
+from finlab.allocation.learned_fin import LearnedFin
+from finlab.allocation.levenberg_marquardt import CommandProblem
+from finlab.allocation.thrust_curve import thrust_curves
+from finlab.data.features import Geometry, geometry
+from finlab.layout import Layout
+
+Array = NDArray[np.float64]
+
+MAX_SUBSETS = 16
+"""Most sub-layouts that are searched beside the network's proposals."""
+FULL_TURN = 2 * np.pi - 1e-6
+"""Arc of zero directions [rad] from which a fin counts as able to point anywhere."""
+
+
+class Prepared(NamedTuple):
+    """One layout of n healthy fins, ready for prediction, search and refinement."""
+
+    lower: Array
+    """Lower limits (n, 3)."""
+    upper: Array
+    """Upper limits (n, 3)."""
+    geometry: Geometry
+    """The part of the network's features that does not depend on the target."""
+    planar: PlanarProblem
+    """The layout for the search in force space."""
+    commands: CommandProblem
+    """The layout for the refinement of commands."""
+    subsets: Array
+    """Thrust seeds (S, n) [N] of sub-layouts: the fins outside are nearly at rest."""
+
+
+def prepare(layout: Layout, fin: LearnedFin, std: Array) -> Prepared:
+    """Prepare a layout whose fins are all healthy; `std` (6,) normalizes wrenches."""
+    position = np.array([f.position for f in layout.fins], dtype=np.float64)
+    angle = np.array([f.mounting_angle for f in layout.fins], dtype=np.float64)
+    lower = np.array([f.limits.lower for f in layout.fins], dtype=np.float64)
+    upper = np.array([f.limits.upper for f in layout.fins], dtype=np.float64)
+    c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
+    axes = np.stack([np.stack([c, s, zero], -1), np.stack([-s, c, zero], -1), np.stack([zero, zero, one], -1)], axis=1)
+    torque = np.cross(position[:, None], axes)
+    columns = np.concatenate([axes, torque], axis=-1) / std  # (n, 3, 6)
+    curves = thrust_curves(fin, lower, upper)
+    arc = upper[:, 2] - lower[:, 2]
+    half = np.where(arc >= FULL_TURN, np.pi, 0.5 * arc)
+    cost = DEFAULT_WEIGHTS.zero_direction / energy_scale(upper)[:, 2] ** 2
+    planar = PlanarProblem(
+        np.ascontiguousarray(columns[:, 1:]), curves, 0.5 * (lower[:, 2] + upper[:, 2]), half, cost
+    )
+    return Prepared(
+        lower,
+        upper,
+        geometry(position[None], angle[None], lower[None], upper[None], std),
+        planar,
+        CommandProblem(fin, columns, lower, upper, arc >= FULL_TURN),
+        _subset_seeds(curves.maximum),
+    )
+
+
+def _subset_seeds(maximum: Array) -> Array:
+    """Seeds that let one or two fins rest; sub-layouts of fewer than two working fins are no use.
+
+    The energy is concave in a fin's force, so the cheapest allocation often rests some fins, which a
+    local search from the whole layout may miss.
+    """
+    n = len(maximum)
+    resting = [c for k in range(0, min(3, n - 1)) for c in combinations(range(n), k)][:MAX_SUBSETS]
+    seeds = np.tile(maximum, (len(resting), 1))
+    for row, fins in enumerate(resting):
+        seeds[row, list(fins)] *= 1e-3
+    return seeds

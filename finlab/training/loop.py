@@ -1,0 +1,168 @@
+"""The plain training loop shared by surrogate and allocator."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+import torch.distributed as dist
+from torch import Tensor, nn
+from tqdm import tqdm
+
+from finlab.training.state import load_state, save_state
+
+LOG_FILE = "log.csv"
+"""One row per logged step: step, samples, seconds, learning rate and every loss term."""
+
+
+@dataclass(frozen=True)
+class LoopSettings:
+    """What the loop itself needs to know."""
+
+    steps: int
+    """Optimizer steps in all."""
+    batch_size: int
+    """Samples per step, over all processes; only for the throughput shown."""
+    learning_rate: float
+    """Peak learning rate."""
+    warmup: int = 0
+    """Steps over which it rises linearly."""
+    cosine: bool = True
+    """Whether it falls to a hundredth along a cosine."""
+    ema: float = 0.0
+    """Decay of the running average of the weights; 0 keeps none."""
+    clip: float = 1.0
+    """Largest norm of the gradient."""
+    log_every: int = 20
+    """Steps between rows of the log."""
+    save_every_s: float = 60.0
+    """Seconds between saved states."""
+
+
+def learning_rate(settings: LoopSettings, step: int) -> float:
+    """Learning rate of a step, a function of the step alone so that a resumed run goes on exactly."""
+    rise = min(1.0, (step + 1) / settings.warmup) if settings.warmup else 1.0
+    if not settings.cosine:
+        return settings.learning_rate * rise
+    fall = 0.5 * (1 + math.cos(math.pi * step / max(settings.steps, 1)))
+    return settings.learning_rate * rise * (0.01 + 0.99 * fall)
+
+
+def train(
+    model: nn.Module,
+    terms_of_step: Callable[[nn.Module, int], dict[str, Tensor]],
+    settings: LoopSettings,
+    folder: Path,
+    identity: dict[str, Any],
+    *,
+    stop_after: int | None = None,
+    on_save: Callable[[dict[str, Tensor], int], None] | None = None,
+) -> dict[str, Tensor]:
+    """Minimize the term `loss` of `terms_of_step(model, step)`; resume from `folder` where it holds a state.
+
+    Args:
+        model: what is trained, already on its device.
+        terms_of_step: means over this process's share of the batch, `loss` among them.
+        settings: see `LoopSettings`.
+        folder: where log and state are written (by the first process only).
+        identity: settings that a resumed run must share.
+        stop_after: stop (resumable) once this many steps are done in all.
+        on_save: called with the shipped weights and the step at each save.
+
+    Returns:
+        The weights to ship: the running average, or the last ones where none is kept.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    first = not dist.is_initialized() or dist.get_rank() == 0
+    optimizer = torch.optim.Adam(model.parameters(), lr=settings.learning_rate)
+    average = {k: v.detach().clone() for k, v in model.named_parameters()} if settings.ema else {}
+    done = load_state(folder, model, optimizer, average, identity)
+    wrapped = nn.parallel.DistributedDataParallel(model) if dist.is_initialized() else model
+    log = _Log(folder / LOG_FILE, done) if first else None
+    end = min(settings.steps, stop_after or settings.steps)
+    bar = tqdm(
+        total=settings.steps, initial=done, disable=not (first and sys.stderr.isatty()), unit="step", smoothing=0.05
+    )
+    started = saved = time.monotonic()
+    for step in range(done, end):
+        for group in optimizer.param_groups:
+            group["lr"] = learning_rate(settings, step)
+        optimizer.zero_grad(set_to_none=True)
+        terms = terms_of_step(wrapped, step)
+        terms["loss"].backward()
+        nn.utils.clip_grad_norm_(model.parameters(), settings.clip)
+        optimizer.step()
+        if average:
+            # The average starts short and grows, so that early weights are soon forgotten.
+            decay = min(settings.ema, (1 + step) / (10 + step))
+            with torch.no_grad():
+                for name, parameter in model.named_parameters():
+                    average[name].lerp_(parameter, 1 - decay)
+        bar.update()
+        if step % settings.log_every == 0 or step == end - 1:
+            values = _mean_over_processes(terms)
+            if log is not None:
+                seconds = time.monotonic() - started
+                rate = (step + 1 - done) * settings.batch_size / seconds
+                log.write(step, (step + 1) * settings.batch_size, seconds, learning_rate(settings, step), values)
+                bar.set_postfix_str(f"loss {values['loss']:.4g}, {rate / 1e3:.1f} k samples/s")
+        if first and (time.monotonic() - saved > settings.save_every_s or step == end - 1):
+            save_state(folder, step + 1, model, optimizer, average, identity)
+            saved = time.monotonic()
+            if on_save is not None:
+                on_save(average or _weights(model), step + 1)
+    bar.close()
+    if log is not None:
+        log.close()
+    return average or _weights(model)
+
+
+def _weights(model: nn.Module) -> dict[str, Tensor]:
+    return {k: v.detach().clone() for k, v in model.named_parameters()}
+
+
+def _mean_over_processes(terms: dict[str, Tensor]) -> dict[str, float]:
+    stacked = torch.stack([value.detach().float() for value in terms.values()])
+    if dist.is_initialized():
+        dist.all_reduce(stacked)
+        stacked /= dist.get_world_size()
+    return dict(zip(terms, stacked.tolist(), strict=True))
+
+
+class _Log:
+    """The CSV log; a resumed run drops the rows after its saved state and goes on."""
+
+    def __init__(self, path: Path, done: int) -> None:
+        self.path = path
+        kept: list[dict[str, str]] = []
+        if done and path.exists():
+            with path.open(newline="") as file:
+                kept = [row for row in csv.DictReader(file) if int(row["step"]) < done]
+        self.offset = float(kept[-1]["seconds"]) if kept else 0.0
+        self.file = path.with_suffix(".new").open("w", newline="")
+        self.writer: csv.DictWriter[str] | None = None
+        for row in kept:
+            self._row(row)
+        os.replace(path.with_suffix(".new"), path)
+
+    def write(self, step: int, samples: int, seconds: float, rate: float, values: dict[str, float]) -> None:
+        fixed = {"step": step, "samples": samples, "seconds": f"{self.offset + seconds:.1f}", "learning_rate": f"{rate:.6g}"}
+        self._row({**fixed, **{name: f"{value:.8g}" for name, value in values.items()}})
+
+    def _row(self, row: dict[str, Any]) -> None:
+        if self.writer is None:
+            self.writer = csv.DictWriter(self.file, list(row))
+            self.writer.writeheader()
+        self.writer.writerow(row)
+        self.file.flush()
+
+    def close(self) -> None:
+        self.file.close()

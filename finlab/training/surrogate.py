@@ -1,0 +1,153 @@
+"""`finlab train surrogate`: learn the fin physics from forward samples (paper, surrogate pretraining)."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from finlab.data.normalization import Normalization
+from finlab.data.sampling import ForwardSampler
+from finlab.layout import FinModelSpec
+from finlab.model.checkpoint import Checkpoint, save_checkpoint
+from finlab.model.surrogate import CoefficientSurrogate, Surrogate, make_surrogate
+from finlab.physics import FinModel, make_fin_model
+from finlab.training.curves import plot_log
+from finlab.training.device import training_device
+from finlab.training.loop import LoopSettings, train
+from finlab.training.presets import Preset, get_preset
+
+TRAIN_SEED = 20_000
+"""Added to the user's seed, so that no training stream equals one of evaluation."""
+NORMALIZATION_SAMPLES = 200_000
+"""Samples with nominal limits over which the wrench statistics are taken."""
+COMMAND_RANGE = ((0.02, 0.85), (0.05, 3.2), (-np.pi, np.pi))
+"""Commands a coefficient surrogate learns: amplitude [rad], frequency [Hz], zero direction [rad]; a
+little wider than every limit of the splits."""
+
+
+def train_surrogate(
+    preset: str,
+    out: Path,
+    *,
+    seed: int = 0,
+    steps: int | None = None,
+    stop_after: int | None = None,
+    fin_model: FinModelSpec | None = None,
+) -> Checkpoint:
+    """Train a preset's surrogate and write a checkpoint folder without an allocator network.
+
+    Args:
+        preset: name of the recipe.
+        out: folder for checkpoint, log, loss curve and resume state.
+        seed: seed of the data and of the first weights.
+        steps: optimizer steps instead of the preset's.
+        stop_after: stop (resumable) after so many steps.
+        fin_model: fin model to learn; the default `drag` otherwise.
+    """
+    recipe = get_preset(preset)
+    spec = fin_model or FinModelSpec()
+    model = make_fin_model(spec)
+    training = recipe.surrogate_training
+    total = steps or training.steps
+    device = training_device()
+    torch.manual_seed(seed)
+    surrogate = make_surrogate(recipe.surrogate).to(device)
+    normalization = measure_normalization(model, seed)
+    if isinstance(surrogate, CoefficientSurrogate):
+        terms = _coefficient_terms(model, training.batch_size, seed, device)
+    else:
+        terms = _wrench_terms(model, training.batch_size, seed, normalization, device)
+    identity: dict[str, Any] = {
+        "preset": preset,
+        "seed": seed,
+        "steps": total,
+        "training": asdict(training),
+        "surrogate": asdict(recipe.surrogate),
+        "fin_model": spec_to_dict(spec),
+    }
+    settings = LoopSettings(total, training.batch_size, training.learning_rate, warmup=min(100, total), ema=0.99)
+    weights = train(surrogate, terms, settings, out, identity, stop_after=stop_after)
+    surrogate.load_state_dict(weights, strict=True)
+    surrogate.cpu().eval().requires_grad_(False)
+    checkpoint = Checkpoint(
+        name=out.name,
+        surrogate=surrogate,
+        normalization=normalization,
+        fin_model=spec_to_dict(spec),
+        preset=preset,
+        training={"surrogate": identity | {"samples": total * training.batch_size}},
+        metrics={"surrogate": surrogate_metrics(surrogate, model, seed + 1)},
+    )
+    save_checkpoint(out, checkpoint)
+    plot_log(out)
+    return checkpoint
+
+
+def spec_to_dict(spec: FinModelSpec) -> dict[str, Any]:
+    """A fin model as in a layout file."""
+    return {"type": spec.type, **dict(spec.parameters)}
+
+
+def measure_normalization(model: FinModel, seed: int) -> Normalization:
+    """Wrench statistics over layouts of 2-5 fins with nominal limits."""
+    sampler = ForwardSampler(TRAIN_SEED + seed, NORMALIZATION_SAMPLES, fin_model=model, varied_limits=0.0)
+    return Normalization.of(sampler.batch(0).wrench.numpy())
+
+
+def surrogate_metrics(surrogate: Surrogate, model: FinModel, seed: int) -> dict[str, float]:
+    """Accuracy against the fin model on fresh samples, half of them with varied limits.
+
+    `relative_force_error` is RMS(F - F_plant) / RMS(F_plant) per fin and is known only where the
+    surrogate speaks of single fins; `wrench_error_norm` is the mean normalized wrench error.
+    """
+    sampler = ForwardSampler(TRAIN_SEED + 7_000 + seed, 50_000, fin_model=model)
+    batch = sampler.batch(0)
+    std = measure_normalization(model, seed).std
+    with torch.inference_mode():
+        limits = (batch.lower, batch.upper, batch.mask)
+        wrench = surrogate(batch.command, batch.position, batch.mounting_angle, *limits)
+        metrics = {"wrench_error_norm": float(((wrench - batch.wrench) / torch.tensor(std)).norm(dim=-1).mean())}
+        if isinstance(surrogate, CoefficientSurrogate):
+            command = batch.command[batch.mask]
+            truth = model.force(command)
+            rms = (surrogate.fin_force(command) - truth).square().mean().sqrt() / truth.square().mean().sqrt()
+            metrics["relative_force_error"] = float(rms)
+    return metrics
+
+
+def _coefficient_terms(model: FinModel, batch_size: int, seed: int, device: torch.device):  # type: ignore[no-untyped-def]
+    """Mean squared error of force coefficients over single fins: the same relative weight for all forces."""
+    low, high = (torch.tensor(v, dtype=torch.float32, device=device) for v in zip(*COMMAND_RANGE, strict=True))
+    a0, f0 = CoefficientSurrogate.REFERENCE
+
+    def terms(net: nn.Module, step: int) -> dict[str, Tensor]:
+        draw = torch.Generator().manual_seed((TRAIN_SEED + seed) * 1_000_003 + step)
+        command = low + (high - low) * torch.rand(batch_size, 3, generator=draw).to(device)
+        scale = (command[:, 0] * command[:, 1] / (a0 * f0)).square()[:, None]
+        error = (net.fin_force(command) - model.force(command)) / scale  # type: ignore[operator]
+        return {"loss": error.square().sum(-1).mean()}
+
+    return terms
+
+
+def _wrench_terms(model: FinModel, batch_size: int, seed: int, normalization: Normalization, device: torch.device):  # type: ignore[no-untyped-def]
+    """The paper's L_phys: squared error of the normalized wrench of whole robots."""
+    sampler = ForwardSampler(TRAIN_SEED + seed, batch_size, fin_model=model)
+    std = torch.tensor(normalization.std, dtype=torch.float32, device=device)
+
+    def terms(net: nn.Module, step: int) -> dict[str, Tensor]:
+        b = type(sampler.batch(step))(*(t.to(device) for t in sampler.batch(step)))
+        wrench = net(b.command, b.position, b.mounting_angle, b.lower, b.upper, b.mask)
+        return {"loss": ((wrench - b.wrench) / std).square().sum(-1).mean()}
+
+    return terms
+
+
+def preset_of(checkpoint: Checkpoint) -> Preset:
+    """The recipe that a checkpoint was made by."""
+    return get_preset(checkpoint.preset)
