@@ -5,9 +5,9 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from finlab.allocation.actuation import Actuation
+from finlab.allocation.actuation_descent import DescentOptions, descend
 from finlab.allocation.box_least_squares import solve_box_quadratics
 from finlab.allocation.energy import command_energy
-from finlab.allocation.levenberg import LevenbergOptions, descend
 from finlab.allocation.single_target import Problem
 from finlab.layout import Fin, FinModelSpec, Layout, random_layout
 from finlab.physics import Plant
@@ -100,7 +100,7 @@ def test_descent_lowers_its_objective_and_reports_it(energy_weight: float) -> No
         error = (((actuation.wrench(command) - target) / SIGMA) ** 2).sum(-1)
         return error + energy_weight * command_energy(command, actuation.upper)
 
-    end = descend(actuation, start, target, SIGMA, LevenbergOptions(energy_weight=energy_weight))
+    end = descend(actuation, start, target, SIGMA, DescentOptions(energy_weight=energy_weight))
     np.testing.assert_allclose(end.objective, objective(end.command), rtol=1e-9)
     assert (end.objective <= objective(start)).all()
     assert np.median(objective(end.command)) < 0.05 * np.median(objective(start))
@@ -111,7 +111,7 @@ def test_energy_in_the_descent_finds_cheaper_commands() -> None:
     actuation = Actuation(random_layout(rng, n_fins=5))
     start, target = actuation.sample(rng, (50,)), actuation.wrench(actuation.sample(rng, (50,)))
     plain, cheap = (
-        descend(actuation, start, target, SIGMA, LevenbergOptions(energy_weight=weight, n_steps=60)).command
+        descend(actuation, start, target, SIGMA, DescentOptions(energy_weight=weight, n_steps=60)).command
         for weight in (0.0, 1e-4)
     )
     assert (

@@ -87,21 +87,9 @@ def test_ablation_has_the_papers_rows() -> None:
 
 def test_eval_wrench(statistics: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "rows.json"
-    arguments = [
-        "eval",
-        "wrench",
-        "--split",
-        "limits",
-        "--layouts",
-        "2",
-        "--targets",
-        "3",
-        "--methods",
-        "analytic,qp",
-        "--seed",
-        "1000",
-    ]
-    assert main(arguments) == 0
+    cases = ["--split", "limits", "--layouts", "2", "--targets", "3", "--seed", "1000"]
+    arguments = ["eval", "wrench", *cases, "--methods", "analytic,qp", "--checkpoint", statistics]
+    assert main([*arguments, "--json", str(file)]) == 0
     rows = json.loads(file.read_text())["rows"]
     assert [(row["split"], row["method"], row["n"]) for row in rows] == [
         ("limits", "analytic", 6),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from finlab.allocation.actuation import Actuation
-from finlab.allocation.levenberg import LevenbergOptions, descend
+from finlab.allocation.actuation_descent import DescentOptions, descend
 from finlab.errors import DataError
 from finlab.evaluation.splits import NEAR_ANGLE, NEAR_POSITION, SPLITS, Case, make_split
 from finlab.layout import Limits
@@ -91,7 +91,7 @@ def test_targets_are_reachable(split: str) -> None:
         actuation = Actuation(case.layout.without(case.failed) if case.failed else case.layout)
         start = actuation.sample(rng, (30 * len(case.targets),))
         end = descend(
-            actuation, start, np.repeat(case.targets, 30, axis=0), sigma, LevenbergOptions(n_steps=60)
+            actuation, start, np.repeat(case.targets, 30, axis=0), sigma, DescentOptions(n_steps=60)
         )
         assert np.sqrt(end.objective.reshape(len(case.targets), -1).min(axis=1)).max() < 0.02
 
@@ -101,7 +101,7 @@ def test_targets_are_reachable(split: str) -> None:
     [
         (
             ("nowhere", 1, 1, 0),
-            "expected one of id, ood, ood-fins, limits, failure, near-singular, got 'nowhere'",
+            "expected one of id, ood, ood-fins, limits, .*, got 'nowhere'",
         ),
         (("id", 0, 1, 0), "layouts: expected a number of at least 1, got 0"),
         (("id", 1, -3, 0), "targets: expected a number of at least 1, got -3"),
