@@ -10,8 +10,8 @@ from webapp.handles import put
 from webapp.theme import DELIVERED, SKY, VERMILLION, css
 
 Array = NDArray[np.float64]
-SMALLEST_ERROR = 1e-5
-"""Errors below this are drawn here; the axis is logarithmic."""
+LOWEST, HIGHEST = -5.0, 1.5
+"""Powers of ten on the error axis; what lies beyond is drawn at the edge."""
 FONT = "11px sans-serif"
 
 
@@ -35,8 +35,8 @@ def add_candidate_plot(gui: viser.GuiApi, height: int) -> viser.GuiUplotHandle:
             dots("refined", css(DELIVERED), 8),
             dots("shown", css(VERMILLION), 15, filled=False),
         ),
-        scales={"x": uplot.Scale(time=False), "y": uplot.Scale(distr=3)},
-        axes=(axis("energy", 30), axis("error", 46)),
+        scales={"x": uplot.Scale(time=False), "y": uplot.Scale(auto=False, range=(LOWEST, HIGHEST))},
+        axes=(axis("energy", 30), axis("log₁₀ error", 42)),
         height=height,
     )
 
@@ -49,7 +49,7 @@ def refresh_candidate_plot(plot: viser.GuiUplotHandle, answer: Allocation | None
 
 
 def candidate_data(samples: Candidates | None, refined: Candidates | None, shown: int) -> tuple[Array, ...]:
-    """Columns: energy, then the errors of samples, refined ones and the shown one; NaN means no dot."""
+    """Columns: energy, log10 of the errors of samples, of refined ones, of the shown one; NaN is no dot."""
     groups = [(1, samples), (2, refined)]
     rows = [
         (energy, column, error)
@@ -67,5 +67,5 @@ def candidate_data(samples: Candidates | None, refined: Candidates | None, shown
     for k, (energy, column, error) in enumerate(rows):
         data[0, k] = energy
         if column > 0:
-            data[column, k] = max(error, SMALLEST_ERROR)
+            data[column, k] = np.clip(np.log10(max(error, 1e-12)), LOWEST + 0.2, HIGHEST - 0.2)
     return tuple(np.ascontiguousarray(column) for column in data)

@@ -11,14 +11,13 @@ from typing import Any
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp import editing
+from webapp.arrow_scale import NEWTONS
 from webapp.history import History
 from webapp.state import AXES, State, number
 from webapp.targets import FIRST, PRESETS
 
 POSITION_STEPS = {"off": 0.0, "5 mm": 0.005, "1 cm": 0.01, "5 cm": 0.05}
 """Grids [m] that a fin's position can snap to."""
-ARROW_NEWTONS = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
-"""Scales to choose from: what an arrow of 0.1 m stands for [N]."""
 ANGLE_STEPS = {"off": 0.0, "5°": 5.0, "15°": 15.0, "45°": 45.0}
 """Grids [deg] that a mounting angle can snap to."""
 
@@ -43,17 +42,12 @@ class Display:
     """Cast shadows; slow without a graphics card."""
     dark: bool = False
     """Dark theme."""
-    newtons: float = 1.0
-    """Force that an arrow of 0.1 m stands for [N]."""
+    newtons: float = 0.0
+    """Force that an arrow of 0.1 m stands for [N]; 0 lets the app choose."""
     position_snap: str = "off"
     """Key of `POSITION_STEPS`."""
     angle_snap: str = "off"
     """Key of `ANGLE_STEPS`."""
-
-    @property
-    def arrow_scale(self) -> float:
-        """Length of a force arrow per newton [m/N]."""
-        return 0.1 / self.newtons
 
 
 class Session:
@@ -194,8 +188,8 @@ class Session:
         choices = {"position_snap": POSITION_STEPS, "angle_snap": ANGLE_STEPS}
         if key in choices and value not in choices[key]:
             raise FinlabError(f"{key}: expected one of {', '.join(choices[key])}, got {value!r:.40}")
-        if key == "newtons" and value not in ARROW_NEWTONS:
-            raise FinlabError(f"arrow scale: expected one of {ARROW_NEWTONS} N per 0.1 m, got {value!r:.40}")
+        if key == "newtons" and value not in (0.0, *NEWTONS):
+            raise FinlabError(f"arrow scale: expected one of {NEWTONS} N per 0.1 m, got {value!r:.40}")
         if key == "speed":
             value = number(value, "speed of the animation", 0.02, 1.0)
         self.display = replace(self.display, **{key: value})

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
@@ -22,23 +21,23 @@ class Solver:
         """`checkpoint` is a name or folder, None for the shipped one; `load` is replaced in tests."""
         self._checkpoint = checkpoint
         self._load = load
-        self._allocators: dict[str, tuple[dict[str, Any], Allocator]] = {}
+        self._allocators: dict[str, Allocator] = {}
 
     def allocator(self, state: State) -> Allocator:
-        """The allocator for the state's method and settings; loads it when they have changed."""
-        options: dict[str, Any] = {}
-        if state.method in SAMPLING_METHODS:
-            options = {
-                "n_candidates": state.n_candidates,
-                "temperature": state.temperature,
-                "gamma": state.gamma,
-            }
-        known = self._allocators.get(state.method)
-        if known is None or known[0] != options:
+        """The allocator for the state's method and settings, loaded once per method.
+
+        Raises:
+            FinlabError: it cannot be loaded.
+        """
+        if state.method not in self._allocators:
             checkpoint = None if state.method == "paper" else self._checkpoint
-            known = (options, self._load(checkpoint, method=state.method, **options))
-            self._allocators[state.method] = known
-        return known[1]
+            self._allocators[state.method] = self._load(checkpoint, method=state.method)
+        allocator = self._allocators[state.method]
+        if state.method in SAMPLING_METHODS:
+            # They take effect on the next answer; a network is not loaded again for each step of a slider.
+            for key in ("n_candidates", "temperature", "gamma"):
+                setattr(allocator, key, getattr(state, key))
+        return allocator
 
     def solve(self, state: State) -> Allocation:
         """The answer to a state.

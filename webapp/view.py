@@ -112,6 +112,11 @@ class View:
         """Why the present state has no answer."""
         return self._error if self._error_revision == self.session.revision else None
 
+    @property
+    def newtons(self) -> float:
+        """Force [N] that an arrow of 0.1 m stands for."""
+        return self.scene.newtons
+
     def do(self, act: Callable[[], object]) -> None:
         """Carry out an intent; a refusal becomes a note, and the page goes back to what the session holds."""
         try:
@@ -149,9 +154,9 @@ class View:
 
     def _refresh(self) -> None:
         with self.client.atomic():
+            self.scene.refresh(self.shown)  # first: it settles the scale that the legend tells
             for panel in self._panels:
                 panel.refresh()
-            self.scene.refresh(self.shown)
 
     def _apply_theme(self) -> None:
         if self.session.display.dark != self._dark:

@@ -95,4 +95,14 @@ def _mode_name(command: NDArray[np.float64], best: NDArray[np.float64]) -> str:
         parts.append(f"fin {resting[0]} rests" if len(resting) == 1 else f"fins {listed(resting)} rest")
     if turned:
         parts.append(f"fin{'s' if len(turned) > 1 else ''} {listed(turned)} reversed")
-    return ", ".join(parts) or "all fins push"
+    return ", ".join(parts) or _style(command, best)
+
+
+def _style(command: NDArray[np.float64], best: NDArray[np.float64]) -> str:
+    """How the fin that differs most from the best candidate beats: wide and slow, or narrow and quick."""
+    with np.errstate(invalid="ignore"):
+        wider = np.nan_to_num(np.log(command[:, 0] / best[:, 0]) - np.log(command[:, 1] / best[:, 1]))
+    fin = int(np.argmax(np.abs(wider)))
+    if abs(wider[fin]) < 0.1:
+        return "all fins push"
+    return f"fin {fin + 1} {'wider and slower' if wider[fin] > 0 else 'narrower and quicker'}"

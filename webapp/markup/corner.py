@@ -18,7 +18,7 @@ def corner(state: State, newtons: float, allocation: Allocation | None, busy: bo
 
 
 def _legend(newtons: float) -> str:
-    arrows = [("asked", ASKED, 0.5), ("delivered", DELIVERED, 1.0), ("missing", MISSING, 1.0)]
+    arrows = [("asked", ASKED, 0.65), ("delivered", DELIVERED, 1.0), ("missing", MISSING, 1.0)]
     rows = [f"{_arrow(css(color, alpha))}<span>{word}</span>" for word, color, alpha in arrows]
     turn = math.degrees(TORQUE_SCALE)
     return (

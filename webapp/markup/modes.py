@@ -18,7 +18,11 @@ def mode_table(candidates: Candidates | None, shown: int) -> str:
         kind = "chosen" if k == shown else ""
         rows.append(
             f"<tr class='{kind}'><td>{k + 1}</td><td class='words'>{escape(name)}</td>"
-            f"<td>{candidates.err_norm[k]:.1e}</td><td>{candidates.energy[k]:.3f}</td></tr>"
+            f"<td>{_error(candidates.err_norm[k])}</td><td>{candidates.energy[k]:.3f}</td></tr>"
         )
     header = "<tr><th>#</th><th class='words'>mode</th><th>error</th><th>energy</th></tr>"
     return f"<div class='fl'><table class='modes'>{header}{''.join(rows)}</table></div>"
+
+
+def _error(value: float) -> str:
+    return f"{value:.4f}" if value >= 5e-5 else "0.0000"

@@ -4,10 +4,10 @@ from functools import partial
 
 import viser
 
+from webapp.arrow_scale import NEWTONS
 from webapp.handles import on_user_change, put
 from webapp.panels.host import Host
 from webapp.scene.robot_scene import CAMERAS
-from webapp.session import ARROW_NEWTONS
 
 SWITCHES = {
     "frozen": ("Freeze", "Fins hold still at their zero direction."),
@@ -22,10 +22,10 @@ SWITCHES = {
 
 
 def _scale_entry(newtons: float) -> str:
-    return f"0.1 m = {newtons:g} N"
+    return f"0.1 m = {newtons:g} N" if newtons else "automatic"
 
 
-SCALES = {_scale_entry(newtons): newtons for newtons in ARROW_NEWTONS}
+SCALES = {_scale_entry(newtons): newtons for newtons in (0.0, *NEWTONS)}
 """Entries of the arrow scale and their forces [N]."""
 
 

@@ -28,9 +28,7 @@ class Header:
         host, history = self._host, self._host.session.history
         put(
             self._corner,
-            content=corner(
-                host.session.state, host.session.display.newtons, host.shown, host.busy, host.error
-            ),
+            content=corner(host.session.state, host.newtons, host.shown, host.busy, host.error),
         )
         undo, redo = history.undo_name or "nothing", history.redo_name or "nothing"
         put(self._history, hint=f"Undo: {undo} (Ctrl+Z). Redo: {redo} (Ctrl+Shift+Z).")

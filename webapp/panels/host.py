@@ -33,6 +33,10 @@ class Host(Protocol):
     def error(self) -> str | None:
         """Why there is no answer to the present state, if there is none."""
 
+    @property
+    def newtons(self) -> float:
+        """Force [N] that an arrow of 0.1 m stands for."""
+
     def do(self, act: Callable[[], object]) -> None:
         """Carry out an intent: show what changed, or tell the user why not."""
 

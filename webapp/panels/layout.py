@@ -46,11 +46,10 @@ class LayoutPanel:
                 "Shaft [°]", -180.0, 180.0, 1.0, 0.0, hint="Azimuth of the shaft, 0 is ahead."
             )
             on_user_change(self._angle, self._turn)
-            self._snap_m = gui.add_button_group("Snap place", tuple(POSITION_STEPS))
+            self._snap_m = gui.add_dropdown("Snap place", tuple(POSITION_STEPS), hint="Grid for positions.")
             on_user_change(self._snap_m, partial(self._set_display, "position_snap"))
-            self._snap_deg = gui.add_button_group("Snap turn", tuple(ANGLE_STEPS))
+            self._snap_deg = gui.add_dropdown("Snap turn", tuple(ANGLE_STEPS), hint="Grid for the shaft.")
             on_user_change(self._snap_deg, partial(self._set_display, "angle_snap"))
-            self._snaps = gui.add_html("")
         self._edit = gui.add_button_group("Selected fin", ("Mirror", "Duplicate", "Delete"))
         on_user_change(self._edit, self._edit_fin)
         self._add = gui.add_button("Add a fin", icon=viser.Icon.PLUS, hint=f"Up to {MAX_FINS} fins.")
@@ -99,9 +98,7 @@ class LayoutPanel:
             fin = layout.fins[layout.index(session.selected)]
             put(self._position, value=tuple(round(v, 4) for v in fin.position))
             put(self._angle, value=round(math.degrees(fin.mounting_angle), 1))
-        display = session.display
-        snaps = f"snap {display.position_snap} · turn {display.angle_snap}"
-        hint = "" if selected else "Click a fin to select it. "
-        put(self._snaps, content=f"<div class='fl dim'>{hint}{snaps}</div>")
+        put(self._snap_m, value=session.display.position_snap)
+        put(self._snap_deg, value=session.display.angle_snap)
         first = layout.description.strip().split("\n")[0]
         put(self._about, content=f"<div class='fl dim'>{escape(first)}</div>")

@@ -23,7 +23,7 @@ class Lines:
         self._steps = scene.add_line_segments(
             "/dimension", NO_LINE, LIGHT.line, thickness=2.0, thickness_units="screen"
         )
-        self._text = scene.add_label("/dimension/text", "", anchor="bottom-center", font_screen_scale=0.85)
+        self._text = scene.add_label("/dimension/text", "", anchor="top-center", font_screen_scale=0.85)
 
     def refresh(self, layout: Layout, healthy: tuple[str, ...], selected: str | None, graph: bool) -> None:
         """Show the edges between healthy fins, and the coordinates of the selected one."""
@@ -40,4 +40,4 @@ class Lines:
         corners = np.array([[0, 0, 0], [x, 0, 0], [x, y, 0], [x, y, z]], dtype=np.float32)
         put(self._steps, points=np.stack([corners[:-1], corners[1:]], axis=1))
         put(self._text, text=f"x {x:+.3f}  y {y:+.3f}  z {z:+.3f} m".replace("-", "−"))
-        put(self._text, position=np.array([x, y, z + 0.12]))
+        put(self._text, position=np.array([x, y, z - 0.07]))

@@ -2,18 +2,21 @@
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
+from webapp.arrow_scale import LENGTH, fitting_newtons
 from webapp.meshes.hull import hull_of
 from webapp.scene.fin_node import FinNode
 from webapp.scene.lines import Lines
 from webapp.scene.stage import Stage
 from webapp.scene.wrench_nodes import WrenchNodes
 from webapp.session import Session
+from webapp.state import State
 from webapp.words import is_reached
 
 CAMERAS = {
@@ -53,8 +56,10 @@ class RobotScene:
         self._lines = Lines(scene)
         self._fins: list[FinNode] = []
         self._dragged: int | None = None
-        self._phase: NDArray[np.float64] = np.zeros(0)
+        self._phase: NDArray[Any] = np.zeros(0)
         self._command: NDArray[np.float64] = np.zeros((0, 3))
+        self.newtons = 1.0
+        """Force [N] that an arrow of 0.1 m stands for at the moment."""
         self.look_from("3D")
 
     def look_from(self, view: str) -> None:
@@ -75,7 +80,8 @@ class RobotScene:
             self._fins.append(FinNode(self._client.scene, len(self._fins), self._clicked, self._drag))
         for node in self._fins[state.layout.n_fins :]:
             node.hide()
-        scale = display.arrow_scale
+        self.newtons = display.newtons or fitting_newtons(_largest(state, allocation), self.newtons)
+        scale = LENGTH / self.newtons
         fits = allocation is not None and allocation.layout.names == state.layout.names
         for i, fin in enumerate(state.layout.fins):
             selected = fin.name == self._session.selected
@@ -110,7 +116,7 @@ class RobotScene:
         if not display.frozen:
             frequency = np.where(alive, self._command[:, 1], 0.0)
             turned = self._phase + 2 * np.pi * frequency * elapsed * display.speed
-            self._phase = np.asarray(turned % (2 * np.pi), dtype=np.float64)
+            self._phase = turned % (2 * np.pi)
         for i in range(min(len(self._command), self._session.state.layout.n_fins)):
             if not alive[i]:
                 angle = math.pi / 2  # a limp fin hangs down
@@ -127,3 +133,11 @@ class RobotScene:
             return
         self._dragged = None if phase == "end" else index
         self._on_drag(self._session.state.layout.names[index], phase, position, angle)
+
+
+def _largest(state: State, allocation: Allocation | None) -> float:
+    """Largest force that an arrow has to show [N]."""
+    forces = [np.array(state.target[:3])]
+    if allocation is not None:
+        forces += [allocation.wrench[:3], *allocation.fin_forces]
+    return float(max(np.linalg.norm(force) for force in forces))

@@ -1,0 +1,117 @@
+"""A real browser for the flows. Without Chromium they are skipped, loudly; on CI that is a failure."""
+
+import os
+import shutil
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+CHROMIUM = next((p for p in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if p), None)
+MISSING = (
+    "NO CHROMIUM: the browser tests were skipped, so nothing checked the app's pages. Install one with "
+    "`apt-get install chromium` and run them again."
+)
+FLAGS = [
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-dev-shm-usage",
+]
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Skip the flows where there is no browser, or let them fail where there must be one."""
+    if CHROMIUM is not None:
+        return
+    here = [item for item in items if Path(__file__).parent in item.path.parents]
+    if os.environ.get("CI", "").lower() in ("1", "true"):
+        return  # the fixture fails
+    if here:
+        warnings.warn(MISSING, stacklevel=1)
+    for item in here:
+        item.add_marker(pytest.mark.skip(reason=MISSING))
+
+
+@dataclass
+class Served:
+    """A running app."""
+
+    url: str
+    """Where it answers."""
+    app: Any
+    """The `App`, to look at its sessions."""
+    server: Any
+    """The `ViserServer`."""
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[Served]:
+    """The app with the stand-in allocator, without shadows, so that software rendering keeps up."""
+    import viser
+
+    from finlab.assets import shipped_layouts
+    from finlab.layout import load_layout
+    from tests.webapp.stand_in import load_stand_in
+    from webapp.app import App
+    from webapp.session import Display
+    from webapp.solver import Solver
+
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    layout = load_layout(shipped_layouts()["ucat"])
+    app = App(server, Solver(load=load_stand_in), layout, Display(shadows=False, speed=0.2))
+    yield Served(f"http://127.0.0.1:{server.get_port()}/?fixedDpr=0.5", app, server)
+    app.stop()
+    server.stop()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """One Chromium for a file of flows."""
+    if CHROMIUM is None:
+        pytest.fail(MISSING)
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright, tempfile.TemporaryDirectory() as home:
+        chromium = playwright.chromium.launch(
+            executable_path=CHROMIUM,
+            headless=True,
+            chromium_sandbox=False,
+            args=FLAGS,
+            downloads_path=home,
+        )
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def new_page(browser: Any, served: Served) -> Iterator[Callable[[], Any]]:
+    """Opens pages of the app, each in a browser profile of its own."""
+    from tests.browser.page import Page
+
+    contexts = []
+
+    def open_page(context: Any = None) -> Page:
+        if context is None:
+            context = browser.new_context(viewport={"width": 900, "height": 600}, accept_downloads=True)
+            contexts.append(context)
+        return Page(context.new_page(), served)
+
+    yield open_page
+    for context in contexts:
+        context.close()
+
+
+@pytest.fixture
+def page(new_page: Callable[[], Any]) -> Any:
+    """One page of the app, ready."""
+    return new_page()

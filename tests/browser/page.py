@@ -1,0 +1,144 @@
+"""A page of the app in a real browser, in the words of a user: press, type, drag, read."""
+
+import re
+import time
+from collections.abc import Callable
+from typing import Any
+
+WAIT_MS = 15_000
+PAUSE_S = 0.12
+"""Between two inputs: the page sends at most one change in 50 ms, a quicker one would overwrite the last."""
+
+ROW = "xpath=ancestor::div[contains(@class,'Flex-root')][1]"
+"""From a label to the row it stands in."""
+VERTICES = """name => {
+  let geometry = null;
+  window.__viserMutable.nodeRefFromName[name].traverse(o => { geometry = geometry ?? o.geometry ?? null; });
+  return Array.from(geometry.attributes.position.array.slice(0, 600));
+}"""
+PROJECT = """([name, point]) => {
+  const node = window.__viserMutable.nodeRefFromName[name];
+  node.updateWorldMatrix(true, false);
+  const place = node.localToWorld(node.position.clone().set(...point));
+  const seen = place.project(window.__viserMutable.camera);
+  const canvas = document.querySelector('canvas').getBoundingClientRect();
+  return [canvas.left + (seen.x + 1) / 2 * canvas.width, canvas.top + (1 - seen.y) / 2 * canvas.height];
+}"""
+
+
+class Page:
+    """One tab."""
+
+    def __init__(self, page: Any, served: Any) -> None:
+        """Open the app and wait until the robot stands."""
+        self.page = page
+        self._served = served
+        self.problems: list[str] = []
+        page.set_default_timeout(WAIT_MS)
+        page.on("console", lambda m: self.problems.append(m.text) if m.type == "error" else None)
+        before = set(served.app.views)
+        page.goto(served.url)
+        self.ready()
+        self.until(lambda: bool(set(served.app.views) - before))
+        self.view = served.app.views[max(set(served.app.views) - before)]
+
+    def ready(self) -> None:
+        """Wait for panel, robot and first answer."""
+        self.page.get_by_role("button", name="Undo").wait_for()
+        self.node("/fins/0/turn/blade")
+        self.page.locator(".fl-status .err").wait_for(state="attached")
+        # The notice about software rendering lies over the view.
+        for close in self.page.locator(".mantine-Notification-closeButton").all():
+            close.click()
+
+    @property
+    def session(self) -> Any:
+        """What the server holds for this tab."""
+        return self.view.session
+
+    def until(self, condition: Callable[[], bool], seconds: float = 10.0) -> None:
+        """Wait for the server or the page to come round."""
+        end = time.monotonic() + seconds
+        while not condition():
+            assert time.monotonic() < end, "what was waited for did not happen"
+            self.page.wait_for_timeout(50)
+
+    def node(self, name: str) -> None:
+        """Wait for a node of the scene."""
+        self.page.wait_for_function("name => window.__viserMutable?.nodeRefFromName[name] != null", arg=name)
+
+    def tab(self, name: str) -> None:
+        """Open a tab of the panel."""
+        self.page.get_by_text(name, exact=True).first.click()
+        self._pause()
+
+    def press(self, name: str) -> None:
+        """Press a button that is shown."""
+        self.page.locator("button:visible", has_text=re.compile(f"^{re.escape(name)}$")).first.click()
+        self._pause()
+
+    def row(self, label: str) -> Any:
+        """The inputs beside a label."""
+        found = self.page.locator("label:visible", has_text=label).first
+        return found.locator(ROW).locator("input:not([type=hidden])")
+
+    def type(self, label: str, value: str, place: int = -1) -> None:
+        """Type into a number box."""
+        box = self.row(label)
+        box = box.last if place < 0 else box.nth(place)
+        box.fill(value)
+        box.press("Enter")
+        self._pause()
+
+    def choose(self, label: str, entry: str) -> None:
+        """Choose from a list."""
+        self.row(label).first.click()
+        options = self.page.locator("div[role=option]:visible")
+        options.filter(has_text=re.compile(f"^{re.escape(entry)}")).first.click()
+        self._pause()
+
+    def key(self, keys: str) -> None:
+        """Press a key outside any input."""
+        self.page.evaluate("document.activeElement && document.activeElement.blur()")
+        self.page.keyboard.press(keys)
+        self._pause()
+
+    def slide(self, label: str, pixels: float) -> None:
+        """Drag a slider's thumb sideways."""
+        thumb = self.page.locator("label:visible", has_text=label).first.locator(ROW).get_by_role("slider")
+        box = thumb.bounding_box()
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        self.drag((x, y), (x + pixels, y))
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float], steps: int = 16) -> None:
+        """Drag with the mouse, as slowly as a hand."""
+        mouse = self.page.mouse
+        mouse.move(*start)
+        self.page.wait_for_timeout(150)
+        mouse.down()
+        for k in range(1, steps + 1):
+            mouse.move(*(a + (b - a) * k / steps for a, b in zip(start, end, strict=True)))
+            self.page.wait_for_timeout(25)
+        self.page.wait_for_timeout(100)
+        mouse.up()
+        self._pause()
+
+    def pixel(self, node: str, point: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> tuple[float, float]:
+        """Where a point of a node is on the screen."""
+        x, y = self.page.evaluate(PROJECT, [node, list(point)])
+        return x, y
+
+    def text(self, selector: str) -> str:
+        """The text of the first such element."""
+        return str(self.page.locator(selector).first.inner_text())
+
+    def notes(self) -> list[str]:
+        """Texts of the notes that are shown."""
+        return [str(t) for t in self.page.locator(".mantine-Notification-root").all_inner_texts()]
+
+    def vertices(self, node: str) -> list[float]:
+        """First coordinates of a mesh as the browser holds it."""
+        return [float(v) for v in self.page.evaluate(VERTICES, node)]
+
+    def _pause(self) -> None:
+        self.page.wait_for_timeout(1000 * PAUSE_S)

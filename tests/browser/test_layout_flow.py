@@ -1,0 +1,84 @@
+"""Place a fin by gizmo and by numbers, mirror it, undo; open and save files."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+
+def test_gizmo_moves_a_fin(page: Any) -> None:
+    page.key("n")
+    page.until(lambda: page.session.selected == "front_right")
+    page.key("2")  # from above, the x arrow lies flat on the screen
+    page.page.wait_for_timeout(600)
+    start = page.session.state.layout.fins[0].position
+    grip, further = page.pixel("/fins/0", (0.168, 0, 0)), page.pixel("/fins/0", (0.268, 0, 0))
+    page.drag(grip, further)
+    page.until(lambda: page.session.state.layout.fins[0].position != start)
+    page.until(lambda: not page.view.busy)
+    end = page.session.state.layout.fins[0].position
+    assert end[0] - start[0] == pytest.approx(0.1, abs=0.02)
+    assert end[1:] == pytest.approx(start[1:], abs=1e-6)
+    assert page.session.history.undo_name == "Move front_right"
+    page.key("Control+z")
+    page.until(lambda: page.session.state.layout.fins[0].position == start)
+    page.until(lambda: page.pixel("/fins/0", (0.168, 0, 0)) == pytest.approx(grip, abs=3))
+
+
+def test_click_selects_and_numbers_move(page: Any) -> None:
+    page.page.mouse.click(*page.pixel("/fins/2/turn/shaft", (-0.02, 0, 0)))
+    page.until(lambda: page.session.selected == "back_left")
+    page.tab("Layout")
+    page.type("Position [m]", "-0.2", place=0)
+    page.until(lambda: page.session.state.layout.fins[2].position[0] == -0.2)
+    page.type("Shaft [°]", "90")
+    page.until(lambda: abs(page.session.state.layout.fins[2].mounting_angle - 1.5708) < 1e-3)
+
+
+def test_add_mirror_and_undo(page: Any) -> None:
+    page.tab("Layout")
+    page.choose("Layout", "B")
+    page.until(lambda: page.session.state.layout.name == "B")
+    page.press("Add a fin")
+    page.until(lambda: page.session.state.layout.n_fins == 5)
+    page.type("Position [m]", "0.1", place=1)
+    page.until(lambda: page.session.state.layout.fins[4].position[1] == 0.1)
+    page.press("Mirror")
+    page.until(lambda: page.session.state.layout.n_fins == 6)
+    assert page.session.state.layout.fins[5].position[1] == -0.1
+    page.node("/fins/5/turn/blade")
+    page.press("Undo")
+    page.until(lambda: page.session.state.layout.n_fins == 5)
+    page.press("Redo")
+    page.until(lambda: page.session.state.layout.n_fins == 6)
+
+
+def test_bad_number_is_refused_with_a_note(page: Any) -> None:
+    page.key("n")
+    page.tab("Layout")
+    before = page.session.state.layout
+    page.type("Position [m]", "55", place=2)
+    page.until(lambda: any("z of front_right" in note for note in page.notes()))
+    assert page.session.state.layout == before
+
+
+def test_save_open_and_a_bad_file(page: Any, tmp_path: Path) -> None:
+    page.tab("Files")
+    with page.page.expect_download() as download:
+        page.press("Save the layout")
+    saved = tmp_path / "saved.yaml"
+    download.value.save_as(saved)
+    text = saved.read_text()
+    changed = tmp_path / "changed.yaml"
+    changed.write_text(text.replace("front_right", "bow"))
+    with page.page.expect_file_chooser() as chooser:
+        page.press("Open a layout file")
+    chooser.value.set_files(changed)
+    page.until(lambda: page.session.state.layout.names[0] == "bow")
+    broken = tmp_path / "broken.yaml"
+    broken.write_text(text.replace("version: 1", "version: 99"))
+    with page.page.expect_file_chooser() as chooser:
+        page.press("Open a layout file")
+    chooser.value.set_files(broken)
+    page.until(lambda: any("broken.yaml" in note and "version" in note for note in page.notes()))
+    assert page.session.state.layout.names[0] == "bow", "nothing is lost"

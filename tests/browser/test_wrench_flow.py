@@ -1,0 +1,66 @@
+"""Move a slider, fail a fin, choose a candidate: numbers and arrows follow."""
+
+from typing import Any
+
+
+def test_slider_moves_numbers_and_arrows(page: Any) -> None:
+    before = page.vertices("/wrench/delivered_force")
+    page.slide("Fx [N]", 25)
+    page.until(lambda: page.session.state.target[0] > 2.0)
+    asked = page.session.state.target[0]
+    page.until(lambda: f"{asked:+.2f}" in page.text(".bars"))
+    page.until(lambda: not page.view.busy)
+    assert abs(page.view.shown.wrench[0] - asked) < 0.05
+    page.until(lambda: page.vertices("/wrench/delivered_force") != before)
+    assert "Reachable" in page.text(".fl-status")
+    assert page.problems == []
+
+
+def test_unreachable_wrench_is_said_in_words(page: Any) -> None:
+    page.type("Fz [N]", "30")
+    page.until(lambda: "Not reachable" in page.text(".fl-status"))
+    page.until(lambda: "left undone" in page.text(".said"))
+    assert "at the limit" in page.text(".fl-status")
+
+
+def test_failed_fin_leaves_table_arrows_and_graph(page: Any) -> None:
+    force = page.vertices("/fins/0/turn/force")
+    page.press("2")
+    page.until(lambda: page.session.state.failed == ("front_left",))
+    page.until(lambda: "failed" in page.text("table.fins tr.dead"))
+    page.until(lambda: "3 of 4 fins" in page.text(".fl-status"))
+    page.until(lambda: page.vertices("/fins/0/turn/force") != force)
+    hidden = "() => window.__viserMutable.nodeRefFromName['/fins/1/turn/force'].visible === false"
+    page.page.wait_for_function(hidden)
+    page.press("2 ✕")
+    page.until(lambda: page.session.state.failed == ())
+
+
+def test_last_fin_cannot_fail(page: Any) -> None:
+    for number in ("1", "2", "3"):
+        page.press(number)
+        page.until(lambda number=number: len(page.session.state.failed) == int(number))
+    page.press("4")
+    page.until(lambda: any("last fin that works" in note for note in page.notes()))
+    assert len(page.session.state.failed) == 3
+
+
+def test_candidate_is_shown_on_the_robot(page: Any) -> None:
+    page.tab("Modes")
+    best = page.view.best
+    page.choose("Show", "3 ")
+    page.until(lambda: page.session.candidate == 2)
+    page.until(lambda: page.view.shown is not best)
+    assert "3" in page.text("table.modes tr.chosen")
+    page.type("Candidates K", "16")
+    page.until(lambda: page.session.state.n_candidates == 16 and not page.view.busy)
+    assert len(page.view.best.samples.energy) == 16
+
+
+def test_method_that_fails_says_so_and_the_page_goes_on(page: Any) -> None:
+    page.tab("Modes")
+    page.choose("Method", "slsqp")
+    page.until(lambda: any("out of order" in note for note in page.notes()))
+    page.key("Control+z")
+    page.until(lambda: page.session.state.method == "learned")
+    page.until(lambda: "Reachable" in page.text(".fl-status"))
