@@ -6,8 +6,6 @@ the paper's baselines do. Numpy float64.
 
 from __future__ import annotations
 
-from collections import OrderedDict
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,8 +16,6 @@ from finlab.layout.arrays import planar_effectiveness, stack_layouts
 Array = NDArray[np.float64]
 
 FULL_TURN = 2 * np.pi - 1e-9
-CACHE_SIZE = 16
-"""Layouts whose actuation is kept; a control loop asks for the same one again and again."""
 
 
 class Actuation:
@@ -97,19 +93,3 @@ class Actuation:
                     value[axis][..., index] = component
                     slope[axis][..., index, :] = derivative
         return LocalForce(*value, *slope)
-
-
-class ActuationCache:
-    """Remembers the actuation of the layouts last asked for, by identity (layouts are frozen)."""
-
-    def __init__(self) -> None:
-        self._kept: OrderedDict[int, Actuation] = OrderedDict()
-
-    def __call__(self, layout: Layout) -> Actuation:
-        """The actuation of a layout."""
-        kept = self._kept.get(id(layout))
-        if kept is None or kept.layout is not layout:
-            kept = self._kept[id(layout)] = Actuation(layout)
-            if len(self._kept) > CACHE_SIZE:
-                self._kept.popitem(last=False)
-        return kept

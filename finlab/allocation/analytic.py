@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.actuation import Actuation
-from finlab.allocation.model_based import ModelBased
+from finlab.allocation.model_based import CACHE_SIZE, ModelBased
 from finlab.data.normalization import Normalization
 
 Array = NDArray[np.float64]
@@ -76,9 +78,10 @@ class Analytic(ModelBased):
     def __init__(self, normalization: Normalization, *, rcond: float = 1e-3) -> None:
         super().__init__(normalization)
         self.rcond = rcond
-        self._inverse: ForceInverse | None = None
+        self._inverse = lru_cache(CACHE_SIZE)(self._prepare)
 
     def _commands(self, actuation: Actuation, targets: Array, rng: np.random.Generator) -> Array:
-        if self._inverse is None or self._inverse.actuation is not actuation:
-            self._inverse = ForceInverse(actuation, self.normalization.std, self.rcond)
-        return self._inverse.command(targets)
+        return self._inverse(actuation).command(targets)
+
+    def _prepare(self, actuation: Actuation) -> ForceInverse:
+        return ForceInverse(actuation, self.normalization.std, self.rcond)

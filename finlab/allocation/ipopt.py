@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation.actuation import Actuation
 from finlab.allocation.energy import DEFAULT_WEIGHTS, energy_scale
-from finlab.allocation.model_based import ENERGY_WEIGHT
+from finlab.allocation.model_based import CACHE_SIZE, ENERGY_WEIGHT
 from finlab.allocation.single_target import Problem, SingleTarget
 from finlab.data.normalization import Normalization
 from finlab.errors import AllocationError
@@ -47,12 +48,11 @@ class Ipopt(SingleTarget):
     def __init__(self, normalization: Normalization, *, n_starts: int = 8) -> None:
         super().__init__(normalization, n_starts=n_starts)
         self._casadi = _import_casadi()
-        self._solver: tuple[Actuation, Any] | None = None
+        self._solver = lru_cache(CACHE_SIZE)(self._build)
 
     def _minimize(self, problem: Problem, start: Array) -> Array:
-        if self._solver is None or self._solver[0] is not problem.actuation:
-            self._solver = problem.actuation, self._build(problem.actuation)
-        answer = self._solver[1](x0=problem.command(start).ravel(), p=problem.target, **self._bounds(problem))
+        solver = self._solver(problem.actuation)
+        answer = solver(x0=problem.command(start).ravel(), p=problem.target, **self._bounds(problem))
         return problem.position(np.array(answer["x"], np.float64).reshape(-1, 3))
 
     @staticmethod

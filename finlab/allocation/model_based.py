@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.actuation import Actuation, ActuationCache
+from finlab.allocation.actuation import Actuation
 from finlab.allocation.allocation import Solution
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.energy import command_energy
@@ -18,6 +19,8 @@ Array = NDArray[np.float64]
 
 ENERGY_WEIGHT = 1e-4
 """Weight of the energy proxy beside the squared normalized error where a method weighs the two."""
+CACHE_SIZE = 64
+"""Layouts whose prepared quantities a method keeps; a control loop asks for the same one again and again."""
 
 
 class ModelBased(Allocator):
@@ -29,7 +32,7 @@ class ModelBased(Allocator):
 
     def __init__(self, normalization: Normalization) -> None:
         self.normalization = normalization
-        self._actuation = ActuationCache()
+        self._actuation = lru_cache(CACHE_SIZE)(Actuation)
 
     @abstractmethod
     def _commands(self, actuation: Actuation, targets: Array, rng: np.random.Generator) -> Array:

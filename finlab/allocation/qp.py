@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from finlab.allocation.actuation import Actuation
-from finlab.allocation.model_based import ModelBased
+from finlab.allocation.model_based import CACHE_SIZE, ModelBased
 from finlab.data.normalization import Normalization
 
 Array = NDArray[np.float64]
@@ -23,7 +25,6 @@ class LinearMap:
     """
 
     def __init__(self, actuation: Actuation, sigma: Array) -> None:
-        self.actuation = actuation
         self.reference = (actuation.lower + actuation.upper) / 2
         n = self.reference.size
         offset = DIFFERENCE_STEP * np.eye(n).reshape(n, -1, 3) * actuation.width
@@ -51,12 +52,10 @@ class Qp(ModelBased):
     def __init__(self, normalization: Normalization, *, regularization: float = 1.0) -> None:
         super().__init__(normalization)
         self.regularization = regularization
-        self._map: LinearMap | None = None
+        self._map = lru_cache(CACHE_SIZE)(self._prepare)
 
     def _commands(self, actuation: Actuation, targets: Array, rng: np.random.Generator) -> Array:
-        if self._map is None or self._map.actuation is not actuation:
-            self._map = LinearMap(actuation, self.normalization.std)
-        linear = self._map
+        linear = self._map(actuation)
         n_free = int(linear.free.sum())
         step = np.zeros((len(targets), linear.free.size))
         if n_free:
@@ -66,3 +65,6 @@ class Qp(ModelBased):
             for i, right in enumerate(wanted):
                 step[i, linear.free] = lsq_linear(matrix, right, (-0.5, 0.5), method="bvls").x
         return linear.reference + step.reshape(-1, actuation.n_fins, 3) * actuation.width
+
+    def _prepare(self, actuation: Actuation) -> LinearMap:
+        return LinearMap(actuation, self.normalization.std)

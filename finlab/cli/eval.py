@@ -20,6 +20,9 @@ Methods = Annotated[str, arg(metavar="A,B,...")]
 Checkpoint = Annotated[str | None, arg(metavar="NAME|FOLDER")]
 JsonFile = Annotated[Path | None, arg(metavar="FILE")]
 
+LATENCY_LAYOUTS = 5
+"""Layouts whose calls are timed."""
+
 
 @verbs.command
 def wrench(
@@ -120,8 +123,8 @@ def latency(
     _check_writable(json)
     if not 2 <= fins <= 5:
         raise DataError(f"fins: expected 2 to 5, the fin counts of split id, got {fins}")
-    cases = [case for case in make_split("id", 100, 10, seed) if case.layout.n_fins == fins]
-    rows = latency_rows(_load(methods, checkpoint), cases, n_calls=calls, budget_s=budget)
+    cases = [case for case in make_split("id", 100, 50, seed) if case.layout.n_fins == fins]
+    rows = latency_rows(_load(methods, checkpoint), cases[:LATENCY_LAYOUTS], n_calls=calls, budget_s=budget)
     described = machine()
     _write(json, {"rows": rows, "machine": described})
     print(latency_report(rows, described))
