@@ -80,7 +80,7 @@ class Analytic(ModelBased):
         self.rcond = rcond
         self._inverse = lru_cache(CACHE_SIZE)(self._prepare)
 
-    def _commands(self, actuation: Actuation, targets: Array, rng: np.random.Generator) -> Array:
+    def _commands(self, actuation: Actuation, targets: Array, seed: int) -> Array:
         return self._inverse(actuation).command(targets)
 
     def _prepare(self, actuation: Actuation) -> ForceInverse:

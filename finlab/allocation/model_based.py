@@ -35,7 +35,7 @@ class ModelBased(Allocator):
         self._actuation = lru_cache(CACHE_SIZE)(Actuation)
 
     @abstractmethod
-    def _commands(self, actuation: Actuation, targets: Array, rng: np.random.Generator) -> Array:
+    def _commands(self, actuation: Actuation, targets: Array, seed: int) -> Array:
         """Commands (N, n, 3) for targets (N, 6).
 
         Random starts are drawn once and shared by all targets, so that a target gets the same answer alone
@@ -44,7 +44,7 @@ class ModelBased(Allocator):
 
     def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         actuation = self._actuation(layout)
-        command = self._commands(actuation, targets, np.random.default_rng(seed))
+        command = self._commands(actuation, targets, seed)
         return Solution(actuation.feasible(command))
 
     def _objective(self, actuation: Actuation, command: Array, target: Array) -> Array:

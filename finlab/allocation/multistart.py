@@ -44,8 +44,8 @@ class Multistart(ModelBased):
         self.n_candidates = n_candidates
         self.options = DescentOptions(n_steps=n_steps, energy_weight=energy_weight)
 
-    def _commands(self, actuation: Actuation, targets: Array, rng: np.random.Generator) -> Array:
-        start = actuation.sample(rng, (self.n_candidates,))
+    def _commands(self, actuation: Actuation, targets: Array, seed: int) -> Array:
+        start = actuation.sample(np.random.default_rng(seed), (self.n_candidates,))
         size = max(1, CHUNK_ROWS // self.n_candidates)
         parts = [
             self._best(actuation, start, targets[first : first + size])

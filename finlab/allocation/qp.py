@@ -54,7 +54,7 @@ class Qp(ModelBased):
         self.regularization = regularization
         self._map = lru_cache(CACHE_SIZE)(self._prepare)
 
-    def _commands(self, actuation: Actuation, targets: Array, rng: np.random.Generator) -> Array:
+    def _commands(self, actuation: Actuation, targets: Array, seed: int) -> Array:
         linear = self._map(actuation)
         n_free = int(linear.free.sum())
         step = np.zeros((len(targets), linear.free.size))

@@ -80,8 +80,8 @@ class SingleTarget(ModelBased):
     def _minimize(self, problem: Problem, start: Array) -> Array:
         """Positions (n_free,) where the solver ends from a start (n_free,)."""
 
-    def _commands(self, actuation: Actuation, targets: Array, rng: np.random.Generator) -> Array:
-        starts = actuation.sample(rng, (self.n_starts,))
+    def _commands(self, actuation: Actuation, targets: Array, seed: int) -> Array:
+        starts = actuation.sample(np.random.default_rng(seed), (self.n_starts,))
         result = np.empty((len(targets), actuation.n_fins, 3))
         for i, target in enumerate(targets):
             problem = Problem(actuation, target, self.normalization.std)

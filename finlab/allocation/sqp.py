@@ -47,30 +47,26 @@ class Sqp(ModelBased):
         self.n_starts = n_starts
         self.regularization = regularization
 
-    def _commands(self, actuation: Actuation, targets: Array, rng: np.random.Generator) -> Array:
+    def _commands(self, actuation: Actuation, targets: Array, seed: int) -> Array:
         best = np.empty((len(targets), actuation.n_fins, 3))
         error = np.full(len(targets), np.inf)
-        for k in range(self.n_starts):
-            start = self._start(k, actuation, targets, rng)
+        middle = (actuation.lower + actuation.upper) / 2
+        others = actuation.sample(np.random.default_rng(seed), (self.n_starts - 1,))
+        for start in (middle, *others):
             for first in range(0, len(targets), CHUNK):
                 rows = np.arange(first, min(first + CHUNK, len(targets)))
                 rows = rows[error[rows] > SOLVED]
                 if not len(rows):
                     continue
-                command, reached = self._descend(actuation, start[rows], targets[rows])
+                command, reached = self._descend(actuation, start, targets[rows])
                 better = reached < error[rows]
                 best[rows[better]], error[rows[better]] = command[better], reached[better]
         return best
 
-    def _start(self, k: int, actuation: Actuation, targets: Array, rng: np.random.Generator) -> Array:
-        if k == 0:
-            return np.tile((actuation.lower + actuation.upper) / 2, (len(targets), 1, 1))
-        return np.tile(actuation.sample(rng, ()), (len(targets), 1, 1))
-
-    def _descend(self, actuation: Actuation, command: Array, targets: Array) -> tuple[Array, Array]:
-        """Where the starts (B, n, 3) end, and the normalized error (B,) there."""
+    def _descend(self, actuation: Actuation, start: Array, targets: Array) -> tuple[Array, Array]:
+        """Where one start (n, 3) ends for each target (B, 6), and the normalized error (B,) there."""
         sigma, width = self.normalization.std, actuation.width.ravel()
-        command = command.copy()
+        command = np.tile(start, (len(targets), 1, 1))
         busy = np.arange(len(command))
         error = self.normalization.error(actuation.wrench(command), targets)
         for _ in range(self.n_steps):
