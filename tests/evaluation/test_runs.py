@@ -125,3 +125,20 @@ def test_bad_input_is_one_sentence(
     assert main(["eval", *arguments.split(), "--checkpoint", statistics]) == 2
     error = capsys.readouterr().err
     assert error.startswith("finlab: error: ") and message in error and error.count("\n") == 1
+
+
+def test_eval_ablation(
+    untrained_checkpoint: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("finlab.evaluation.ablation.TIMED_CALLS", 1)
+    file = tmp_path / "rows.json"
+    arguments = ["eval", "ablation", "--layouts", "2", "--targets", "2", "--candidates", "8"]
+    assert main([*arguments, "--checkpoint", str(untrained_checkpoint), "--json", str(file)]) == 0
+    rows = json.loads(file.read_text())["rows"]
+    shown = [(row["variant"], row["scored_by"]) for row in rows]
+    assert shown == [(name, model) for name in VARIANTS for model in ("surrogate", "plant")]
+    assert all(row["n"] == 4 and row["time_s"] > 0 for row in rows)
+    assert "(printed in the paper)" in capsys.readouterr().out
