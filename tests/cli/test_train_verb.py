@@ -1,0 +1,41 @@
+"""`finlab train surrogate|allocator`: a few steps, then an allocation with the result."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from finlab.cli import main
+
+SMOKE = ["--preset", "smoke", "--steps", "3"]
+
+
+def test_trains_both_and_allocates_with_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    surrogate, whole = str(tmp_path / "surrogate"), str(tmp_path / "whole")
+    assert main(["train", "surrogate", "-o", surrogate, *SMOKE]) == 0
+    assert "surrogate relative_force_error" in capsys.readouterr().out
+    assert main(["train", "allocator", "-o", whole, "--surrogate", surrogate, *SMOKE]) == 0
+    assert f"{whole}: checkpoint whole, preset smoke, sha256 " in capsys.readouterr().out
+    command = ["allocate", "A", "--wrench", "1", "0", "0", "0", "0", "0", "--checkpoint", whole, "--json"]
+    assert main(command) == 0
+    assert json.loads(capsys.readouterr().out)["checkpoint"] == "whole"
+
+
+@pytest.mark.parametrize(
+    ("argv", "message"),
+    [
+        (["surrogate", "--preset", "magic"], "preset: expected one of default, paper, smoke"),
+        (["surrogate", "--steps", "0"], "--steps: expected a number from 1, got 0"),
+        (
+            ["allocator", "--surrogate", "nowhere/", "--batch-size", "-4"],
+            "--batch-size: expected a number from 1",
+        ),
+        (["allocator", "--surrogate", "nowhere/"], "'nowhere' is not among the shipped ones"),
+    ],
+)
+def test_refuses_in_one_sentence(
+    argv: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["train", argv[0], "-o", str(tmp_path / "out"), *argv[1:]]) == 2
+    err = capsys.readouterr().err
+    assert message in err and len(err.splitlines()) == 1
