@@ -35,6 +35,8 @@ class PlanarProblem(NamedTuple):
 
     columns: Array
     """Normalized wrench per newton (n, 2, 6) of each fin's horizontal and vertical force."""
+    products: Array
+    """Outer products (n, 2, 2, 6, 6) of those columns."""
     curves: ThrustCurves
     """What thrust each fin can give, and at what energy."""
     middle: Array
@@ -43,11 +45,8 @@ class PlanarProblem(NamedTuple):
     """Half of the arc (n,) [rad]; pi and more for a full circle."""
     direction_cost: Array
     """Energy per squared zero direction (n,) [1/rad^2]."""
-
-    @property
-    def turns_fully(self) -> bool:
-        """Whether every fin may point anywhere."""
-        return bool((self.half >= np.pi - 1e-6).all())
+    turns_fully: bool
+    """Whether every fin may point anywhere."""
 
 
 class Planar(NamedTuple):
@@ -75,19 +74,47 @@ def descend(problem: PlanarProblem, target: Array, thrust: Array, steps: int) ->
         problem: the layout.
         target: normalized wrenches (R, 6).
         thrust: seeds (R, n) [N]; only the sizes matter, directions follow from the target.
-        steps: reweighting steps; two more remove the last of the wrench error.
+        steps: reweighting steps; where some fins cannot turn fully, two more remove what error is left.
     """
+    if problem.turns_fully:
+        return _descend_freely(problem, target, thrust, steps)
     weight = mobility(problem, thrust)
-    multiplier = np.linalg.solve(_gram(problem.columns, weight), target[..., None])[..., 0]
+    multiplier = np.linalg.solve(_gram(problem, weight), target[..., None])[..., 0]
     for step in range(steps + 2):
         wanted = _answer(problem, weight, multiplier)
         planar, slope = _project(problem, wanted, target)
-        gram = _gram(problem.columns, weight, slope)
+        gram = _gram(problem, weight, slope)
         multiplier = multiplier + np.linalg.solve(gram, planar.residual[..., None])[..., 0]
         if step < steps:
             size = np.linalg.norm(_answer(problem, weight, multiplier), axis=-1)
             weight = mobility(problem, np.minimum(size, problem.curves.maximum))
     return _project(problem, _answer(problem, weight, multiplier), target)[0]
+
+
+def _descend_freely(problem: PlanarProblem, target: Array, thrust: Array, steps: int) -> Planar:
+    """`descend` where every fin may point anywhere: directions are free and thrust limits are met by weights.
+
+    A fin asked for more than it has gets its mobility cut in proportion, again and again until it
+    holds: the fixed point is the multiplier of its limit.
+    """
+    top = problem.curves.maximum
+    weight = mobility(problem, thrust)
+    cut = np.ones_like(weight)
+    right = np.ascontiguousarray(target[..., None])
+    for step in range(steps + 1):
+        weighted = weight * cut
+        multiplier = np.linalg.solve(_gram(problem, weighted), right)[..., 0]
+        wanted = _answer(problem, weighted, multiplier)
+        size = np.sqrt(np.einsum("rnc,rnc->rn", wanted, wanted))
+        if step < steps:
+            ratio = top / (size + 1e-12)
+            cut = np.minimum(cut * ratio, 1.0) if (ratio < 1.0).any() or (cut < 1.0).any() else cut
+            weight = mobility(problem, np.minimum(size, top))
+    held = np.minimum(np.maximum(size, problem.curves.minimum), top)
+    n = wanted.shape[1]
+    force = wanted * (held / (size + 1e-12))[..., None]
+    reached = force.reshape(len(force), 2 * n) @ problem.columns.reshape(2 * n, 6)
+    return Planar(held, np.arctan2(wanted[..., 1], wanted[..., 0]), target - reached)
 
 
 def energy(problem: PlanarProblem, planar: Planar) -> Array:
@@ -116,19 +143,18 @@ def _answer(problem: PlanarProblem, weight: Array, multiplier: Array) -> Array:
     return pull.reshape(len(multiplier), n, 2) * weight[..., None]
 
 
-def _gram(columns: Array, weight: Array, slope: Array | None = None) -> Array:
+def _gram(problem: PlanarProblem, weight: Array, slope: Array | None = None) -> Array:
     """sum_i m_i B_i D_i B_i^T (R, 6, 6), slightly regularized; D_i (R, n, 2, 2) is the slope of the projection."""
-    n = columns.shape[0]
+    n = len(problem.products)
     if slope is None:
-        outer = np.einsum("nci,ncj->nij", columns, columns)
-        gram = (weight @ outer.reshape(n, 36)).reshape(-1, 6, 6)
+        gram = weight @ (problem.products[:, 0, 0] + problem.products[:, 1, 1]).reshape(n, 36)
     else:
-        pairs = np.einsum("nci,ndj->ncdij", columns, columns).reshape(n * 4, 36)
-        gram = ((weight[..., None, None] * slope).reshape(len(weight), n * 4) @ pairs).reshape(-1, 6, 6)
-    trace = np.einsum("rii->r", gram)
-    diagonal = np.arange(6)
-    gram[:, diagonal, diagonal] += (RIDGE * trace + 1e-12)[:, None]
-    return gram
+        weighted = (weight[..., None, None] * slope).reshape(len(weight), n * 4)
+        gram = weighted @ problem.products.reshape(n * 4, 36)
+    # Every seventh entry of the flattened matrix is on the diagonal.
+    diagonal = gram[:, ::7]
+    diagonal += RIDGE * diagonal.sum(1, keepdims=True) + 1e-12
+    return gram.reshape(-1, 6, 6)
 
 
 def _project(problem: PlanarProblem, wanted: Array, target: Array) -> tuple[Planar, Array]:

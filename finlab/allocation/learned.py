@@ -19,6 +19,7 @@ from finlab.allocation.allocator import Allocator
 from finlab.allocation.energy import command_energy
 from finlab.allocation.learned_fin import LearnedFin
 from finlab.allocation.levenberg_marquardt import refine
+from finlab.allocation.numpy_network import NumpyNetwork
 from finlab.allocation.prepared import Prepared, prepare
 from finlab.allocation.proposal import Proposal, propose
 from finlab.errors import CheckpointError
@@ -70,11 +71,14 @@ class LearnedAllocator(Allocator):
                 f"checkpoint {checkpoint.name!r}: method `learned` needs a surrogate of kind `coefficient`, "
                 f"got {checkpoint.surrogate.config.kind!r}; use method `paper` with this checkpoint"
             )
-        assert checkpoint.network is not None
+        if checkpoint.network is None or not checkpoint.network.config.joint:
+            raise CheckpointError(f"checkpoint {checkpoint.name!r}: method `learned` needs a joint-mixture network")
         self.checkpoint = checkpoint.name
         self.trained = checkpoint
         self.normalization = checkpoint.normalization
-        self.network = checkpoint.network
+        network = {key: value.numpy() for key, value in checkpoint.network.state_dict().items()}
+        sizes = checkpoint.network.config
+        self.network = NumpyNetwork(network, sizes.heads, sizes.n_components)
         self.n_candidates, self.temperature, self.gamma = n_candidates, temperature, gamma
         self.n_seeds, self.n_refined = n_seeds, n_refined
         self.search_steps, self.refine_steps = search_steps, refine_steps
@@ -177,15 +181,11 @@ def _best_of_each_component(proposal: Proposal, score: Array, n_seeds: int) -> N
     At low temperature the samples of one component lie close together and would all descend to the
     same allocation.
     """
-    order = np.argsort(score, axis=1)
-    component = np.take_along_axis(proposal.component, order, axis=1)
-    first = np.zeros(component.shape, dtype=bool)
-    rows = np.arange(len(component))
-    n_components = int(component.max()) + 1
-    seen = np.zeros((len(component), n_components), dtype=bool)
-    for column in range(component.shape[1]):
-        k = component[:, column]
-        first[:, column] = ~seen[rows, k]
-        seen[rows, k] = True
-    rank = np.argsort(~first, axis=1, kind="stable")[:, :n_seeds]
-    return np.take_along_axis(order, rank, axis=1)
+    rows = np.arange(len(score))[:, None]
+    worst_first = np.argsort(-score, axis=1)
+    n_components = int(proposal.component.max()) + 1
+    best = np.zeros((len(score), n_components), dtype=np.int64)
+    # Later assignments win, so the best candidate of each component is what stays.
+    best[rows, proposal.component[rows, worst_first]] = worst_first
+    order = np.argsort(score[rows, best], axis=1)[:, :n_seeds]
+    return best[rows, order]

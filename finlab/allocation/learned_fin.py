@@ -30,19 +30,26 @@ class LearnedFin:
             (np.array(weights[f"net.{i}.weight"], np.float64).T.copy(), np.array(weights[f"net.{i}.bias"], np.float64))
             for i in layers
         ]
+        self._rough = [(weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in self._layers]
         self._a0, self._f0 = reference
         self._unit = unit
 
-    def force(self, command: Array) -> Array:
-        """Forces (..., 3) [N] of commands (..., 3)."""
+    def force(self, command: NDArray[np.floating]) -> NDArray[np.floating]:
+        """Forces (..., 3) [N] of commands (..., 3), in single precision where the commands are."""
         flat = command.reshape(-1, 3)
+        layers = self._rough if command.dtype == np.float32 else self._layers
         a, f, c, s = self._inputs(flat)
         hidden = np.stack([a - 0.5, f - 0.5, c, s], axis=1)
-        for weight, bias in self._layers[:-1]:
-            hidden = np.tanh(hidden @ weight + bias)
-        weight, bias = self._layers[-1]
+        for weight, bias in layers[:-1]:
+            hidden = hidden @ weight
+            hidden += bias
+            np.tanh(hidden, out=hidden)
+        weight, bias = layers[-1]
         k = (hidden @ weight + bias) * ((a * f) ** 2 * self._unit)[:, None]
-        force = np.stack([k[:, 0], c * k[:, 1] - s * k[:, 2], s * k[:, 1] + c * k[:, 2]], axis=1)
+        force = np.empty_like(k)
+        force[:, 0] = k[:, 0]
+        force[:, 1] = c * k[:, 1] - s * k[:, 2]
+        force[:, 2] = s * k[:, 1] + c * k[:, 2]
         return force.reshape(command.shape)
 
     def force_and_jacobian(self, command: Array) -> tuple[Array, Array]:

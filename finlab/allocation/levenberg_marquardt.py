@@ -35,13 +35,15 @@ class CommandProblem(NamedTuple):
         rows, n, _ = command.shape
         return self.fin.force(command).reshape(rows, 3 * n) @ self.columns.reshape(3 * n, 6)
 
-    def clamp(self, command: Array) -> Array:
-        """Commands (R, n, 3) inside the limits, zero directions wrapped first."""
-        middle = 0.5 * (self.lower[:, 2] + self.upper[:, 2])
-        direction = command[..., 2]
-        wrapped = np.mod(direction - middle + np.pi, 2 * np.pi) + middle - np.pi
-        moved = np.concatenate([command[..., :2], wrapped[..., None]], axis=-1)
-        return np.minimum(np.maximum(moved, self.lower), self.upper)
+    def clamp(self, command: NDArray[np.floating]) -> NDArray[np.floating]:
+        """Commands (..., n, 3) inside the limits, zero directions wrapped first; the type is kept."""
+        kind = command.dtype.type
+        middle = (0.5 * (self.lower[:, 2] + self.upper[:, 2])).astype(kind)
+        half_turn, turn = kind(np.pi), kind(2 * np.pi)
+        moved = command.copy()
+        moved[..., 2] = np.mod(command[..., 2] - middle + half_turn, turn) + (middle - half_turn)
+        np.maximum(moved, self.lower.astype(kind), out=moved)
+        return np.minimum(moved, self.upper.astype(kind), out=moved)
 
 
 def refine(problem: CommandProblem, target: Array, command: Array, steps: int, damping: float = 1e-6) -> Array:

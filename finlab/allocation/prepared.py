@@ -55,8 +55,15 @@ def prepare(layout: Layout, fin: LearnedFin, std: Array) -> Prepared:
     arc = upper[:, 2] - lower[:, 2]
     half = np.where(arc >= FULL_TURN, np.pi, 0.5 * arc)
     cost = DEFAULT_WEIGHTS.zero_direction / energy_scale(upper)[:, 2] ** 2
+    in_plane = np.ascontiguousarray(columns[:, 1:])
     planar = PlanarProblem(
-        np.ascontiguousarray(columns[:, 1:]), curves, 0.5 * (lower[:, 2] + upper[:, 2]), half, cost
+        columns=in_plane,
+        products=np.einsum("nci,ndj->ncdij", in_plane, in_plane),
+        curves=curves,
+        middle=0.5 * (lower[:, 2] + upper[:, 2]),
+        half=half,
+        direction_cost=cost,
+        turns_fully=bool((arc >= FULL_TURN).all()),
     )
     return Prepared(
         lower,

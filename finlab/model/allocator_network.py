@@ -57,7 +57,7 @@ class AllocatorNetwork(nn.Module):
         self.wrench = nn.Sequential(nn.Linear(6, width), nn.SiLU(), nn.Linear(width, width))
         self.join = nn.Linear(2 * width, width)
         layer = nn.TransformerEncoderLayer(
-            width, config.heads, config.feedforward, dropout=0.0, activation="gelu", batch_first=True, norm_first=True
+            width, config.heads, config.feedforward, dropout=0.0, batch_first=True, norm_first=True
         )
         self.transformer = nn.TransformerEncoder(layer, config.transformer_layers, enable_nested_tensor=False)
         self.norm = nn.LayerNorm(width)

@@ -97,7 +97,7 @@ def load_checkpoint(folder: Path) -> Checkpoint:
         raise CheckpointError(f"{weights}: its SHA-256 is not the one in {CONFIG_FILE}; the file was changed or cut off")
     try:
         tensors = load_file(weights)
-        surrogate = make_surrogate(SurrogateConfig(**config["surrogate"]))
+        surrogate = make_surrogate(_surrogate_config(config["surrogate"]))
         surrogate.load_state_dict(_without_prefix("surrogate", tensors), strict=True)
         network = None
         if config["network"] is not None:
@@ -171,6 +171,10 @@ def _read_config(folder: Path) -> dict[str, Any]:
             "use the finlab that made it, or train again"
         )
     return config
+
+
+def _surrogate_config(saved: dict[str, Any]) -> SurrogateConfig:
+    return SurrogateConfig(kind=saved["kind"], hidden=tuple(int(width) for width in saved["hidden"]))
 
 
 def _normalization(config: dict[str, Any]) -> Normalization:

@@ -83,13 +83,13 @@ _DEFAULT = Preset(
     "default",
     network=NetworkConfig(width=96, transformer_layers=2, feedforward=192, n_components=16),
     surrogate_training=SurrogateTraining(steps=40_000),
-    allocator_training=AllocatorTraining(steps=14_000, batch_size=1024),
+    allocator_training=AllocatorTraining(steps=18_000, batch_size=1024),
 )
 _PAPER = Preset(
     "paper",
-    surrogate=SurrogateConfig(kind="mlp", hidden=512, layers=1),
+    surrogate=SurrogateConfig(kind="mlp", hidden=(512, 64)),
     network=NetworkConfig(features="raw", joint=False, n_components=8),
-    surrogate_training=SurrogateTraining(steps=40_000, batch_size=4096, learning_rate=2e-3),
+    surrogate_training=SurrogateTraining(steps=30_000, batch_size=512, learning_rate=2e-3),
     allocator_training=AllocatorTraining(
         steps=35_000,  # 115 epochs of 5 M samples
         batch_size=16_384,
@@ -108,7 +108,7 @@ _PAPER = Preset(
 )
 _SMOKE = Preset(
     "smoke",
-    surrogate=SurrogateConfig(hidden=16, layers=1),
+    surrogate=SurrogateConfig(hidden=(16,)),
     network=NetworkConfig(width=32, heads=2, graph_layers=1, transformer_layers=1, feedforward=32, n_components=4),
     surrogate_training=SurrogateTraining(steps=60, batch_size=256),
     allocator_training=replace(_DEFAULT.allocator_training, steps=40, batch_size=128, warmup=5, ema=0.9),

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from finlab.data.normalization import Normalization
-from finlab.data.sampling import ForwardSampler
+from finlab.data.sampling import Batch, ForwardSampler
 from finlab.layout import FinModelSpec
 from finlab.model.checkpoint import Checkpoint, save_checkpoint
 from finlab.model.surrogate import CoefficientSurrogate, Surrogate, make_surrogate
@@ -19,7 +19,7 @@ from finlab.physics import FinModel, make_fin_model
 from finlab.training.curves import plot_log
 from finlab.training.device import training_device
 from finlab.training.loop import LoopSettings, train
-from finlab.training.presets import Preset, get_preset
+from finlab.training.presets import get_preset
 
 TRAIN_SEED = 20_000
 """Added to the user's seed, so that no training stream equals one of evaluation."""
@@ -141,13 +141,8 @@ def _wrench_terms(model: FinModel, batch_size: int, seed: int, normalization: No
     std = torch.tensor(normalization.std, dtype=torch.float32, device=device)
 
     def terms(net: nn.Module, step: int) -> dict[str, Tensor]:
-        b = type(sampler.batch(step))(*(t.to(device) for t in sampler.batch(step)))
+        b = Batch(*(t.to(device) for t in sampler.batch(step)))
         wrench = net(b.command, b.position, b.mounting_angle, b.lower, b.upper, b.mask)
         return {"loss": ((wrench - b.wrench) / std).square().sum(-1).mean()}
 
     return terms
-
-
-def preset_of(checkpoint: Checkpoint) -> Preset:
-    """The recipe that a checkpoint was made by."""
-    return get_preset(checkpoint.preset)
