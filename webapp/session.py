@@ -55,7 +55,8 @@ class Session:
 
     def __init__(self, layout: Layout, display: Display | None = None) -> None:
         """Start with a layout, no failures, and a gentle wrench forward and to the left."""
-        self.history: History[State] = History(State(layout, target=FIRST))
+        self._first = State(layout, target=FIRST)
+        self.history: History[State] = History(self._first)
         self.display = display or Display()
         self.selected: str | None = None
         self.candidate = 0
@@ -164,6 +165,11 @@ class Session:
         if self.selected is None:
             raise FinlabError("no fin is selected; click one, or choose it in the list")
         return self.selected
+
+    def start_over(self) -> None:
+        """Everything as at first sight; the way here can be undone."""
+        self._commit("Start over", self._first)
+        self.selected = None
 
     # Looking.
 

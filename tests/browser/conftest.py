@@ -54,7 +54,7 @@ class Served:
     """The `ViserServer`."""
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def served() -> Iterator[Served]:
     """The app with the stand-in allocator, without shadows, so that software rendering keeps up."""
     import viser
@@ -74,9 +74,9 @@ def served() -> Iterator[Served]:
     server.stop()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
-    """One Chromium for a file of flows."""
+    """One Chromium for all flows."""
     if CHROMIUM is None:
         pytest.fail(MISSING)
     from playwright.sync_api import sync_playwright
@@ -93,7 +93,7 @@ def browser() -> Iterator[Any]:
         chromium.close()
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def new_page(browser: Any, served: Served) -> Iterator[Callable[[], Any]]:
     """Opens pages of the app, each in a browser profile of its own."""
     from tests.browser.page import Page
@@ -111,7 +111,14 @@ def new_page(browser: Any, served: Served) -> Iterator[Callable[[], Any]]:
         context.close()
 
 
-@pytest.fixture
-def page(new_page: Callable[[], Any]) -> Any:
-    """One page of the app, ready."""
+@pytest.fixture(scope="session")
+def opened(new_page: Callable[[], Any]) -> Any:
+    """One page for most flows: opening it takes longer than a flow."""
     return new_page()
+
+
+@pytest.fixture
+def page(opened: Any) -> Any:
+    """The page, as at first sight."""
+    opened.start_over()
+    return opened

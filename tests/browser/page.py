@@ -5,7 +5,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-WAIT_MS = 15_000
+WAIT_MS = 45_000
+"""Longest wait for the page: software rendering on a busy machine is slow."""
 PAUSE_S = 0.12
 """Between two inputs: the page sends at most one change in 50 ms, a quicker one would overwrite the last."""
 
@@ -40,23 +41,41 @@ class Page:
         page.goto(served.url)
         self.ready()
         self.until(lambda: bool(set(served.app.views) - before))
-        self.view = served.app.views[max(set(served.app.views) - before)]
+        self.session = served.app.views[max(set(served.app.views) - before)].session
 
     def ready(self) -> None:
         """Wait for panel, robot and first answer."""
         self.page.get_by_role("button", name="Undo").wait_for()
         self.node("/fins/0/turn/blade")
         self.page.locator(".fl-status .err").wait_for(state="attached")
-        # The notice about software rendering lies over the view.
-        for close in self.page.locator(".mantine-Notification-closeButton").all():
-            close.click()
+        self.close_notes()  # viser's own one on software rendering lies over the view
 
     @property
-    def session(self) -> Any:
-        """What the server holds for this tab."""
-        return self.view.session
+    def view(self) -> Any:
+        """The server's side of this tab; another one after a reload."""
+        return next(view for view in self._served.app.views.values() if view.session is self.session)
 
-    def until(self, condition: Callable[[], bool], seconds: float = 10.0) -> None:
+    def start_over(self) -> None:
+        """As at first sight: the state, the tab, the camera, and no notes."""
+
+        def restart() -> None:
+            self.session.start_over()
+            self.view.look_from("3D")
+
+        self._served.server.get_event_loop().call_soon_threadsafe(self.view.do, restart)
+        self.close_notes()
+        self.tab("Wrench")
+        self.until(
+            lambda: not self.view.busy and self.page.locator(".mantine-Notification-root").count() == 0
+        )
+        self.problems.clear()
+
+    def close_notes(self) -> None:
+        """Close all notes; by script, because one that fades away cannot be clicked."""
+        script = "document.querySelectorAll('.mantine-Notification-closeButton').forEach(b => b.click())"
+        self.page.evaluate(script)
+
+    def until(self, condition: Callable[[], bool], seconds: float = 30.0) -> None:
         """Wait for the server or the page to come round."""
         end = time.monotonic() + seconds
         while not condition():
@@ -74,7 +93,7 @@ class Page:
 
     def press(self, name: str) -> None:
         """Press a button that is shown."""
-        self.page.locator("button:visible", has_text=re.compile(f"^{re.escape(name)}$")).first.click()
+        self.page.get_by_role("button", name=name, exact=True).first.click()
         self._pause()
 
     def row(self, label: str) -> Any:

@@ -1,0 +1,205 @@
+"""The app against a real server, and a page without a browser."""
+
+import asyncio
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+import viser
+from viser import _messages
+
+from finlab.assets import shipped_layouts
+from finlab.errors import FinlabError
+from finlab.layout import load_layout
+from tests.webapp.stand_in import load_stand_in
+from webapp.app import App, _session_keys, serve
+from webapp.session import Session
+from webapp.solver import Solver
+from webapp.store import SessionStore
+from webapp.view import View
+
+
+class FakeClient:
+    """A browser that takes everything: real viser scene and panel, and a list of what it was sent."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self.scene, self.gui, self.atomic = server.scene, server.gui, server.atomic
+        self.camera = type("Camera", (), {})()
+        self.notes: list[str] = []
+        self.files: dict[str, bytes] = {}
+
+    def add_notification(self, title: str, body: str, **_: Any) -> None:
+        self.notes.append(f"{title}: {body}")
+
+    def send_file_download(self, name: str, content: bytes, **_: Any) -> None:
+        self.files[name] = content
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[viser.ViserServer]:
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    yield server
+    server.stop()
+
+
+@pytest.fixture(scope="module")
+def app(server: viser.ViserServer) -> Iterator[App]:
+    app = App(server, Solver(load=load_stand_in), load_layout(shipped_layouts()["ucat"]))
+    yield app
+    app.stop()
+
+
+@pytest.fixture
+def view(server: viser.ViserServer, app: App) -> Iterator[View]:
+    client: Any = FakeClient(server)
+    loop = server.get_event_loop()
+    session = Session(load_layout(shipped_layouts()["ucat"]))
+    view = on_loop(server, lambda: View(client, session, app._solver, app._worker, loop))
+    yield view
+    view.close()
+    on_loop(server, lambda: (server.gui.reset(), server.scene.reset()))
+
+
+def on_loop(server: viser.ViserServer, act: Callable[[], Any]) -> Any:
+    """Run where views live, and wait for it."""
+
+    async def run() -> Any:
+        return act()
+
+    return asyncio.run_coroutine_threadsafe(run(), server.get_event_loop()).result(30)
+
+
+def until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + 30
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def test_newest_question_is_answered(server: viser.ViserServer, view: View) -> None:
+    for k in range(60):
+        on_loop(server, lambda k=k: view.do(lambda: view.session.set_target(0, 0.02 * k)))
+    until(lambda: not view.busy)
+    assert view.shown is not None
+    assert view.shown.target[0] == pytest.approx(1.18)
+    assert len(view.client.notes) == 0
+
+
+def test_refusals_become_notes_and_lose_nothing(server: viser.ViserServer, view: View) -> None:
+    state = view.session.state
+    on_loop(server, lambda: view.do(lambda: view.session.set_target(0, float("nan"))))
+    on_loop(server, lambda: view.do(lambda: view.session.toggle_failure("<b>nobody</b>")))
+    assert view.session.state == state
+    assert len(view.client.notes) == 2
+    assert "Fx" in view.client.notes[0]
+
+
+def test_solver_errors_become_notes_and_the_page_goes_on(server: viser.ViserServer, view: View) -> None:
+    on_loop(server, lambda: view.do(lambda: view.session.set_setting("method", "slsqp")))
+    until(lambda: view.error is not None)
+    assert view.client.notes == ["No answer: slsqp is out of order in this test"]
+    on_loop(server, lambda: view.do(view.session.undo))
+    until(lambda: not view.busy)
+    assert view.error is None and view.shown is not None
+
+
+def test_nodes_and_widgets_do_not_grow(server: viser.ViserServer, view: View) -> None:
+    layouts = [load_layout(shipped_layouts()[name]) for name in ("pair", "octo", "ucat")]
+
+    def count() -> tuple[int, int]:
+        return len(server.scene._handle_from_node_name), len(server.gui._gui_input_handle_from_uuid)
+
+    def round_trip() -> None:
+        for layout in layouts:
+            view.do(lambda layout=layout: view.session.open_layout(layout))
+            view.scene.animate(0.1)
+
+    on_loop(server, round_trip)
+    until(lambda: not view.busy)
+    before = count()
+    for _ in range(10):
+        on_loop(server, round_trip)
+    until(lambda: not view.busy)
+    assert count() == before
+
+
+def test_names_are_escaped(server: viser.ViserServer, view: View) -> None:
+    evil = "<img src=x onerror=alert(1)>"
+    layout = view.session.state.layout.replace_fin("front_left", name=evil)
+    on_loop(server, lambda: view.do(lambda: view.session.open_layout(layout)))
+    until(lambda: not view.busy)
+    containers = server.gui._container_handle_from_uuid.values()
+    handles = [handle for container in containers for handle in container._children.values()]
+    texts = [handle.content for handle in handles if isinstance(handle, viser.GuiHtmlHandle)]
+    assert any("&lt;img" in text for text in texts) and not any("<img" in text for text in texts)
+    on_loop(server, lambda: view.do(lambda: view.session.toggle_failure(evil)))
+
+
+def test_sharing_is_off(server: viser.ViserServer, app: App) -> None:
+    handlers = server._websock_server._incoming_handlers
+    assert _messages.ShareUrlRequest not in handlers and _messages.ShareUrlDisconnect not in handlers
+
+
+def test_store_keeps_tabs_apart_and_finds_work_again() -> None:
+    store = SessionStore(lambda: Session(load_layout(shipped_layouts()["A"])))
+    key, session = store.enter([])
+    other_key, other = store.enter([key])
+    assert other is not session
+    store.leave(key)
+    assert store.enter([other_key, key]) == (key, session)
+    assert store.enter(["made up"])[1] not in (session, other)
+
+
+@pytest.mark.parametrize("text", [None, "", "{", "3", '{"a": 1}', "[1, null]", '"key"'])
+def test_storage_may_hold_anything(text: str | None) -> None:
+    assert _session_keys(text) == []
+
+
+def test_taken_port_and_bad_port_are_refused() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(FinlabError, match=f"{port}.*--port"):
+            serve(port=port)
+    with pytest.raises(FinlabError, match="65535"):
+        serve(port=70000)
+    with pytest.raises(FinlabError, match="no_such"):
+        serve(layout="no_such.yaml")
+
+
+def test_serves_until_sigterm() -> None:
+    code = (
+        "import sys; from webapp import app, solver; from tests.webapp.stand_in import load_stand_in\n"
+        "app.Solver = lambda checkpoint: solver.Solver(load=load_stand_in)\n"
+        "app.serve(port=0)"
+    )
+    root = str(shipped_layouts()["A"].parent.parent)
+    process = subprocess.Popen(
+        [sys.executable, "-c", code],
+        cwd=root,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": root},
+    )
+    stop = threading.Timer(60, process.kill)
+    stop.start()
+    try:
+        assert process.stdout is not None
+        line = next(line for line in process.stdout if line.startswith("finlab app"))
+        url = line.split()[2]
+        assert url.startswith("http://127.0.0.1:")
+        assert urllib.request.urlopen(url, timeout=20).status == 200
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(20) == 0
+    finally:
+        stop.cancel()
+        process.kill()

@@ -1,0 +1,128 @@
+"""The session: checked intents, undo by steps that make sense, nothing lost on refusal."""
+
+import math
+
+import pytest
+
+from finlab.assets import shipped_layouts
+from finlab.errors import FinlabError
+from finlab.layout import load_layout
+from webapp.session import Session
+
+
+@pytest.fixture
+def session() -> Session:
+    return Session(load_layout(shipped_layouts()["A"]))
+
+
+def test_a_drag_is_one_step_of_undo(session: Session) -> None:
+    name = session.state.layout.names[0]
+    start = session.state
+    for k in range(20):
+        session.drag_fin(name, (0.2 + 0.001 * k, -0.15, 0.0), -1.0)
+    session.end_drag(name, (0.22, -0.15, 0.0), -1.0)
+    assert session.state.layout.fins[0].position[0] == pytest.approx(0.22)
+    assert session.undo() == f"Move {name}"
+    assert session.state == start
+    assert session.redo() == f"Move {name}"
+    assert session.state.layout.fins[0].position[0] == pytest.approx(0.22)
+
+
+def test_slider_steps_merge_only_in_quick_succession() -> None:
+    now = 0.0
+    session = Session(load_layout(shipped_layouts()["A"]))
+    session.history._clock = lambda: now
+    session.set_target(0, 1.0)
+    session.set_target(0, 2.0)
+    now = 5.0
+    session.set_target(0, 3.0)
+    session.undo()
+    assert session.state.target[0] == 2.0
+    session.undo()
+    assert session.state.target[0] == 1.2
+    with pytest.raises(FinlabError, match="nothing to undo"):
+        session.undo()
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, 1e9, "1", None, True])
+def test_bad_targets_change_nothing(session: Session, value: object) -> None:
+    before, revision = session.state, session.revision
+    with pytest.raises(FinlabError, match="Fx"):
+        session.set_target(0, value)
+    assert session.state == before and session.revision == revision
+
+
+def test_bad_settings_change_nothing(session: Session) -> None:
+    before = session.state
+    for key, value in (
+        ("n_candidates", 1e9),
+        ("temperature", -1.0),
+        ("gamma", math.nan),
+        ("method", "guess"),
+        ("layout", 3.0),
+    ):
+        with pytest.raises(FinlabError):
+            session.set_setting(key, value)
+    for key, value in (("position_snap", "1 km"), ("speed", math.nan), ("newtons", 3.0)):
+        with pytest.raises(FinlabError):
+            session.set_display(key, value)
+    with pytest.raises(FinlabError, match="no fin"):
+        session.move_fin("nobody", (0.0, 0.0, 0.0))
+    with pytest.raises(FinlabError, match=r"y of"):
+        session.move_fin(session.state.layout.names[0], (0.0, math.nan, 0.0))
+    assert session.state == before
+
+
+def test_last_fin_can_neither_fail_nor_go(session: Session) -> None:
+    for name in session.state.layout.names[:3]:
+        session.toggle_failure(name)
+    with pytest.raises(FinlabError, match="last fin that works"):
+        session.toggle_failure(session.state.layout.names[3])
+    for name in session.state.layout.names[:3]:
+        session.select(name)
+        session.delete_fin()
+    assert session.state.failed == ()
+    session.select(session.state.layout.names[0])
+    with pytest.raises(FinlabError, match="only fin"):
+        session.delete_fin()
+
+
+def test_snapping_happens_when_a_drag_ends(session: Session) -> None:
+    name = session.state.layout.names[0]
+    session.set_display("position_snap", "5 cm")
+    session.set_display("angle_snap", "45°")
+    session.drag_fin(name, (0.213, -0.15, 0.0), 0.7)
+    assert session.state.layout.fins[0].position[0] == 0.213
+    session.end_drag(name, (0.213, -0.15, 0.0), 0.7)
+    assert session.state.layout.fins[0].position == pytest.approx((0.2, -0.15, 0.0))
+    assert session.state.layout.fins[0].mounting_angle == pytest.approx(math.pi / 4)
+
+
+def test_mirror_duplicate_add_and_selection(session: Session) -> None:
+    with pytest.raises(FinlabError, match="no fin is selected"):
+        session.mirror_fin()
+    session.add_fin()
+    added = session.selected
+    assert added is not None
+    with pytest.raises(FinlabError, match="mirror plane"):
+        session.mirror_fin()
+    session.move_fin(added, (-0.1, 0.2, 0.05))
+    session.turn_fin(added, 2.0)
+    session.mirror_fin()
+    twin = session.state.layout.fins[-1]
+    assert twin.position == (-0.1, -0.2, 0.05) and twin.mounting_angle == pytest.approx(-2.0)
+    session.duplicate_fin()
+    session.duplicate_fin()
+    assert session.state.layout.n_fins == 8
+    with pytest.raises(FinlabError, match="at most 8"):
+        session.add_fin()
+    session.undo()
+    assert session.selected is None, "a fin that is gone is not selected"
+
+
+def test_next_fin_goes_round(session: Session) -> None:
+    seen = []
+    for _ in range(5):
+        session.select_next()
+        seen.append(session.selected)
+    assert seen == [*session.state.layout.names, session.state.layout.names[0]]

@@ -1,0 +1,66 @@
+"""Meshes are closed and face outwards; the blade trails behind its thrust."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from finlab.assets import shipped_layouts
+from finlab.layout import load_layout
+from webapp.meshes import arrows, fin
+from webapp.meshes.hull import Hull, hull_of
+from webapp.meshes.mesh import Mesh
+
+
+def solid(mesh: Mesh) -> trimesh.Trimesh:
+    return trimesh.Trimesh(mesh.vertices, mesh.faces, process=True)
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        fin.blade(),
+        fin.shaft(),
+        arrows.force_arrow(np.array([0.1, -0.2, 0.05]), np.zeros(3), 0.01),
+        arrows.torque_ring(np.array([0.0, 0.1, 0.3]), np.zeros(3), 0.01),
+    ],
+    ids=["blade", "shaft", "arrow", "ring"],
+)
+def test_closed_and_outward(mesh: Mesh) -> None:
+    body = solid(mesh)
+    assert body.is_watertight and body.volume > 0
+    assert np.isfinite(mesh.vertices).all()
+
+
+def test_blade_trails_behind_its_thrust() -> None:
+    # Zero direction zero pushes along +y' of the fin's frame, so the blade lies along -y'.
+    blade = fin.blade()
+    assert blade.vertices[:, 1].min() < -0.15 and blade.vertices[:, 1].max() < 0.02
+    extent = np.ptp(blade.vertices, axis=0)
+    assert extent[:2] == pytest.approx([0.10, 0.18], abs=0.02)
+
+
+@pytest.mark.parametrize("shape", ["box", "ellipsoid", "torpedo", "ucat"])
+def test_hulls(shape: str) -> None:
+    hull = Hull(shape, (0.3, 0.12, 0.1), (0.02, 0.0, 0.01))
+    mesh = hull.mesh()
+    assert solid(mesh).volume > 0
+    assert mesh.vertices.max(axis=0) == pytest.approx([0.32, 0.12, 0.11], abs=0.01)
+    assert hull.contains(np.array([0.02, 0.0, 0.01])) and not hull.contains(np.array([0.5, 0.0, 0.0]))
+    anchor = hull.anchor(np.array([0.1, 0.4, 0.0]))
+    assert 0.02 < anchor[1] < 0.13
+
+
+def test_every_shipped_layout_has_a_hull_near_its_fins() -> None:
+    for path in shipped_layouts().values():
+        layout = load_layout(path)
+        hull = hull_of(layout)
+        for one in layout.fins:
+            gap = np.linalg.norm(np.array(one.position) - hull.anchor(np.array(one.position)))
+            assert gap < 0.25, (layout.name, one.name)
+
+
+def test_arrows_scale_and_vanish() -> None:
+    way = np.array([0.3, 0.0, 0.0])
+    assert arrows.force_arrow(way, np.zeros(3), 0.01).vertices[:, 0].max() == pytest.approx(0.3)
+    assert arrows.force_arrow(0 * way, np.zeros(3), 0.01) is arrows.NOTHING
+    assert arrows.torque_ring(np.zeros(3), np.zeros(3), 0.01) is arrows.NOTHING

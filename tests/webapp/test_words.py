@@ -1,0 +1,95 @@
+"""What the app says about an answer, and what it writes into files."""
+
+import numpy as np
+import pytest
+
+from finlab.assets import shipped_layouts
+from finlab.errors import LayoutError
+from finlab.layout import load_layout
+from tests.webapp.stand_in import StandIn
+from webapp import files
+from webapp.arrow_scale import LENGTH, LONGEST, fitting_newtons
+from webapp.plots import candidate_data
+from webapp.targets import PRESETS, axis_reach, full_thrust
+from webapp.words import authority_sentence, is_reached, mode_names, reach_sentence, rest_sentence
+
+
+def test_reachable_and_not() -> None:
+    layout, allocator = load_layout(shipped_layouts()["ucat"]), StandIn()
+    easy = allocator.allocate(layout, PRESETS["Turn"])
+    assert is_reached(easy) and reach_sentence(easy) == "Reachable"
+    assert rest_sentence(easy) == "Nothing is left undone."
+    hard = allocator.allocate(layout, [0, 0, 60, 0, 0, 0])
+    assert not is_reached(hard)
+    assert "of the heave force" in reach_sentence(hard) and "at the limit" in reach_sentence(hard)
+    assert "N of heave" in rest_sentence(hard) and rest_sentence(hard).endswith("left undone.")
+
+
+def test_robot_without_yaw_says_so() -> None:
+    layout = load_layout(shipped_layouts()["no_yaw"])
+    sentence = authority_sentence(layout, (), axis_reach(layout))
+    assert sentence is not None and "cannot" in sentence and "yaw" in sentence
+    ucat = load_layout(shipped_layouts()["ucat"])
+    assert authority_sentence(ucat, (), axis_reach(ucat)) is None
+
+
+def test_reach_is_a_bound_that_is_met_on_heave() -> None:
+    layout = load_layout(shipped_layouts()["ucat"])
+    assert axis_reach(layout)[2] == pytest.approx(full_thrust(layout).sum())
+    assert axis_reach(layout, ("front_left",))[2] == pytest.approx(full_thrust(layout)[1:].sum())
+
+
+def test_modes_have_names() -> None:
+    answer = StandIn().allocate(load_layout(shipped_layouts()["ucat"]), PRESETS["Turn"])
+    assert answer.candidates is not None
+    names = mode_names(answer.candidates)
+    assert len(names) == len(answer.candidates.energy) and all(names)
+
+
+def test_plot_columns_rise_and_hold_every_dot() -> None:
+    answer = StandIn().allocate(load_layout(shipped_layouts()["ucat"]), PRESETS["Turn"])
+    assert answer.samples is not None and answer.candidates is not None
+    energy, sampled, refined, shown = candidate_data(answer.samples, answer.candidates, 1)
+    assert (np.diff(energy) >= 0).all()
+    assert np.isfinite(sampled).sum() == 64
+    assert np.isfinite(refined).sum() == len(answer.candidates.energy)
+    assert np.isfinite(shown).sum() == 1
+    assert len(candidate_data(None, None, 0)[0]) == 1
+
+
+def test_arrow_scale_fits_and_rests() -> None:
+    for largest in (0.01, 0.3, 1.2, 9.0, 60.0):
+        newtons = fitting_newtons(largest, 1.0)
+        assert LENGTH * largest / newtons <= LONGEST
+    assert fitting_newtons(1.3, fitting_newtons(1.2, 1.0)) == fitting_newtons(1.2, 1.0)
+
+
+def test_layout_files_go_out_and_come_back() -> None:
+    layout = load_layout(shipped_layouts()["ucat"])
+    assert files.read_layout("x.yaml", files.layout_bytes(layout)) == layout
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("big.yaml", b"a" * 2_000_000, "larger"),
+        ("bin.yaml", bytes(range(256)), "UTF-8"),
+        ("nul.yaml", b"format: \x00", "binary"),
+        ("bad.json", b"{", "bad.json"),
+        ("../../x.yaml", b"format: other", "x.yaml"),
+        ("empty.yaml", b"", "empty.yaml"),
+    ],
+)
+def test_bad_uploads_are_refused_by_name(name: str, content: bytes, said: str) -> None:
+    with pytest.raises(LayoutError, match=said):
+        files.read_layout(name, content)
+
+
+def test_candidates_as_csv() -> None:
+    answer = StandIn().allocate(load_layout(shipped_layouts()["ucat"]), PRESETS["Turn"])
+    lines = files.candidates_csv(answer).decode().splitlines()
+    assert answer.candidates is not None
+    assert len(lines) == 1 + len(answer.candidates.energy)
+    assert lines[0].startswith("err_norm,energy,source,front_right.amplitude_rad")
+    with pytest.raises(Exception, match="no candidates"):
+        files.candidates_csv(None)
