@@ -70,6 +70,11 @@ class App:
             remembered = _session_keys(client.local_storage.get_item(STORAGE_KEY, timeout=5.0))
         except (RuntimeError, TimeoutError):  # gone already, or a browser that forbids storage
             remembered = []
+        for client_id, key in list(self._keys.items()):
+            # A connection that broke may still count as open; its tab is perhaps the one that is coming back.
+            view = self.views.get(client_id)
+            if key in remembered and view is not None and not _answers(view.client):
+                self._loop.call_soon_threadsafe(self._drop, client_id)
         self._loop.call_soon_threadsafe(self._open, client, remembered)
 
     def _open(self, client: viser.ClientHandle, remembered: list[str]) -> None:
@@ -83,10 +88,13 @@ class App:
         self.views[client.client_id] = View(client, session, self._solver, self._worker, self._loop)
 
     async def _disconnected(self, client: viser.ClientHandle) -> None:
-        view = self.views.pop(client.client_id, None)
+        self._drop(client.client_id)
+
+    def _drop(self, client_id: int) -> None:
+        view = self.views.pop(client_id, None)
         if view is not None:
             view.close()
-            self._store.leave(self._keys.pop(client.client_id))
+            self._store.leave(self._keys.pop(client_id))
 
     async def _animate(self) -> None:
         before = time.monotonic()
@@ -97,6 +105,15 @@ class App:
                 # A long pause (a busy machine) must not become a leap of the fins.
                 view.scene.animate(min(now - before, 0.2))
             before = now
+
+
+def _answers(client: viser.ClientHandle) -> bool:
+    """Whether a page is still there. Waits for it, so not to be called on the event loop."""
+    try:
+        client.local_storage.get_item(STORAGE_KEY, timeout=2.0)
+    except (RuntimeError, TimeoutError):
+        return False
+    return True
 
 
 def serve(

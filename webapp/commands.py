@@ -35,6 +35,7 @@ def add_commands(gui: viser.GuiApi, host: Host) -> None:
     add("Duplicate the selected fin", session.duplicate_fin)
     add("Delete the selected fin", session.delete_fin)
     add("Add a fin", session.add_fin)
+    add("Tour: start, or next stop", session.next_stop, "T")
     add("Start over", session.start_over)
     add("Freeze or move the fins", lambda: toggle("frozen"), "P")
     add("Show or hide the fin graph", lambda: toggle("graph"))

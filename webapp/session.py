@@ -15,6 +15,7 @@ from webapp.arrow_scale import NEWTONS
 from webapp.history import History
 from webapp.state import AXES, State, number
 from webapp.targets import FIRST, PRESETS
+from webapp.tour import STEPS
 
 POSITION_STEPS = {"off": 0.0, "5 mm": 0.005, "1 cm": 0.01, "5 cm": 0.05}
 """Grids [m] that a fin's position can snap to."""
@@ -61,6 +62,9 @@ class Session:
         self.selected: str | None = None
         self.candidate = 0
         """Which of the answer's candidates is shown; 0 is the best one."""
+        self.stop: int | None = None
+        """Where the tour is, None while there is none."""
+        self._before_tour: State | None = None
         self.revision = 0
         """Grows with every change of the state; an answer carries the revision it was made for."""
 
@@ -170,6 +174,34 @@ class Session:
         """Everything as at first sight; the way here can be undone."""
         self._commit("Start over", self._first)
         self.selected = None
+
+    # The tour.
+
+    def next_stop(self) -> None:
+        """The tour's first stop, or the one after this; after the last one the tour is over."""
+        if self.stop is None:
+            self._before_tour = self.state
+        stop = 0 if self.stop is None else self.stop + 1
+        if stop == len(STEPS):
+            self.end_tour()
+        else:
+            self._go(stop)
+
+    def previous_stop(self) -> None:
+        """The tour's stop before this one."""
+        self._go(max((self.stop or 0) - 1, 0))
+
+    def end_tour(self) -> None:
+        """Back to what was there before the tour."""
+        if self._before_tour is not None:
+            self._commit("End the tour", self._before_tour)
+        self.stop, self._before_tour = None, None
+
+    def _go(self, stop: int) -> None:
+        step = STEPS[stop]
+        self._commit(f"Tour: {step.title}", step.state(self.state))
+        self.stop, self.candidate, self.selected = stop, step.candidate, None
+        self.display = replace(self.display, graph=step.graph)
 
     # Looking.
 

@@ -24,10 +24,11 @@ class SessionStore:
         """The session for a tab, and its key.
 
         Args:
-            keys: what this browser remembers. The first one that no other tab shows is taken, so that a
-                reload finds its work again and a second tab gets a session of its own.
+            keys: what this browser remembers. Of those that no other tab shows, the one left last is taken:
+                a reload finds its work again, and a second tab gets a session of its own.
         """
-        key = next((k for k in keys if k in self._sessions and k not in self._open), None)
+        free = [k for k in keys if k in self._sessions and k not in self._open]
+        key = max(free, key=lambda k: self._left.get(k, 0.0), default=None)
         if key is None:
             key = secrets.token_urlsafe(12)
             self._sessions[key] = self._make()

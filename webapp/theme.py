@@ -13,6 +13,8 @@ SKY: Rgb = (86, 180, 233)
 PURPLE: Rgb = (204, 121, 167)
 YELLOW: Rgb = (240, 228, 66)
 
+BRAND: Rgb = (0, 92, 144)
+"""Buttons and sliders."""
 ASKED = BLUE
 """The target wrench, wherever it is drawn."""
 DELIVERED = GREEN

@@ -24,7 +24,7 @@ from webapp.panels.wrench import WrenchPanel
 from webapp.scene.robot_scene import RobotScene
 from webapp.session import Session
 from webapp.solver import Solver
-from webapp.theme import BLUE, GREEN, VERMILLION
+from webapp.theme import BRAND, GREEN, VERMILLION
 from webapp.worker import Worker
 
 PANEL_WIDTH = 410
@@ -162,7 +162,7 @@ class View:
         if self.session.display.dark != self._dark:
             self._dark = self.session.display.dark
             self.client.gui.configure_theme(
-                dark_mode=self._dark, show_logo=False, show_share_button=False, brand_color=BLUE
+                dark_mode=self._dark, show_logo=False, show_share_button=False, brand_color=BRAND
             )
 
     def _drag(self, name: str, phase: str, position: tuple[float, float, float], angle: float) -> None:

@@ -33,8 +33,8 @@ def reach_sentence(allocation: Allocation) -> str:
     axis = int(np.argmax(np.abs(allocation.unallocated / allocation.sigma)))
     target, given = allocation.target[axis], allocation.wrench[axis]
     kind = "force" if axis < 3 else "torque"
-    if abs(target) > 1e-3 and 0.0 <= given / target < 1.0:
-        sentence = f"Not reachable: {100 * given / target:.0f} % of the {AXIS_WORDS[axis]} {kind}"
+    if abs(target) > 1e-3 and -0.005 < given / target < 1.0:
+        sentence = f"Not reachable: {abs(100 * given / target):.0f} % of the {AXIS_WORDS[axis]} {kind}"
     else:
         sentence = (
             f"Not reachable: {abs(given - target):.2g} {AXIS_UNITS[axis]} of {AXIS_WORDS[axis]} too much"

@@ -9,8 +9,12 @@ from finlab.layout import load_layout
 from tests.webapp.stand_in import StandIn
 from webapp import files
 from webapp.arrow_scale import LENGTH, LONGEST, fitting_newtons
+from webapp.checks import check
 from webapp.plots import candidate_data
+from webapp.session import Session
+from webapp.state import State
 from webapp.targets import PRESETS, axis_reach, full_thrust
+from webapp.tour import STEPS
 from webapp.words import authority_sentence, is_reached, mode_names, reach_sentence, rest_sentence
 
 
@@ -93,3 +97,30 @@ def test_candidates_as_csv() -> None:
     assert lines[0].startswith("err_norm,energy,source,front_right.amplitude_rad")
     with pytest.raises(Exception, match="no candidates"):
         files.candidates_csv(None)
+
+
+def test_checks_of_a_layout() -> None:
+    ucat = check(load_layout(shipped_layouts()["ucat"]))
+    assert ucat.rank == 6 and ucat.remaining == pytest.approx(0.75) and ucat.warnings == ()
+    blind = check(load_layout(shipped_layouts()["no_yaw"]))
+    assert blind.rank < 6 and blind.condition == np.inf and blind.reach[5] < 1e-6
+    layout = load_layout(shipped_layouts()["ucat"])
+    crowded = layout.replace_fin("front_left", position=layout.fins[0].position)
+    assert "may touch" in check(crowded).warnings[0]
+    inside = layout.replace_fin("front_left", position=(0.0, 0.0, 0.0))
+    assert any("inside the hull" in text for text in check(inside).warnings)
+
+
+def test_every_stop_of_the_tour_stands() -> None:
+    for step in STEPS:
+        state = step.state(State(load_layout(shipped_layouts()["A"])))
+        assert set(step.failed) <= set(state.layout.names)
+    session = Session(load_layout(shipped_layouts()["A"]))
+    before = session.state
+    for _ in STEPS:
+        session.next_stop()
+    session.previous_stop()
+    assert session.stop == len(STEPS) - 2
+    session.next_stop()
+    session.next_stop()
+    assert session.stop is None and session.state == before

@@ -5,6 +5,7 @@ import viser
 from webapp.handles import on_user_change, put
 from webapp.markup.corner import corner
 from webapp.markup.style import STYLE
+from webapp.markup.tour_card import tour_card
 from webapp.panels.host import Host
 
 
@@ -16,12 +17,23 @@ class Header:
         self._host = host
         gui.add_html(STYLE)
         self._corner = gui.add_html("")
-        self._history = gui.add_button_group("History", ("Undo", "Redo"), hint="Ctrl+Z, Ctrl+Shift+Z")
+        self._history = gui.add_button_group("Session", ("Undo", "Redo", "Tour"))
         on_user_change(self._history, self._step)
+        self._card = gui.add_html("", visible=False)
+        self._stops = gui.add_button_group("Tour", ("Back", "Next", "End"), visible=False)
+        on_user_change(self._stops, self._walk)
 
     def _step(self, button: str) -> None:
         session = self._host.session
-        self._host.do(session.undo if button == "Undo" else session.redo)
+        acts = {"Undo": session.undo, "Redo": session.redo, "Tour": session.next_stop}
+        if button in acts:
+            self._host.do(acts[button])
+
+    def _walk(self, button: str) -> None:
+        session = self._host.session
+        acts = {"Back": session.previous_stop, "Next": session.next_stop, "End": session.end_tour}
+        if button in acts:
+            self._host.do(acts[button])
 
     def refresh(self) -> None:
         """Write the status line."""
@@ -31,4 +43,7 @@ class Header:
             content=corner(host.session.state, host.newtons, host.shown, host.busy, host.error),
         )
         undo, redo = history.undo_name or "nothing", history.redo_name or "nothing"
-        put(self._history, hint=f"Undo: {undo} (Ctrl+Z). Redo: {redo} (Ctrl+Shift+Z).")
+        put(self._history, hint=f"Undo: {undo} (Ctrl+Z). Redo: {redo} (Ctrl+Shift+Z). A tour in five steps.")
+        stop = host.session.stop
+        put(self._card, visible=stop is not None, content="" if stop is None else tour_card(stop))
+        put(self._stops, visible=stop is not None)

@@ -6,11 +6,13 @@ from html import escape
 
 import viser
 
-from finlab.assets import shipped_layouts
-from finlab.layout import Layout, load_layout
+from finlab.layout import Layout
+from webapp.checks import check
 from webapp.handles import on_user_change, on_user_click, put
+from webapp.markup.check_card import check_card
 from webapp.panels.host import Host
 from webapp.session import ANGLE_STEPS, POSITION_STEPS
+from webapp.shipped import shipped, shipped_name
 from webapp.state import MAX_FINS
 
 NONE = "none"
@@ -25,12 +27,7 @@ class LayoutPanel:
     def __init__(self, gui: viser.GuiApi, host: Host) -> None:
         """Build the widgets."""
         self._host = host
-        self._shipped: dict[str, Layout] = {
-            name: load_layout(path) for name, path in shipped_layouts().items()
-        }
-        self._layouts = gui.add_dropdown(
-            "Layout", (*self._shipped, OWN), hint="Shipped layouts to start from."
-        )
+        self._layouts = gui.add_dropdown("Layout", (*shipped(), OWN), hint="Shipped layouts to start from.")
         on_user_change(self._layouts, self._open)
         self._about = gui.add_html("")
         self._fins = gui.add_dropdown("Fin", (NONE,), hint="Or click a fin in the view.")
@@ -54,10 +51,12 @@ class LayoutPanel:
         on_user_change(self._edit, self._edit_fin)
         self._add = gui.add_button("Add a fin", icon=viser.Icon.PLUS, hint=f"Up to {MAX_FINS} fins.")
         on_user_click(self._add, lambda: host.do(host.session.add_fin))
+        self._card = gui.add_html("")
+        self._checked: Layout | None = None
 
     def _open(self, name: str) -> None:
-        if name in self._shipped:
-            self._host.do(partial(self._host.session.open_layout, self._shipped[name]))
+        if name in shipped():
+            self._host.do(partial(self._host.session.open_layout, shipped()[name]))
         else:
             self.refresh()
 
@@ -87,8 +86,7 @@ class LayoutPanel:
     def refresh(self) -> None:
         """Write the layout and the selected fin."""
         session, layout = self._host.session, self._host.session.state.layout
-        match = next((name for name, known in self._shipped.items() if known == layout), OWN)
-        put(self._layouts, value=match)
+        put(self._layouts, value=shipped_name(layout) or OWN)
         put(self._fins, options=(NONE, *layout.names))
         put(self._fins, value=session.selected or NONE)
         selected = session.selected is not None
@@ -102,3 +100,6 @@ class LayoutPanel:
         put(self._snap_deg, value=session.display.angle_snap)
         first = layout.description.strip().split("\n")[0]
         put(self._about, content=f"<div class='fl dim'>{escape(first)}</div>")
+        if layout != self._checked:
+            self._checked = layout
+            put(self._card, content=check_card(layout, check(layout)))

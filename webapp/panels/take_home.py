@@ -7,9 +7,12 @@ from typing import Any
 
 import viser
 
+from finlab.assets import shipped_layouts
 from webapp import files
 from webapp.handles import on_user_click, put
 from webapp.panels.host import Host
+from webapp.shipped import shipped_name
+from webapp.state import State
 
 
 class TakeHomePanel:
@@ -50,15 +53,30 @@ class TakeHomePanel:
     def refresh(self) -> None:
         """Write the command that asks the same question."""
         state = self._host.session.state
-        words = ["finlab", "allocate", f"{files.file_stem(state.layout.name)}.yaml", "--wrench"]
+        known = shipped_name(state.layout)
+        words = ["finlab", "allocate", known or f"{files.file_stem(state.layout.name)}.yaml", "--wrench"]
         words += [f"{value:g}" for value in state.target]
         for name in state.failed:
             words += ["--failed", name]
         if state.method != "learned":
             words += ["--method", state.method]
-        text = escape(shlex.join(words))
+        shell, python = escape(shlex.join(words)), escape(_python(state, words[2]))
         put(
             self._command,
             content=f"<div class='fl'><span class='dim'>The same question on the command line:</span>"
-            f"<pre class='command'>{text}</pre></div>",
+            f"<pre class='command'>{shell}</pre><span class='dim'>And in Python:</span>"
+            f"<pre class='command'>{python}</pre></div>",
         )
+
+
+def _python(state: State, name: str) -> str:
+    """The same question as lines of Python."""
+    path = str(shipped_layouts()[name]) if name in shipped_layouts() else name
+    method = "" if state.method == "learned" else f"method={state.method!r}"
+    target = ", ".join(f"{value:g}" for value in state.target)
+    failed = f", failed={list(state.failed)!r}" if state.failed else ""
+    return (
+        f"import finlab\nlayout = finlab.load_layout({path!r})\n"
+        f"result = finlab.load_allocator({method}).allocate(layout, [{target}]{failed})\n"
+        "print(result.command, result.wrench)"
+    )

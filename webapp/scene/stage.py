@@ -41,8 +41,9 @@ class Stage:
             shadow_opacity=0.22,
         )
 
-    def refresh(self, hull: Hull, dark: bool, shadows: bool) -> None:
-        """Show another hull, theme or quality."""
+    def refresh(self, hull: Hull, dark: bool, shadows: bool, glass: bool) -> None:
+        """Show another hull, theme or quality; a hull of glass lets one look at the lines inside."""
+        put(self._body, opacity=0.35 if glass else None)
         if hull != self._hull:
             self._hull = hull
             for node, mesh in ((self._body, hull.mesh()), (self._bow, hull.bow())):
