@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 RIDGE = 1e-9
 """Relative regularization of the 6 x 6 systems."""
-REST = 1e-3
+REST = 1e-5
 """Share of the largest thrust below which a fin's mobility no longer shrinks; it can still come back."""
 
 
