@@ -11,14 +11,16 @@ from pathlib import Path
 import viser
 
 from finlab.assets import shipped_layouts
+from finlab.deploy.graph_file import read_graph
 from finlab.errors import FinlabError
 from finlab.layout import Layout, load_layout
+from webapp.files import GRAPH_SUFFIX
 from webapp.session import Display, Session
 from webapp.solver import Solver
 from webapp.state import State
 from webapp.store import SessionStore
 from webapp.view import View
-from webapp.viser_internals import disable_sharing
+from webapp.viser_internals import disable_sharing, start_server, stop_server
 from webapp.worker import Worker
 
 FIRST_LAYOUT = "ucat"
@@ -134,7 +136,7 @@ def serve(
     _check_port(host, port)
     solver = Solver(checkpoint)
     solver.allocator(State(first))  # a missing checkpoint is reported now, not in the browser
-    server = viser.ViserServer(host=host, port=port, label="finlab", verbose=False)
+    server = start_server(host, port)
     app = App(server, solver, first)
     try:
         if port not in (0, server.get_port()):
@@ -143,12 +145,14 @@ def serve(
         _wait_for_signal()
     finally:
         app.stop()
-        server.stop()
+        stop_server(server)
 
 
 def _first_layout(text: str) -> Layout:
     shipped = shipped_layouts()
-    return load_layout(shipped[text] if text in shipped and not Path(text).exists() else text)
+    if text in shipped and not Path(text).exists():
+        return load_layout(shipped[text])
+    return read_graph(text).layout if text.endswith(GRAPH_SUFFIX) else load_layout(text)
 
 
 def _check_port(host: str, port: int) -> None:

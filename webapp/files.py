@@ -8,9 +8,13 @@ from pathlib import Path
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
+from finlab.deploy.graph_file import parse_graph
 from finlab.errors import FinlabError, LayoutError
 from finlab.layout import Layout, parse_layout, save_layout
 from finlab.layout.reading import MAX_BYTES, parse_json, parse_yaml
+
+GRAPH_SUFFIX = ".graph.json"
+"""Ending of the name of a layout graph file."""
 
 
 def file_stem(name: str) -> str:
@@ -19,7 +23,7 @@ def file_stem(name: str) -> str:
 
 
 def read_layout(name: str, content: bytes) -> Layout:
-    """The layout in an uploaded file.
+    """The layout in an uploaded layout file or layout graph file.
 
     Raises:
         LayoutError: the file is too large, no text or no layout; the message names file and key.
@@ -33,6 +37,8 @@ def read_layout(name: str, content: bytes) -> Layout:
         raise LayoutError("is not UTF-8 text, expected a YAML or JSON layout file", source=source) from None
     if "\0" in text:
         raise LayoutError("is a binary file, expected a YAML or JSON layout file", source=source)
+    if source.lower().endswith(GRAPH_SUFFIX):
+        return parse_graph(text, source).layout
     parse = parse_json if source.lower().endswith(".json") else parse_yaml
     return parse_layout(parse(text, source), source=source)
 

@@ -68,6 +68,12 @@ class Session:
         self.revision = 0
         """Grows with every change of the state; an answer carries the revision it was made for."""
 
+    def twin(self) -> "Session":
+        """A session with the same state and look, for work that must not see later changes."""
+        other = Session(self.state.layout, self.display)
+        other.history = History(self.state)
+        return other
+
     @property
     def state(self) -> State:
         """The present state."""

@@ -4,16 +4,18 @@ Everything here runs on viser's event loop; only the solver's work is handed to 
 """
 
 import asyncio
+import threading
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
+import imageio.v3 as iio
 import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
-from webapp import files
 from webapp.commands import add_commands
+from webapp.files import file_stem, graph_bytes
 from webapp.panels.display import DisplayPanel
 from webapp.panels.header import Header
 from webapp.panels.host import Panel
@@ -21,12 +23,15 @@ from webapp.panels.layout import LayoutPanel
 from webapp.panels.modes import ModesPanel
 from webapp.panels.take_home import TakeHomePanel
 from webapp.panels.wrench import WrenchPanel
+from webapp.recording import recorded_html
 from webapp.scene.robot_scene import RobotScene
 from webapp.session import Session
 from webapp.solver import Solver
 from webapp.theme import BRAND, GREEN, VERMILLION
 from webapp.worker import Worker
 
+PICTURE_SIZE = (1080, 1620)
+"""Height and width of an exported picture [px]."""
 PANEL_WIDTH = 410
 """Width of the panel beside the view [px]."""
 
@@ -136,19 +141,46 @@ class View:
         self.scene.look_from(view)
 
     def export_graph(self) -> None:
-        """Make the layout graph file on the worker's thread and send it."""
+        """Make the layout graph file and send it."""
         state = self.session.state
+        self._export(
+            ".graph.json", lambda: graph_bytes(state.layout, state.failed, self._solver.allocator(state))
+        )
+
+    def export_html(self) -> None:
+        """Make a standalone page of the 3D view and send it."""
+        shown, twin = self.shown, self.session.twin()
+        if shown is None:
+            raise FinlabError("there is no answer yet; wait for one")
+        self._export(".html", lambda: recorded_html(twin, shown))
+
+    def _export(self, suffix: str, make: Callable[[], bytes]) -> None:
+        """Have the worker make a file, and send it."""
+        name = f"{file_stem(self.session.state.layout.name)}{suffix}"
 
         def job() -> None:
             try:
-                content = files.graph_bytes(state.layout, state.failed, self._solver.allocator(state))
+                content = make()
             except FinlabError as error:
                 self._post(partial(self.notify, "Not exported", str(error)))
-                return
-            name = f"{files.file_stem(state.layout.name)}.graph.json"
-            self._post(partial(self.client.send_file_download, name, content, save_immediately=True))
+            else:
+                self._post(partial(self.client.send_file_download, name, content, save_immediately=True))
 
-        self._worker.submit(("export", id(self)), job)
+        self._worker.submit((suffix, id(self)), job)
+
+    def export_picture(self) -> None:
+        """Make a picture of the 3D view and send it; the page has to answer, so not on the event loop."""
+        name = f"{file_stem(self.session.state.layout.name)}.png"
+        threading.Thread(target=self._send_picture, args=(name,), daemon=True).start()
+
+    def _send_picture(self, name: str) -> None:
+        try:
+            picture = self.client.get_render(*PICTURE_SIZE, transport_format="png", timeout=30.0)
+        except (RuntimeError, TimeoutError) as error:
+            self._post(partial(self.notify, "No picture", str(error)))
+            return
+        content = iio.imwrite("<bytes>", picture, extension=".png")
+        self._post(partial(self.client.send_file_download, name, content, save_immediately=True))
 
     # From the session to the page.
 

@@ -1,7 +1,22 @@
-"""Every use of viser's private parts (of 1.1.1): look here first when viser is upgraded."""
+"""Every use of viser's private parts (of 1.1.1), and its habits: look here first when viser is upgraded."""
+
+import contextlib
+import io
 
 import viser
 from viser import _messages
+
+
+def start_server(host: str, port: int) -> viser.ViserServer:
+    """A server that does not print a banner of its own; `verbose=False` alone leaves it."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        return viser.ViserServer(host=host, port=port, label="finlab", verbose=False)
+
+
+def stop_server(server: viser.ViserServer) -> None:
+    """Stop a server, silently."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        server.stop()
 
 
 def disable_sharing(server: viser.ViserServer) -> None:

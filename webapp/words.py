@@ -26,6 +26,12 @@ def is_reached(allocation: Allocation) -> bool:
     return allocation.err_norm <= REACHED
 
 
+def missing_part(allocation: Allocation) -> NDArray[np.float64]:
+    """The unallocated wrench (6,) [N, N m] without what is too small to matter."""
+    rest = allocation.unallocated
+    return np.where(np.abs(rest / allocation.sigma) > 2 * REACHED, rest, 0.0)
+
+
 def reach_sentence(allocation: Allocation) -> str:
     """One sentence: reachable, or what is missing most and which fins are at their limits."""
     if is_reached(allocation):

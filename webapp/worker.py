@@ -1,6 +1,7 @@
 """One thread that computes; of several questions from one asker only the newest is answered."""
 
 import threading
+import traceback
 from collections.abc import Callable, Hashable
 
 Job = Callable[[], None]
@@ -46,4 +47,7 @@ class Worker:
                 if self._stopped:
                     return
                 job = self._jobs.pop(next(iter(self._jobs)))
-            job()
+            try:
+                job()
+            except Exception:  # one asker's fault must not silence all the others
+                traceback.print_exc()

@@ -57,21 +57,20 @@ class Served:
 @pytest.fixture(scope="session")
 def served() -> Iterator[Served]:
     """The app with the stand-in allocator, without shadows, so that software rendering keeps up."""
-    import viser
-
     from finlab.assets import shipped_layouts
     from finlab.layout import load_layout
     from tests.webapp.stand_in import load_stand_in
     from webapp.app import App
     from webapp.session import Display
     from webapp.solver import Solver
+    from webapp.viser_internals import start_server, stop_server
 
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    server = start_server("127.0.0.1", 0)
     layout = load_layout(shipped_layouts()["ucat"])
     app = App(server, Solver(load=load_stand_in), layout, Display(shadows=False, speed=0.2))
     yield Served(f"http://127.0.0.1:{server.get_port()}/?fixedDpr=0.5", app, server)
     app.stop()
-    server.stop()
+    stop_server(server)
 
 
 @pytest.fixture(scope="session")

@@ -62,6 +62,20 @@ def test_bad_number_is_refused_with_a_note(page: Any) -> None:
     assert page.session.state.layout == before
 
 
+def test_page_picture_and_command_to_take_home(page: Any, tmp_path: Path) -> None:
+    page.tab("Files")
+    assert "finlab allocate ucat --wrench 1.2 0 0 0 0 0.25" in page.text("pre.command")
+    with page.page.expect_download() as download:
+        page.press("Save the moving 3D view (HTML)")
+    download.value.save_as(tmp_path / "robot.html")
+    html = (tmp_path / "robot.html").read_text()
+    assert "__VISER_EMBED_DATA__" in html and len(html) < 3_000_000
+    with page.page.expect_download() as download:
+        page.press("Save a picture (PNG)")
+    download.value.save_as(tmp_path / "robot.png")
+    assert (tmp_path / "robot.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_save_open_and_a_bad_file(page: Any, tmp_path: Path) -> None:
     page.tab("Files")
     with page.page.expect_download() as download:

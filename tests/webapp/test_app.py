@@ -143,6 +143,16 @@ def test_names_are_escaped(server: viser.ViserServer, view: View) -> None:
     on_loop(server, lambda: view.do(lambda: view.session.toggle_failure(evil)))
 
 
+def test_html_export_is_one_file(server: viser.ViserServer, view: View) -> None:
+    until(lambda: not view.busy)
+    on_loop(server, lambda: view.do(view.export_html))
+    until(lambda: "ucat.html" in view.client.files)
+    assert b"__VISER_EMBED_DATA__" in view.client.files["ucat.html"]
+    on_loop(server, lambda: view.do(view.export_graph))
+    until(lambda: any("Not exported" in note for note in view.client.notes))
+    assert "needs a trained network" in view.client.notes[-1]
+
+
 def test_sharing_is_off(server: viser.ViserServer, app: App) -> None:
     handlers = server._websock_server._incoming_handlers
     assert _messages.ShareUrlRequest not in handlers and _messages.ShareUrlDisconnect not in handlers

@@ -2,6 +2,8 @@
 
 import threading
 
+import pytest
+
 from webapp.worker import Worker
 
 
@@ -30,3 +32,12 @@ def test_askers_take_turns() -> None:
     assert done.wait(10)
     assert ran == ["a", "c"]
     worker.stop()
+
+
+def test_a_fault_does_not_end_the_thread(capsys: pytest.CaptureFixture[str]) -> None:
+    worker, done = Worker(), threading.Event()
+    worker.submit("bad", lambda: 1 / 0)  # type: ignore[arg-type]
+    worker.submit("good", done.set)
+    assert done.wait(10)
+    worker.stop()
+    assert "ZeroDivisionError" in capsys.readouterr().err

@@ -46,6 +46,12 @@ class Host(Protocol):
     def look_from(self, view: str) -> None:
         """Move the camera."""
 
+    def export_html(self) -> None:
+        """Make a standalone page of the 3D view and send it to the browser."""
+
+    def export_picture(self) -> None:
+        """Make a picture of the 3D view and send it to the browser."""
+
     def export_graph(self) -> None:
         """Make the layout graph file and send it to the browser."""
 

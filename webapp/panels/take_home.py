@@ -29,6 +29,14 @@ class TakeHomePanel:
             "Export the graph file", icon=viser.Icon.FILE_EXPORT, hint="For deployment on the robot."
         )
         self._candidates = gui.add_button("Save the candidates (CSV)", icon=viser.Icon.TABLE_EXPORT)
+        self._html = gui.add_button(
+            "Save the moving 3D view (HTML)", icon=viser.Icon.BRAND_HTML5, hint="One file."
+        )
+        self._picture = gui.add_button(
+            "Save a picture (PNG)", icon=viser.Icon.PHOTO, hint="What the view shows."
+        )
+        on_user_click(self._html, partial(host.do, host.export_html))
+        on_user_click(self._picture, host.export_picture)
         on_user_click(self._save, partial(host.do, self._send_layout))
         on_user_click(self._export, partial(host.do, host.export_graph))
         on_user_click(self._candidates, partial(host.do, self._send_candidates))

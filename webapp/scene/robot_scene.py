@@ -17,7 +17,7 @@ from webapp.scene.stage import Stage
 from webapp.scene.wrench_nodes import WrenchNodes
 from webapp.session import Session
 from webapp.state import State
-from webapp.words import is_reached
+from webapp.words import missing_part
 
 CAMERAS = {
     "3D": (0.72, 0.70, 0.52),
@@ -98,7 +98,7 @@ class RobotScene:
             self._take_command(allocation.command)
         target = np.array(state.target)
         given = allocation.wrench if allocation is not None else None
-        missing = allocation is not None and not is_reached(allocation)
+        missing = np.zeros(6) if allocation is None else missing_part(allocation)
         self._wrench.refresh(target, given, missing, hull.center[2] + hull.half[2], scale)
         shown = self._session.selected if display.dimensions else None
         self._lines.refresh(state.layout, state.healthy, shown, display.graph)

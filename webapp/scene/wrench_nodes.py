@@ -41,13 +41,13 @@ class WrenchNodes:
         self._given = node("delivered_force", DELIVERED, None), node("delivered_torque", DELIVERED, None)
         self._missing = node("missing_force", MISSING, None), node("missing_torque", MISSING, None)
 
-    def refresh(self, target: Array, wrench: Array | None, missing: bool, top: float, scale: float) -> None:
+    def refresh(self, target: Array, wrench: Array | None, missing: Array, top: float, scale: float) -> None:
         """Show a target (6,) and what is delivered of it (6,), None while unknown.
 
         Args:
             target: asked wrench [N, N m].
             wrench: delivered wrench.
-            missing: whether the difference matters enough to be drawn.
+            missing: the part (6,) of the difference that matters enough to be drawn.
             top: height of the hull's top [m].
             scale: length of a force arrow per newton [m/N].
         """
@@ -58,9 +58,8 @@ class WrenchNodes:
         given = np.zeros(6) if wrench is None else wrench
         _show(self._given[0], force_arrow(given[:3] * scale, zero, 0.0065))
         _show(self._given[1], torque_ring(given[3:], zero, 0.005))
-        rest = target - given if missing and wrench is not None else np.zeros(6)
-        _show(self._missing[0], force_arrow(rest[:3] * scale, given[:3] * scale, 0.006))
-        _show(self._missing[1], torque_ring(rest[3:], zero, 0.005, radius=1.35 * RING_RADIUS))
+        _show(self._missing[0], force_arrow(missing[:3] * scale, given[:3] * scale, 0.006))
+        _show(self._missing[1], torque_ring(missing[3:], zero, 0.005, radius=1.35 * RING_RADIUS))
 
 
 def _show(node: viser.MeshHandle, mesh: Mesh) -> None:
