@@ -15,37 +15,44 @@ LOWEST, HIGHEST = -5.0, 1.5
 FONT = "11px sans-serif"
 
 
-def add_candidate_plot(gui: viser.GuiApi, height: int) -> viser.GuiUplotHandle:
-    """A plot of energy against error, empty; `height` in pixels."""
+class CandidatePlot:
+    """A plot of energy against error; of many answers in a row, each is put in once."""
 
-    def dots(label: str, color: str, size: int, filled: bool = True) -> uplot.Series:
-        points = uplot.Series_Points(show=True, size=size, stroke=color, width=1.5)
-        if filled:
-            points["fill"] = color
-        return uplot.Series(label=label, stroke=color, width=0, points=points)
+    def __init__(self, gui: viser.GuiApi, height: int) -> None:
+        """Build it, empty; `height` in pixels."""
+        self._shows: tuple[Allocation, int] | None = None
+        self._plot = gui.add_uplot(
+            candidate_data(None, None, 0),
+            (
+                uplot.Series(label="energy"),
+                _dots("sampled", css(SKY, 0.75), 5),
+                _dots("refined", css(DELIVERED), 8),
+                _dots("shown", css(VERMILLION), 15, filled=False),
+            ),
+            scales={"x": uplot.Scale(time=False), "y": uplot.Scale(auto=False, range=(LOWEST, HIGHEST))},
+            axes=(_axis("energy", 30), _axis("log₁₀ error", 42)),
+            height=height,
+        )
 
-    def axis(label: str, size: int) -> uplot.Axis:
-        return uplot.Axis(label=label, labelSize=18, size=size, labelFont=FONT, font=FONT)
-
-    return gui.add_uplot(
-        candidate_data(None, None, 0),
-        (
-            uplot.Series(label="energy"),
-            dots("sampled", css(SKY, 0.75), 5),
-            dots("refined", css(DELIVERED), 8),
-            dots("shown", css(VERMILLION), 15, filled=False),
-        ),
-        scales={"x": uplot.Scale(time=False), "y": uplot.Scale(auto=False, range=(LOWEST, HIGHEST))},
-        axes=(axis("energy", 30), axis("log₁₀ error", 42)),
-        height=height,
-    )
+    def refresh(self, answer: Allocation | None, shown: int) -> None:
+        """Put an answer's samples and candidates in; `shown` is the one on the robot."""
+        if answer is None or (
+            self._shows is not None and self._shows[0] is answer and self._shows[1] == shown
+        ):
+            return
+        self._shows = (answer, shown)
+        put(self._plot, data=candidate_data(answer.samples, answer.candidates, shown))
 
 
-def refresh_candidate_plot(plot: viser.GuiUplotHandle, answer: Allocation | None, shown: int) -> None:
-    """Put an answer's samples and candidates into the plot; `shown` is the one on the robot."""
-    if answer is None:
-        return
-    put(plot, data=candidate_data(answer.samples, answer.candidates, shown))
+def _dots(label: str, color: str, size: int, filled: bool = True) -> uplot.Series:
+    points = uplot.Series_Points(show=True, size=size, stroke=color, width=1.5)
+    if filled:
+        points["fill"] = color
+    return uplot.Series(label=label, stroke=color, width=0, points=points)
+
+
+def _axis(label: str, size: int) -> uplot.Axis:
+    return uplot.Axis(label=label, labelSize=18, size=size, labelFont=FONT, font=FONT)
 
 
 def candidate_data(samples: Candidates | None, refined: Candidates | None, shown: int) -> tuple[Array, ...]:

@@ -1,12 +1,12 @@
 """Target wrenches to start from, and how much of each axis a layout can give."""
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.layout import Layout
-from finlab.layout.arrays import planar_effectiveness
+from finlab.layout import Fin, FinModelSpec, Layout, Limits, planar_effectiveness
 from finlab.physics import Plant
 
 PRESETS: dict[str, tuple[float, float, float, float, float, float]] = {
@@ -37,8 +37,15 @@ def axis_reach(layout: Layout, failed: tuple[str, ...] = ()) -> NDArray[np.float
 
 def full_thrust(layout: Layout) -> NDArray[np.float64]:
     """Mean thrust (n,) of each fin at its largest amplitude and frequency [N]."""
-    command = np.array([(*fin.limits.upper[:2], np.mean(fin.limits.zero_direction)) for fin in layout.fins])
-    return np.linalg.norm(Plant(layout).fin_forces(command), axis=-1)
+    return np.array([_full_thrust(fin.limits, fin.model) for fin in layout.fins])
+
+
+@lru_cache(maxsize=256)
+def _full_thrust(limits: Limits, model: FinModelSpec) -> float:
+    """Full thrust of one fin [N]; where it sits does not matter, so a drag asks for the same one again."""
+    alone = Layout("alone", (Fin("fin", (0.0, 0.0, 0.0), 0.0, limits, model),))
+    command = [[*limits.upper[:2], sum(limits.zero_direction) / 2]]
+    return float(np.linalg.norm(Plant(alone).fin_forces(command)))
 
 
 def slider_end(reach: float) -> float:

@@ -217,7 +217,8 @@ class View:
         def job() -> None:
             try:
                 allocation = self._solver.solve(state)
-                _ = allocation.wrench, allocation.energy  # the plant's part belongs to this thread too
+                # What is computed when first asked for belongs to this thread too.
+                _ = allocation.wrench, allocation.energy, allocation.candidates, allocation.samples
             except FinlabError as error:
                 self._post(partial(self._take_error, revision, str(error)))
             except Exception as error:  # a fault of a method must not take the page with it

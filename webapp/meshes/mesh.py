@@ -1,5 +1,6 @@
 """A triangle mesh, and the surfaces that the shapes are made of."""
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -51,13 +52,18 @@ def tube(path: Array, radius: Array | float, sides: int = 16, across: Array | No
     ring = np.cos(turn)[None, :, None] * first[:, None] + np.sin(turn)[None, :, None] * second[:, None]
     points = path[:, None] + radius[:, None, None] * ring
     vertices = np.concatenate([points.reshape(-1, 3), path[:1], path[-1:]])
-    faces = list(_grid_faces(len(path), sides))
-    start, end = len(vertices) - 2, len(vertices) - 1
-    last = (len(path) - 1) * sides
+    return Mesh(vertices, _tube_faces(len(path), sides))
+
+
+@cache
+def _tube_faces(rows: int, sides: int) -> NDArray[np.int32]:
+    """Triangles of a tube of so many rings, with a fan at each end whose middle points come last."""
+    faces = _grid_faces(rows, sides)
+    start, end, last = rows * sides, rows * sides + 1, (rows - 1) * sides
     for k in range(sides):
         n = (k + 1) % sides
         faces += [(start, n, k), (end, last + k, last + n)]
-    return Mesh(vertices, np.array(faces, dtype=np.int32))
+    return np.array(faces, dtype=np.int32)
 
 
 def _grid_faces(rows: int, columns: int) -> list[tuple[int, int, int]]:

@@ -8,7 +8,7 @@ from finlab.allocation.methods import METHODS
 from webapp.handles import on_user_change, put
 from webapp.markup.modes import MOST_ROWS, mode_table
 from webapp.panels.host import Host
-from webapp.plots import add_candidate_plot, refresh_candidate_plot
+from webapp.plots import CandidatePlot
 from webapp.state import CANDIDATE_RANGE, GAMMA_RANGE, TEMPERATURE_RANGE
 from webapp.words import mode_names
 
@@ -38,7 +38,7 @@ class ModesPanel:
             ("gamma", self._gamma),
         ):
             on_user_change(widget, partial(self._set, key))
-        self._plot = add_candidate_plot(gui, height=260)
+        self._plot = CandidatePlot(gui, height=260)
         self._choice = gui.add_dropdown("Show", ("1",), hint="Which candidate moves the fins.")
         on_user_change(self._choice, self._choose)
         self._table = gui.add_html("")
@@ -58,7 +58,7 @@ class ModesPanel:
         put(self._temperature, value=state.temperature)
         put(self._gamma, value=state.gamma)
         candidates = None if best is None else best.candidates
-        refresh_candidate_plot(self._plot, best, shown)
+        self._plot.refresh(best, shown)
         entries: tuple[str, ...] = ("1 only answer",)
         if candidates is not None and len(candidates.energy):
             entries = tuple(f"{k + 1} {name}" for k, name in enumerate(mode_names(candidates)[:MOST_ROWS]))

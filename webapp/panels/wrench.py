@@ -10,7 +10,7 @@ from webapp.handles import on_user_change, put
 from webapp.markup.bars import wrench_bars
 from webapp.markup.fins import fin_table
 from webapp.panels.host import Host
-from webapp.plots import add_candidate_plot, refresh_candidate_plot
+from webapp.plots import CandidatePlot
 from webapp.state import AXES, AXIS_UNITS, AXIS_WORDS
 from webapp.targets import PRESETS, axis_reach, full_thrust, slider_end
 from webapp.words import authority_sentence, rest_sentence
@@ -42,7 +42,7 @@ class WrenchPanel:
         on_user_change(self._failures, self._toggle_failure)
         self._bars = gui.add_html("")
         self._table = gui.add_html("")
-        self._plot = add_candidate_plot(gui, height=190)
+        self._plot = CandidatePlot(gui, height=190)
         self._ranges_for: tuple[Layout, tuple[str, ...]] | None = None
         self._reach = np.ones(6)
         self._full = np.ones(1)
@@ -60,7 +60,7 @@ class WrenchPanel:
         """Write target, failures and answer."""
         host, state = self._host, self._host.session.state
         self._refresh_ranges()
-        refresh_candidate_plot(self._plot, host.best, host.session.candidate)
+        self._plot.refresh(host.best, host.session.candidate)
         for slider, value in zip(self._sliders, state.target, strict=True):
             low, high = min(slider.min, value), max(slider.max, value)
             put(slider, min=low, max=high)

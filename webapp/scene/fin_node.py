@@ -14,6 +14,7 @@ from webapp.meshes import fin as fin_mesh
 from webapp.meshes.arrows import NOTHING, force_arrow
 from webapp.meshes.hull import Hull
 from webapp.meshes.mesh import Mesh, tube
+from webapp.scene.shape import Shape
 from webapp.theme import DEAD, LIGHT, Rgb, fin_color
 
 Array = NDArray[np.float64]
@@ -68,24 +69,28 @@ class FinNode:
             f"{name}/turn/shaft", shaft.vertices, shaft.faces, color=LIGHT.metal
         )
         fan = fin_mesh.sweep(0.1)
-        self._fan = scene.add_mesh_simple(
-            f"{name}/turn/fan",
-            fan.vertices,
-            fan.faces,
-            color=self._color,
-            opacity=0.3,
-            side="double",
-            cast_shadow=False,
-            receive_shadow=False,
+        self._fan = Shape(
+            scene.add_mesh_simple(
+                f"{name}/turn/fan",
+                fan.vertices,
+                fan.faces,
+                color=self._color,
+                opacity=0.3,
+                side="double",
+                cast_shadow=False,
+                receive_shadow=False,
+            )
         )
-        self._force = scene.add_mesh_simple(
-            f"{name}/turn/force", NOTHING.vertices, NOTHING.faces, color=self._color, cast_shadow=False
+        self._force = Shape(
+            scene.add_mesh_simple(
+                f"{name}/turn/force", NOTHING.vertices, NOTHING.faces, color=self._color, cast_shadow=False
+            )
         )
         self._label = scene.add_label(
             f"{name}/label", str(index + 1), anchor="center-center", font_screen_scale=0.85
         )
-        self._strut = scene.add_mesh_simple(
-            f"/struts/{index}", NOTHING.vertices, NOTHING.faces, color=LIGHT.metal
+        self._strut = Shape(
+            scene.add_mesh_simple(f"/struts/{index}", NOTHING.vertices, NOTHING.faces, color=LIGHT.metal)
         )
 
         for node in (self._blade, self._shaft):
@@ -111,7 +116,7 @@ class FinNode:
         """The layout has no fin at this place."""
         put(self._move, visible=False, active_axes=(False,) * 3)
         put(self._turn, active_axes=(False,) * 3)
-        put(self._strut, visible=False)
+        put(self._strut.node, visible=False)
 
     def place(self, fin: Fin, hull: Hull, selected: bool, label: str | None, owned_by_user: bool) -> None:
         """Show a fin.
@@ -133,37 +138,34 @@ class FinNode:
         put(self._label, position=np.array([0.0, 0.0, 0.04]))
         shaft = np.array([math.cos(fin.mounting_angle), math.sin(fin.mounting_angle), 0.0])
         servo = np.array(fin.position) - 0.03 * shaft
-        self._show(self._strut, _strut(servo, hull.anchor(servo)))
-        put(self._strut, visible=True)
+        self._strut.show(_strut, servo, hull)
+        put(self._strut.node, visible=True)
 
     def command(self, command: Array | None, arrow: Array, mounting_angle: float, fans: bool) -> None:
         """Show a command (3,), None for a failed fin, and its force as a body-frame arrow (3,) [m]."""
         alive = command is not None
         color: Rgb = self._color if alive else DEAD
         put(self._blade, color=color)
-        put(self._fan, visible=fans and alive)
-        put(self._force, visible=alive)
+        put(self._fan.node, visible=fans and alive)
+        put(self._force.node, visible=alive)
         if command is None:
             return
-        self._show(self._fan, fin_mesh.sweep(float(command[0])))
+        self._fan.show(fin_mesh.sweep, float(command[0]))
         half = command[2] / 2
-        put(self._fan, wxyz=np.array([math.cos(half), math.sin(half), 0.0, 0.0]))
+        put(self._fan.node, wxyz=np.array([math.cos(half), math.sin(half), 0.0, 0.0]))
         cos, sin = math.cos(mounting_angle), math.sin(mounting_angle)
         in_fin_frame = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ arrow
         root = np.array([fin_mesh.ROOT + fin_mesh.SPAN / 2, 0.0, 0.0])
-        self._show(self._force, force_arrow(in_fin_frame, root, 0.007))
+        self._force.show(force_arrow, in_fin_frame, root, 0.007)
 
     def pose_blade(self, angle: float) -> None:
         """Turn the blade about its shaft to an angle [rad]."""
         self._blade.wxyz = (math.cos(angle / 2), math.sin(angle / 2), 0.0, 0.0)
 
-    @staticmethod
-    def _show(node: viser.MeshHandle, mesh: Mesh) -> None:
-        put(node, vertices=mesh.vertices.astype(np.float32), faces=mesh.faces.astype(np.uint32))
 
-
-def _strut(servo: Array, anchor: Array) -> Mesh:
+def _strut(servo: Array, hull: Hull) -> Mesh:
     """A rod from the servo to the hull, nothing where the servo already sits in it."""
+    anchor = hull.anchor(servo)
     if np.linalg.norm(anchor - servo) < 5e-3:
         return NOTHING
     return tube(np.array([servo, anchor]), 0.008, 12)

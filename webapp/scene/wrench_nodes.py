@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 
 from webapp.handles import put
 from webapp.meshes.arrows import NOTHING, RING_RADIUS, force_arrow, torque_ring
-from webapp.meshes.mesh import Mesh, tube
+from webapp.meshes.mesh import tube
+from webapp.scene.shape import Shape
 from webapp.theme import ASKED, DELIVERED, LIGHT, MISSING
 
 Array = NDArray[np.float64]
@@ -26,8 +27,8 @@ class WrenchNodes:
         )
         self._hub = scene.add_icosphere("/wrench/hub", 0.012, color=(70, 78, 86), cast_shadow=False)
 
-        def node(name: str, color: tuple[int, int, int], opacity: float | None) -> viser.MeshHandle:
-            return scene.add_mesh_simple(
+        def node(name: str, color: tuple[int, int, int], opacity: float | None) -> Shape:
+            node = scene.add_mesh_simple(
                 f"/wrench/{name}",
                 NOTHING.vertices,
                 NOTHING.faces,
@@ -36,6 +37,7 @@ class WrenchNodes:
                 cast_shadow=False,
                 receive_shadow=False,
             )
+            return Shape(node)
 
         self._asked = node("asked_force", ASKED, 0.4), node("asked_torque", ASKED, 0.4)
         self._given = node("delivered_force", DELIVERED, None), node("delivered_torque", DELIVERED, None)
@@ -53,14 +55,10 @@ class WrenchNodes:
         """
         put(self._root, position=np.array([0.0, 0.0, top + HEIGHT]))
         zero = np.zeros(3)
-        _show(self._asked[0], force_arrow(target[:3] * scale, zero, 0.011))
-        _show(self._asked[1], torque_ring(target[3:], zero, 0.0085))
+        self._asked[0].show(force_arrow, target[:3] * scale, zero, 0.011)
+        self._asked[1].show(torque_ring, target[3:], zero, 0.0085)
         given = np.zeros(6) if wrench is None else wrench
-        _show(self._given[0], force_arrow(given[:3] * scale, zero, 0.0065))
-        _show(self._given[1], torque_ring(given[3:], zero, 0.005))
-        _show(self._missing[0], force_arrow(missing[:3] * scale, given[:3] * scale, 0.006))
-        _show(self._missing[1], torque_ring(missing[3:], zero, 0.005, radius=1.35 * RING_RADIUS))
-
-
-def _show(node: viser.MeshHandle, mesh: Mesh) -> None:
-    put(node, vertices=mesh.vertices.astype(np.float32), faces=mesh.faces.astype(np.uint32))
+        self._given[0].show(force_arrow, given[:3] * scale, zero, 0.0065)
+        self._given[1].show(torque_ring, given[3:], zero, 0.005)
+        self._missing[0].show(force_arrow, missing[:3] * scale, given[:3] * scale, 0.006)
+        self._missing[1].show(torque_ring, missing[3:], zero, 0.005, 1.35 * RING_RADIUS)
