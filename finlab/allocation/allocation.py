@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -37,10 +38,10 @@ class Solution(NamedTuple):
     """Chosen commands (N, n, 3)."""
     wrench_surrogate: Array | None = None
     """Wrench (N, 6) that the method itself believed, where it used a model of its own."""
-    candidates: Candidates | None = None
-    """Refined candidates, for a single target."""
-    samples: Candidates | None = None
-    """Raw candidates before refinement, for a single target."""
+    candidates: Callable[[], Candidates] | None = None
+    """Gives the refined candidates, for a single target; made only when asked for."""
+    samples: Callable[[], Candidates] | None = None
+    """Gives the raw candidates before refinement, for a single target."""
 
 
 @dataclass(frozen=True)
@@ -65,10 +66,20 @@ class Allocation:
     """Name of the checkpoint that was used, if any."""
     wrench_surrogate: Array | None = None
     """Wrench (6,) that the method itself expected, if it used a learned model."""
-    candidates: Candidates | None = None
-    """Refined candidates, best first."""
-    samples: Candidates | None = None
-    """Raw candidates before refinement."""
+    make_candidates: Callable[[], Candidates | None] = field(default=lambda: None, repr=False, compare=False)
+    """Gives `candidates` when they are first asked for."""
+    make_samples: Callable[[], Candidates | None] = field(default=lambda: None, repr=False, compare=False)
+    """Gives `samples` when they are first asked for."""
+
+    @cached_property
+    def candidates(self) -> Candidates | None:
+        """Refined candidates, best first; None for methods that have a single answer."""
+        return self.make_candidates()
+
+    @cached_property
+    def samples(self) -> Candidates | None:
+        """Raw candidates before refinement, best first; None for methods that draw none."""
+        return self.make_samples()
 
     @property
     def fins(self) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -81,8 +81,8 @@ class Allocator(ABC):
             solve_ms=solve_ms,
             checkpoint=self.checkpoint,
             wrench_surrogate=None if solution.wrench_surrogate is None else solution.wrench_surrogate[0],
-            candidates=_candidates_with_failed(solution.candidates, alive),
-            samples=_candidates_with_failed(solution.samples, alive),
+            make_candidates=lambda: _candidates_with_failed(solution.candidates, alive),
+            make_samples=lambda: _candidates_with_failed(solution.samples, alive),
         )
 
     def allocate_batch(
@@ -148,5 +148,10 @@ def _with_failed(command: Array, alive: NDArray[np.bool_]) -> Array:
     return full
 
 
-def _candidates_with_failed(candidates: Candidates | None, alive: NDArray[np.bool_]) -> Candidates | None:
-    return None if candidates is None else candidates._replace(command=_with_failed(candidates.command, alive))
+def _candidates_with_failed(
+    make: Callable[[], Candidates] | None, alive: NDArray[np.bool_]
+) -> Candidates | None:
+    if make is None:
+        return None
+    candidates = make()
+    return candidates._replace(command=_with_failed(candidates.command, alive))

@@ -41,21 +41,19 @@ def fin_energy(
     command: NDArray[np.floating],
     upper: NDArray[np.floating],
     weights: EnergyWeights = DEFAULT_WEIGHTS,
-) -> NDArray[np.float64]:
+) -> NDArray[np.floating]:
     """Energy of each fin, shape (...,): the summand of the paper's `J_en`."""
-    amplitude, frequency, direction = np.moveaxis(np.asarray(command, np.float64) / energy_scale(upper), -1, 0)
-    return (
-        weights.amplitude * amplitude**2
-        + weights.frequency * frequency**2
-        + weights.zero_direction * direction**2
-        + weights.product * amplitude * frequency
-    )
+    scaled = command / energy_scale(upper).astype(command.dtype)
+    a, f, d = scaled[..., 0], scaled[..., 1], scaled[..., 2]
+    w = weights
+    return w.amplitude * a * a + w.frequency * f * f + w.zero_direction * d * d + w.product * a * f
 
 
 def command_energy(
     command: NDArray[np.floating],
     upper: NDArray[np.floating],
     weights: EnergyWeights = DEFAULT_WEIGHTS,
-) -> NDArray[np.float64]:
+) -> NDArray[np.floating]:
     """`J_en` of whole robots: commands (..., n, 3) to energies (...,). Failed fins (NaN) count nothing."""
-    return np.nansum(fin_energy(command, upper, weights), axis=-1)
+    energy = fin_energy(command, upper, weights)
+    return np.where(np.isnan(energy), 0.0, energy).sum(-1)

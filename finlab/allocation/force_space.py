@@ -45,6 +45,8 @@ class PlanarProblem(NamedTuple):
     """Half of the arc (n,) [rad]; pi and more for a full circle."""
     direction_cost: Array
     """Energy per squared zero direction (n,) [1/rad^2]."""
+    idle_direction: Array
+    """Zero direction (n,) [rad] of a fin at rest: the cheapest one."""
     turns_fully: bool
     """Whether every fin may point anywhere."""
 
@@ -117,23 +119,15 @@ def _descend_freely(problem: PlanarProblem, target: Array, thrust: Array, steps:
     return Planar(held, np.arctan2(wanted[..., 1], wanted[..., 0]), target - reached)
 
 
-def energy(problem: PlanarProblem, planar: Planar) -> Array:
-    """Energy (R,) of planar forces."""
-    thrust = problem.curves.lookup(planar.thrust)[..., 2]
-    return (thrust + problem.direction_cost * _cheap_direction(problem, planar) ** 2).sum(-1)
-
-
-def commands(problem: PlanarProblem, planar: Planar) -> Array:
-    """Commands (R, n, 3) that give planar forces at the least energy."""
+def realize(problem: PlanarProblem, planar: Planar) -> tuple[Array, Array]:
+    """Commands (R, n, 3) that give planar forces at the least energy, and that energy (R,)."""
     looked_up = problem.curves.lookup(planar.thrust)
-    return np.concatenate([looked_up[..., :2], _cheap_direction(problem, planar)[..., None]], axis=-1)
-
-
-def _cheap_direction(problem: PlanarProblem, planar: Planar) -> Array:
-    """Zero directions (R, n); a fin at rest points where that costs least."""
+    # A fin at rest points where that costs least.
     resting = planar.thrust <= problem.curves.minimum * (1.0 + 1e-6)
-    idle = np.clip(0.0, problem.middle - problem.half, problem.middle + problem.half)
-    return np.where(resting, idle, planar.direction)
+    direction = np.where(resting, problem.idle_direction, planar.direction)
+    energy = (looked_up[..., 2] + problem.direction_cost * direction * direction).sum(-1)
+    looked_up[..., 2] = direction
+    return looked_up, energy
 
 
 def _answer(problem: PlanarProblem, weight: Array, multiplier: Array) -> Array:

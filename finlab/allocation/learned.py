@@ -9,6 +9,7 @@ model scores the answer afterwards.
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,8 @@ CHUNK = 256
 """Targets that are solved together; keeps memory flat for any number of targets."""
 TOLERANCE = 2e-4
 """Normalized error (by the surrogate) below which an answer counts as exact and energy decides."""
+INSISTENT_STEPS = 25
+"""Levenberg-Marquardt steps for a target that the quick way did not reach."""
 
 
 class LearnedAllocator(Allocator):
@@ -49,8 +52,8 @@ class LearnedAllocator(Allocator):
         gamma: float = 1e-2,
         n_seeds: int = 8,
         n_refined: int = 6,
-        search_steps: int = 6,
-        refine_steps: int = 3,
+        search_steps: int = 5,
+        refine_steps: int = 2,
         subsets: bool = True,
     ) -> None:
         """Make it from a checkpoint.
@@ -100,82 +103,93 @@ class LearnedAllocator(Allocator):
         return Solution(np.concatenate([part.command for part in parts]), np.concatenate(wrench))
 
     def _solve_chunk(self, prepared: Prepared, targets: Array, seed: int, keep: bool) -> Solution:
-        rows = len(targets)
-        target = targets / self.normalization.std
-        centred = target - self.normalization.mean / self.normalization.std
+        rows, n = len(targets), len(prepared.lower)
+        std = self.normalization.std
+        target = targets / std
+        centred = target - self.normalization.mean / std
         proposal = propose(self.network, prepared, centred, target, self.n_candidates, self.temperature, seed)
-        score = proposal.error**2 + self.gamma * command_energy(proposal.command, prepared.upper)
-        chosen = _best_of_each_component(proposal, score, self.n_seeds)
-        seeds = np.take_along_axis(proposal.thrust, chosen[..., None], axis=1)
-        if self.subsets:
-            shared = np.broadcast_to(prepared.subsets, (rows, *prepared.subsets.shape))
-            seeds = np.concatenate([seeds, shared], axis=1)
-        command = self._search(prepared, target, seeds)
-        command, error, energy = self._refine(prepared, target, command)
-        missed = error.min(1) > TOLERANCE
+        command = self._search(prepared, target, self._seeds(prepared, proposal))
+        pool = self._refine(prepared, target, command, self.refine_steps)
+        missed = pool.error.min(1) > TOLERANCE
         if missed.any():
-            command[missed], error[missed], energy[missed] = self._insist(
-                prepared, target[missed], proposal.command[missed], command[missed]
-            )
-        order = np.lexsort((energy, np.where(error > TOLERANCE, error, 0.0)), axis=-1)
-        command = np.take_along_axis(command, order[..., None, None], axis=1)
-        best = np.ascontiguousarray(command[:, 0])
-        wrench = prepared.commands.wrench(best) * self.normalization.std
+            # More steps from more seeds, for the few targets that the quick way did not reach.
+            more = np.concatenate([pool.command[missed], proposal.command[missed, :32].astype(np.float64)], axis=1)
+            insisted = self._refine(prepared, target[missed], more, INSISTENT_STEPS)
+            for kept, new in zip(pool, insisted, strict=True):
+                kept[missed] = new[:, : self.n_refined]
+        best = pool.command[:, 0]
+        wrench = pool.wrench[:, 0] * std
         if not keep:
             return Solution(best, wrench)
-        return Solution(best, wrench, self._candidates(prepared, target, command[0]), self._samples(prepared, proposal))
+        return Solution(
+            best, wrench, lambda: _candidates(pool, std), lambda: _samples(proposal, prepared, std)
+        )
+
+    def _seeds(self, prepared: Prepared, proposal: Proposal) -> Array:
+        """Thrust seeds (N, S, n): the best candidate of each component, and sub-layouts."""
+        score = proposal.error * proposal.error + self.gamma * proposal.energy
+        chosen = _best_of_each_component(proposal.component, score, self.n_seeds)
+        seeds = proposal.thrust[np.arange(len(score))[:, None], chosen].astype(np.float64)
+        if not self.subsets:
+            return seeds
+        shared = np.broadcast_to(prepared.subsets, (len(score), *prepared.subsets.shape))
+        return np.concatenate([seeds, shared], axis=1)
 
     def _search(self, prepared: Prepared, target: Array, thrust: Array) -> Array:
         """Cheapest commands (N, n_refined, n, 3) reached from thrust seeds (N, S, n)."""
         rows, n_seeds, n = thrust.shape
-        planar = force_space.descend(
-            prepared.planar, np.repeat(target, n_seeds, axis=0), thrust.reshape(-1, n), self.search_steps
-        )
-        error = (planar.residual**2).sum(-1)
-        score = (error * 100.0 + self.gamma * force_space.energy(prepared.planar, planar)).reshape(rows, n_seeds)
+        flat = np.repeat(target, n_seeds, axis=0)
+        planar = force_space.descend(prepared.planar, flat, thrust.reshape(-1, n), self.search_steps)
+        command, energy = force_space.realize(prepared.planar, planar)
+        error = np.einsum("ri,ri->r", planar.residual, planar.residual)
+        score = (100.0 * error + self.gamma * energy).reshape(rows, n_seeds)
         kept = np.argsort(score, axis=1)[:, : self.n_refined] + np.arange(rows)[:, None] * n_seeds
-        kept = kept.ravel()
-        best = force_space.Planar(planar.thrust[kept], planar.direction[kept], planar.residual[kept])
-        return force_space.commands(prepared.planar, best).reshape(rows, -1, n, 3)
+        return command[kept]
 
-    def _refine(
-        self, prepared: Prepared, target: Array, command: Array, steps: int | None = None
-    ) -> tuple[Array, Array, Array]:
-        """Refined commands (N, P, n, 3), their normalized errors (N, P) by the surrogate and energies (N, P)."""
+    def _refine(self, prepared: Prepared, target: Array, command: Array, steps: int) -> Pool:
+        """Refined commands (N, P, n, 3), best first: the cheapest exact one, or the most exact one."""
         rows, p, n, _ = command.shape
-        repeated = np.repeat(target, p, axis=0)
-        flat = refine(prepared.commands, repeated, command.reshape(-1, n, 3), steps or self.refine_steps)
-        error = np.linalg.norm(repeated - prepared.commands.wrench(flat), axis=-1)
-        energy = command_energy(flat, prepared.upper)
-        return flat.reshape(rows, p, n, 3), error.reshape(rows, p), energy.reshape(rows, p)
-
-    def _insist(
-        self, prepared: Prepared, target: Array, proposed: Array, command: Array
-    ) -> tuple[Array, Array, Array]:
-        """More steps from more seeds, for the few targets that the quick way did not reach."""
-        more = np.concatenate([command, proposed[:, :32]], axis=1)
-        more, error, energy = self._refine(prepared, target, prepared.commands.clamp(more), 25)
-        best = np.lexsort((energy, np.where(error > TOLERANCE, error, 0.0)), axis=-1)[:, : command.shape[1]]
-        take = np.take_along_axis
-        return take(more, best[..., None, None], axis=1), take(error, best, axis=1), take(energy, best, axis=1)
-
-    def _candidates(self, prepared: Prepared, target: Array, command: Array) -> Candidates:
-        wrench = prepared.commands.wrench(command)
-        error = np.linalg.norm(wrench - target, axis=-1)
-        names = ("refined",) * len(command)
-        energy = command_energy(command, prepared.upper)
-        return Candidates(command, wrench * self.normalization.std, error, energy, names)
-
-    def _samples(self, prepared: Prepared, proposal: Proposal) -> Candidates:
-        order = np.argsort(proposal.error[0])
-        names = tuple(f"mode {k + 1}" for k in proposal.component[0][order])
-        command = proposal.command[0][order]
-        energy = command_energy(command, prepared.upper)
-        wrench = proposal.wrench[0][order] * self.normalization.std
-        return Candidates(command, wrench, proposal.error[0][order], energy, names)
+        refined = refine(prepared.commands, np.repeat(target, p, axis=0), command.reshape(-1, n, 3), steps)
+        energy = command_energy(refined.command, prepared.upper)
+        rank = np.where(refined.error > TOLERANCE, 1e3 + refined.error, energy).reshape(rows, p)
+        order = np.argsort(rank, axis=1) + np.arange(rows)[:, None] * p
+        return Pool(refined.command[order], refined.wrench[order], refined.error[order], energy[order])
 
 
-def _best_of_each_component(proposal: Proposal, score: Array, n_seeds: int) -> NDArray[np.int64]:
+class Pool(NamedTuple):
+    """P refined answers to each of N targets, best first."""
+
+    command: Array
+    """(N, P, n, 3)."""
+    wrench: Array
+    """Normalized wrench (N, P, 6) by the surrogate."""
+    error: Array
+    """Normalized error (N, P) by the surrogate."""
+    energy: Array
+    """(N, P)."""
+
+
+def _candidates(pool: Pool, std: Array) -> Candidates:
+    """The refined answers to a single target."""
+    command, wrench, error, energy = (values[0] for values in pool)
+    return Candidates(command, wrench * std, error, energy, ("refined",) * len(command))
+
+
+def _samples(proposal: Proposal, prepared: Prepared, std: Array) -> Candidates:
+    """The raw candidates for a single target."""
+    order = np.argsort(proposal.error[0])
+    names = tuple(f"mode {k + 1}" for k in proposal.component[0][order])
+    command = proposal.command[0][order].astype(np.float64)
+    return Candidates(
+        np.clip(command, prepared.lower, prepared.upper),
+        proposal.wrench[0][order] * std,
+        proposal.error[0][order].astype(np.float64),
+        proposal.energy[0][order].astype(np.float64),
+        names,
+    )
+
+
+def _best_of_each_component(component: NDArray[np.int64], score: Array, n_seeds: int) -> NDArray[np.int64]:
     """Indices (N, n_seeds) of the best candidates, at most one from each mixture component.
 
     At low temperature the samples of one component lie close together and would all descend to the
@@ -183,9 +197,8 @@ def _best_of_each_component(proposal: Proposal, score: Array, n_seeds: int) -> N
     """
     rows = np.arange(len(score))[:, None]
     worst_first = np.argsort(-score, axis=1)
-    n_components = int(proposal.component.max()) + 1
-    best = np.zeros((len(score), n_components), dtype=np.int64)
+    best = np.zeros((len(score), int(component.max()) + 1), dtype=np.int64)
     # Later assignments win, so the best candidate of each component is what stays.
-    best[rows, proposal.component[rows, worst_first]] = worst_first
+    best[rows, component[rows, worst_first]] = worst_first
     order = np.argsort(score[rows, best], axis=1)[:, :n_seeds]
     return best[rows, order]

@@ -46,7 +46,18 @@ class CommandProblem(NamedTuple):
         return np.minimum(moved, self.upper.astype(kind), out=moved)
 
 
-def refine(problem: CommandProblem, target: Array, command: Array, steps: int, damping: float = 1e-6) -> Array:
+class Refined(NamedTuple):
+    """R refined commands."""
+
+    command: Array
+    """(R, n, 3), inside the limits."""
+    wrench: Array
+    """Normalized wrench (R, 6) by the surrogate."""
+    error: Array
+    """Normalized error (R,) of that wrench."""
+
+
+def refine(problem: CommandProblem, target: Array, command: Array, steps: int, damping: float = 1e-6) -> Refined:
     """Reduce the tracking error of commands (R, n, 3) towards normalized targets (R, 6).
 
     Each step is the smallest change, in units of the limit ranges, that cancels the error to first
@@ -55,47 +66,53 @@ def refine(problem: CommandProblem, target: Array, command: Array, steps: int, d
     """
     rows, n, _ = command.shape
     span = problem.upper - problem.lower
-    flat_columns = problem.columns
-    mu = np.full(rows, damping)
-    best = command
-    best_error = np.full(rows, np.inf)
-    identity = np.eye(6)
+    columns = problem.columns.reshape(3 * n, 6)
+    damping_of = np.full(rows, damping)
+    best: tuple[Array, Array, Array] | None = None  # command, wrench, squared error
     for step in range(steps + 1):
-        if step == steps:
-            error = ((target - problem.wrench(command)) ** 2).sum(-1)
-            return np.where((error < best_error)[:, None, None], command, best)
-        force, slope = problem.fin.force_and_jacobian(command)
-        residual = target - force.reshape(rows, 3 * n) @ flat_columns.reshape(3 * n, 6)
-        error = (residual * residual).sum(-1)
-        worse = error > best_error
-        if worse.any():
-            mu = np.where(worse, mu * 30.0 + 1e-4, mu * 0.3)
-            command = np.where(worse[:, None, None], best, command)
+        if step < steps:
             force, slope = problem.fin.force_and_jacobian(command)
-            residual = target - force.reshape(rows, 3 * n) @ flat_columns.reshape(3 * n, 6)
-            error = (residual * residual).sum(-1)
-        best, best_error = command, error
-        # (R, n, 3 commands, 6): change of the normalized wrench per unit of each limit range.
-        jacobian = np.matmul(np.swapaxes(slope, -1, -2), flat_columns) * span[..., None]
-        scale = _freedom(problem, command)
-        for _ in range(2):
-            scaled = (jacobian * scale[..., None]).reshape(rows, 3 * n, 6)
-            gram = np.swapaxes(scaled, 1, 2) @ scaled
-            gram += (mu[:, None, None] + 1e-9) * identity
-            multiplier = np.linalg.solve(gram, residual[..., None])
-            change = ((scaled @ multiplier)[..., 0]).reshape(rows, n, 3) * scale
+        else:
+            force = problem.fin.force(command)
+        wrench = force.reshape(rows, 3 * n) @ columns
+        residual = target - wrench
+        error = np.einsum("ri,ri->r", residual, residual)
+        if best is not None:
+            worse = error > best[2]
+            if worse.any():
+                command = np.where(worse[:, None, None], best[0], command)
+                wrench = np.where(worse[:, None], best[1], wrench)
+                error = np.where(worse, best[2], error)
+                residual = target - wrench
+                damping_of = np.where(worse, damping_of * 30.0 + 1e-4, damping_of * 0.3)
+                if step < steps:
+                    force, slope = problem.fin.force_and_jacobian(command)
+        best = (command, wrench, error)
+        if step < steps:
+            # (R, n, 3 commands, 6): change of the normalized wrench per unit of each limit range.
+            jacobian = np.matmul(slope.swapaxes(-1, -2), problem.columns)
+            jacobian *= span[..., None]
+            command = problem.clamp(command + _step(problem, command, jacobian, residual, damping_of) * span)
+    assert best is not None
+    return Refined(best[0], best[1], np.sqrt(best[2]))
+
+
+def _step(problem: CommandProblem, command: Array, jacobian: Array, residual: Array, damping: Array) -> Array:
+    """Damped smallest change (R, n, 3), in units of the limit ranges, that leaves no limit."""
+    rows, n, _ = command.shape
+    free = jacobian.reshape(rows, 3 * n, 6)
+    for attempt in range(2):
+        gram = free.swapaxes(1, 2) @ free
+        gram.reshape(rows, 36)[:, ::7] += (damping + 1e-9)[:, None]
+        multiplier = np.linalg.solve(gram, residual[..., None])
+        change = (free @ multiplier).reshape(rows, n, 3)
+        if attempt == 0:
             # Hold what is at a limit and wants out, then solve again with the rest.
             out = _leaves(problem, command, change)
             if not out.any():
                 break
-            scale = np.where(out, 0.0, scale)
-        command = problem.clamp(command + change * span)
-    return best
-
-
-def _freedom(problem: CommandProblem, command: Array) -> Array:
-    """1 for every command that may move (R, n, 3); 0 for those with a zero-width range."""
-    return np.broadcast_to((problem.upper > problem.lower).astype(np.float64), command.shape)
+            free = np.where(out.reshape(rows, 3 * n, 1), 0.0, free)
+    return change
 
 
 def _leaves(problem: CommandProblem, command: Array, change: Array) -> NDArray[np.bool_]:

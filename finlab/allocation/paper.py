@@ -67,7 +67,7 @@ class PaperAllocator(Allocator):
         for value, known, key in ((warm_start, ("mdn", "random"), "warm_start"), (ranking, ("physics", "nll"), "ranking")):
             if value not in known:
                 raise AllocationError(f"{key}: expected one of {', '.join(known)}, got {value!r}")
-        self.checkpoint = checkpoint.name
+        self.checkpoint, self.trained = checkpoint.name, checkpoint
         self.normalization = checkpoint.normalization
         self.network, self.surrogate = checkpoint.network, checkpoint.surrogate
         self.n_candidates, self.temperature, self.gamma = n_candidates, temperature, gamma
@@ -116,8 +116,10 @@ class PaperAllocator(Allocator):
         solution = Solution(answer[:, 0], wrench.numpy().astype(np.float64))
         if not keep:
             return solution
-        refined = self._candidates(robot, chosen, target, "refined")
-        return solution._replace(candidates=refined, samples=self._candidates(robot, command, target, "sample"))
+        return solution._replace(
+            candidates=lambda: self._candidates(robot, chosen, target, "refined"),
+            samples=lambda: self._candidates(robot, command, target, "sample"),
+        )
 
     def _predict(self, robot: _Robot, target: Tensor) -> Mixture:
         layout = (robot.position, robot.angle, robot.lower[None], robot.upper[None])

@@ -63,6 +63,7 @@ def prepare(layout: Layout, fin: LearnedFin, std: Array) -> Prepared:
         middle=0.5 * (lower[:, 2] + upper[:, 2]),
         half=half,
         direction_cost=cost,
+        idle_direction=np.clip(0.0, lower[:, 2], upper[:, 2]),
         turns_fully=bool((arc >= FULL_TURN).all()),
     )
     return Prepared(

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.allocation.energy import command_energy
 from finlab.allocation.numpy_network import MixtureArrays, NumpyNetwork
 from finlab.allocation.prepared import Prepared
 from finlab.data.features import fin_frame_features
@@ -27,6 +28,8 @@ class Proposal(NamedTuple):
     """Normalized error (N, K) by the surrogate."""
     thrust: Array
     """Planar force of each fin (N, K, n) [N] by the surrogate."""
+    energy: Array
+    """Energy proxy (N, K)."""
 
 
 def predict(network: NumpyNetwork, prepared: Prepared, centred: Array) -> MixtureArrays:
@@ -95,4 +98,4 @@ def propose(
     missing = wrench - target[:, None]
     error = np.sqrt(np.einsum("rki,rki->rk", missing, missing))
     thrust = np.sqrt(force[..., 1] ** 2 + force[..., 2] ** 2)
-    return Proposal(command, component, wrench, error, thrust)
+    return Proposal(command, component, wrench, error, thrust, command_energy(command, upper))
