@@ -1,0 +1,70 @@
+"""Random robots and networks of both kinds, small enough to run in milliseconds."""
+
+import math
+from typing import NamedTuple
+
+import pytest
+import torch
+from torch import Tensor
+
+from finlab.data.features import SIZES, fin_frame_features, geometry, raw_features
+from finlab.data.sampling import sample_layouts, seeded_generator
+from finlab.model.allocator_network import AllocatorNetwork, NetworkConfig
+
+STD = torch.tensor([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
+
+
+class Robots(NamedTuple):
+    """B robots padded to n fins, with a normalized target each."""
+
+    position: Tensor
+    mounting_angle: Tensor
+    lower: Tensor
+    upper: Tensor
+    mask: Tensor
+    target: Tensor
+
+    def take(self, batch: slice, fins: Tensor | slice) -> "Robots":
+        """Some robots, with some fins in some order."""
+        per_fin = [tensor[batch][:, fins] for tensor in self[:5]]
+        return Robots(*per_fin, self.target[batch])
+
+    def features(self, kind: str) -> Tensor:
+        """Node features (B, n, F)."""
+        layout = (self.position, self.mounting_angle, self.lower, self.upper)
+        if kind == "raw":
+            return raw_features(*layout)
+        return fin_frame_features(geometry(*layout, STD, self.mask), self.target)
+
+
+@pytest.fixture
+def robots() -> Robots:
+    """12 robots of 2-5 fins, half of them with limits of their own; every count comes up."""
+    generator = seeded_generator(5, 0)
+    layouts = sample_layouts(generator, 12, (2, 5), varied_limits=0.5)
+    robots = Robots(*layouts, torch.randn(12, 6, generator=generator))
+    assert set(robots.mask.sum(1).tolist()) == {2, 3, 4, 5}
+    arcs = robots.upper[..., 2] - robots.lower[..., 2] < 2 * math.pi - 0.1
+    assert arcs.any() and not arcs.all()
+    return robots
+
+
+@pytest.fixture(params=["joint", "per_fin"])
+def network(request: pytest.FixtureRequest) -> AllocatorNetwork:
+    """Our kind of network (fin-frame features, joint mixture) and the paper's (raw ones, per fin)."""
+    joint = request.param == "joint"
+    config = NetworkConfig(
+        features="fin_frame" if joint else "raw",
+        joint=joint,
+        width=32,
+        heads=2,
+        transformer_layers=2,
+        feedforward=48,
+        n_components=5,
+    )
+    torch.manual_seed(1)
+    network = AllocatorNetwork(config, SIZES[config.features]).eval()
+    # Fresh biases and normalizations are zeros and ones, which would hide one that is misplaced.
+    for parameter in network.parameters():
+        torch.nn.init.normal_(parameter, std=0.3)
+    return network.requires_grad_(False)

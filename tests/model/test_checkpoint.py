@@ -1,0 +1,224 @@
+"""Checkpoints: what is saved comes back, and everything that is not one is refused with a sentence."""
+
+import json
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from safetensors.torch import load_file, save_file
+
+from finlab.allocation import load_allocator
+from finlab.errors import CheckpointError
+from finlab.model.checkpoint import (
+    Checkpoint,
+    file_sha256,
+    load_allocator_checkpoint,
+    load_checkpoint,
+    load_normalization,
+    resolve_checkpoint,
+    save_checkpoint,
+)
+
+Config = dict[str, Any]
+
+
+@pytest.fixture
+def folder(untrained_checkpoint: Path, tmp_path: Path) -> Path:
+    """A whole checkpoint that a test may spoil."""
+    return Path(shutil.copytree(untrained_checkpoint, tmp_path / "mine"))
+
+
+def change_config(folder: Path, change: Callable[[Config], object]) -> None:
+    path = folder / "config.json"
+    config = json.loads(path.read_text())
+    change(config)
+    path.write_text(json.dumps(config))
+
+
+def sign(folder: Path) -> None:
+    """Write the right SHA-256 of the weights, as someone would who builds checkpoints by other means."""
+    change_config(folder, lambda config: config.update(sha256=file_sha256(folder / "model.safetensors")))
+
+
+def change_weights(folder: Path, change: Callable[[dict[str, torch.Tensor]], object]) -> None:
+    path = folder / "model.safetensors"
+    tensors = load_file(path)
+    change(tensors)
+    save_file(tensors, path)
+    sign(folder)
+
+
+def refusal(folder: Path, load: Callable[[Path], Checkpoint] = load_checkpoint) -> str:
+    """The sentence with which a folder is refused."""
+    with pytest.raises(CheckpointError) as caught:
+        load(folder)
+    message = str(caught.value)
+    assert "\n" not in message and folder.name in message
+    return message
+
+
+def test_round_trip(untrained_checkpoint: Path, tmp_path: Path) -> None:
+    first = load_checkpoint(untrained_checkpoint)
+    first.metrics, first.training = {"surrogate": {"error": 0.25}}, {"seed": 7}
+    save_checkpoint(tmp_path / "again", first)
+    second = load_checkpoint(tmp_path / "again")
+    assert second.name == "again"
+    for name in ("preset", "training", "metrics", "fin_model", "sha256"):
+        assert getattr(second, name) == getattr(first, name), name
+    np.testing.assert_array_equal(np.array(second.normalization), np.array(first.normalization))
+    assert second.network is not None and first.network is not None
+    assert second.network.config == first.network.config
+    assert second.surrogate.config == first.surrogate.config
+    for ours, theirs in ((second.network, first.network), (second.surrogate, first.surrogate)):
+        for (name, got), (_, expected) in zip(
+            ours.state_dict().items(), theirs.state_dict().items(), strict=True
+        ):
+            assert torch.equal(got, expected), name
+
+
+def test_what_is_loaded_is_frozen(untrained_checkpoint: Path) -> None:
+    checkpoint = load_checkpoint(untrained_checkpoint)
+    assert checkpoint.network is not None
+    for module in (checkpoint.network, checkpoint.surrogate):
+        assert not module.training
+        assert not any(parameter.requires_grad for parameter in module.parameters())
+
+
+def test_the_files_are_safetensors_and_json_with_all_that_the_format_promises(folder: Path) -> None:
+    assert {path.name for path in folder.iterdir()} == {"model.safetensors", "config.json"}
+    config = json.loads((folder / "config.json").read_text())
+    promised = {"format", "version", "preset", "sha256", "fin_model", "normalization", "surrogate", "network"}
+    assert promised | {"training", "metrics"} == set(config)
+    assert config["sha256"] == file_sha256(folder / "model.safetensors")
+    prefixes = {name.split(".")[0] for name in load_file(folder / "model.safetensors")}
+    assert prefixes == {"surrogate", "network"}
+
+
+def test_refuses_a_missing_folder(tmp_path: Path) -> None:
+    assert re.search(
+        r"nowhere/config\.json: no such file; a checkpoint folder holds", refusal(tmp_path / "nowhere")
+    )
+
+
+def test_refuses_missing_weights(folder: Path) -> None:
+    (folder / "model.safetensors").unlink()
+    assert "model.safetensors: no such file; a checkpoint folder holds" in refusal(folder)
+
+
+@pytest.mark.parametrize("kept", [0, 100, -1])
+def test_refuses_a_cut_file(folder: Path, kept: int) -> None:
+    path = folder / "model.safetensors"
+    path.write_bytes(path.read_bytes()[:kept])
+    assert "its SHA-256 is not the one in config.json; the file was changed or cut off" in refusal(folder)
+
+
+def test_refuses_one_changed_bit(folder: Path) -> None:
+    path = folder / "model.safetensors"
+    content = bytearray(path.read_bytes())
+    content[-1] ^= 1
+    path.write_bytes(content)
+    assert "its SHA-256 is not the one in config.json" in refusal(folder)
+
+
+def test_refuses_weights_of_another_format_even_when_signed(folder: Path) -> None:
+    torch.save({"network": torch.zeros(3)}, folder / "model.safetensors")
+    sign(folder)
+    assert "config.json and model.safetensors do not fit together" in refusal(folder)
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (b"", "not readable as JSON"),
+        (b'{"format": "finlab-checkpoint",', "not readable as JSON"),
+        (b"\xff\xfe\x00", "not readable as JSON"),
+        (b"[]", "not a finlab checkpoint (expected format 'finlab-checkpoint')"),
+        (b'{"model_type": "bert"}', "not a finlab checkpoint (expected format 'finlab-checkpoint')"),
+        (b'"' + b"x" * 1_000_001 + b'"', "bytes; this is not a checkpoint's configuration"),
+    ],
+    ids=["empty", "cut", "binary", "list", "foreign", "huge"],
+)
+def test_refuses_a_configuration_that_is_none(folder: Path, content: bytes, sentence: str) -> None:
+    (folder / "config.json").write_bytes(content)
+    assert sentence in refusal(folder)
+
+
+@pytest.mark.parametrize("version", [0, 2, "1", None])
+def test_refuses_another_version_and_says_what_to_do(folder: Path, version: object) -> None:
+    change_config(folder, lambda config: config.update(version=version))
+    message = refusal(folder)
+    assert f"checkpoint version {version!r}, this finlab reads version 1" in message
+    assert "use the finlab that made it, or train again" in message
+
+
+@pytest.mark.parametrize("key", ["surrogate", "network", "normalization", "fin_model", "training", "metrics"])
+def test_refuses_a_missing_key_and_names_it(folder: Path, key: str) -> None:
+    change_config(folder, lambda config: config.pop(key))
+    assert f"do not fit together ('{key}')" in refusal(folder)
+
+
+@pytest.mark.parametrize("key", ["network.head.bias", "surrogate.net.0.weight"])
+def test_refuses_missing_tensors(folder: Path, key: str) -> None:
+    change_weights(folder, lambda tensors: tensors.pop(key))
+    assert "config.json and model.safetensors do not fit together" in refusal(folder)
+
+
+def test_refuses_tensors_nobody_asked_for(folder: Path) -> None:
+    change_weights(folder, lambda tensors: tensors.update({"network.extra": torch.zeros(2)}))
+    assert "do not fit together" in refusal(folder)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda config: config["network"].update(width=64),
+        lambda config: config["network"].update(heads=3),
+        lambda config: config["network"].update(features="magic"),
+        lambda config: config["network"].update(dropout=0.1),
+        lambda config: config["surrogate"].update(kind="magic"),
+        lambda config: config["surrogate"].update(hidden=[8]),
+        lambda config: config["normalization"].update(std=[1, 1, 1]),
+        lambda config: config["normalization"].update(std=[1, 1, 0, 1, 1, 1]),
+        lambda config: config["normalization"].update(mean=[0, 0, 0, 0, 0, float("nan")]),
+        lambda config: config.update(network=[]),
+    ],
+)
+def test_refuses_sizes_and_statistics_that_cannot_be(
+    folder: Path, change: Callable[[Config], object]
+) -> None:
+    change_config(folder, change)
+    assert "config.json and model.safetensors do not fit together" in refusal(folder)
+
+
+def test_a_surrogate_alone_loads_but_cannot_allocate(folder: Path) -> None:
+    whole = load_checkpoint(folder)
+    whole.network = None
+    save_checkpoint(folder, whole)
+    assert load_checkpoint(folder).network is None
+    message = refusal(folder, load_allocator_checkpoint)
+    assert "holds a surrogate only; train the allocator with `finlab train allocator`" in message
+    with pytest.raises(CheckpointError, match="holds a surrogate only"):
+        load_allocator(folder)
+
+
+def test_normalization_alone_is_read_without_the_weights(folder: Path) -> None:
+    expected = load_checkpoint(folder).normalization
+    (folder / "model.safetensors").unlink()
+    np.testing.assert_array_equal(load_normalization(folder).std, expected.std)
+    change_config(folder, lambda config: config["normalization"].pop("std"))
+    with pytest.raises(CheckpointError, match="normalization is missing or malformed"):
+        load_normalization(folder)
+
+
+def test_names_and_folders_are_told_apart(folder: Path) -> None:
+    assert resolve_checkpoint(folder) == folder
+    assert resolve_checkpoint("default").name == "default"
+    with pytest.raises(CheckpointError, match="'magic' is not among the shipped ones"):
+        resolve_checkpoint("magic")
+    with pytest.raises(CheckpointError, match=r"away/from/home: no such checkpoint folder"):
+        resolve_checkpoint("away/from/home")
