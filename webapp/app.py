@@ -1,6 +1,7 @@
 """The server: one `View` for each browser that connects, and the clock that lets the fins flap."""
 
 import asyncio
+import contextlib
 import json
 import signal
 import socket
@@ -69,7 +70,7 @@ class App:
     def _connected(self, client: viser.ClientHandle) -> None:
         # Plain `def`: viser runs it on a thread of its pool, where waiting for the page is allowed.
         try:
-            remembered = _session_keys(client.local_storage.get_item(STORAGE_KEY, timeout=5.0))
+            remembered = _session_keys(_stored(client, attempts=20))
         except (RuntimeError, TimeoutError):  # gone already, or a browser that forbids storage
             remembered = []
         for client_id, key in list(self._keys.items()):
@@ -112,10 +113,18 @@ class App:
 def _answers(client: viser.ClientHandle) -> bool:
     """Whether a page is still there. Waits for it, so not to be called on the event loop."""
     try:
-        client.local_storage.get_item(STORAGE_KEY, timeout=2.0)
+        _stored(client, attempts=2)
     except (RuntimeError, TimeoutError):
         return False
     return True
+
+
+def _stored(client: viser.ClientHandle, attempts: int) -> str | None:
+    """What the browser keeps for us; a page that is just reconnecting may drop the question, so ask again."""
+    for _ in range(attempts - 1):
+        with contextlib.suppress(TimeoutError):
+            return client.local_storage.get_item(STORAGE_KEY, timeout=1.0)
+    return client.local_storage.get_item(STORAGE_KEY, timeout=1.0)
 
 
 def serve(
