@@ -115,10 +115,11 @@ def train(
                 log.write(step, (step + 1) * settings.batch_size, seconds, learning_rate(settings, step), values)
                 bar.set_postfix_str(f"loss {values['loss']:.4g}, {rate / 1e3:.1f} k samples/s")
         if first and (time.monotonic() - saved > settings.save_every_s or step == end - 1):
-            save_state(folder, step + 1, model, optimizer, average, identity)
-            saved = time.monotonic()
+            # The state comes last: a run killed in between repeats a few steps and ships them after all.
             if on_save is not None:
                 on_save(average or _weights(model), step + 1)
+            save_state(folder, step + 1, model, optimizer, average, identity)
+            saved = time.monotonic()
     bar.close()
     if log is not None:
         log.close()

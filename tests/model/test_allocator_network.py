@@ -10,13 +10,13 @@ from finlab.model.allocator_network import AllocatorNetwork
 from finlab.model.mixture import LOG_STD_RANGE, Mixture
 
 
-def predict(network: AllocatorNetwork, robots, mask: Tensor | None) -> Mixture:  # type: ignore[no-untyped-def]
+def predict(network: AllocatorNetwork, robots, mask: Tensor | None) -> Mixture:
     """The mixture for robots of tests/model/conftest.py."""
     x = robots.features(network.config.features)
     return network(x, robots.target, robots.lower, robots.upper, mask)
 
 
-def test_padding_does_not_leak(network, robots) -> None:  # type: ignore[no-untyped-def]
+def test_padding_does_not_leak(network, robots) -> None:
     padded = predict(network, robots, robots.mask)
     for row, n in enumerate(robots.mask.sum(1).tolist()):
         one = predict(network, robots.take(slice(row, row + 1), slice(n)), None)
@@ -26,7 +26,7 @@ def test_padding_does_not_leak(network, robots) -> None:  # type: ignore[no-unty
         torch.testing.assert_close(got, one.logits[0], atol=1e-5, rtol=1e-5)
 
 
-def test_what_stands_in_padded_rows_does_not_matter(network, robots) -> None:  # type: ignore[no-untyped-def]
+def test_what_stands_in_padded_rows_does_not_matter(network, robots) -> None:
     x = robots.features(network.config.features)
     limits = (robots.lower, robots.upper, robots.mask)
     clean = network(x, robots.target, *limits)
@@ -39,7 +39,7 @@ def test_what_stands_in_padded_rows_does_not_matter(network, robots) -> None:  #
         )
 
 
-def test_fins_may_come_in_any_order(network, robots) -> None:  # type: ignore[no-untyped-def]
+def test_fins_may_come_in_any_order(network, robots) -> None:
     order = torch.tensor([3, 0, 4, 1, 2])
     straight = predict(network, robots, robots.mask)
     shuffled = robots.take(slice(None), order)
@@ -54,7 +54,7 @@ def test_fins_may_come_in_any_order(network, robots) -> None:  # type: ignore[no
         torch.testing.assert_close(turned.logits[seen], expected_logits[seen], atol=1e-5, rtol=1e-5)
 
 
-def test_the_answer_depends_on_target_and_layout(network, robots) -> None:  # type: ignore[no-untyped-def]
+def test_the_answer_depends_on_target_and_layout(network, robots) -> None:
     base = predict(network, robots, robots.mask).mean
     other_target = predict(network, robots._replace(target=robots.target.flip(1)), robots.mask).mean
     other_layout = predict(network, robots._replace(position=-robots.position), robots.mask).mean
@@ -62,7 +62,7 @@ def test_the_answer_depends_on_target_and_layout(network, robots) -> None:  # ty
     assert (base - other_layout)[robots.mask].abs().mean() > 1e-3
 
 
-def test_shapes_and_spread_are_what_the_configuration_says(network, robots) -> None:  # type: ignore[no-untyped-def]
+def test_shapes_and_spread_are_what_the_configuration_says(network, robots) -> None:
     mixture = predict(network, robots, robots.mask)
     assert mixture.joint == network.config.joint
     assert mixture.logits.shape == ((12, 5) if mixture.joint else (12, 5, 5))
@@ -71,7 +71,7 @@ def test_shapes_and_spread_are_what_the_configuration_says(network, robots) -> N
 
 
 @pytest.mark.parametrize("network", ["joint"], indirect=True)
-def test_joint_means_keep_every_limit(network, robots) -> None:  # type: ignore[no-untyped-def]
+def test_joint_means_keep_every_limit(network, robots) -> None:
     mixture = predict(network, robots, robots.mask)
     assert mixture.mean[robots.mask].abs().max() <= 1.0 + 1e-6
     arcs = robots.upper[..., 2] - robots.lower[..., 2] < 2 * math.pi - 1e-3
@@ -89,7 +89,7 @@ def test_zero_direction_of_an_arc_is_the_nearest_in_it_and_passes_the_gradient()
     assert (gradient[0, 0].norm(dim=-1) > 0.1).all()
 
 
-def test_attention_of_the_first_layer_is_a_distribution_over_real_fins(network, robots) -> None:  # type: ignore[no-untyped-def]
+def test_attention_of_the_first_layer_is_a_distribution_over_real_fins(network, robots) -> None:
     weight = network.attention(robots.features(network.config.features), robots.mask)
     assert weight.shape == (12, 5, 5)
     torch.testing.assert_close(weight.sum(-1), torch.ones(12, 5))
