@@ -20,6 +20,7 @@ from webapp.session import Display, Session
 from webapp.solver import Solver
 from webapp.state import State
 from webapp.store import SessionStore
+from webapp.targets import FIRST
 from webapp.view import View
 from webapp.viser_internals import disable_sharing, start_server, stop_server
 from webapp.worker import Worker
@@ -144,7 +145,8 @@ def serve(
     first = _first_layout(layout or FIRST_LAYOUT)
     _check_port(host, port)
     solver = Solver(checkpoint)
-    solver.allocator(State(first))  # a missing checkpoint is reported now, not in the browser
+    # A missing checkpoint is reported now, not in the browser; and the first page finds a warm solver.
+    _ = solver.solve(State(first, target=FIRST)).samples
     server = start_server(host, port)
     app = App(server, solver, first)
     try:

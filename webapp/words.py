@@ -87,28 +87,35 @@ def mode_names(candidates: Candidates) -> list[str]:
 
 
 def _mode_name(command: NDArray[np.float64], best: NDArray[np.float64]) -> str:
-    push = np.nan_to_num(np.sin(command[:, 0]) ** 2 * command[:, 1] ** 2)
-    resting = [
-        str(i + 1) for i in range(len(push)) if push[i] < 0.15 * push.max() and np.isfinite(command[i, 0])
-    ]
+    resting, resting_in_best = _resting(command), _resting(best)
     turned = [
         str(i + 1)
-        for i in range(len(push))
-        if str(i + 1) not in resting and np.cos(command[i, 2] - best[i, 2]) < 0.0
+        for i in range(len(command))
+        if i not in resting and i not in resting_in_best and np.cos(command[i, 2] - best[i, 2]) < 0.0
     ]
     parts = []
     if resting:
-        parts.append(f"fin {resting[0]} rests" if len(resting) == 1 else f"fins {listed(resting)} rest")
+        rests = "rests" if len(resting) == 1 else "rest"
+        parts.append(f"fin{'s' if len(resting) > 1 else ''} {listed([str(i + 1) for i in resting])} {rests}")
     if turned:
         parts.append(f"fin{'s' if len(turned) > 1 else ''} {listed(turned)} reversed")
-    return ", ".join(parts) or _style(command, best)
+    if resting == resting_in_best and not turned and (style := _style(command, best)):
+        parts.append(style)
+    return ", ".join(parts) or "all fins push"
+
+
+def _resting(command: NDArray[np.float64]) -> list[int]:
+    """Working fins that push next to nothing beside the strongest one; the thrust goes with sin^2(A) f^2."""
+    push = np.sin(command[:, 0]) ** 2 * command[:, 1] ** 2
+    return [i for i in range(len(push)) if push[i] < 0.15 * np.nanmax(push)]
 
 
 def _style(command: NDArray[np.float64], best: NDArray[np.float64]) -> str:
-    """How the fin that differs most from the best candidate beats: wide and slow, or narrow and quick."""
+    """How the fin that differs most from the best candidate beats: wide and slow, or narrow and quick;
+    nothing if there is no telling them apart."""
     with np.errstate(invalid="ignore"):
         wider = np.nan_to_num(np.log(command[:, 0] / best[:, 0]) - np.log(command[:, 1] / best[:, 1]))
     fin = int(np.argmax(np.abs(wider)))
     if abs(wider[fin]) < 0.1:
-        return "all fins push"
+        return ""
     return f"fin {fin + 1} {'wider and slower' if wider[fin] > 0 else 'narrower and quicker'}"
