@@ -2,10 +2,16 @@
 
 import itertools
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+from finlab.allocation.learned import LearnedAllocator
+from finlab.allocation.learned_fin import LearnedFin
+from finlab.model.checkpoint import Checkpoint, load_allocator_checkpoint, resolve_checkpoint
+from finlab.model.surrogate import FORCE_UNIT, CoefficientSurrogate, Surrogate
 
 
 @pytest.fixture
@@ -22,3 +28,32 @@ def force_table(tmp_path: Path) -> str:
     path = tmp_path / "forces.csv"
     path.write_text("\n".join(rows) + "\n")
     return str(path)
+
+
+@pytest.fixture(scope="session")
+def default_checkpoint() -> Checkpoint:
+    """The shipped checkpoint `default`."""
+    return load_allocator_checkpoint(resolve_checkpoint("default"))
+
+
+@pytest.fixture(scope="session")
+def learned(default_checkpoint: Checkpoint) -> LearnedAllocator:
+    """The product's default method with the shipped checkpoint."""
+    return LearnedAllocator(default_checkpoint)
+
+
+@pytest.fixture(scope="session")
+def learned_fin(default_checkpoint: Checkpoint) -> LearnedFin:
+    """The shipped surrogate, in numpy."""
+    return make_fin(default_checkpoint.surrogate)
+
+
+@pytest.fixture
+def fin_of() -> Callable[[CoefficientSurrogate], LearnedFin]:
+    """Takes over a surrogate into numpy."""
+    return make_fin
+
+
+def make_fin(surrogate: Surrogate) -> LearnedFin:
+    weights = {key: value.numpy() for key, value in surrogate.state_dict().items()}
+    return LearnedFin(weights, CoefficientSurrogate.REFERENCE, FORCE_UNIT)
