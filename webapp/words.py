@@ -115,6 +115,7 @@ def _style(command: NDArray[np.float64], best: NDArray[np.float64]) -> str:
     nothing if there is no telling them apart."""
     with np.errstate(invalid="ignore"):
         wider = np.nan_to_num(np.log(command[:, 0] / best[:, 0]) - np.log(command[:, 1] / best[:, 1]))
+    wider[_resting(command)] = 0.0  # how a fin rests is no news
     fin = int(np.argmax(np.abs(wider)))
     if abs(wider[fin]) < 0.1:
         return ""
