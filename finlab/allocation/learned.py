@@ -34,8 +34,9 @@ CHUNK = 256
 """Targets that are solved together; keeps memory flat for any number of targets."""
 TOLERANCE = 2e-4
 """Normalized error (by the surrogate) below which an answer counts as exact and energy decides."""
-INSISTENT_STEPS = 25
-"""Levenberg-Marquardt steps for a target that the quick way did not reach."""
+PATIENCE = ((5, 0), (25, 32))
+"""For the few targets that the quick way did not reach: Levenberg-Marquardt steps, and how many of the
+network's raw candidates join, in stages."""
 
 
 class LearnedAllocator(Allocator):
@@ -50,10 +51,10 @@ class LearnedAllocator(Allocator):
         n_candidates: int = 64,
         temperature: float = 0.02,
         gamma: float = 1e-2,
-        n_seeds: int = 8,
+        n_seeds: int = 6,
         n_refined: int = 6,
-        search_steps: int = 5,
-        refine_steps: int = 2,
+        search_steps: int = 4,
+        refine_steps: int = 1,
         subsets: bool = True,
     ) -> None:
         """Make it from a checkpoint.
@@ -110,13 +111,14 @@ class LearnedAllocator(Allocator):
         proposal = propose(self.network, prepared, centred, target, self.n_candidates, self.temperature, seed)
         command = self._search(prepared, target, self._seeds(prepared, proposal))
         pool = self._refine(prepared, target, command, self.refine_steps)
-        missed = pool.error.min(1) > TOLERANCE
-        if missed.any():
-            # More steps from more seeds, for the few targets that the quick way did not reach.
-            more = np.concatenate([pool.command[missed], proposal.command[missed, :32].astype(np.float64)], axis=1)
-            insisted = self._refine(prepared, target[missed], more, INSISTENT_STEPS)
-            for kept, new in zip(pool, insisted, strict=True):
-                kept[missed] = new[:, : self.n_refined]
+        for steps, extra in PATIENCE:
+            missed = pool.error[:, 0] > TOLERANCE
+            if not missed.any():
+                break
+            more = np.concatenate([pool.command[missed], proposal.command[missed, :extra].astype(np.float64)], axis=1)
+            longer = self._refine(prepared, target[missed], more, steps)
+            for kept, new in zip(pool, longer, strict=True):
+                kept[missed] = new[:, : kept.shape[1]]
         best = pool.command[:, 0]
         wrench = pool.wrench[:, 0] * std
         if not keep:

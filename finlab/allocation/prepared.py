@@ -77,13 +77,13 @@ def prepare(layout: Layout, fin: LearnedFin, std: Array) -> Prepared:
 
 
 def _subset_seeds(maximum: Array) -> Array:
-    """Seeds that let one or two fins rest; sub-layouts of fewer than two working fins are no use.
+    """Seeds that let no, one or two fins rest while at least three work.
 
     The energy is concave in a fin's force, so the cheapest allocation often rests some fins, which a
-    local search from the whole layout may miss.
+    local search from the whole layout may miss. Two fins alone rarely span a wrench.
     """
     n = len(maximum)
-    resting = [c for k in range(0, min(3, n - 1)) for c in combinations(range(n), k)][:MAX_SUBSETS]
+    resting = [c for k in range(min(2, max(n - 3, 0)) + 1) for c in combinations(range(n), k)][:MAX_SUBSETS]
     seeds = np.tile(maximum, (len(resting), 1))
     for row, fins in enumerate(resting):
         seeds[row, list(fins)] *= 1e-3

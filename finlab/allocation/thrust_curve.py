@@ -8,7 +8,6 @@ one planar force per fin, in which the wrench is linear.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +17,9 @@ from finlab.allocation.learned_fin import LearnedFin
 
 Array = NDArray[np.float64]
 
-KNOTS = 96
+KNOTS = 128
 """Thrust levels per curve, evenly spaced in the fourth root of thrust, in which both commands are
 nearly straight lines."""
-_AMPLITUDES = 161
-"""Amplitudes that are tried for each thrust level."""
 
 
 @dataclass(frozen=True)
@@ -47,44 +44,41 @@ class ThrustCurves:
 
 
 def thrust_curves(fin: LearnedFin, lower: Array, upper: Array) -> ThrustCurves:
-    """Curves of fins with limits (n, 3)."""
-    curves = [_curve(fin, tuple(lo), tuple(hi)) for lo, hi in zip(lower.tolist(), upper.tolist(), strict=True)]
-    return ThrustCurves(
-        np.array([c[0] for c in curves]), np.array([c[1] for c in curves]), np.stack([c[2] for c in curves])
-    )
+    """Curves of fins with limits (n, 3).
 
-
-@lru_cache(maxsize=4096)
-def _curve(
-    fin: LearnedFin, lower: tuple[float, float, float], upper: tuple[float, float, float]
-) -> tuple[float, float, Array]:
-    """Smallest and largest thrust, and the table (KNOTS, 3), of one set of limits."""
-    direction = min(max(0.0, lower[2]), upper[2])
-
-    def thrust(amplitude: Array, frequency: Array) -> Array:
-        command = np.stack(np.broadcast_arrays(amplitude, frequency, direction), axis=-1).astype(np.float64)
-        return np.linalg.norm(fin.force(command)[..., 1:], axis=-1)
-
-    ends = thrust(np.array([lower[0], upper[0]]), np.array([lower[1], upper[1]]))
-    low, high = float(ends[0]), float(max(ends[1], ends[0]))
-    level = low + (high - low) * np.linspace(0.0, 1.0, KNOTS) ** 4
-    # Thrust is nearly (A f)^2 times a constant: two fixed-point steps find the frequency of a thrust.
-    amplitude = np.linspace(lower[0], upper[0], _AMPLITUDES)[:, None]
-    frequency = np.broadcast_to(np.array(upper[1]), (_AMPLITUDES, KNOTS))
-    for _ in range(3):
-        frequency = frequency * np.sqrt(level / np.maximum(thrust(amplitude, frequency), 1e-12))
-    slack = 1e-6 + 1e-4 * (upper[1] - lower[1])
-    possible = (frequency >= lower[1] - slack) & (frequency <= upper[1] + slack)
-    scale = energy_scale(np.array(upper))
-    a, f = amplitude / scale[0], frequency / scale[1]
+    Least energy for a thrust means that the gradients of energy and thrust by (amplitude, frequency)
+    are parallel. With normalized a and g and thrust elasticities alpha = dlnT/dlna, beta = dlnT/dlng
+    this is (2 w_a a + w g) a / ((2 w_g g + w a) g) = alpha / beta: a quadratic for the ratio g / a.
+    Thrust is nearly (a g)^2, so the elasticities hardly vary along the way and two sweeps settle them.
+    Where the ray of that ratio leaves the limits, the best point is the ray clipped to them.
+    """
+    scale = energy_scale(upper)
+    direction = np.clip(0.0, lower[:, 2], upper[:, 2])[:, None]
     w = DEFAULT_WEIGHTS
-    cost = np.where(possible, w.amplitude * a * a + w.frequency * f * f + w.product * a * f, np.inf)
-    # At the ends of the range no sampled amplitude may be possible; the nearest frequency serves.
-    gap = np.maximum(lower[1] - frequency, frequency - upper[1])
-    cost = np.where(possible.any(0), cost, 1e3 + gap)
-    best = cost.argmin(0)
-    chosen = np.stack([amplitude[best, 0], np.clip(frequency[best, np.arange(KNOTS)], lower[1], upper[1])], axis=-1)
-    a, f = chosen[:, 0] / scale[0], chosen[:, 1] / scale[1]
+    ratio = np.ones((len(lower), KNOTS))
+    for sweep in range(3):
+        # s runs along the ray until both commands are at their upper limits.
+        last = np.maximum(upper[:, 0] / scale[:, 0], upper[:, 1] / (scale[:, 1] * ratio.min(1)))
+        s = np.linspace(0.0, 1.0, KNOTS) * last[:, None]
+        amplitude = np.clip(s * scale[:, :1], lower[:, :1], upper[:, :1])
+        frequency = np.clip(s * ratio * scale[:, 1:2], lower[:, 1:2], upper[:, 1:2])
+        command = np.stack([amplitude, frequency, np.broadcast_to(direction, s.shape)], axis=-1)
+        force, slope = fin.force_and_jacobian(command)
+        thrust = np.sqrt((force[..., 1:] ** 2).sum(-1)) + 1e-15
+        if sweep < 2:
+            by = (force[..., 1:, None] * slope[..., 1:, :2]).sum(-2) / thrust[..., None]
+            kappa = np.clip((by[..., 0] * amplitude) / np.maximum(by[..., 1] * frequency, 1e-12), 0.1, 10.0)
+            # 2 w_g kappa r^2 + w (kappa - 1) r - 2 w_a = 0
+            b = w.product * (kappa - 1.0)
+            ratio = (np.sqrt(b * b + 16.0 * w.frequency * w.amplitude * kappa) - b) / (4.0 * w.frequency * kappa)
+    thrust = np.maximum.accumulate(thrust, axis=1)
+    minimum, maximum = thrust[:, 0], thrust[:, -1]
+    a, f = amplitude / scale[:, :1], frequency / scale[:, 1:2]
     energy = w.amplitude * a * a + w.frequency * f * f + w.product * a * f
-    table = np.concatenate([chosen, energy[:, None]], axis=-1)
-    return low, high, table
+    along = np.stack([amplitude, frequency, energy], axis=-1)
+    table = np.empty_like(along)
+    for i in range(len(lower)):
+        level = ((thrust[i] - minimum[i]) / max(maximum[i] - minimum[i], 1e-15)) ** 0.25
+        for column in range(3):
+            table[i, :, column] = np.interp(np.linspace(0.0, 1.0, KNOTS), level, along[i, :, column])
+    return ThrustCurves(minimum, maximum, table)
