@@ -8,6 +8,7 @@ one planar force per fin, in which the wrench is linear.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +18,9 @@ from finlab.allocation.learned_fin import LearnedFin
 
 Array = NDArray[np.float64]
 
-KNOTS = 128
+KNOTS = 80
 """Thrust levels per curve, evenly spaced in the fourth root of thrust, in which both commands are
-nearly straight lines."""
+nearly straight lines. Few enough that the products behind a curve stay on one thread."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,17 @@ class ThrustCurves:
 
 
 def thrust_curves(fin: LearnedFin, lower: Array, upper: Array) -> ThrustCurves:
-    """Curves of fins with limits (n, 3).
+    """Curves of fins with limits (n, 3)."""
+    curves = [_curve(fin, tuple(lo), tuple(hi)) for lo, hi in zip(lower.tolist(), upper.tolist(), strict=True)]
+    minimum, maximum, table = zip(*curves, strict=True)
+    return ThrustCurves(np.array(minimum), np.array(maximum), np.stack(table))
+
+
+@lru_cache(maxsize=1024)
+def _curve(
+    fin: LearnedFin, lower: tuple[float, float, float], upper: tuple[float, float, float]
+) -> tuple[float, float, Array]:
+    """Smallest and largest thrust and the table (KNOTS, 3) of one fin.
 
     Least energy for a thrust means that the gradients of energy and thrust by (amplitude, frequency)
     are parallel. With normalized a and g and thrust elasticities alpha = dlnT/dlna, beta = dlnT/dlng
@@ -52,33 +63,27 @@ def thrust_curves(fin: LearnedFin, lower: Array, upper: Array) -> ThrustCurves:
     Thrust is nearly (a g)^2, so the elasticities hardly vary along the way and two sweeps settle them.
     Where the ray of that ratio leaves the limits, the best point is the ray clipped to them.
     """
-    scale = energy_scale(upper)
-    direction = np.clip(0.0, lower[:, 2], upper[:, 2])[:, None]
+    scale = energy_scale(np.array(upper))
+    direction = np.full(KNOTS, min(max(0.0, lower[2]), upper[2]))
     w = DEFAULT_WEIGHTS
-    ratio = np.ones((len(lower), KNOTS))
+    ratio = np.ones(KNOTS)
     for sweep in range(3):
         # s runs along the ray until both commands are at their upper limits.
-        last = np.maximum(upper[:, 0] / scale[:, 0], upper[:, 1] / (scale[:, 1] * ratio.min(1)))
-        s = np.linspace(0.0, 1.0, KNOTS) * last[:, None]
-        amplitude = np.clip(s * scale[:, :1], lower[:, :1], upper[:, :1])
-        frequency = np.clip(s * ratio * scale[:, 1:2], lower[:, 1:2], upper[:, 1:2])
-        command = np.stack([amplitude, frequency, np.broadcast_to(direction, s.shape)], axis=-1)
-        force, slope = fin.force_and_jacobian(command)
-        thrust = np.sqrt((force[..., 1:] ** 2).sum(-1)) + 1e-15
+        s = np.linspace(0.0, max(upper[0] / scale[0], upper[1] / (scale[1] * ratio.min())), KNOTS)
+        amplitude = np.clip(s * scale[0], lower[0], upper[0])
+        frequency = np.clip(s * ratio * scale[1], lower[1], upper[1])
+        force, slope = fin.force_and_jacobian(np.stack([amplitude, frequency, direction], axis=-1))
+        thrust = np.sqrt((force[:, 1:] ** 2).sum(-1)) + 1e-15
         if sweep < 2:
-            by = (force[..., 1:, None] * slope[..., 1:, :2]).sum(-2) / thrust[..., None]
-            kappa = np.clip((by[..., 0] * amplitude) / np.maximum(by[..., 1] * frequency, 1e-12), 0.1, 10.0)
+            by = (force[:, 1:, None] * slope[:, 1:, :2]).sum(-2) / thrust[:, None]
+            kappa = np.clip(by[:, 0] * amplitude / np.maximum(by[:, 1] * frequency, 1e-12), 0.1, 10.0)
             # 2 w_g kappa r^2 + w (kappa - 1) r - 2 w_a = 0
             b = w.product * (kappa - 1.0)
             ratio = (np.sqrt(b * b + 16.0 * w.frequency * w.amplitude * kappa) - b) / (4.0 * w.frequency * kappa)
-    thrust = np.maximum.accumulate(thrust, axis=1)
-    minimum, maximum = thrust[:, 0], thrust[:, -1]
-    a, f = amplitude / scale[:, :1], frequency / scale[:, 1:2]
+    thrust = np.maximum.accumulate(thrust)
+    low, high = float(thrust[0]), float(thrust[-1])
+    a, f = amplitude / scale[0], frequency / scale[1]
     energy = w.amplitude * a * a + w.frequency * f * f + w.product * a * f
-    along = np.stack([amplitude, frequency, energy], axis=-1)
-    table = np.empty_like(along)
-    for i in range(len(lower)):
-        level = ((thrust[i] - minimum[i]) / max(maximum[i] - minimum[i], 1e-15)) ** 0.25
-        for column in range(3):
-            table[i, :, column] = np.interp(np.linspace(0.0, 1.0, KNOTS), level, along[i, :, column])
-    return ThrustCurves(minimum, maximum, table)
+    level = ((thrust - low) / max(high - low, 1e-15)) ** 0.25
+    grid = np.linspace(0.0, 1.0, KNOTS)
+    return low, high, np.stack([np.interp(grid, level, values) for values in (amplitude, frequency, energy)], axis=-1)

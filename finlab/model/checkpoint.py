@@ -17,7 +17,7 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor
 
-from finlab.assets import checkpoint_path
+from finlab.assets import checkpoint_path, shipped_checkpoints
 from finlab.data.features import SIZES
 from finlab.data.normalization import Normalization
 from finlab.errors import CheckpointError
@@ -67,6 +67,7 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
     if checkpoint.network is not None:
         tensors |= _with_prefix("network", checkpoint.network.state_dict())
     save_file({k: v.detach().cpu().contiguous() for k, v in tensors.items()}, folder / WEIGHTS_FILE)
+    (folder / WEIGHTS_FILE).chmod(0o644)
     checkpoint.sha256 = file_sha256(folder / WEIGHTS_FILE)
     config = {
         "format": FORMAT,
@@ -139,13 +140,17 @@ def load_normalization(folder: Path) -> Normalization:
 
 
 def resolve_checkpoint(checkpoint: str | Path) -> Path:
-    """A checkpoint folder from a path, or from the name of a shipped checkpoint."""
+    """The folder of a checkpoint: a shipped one by its bare name, any other by its path.
+
+    A bare name is never looked up in the current folder, so that a folder called `default` there does
+    not take the shipped one's place; write `./default` for it.
+    """
     path = Path(checkpoint)
-    if path.is_dir():
-        return path
-    if path.name == str(checkpoint):
+    if path.name == str(checkpoint) and (str(checkpoint) in shipped_checkpoints() or not path.is_dir()):
         return checkpoint_path(str(checkpoint))
-    raise CheckpointError(f"{path}: no such checkpoint folder")
+    if not path.is_dir():
+        raise CheckpointError(f"{path}: no such checkpoint folder")
+    return path
 
 
 def file_sha256(path: Path) -> str:
