@@ -1,0 +1,187 @@
+"""What every method has in common: problems are checked, failed fins left out, answers judge themselves."""
+
+import math
+
+import numpy as np
+import pytest
+
+from finlab.allocation import METHODS, Allocation, Allocator, Candidates, Solution, load_allocator
+from finlab.data.normalization import Normalization
+from finlab.errors import AllocationError, CommandError, LayoutError
+from finlab.layout import Fin, Layout
+from finlab.physics import Plant
+
+SIGMA = np.array([1.0, 2.0, 1.0, 0.5, 0.5, 0.5])
+ROBOT = Layout(
+    "robot",
+    (
+        Fin("bow", (0.2, 0.0, 0.0), math.pi / 2),
+        Fin("left", (0.0, 0.15, 0.0), 0.0),
+        Fin("stern", (-0.2, 0.0, 0.05), -1.0),
+    ),
+)
+SURGE = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+
+
+class Drawn(Allocator):
+    """Answers with commands drawn from seed and target; remembers what it was asked."""
+
+    name = "drawn"
+
+    def __init__(self) -> None:
+        self.normalization = Normalization(np.zeros(6), SIGMA)
+        self.asked: list[tuple[Layout, np.ndarray | None]] = []
+
+    def _solve(
+        self, layout: Layout, targets: np.ndarray, *, seed: int, previous: np.ndarray | None
+    ) -> Solution:
+        self.asked.append((layout, previous))
+        seeds = [np.random.default_rng([seed, *np.abs(t).view(np.uint64).tolist()]) for t in targets]
+        share = np.array([rng.uniform(size=(layout.n_fins, 3)) for rng in seeds])
+        command = np.array([0.05, 0.1, -3.0]) + share * [0.5, 1.9, 6.0]
+        few = Candidates(command, targets * 0, np.zeros(1), np.zeros(1), ("drawn",))
+        return Solution(command, 0.5 * targets, lambda: few, None)
+
+
+@pytest.fixture
+def method() -> Drawn:
+    return Drawn()
+
+
+@pytest.mark.parametrize(
+    ("wrench", "sentence"),
+    [
+        ([1, 0, math.nan, 0, 0, 0], "wrench: Fz must be finite and at most 1e+06 in size, got nan"),
+        ([1, 0, 0, 0, 0, -math.inf], "wrench: Tz must be finite and at most 1e+06 in size, got -inf"),
+        ([1, 2e6, 0, 0, 0, 0], "wrench: Fy must be finite and at most 1e+06 in size, got 2000000.0"),
+        (
+            [1, 0, 0],
+            "wrench: expected six numbers [Fx, Fy, Fz, Tx, Ty, Tz] in N and N m, got an array of shape (3,)",
+        ),
+        ([], "got an array of shape (0,)"),
+        (1.0, "got an array of shape ()"),
+        ([SURGE, SURGE], "got an array of shape (2, 6)"),
+        ("forward", "wrench: expected six numbers [Fx, Fy, Fz, Tx, Ty, Tz] in N and N m, got 'forward'"),
+        (["a", 0, 0, 0, 0, 0], "wrench: expected six numbers"),
+        ([[1, 2], 3, 4, 5, 6, 7], "wrench: expected six numbers"),
+        ({"Fx": 1}, "wrench: expected six numbers"),
+    ],
+)
+def test_refuses_a_wrench_that_is_none(method: Drawn, wrench: object, sentence: str) -> None:
+    with pytest.raises(CommandError) as caught:
+        method.allocate(ROBOT, wrench)  # type: ignore[arg-type]
+    assert sentence in str(caught.value) and "\n" not in str(caught.value)
+    assert method.asked == []
+
+
+@pytest.mark.parametrize("wrenches", [SURGE, [[1.0, 2.0]], [[SURGE]], [[math.nan] * 6]])
+def test_refuses_many_wrenches_that_are_none(method: Drawn, wrenches: object) -> None:
+    with pytest.raises(CommandError, match="wrench: "):
+        method.allocate_batch(ROBOT, wrenches)  # type: ignore[arg-type]
+
+
+def test_refuses_unknown_fins_and_names_those_there_are(method: Drawn) -> None:
+    with pytest.raises(LayoutError, match="robot has no fin 'keel', it has bow, left, stern"):
+        method.allocate(ROBOT, SURGE, failed=["bow", "keel"])
+
+
+def test_refuses_a_robot_without_a_working_fin(method: Drawn) -> None:
+    with pytest.raises(LayoutError, match="no fin left once bow, left, stern are lost"):
+        method.allocate(ROBOT, SURGE, failed=["bow", "left", "stern"])
+
+
+def test_refuses_a_bare_name_in_place_of_a_list(method: Drawn) -> None:
+    with pytest.raises(
+        AllocationError, match=r"expected a list of fin names, got the text 'bow'; write \['bow'\]"
+    ):
+        method.allocate(ROBOT, SURGE, failed="bow")
+
+
+def test_refuses_a_previous_command_of_another_robot(method: Drawn) -> None:
+    with pytest.raises(
+        CommandError, match=r"previous: expected a command of shape \(3, 3\) for layout 'robot'"
+    ):
+        method.allocate(ROBOT, SURGE, previous=np.zeros((4, 3)))
+
+
+@pytest.mark.xfail(strict=True, reason="text and infinities are not looked for yet")
+@pytest.mark.parametrize("previous", ["rest", [[math.inf] * 3] * 3])
+def test_refuses_a_previous_command_that_is_none(method: Drawn, previous: object) -> None:
+    with pytest.raises(CommandError, match="previous: "):
+        method.allocate(ROBOT, SURGE, previous=previous)  # type: ignore[arg-type]
+
+
+def test_failed_fins_leave_the_graph_and_come_back_as_nan(method: Drawn) -> None:
+    result = method.allocate(ROBOT, SURGE, failed=["left"])
+    assert method.asked[0][0].names == ("bow", "stern")
+    assert result.fins == ("bow", "left", "stern") and result.failed == ("left",)
+    assert np.isnan(result.command[1]).all()
+    expected = method.allocate(ROBOT.without(["left"]), SURGE).command
+    np.testing.assert_array_equal(result.command[[0, 2]], expected)
+    assert result.candidates is not None
+    assert np.isnan(result.candidates.command[:, 1]).all()
+    np.testing.assert_array_equal(result.candidates.command[0, [0, 2]], expected)
+    batch = method.allocate_batch(ROBOT, [SURGE, SURGE], failed=["left"])
+    assert batch.command.shape == (2, 3, 3) and np.isnan(batch.command[:, 1]).all()
+
+
+def test_previous_commands_reach_the_method_without_the_failed_fins(method: Drawn) -> None:
+    previous = np.arange(9.0).reshape(3, 3)
+    previous[0] = np.nan
+    method.allocate(ROBOT, SURGE, failed=["bow"], previous=previous)
+    np.testing.assert_array_equal(method.asked[0][1], [[3, 4, 5], [6, 7, 8]])
+
+
+def test_the_same_seed_gives_the_same_answer(method: Drawn) -> None:
+    first, second, other = (method.allocate(ROBOT, SURGE, seed=seed).command for seed in (3, 3, 4))
+    np.testing.assert_array_equal(first, second)
+    assert not np.array_equal(first, other)
+
+
+def test_many_targets_get_the_answers_of_each(method: Drawn) -> None:
+    targets = np.random.default_rng(0).normal(size=(4, 6))
+    batch = method.allocate_batch(ROBOT, targets, seed=2)
+    for row, target in enumerate(targets):
+        single = method.allocate(ROBOT, target, seed=2)
+        np.testing.assert_array_equal(batch.command[row], single.command)
+        np.testing.assert_array_equal(batch.wrench_surrogate[row], single.wrench_surrogate)  # type: ignore[index]
+    assert batch.solve_ms.shape == (4,)
+
+
+def test_the_target_is_a_copy(method: Drawn) -> None:
+    target = np.array(SURGE)
+    result = method.allocate(ROBOT, target)
+    target[0] = 99.0
+    assert result.target[0] == 1.0
+
+
+def test_an_answer_judges_itself_by_the_plant(method: Drawn) -> None:
+    result = method.allocate(ROBOT, SURGE, failed=["left"])
+    delivered = Plant(ROBOT).wrench(result.command)
+    np.testing.assert_allclose(result.wrench, delivered, atol=1e-12)
+    np.testing.assert_allclose(result.fin_forces, Plant(ROBOT).fin_forces(result.command))
+    np.testing.assert_allclose(result.fin_forces.sum(0), delivered[:3], atol=1e-12)
+    np.testing.assert_allclose(result.unallocated, np.array(SURGE) - delivered, atol=1e-12)
+    assert result.err_norm == pytest.approx(np.linalg.norm((delivered - SURGE) / SIGMA))
+    np.testing.assert_array_equal(result.wrench_surrogate, 0.5 * np.array(SURGE))
+    assert result.method == "drawn" and result.checkpoint is None and result.solve_ms >= 0.0
+
+
+def test_energy_counts_the_working_fins(method: Drawn) -> None:
+    result = method.allocate(ROBOT, SURGE, failed=["left"])
+    whole = 0.0
+    for amplitude, frequency, direction in result.command[[0, 2]] / [0.6, 2.1, math.pi]:
+        whole += amplitude**2 + frequency**2 + 0.1 * direction**2 + amplitude * frequency
+    assert result.energy == pytest.approx(whole)
+
+
+def test_a_method_without_candidates_says_so(method: Drawn) -> None:
+    result: Allocation = method.allocate(ROBOT, SURGE)
+    assert result.samples is None
+    assert result.candidates is not None and result.candidates.source == ("drawn",)
+
+
+def test_unknown_methods_are_refused_with_the_names_that_exist() -> None:
+    with pytest.raises(AllocationError) as caught:
+        load_allocator(method="magic")
+    assert str(caught.value) == f"method: expected one of {', '.join(METHODS)}, got 'magic'"

@@ -1,0 +1,165 @@
+"""The paper's own pipeline on untrained networks: repeatable, inside limits, and refinement refines."""
+
+import numpy as np
+import pytest
+import torch
+
+from finlab.allocation.paper import CHUNK, PaperAllocator
+from finlab.assets import shipped_layouts
+from finlab.data.features import SIZES
+from finlab.data.normalization import Normalization
+from finlab.errors import AllocationError, CheckpointError
+from finlab.layout import Fin, Layout, Limits, load_layout
+from finlab.model.allocator_network import AllocatorNetwork, NetworkConfig
+from finlab.model.checkpoint import Checkpoint
+from finlab.model.surrogate import SurrogateConfig, make_surrogate
+from finlab.physics import Plant
+
+TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]
+
+
+@pytest.fixture(scope="module")
+def checkpoint() -> Checkpoint:
+    """A small network and surrogate of the paper's kind, with random weights."""
+    with torch.random.fork_rng():
+        torch.manual_seed(0)
+        sizes = NetworkConfig(
+            features="raw",
+            joint=False,
+            width=16,
+            heads=2,
+            transformer_layers=1,
+            feedforward=16,
+            n_components=4,
+        )
+        return Checkpoint(
+            name="tiny",
+            surrogate=make_surrogate(SurrogateConfig("mlp", (32,))).requires_grad_(False),
+            normalization=Normalization(np.full(6, 0.01), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])),
+            fin_model={"type": "drag"},
+            network=AllocatorNetwork(sizes, SIZES["raw"]).eval().requires_grad_(False),
+        )
+
+
+@pytest.fixture
+def robot() -> Layout:
+    """Layout A with a fin confined to an arc and one that cannot move at all."""
+    layout = load_layout(shipped_layouts()["A"])
+    first, second = layout.names[:2]
+    arc, stiff = Limits(zero_direction=(0.3, 1.7)), Limits((0.3, 0.3), (1.1, 1.1), (0.7, 0.7))
+    return layout.replace_fin(first, limits=arc).replace_fin(second, limits=stiff)
+
+
+def keeps_limits(layout: Layout, command: np.ndarray) -> bool:
+    lower = np.array([fin.limits.lower for fin in layout.fins])
+    upper = np.array([fin.limits.upper for fin in layout.fins])
+    return bool(np.isfinite(command).all() and (command >= lower).all() and (command <= upper).all())
+
+
+ABLATIONS: list[dict[str, object]] = [
+    {},
+    {"refine": False},
+    {"mean_only": True},
+    {"warm_start": "random"},
+    {"ranking": "nll"},
+    {"ranking": "nll", "refine": False},
+    {"n_candidates": 1},
+    {"temperature": 1.0, "n_refined": 100},
+]
+
+
+@pytest.mark.parametrize("options", ABLATIONS)
+def test_every_variant_keeps_the_limits_bit_for_bit(
+    options: dict[str, object], checkpoint: Checkpoint, robot: Layout
+) -> None:
+    method = PaperAllocator(checkpoint, n_steps=5, **options)  # type: ignore[arg-type]
+    targets = np.random.default_rng(0).normal(size=(6, 6)) * np.array([[1.0], [1], [1], [50], [0], [1e5]])
+    assert keeps_limits(robot, method.allocate_batch(robot, targets).command)
+    result = method.allocate(robot, TARGET, seed=1)
+    assert keeps_limits(robot, result.command)
+    assert result.candidates is not None and result.samples is not None
+    assert keeps_limits(robot, result.candidates.command) and keeps_limits(robot, result.samples.command)
+
+
+@pytest.mark.parametrize("options", ABLATIONS)
+def test_the_same_seed_gives_the_same_answer(
+    options: dict[str, object], checkpoint: Checkpoint, robot: Layout
+) -> None:
+    method = PaperAllocator(checkpoint, n_steps=5, **options)  # type: ignore[arg-type]
+    first, second, other = (method.allocate(robot, TARGET, seed=seed).command for seed in (4, 4, 5))
+    np.testing.assert_array_equal(first, second)
+    if not options.get("mean_only"):
+        assert not np.array_equal(first, other)
+
+
+def test_refinement_lowers_what_the_surrogate_sees(checkpoint: Checkpoint, robot: Layout) -> None:
+    def believed(**options: object) -> float:
+        method = PaperAllocator(checkpoint, **options)  # type: ignore[arg-type]
+        wrench = method.allocate_batch(robot, targets).wrench_surrogate
+        return float(method.normalization.error(wrench, targets).mean())
+
+    targets = np.random.default_rng(1).normal(size=(10, 6)) * checkpoint.normalization.std
+    mean, ranked, refined = believed(mean_only=True), believed(refine=False), believed()
+    assert refined < 0.9 * ranked < 0.9 * mean
+
+
+def test_answers_believe_what_the_surrogate_says(checkpoint: Checkpoint, robot: Layout) -> None:
+    result = PaperAllocator(checkpoint, n_steps=5).allocate(robot, TARGET)
+    layout = [(fin.position, fin.mounting_angle, fin.limits.lower, fin.limits.upper) for fin in robot.fins]
+    rest = [torch.tensor(np.array(value), dtype=torch.float32) for value in zip(*layout, strict=True)]
+    wrench = checkpoint.surrogate(torch.tensor(result.command, dtype=torch.float32), *rest)
+    np.testing.assert_allclose(result.wrench_surrogate, wrench.numpy(), atol=1e-4)
+
+
+def test_candidates_come_best_first(checkpoint: Checkpoint, robot: Layout) -> None:
+    method = PaperAllocator(checkpoint, n_candidates=20, n_refined=3, n_steps=5)
+    result = method.allocate(robot, TARGET)
+    assert result.candidates is not None and result.samples is not None
+    assert result.candidates.source == ("refined",) * 3 and result.samples.source == ("sample",) * 20
+    for offered in (result.candidates, result.samples):
+        assert (np.diff(offered.err_norm) >= 0).all()
+        error = method.normalization.error(offered.wrench, np.array(TARGET))
+        np.testing.assert_allclose(offered.err_norm, error, atol=1e-3)
+
+
+def test_failed_fins_are_left_out(checkpoint: Checkpoint, robot: Layout) -> None:
+    method = PaperAllocator(checkpoint, n_steps=5)
+    lost = robot.names[2]
+    result = method.allocate(robot, TARGET, failed=[lost])
+    assert np.isnan(result.command[2]).all()
+    expected = method.allocate(robot.without([lost]), TARGET).command
+    np.testing.assert_array_equal(np.delete(result.command, 2, axis=0), expected)
+
+
+def test_targets_beyond_one_chunk_get_their_answers(checkpoint: Checkpoint) -> None:
+    method = PaperAllocator(checkpoint, n_candidates=2, refine=False)
+    layout = Layout("pair", (Fin("a", (0.1, 0.0, 0.0), 0.0), Fin("b", (-0.1, 0.0, 0.0), 2.0)))
+    targets = np.random.default_rng(0).normal(size=(CHUNK + 1, 6))
+    batch = method.allocate_batch(layout, targets)
+    assert batch.command.shape == (CHUNK + 1, 2, 3)
+    last = method.allocate_batch(layout, targets[CHUNK:], seed=CHUNK)
+    np.testing.assert_allclose(batch.command[CHUNK], last.command[0], atol=1e-6)
+
+
+def test_on_our_networks_it_reaches_the_target(default_checkpoint: Checkpoint) -> None:
+    method = PaperAllocator(default_checkpoint)
+    layout = load_layout(shipped_layouts()["A"])
+    lower = np.array([fin.limits.lower for fin in layout.fins])
+    upper = np.array([fin.limits.upper for fin in layout.fins])
+    share = np.random.default_rng(0).uniform(size=(10, layout.n_fins, 3))
+    targets = Plant(layout).wrench(lower + share * (upper - lower))
+    command = method.allocate_batch(layout, targets).command
+    assert np.median(method.normalization.error(Plant(layout).wrench(command), targets)) < 0.02
+
+
+def test_refuses_options_nobody_knows(checkpoint: Checkpoint) -> None:
+    with pytest.raises(AllocationError, match="warm_start: expected one of mdn, random, got 'magic'"):
+        PaperAllocator(checkpoint, warm_start="magic")
+    with pytest.raises(AllocationError, match="ranking: expected one of physics, nll, got 'magic'"):
+        PaperAllocator(checkpoint, ranking="magic")
+
+
+def test_refuses_a_checkpoint_without_network(checkpoint: Checkpoint) -> None:
+    alone = Checkpoint("alone", checkpoint.surrogate, checkpoint.normalization, {"type": "drag"})
+    with pytest.raises(CheckpointError, match="checkpoint 'alone' holds no allocator network"):
+        PaperAllocator(alone)
