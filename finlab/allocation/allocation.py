@@ -55,7 +55,7 @@ class Allocation:
     target: Array
     """Desired wrench (6,), [N, N m], body frame."""
     command: Array
-    """Command (n, 3) of every fin: amplitude [rad], frequency [Hz], zero direction [rad]; NaN for a failed one."""
+    """Command (n, 3) of every fin: amplitude [rad], frequency [Hz], zero direction [rad]; NaN if failed."""
     sigma: Array
     """Per-axis standard deviation (6,) of the error measure."""
     method: str

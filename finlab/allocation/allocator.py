@@ -132,7 +132,9 @@ def check_previous(previous: ArrayLike, layout: Layout) -> Array:
 def remove_failed(layout: Layout, failed: Sequence[str]) -> tuple[Layout, NDArray[np.bool_]]:
     """The layout without its failed fins, and the mask (n,) of the healthy ones."""
     if isinstance(failed, str):
-        raise AllocationError(f"failed: expected a list of fin names, got the text {failed!r}; write [{failed!r}]")
+        raise AllocationError(
+            f"failed: expected a list of fin names, got the text {failed!r}; write [{failed!r}]"
+        )
     if not failed:
         return layout, np.ones(layout.n_fins, dtype=bool)
     alive = np.array([name not in set(failed) for name in layout.names])

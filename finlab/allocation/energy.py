@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +42,7 @@ def fin_energy(
     command: NDArray[np.floating],
     upper: NDArray[np.floating],
     weights: EnergyWeights = DEFAULT_WEIGHTS,
-) -> NDArray[np.floating]:
+) -> NDArray[Any]:
     """Energy of each fin, shape (...,): the summand of the paper's `J_en`."""
     scaled = command / energy_scale(upper).astype(command.dtype)
     a, f, d = scaled[..., 0], scaled[..., 1], scaled[..., 2]
@@ -53,7 +54,7 @@ def command_energy(
     command: NDArray[np.floating],
     upper: NDArray[np.floating],
     weights: EnergyWeights = DEFAULT_WEIGHTS,
-) -> NDArray[np.floating]:
+) -> NDArray[Any]:
     """`J_en` of whole robots: commands (..., n, 3) to energies (...,). Failed fins (NaN) count nothing."""
     energy = fin_energy(command, upper, weights)
     return np.where(np.isnan(energy), 0.0, energy).sum(-1)

@@ -15,14 +15,14 @@ m_i B_i^T l on what it can do, and a semismooth Newton step on l removes the wre
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.thrust_curve import ThrustCurves
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 RIDGE = 1e-9
 """Relative regularization of the 6 x 6 systems."""
@@ -138,7 +138,7 @@ def _answer(problem: PlanarProblem, weight: Array, multiplier: Array) -> Array:
 
 
 def _gram(problem: PlanarProblem, weight: Array, slope: Array | None = None) -> Array:
-    """sum_i m_i B_i D_i B_i^T (R, 6, 6), slightly regularized; D_i (R, n, 2, 2) is the slope of the projection."""
+    """sum_i m_i B_i D_i B_i^T (R, 6, 6), slightly regularized; D_i (R, n, 2, 2) is the projection's slope."""
     n = len(problem.products)
     if slope is None:
         gram = weight @ (problem.products[:, 0, 0] + problem.products[:, 1, 1]).reshape(n, 36)

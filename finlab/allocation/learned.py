@@ -1,4 +1,4 @@
-"""The learned allocator: the network proposes, the surrogate ranks, a search finds the cheapest exact command.
+"""The learned allocator: the network proposes, the surrogate ranks, a search finds the cheapest answer.
 
 Predict (mixture of the network) -> sample K candidates -> rank by the surrogate's error and energy ->
 drive the best ones, and a few sub-layouts, to the nearest cheap exact allocation in force space ->
@@ -9,7 +9,7 @@ model scores the answer afterwards.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ from finlab.layout import Layout
 from finlab.model.checkpoint import Checkpoint
 from finlab.model.surrogate import FORCE_UNIT, CoefficientSurrogate
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 CHUNK = 256
 """Targets that are solved together; keeps memory flat for any number of targets."""
@@ -76,7 +76,9 @@ class LearnedAllocator(Allocator):
                 f"got {checkpoint.surrogate.config.kind!r}; use method `paper` with this checkpoint"
             )
         if checkpoint.network is None or not checkpoint.network.config.joint:
-            raise CheckpointError(f"checkpoint {checkpoint.name!r}: method `learned` needs a joint-mixture network")
+            raise CheckpointError(
+                f"checkpoint {checkpoint.name!r}: method `learned` needs a joint-mixture network"
+            )
         self.checkpoint = checkpoint.name
         self.trained = checkpoint
         self.normalization = checkpoint.normalization
@@ -104,7 +106,6 @@ class LearnedAllocator(Allocator):
         return Solution(np.concatenate([part.command for part in parts]), np.concatenate(wrench))
 
     def _solve_chunk(self, prepared: Prepared, targets: Array, seed: int, keep: bool) -> Solution:
-        rows, n = len(targets), len(prepared.lower)
         std = self.normalization.std
         target = targets / std
         centred = target - self.normalization.mean / std
@@ -115,7 +116,9 @@ class LearnedAllocator(Allocator):
             missed = pool.error[:, 0] > TOLERANCE
             if not missed.any():
                 break
-            more = np.concatenate([pool.command[missed], proposal.command[missed, :extra].astype(np.float64)], axis=1)
+            more = np.concatenate(
+                [pool.command[missed], proposal.command[missed, :extra].astype(np.float64)], axis=1
+            )
             longer = self._refine(prepared, target[missed], more, steps)
             for kept, new in zip(pool, longer, strict=True):
                 kept[missed] = new[:, : kept.shape[1]]

@@ -7,11 +7,12 @@ tensor library's, and a robot's computer needs no such library.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 
 class LearnedFin:
@@ -27,7 +28,10 @@ class LearnedFin:
         """
         layers = sorted({int(key.split(".")[1]) for key in weights})
         self._layers = [
-            (np.array(weights[f"net.{i}.weight"], np.float64).T.copy(), np.array(weights[f"net.{i}.bias"], np.float64))
+            (
+                np.array(weights[f"net.{i}.weight"], np.float64).T.copy(),
+                np.array(weights[f"net.{i}.bias"], np.float64),
+            )
             for i in layers
         ]
         self._rough = [(weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in self._layers]

@@ -6,14 +6,14 @@ surrogate, so it removes what the planar search's simplifications leave.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.learned_fin import LearnedFin
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 
 class CommandProblem(NamedTuple):
@@ -57,7 +57,9 @@ class Refined(NamedTuple):
     """Normalized error (R,) of that wrench."""
 
 
-def refine(problem: CommandProblem, target: Array, command: Array, steps: int, damping: float = 1e-6) -> Refined:
+def refine(
+    problem: CommandProblem, target: Array, command: Array, steps: int, damping: float = 1e-6
+) -> Refined:
     """Reduce the tracking error of commands (R, n, 3) towards normalized targets (R, 6).
 
     Each step is the smallest change, in units of the limit ranges, that cancels the error to first

@@ -8,12 +8,12 @@ against `finlab.model.allocator_network.AllocatorNetwork`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float32]
+Array = NDArray[Any]
 
 _LAYER_NORM_EPS = np.float32(1e-5)
 _LOG_STD_LOW, _LOG_STD_RANGE = np.float32(-3.0), np.float32(6.0)
@@ -53,7 +53,9 @@ class NumpyNetwork:
         self.norm = (w["norm.weight"], w["norm.bias"])
         self.head, self.weight = _linear(w, "head"), _linear(w, "weight")
 
-    def __call__(self, x: Array, target: Array, lower: NDArray[np.floating], upper: NDArray[np.floating]) -> MixtureArrays:
+    def __call__(
+        self, x: Array, target: Array, lower: NDArray[np.floating], upper: NDArray[np.floating]
+    ) -> MixtureArrays:
         """The mixture.
 
         Args:

@@ -1,4 +1,4 @@
-"""The paper's own pipeline: sample the mixture, rank by the surrogate, refine with Adam (paper, "Inference")."""
+"""The paper's own pipeline: sample the mixture, rank by the surrogate, refine with Adam."""
 
 from __future__ import annotations
 
@@ -64,7 +64,10 @@ class PaperAllocator(Allocator):
         """
         if checkpoint.network is None:
             raise CheckpointError(f"checkpoint {checkpoint.name!r} holds no allocator network")
-        for value, known, key in ((warm_start, ("mdn", "random"), "warm_start"), (ranking, ("physics", "nll"), "ranking")):
+        for value, known, key in (
+            (warm_start, ("mdn", "random"), "warm_start"),
+            (ranking, ("physics", "nll"), "ranking"),
+        ):
             if value not in known:
                 raise AllocationError(f"{key}: expected one of {', '.join(known)}, got {value!r}")
         self.checkpoint, self.trained = checkpoint.name, checkpoint
@@ -79,7 +82,9 @@ class PaperAllocator(Allocator):
         robot = _Robot(layout)
         parts = []
         for start in range(0, len(targets), CHUNK):
-            parts.append(self._solve_chunk(robot, targets[start : start + CHUNK], seed + start, len(targets) == 1))
+            parts.append(
+                self._solve_chunk(robot, targets[start : start + CHUNK], seed + start, len(targets) == 1)
+            )
         if len(parts) == 1:
             return parts[0]
         wrench = [part.wrench_surrogate for part in parts if part.wrench_surrogate is not None]

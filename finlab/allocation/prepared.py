@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from finlab.allocation.thrust_curve import thrust_curves
 from finlab.data.features import Geometry, geometry
 from finlab.layout import Layout
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 MAX_SUBSETS = 16
 """Most sub-layouts that are searched beside the network's proposals."""
@@ -48,7 +48,9 @@ def prepare(layout: Layout, fin: LearnedFin, std: Array) -> Prepared:
     lower = np.array([f.limits.lower for f in layout.fins], dtype=np.float64)
     upper = np.array([f.limits.upper for f in layout.fins], dtype=np.float64)
     c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
-    axes = np.stack([np.stack([c, s, zero], -1), np.stack([-s, c, zero], -1), np.stack([zero, zero, one], -1)], axis=1)
+    axes = np.stack(
+        [np.stack([c, s, zero], -1), np.stack([-s, c, zero], -1), np.stack([zero, zero, one], -1)], axis=1
+    )
     torque = np.cross(position[:, None], axes)
     columns = np.concatenate([axes, torque], axis=-1) / std  # (n, 3, 6)
     curves = thrust_curves(fin, lower, upper)

@@ -1,8 +1,8 @@
-"""What the network proposes for a target: K candidate commands, drawn from its mixture and scored by the surrogate."""
+"""What the network proposes: K candidate commands, drawn from its mixture and scored by the surrogate."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from finlab.allocation.numpy_network import MixtureArrays, NumpyNetwork
 from finlab.allocation.prepared import Prepared
 from finlab.data.features import fin_frame_features
 
-Array = NDArray[np.floating]
+Array = NDArray[Any]
 
 
 class Proposal(NamedTuple):
@@ -38,7 +38,9 @@ def predict(network: NumpyNetwork, prepared: Prepared, centred: Array) -> Mixtur
     return network(x, centred.astype(np.float32), prepared.lower, prepared.upper)
 
 
-def sample(mixture: MixtureArrays, n_samples: int, temperature: float, seed: int) -> tuple[Array, NDArray[np.int64]]:
+def sample(
+    mixture: MixtureArrays, n_samples: int, temperature: float, seed: int
+) -> tuple[Array, NDArray[np.int64]]:
     """Normalized commands (N, K, n, 3) and their components (N, K).
 
     The first M candidates are the components' means. The rest are drawn by the mixture's weights, with

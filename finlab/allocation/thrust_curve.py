@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from finlab.allocation.energy import DEFAULT_WEIGHTS, energy_scale
 from finlab.allocation.learned_fin import LearnedFin
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 KNOTS = 80
 """Thrust levels per curve, evenly spaced in the fourth root of thrust, in which both commands are
@@ -46,7 +47,9 @@ class ThrustCurves:
 
 def thrust_curves(fin: LearnedFin, lower: Array, upper: Array) -> ThrustCurves:
     """Curves of fins with limits (n, 3)."""
-    curves = [_curve(fin, tuple(lo), tuple(hi)) for lo, hi in zip(lower.tolist(), upper.tolist(), strict=True)]
+    curves = [
+        _curve(fin, tuple(lo), tuple(hi)) for lo, hi in zip(lower.tolist(), upper.tolist(), strict=True)
+    ]
     minimum, maximum, table = zip(*curves, strict=True)
     return ThrustCurves(np.array(minimum), np.array(maximum), np.stack(table))
 
@@ -79,11 +82,17 @@ def _curve(
             kappa = np.clip(by[:, 0] * amplitude / np.maximum(by[:, 1] * frequency, 1e-12), 0.1, 10.0)
             # 2 w_g kappa r^2 + w (kappa - 1) r - 2 w_a = 0
             b = w.product * (kappa - 1.0)
-            ratio = (np.sqrt(b * b + 16.0 * w.frequency * w.amplitude * kappa) - b) / (4.0 * w.frequency * kappa)
+            ratio = (np.sqrt(b * b + 16.0 * w.frequency * w.amplitude * kappa) - b) / (
+                4.0 * w.frequency * kappa
+            )
     thrust = np.maximum.accumulate(thrust)
     low, high = float(thrust[0]), float(thrust[-1])
     a, f = amplitude / scale[0], frequency / scale[1]
     energy = w.amplitude * a * a + w.frequency * f * f + w.product * a * f
     level = ((thrust - low) / max(high - low, 1e-15)) ** 0.25
     grid = np.linspace(0.0, 1.0, KNOTS)
-    return low, high, np.stack([np.interp(grid, level, values) for values in (amplitude, frequency, energy)], axis=-1)
+    return (
+        low,
+        high,
+        np.stack([np.interp(grid, level, values) for values in (amplitude, frequency, energy)], axis=-1),
+    )

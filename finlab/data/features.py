@@ -104,7 +104,9 @@ def geometry(
     solver = rows @ inverse  # (B, 2n, 6)
     solved = solver.reshape(batch, n, 2, 6)
     hat = [(solved[:, :, i] * pairs[:, :, j]).sum(-1) for i, j in ((0, 0), (1, 1), (0, 1))]
-    shape = xp.stack([h[..., 0], h[..., 1], h[..., 3], h[..., 4], h[..., 5], v[..., 2], v[..., 3], v[..., 4]], axis=-1)
+    shape = xp.stack(
+        [h[..., 0], h[..., 1], h[..., 3], h[..., 4], h[..., 5], v[..., 2], v[..., 3], v[..., 4]], axis=-1
+    )
     limits = _scaled_limits(xp, lower, upper)
     static = xp.concatenate([shape * 0.25, xp.stack([*hat, full], axis=-1), limits], axis=-1)
     return Geometry(static, columns, solver)

@@ -25,9 +25,7 @@ class Normalization(NamedTuple):
         wrenches = np.asarray(wrenches, dtype=np.float64)
         return cls(wrenches.mean(axis=0), np.maximum(wrenches.std(axis=0), STD_FLOOR))
 
-    def error(
-        self, wrench: NDArray[np.floating], target: NDArray[np.floating]
-    ) -> NDArray[np.float64]:
+    def error(self, wrench: NDArray[np.floating], target: NDArray[np.floating]) -> NDArray[np.float64]:
         """`err_norm = ||(wrench - target) / std||`, over the last axis."""
         scaled = (np.asarray(wrench, np.float64) - np.asarray(target, np.float64)) / self.std
         return np.linalg.norm(scaled, axis=-1)

@@ -52,7 +52,9 @@ class AllocatorNetwork(nn.Module):
         self.config = config
         width = config.width
         sizes = [n_features] + [width] * config.graph_layers
-        self.graph = nn.ModuleList(DenseGATv2(a, b, config.heads) for a, b in zip(sizes, sizes[1:], strict=False))
+        self.graph = nn.ModuleList(
+            DenseGATv2(a, b, config.heads) for a, b in zip(sizes, sizes[1:], strict=False)
+        )
         self.skip = nn.Linear(n_features, width)
         self.wrench = nn.Sequential(nn.Linear(6, width), nn.SiLU(), nn.Linear(width, width))
         self.join = nn.Linear(2 * width, width)
@@ -80,7 +82,9 @@ class AllocatorNetwork(nn.Module):
         """Attention weights (B, n, n) of the first GATv2 layer, averaged over heads: what it looks at."""
         return self.graph[0](x, mask)[1].mean(-1)
 
-    def forward(self, x: Tensor, target: Tensor, lower: Tensor, upper: Tensor, mask: Tensor | None = None) -> Mixture:
+    def forward(
+        self, x: Tensor, target: Tensor, lower: Tensor, upper: Tensor, mask: Tensor | None = None
+    ) -> Mixture:
         """The mixture for B robots.
 
         Args:

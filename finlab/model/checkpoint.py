@@ -93,9 +93,13 @@ def load_checkpoint(folder: Path) -> Checkpoint:
     config = _read_config(folder)
     weights = folder / WEIGHTS_FILE
     if not weights.is_file():
-        raise CheckpointError(f"{weights}: no such file; a checkpoint folder holds {CONFIG_FILE} and {WEIGHTS_FILE}")
+        raise CheckpointError(
+            f"{weights}: no such file; a checkpoint folder holds {CONFIG_FILE} and {WEIGHTS_FILE}"
+        )
     if file_sha256(weights) != config.get("sha256"):
-        raise CheckpointError(f"{weights}: its SHA-256 is not the one in {CONFIG_FILE}; the file was changed or cut off")
+        raise CheckpointError(
+            f"{weights}: its SHA-256 is not the one in {CONFIG_FILE}; the file was changed or cut off"
+        )
     try:
         tensors = load_file(weights)
         surrogate = make_surrogate(_surrogate_config(config["surrogate"]))
@@ -120,14 +124,18 @@ def load_checkpoint(folder: Path) -> Checkpoint:
         )
     except (KeyError, TypeError, ValueError, RuntimeError, SafetensorError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise CheckpointError(f"{folder}: {CONFIG_FILE} and {WEIGHTS_FILE} do not fit together ({reason})") from error
+        raise CheckpointError(
+            f"{folder}: {CONFIG_FILE} and {WEIGHTS_FILE} do not fit together ({reason})"
+        ) from error
 
 
 def load_allocator_checkpoint(folder: Path) -> Checkpoint:
     """Like `load_checkpoint`, but the allocator network must be there."""
     checkpoint = load_checkpoint(folder)
     if checkpoint.network is None:
-        raise CheckpointError(f"{folder}: holds a surrogate only; train the allocator with `finlab train allocator`")
+        raise CheckpointError(
+            f"{folder}: holds a surrogate only; train the allocator with `finlab train allocator`"
+        )
     return checkpoint
 
 
@@ -161,9 +169,13 @@ def file_sha256(path: Path) -> str:
 def _read_config(folder: Path) -> dict[str, Any]:
     path = folder / CONFIG_FILE
     if not path.is_file():
-        raise CheckpointError(f"{path}: no such file; a checkpoint folder holds {CONFIG_FILE} and {WEIGHTS_FILE}")
+        raise CheckpointError(
+            f"{path}: no such file; a checkpoint folder holds {CONFIG_FILE} and {WEIGHTS_FILE}"
+        )
     if path.stat().st_size > MAX_CONFIG_BYTES:
-        raise CheckpointError(f"{path}: larger than {MAX_CONFIG_BYTES} bytes; this is not a checkpoint's configuration")
+        raise CheckpointError(
+            f"{path}: larger than {MAX_CONFIG_BYTES} bytes; this is not a checkpoint's configuration"
+        )
     try:
         config = json.loads(path.read_text())
     except (UnicodeDecodeError, json.JSONDecodeError) as error:

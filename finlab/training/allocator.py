@@ -1,4 +1,4 @@
-"""`finlab train allocator`: imitation, physics guidance through the frozen surrogate, entropy (paper, main training)."""
+"""`finlab train allocator`: imitation, guidance through the surrogate, entropy (paper, main training)."""
 
 from __future__ import annotations
 
@@ -146,7 +146,9 @@ def make_terms(
         result["guidance"] = guidance
         ramp = min(1.0, step / max(1.0, training.ramp * training.steps))
         beta = training.guidance_start + ramp * (training.guidance - training.guidance_start)
-        loss = training.imitation * result["imitation"] + beta * guidance + training.entropy * result["entropy"]
+        loss = (
+            training.imitation * result["imitation"] + beta * guidance + training.entropy * result["entropy"]
+        )
         return {"loss": loss, **result}
 
     return terms

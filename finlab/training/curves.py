@@ -15,7 +15,7 @@ _FIXED = ("step", "samples", "seconds", "learning_rate")
 
 
 def plot_log(folder: Path) -> Path | None:
-    """Draw every loss term of `folder/log.csv` against samples seen; None where matplotlib is not installed."""
+    """Draw every loss term of `folder/log.csv` against samples seen; None without matplotlib."""
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure

@@ -89,7 +89,11 @@ def train(
     log = _Log(folder / LOG_FILE, done) if first else None
     end = min(settings.steps, stop_after or settings.steps)
     bar = tqdm(
-        total=settings.steps, initial=done, disable=not (first and sys.stderr.isatty()), unit="step", smoothing=0.05
+        total=settings.steps,
+        initial=done,
+        disable=not (first and sys.stderr.isatty()),
+        unit="step",
+        smoothing=0.05,
     )
     started = saved = time.monotonic()
     for step in range(done, end):
@@ -112,7 +116,9 @@ def train(
             if log is not None:
                 seconds = time.monotonic() - started
                 rate = (step + 1 - done) * settings.batch_size / seconds
-                log.write(step, (step + 1) * settings.batch_size, seconds, learning_rate(settings, step), values)
+                log.write(
+                    step, (step + 1) * settings.batch_size, seconds, learning_rate(settings, step), values
+                )
                 bar.set_postfix_str(f"loss {values['loss']:.4g}, {rate / 1e3:.1f} k samples/s")
         if first and (time.monotonic() - saved > settings.save_every_s or step == end - 1):
             # The state comes last: a run killed in between repeats a few steps and ships them after all.
@@ -155,7 +161,12 @@ class _Log:
         os.replace(path.with_suffix(".new"), path)
 
     def write(self, step: int, samples: int, seconds: float, rate: float, values: dict[str, float]) -> None:
-        fixed = {"step": step, "samples": samples, "seconds": f"{self.offset + seconds:.1f}", "learning_rate": f"{rate:.6g}"}
+        fixed = {
+            "step": step,
+            "samples": samples,
+            "seconds": f"{self.offset + seconds:.1f}",
+            "learning_rate": f"{rate:.6g}",
+        }
         self._row({**fixed, **{name: f"{value:.8g}" for name, value in values.items()}})
 
     def _row(self, row: dict[str, Any]) -> None:

@@ -26,7 +26,9 @@ def imitation(mixture: Mixture, batch: Batch, *, spread_only: bool) -> Tensor:
     return -mixture.log_prob(target, batch.mask)
 
 
-def tracking_error(surrogate: Surrogate, command: Tensor, batch: Batch, target: Tensor, std: Tensor) -> Tensor:
+def tracking_error(
+    surrogate: Surrogate, command: Tensor, batch: Batch, target: Tensor, std: Tensor
+) -> Tensor:
     """Normalized wrench residual (B, K, 6) of commands (B, K, n, 3), by the surrogate."""
     one = (t[:, None] for t in (batch.position, batch.mounting_angle, batch.lower, batch.upper, batch.mask))
     return surrogate(command, *one) / std - target[:, None]

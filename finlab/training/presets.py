@@ -109,7 +109,9 @@ _PAPER = Preset(
 _SMOKE = Preset(
     "smoke",
     surrogate=SurrogateConfig(hidden=(16,)),
-    network=NetworkConfig(width=32, heads=2, graph_layers=1, transformer_layers=1, feedforward=32, n_components=4),
+    network=NetworkConfig(
+        width=32, heads=2, graph_layers=1, transformer_layers=1, feedforward=32, n_components=4
+    ),
     surrogate_training=SurrogateTraining(steps=60, batch_size=256),
     allocator_training=replace(_DEFAULT.allocator_training, steps=40, batch_size=128, warmup=5, ema=0.9),
 )

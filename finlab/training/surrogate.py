@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,8 @@ from finlab.training.device import training_device
 from finlab.training.loop import LoopSettings, train
 from finlab.training.presets import get_preset
 
+Terms = Callable[[nn.Module, int], dict[str, Tensor]]
+"""Loss terms of a step of training."""
 TRAIN_SEED = 20_000
 """Added to the user's seed, so that no training stream equals one of evaluation."""
 NORMALIZATION_SAMPLES = 200_000
@@ -70,7 +73,9 @@ def train_surrogate(
         "surrogate": asdict(recipe.surrogate),
         "fin_model": spec_to_dict(spec),
     }
-    settings = LoopSettings(total, training.batch_size, training.learning_rate, warmup=min(100, total), ema=0.99)
+    settings = LoopSettings(
+        total, training.batch_size, training.learning_rate, warmup=min(100, total), ema=0.99
+    )
     weights = train(surrogate, terms, settings, out, identity, stop_after=stop_after)
     surrogate.load_state_dict(weights, strict=True)
     surrogate.cpu().eval().requires_grad_(False)
@@ -111,7 +116,9 @@ def surrogate_metrics(surrogate: Surrogate, model: FinModel, seed: int) -> dict[
     with torch.inference_mode():
         limits = (batch.lower, batch.upper, batch.mask)
         wrench = surrogate(batch.command, batch.position, batch.mounting_angle, *limits)
-        metrics = {"wrench_error_norm": float(((wrench - batch.wrench) / torch.tensor(std)).norm(dim=-1).mean())}
+        metrics = {
+            "wrench_error_norm": float(((wrench - batch.wrench) / torch.tensor(std)).norm(dim=-1).mean())
+        }
         if isinstance(surrogate, CoefficientSurrogate):
             command = batch.command[batch.mask]
             truth = model.force(command)
@@ -120,9 +127,11 @@ def surrogate_metrics(surrogate: Surrogate, model: FinModel, seed: int) -> dict[
     return metrics
 
 
-def _coefficient_terms(model: FinModel, batch_size: int, seed: int, device: torch.device):  # type: ignore[no-untyped-def]
+def _coefficient_terms(model: FinModel, batch_size: int, seed: int, device: torch.device) -> Terms:
     """Mean squared error of force coefficients over single fins: the same relative weight for all forces."""
-    low, high = (torch.tensor(v, dtype=torch.float32, device=device) for v in zip(*COMMAND_RANGE, strict=True))
+    low, high = (
+        torch.tensor(v, dtype=torch.float32, device=device) for v in zip(*COMMAND_RANGE, strict=True)
+    )
     a0, f0 = CoefficientSurrogate.REFERENCE
 
     def terms(net: nn.Module, step: int) -> dict[str, Tensor]:
@@ -135,7 +144,9 @@ def _coefficient_terms(model: FinModel, batch_size: int, seed: int, device: torc
     return terms
 
 
-def _wrench_terms(model: FinModel, batch_size: int, seed: int, normalization: Normalization, device: torch.device):  # type: ignore[no-untyped-def]
+def _wrench_terms(
+    model: FinModel, batch_size: int, seed: int, normalization: Normalization, device: torch.device
+) -> Terms:
     """The paper's L_phys: squared error of the normalized wrench of whole robots."""
     sampler = ForwardSampler(TRAIN_SEED + seed, batch_size, fin_model=model)
     std = torch.tensor(normalization.std, dtype=torch.float32, device=device)
