@@ -32,6 +32,8 @@ def add_commands(gui: viser.GuiApi, host: Host) -> None:
     add("Select nothing", lambda: session.select(None), "X")
     add("Fail or repair the selected fin", fail_selected, "F")
     add("Mirror the selected fin", session.mirror_fin, "M")
+    add("Unlink the selected fin from its mirror image", session.unlink_fin)
+    add("Stick the selected fin to the hull", session.stick_fin)
     add("Duplicate the selected fin", session.duplicate_fin)
     add("Delete the selected fin", session.delete_fin)
     add("Add a fin", session.add_fin)
@@ -39,6 +41,7 @@ def add_commands(gui: viser.GuiApi, host: Host) -> None:
     add("Start over", session.start_over)
     add("Freeze or move the fins", lambda: toggle("frozen"), "P")
     add("Show or hide the fin graph", lambda: toggle("graph"))
+    add("Show or hide the centre of gravity", lambda: toggle("center"))
     add("Dark or light theme", lambda: toggle("dark"))
     for view, key in (("3D", "1"), ("Top", "2"), ("Side", "3"), ("Front", "4")):
         add(f"Camera: {view}", partial(host.look_from, view), key)

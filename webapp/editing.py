@@ -3,17 +3,19 @@
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from finlab.errors import FinlabError
 from finlab.layout import Fin, Layout
+from webapp.angles import wrapped
+from webapp.links import existing_image, image
+from webapp.meshes.hull import hull_of
 from webapp.state import MAX_FINS, number
 
 MAX_COORDINATE = 2.0
 """How far out a fin may be placed in the browser [m]."""
-
-
-def wrapped(angle: float) -> float:
-    """The angle [rad] within (-pi, pi]."""
-    return math.pi - (math.pi - angle) % (2 * math.pi)
+STAND_OFF = 0.02
+"""Distance of a fin that sticks to the hull from its surface: room for the servo [m]."""
 
 
 def snapped(value: float, step: float) -> float:
@@ -37,16 +39,43 @@ def turned(layout: Layout, name: str, angle: float, step: float = 0.0) -> Layout
 
 
 def mirrored(layout: Layout, name: str) -> tuple[Layout, str]:
-    """The layout with a copy of a fin on the other side of the robot, and the copy's name.
+    """The layout with a fin's image on the other side of the robot, and the image's name.
 
-    The mirror is the xz plane: y changes sign, and so does the shaft's azimuth.
+    A fin that already stands there is taken for the image, and nothing is added.
     """
     fin = layout.fins[layout.index(name)]
-    x, y, z = fin.position
-    if abs(y) < 1e-3:
+    if abs(fin.position[1]) < 1e-3:
         raise FinlabError(f"{name} sits on the mirror plane (y = 0), so its mirror image is itself")
-    twin = replace(fin, position=(x, -y, z), mounting_angle=wrapped(-fin.mounting_angle))
-    return _added(layout, twin, _mirror_name(name))
+    there = existing_image(layout, name)
+    return (layout, there) if there is not None else _added(layout, image(fin), _mirror_name(name))
+
+
+def ring(layout: Layout, name: str, count: int) -> Layout:
+    """The layout with copies of a fin, so that `count` of them stand evenly around the vertical axis."""
+    fin = layout.fins[layout.index(name)]
+    x, y, z = fin.position
+    if math.hypot(x, y) < 1e-3:
+        raise FinlabError(f"{name} stands on the vertical axis, so its copies would all be in one place")
+    for k in range(1, round(number(count, "fins around the axis", 2, MAX_FINS))):
+        turn = 2 * math.pi * k / count
+        cos, sin = math.cos(turn), math.sin(turn)
+        place = (x * cos - y * sin, x * sin + y * cos, z)
+        copy = replace(fin, position=place, mounting_angle=wrapped(fin.mounting_angle + turn))
+        layout, _ = _added(layout, copy, name)
+    return layout
+
+
+def stuck(layout: Layout, name: str) -> Layout:
+    """The layout with a fin moved onto the hull's surface, its shaft along the surface's normal.
+
+    Shafts are horizontal, so of the normal only the azimuth is taken; where it points straight up or down
+    the shaft stays.
+    """
+    fin = layout.fins[layout.index(name)]
+    point, normal = hull_of(layout).nearest(np.array(fin.position))
+    azimuth = fin.mounting_angle if np.hypot(*normal[:2]) < 0.2 else math.atan2(normal[1], normal[0])
+    x, y, z = (round(float(v), 4) for v in point + STAND_OFF * normal)
+    return layout.replace_fin(name, position=(x, y, z), mounting_angle=wrapped(azimuth))
 
 
 def duplicated(layout: Layout, name: str) -> tuple[Layout, str]:

@@ -10,9 +10,11 @@ from typing import Any
 
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from webapp import editing
+from finlab.layout.body import Hull
+from webapp import editing, hull_editing
 from webapp.arrow_scale import NEWTONS
 from webapp.history import History
+from webapp.links import followed, linked, partner, unlinked
 from webapp.state import AXES, State, number
 from webapp.targets import FIRST, PRESETS
 from webapp.tour import STEPS
@@ -49,6 +51,12 @@ class Display:
     """Key of `POSITION_STEPS`."""
     angle_snap: str = "off"
     """Key of `ANGLE_STEPS`."""
+    stick: bool = False
+    """Fins slide on the hull, shafts along its normal."""
+    ghost: bool = True
+    """Show where moved fins stood when the layout was opened or saved."""
+    center: bool = False
+    """Mark the centre of gravity."""
 
 
 class Session:
@@ -60,8 +68,10 @@ class Session:
         self.history: History[State] = History(self._first)
         self.display = display or Display()
         self.selected: str | None = None
-        self.candidate = 0
-        """Which of the answer's candidates is shown; 0 is the best one."""
+        self.saved = layout
+        """The layout as it was opened or saved last."""
+        self.mode = 0
+        """Which of the answer's modes is shown; 0 is the best one."""
         self.stop: int | None = None
         """Where the tour is, None while there is none."""
         self._before_tour: State | None = None
@@ -85,9 +95,9 @@ class Session:
             self._settled()
 
     def _settled(self) -> None:
-        """After any change of the state: a choice of candidate is void, a lost fin is not selected."""
+        """After any change of the state: a choice of mode is void, a lost fin is not selected."""
         self.revision += 1
-        self.candidate = 0
+        self.mode = 0
         if self.selected not in self.state.layout.names:
             self.selected = None
 
@@ -115,33 +125,52 @@ class Session:
     # The layout.
 
     def open_layout(self, layout: Layout) -> None:
-        """Another layout; the target stays, failures are forgotten."""
-        self._commit(f"Open {layout.name}", replace(self.state, layout=layout, failed=()))
+        """Another layout; the target stays, failures and links are forgotten."""
+        self._commit(f"Open {layout.name}", replace(self.state, layout=layout, failed=(), links=()))
+        self.saved = layout
+
+    def note_saved(self) -> None:
+        """The layout has been saved as it is."""
+        self.saved = self.state.layout
 
     def move_fin(self, name: str, position: tuple[float, float, float]) -> None:
         """A fin at another place [m], snapped."""
-        step = POSITION_STEPS[self.display.position_snap]
-        self._edit(f"Move {name}", editing.moved(self.state.layout, name, position, step), f"move {name}")
+        self._place(f"Move {name}", editing.moved(self.state.layout, name, position, self._step_m), name)
 
     def turn_fin(self, name: str, angle: float) -> None:
         """A fin with another mounting angle [rad], snapped."""
-        step = math.radians(ANGLE_STEPS[self.display.angle_snap])
-        self._edit(f"Turn {name}", editing.turned(self.state.layout, name, angle, step), f"turn {name}")
+        layout = editing.turned(self.state.layout, name, angle, self._step_rad)
+        self._edit(f"Turn {name}", followed(layout, self.state.links, name), f"turn {name}")
 
     def drag_fin(self, name: str, position: tuple[float, float, float], angle: float) -> None:
         """A fin on its way in the user's hand: not snapped yet, and one step of undo for the whole drag."""
         layout = editing.turned(editing.moved(self.state.layout, name, position), name, angle)
-        self._commit(f"Move {name}", self.state.with_layout(layout), f"drag {name}", timed=False)
+        self._drag(name, layout)
 
     def end_drag(self, name: str, position: tuple[float, float, float], angle: float) -> None:
         """A drag is over: snap, and let the next change be a step of its own."""
-        snap_m = POSITION_STEPS[self.display.position_snap]
-        snap_rad = math.radians(ANGLE_STEPS[self.display.angle_snap])
-        layout = editing.turned(
-            editing.moved(self.state.layout, name, position, snap_m), name, angle, snap_rad
-        )
-        self._commit(f"Move {name}", self.state.with_layout(layout), f"drag {name}", timed=False)
+        layout = editing.moved(self.state.layout, name, position, self._step_m)
+        self._drag(name, editing.turned(layout, name, angle, self._step_rad))
         self.history.end_merge()
+
+    def _drag(self, name: str, layout: Layout) -> None:
+        if self.display.stick:
+            layout = editing.stuck(layout, name)
+        state = self.state.with_layout(followed(layout, self.state.links, name))
+        self._commit(f"Move {name}", state, f"drag {name}", timed=False)
+
+    def _place(self, step: str, layout: Layout, name: str) -> None:
+        if self.display.stick:
+            layout = editing.stuck(layout, name)
+        self._edit(step, followed(layout, self.state.links, name), f"move {name}")
+
+    @property
+    def _step_m(self) -> float:
+        return POSITION_STEPS[self.display.position_snap]
+
+    @property
+    def _step_rad(self) -> float:
+        return math.radians(ANGLE_STEPS[self.display.angle_snap])
 
     def add_fin(self) -> None:
         """One more fin; it is selected."""
@@ -157,11 +186,42 @@ class Session:
         self.selected = name
 
     def mirror_fin(self) -> None:
-        """The selected fin's image on the other side; it is selected."""
+        """The selected fin's image on the other side, linked to it; the image is selected."""
         source = self._selected_name()
         layout, name = editing.mirrored(self.state.layout, source)
-        self._edit(f"Mirror {source}", layout)
+        state = self.state.with_layout(layout)
+        self._commit(f"Mirror {source}", replace(state, links=linked(state.links, source, name)))
         self.selected = name
+
+    def unlink_fin(self) -> None:
+        """The selected fin and its mirror image go their own ways."""
+        name = self._selected_name()
+        if partner(self.state.links, name) is None:
+            raise FinlabError(f"{name} is not linked to another fin; Mirror links it to its image")
+        self._commit(f"Unlink {name}", replace(self.state, links=unlinked(self.state.links, name)))
+
+    def ring_of_fins(self, count: int) -> None:
+        """Copies of the selected fin, so that `count` stand evenly around the vertical axis."""
+        name = self._selected_name()
+        self._edit(f"{count} around the axis", editing.ring(self.state.layout, name, count))
+
+    def stick_fin(self) -> None:
+        """The selected fin onto the hull."""
+        name = self._selected_name()
+        layout = editing.stuck(self.state.layout, name)
+        self._edit(f"Stick {name} to the hull", followed(layout, self.state.links, name))
+
+    def set_hull(self, shape: str, size: tuple[float, float, float]) -> None:
+        """A parametric hull of a size [m]."""
+        self._edit(f"Hull {shape}", hull_editing.shaped(self.state.layout, shape, size), f"hull {shape}")
+
+    def import_hull(self, hull: Hull) -> None:
+        """A hull from a mesh file."""
+        self._edit("Import hull", hull_editing.with_hull(self.state.layout, hull))
+
+    def set_center_of_gravity(self, center: tuple[float, float, float]) -> None:
+        """The centre of gravity at another place in the hull [m]."""
+        self._edit("Move the centre of gravity", hull_editing.balanced(self.state.layout, center), "center")
 
     def delete_fin(self) -> None:
         """The selected fin goes."""
@@ -206,7 +266,7 @@ class Session:
     def _go(self, stop: int) -> None:
         step = STEPS[stop]
         self._commit(f"Tour: {step.title}", step.state(self.state))
-        self.stop, self.candidate, self.selected = stop, step.candidate, None
+        self.stop, self.mode, self.selected = stop, step.mode, None
         self.display = replace(self.display, graph=step.graph)
 
     # Looking.
@@ -223,9 +283,9 @@ class Session:
         names = self.state.layout.names
         self.select(names[(names.index(self.selected) + 1) % len(names)] if self.selected else names[0])
 
-    def show_candidate(self, index: int) -> None:
-        """Show one of the answer's candidates on the robot."""
-        self.candidate = max(0, int(index))
+    def show_mode(self, index: int) -> None:
+        """Show one of the answer's modes on the robot."""
+        self.mode = max(0, int(index))
 
     def set_display(self, key: str, value: Any) -> None:
         """One field of `Display`."""

@@ -6,6 +6,7 @@ from typing import Any
 from finlab.allocation.methods import METHODS
 from finlab.errors import FinlabError
 from finlab.layout import Layout
+from webapp.links import Links, kept
 
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 """Names of the wrench's components, in the order of the library."""
@@ -44,6 +45,8 @@ class State:
     """Weight of the energy in the ranking."""
     method: str = "learned"
     """Name of the allocation method."""
+    links: Links = ()
+    """Mirror pairs of fins that move together."""
 
     @property
     def healthy(self) -> tuple[str, ...]:
@@ -71,7 +74,8 @@ class State:
     def with_layout(self, layout: Layout) -> "State":
         """Another layout; failures of fins that still exist stay, unless none would work."""
         failed = tuple(name for name in layout.names if name in self.failed)
-        return replace(self, layout=layout, failed=() if len(failed) == layout.n_fins else failed)
+        failed = () if len(failed) == layout.n_fins else failed
+        return replace(self, layout=layout, failed=failed, links=kept(self.links, layout))
 
     def with_setting(self, key: str, value: Any) -> "State":
         """K, T, gamma or the method changed: `key` is the field's name."""

@@ -21,8 +21,8 @@ class Step:
     """Wrench that is asked for [N, N m]."""
     failed: tuple[str, ...] = ()
     """Fins that have failed."""
-    candidate: int = 0
-    """Which candidate is shown."""
+    mode: int = 0
+    """Which mode is shown."""
     graph: bool = False
     """Whether the fin graph is shown."""
 
@@ -52,7 +52,7 @@ STEPS = (
         "and this is the second. Choose more under Modes: fins change, the green sum stays.",
         "ucat",
         PRESETS["Turn"],
-        candidate=1,
+        mode=1,
     ),
     Step(
         "A fin fails",

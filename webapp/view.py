@@ -16,6 +16,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
 from webapp.commands import add_commands
 from webapp.files import file_stem, graph_bytes
+from webapp.modes import Mode, distinct_modes
 from webapp.panels.display import DisplayPanel
 from webapp.panels.header import Header
 from webapp.panels.host import Panel
@@ -57,6 +58,7 @@ class View:
         self._asked = -1
         self._best: Allocation | None = None
         self._best_revision = -1
+        self._modes: tuple[Mode, ...] = ()
         self._error: str | None = None
         self._error_revision = -1
         self._shown: tuple[Allocation, int, Allocation] | None = None
@@ -97,11 +99,17 @@ class View:
         return self._best
 
     @property
+    def modes(self) -> tuple[Mode, ...]:
+        """The newest answer's distinct modes."""
+        return self._modes
+
+    @property
     def shown(self) -> Allocation | None:
-        """The newest answer, with the chosen candidate's command."""
-        best, index = self._best, self.session.candidate
-        if best is None or best.candidates is None or not 0 < index < len(best.candidates.energy):
+        """The newest answer, with the chosen mode's command."""
+        best, mode = self._best, self.session.mode
+        if best is None or best.candidates is None or not 0 < mode < len(self._modes):
             return best
+        index = self._modes[mode].index
         if self._shown is None or self._shown[0] is not best or self._shown[1] != index:
             other = replace(best, command=best.candidates.command[index], wrench_surrogate=None)
             self._shown = (best, index, other)
@@ -238,6 +246,7 @@ class View:
         if revision < self._best_revision:
             return
         self._best, self._best_revision = allocation, revision
+        self._modes = distinct_modes(allocation.candidates)
         self._error = None
         self._refresh()
 

@@ -1,24 +1,17 @@
 """Sentences about an answer, for people."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.allocation import Allocation, Candidates
+from finlab.allocation.allocation import Allocation
 from finlab.layout import Layout
+from webapp.figures import listed
 from webapp.state import AXIS_UNITS, AXIS_WORDS
 
 REACHED = 0.05
 """Normalized error below which a target counts as reached."""
 AT_LIMIT = 0.995
 """Share of the upper limit from which a command counts as saturated."""
-
-
-def listed(items: Sequence[str]) -> str:
-    """`a`, `a and b`, `a, b and c`."""
-    items = list(items)
-    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
 
 
 def is_reached(allocation: Allocation) -> bool:
@@ -79,44 +72,3 @@ def saturated(allocation: Allocation) -> NDArray[np.bool_]:
     upper = np.array([fin.limits.upper[:2] for fin in allocation.layout.fins])
     with np.errstate(invalid="ignore"):
         return np.asarray(allocation.command[:, :2] >= AT_LIMIT * upper)
-
-
-def mode_names(candidates: Candidates) -> list[str]:
-    """What each candidate does: who rests, and who pushes another way than in the best one."""
-    return [_mode_name(command, candidates.command[0]) for command in candidates.command]
-
-
-def _mode_name(command: NDArray[np.float64], best: NDArray[np.float64]) -> str:
-    resting, resting_in_best = _resting(command), _resting(best)
-    turned = [
-        str(i + 1)
-        for i in range(len(command))
-        if i not in resting and i not in resting_in_best and np.cos(command[i, 2] - best[i, 2]) < 0.0
-    ]
-    parts = []
-    if resting:
-        rests = "rests" if len(resting) == 1 else "rest"
-        parts.append(f"fin{'s' if len(resting) > 1 else ''} {listed([str(i + 1) for i in resting])} {rests}")
-    if turned:
-        parts.append(f"fin{'s' if len(turned) > 1 else ''} {listed(turned)} reversed")
-    if resting == resting_in_best and not turned and (style := _style(command, best)):
-        parts.append(style)
-    return ", ".join(parts) or "all fins push"
-
-
-def _resting(command: NDArray[np.float64]) -> list[int]:
-    """Working fins that push next to nothing beside the strongest one; the thrust goes with sin^2(A) f^2."""
-    push = np.sin(command[:, 0]) ** 2 * command[:, 1] ** 2
-    return [i for i in range(len(push)) if push[i] < 0.15 * np.nanmax(push)]
-
-
-def _style(command: NDArray[np.float64], best: NDArray[np.float64]) -> str:
-    """How the fin that differs most from the best candidate beats: wide and slow, or narrow and quick;
-    nothing if there is no telling them apart."""
-    with np.errstate(invalid="ignore"):
-        wider = np.nan_to_num(np.log(command[:, 0] / best[:, 0]) - np.log(command[:, 1] / best[:, 1]))
-    wider[_resting(command)] = 0.0  # how a fin rests is no news
-    fin = int(np.argmax(np.abs(wider)))
-    if abs(wider[fin]) < 0.1:
-        return ""
-    return f"fin {fin + 1} {'wider and slower' if wider[fin] > 0 else 'narrower and quicker'}"

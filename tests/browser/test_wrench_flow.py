@@ -45,13 +45,16 @@ def test_last_fin_cannot_fail(page: Any) -> None:
     assert len(page.session.state.failed) == 3
 
 
-def test_candidate_is_shown_on_the_robot(page: Any) -> None:
+def test_mode_is_picked_in_plot_and_table(page: Any) -> None:
     page.tab("Modes")
+    page.until(lambda: len(page.view.modes) > 1 and page.page.locator("table.modes tr.pick").count() > 1)
     best = page.view.best
-    page.choose("Show", "3 ")
-    page.until(lambda: page.session.candidate == 2)
+    page.page.locator("table.modes tr.pick").nth(1).click()
+    page.until(lambda: page.session.mode == 1)
     page.until(lambda: page.view.shown is not best)
-    assert "3" in page.text("table.modes tr.chosen")
+    page.until(lambda: page.text("table.modes tr.chosen").startswith("2"))
+    page.page.locator("svg.plot:visible g.pick").last.click()  # the best one is drawn last
+    page.until(lambda: page.session.mode == 0)
     page.type("Candidates K", "16")
     page.until(lambda: page.session.state.n_candidates == 16 and not page.view.busy)
     assert len(page.view.best.samples.energy) == 16

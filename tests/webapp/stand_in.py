@@ -41,7 +41,7 @@ class StandIn(Allocator):
         noise = rng.normal(size=picks.shape) * (0.05 + self.temperature) * [0.5, 1.5, 2.0]
         samples = _ranked(layout, np.clip(picks + noise, lower, upper), targets[0], upper, "sampled")
         candidates = _ranked(layout, refined, targets[0], upper, "refined")
-        return Solution(candidates.command[:1], None, lambda: candidates, lambda: samples)
+        return Solution(candidates.command[:1], candidates=lambda: candidates, samples=lambda: samples)
 
 
 def _ranked(layout: Layout, command: Array, target: Array, upper: Array, source: str) -> Candidates:

@@ -10,12 +10,11 @@ from tests.webapp.stand_in import StandIn
 from webapp import files
 from webapp.arrow_scale import LENGTH, LONGEST, fitting_newtons
 from webapp.checks import check
-from webapp.plots import candidate_data
 from webapp.session import Session
 from webapp.state import State
 from webapp.targets import PRESETS, axis_reach, full_thrust
 from webapp.tour import STEPS
-from webapp.words import authority_sentence, is_reached, mode_names, reach_sentence, rest_sentence
+from webapp.words import authority_sentence, is_reached, reach_sentence, rest_sentence
 
 
 def test_reachable_and_not() -> None:
@@ -41,24 +40,6 @@ def test_reach_is_a_bound_that_is_met_on_heave() -> None:
     layout = load_layout(shipped_layouts()["ucat"])
     assert axis_reach(layout)[2] == pytest.approx(full_thrust(layout).sum())
     assert axis_reach(layout, ("front_left",))[2] == pytest.approx(full_thrust(layout)[1:].sum())
-
-
-def test_modes_have_names() -> None:
-    answer = StandIn().allocate(load_layout(shipped_layouts()["ucat"]), PRESETS["Turn"])
-    assert answer.candidates is not None
-    names = mode_names(answer.candidates)
-    assert len(names) == len(answer.candidates.energy) and all(names)
-
-
-def test_plot_columns_rise_and_hold_every_dot() -> None:
-    answer = StandIn().allocate(load_layout(shipped_layouts()["ucat"]), PRESETS["Turn"])
-    assert answer.samples is not None and answer.candidates is not None
-    energy, sampled, refined, shown = candidate_data(answer.samples, answer.candidates, 1)
-    assert (np.diff(energy) >= 0).all()
-    assert np.isfinite(sampled).sum() == 64
-    assert np.isfinite(refined).sum() == len(answer.candidates.energy)
-    assert np.isfinite(shown).sum() == 1
-    assert len(candidate_data(None, None, 0)[0]) == 1
 
 
 def test_arrow_scale_fits_and_rests() -> None:

@@ -4,6 +4,7 @@ import math
 from html import escape
 
 from finlab.allocation.allocation import Allocation
+from webapp.figures import small, three_digits
 from webapp.state import State
 from webapp.theme import ASKED, DELIVERED, MISSING, TORQUE_SCALE, css
 from webapp.words import is_reached, reach_sentence
@@ -43,10 +44,11 @@ def _status(state: State, allocation: Allocation | None, busy: bool, error: str 
         parts.append("<span class='dim'>computing …</span>")
     else:
         color = DELIVERED if is_reached(allocation) else MISSING
+        energy, time = three_digits(allocation.energy), three_digits(allocation.solve_ms)
         parts += [
-            f"<span><span class='dim'>error</span> <b class='err'>{allocation.err_norm:.3f}</b></span>",
-            f"<span><span class='dim'>energy</span> <b class='energy'>{allocation.energy:.3f}</b></span>",
-            f"<span><span class='dim'>{escape(allocation.method)}</span> {allocation.solve_ms:.0f} ms</span>",
+            f"<span><span class='dim'>error</span> <b class='err'>{small(allocation.err_norm)}</b> σ</span>",
+            f"<span><span class='dim'>energy</span> <b class='energy'>{energy}</b></span>",
+            f"<span><span class='dim'>{escape(allocation.method)}</span> {time} ms</span>",
             f"<span class='pill' style='background:{css(color)}'>{escape(reach_sentence(allocation))}</span>",
         ]
         if busy:

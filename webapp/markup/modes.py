@@ -1,28 +1,33 @@
-"""The table of an answer's distinct candidates."""
+"""The table of an answer's distinct modes."""
 
 from html import escape
 
 from finlab.allocation.allocation import Candidates
-from webapp.words import mode_names
+from webapp.figures import small, three_digits
+from webapp.markup.picking import pick
+from webapp.modes import Mode
 
-MOST_ROWS = 8
-"""Candidates that are listed."""
 
+def mode_table(candidates: Candidates | None, modes: tuple[Mode, ...], shown: int, picker: str) -> str:
+    """Error, energy and a name for each mode.
 
-def mode_table(candidates: Candidates | None, shown: int) -> str:
-    """Error, energy and a name for each candidate; the shown one is marked."""
-    if candidates is None or len(candidates.energy) == 0:
+    Args:
+        candidates: the answer's candidates.
+        modes: its modes.
+        shown: which mode moves the fins.
+        picker: class of the marker before the buttons that a click on a row presses.
+    """
+    if candidates is None or not modes:
         return "<div class='fl dim'>This method gives one answer and no candidates.</div>"
     rows = []
-    for k, name in enumerate(mode_names(candidates)[:MOST_ROWS]):
+    for k, mode in enumerate(modes):
         kind = "chosen" if k == shown else ""
+        several = f" <span class='dim'>×{mode.size}</span>" if mode.size > 1 else ""
         rows.append(
-            f"<tr class='{kind}'><td>{k + 1}</td><td class='words'>{escape(name)}</td>"
-            f"<td>{_error(candidates.err_norm[k])}</td><td>{candidates.energy[k]:.3f}</td></tr>"
+            f"<tr class='{kind} pick' {pick(picker, k)}><td>{k + 1}</td>"
+            f"<td class='words'>{escape(mode.name)}{several}</td>"
+            f"<td>{small(float(candidates.err_norm[mode.index]))}</td>"
+            f"<td>{three_digits(float(candidates.energy[mode.index]))}</td></tr>"
         )
-    header = "<tr><th>#</th><th class='words'>mode</th><th>error</th><th>energy</th></tr>"
+    header = "<tr><th>#</th><th class='words'>mode</th><th>error [σ]</th><th>energy</th></tr>"
     return f"<div class='fl'><table class='modes'>{header}{''.join(rows)}</table></div>"
-
-
-def _error(value: float) -> str:
-    return f"{value:.4f}" if value >= 5e-5 else "0.0000"

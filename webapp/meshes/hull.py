@@ -1,12 +1,17 @@
-"""Hulls: one closed profile along x with a superelliptic cross-section, in four shapes."""
+"""Hulls drawn from a shape and a size: a closed profile along x with a superelliptic cross-section."""
 
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.meshes.mesh import Mesh, revolved
+from webapp.meshes.mesh_hull import MeshHull
+from webapp.meshes.triangles import Triangles
 
 Array = NDArray[np.float64]
 
@@ -69,11 +74,27 @@ class Hull:
         inside = np.flatnonzero(self.contains(way))
         return np.asarray(way[inside[0]] if len(inside) else axis)
 
+    def nearest(self, point: Array) -> tuple[Array, Array]:
+        """The point (3,) of the surface nearest to `point`, and the outward normal (3,) there."""
+        return _triangles(self).nearest(point)
 
-def hull_of(layout: Layout) -> Hull:
+
+@lru_cache(maxsize=8)
+def _triangles(hull: Hull) -> Triangles:
+    return Triangles(hull.mesh())
+
+
+AnyHull = Hull | MeshHull
+
+
+def hull_of(layout: Layout) -> AnyHull:
     """The hull that the layout describes, or one that fits between its fins."""
     described = layout.body.hull if layout.body is not None else None
-    if described is not None and described.shape is not None and described.size_m is not None:
+    if described is not None and described.mesh is not None:
+        x, y, z = described.center_m
+        with suppress(FinlabError):  # the file may be on another computer; a made-up hull is better than none
+            return MeshHull.load(described.mesh, described.scale, (x, y, z))
+    elif described is not None and described.shape is not None and described.size_m is not None:
         length, width, height = described.size_m
         x, y, z = described.center_m
         return Hull(described.shape, (length / 2, width / 2, height / 2), (x, y, z))

@@ -15,6 +15,8 @@ SWITCHES = {
     "labels": ("Fin numbers", "A number at the root of each fin."),
     "graph": ("Fin graph", "Edges between working fins: what the network sees."),
     "dimensions": ("Dimensions", "Coordinates of the selected fin."),
+    "ghost": ("Ghost", "Where moved fins stood when the layout was opened or saved."),
+    "center": ("Centre of gravity", "Mark it, and look through the hull."),
     "shadows": ("Shadows", "Slow without a graphics card."),
     "dark": ("Dark", "Dark theme."),
 }

@@ -6,6 +6,7 @@ from typing import Protocol
 import viser
 
 from finlab.allocation.allocation import Allocation
+from webapp.modes import Mode
 from webapp.session import Session
 
 
@@ -22,8 +23,12 @@ class Host(Protocol):
         """The newest answer; it may be older than the state."""
 
     @property
+    def modes(self) -> tuple[Mode, ...]:
+        """Its distinct modes."""
+
+    @property
     def shown(self) -> Allocation | None:
-        """The answer with the chosen candidate's command."""
+        """The answer with the chosen mode's command."""
 
     @property
     def busy(self) -> bool:

@@ -11,6 +11,7 @@ from webapp.checks import check
 from webapp.handles import on_user_change, on_user_click, put
 from webapp.markup.check_card import check_card
 from webapp.panels.host import Host
+from webapp.panels.hull import HullPanel
 from webapp.session import ANGLE_STEPS, POSITION_STEPS
 from webapp.shipped import shipped, shipped_name
 from webapp.state import MAX_FINS
@@ -47,10 +48,25 @@ class LayoutPanel:
             on_user_change(self._snap_m, partial(self._set_display, "position_snap"))
             self._snap_deg = gui.add_dropdown("Snap turn", tuple(ANGLE_STEPS), hint="Grid for the shaft.")
             on_user_change(self._snap_deg, partial(self._set_display, "angle_snap"))
-        self._edit = gui.add_button_group("Selected fin", ("Mirror", "Duplicate", "Delete"))
+            self._stick = gui.add_checkbox(
+                "Stick to hull", False, hint="Fins slide on the hull's surface, shafts along its normal."
+            )
+            on_user_change(self._stick, partial(self._set_display, "stick"))
+        self._edit = gui.add_button_group(
+            "Selected fin",
+            ("Mirror", "Unlink", "Duplicate", "Delete", "To hull"),
+            hint="A mirror image moves with its fin until it is unlinked.",
+        )
         on_user_change(self._edit, self._edit_fin)
+        self._ring = gui.add_button_group(
+            "Around axis",
+            ("2", "3", "4", "5", "6", "8"),
+            hint="Copies, so that so many stand around the vertical axis.",
+        )
+        on_user_change(self._ring, self._copy_around)
         self._add = gui.add_button("Add a fin", icon=viser.Icon.PLUS, hint=f"Up to {MAX_FINS} fins.")
         on_user_click(self._add, lambda: host.do(host.session.add_fin))
+        self._hull = HullPanel(gui, host)
         self._card = gui.add_html("")
         self._checked: Layout | None = None
 
@@ -70,18 +86,24 @@ class LayoutPanel:
                 partial(self._host.session.turn_fin, self._host.session.selected, math.radians(degrees))
             )
 
-    def _set_display(self, key: str, value: str) -> None:
+    def _set_display(self, key: str, value: str | bool) -> None:
         self._host.do(partial(self._host.session.set_display, key, value))
 
     def _edit_fin(self, button: str) -> None:
         session = self._host.session
         acts = {
             "Mirror": session.mirror_fin,
+            "Unlink": session.unlink_fin,
             "Duplicate": session.duplicate_fin,
             "Delete": session.delete_fin,
+            "To hull": session.stick_fin,
         }
         if button in acts:
             self._host.do(acts[button])
+
+    def _copy_around(self, button: str) -> None:
+        if button.isdigit():
+            self._host.do(partial(self._host.session.ring_of_fins, int(button)))
 
     def refresh(self) -> None:
         """Write the layout and the selected fin."""
@@ -96,10 +118,15 @@ class LayoutPanel:
             fin = layout.fins[layout.index(session.selected)]
             put(self._position, value=tuple(round(v, 4) for v in fin.position))
             put(self._angle, value=round(math.degrees(fin.mounting_angle), 1))
+        self._hull.refresh()
+        put(self._stick, value=session.display.stick)
         put(self._snap_m, value=session.display.position_snap)
         put(self._snap_deg, value=session.display.angle_snap)
         first = layout.description.strip().split("\n")[0]
-        put(self._about, content=f"<div class='fl dim'>{escape(first)}</div>")
+        pairs = "".join(
+            f"<div>{escape(a)} ⇄ {escape(b)} move together.</div>" for a, b in session.state.links
+        )
+        put(self._about, content=f"<div class='fl'><div class='dim'>{escape(first)}</div>{pairs}</div>")
         if layout != self._checked:
             self._checked = layout
             put(self._card, content=check_card(layout, check(layout)))

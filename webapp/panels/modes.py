@@ -6,11 +6,10 @@ import viser
 
 from finlab.allocation.methods import METHODS
 from webapp.handles import on_user_change, put
-from webapp.markup.modes import MOST_ROWS, mode_table
+from webapp.markup.modes import mode_table
 from webapp.panels.host import Host
-from webapp.plots import CandidatePlot
+from webapp.panels.mode_picker import ModePicker
 from webapp.state import CANDIDATE_RANGE, GAMMA_RANGE, TEMPERATURE_RANGE
-from webapp.words import mode_names
 
 
 class ModesPanel:
@@ -38,30 +37,19 @@ class ModesPanel:
             ("gamma", self._gamma),
         ):
             on_user_change(widget, partial(self._set, key))
-        self._plot = CandidatePlot(gui, height=260)
-        self._choice = gui.add_dropdown("Show", ("1",), hint="Which candidate moves the fins.")
-        on_user_change(self._choice, self._choose)
+        self._picker = ModePicker(gui, host, 250, "fl-modes")
         self._table = gui.add_html("")
 
     def _set(self, key: str, value: object) -> None:
         self._host.do(partial(self._host.session.set_setting, key, value))
 
-    def _choose(self, entry: str) -> None:
-        index = int(entry.split(" ")[0]) - 1 if entry[:1].isdigit() else 0
-        self._host.do(partial(self._host.session.show_candidate, index))
-
     def refresh(self) -> None:
         """Write settings and candidates."""
-        state, best, shown = self._host.session.state, self._host.best, self._host.session.candidate
+        host, state = self._host, self._host.session.state
         put(self._method, value=state.method)
         put(self._count, value=state.n_candidates)
         put(self._temperature, value=state.temperature)
         put(self._gamma, value=state.gamma)
-        candidates = None if best is None else best.candidates
-        self._plot.refresh(best, shown)
-        entries: tuple[str, ...] = ("1 only answer",)
-        if candidates is not None and len(candidates.energy):
-            entries = tuple(f"{k + 1} {name}" for k, name in enumerate(mode_names(candidates)[:MOST_ROWS]))
-        put(self._choice, options=entries)
-        put(self._choice, value=entries[min(shown, len(entries) - 1)])
-        put(self._table, content=mode_table(candidates, shown))
+        self._picker.refresh()
+        candidates = None if host.best is None else host.best.candidates
+        put(self._table, content=mode_table(candidates, host.modes, self._picker.shown, self._picker.name))

@@ -52,6 +52,7 @@ class TakeHomePanel:
         self._host.client.send_file_download(
             f"{files.file_stem(layout.name)}.yaml", files.layout_bytes(layout), save_immediately=True
         )
+        self._host.session.note_saved()
 
     def _send_candidates(self) -> None:
         self._host.client.send_file_download(

@@ -9,10 +9,12 @@ from finlab.layout import Layout
 from webapp.handles import on_user_change, put
 from webapp.markup.bars import wrench_bars
 from webapp.markup.fins import fin_table
+from webapp.markup.picking import button_colors
 from webapp.panels.host import Host
-from webapp.plots import CandidatePlot
+from webapp.panels.mode_picker import ModePicker
 from webapp.state import AXES, AXIS_UNITS, AXIS_WORDS
 from webapp.targets import PRESETS, axis_reach, full_thrust, slider_end
+from webapp.theme import DEAD, css, fin_color
 from webapp.words import authority_sentence, rest_sentence
 
 
@@ -36,13 +38,14 @@ class WrenchPanel:
         ]
         for k, slider in enumerate(self._sliders):
             on_user_change(slider, partial(self._set_target, k))
+        self._paint = gui.add_html("")
         self._failures = gui.add_button_group(
             "Fail a fin", ("1",), hint="Press a fin's number: fail or repair it."
         )
         on_user_change(self._failures, self._toggle_failure)
         self._bars = gui.add_html("")
         self._table = gui.add_html("")
-        self._plot = CandidatePlot(gui, height=190)
+        self._picker = ModePicker(gui, host, 190, "fl-wrench-modes")
         self._ranges_for: tuple[Layout, tuple[str, ...]] | None = None
         self._reach = np.ones(6)
         self._full = np.ones(1)
@@ -60,7 +63,6 @@ class WrenchPanel:
         """Write target, failures and answer."""
         host, state = self._host, self._host.session.state
         self._refresh_ranges()
-        self._plot.refresh(host.best, host.session.candidate)
         for slider, value in zip(self._sliders, state.target, strict=True):
             low, high = min(slider.min, value), max(slider.max, value)
             put(slider, min=low, max=high)
@@ -71,6 +73,12 @@ class WrenchPanel:
                 f"{i + 1} ✕" if n in state.failed else str(i + 1) for i, n in enumerate(state.layout.names)
             ),
         )
+        colors = [
+            (css(DEAD), "#fff") if n in state.failed else (css(fin_color(i)), "#111")
+            for i, n in enumerate(state.layout.names)
+        ]
+        put(self._paint, content=button_colors("fl-fails", colors))
+        self._picker.refresh()
         answer = host.shown
         sentence = "" if answer is None else rest_sentence(answer)
         blind = authority_sentence(state.layout, state.failed, self._reach)

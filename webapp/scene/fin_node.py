@@ -12,7 +12,7 @@ from finlab.layout import Fin
 from webapp.handles import put
 from webapp.meshes import fin as fin_mesh
 from webapp.meshes.arrows import NOTHING, force_arrow
-from webapp.meshes.hull import Hull
+from webapp.meshes.hull import AnyHull
 from webapp.meshes.mesh import Mesh, tube
 from webapp.scene.shape import Shape
 from webapp.theme import DEAD, LIGHT, Rgb, fin_color
@@ -118,7 +118,7 @@ class FinNode:
         put(self._turn, active_axes=(False,) * 3)
         put(self._strut.node, visible=False)
 
-    def place(self, fin: Fin, hull: Hull, selected: bool, label: str | None, owned_by_user: bool) -> None:
+    def place(self, fin: Fin, hull: AnyHull, selected: bool, label: str | None, owned_by_user: bool) -> None:
         """Show a fin.
 
         Args:
@@ -163,7 +163,7 @@ class FinNode:
         self._blade.wxyz = (math.cos(angle / 2), math.sin(angle / 2), 0.0, 0.0)
 
 
-def _strut(servo: Array, hull: Hull) -> Mesh:
+def _strut(servo: Array, hull: AnyHull) -> Mesh:
     """A rod from the servo to the hull, nothing where the servo already sits in it."""
     anchor = hull.anchor(servo)
     if np.linalg.norm(anchor - servo) < 5e-3:

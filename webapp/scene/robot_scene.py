@@ -12,6 +12,7 @@ from finlab.allocation.allocation import Allocation
 from webapp.arrow_scale import LENGTH, fitting_newtons
 from webapp.meshes.hull import hull_of
 from webapp.scene.fin_node import FinNode
+from webapp.scene.ghost import Ghost
 from webapp.scene.lines import Lines
 from webapp.scene.stage import Stage
 from webapp.scene.wrench_nodes import WrenchNodes
@@ -20,7 +21,7 @@ from webapp.state import State
 from webapp.words import missing_part
 
 CAMERAS = {
-    "3D": (0.72, 0.70, 0.52),
+    "3D": (0.53, 0.50, 0.66),
     "Top": (-0.001, 0.0, 1.35),
     "Side": (0.0, -1.3, 0.1),
     "Front": (1.3, 0.0, 0.1),
@@ -54,6 +55,7 @@ class RobotScene:
         self._stage = Stage(scene, hull_of(session.state.layout))
         self._wrench = WrenchNodes(scene)
         self._lines = Lines(scene)
+        self._ghost = Ghost(scene)
         self._fins: list[FinNode] = []
         self._dragged: int | None = None
         self._phase: NDArray[Any] = np.zeros(0)
@@ -75,7 +77,7 @@ class RobotScene:
         state, display = self._session.state, self._session.display
         hull = hull_of(state.layout)
         if self._dragged is None:  # a hull that breathes with the fin one drags is hard to aim at
-            self._stage.refresh(hull, display.dark, display.shadows, display.graph)
+            self._stage.refresh(hull, display.dark, display.shadows, display.graph, display.center)
         while len(self._fins) < state.layout.n_fins:
             self._fins.append(FinNode(self._client.scene, len(self._fins), self._clicked, self._drag))
         for node in self._fins[state.layout.n_fins :]:
@@ -96,6 +98,7 @@ class RobotScene:
                 self._fins[i].command(allocation.command[i], force * scale, angle, display.fans)
         if fits and allocation is not None:
             self._take_command(allocation.command)
+        self._ghost.refresh(self._session.saved if display.ghost else None, state.layout)
         target = np.array(state.target)
         given = allocation.wrench if allocation is not None else None
         missing = np.zeros(6) if allocation is None else missing_part(allocation)

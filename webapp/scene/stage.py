@@ -4,7 +4,7 @@ import numpy as np
 import viser
 
 from webapp.handles import put
-from webapp.meshes.hull import Hull
+from webapp.meshes.hull import AnyHull
 from webapp.theme import Look, look
 
 FLOOR_SIZE = 6.0
@@ -14,7 +14,7 @@ FLOOR_SIZE = 6.0
 class Stage:
     """Everything that stays where it is while fins are edited."""
 
-    def __init__(self, scene: viser.SceneApi, hull: Hull) -> None:
+    def __init__(self, scene: viser.SceneApi, hull: AnyHull) -> None:
         """Build the stage around a hull."""
         self._scene = scene
         self._dark: bool | None = None
@@ -24,6 +24,9 @@ class Stage:
         self._body = scene.add_mesh_simple("/hull", mesh.vertices, mesh.faces, side="double")
         self._bow = scene.add_mesh_simple(
             "/hull/bow", bow.vertices, bow.faces, side="double", cast_shadow=False
+        )
+        self._center = scene.add_label(
+            "/axes/center", "⊕ centre of gravity", anchor="bottom-left", font_screen_scale=0.85, visible=False
         )
         scene.add_frame(
             "/axes", axes_length=0.09, axes_radius=0.004, origin_radius=0.009, origin_color=(40, 40, 40)
@@ -41,9 +44,11 @@ class Stage:
             shadow_opacity=0.22,
         )
 
-    def refresh(self, hull: Hull, dark: bool, shadows: bool, glass: bool) -> None:
+    def refresh(self, hull: AnyHull, dark: bool, shadows: bool, glass: bool, center: bool) -> None:
         """Show another hull, theme or quality; a hull of glass lets one look at the lines inside."""
-        put(self._body, opacity=0.35 if glass else None)
+        put(self._body, opacity=0.35 if glass or center else None)
+        put(self._bow, opacity=0.35 if glass or center else None)
+        put(self._center, visible=center)
         if hull != self._hull:
             self._hull = hull
             for node, mesh in ((self._body, hull.mesh()), (self._bow, hull.bow())):
@@ -57,7 +62,7 @@ class Stage:
             self._paint(look(dark))
 
     @staticmethod
-    def floor_height(hull: Hull) -> float:
+    def floor_height(hull: AnyHull) -> float:
         """Height of the floor: a hand below the keel [m]."""
         return hull.center[2] - hull.half[2] - 0.22
 

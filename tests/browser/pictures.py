@@ -1,0 +1,92 @@
+"""Takes the pictures of docs/: `python -m tests.browser.pictures docs`, with the shipped checkpoint.
+
+Not a test: run it after the app's looks have changed, and look at every picture.
+"""
+
+import io
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+
+from tests.browser.conftest import CHROMIUM, FLAGS, Served
+from tests.browser.page import Page
+
+SIZE = {"width": 1400, "height": 860}
+
+
+def save(page: Page, path: Path) -> None:
+    """A screenshot without the notes, squeezed as far as it goes without losing anything."""
+    page.close_notes()
+    page.page.wait_for_timeout(2500)
+    picture = Image.open(io.BytesIO(page.page.screenshot())).convert("RGB")
+    picture.save(path, optimize=True)
+    print(path, path.stat().st_size // 1000, "kB", flush=True)
+
+
+def _layout(page: Page) -> None:
+    page.key("n")
+    page.tab("Layout")
+
+
+def _modes(page: Page) -> None:
+    page.key("x")
+    page.tab("Modes")
+
+
+def _failure(page: Page) -> None:
+    page.tab("Wrench")
+    page.press("2")
+    page.until(lambda: not page.view.busy)
+
+
+def _tour(page: Page) -> None:
+    page.press("2 ✕")
+    page.press("Tour")
+    page.press("Next")
+    page.until(lambda: not page.view.busy)
+
+
+SCENES: dict[str, Callable[[Page], object]] = {
+    "app": lambda page: None,
+    "app-layout": _layout,
+    "app-modes": _modes,
+    "app-failure": _failure,
+    "app-tour": _tour,
+}
+"""Picture and what to do before it; each goes on from the one before."""
+
+
+def main(folder: Path, wanted: list[str]) -> None:
+    """Take the pictures, all or those named."""
+    from playwright.sync_api import sync_playwright
+
+    from finlab.assets import shipped_layouts
+    from finlab.layout import load_layout
+    from webapp.app import App
+    from webapp.session import Display
+    from webapp.solver import Solver
+    from webapp.viser_internals import start_server, stop_server
+
+    server = start_server("127.0.0.1", 0)
+    app = App(server, Solver(), load_layout(shipped_layouts()["ucat"]), Display())
+    with sync_playwright() as playwright:
+        browser: Any = playwright.chromium.launch(
+            executable_path=CHROMIUM, headless=True, chromium_sandbox=False, args=FLAGS
+        )
+        page = Page(
+            browser.new_page(viewport=SIZE), Served(f"http://127.0.0.1:{server.get_port()}/", app, server)
+        )
+        for name, prepare in SCENES.items():
+            prepare(page)
+            if not wanted or name in wanted:
+                save(page, folder / f"{name}.png")
+        browser.close()
+    app.stop()
+    stop_server(server)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), sys.argv[2:])

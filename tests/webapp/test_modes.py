@@ -1,0 +1,75 @@
+"""Candidates that do the same are one mode, and no two modes share a name."""
+
+import numpy as np
+
+from finlab.allocation.allocation import Candidates
+from finlab.assets import shipped_layouts
+from finlab.layout import load_layout
+from tests.webapp.stand_in import StandIn
+from webapp.figures import small, three_digits
+from webapp.markup.mode_plot import mode_plot
+from webapp.markup.modes import mode_table
+from webapp.modes import distinct_modes
+from webapp.targets import PRESETS
+
+PUSH, REST = (0.3, 1.1, 0.0), (0.05, 0.1, 0.0)
+
+
+def candidates(*commands: list[tuple[float, float, float]]) -> Candidates:
+    command = np.array(commands)
+    k = len(command)
+    return Candidates(command, np.zeros((k, 6)), np.full(k, 1e-6), np.arange(k) + 2.0, ("refined",) * k)
+
+
+def test_how_a_fin_rests_is_no_news() -> None:
+    modes = distinct_modes(candidates([PUSH, REST], [PUSH, (0.2, 0.1, 3.0)], [REST, PUSH]))
+    assert [mode.name for mode in modes] == ["fin 2 rests", "fin 1 rests"]
+    assert [mode.size for mode in modes] == [2, 1] and modes[1].index == 2
+
+
+def test_directions_wrap() -> None:
+    modes = distinct_modes(candidates([(0.3, 1.0, np.pi), PUSH], [(0.3, 1.0, -np.pi + 0.01), PUSH]))
+    assert len(modes) == 1
+
+
+def test_names_tell_modes_apart() -> None:
+    modes = distinct_modes(
+        candidates(
+            [PUSH, PUSH],
+            [PUSH, (0.3, 1.1, 3.1)],
+            [(0.5, 0.7, 0.0), PUSH],
+            [PUSH, (0.3, 1.1, 1.0)],
+            [(0.3, 1.6, 0.0), PUSH],
+        )
+    )
+    names = [mode.name for mode in modes]
+    assert len(set(names)) == len(names) == 5
+    assert names[0] == "all fins push" and names[1].endswith("fin 2 reversed")
+    assert "fin 1 wider and slower" in names[2] and "fin 2 turned +57°" in names[3]
+    assert "fin 1" in names[4]
+
+
+def test_failed_fins_are_left_out() -> None:
+    modes = distinct_modes(candidates([(np.nan,) * 3, PUSH, REST]))
+    assert modes[0].name == "fin 3 rests"
+    assert distinct_modes(None) == ()
+
+
+def test_real_candidates_are_drawn_and_listed() -> None:
+    answer = StandIn().allocate(load_layout(shipped_layouts()["ucat"]), PRESETS["Turn"])
+    modes = distinct_modes(answer.candidates)
+    assert answer.candidates is not None and answer.samples is not None
+    assert sum(mode.size for mode in modes) == len(answer.candidates.energy)
+    plot = mode_plot(answer, modes, 0, 200, "here")
+    assert plot.count("onclick") == len(modes)
+    assert plot.count("r='2.4'") == 1 + len(answer.samples.energy), "one more in the legend"
+    table = mode_table(answer.candidates, modes, 0, "here")
+    assert table.count("onclick") == len(modes) and "0.0000" not in table
+    assert "no candidates" in mode_table(None, (), 0, "here")
+
+
+def test_figures_keep_their_width() -> None:
+    assert {len(small(v)) for v in (0.0, 3.1e-5, 1.2345, 99.0)} == {8}
+    assert [three_digits(v) for v in (2.319, 0.041, 12.5, 0.0)] == ["2.32", "0.0410", "12.5", "0.00"]
+    assert three_digits(float("nan")) == small(float("nan")) == "–"
+    assert "−" in small(1e-5) and "-" not in three_digits(-2e-9)
