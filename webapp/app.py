@@ -16,19 +16,24 @@ from finlab.deploy.graph_file import read_graph
 from finlab.errors import FinlabError
 from finlab.layout import Layout, load_layout
 from webapp.files import GRAPH_SUFFIX
+from webapp.guard import Guard
+from webapp.keeping import SessionFiles
 from webapp.session import Display, Session
 from webapp.solver import Solver
 from webapp.state import State
 from webapp.store import SessionStore
 from webapp.targets import FIRST
+from webapp.uploads import cache_folder
 from webapp.view import View
-from webapp.viser_internals import disable_sharing, start_server, stop_server
+from webapp.viser_internals import disable_sharing, start_guarded, stop_server
 from webapp.worker import Worker
 
 FIRST_LAYOUT = "ucat"
 """The shipped layout that a new session opens."""
 FRAME_S = 1 / 25
 """Time between two poses of the fins [s]."""
+KEEP_S = 2.0
+"""How often changed sessions are written to disk [s]."""
 STORAGE_KEY = "finlab-sessions"
 """Where a browser keeps the keys of its sessions."""
 MAX_KEYS = 8
@@ -39,7 +44,12 @@ class App:
     """Connects browsers to sessions on a running viser server."""
 
     def __init__(
-        self, server: viser.ViserServer, solver: Solver, layout: Layout, display: Display | None = None
+        self,
+        server: viser.ViserServer,
+        solver: Solver,
+        layout: Layout,
+        display: Display | None = None,
+        folder: Path | None = None,
     ) -> None:
         """Take over a server.
 
@@ -48,11 +58,14 @@ class App:
             solver: answers their questions.
             layout: what a new session opens.
             display: how a new session looks.
+            folder: where sessions are kept beyond the life of the server; None keeps none.
         """
         self._server = server
         self._solver = solver
         self._worker = Worker()
-        self._store = SessionStore(lambda: Session(layout, display))
+        self._store = SessionStore(
+            lambda: Session(layout, display), None if folder is None else SessionFiles(folder)
+        )
         self.views: dict[int, View] = {}
         """The pages that are open, by client."""
         self._keys: dict[int, str] = {}
@@ -66,7 +79,10 @@ class App:
     def stop(self) -> None:
         """Stop the clock and the worker; the server is stopped by its owner."""
         self._clock.cancel()
+        with contextlib.suppress(TimeoutError, RuntimeError):  # one turn of the loop, so that the clock ends
+            asyncio.run_coroutine_threadsafe(asyncio.sleep(0.01), self._loop).result(2.0)
         self._worker.stop()
+        self._store.keep()
 
     def _connected(self, client: viser.ClientHandle) -> None:
         # Plain `def`: viser runs it on a thread of its pool, where waiting for the page is allowed.
@@ -101,7 +117,7 @@ class App:
             self._store.leave(self._keys.pop(client_id))
 
     async def _animate(self) -> None:
-        before = time.monotonic()
+        before = kept = time.monotonic()
         while True:
             await asyncio.sleep(FRAME_S)
             now = time.monotonic()
@@ -109,6 +125,9 @@ class App:
                 # A long pause (a busy machine) must not become a leap of the fins.
                 view.scene.animate(min(now - before, 0.2))
             before = now
+            if now - kept > KEEP_S:
+                kept = now
+                self._store.keep()
 
 
 def _answers(client: viser.ClientHandle) -> bool:
@@ -134,7 +153,8 @@ def serve(
     """Serve the app until SIGTERM or Ctrl-C.
 
     Args:
-        host: address to listen on; only this machine can reach the default.
+        host: address to listen on. Only this machine can reach the default; for any other one the printed
+            address carries a token, without which nothing is shown.
         port: port to listen on; 0 takes a free one.
         layout: file, or name of a shipped layout, that a new session opens; None for the U-CAT.
         checkpoint: folder or name of a checkpoint; None for the shipped one.
@@ -147,12 +167,14 @@ def serve(
     solver = Solver(checkpoint)
     # A missing checkpoint is reported now, not in the browser; and the first page finds a warm solver.
     _ = solver.solve(State(first, target=FIRST)).samples
-    server = start_server(host, port)
-    app = App(server, solver, first)
+    guard = Guard.of(host)
+    server = start_guarded(guard, port)
+    app = App(server, solver, first, folder=cache_folder() / "sessions")
     try:
         if port not in (0, server.get_port()):
             raise FinlabError(f"port {port} was taken while the app started; choose another --port")
-        print(f"finlab app: http://{host}:{server.get_port()}  (Ctrl-C stops it)", flush=True)
+        secret = "" if guard.token is None else f"/?token={guard.token}"
+        print(f"finlab app: http://{host}:{server.get_port()}{secret}  (Ctrl-C stops it)", flush=True)
         _wait_for_signal()
     finally:
         app.stop()

@@ -14,7 +14,7 @@ from finlab.layout.body import Hull
 from webapp import editing, hull_editing
 from webapp.arrow_scale import NEWTONS
 from webapp.history import History
-from webapp.links import followed, linked, partner, unlinked
+from webapp.links import followed, partner, unlinked
 from webapp.state import AXES, State, number
 from webapp.targets import FIRST, PRESETS
 from webapp.tour import STEPS
@@ -72,11 +72,18 @@ class Session:
         """The layout as it was opened or saved last."""
         self.mode = 0
         """Which of the answer's modes is shown; 0 is the best one."""
+        self.overlay: str | None = None
+        """Method whose forces are shown beside those on the robot."""
         self.stop: int | None = None
         """Where the tour is, None while there is none."""
         self._before_tour: State | None = None
         self.revision = 0
         """Grows with every change of the state; an answer carries the revision it was made for."""
+
+    def resume(self, state: State) -> None:
+        """Go on from a state that was kept; what led there is not known any more."""
+        self.history = History(state)
+        self.saved = state.layout
 
     def twin(self) -> "Session":
         """A session with the same state and look, for work that must not see later changes."""
@@ -189,8 +196,7 @@ class Session:
         """The selected fin's image on the other side, linked to it; the image is selected."""
         source = self._selected_name()
         layout, name = editing.mirrored(self.state.layout, source)
-        state = self.state.with_layout(layout)
-        self._commit(f"Mirror {source}", replace(state, links=linked(state.links, source, name)))
+        self._commit(f"Mirror {source}", self.state.with_layout(layout).with_link(source, name))
         self.selected = name
 
     def unlink_fin(self) -> None:
@@ -286,6 +292,10 @@ class Session:
     def show_mode(self, index: int) -> None:
         """Show one of the answer's modes on the robot."""
         self.mode = max(0, int(index))
+
+    def set_overlay(self, method: str | None) -> None:
+        """Show the forces of a compared method, or of none."""
+        self.overlay = method
 
     def set_display(self, key: str, value: Any) -> None:
         """One field of `Display`."""

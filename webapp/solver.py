@@ -3,9 +3,12 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import load_allocator
+from webapp.density import Densities, densities
 from webapp.state import State
 
 Load = Callable[..., Allocator]
@@ -38,6 +41,11 @@ class Solver:
             for key in ("n_candidates", "temperature", "gamma"):
                 setattr(allocator, key, getattr(state, key))
         return allocator
+
+    def densities(self, state: State) -> Densities | None:
+        """What the network proposes for a state; None for methods without one."""
+        allocator = self.allocator(state)
+        return densities(allocator, state.layout, state.failed, np.array(state.target), state.temperature)
 
     def solve(self, state: State) -> Allocation:
         """The answer to a state.

@@ -6,7 +6,7 @@ from typing import Any
 from finlab.allocation.methods import METHODS
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from webapp.links import Links, kept
+from webapp.links import Links, kept, linked
 
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 """Names of the wrench's components, in the order of the library."""
@@ -25,6 +25,8 @@ TEMPERATURE_RANGE = (0.0, 2.0)
 """Temperatures T of the mixture."""
 GAMMA_RANGE = (0.0, 1.0)
 """Weights gamma of the energy in the ranking."""
+SETTINGS = ("method", "n_candidates", "temperature", "gamma")
+"""Fields of `State` that say how the question is answered."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,12 @@ class State:
         failed = tuple(name for name in layout.names if name in self.failed)
         failed = () if len(failed) == layout.n_fins else failed
         return replace(self, layout=layout, failed=failed, links=kept(self.links, layout))
+
+    def with_link(self, a: str, b: str) -> "State":
+        """Two fins become a mirror pair that moves together."""
+        for name in (a, b):
+            self.layout.index(name)
+        return replace(self, links=linked(self.links, a, b))
 
     def with_setting(self, key: str, value: Any) -> "State":
         """K, T, gamma or the method changed: `key` is the field's name."""

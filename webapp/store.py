@@ -4,6 +4,7 @@ import secrets
 import time
 from collections.abc import Callable, Iterable
 
+from webapp.keeping import SessionFiles
 from webapp.session import Session
 
 MAX_SESSIONS = 64
@@ -13,9 +14,11 @@ MAX_SESSIONS = 64
 class SessionStore:
     """All sessions of this server, each shown in one tab at a time."""
 
-    def __init__(self, make: Callable[[], Session]) -> None:
-        """`make` gives a fresh session."""
+    def __init__(self, make: Callable[[], Session], files: SessionFiles | None = None) -> None:
+        """`make` gives a fresh session; `files` keep sessions beyond the life of the server."""
         self._make = make
+        self._files = files
+        self._kept: dict[str, int] = {}
         self._sessions: dict[str, Session] = {}
         self._open: set[str] = set()
         self._left: dict[str, float] = {}
@@ -27,10 +30,13 @@ class SessionStore:
             keys: what this browser remembers. Of those that no other tab shows, the one left last is taken:
                 a reload finds its work again, and a second tab gets a session of its own.
         """
+        keys = list(keys)
+        for key in keys:
+            self._resume(key)
         free = [k for k in keys if k in self._sessions and k not in self._open]
-        key = max(free, key=lambda k: self._left.get(k, 0.0), default=None)
-        if key is None:
-            key = secrets.token_urlsafe(12)
+        found = max(free, key=lambda k: self._left.get(k, 0.0), default=None)
+        key = found or secrets.token_urlsafe(12)
+        if found is None:
             self._sessions[key] = self._make()
             self._forget_old()
         self._open.add(key)
@@ -41,6 +47,25 @@ class SessionStore:
         self._open.discard(key)
         self._left[key] = time.monotonic()
 
+    def _resume(self, key: str) -> None:
+        """Bring a session back that an earlier server has kept."""
+        if self._files is None or key in self._sessions:
+            return
+        state = self._files.read(key)
+        if state is not None:
+            self._sessions[key] = self._make()
+            self._sessions[key].resume(state)
+            self._forget_old()
+
+    def keep(self) -> None:
+        """Write the sessions that have changed since the last time."""
+        if self._files is None:
+            return
+        for key, session in self._sessions.items():
+            if session.revision != self._kept.get(key, 0):
+                self._kept[key] = session.revision
+                self._files.write(key, session.state)
+
     def _forget_old(self) -> None:
         waiting = sorted(
             (k for k in self._sessions if k not in self._open), key=lambda k: self._left.get(k, 0.0)
@@ -48,3 +73,4 @@ class SessionStore:
         for key in waiting[: max(0, len(self._sessions) - MAX_SESSIONS)]:
             del self._sessions[key]
             self._left.pop(key, None)
+            self._kept.pop(key, None)

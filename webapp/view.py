@@ -15,8 +15,11 @@ import viser
 from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
 from webapp.commands import add_commands
+from webapp.comparison import Comparison
+from webapp.density import Densities
 from webapp.files import file_stem, graph_bytes
 from webapp.modes import Mode, distinct_modes
+from webapp.panels.compare import ComparePanel
 from webapp.panels.display import DisplayPanel
 from webapp.panels.header import Header
 from webapp.panels.host import Panel
@@ -59,6 +62,8 @@ class View:
         self._best: Allocation | None = None
         self._best_revision = -1
         self._modes: tuple[Mode, ...] = ()
+        self.densities: Densities | None = None
+        self.comparison = Comparison(solver, worker, self._post, self._refresh)
         self._error: str | None = None
         self._error_revision = -1
         self._shown: tuple[Allocation, int, Allocation] | None = None
@@ -79,15 +84,17 @@ class View:
         )
         self._panels.append(Header(gui, self))
         tabs = gui.add_tab_group()
-        with tabs.add_tab("Wrench", icon=viser.Icon.ARROWS_MOVE):
+        with tabs.add_tab("Wrench"):
             self._panels.append(WrenchPanel(gui, self))
-        with tabs.add_tab("Layout", icon=viser.Icon.FISH):
+        with tabs.add_tab("Layout"):
             self._panels.append(LayoutPanel(gui, self))
-        with tabs.add_tab("Modes", icon=viser.Icon.CHART_DOTS):
+        with tabs.add_tab("Modes"):
             self._panels.append(ModesPanel(gui, self))
-        with tabs.add_tab("View", icon=viser.Icon.EYE):
+        with tabs.add_tab("Compare"):
+            self._panels.append(ComparePanel(gui, self))
+        with tabs.add_tab("View"):
             self._panels.append(DisplayPanel(gui, self))
-        with tabs.add_tab("Files", icon=viser.Icon.DOWNLOAD):
+        with tabs.add_tab("Files"):
             self._panels.append(TakeHomePanel(gui, self))
         add_commands(gui, self)
 
@@ -129,6 +136,17 @@ class View:
     def newtons(self) -> float:
         """Force [N] that an arrow of 0.1 m stands for."""
         return self.scene.newtons
+
+    @property
+    def _overlaid(self) -> Allocation | None:
+        """The compared answer whose forces are shown, unless the question has changed since."""
+        answer = self.comparison.answers.get(self.session.overlay or "")
+        fits = self.comparison.state == self.session.state
+        return answer if fits and isinstance(answer, Allocation) else None
+
+    def compare(self) -> None:
+        """Ask the other methods about the present state."""
+        self.comparison.start(self.session.state)
 
     def do(self, act: Callable[[], object]) -> None:
         """Carry out an intent; a refusal becomes a note, and the page goes back to what the session holds."""
@@ -194,7 +212,9 @@ class View:
 
     def _refresh(self) -> None:
         with self.client.atomic():
-            self.scene.refresh(self.shown)  # first: it settles the scale that the legend tells
+            self.scene.refresh(
+                self.shown, self._overlaid
+            )  # first: it settles the scale that the legend tells
             for panel in self._panels:
                 panel.refresh()
 
@@ -225,6 +245,7 @@ class View:
         def job() -> None:
             try:
                 allocation = self._solver.solve(state)
+                densities = self._solver.densities(state)
                 # What is computed when first asked for belongs to this thread too.
                 _ = allocation.wrench, allocation.energy, allocation.candidates, allocation.samples
             except FinlabError as error:
@@ -233,7 +254,7 @@ class View:
                 self._post(partial(self._take_error, revision, f"{state.method} failed: {error}"))
                 raise
             else:
-                self._post(partial(self._take, revision, allocation))
+                self._post(partial(self._take, revision, allocation, densities))
 
         self._worker.submit(id(self), job)
 
@@ -242,10 +263,11 @@ class View:
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(lambda: None if self._closed else act())
 
-    def _take(self, revision: int, allocation: Allocation) -> None:
+    def _take(self, revision: int, allocation: Allocation, densities: Densities | None) -> None:
         if revision < self._best_revision:
             return
         self._best, self._best_revision = allocation, revision
+        self.densities = densities
         self._modes = distinct_modes(allocation.candidates)
         self._error = None
         self._refresh()
@@ -259,4 +281,5 @@ class View:
     def close(self) -> None:
         """The browser has gone."""
         self._closed = True
+        self.comparison.cancel()
         self._worker.forget(id(self))

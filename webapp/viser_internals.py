@@ -2,15 +2,57 @@
 
 import contextlib
 import io
+import threading
+from collections.abc import Callable, Iterator
+from typing import Any
+from unittest.mock import patch
 
 import viser
+import websockets.asyncio.server as websockets_server
 from viser import _messages
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
+
+from webapp.guard import Guard
+
+_STARTING = threading.Lock()
 
 
 def start_server(host: str, port: int) -> viser.ViserServer:
-    """A server that does not print a banner of its own; `verbose=False` alone leaves it."""
-    with contextlib.redirect_stdout(io.StringIO()):
-        return viser.ViserServer(host=host, port=port, label="finlab", verbose=False)
+    """A server that lets only its own pages in, and does not print a banner of its own."""
+    return start_guarded(Guard(host), port)
+
+
+def start_guarded(guard: Guard, port: int) -> viser.ViserServer:
+    """A server behind a guard; `verbose=False` alone would leave the banner."""
+    with _STARTING, _guarded(guard), contextlib.redirect_stdout(io.StringIO()):
+        return viser.ViserServer(host=guard.host, port=port, label="finlab", verbose=False)
+
+
+@contextlib.contextmanager
+def _guarded(guard: Guard) -> Iterator[None]:
+    """Servers that start within this context ask the guard first. Viser has no hook for that."""
+    serve = websockets_server.serve
+
+    def guarded(*arguments: Any, process_request: Callable[..., Any] | None = None, **options: Any) -> Any:
+        async def ask(connection: Any, request: Request) -> Any:
+            headers = {name.lower(): value for name, value in request.headers.raw_items()}
+            verdict = guard.check(request.path, headers)
+            if verdict is not None:
+                body = verdict.text.encode()
+                answer = Headers({**verdict.headers, "Content-Type": "text/plain; charset=utf-8"})
+                answer["Content-Length"] = str(len(body))
+                answer["Connection"] = "close"
+                return Response(verdict.status.value, verdict.status.phrase, answer, body)
+            if process_request is None:
+                return None
+            result = process_request(connection, request)
+            return await result if hasattr(result, "__await__") else result
+
+        return serve(*arguments, process_request=ask, **options)
+
+    with patch.object(websockets_server, "serve", guarded):
+        yield
 
 
 def stop_server(server: viser.ViserServer) -> None:
@@ -28,3 +70,8 @@ def disable_sharing(server: viser.ViserServer) -> None:
 def disconnect_all(server: viser.ViserServer) -> None:
     """Drop every connection, as a bad network would; for tests."""
     server._websock_server.disconnect_all_clients()
+
+
+def backlog(server: viser.ViserServer) -> int:
+    """Messages that the server keeps for clients to come: grows where nodes or widgets are left behind."""
+    return len(server._websock_server._broadcast_buffer.message_from_id)

@@ -6,6 +6,8 @@ from typing import Protocol
 import viser
 
 from finlab.allocation.allocation import Allocation
+from webapp.comparison import Comparison
+from webapp.density import Densities
 from webapp.modes import Mode
 from webapp.session import Session
 
@@ -41,6 +43,16 @@ class Host(Protocol):
     @property
     def newtons(self) -> float:
         """Force [N] that an arrow of 0.1 m stands for."""
+
+    @property
+    def densities(self) -> Densities | None:
+        """What the network proposed for the newest answer, where the method has a network."""
+
+    comparison: Comparison
+    """Other methods on the same question."""
+
+    def compare(self) -> None:
+        """Ask the other methods."""
 
     def do(self, act: Callable[[], object]) -> None:
         """Carry out an intent: show what changed, or tell the user why not."""

@@ -7,6 +7,7 @@ import viser
 from finlab.allocation.methods import METHODS
 from webapp.handles import on_user_change, put
 from webapp.markup.modes import mode_table
+from webapp.panels.density import DensityPanel
 from webapp.panels.host import Host
 from webapp.panels.mode_picker import ModePicker
 from webapp.state import CANDIDATE_RANGE, GAMMA_RANGE, TEMPERATURE_RANGE
@@ -39,6 +40,7 @@ class ModesPanel:
             on_user_change(widget, partial(self._set, key))
         self._picker = ModePicker(gui, host, 250, "fl-modes")
         self._table = gui.add_html("")
+        self._density = DensityPanel(gui)
 
     def _set(self, key: str, value: object) -> None:
         self._host.do(partial(self._host.session.set_setting, key, value))
@@ -53,3 +55,4 @@ class ModesPanel:
         self._picker.refresh()
         candidates = None if host.best is None else host.best.candidates
         put(self._table, content=mode_table(candidates, host.modes, self._picker.shown, self._picker.name))
+        self._density.refresh(host.densities)

@@ -14,6 +14,7 @@ from webapp.meshes.hull import hull_of
 from webapp.scene.fin_node import FinNode
 from webapp.scene.ghost import Ghost
 from webapp.scene.lines import Lines
+from webapp.scene.overlay import Overlay
 from webapp.scene.stage import Stage
 from webapp.scene.wrench_nodes import WrenchNodes
 from webapp.session import Session
@@ -56,6 +57,7 @@ class RobotScene:
         self._wrench = WrenchNodes(scene)
         self._lines = Lines(scene)
         self._ghost = Ghost(scene)
+        self._overlay = Overlay(scene)
         self._fins: list[FinNode] = []
         self._dragged: int | None = None
         self._phase: NDArray[Any] = np.zeros(0)
@@ -72,8 +74,13 @@ class RobotScene:
             camera.position = CAMERAS[view]
             camera.look_at = (0.0, 0.0, 0.03)
 
-    def refresh(self, allocation: Allocation | None) -> None:
-        """Show the session's layout, and the answer to it if there is one for this very layout."""
+    def refresh(self, allocation: Allocation | None, other: Allocation | None = None) -> None:
+        """Show the session's layout, and the answer to it if there is one for this very layout.
+
+        Args:
+            allocation: the answer.
+            other: another method's answer, whose forces are shown beside it.
+        """
         state, display = self._session.state, self._session.display
         hull = hull_of(state.layout)
         if self._dragged is None:  # a hull that breathes with the fin one drags is hard to aim at
@@ -99,6 +106,7 @@ class RobotScene:
         if fits and allocation is not None:
             self._take_command(allocation.command)
         self._ghost.refresh(self._session.saved if display.ghost else None, state.layout)
+        self._overlay.refresh(other, scale)
         target = np.array(state.target)
         given = allocation.wrench if allocation is not None else None
         missing = np.zeros(6) if allocation is None else missing_part(allocation)

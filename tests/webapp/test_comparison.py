@@ -1,0 +1,65 @@
+"""Methods side by side, and what the network proposes."""
+
+import threading
+
+import numpy as np
+import pytest
+
+from finlab.allocation.allocation import Allocation
+from finlab.allocation.methods import load_allocator
+from finlab.assets import shipped_checkpoints, shipped_layouts
+from finlab.layout import load_layout
+from tests.webapp.stand_in import StandIn, load_stand_in
+from webapp.comparison import COMPARED, Comparison
+from webapp.density import densities
+from webapp.markup.comparison import comparison_table
+from webapp.solver import Solver
+from webapp.state import State
+from webapp.targets import PRESETS
+from webapp.worker import Worker
+
+UCAT = load_layout(shipped_layouts()["ucat"])
+
+
+def test_all_methods_answer_one_after_the_other() -> None:
+    worker, done = Worker(), threading.Event()
+    comparison = Comparison(
+        Solver(load=load_stand_in), worker, lambda act: act(), lambda: comparison.running or done.set()
+    )
+    assert "side by side" in comparison_table(comparison, None, False, "here")
+    comparison.start(State(UCAT, target=PRESETS["Turn"]))
+    assert done.wait(60)
+    worker.stop()
+    assert tuple(comparison.answers) == COMPARED
+    assert all(isinstance(answer, Allocation) for answer in comparison.answers.values())
+    table = comparison_table(comparison, "qp", True, "here")
+    assert table.count("<tr") == 1 + len(COMPARED) and table.count("chosen") == 1 and "compare again" in table
+
+
+def test_a_method_that_fails_keeps_nobody_else_waiting() -> None:
+    def load(checkpoint: object = None, method: str = "learned") -> object:
+        return load_stand_in(checkpoint, "slsqp" if method == "paper" else method)
+
+    worker, done = Worker(), threading.Event()
+    comparison = Comparison(
+        Solver(load=load), worker, lambda act: act(), lambda: comparison.running or done.set()
+    )
+    comparison.start(State(UCAT, target=PRESETS["Turn"]))
+    assert done.wait(60)
+    worker.stop()
+    assert comparison.answers["paper"] == "slsqp is out of order in this test"
+    assert isinstance(comparison.answers["multistart"], Allocation)
+
+
+@pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
+def test_densities_of_the_shipped_network() -> None:
+    allocator = load_allocator(None, method="learned")
+    found = densities(allocator, UCAT, ("front_left",), np.array(PRESETS["Turn"]), 0.02)
+    assert found is not None
+    assert found.places[0, -1] == pytest.approx(np.degrees(0.6)) and found.places[2, 0] == pytest.approx(-180)
+    assert np.isnan(found.curves[1]).all()
+    assert found.curves[[0, 2, 3]].max(axis=-1) == pytest.approx(1.0)
+    wide = densities(allocator, UCAT, (), np.array(PRESETS["Turn"]), 1.0)
+    narrow = densities(allocator, UCAT, (), np.array(PRESETS["Turn"]), 0.0)
+    assert wide is not None and narrow is not None and wide.curves.mean() > narrow.curves.mean()
+    assert densities(StandIn(), UCAT, (), np.zeros(6), 0.02) is None

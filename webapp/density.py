@@ -1,0 +1,66 @@
+"""What the network proposes for each fin: densities over amplitude, frequency and zero direction."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.proposal import predict
+from finlab.layout import Layout
+
+Array = NDArray[np.float64]
+
+POINTS = 161
+"""Places at which a density is drawn."""
+NARROWEST = 0.006
+"""Least standard deviation drawn, in normalized commands; a narrower peak would fall between places."""
+
+
+class Densities(NamedTuple):
+    """Curves of one layout, each with its highest point at 1."""
+
+    places: Array
+    """Amplitude [deg], frequency [Hz] and zero direction [deg] at which the curves are known (3, POINTS)."""
+    curves: Array
+    """Densities (n, 3, POINTS) of all fins in the layout's order; NaN for failed ones."""
+
+
+def densities(
+    allocator: Allocator, layout: Layout, failed: tuple[str, ...], target: Array, temperature: float
+) -> Densities | None:
+    """The mixture for a target, with its variances times the temperature as the sampling has them.
+
+    Args:
+        allocator: a method; only the learned one has a mixture of all fins together.
+        layout: the robot.
+        failed: names of failed fins.
+        target: desired wrench (6,) [N, N m].
+        temperature: T of the sampling.
+
+    Returns:
+        None for methods that draw no candidates.
+    """
+    from finlab.allocation.learned import LearnedAllocator
+
+    if not isinstance(allocator, LearnedAllocator):
+        return None
+    healthy = layout.without(failed) if failed else layout
+    normalization = allocator.normalization
+    centred = (np.asarray(target)[None] - normalization.mean) / normalization.std
+    mixture = predict(allocator.network, allocator.prepare(healthy), centred)
+    weight, mean, std = (np.asarray(v[0], dtype=float) for v in (mixture.weight, mixture.mean, mixture.std))
+    std = np.maximum(std * np.sqrt(temperature), NARROWEST)
+    lower = np.array([fin.limits.lower for fin in healthy.fins])
+    upper = np.array([fin.limits.upper for fin in healthy.fins])
+    places = np.linspace(lower.min(axis=0), upper.max(axis=0), POINTS, axis=1)  # (3, P)
+    width = np.maximum(upper - lower, 1e-9)
+    at = 2 * (places[None] - lower[:, :, None]) / width[:, :, None] - 1  # (n, 3, P), normalized
+    distance = (at[:, None] - mean[..., None]) / std[..., None]  # (n, M, 3, P)
+    peaks = np.exp(-0.5 * distance**2) / std[..., None]
+    inside = np.einsum("m,nmcp->ncp", weight, peaks) * (np.abs(at) <= 1 + 1e-9)
+    curves = np.full((layout.n_fins, 3, POINTS), np.nan)
+    rows = [i for i, name in enumerate(layout.names) if name not in failed]
+    curves[rows] = inside / np.maximum(inside.max(axis=-1, keepdims=True), 1e-12)
+    degrees = np.array([180 / np.pi, 1.0, 180 / np.pi])
+    return Densities(places * degrees[:, None], curves)

@@ -1,0 +1,42 @@
+"""Several methods on the same wrench, with the forces of one of them over those of the robot."""
+
+from functools import partial
+
+import viser
+
+from webapp.comparison import COMPARED
+from webapp.handles import on_user_change, on_user_click, put
+from webapp.markup.comparison import comparison_table
+from webapp.markup.picking import marker
+from webapp.panels.host import Host
+
+PICKER = "fl-compare"
+
+
+class ComparePanel:
+    """A button, a table, and whose arrows are shown."""
+
+    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+        """Build the widgets."""
+        self._host = host
+        self._run = gui.add_button(
+            "Compare the methods", icon=viser.Icon.SCALE, hint="On the wrench and the failures of now."
+        )
+        on_user_click(self._run, lambda: host.do(host.compare))
+        gui.add_html(marker(PICKER))
+        self._overlay = gui.add_button_group(
+            "Overlay", ("none", *COMPARED), hint="Dark arrows: the fins' forces by that method."
+        )
+        on_user_change(self._overlay, self._choose)
+        self._table = gui.add_html("")
+
+    def _choose(self, method: str) -> None:
+        wanted = method if method in COMPARED and method != self._host.session.overlay else None
+        self._host.do(partial(self._host.session.set_overlay, wanted))
+
+    def refresh(self) -> None:
+        """Write the answers."""
+        session, comparison = self._host.session, self._host.comparison
+        stale = comparison.state is not None and comparison.state != session.state
+        put(self._run, disabled=comparison.running)
+        put(self._table, content=comparison_table(comparison, session.overlay, stale, PICKER))

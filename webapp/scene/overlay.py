@@ -1,0 +1,37 @@
+"""Forces of the fins by another method, as dark arrows beside the robot's own."""
+
+import numpy as np
+import viser
+
+from finlab.allocation.allocation import Allocation
+from webapp.handles import put
+from webapp.meshes.arrows import NOTHING, force_arrow
+from webapp.meshes.mesh import Mesh, joined
+from webapp.scene.shape import Shape
+
+COLOR = (40, 44, 52)
+LIFT = np.array([0.0, 0.0, 0.025])
+"""The arrows stand a little above the fins' own ones, so that equal ones can be told apart [m]."""
+
+
+class Overlay:
+    """One node for all arrows."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        """Build the node, showing nothing."""
+        self._shape = Shape(
+            scene.add_mesh_simple(
+                "/overlay", NOTHING.vertices, NOTHING.faces, color=COLOR, visible=False, cast_shadow=False
+            )
+        )
+
+    def refresh(self, answer: Allocation | None, scale: float) -> None:
+        """Show an answer's forces, arrows of `scale` [m/N]; nothing for None."""
+        put(self._shape.node, visible=answer is not None)
+        if answer is not None:
+            place = np.array([fin.position for fin in answer.layout.fins])
+            self._shape.show(_arrows, place, np.nan_to_num(answer.fin_forces) * scale)
+
+
+def _arrows(place: np.ndarray, way: np.ndarray) -> Mesh:
+    return joined(*(force_arrow(w, p + LIFT, 0.005) for p, w in zip(place, way, strict=True)))
