@@ -11,9 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.energy import command_energy
+from finlab.allocation.policy import describe_binding
 from finlab.layout import Layout
 
 Array = NDArray[np.float64]
+
+REACHED = 0.01
+"""Normalized error up to which a wrench counts as delivered."""
 
 
 class Candidates(NamedTuple):
@@ -40,6 +44,8 @@ class Solution(NamedTuple):
     """Wrench (N, 6) that the method itself believed, where it used a model of its own."""
     candidates: Callable[[], Candidates] | None = None
     """Gives the refined candidates, for a single target; made only when asked for."""
+    notes: tuple[str, ...] = ()
+    """Sentences that the user should read."""
     samples: Callable[[], Candidates] | None = None
     """Gives the raw candidates before refinement, for a single target."""
 
@@ -66,6 +72,8 @@ class Allocation:
     """Name of the checkpoint that was used, if any."""
     wrench_surrogate: Array | None = None
     """Wrench (6,) that the method itself expected, if it used a learned model."""
+    notes: tuple[str, ...] = ()
+    """Sentences that the user should read, such as a fin model that the checkpoint never saw."""
     make_candidates: Callable[[], Candidates | None] = field(default=lambda: None, repr=False, compare=False)
     """Gives `candidates` when they are first asked for."""
     make_samples: Callable[[], Candidates | None] = field(default=lambda: None, repr=False, compare=False)
@@ -109,6 +117,25 @@ class Allocation:
     def err_norm(self) -> float:
         """Normalized error of the delivered wrench, scored by the analytic fin model."""
         return float(np.linalg.norm(self.unallocated / self.sigma))
+
+    @property
+    def reachable(self) -> bool:
+        """Whether the target is delivered, scored by the analytic fin model: err_norm of at most 0.01."""
+        return self.err_norm <= REACHED
+
+    @property
+    def scale(self) -> float:
+        """Share of the target that is delivered in its own direction; 1 where nothing is asked."""
+        asked, given = self.target / self.sigma, self.wrench / self.sigma
+        size = float(asked @ asked)
+        return 1.0 if size < 1e-12 else float(asked @ given) / size
+
+    @property
+    def binding(self) -> tuple[str, ...]:
+        """Sentences about the limits that bind."""
+        limits = [fin.limits for fin in self.layout.fins]
+        lower, upper = (np.array([getattr(limit, end) for limit in limits]) for end in ("lower", "upper"))
+        return tuple(describe_binding(self.fins, self.command, lower, upper))
 
     @cached_property
     def energy(self) -> float:

@@ -9,14 +9,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finlab.allocation.allocation import Allocation, BatchAllocation, Candidates, Solution
+from finlab.allocation.allocation import REACHED, Allocation, BatchAllocation, Candidates, Solution
+from finlab.allocation.policy import AXES, CLOSEST, Policy, as_policy, largest_share
 from finlab.data.normalization import Normalization
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Layout
 
 Array = NDArray[np.float64]
 
-AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 MAX_WRENCH = 1e6
 """Largest magnitude of a target component [N, N m]; beyond it something is wrong upstream."""
 
@@ -50,6 +50,7 @@ class Allocator(ABC):
         *,
         failed: Sequence[str] = (),
         previous: ArrayLike | None = None,
+        policy: Policy | str = CLOSEST,
         seed: int = 0,
     ) -> Allocation:
         """Commands for one target.
@@ -58,18 +59,22 @@ class Allocator(ABC):
             layout: the robot.
             wrench: desired wrench (6,) [N, N m] in the body frame.
             failed: names of fins that do not work; they leave the graph.
-            previous: command (n, 3) of the previous tick, or the `Allocation` field of one.
+            previous: command (n, 3) of the previous tick: fins then turn slowly, and the robot changes the
+                way it moves only when that pays.
+            policy: what to do when the wrench is out of reach; see `Policy`.
             seed: the same target, layout and seed give the same answer.
 
         Raises:
             CommandError: the wrench is not six finite numbers, or `previous` has another shape.
+            AllocationError: the method does not know the policy.
             LayoutError: an unknown fin, or none left.
         """
-        target = check_wrenches(wrench, single=True)
+        target, policy = check_wrenches(wrench, single=True), as_policy(policy)
+        check_layout_and_seed(layout, seed)
         healthy, alive = remove_failed(layout, failed)
         before = None if previous is None else check_previous(previous, layout)[alive]
         start = time.perf_counter()
-        solution = self._solve(healthy, target[None], seed=seed, previous=before)
+        solution = self._solve_by(policy, healthy, target[None], seed=seed, previous=before)
         solve_ms = (time.perf_counter() - start) * 1e3
         return Allocation(
             layout=layout,
@@ -81,17 +86,57 @@ class Allocator(ABC):
             solve_ms=solve_ms,
             checkpoint=self.checkpoint,
             wrench_surrogate=None if solution.wrench_surrogate is None else solution.wrench_surrogate[0],
+            notes=solution.notes,
             make_candidates=lambda: _candidates_with_failed(solution.candidates, alive),
             make_samples=lambda: _candidates_with_failed(solution.samples, alive),
         )
+
+    def _solve_by(
+        self, policy: Policy, layout: Layout, target: Array, *, seed: int, previous: Array | None
+    ) -> Solution:
+        """Solve for one target (1, 6) under a policy. Methods that minimize the plain error override this."""
+        if policy.kind == "direction":
+            return self._solve_direction(layout, target, seed=seed, previous=previous)
+        if policy.kind == "priority" or len(set(policy.axis_weights)) > 1:
+            raise AllocationError(
+                f"policy: method {self.name!r} minimizes the plain error and knows neither axis weights nor "
+                "priorities; use method 'learned', or policy 'closest' or 'direction'"
+            )
+        return self._solve(layout, target, seed=seed, previous=previous)
+
+    def _solve_direction(
+        self, layout: Layout, target: Array, *, seed: int, previous: Array | None
+    ) -> Solution:
+        """The largest share of the target that is delivered whole."""
+        whole = self._solve(layout, target, seed=seed, previous=previous)
+        if self._reaches(layout, whole, target)[0]:
+            return whole
+
+        def reached(shares: Array) -> NDArray[np.bool_]:
+            targets = shares[:, None] * target
+            return self._reaches(layout, self._solve(layout, targets, seed=seed, previous=None), targets)
+
+        return self._solve(layout, largest_share(reached) * target, seed=seed, previous=previous)
+
+    def _reaches(self, layout: Layout, solution: Solution, targets: Array) -> NDArray[np.bool_]:
+        """Which of the targets (N, 6) are met, by the method's own model, or the plant where it has none."""
+        wrench = solution.wrench_surrogate
+        if wrench is None:
+            from finlab.physics import Plant  # torch is loaded only where the plant is asked
+
+            wrench = Plant(layout).wrench(solution.command)
+        return self.normalization.error(wrench, targets) <= REACHED
 
     def allocate_batch(
         self, layout: Layout, wrenches: ArrayLike, *, failed: Sequence[str] = (), seed: int = 0
     ) -> BatchAllocation:
         """Commands for many targets (N, 6) on one layout; errors as in `allocate`."""
         targets = check_wrenches(wrenches, single=False)
+        check_layout_and_seed(layout, seed)
         healthy, alive = remove_failed(layout, failed)
         start = time.perf_counter()
+        if len(targets) == 0:
+            return BatchAllocation(np.empty((0, layout.n_fins, 3)), None, np.empty(0))
         solution = self._solve(healthy, targets, seed=seed, previous=None)
         elapsed_ms = (time.perf_counter() - start) * 1e3
         return BatchAllocation(
@@ -105,6 +150,8 @@ def check_wrenches(wrench: ArrayLike, *, single: bool) -> Array:
     """One wrench (6,) or many (N, 6) as finite float64, or a `CommandError` that says what is wrong."""
     expected = "six numbers [Fx, Fy, Fz, Tx, Ty, Tz]" if single else "an array of shape (N, 6)"
     try:
+        if np.iscomplexobj(wrench):
+            raise TypeError("complex")
         array = np.array(wrench, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise CommandError(f"wrench: expected {expected} in N and N m, got {wrench!r}") from error
@@ -118,9 +165,26 @@ def check_wrenches(wrench: ArrayLike, *, single: bool) -> Array:
     return array
 
 
+def check_layout_and_seed(layout: object, seed: object) -> None:
+    """Refuse what is no layout, and seeds that are no whole number from 0."""
+    if not isinstance(layout, Layout):
+        raise AllocationError(
+            f"layout: expected a Layout, got {layout!r}; read a file with finlab.load_layout"
+        )
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise AllocationError(f"seed: expected a whole number from 0, got {seed!r}")
+
+
 def check_previous(previous: ArrayLike, layout: Layout) -> Array:
     """The previous command (n, 3), failed fins may hold NaN."""
-    array = np.array(previous, dtype=np.float64)
+    try:
+        array = np.array(previous, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise CommandError(
+            f"previous: expected a command of shape ({layout.n_fins}, 3), got {previous!r}"
+        ) from error
+    if np.isinf(array).any():
+        raise CommandError("previous: expected finite commands (NaN only for failed fins), got infinity")
     if array.shape != (layout.n_fins, 3):
         raise CommandError(
             f"previous: expected a command of shape ({layout.n_fins}, 3) for layout {layout.name!r}, "
@@ -135,6 +199,8 @@ def remove_failed(layout: Layout, failed: Sequence[str]) -> tuple[Layout, NDArra
         raise AllocationError(
             f"failed: expected a list of fin names, got the text {failed!r}; write [{failed!r}]"
         )
+    if not isinstance(failed, Sequence) or not all(isinstance(name, str) for name in failed):
+        raise AllocationError(f"failed: expected a list of fin names, got {failed!r}")
     if not failed:
         return layout, np.ones(layout.n_fins, dtype=bool)
     alive = np.array([name not in set(failed) for name in layout.names])

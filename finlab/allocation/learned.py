@@ -8,11 +8,14 @@ model scores the answer afterwards.
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController
 
 from finlab.allocation import force_space
 from finlab.allocation.allocation import Candidates, Solution
@@ -21,10 +24,13 @@ from finlab.allocation.energy import command_energy
 from finlab.allocation.learned_fin import LearnedFin
 from finlab.allocation.levenberg_marquardt import refine
 from finlab.allocation.numpy_network import NumpyNetwork
+from finlab.allocation.policy import Policy
 from finlab.allocation.prepared import Prepared, prepare
 from finlab.allocation.proposal import Proposal, propose
-from finlab.errors import CheckpointError
-from finlab.layout import Layout
+from finlab.allocation.steady import TURNS, planar_thrust, turn_little, wrap_directions
+from finlab.allocation.unreachable import serve_in_turn
+from finlab.errors import AllocationError, CheckpointError
+from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.model.checkpoint import Checkpoint
 from finlab.model.surrogate import FORCE_UNIT, CoefficientSurrogate
 
@@ -37,6 +43,10 @@ TOLERANCE = 2e-4
 PATIENCE = ((5, 0), (25, 32))
 """For the few targets that the quick way did not reach: Levenberg-Marquardt steps, and how many of the
 network's raw candidates join, in stages."""
+RESTARTS = 32
+"""Raw candidates from which an unreachable target is approached under weights or priorities."""
+SWITCH_GAIN = 0.02
+"""Share of its energy that a robot in motion must save before it changes the way it moves."""
 
 
 class LearnedAllocator(Allocator):
@@ -52,8 +62,8 @@ class LearnedAllocator(Allocator):
         temperature: float = 0.02,
         gamma: float = 1e-2,
         n_seeds: int = 6,
-        n_refined: int = 6,
-        search_steps: int = 4,
+        n_refined: int = 4,
+        search_steps: int | None = None,
         refine_steps: int = 1,
         subsets: bool = True,
     ) -> None:
@@ -66,10 +76,17 @@ class LearnedAllocator(Allocator):
             gamma: weight of the energy in the ranking J = J_norm + gamma J_en.
             n_seeds: candidates that enter the search.
             n_refined: allocations that are refined and offered as candidates.
-            search_steps: reweighting steps of the search in force space.
+            search_steps: reweighting steps of the search in force space; by default 4, and 12 from six fins
+                on, where there is more to choose from.
             refine_steps: Levenberg-Marquardt steps.
             subsets: whether sub-layouts are searched as well.
         """
+        if n_candidates < 1 or n_seeds < 1 or n_refined < 1 or not temperature >= 0.0:
+            raise AllocationError(
+                "method 'learned' needs at least one candidate, seed and refined answer and a temperature "
+                f"from 0, got n_candidates={n_candidates}, n_seeds={n_seeds}, n_refined={n_refined}, "
+                f"temperature={temperature}"
+            )
         if not isinstance(checkpoint.surrogate, CoefficientSurrogate):
             raise CheckpointError(
                 f"checkpoint {checkpoint.name!r}: method `learned` needs a surrogate of kind `coefficient`, "
@@ -89,6 +106,11 @@ class LearnedAllocator(Allocator):
         self.n_seeds, self.n_refined = n_seeds, n_refined
         self.search_steps, self.refine_steps = search_steps, refine_steps
         self.subsets = subsets
+        # All products here are too small to be shared among threads; chunks of targets are not.
+        self._threads = ThreadpoolController()
+        parameters = tuple((k, v) for k, v in checkpoint.fin_model.items() if k != "type")
+        spec = FinModelSpec(checkpoint.fin_model["type"], parameters)
+        self._fin_model = spec.type, dict(spec.values())
         state = {k: v.numpy() for k, v in checkpoint.surrogate.state_dict().items()}
         fin = LearnedFin(state, CoefficientSurrogate.REFERENCE, FORCE_UNIT)
         std = self.normalization.std
@@ -96,39 +118,92 @@ class LearnedAllocator(Allocator):
 
     def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         prepared = self.prepare(layout)
-        parts = [
-            self._solve_chunk(prepared, targets[i : i + CHUNK], seed + i, len(targets) == 1)
-            for i in range(0, len(targets), CHUNK)
-        ]
-        if len(parts) == 1:
-            return parts[0]
-        wrench = [part.wrench_surrogate for part in parts if part.wrench_surrogate is not None]
-        return Solution(np.concatenate([part.command for part in parts]), np.concatenate(wrench))
+        notes = self.notes(layout)
+        if len(targets) == 1:
+            with self._threads.limit(limits=1, user_api="blas"):
+                pool, proposal = self._solve_chunk(prepared, targets, seed, previous)
+            std = self.normalization.std
+            return Solution(
+                pool.command[:, 0],
+                pool.wrench[:, 0] * std,
+                notes=notes,
+                candidates=lambda: _candidates(pool, std),
+                samples=lambda: _samples(proposal, prepared, std),
+            )
 
-    def _solve_chunk(self, prepared: Prepared, targets: Array, seed: int, keep: bool) -> Solution:
+        def solve(start: int) -> Pool:
+            return self._solve_chunk(prepared, targets[start : start + CHUNK], seed + start, None)[0]
+
+        with (
+            self._threads.limit(limits=1, user_api="blas"),
+            ThreadPoolExecutor(os.cpu_count()) as executor,
+        ):
+            parts = list(executor.map(solve, range(0, len(targets), CHUNK)))
+        command = np.concatenate([part.command[:, 0] for part in parts])
+        wrench = np.concatenate([part.wrench[:, 0] for part in parts]) * self.normalization.std
+        return Solution(command, wrench, notes=notes)
+
+    def _solve_by(
+        self, policy: Policy, layout: Layout, target: Array, *, seed: int, previous: Array | None
+    ) -> Solution:
+        if policy.kind == "direction":
+            return self._solve_direction(layout, target, seed=seed, previous=previous)
+        solution = self._solve(layout, target, seed=seed, previous=previous)
+        plain = policy.kind == "closest" and len(set(policy.axis_weights)) == 1
+        if plain or self._reaches(layout, solution, target)[0]:
+            return solution
+        assert solution.candidates is not None and solution.samples is not None
+        starts = np.concatenate([solution.candidates().command, solution.samples().command[:RESTARTS]])
+        stages = (
+            policy.stages
+            if policy.kind == "priority"
+            else [(np.array(policy.axis_weights), np.ones(6, bool))]
+        )
+        command = serve_in_turn(
+            self.prepare(layout).commands, target[0] / self.normalization.std, stages, starts
+        )
+        wrench = self.prepare(layout).commands.wrench(command[None]) * self.normalization.std
+        return solution._replace(command=command[None], wrench_surrogate=wrench)
+
+    def _solve_chunk(
+        self, prepared: Prepared, targets: Array, seed: int, previous: Array | None
+    ) -> tuple[Pool, Proposal]:
+        """Refined answers, best first, to a few targets (N, 6), and the network's raw proposal."""
         std = self.normalization.std
         target = targets / std
         centred = target - self.normalization.mean / std
         proposal = propose(self.network, prepared, centred, target, self.n_candidates, self.temperature, seed)
-        command = self._search(prepared, target, self._seeds(prepared, proposal))
-        pool = self._refine(prepared, target, command, self.refine_steps)
+        if previous is None:
+            return self._descend(prepared, target, proposal, self._seeds(prepared, proposal)), proposal
+        # The fins turn as little as the target allows, those at rest towards where they would be cheapest.
+        seeds = self._seeds(prepared, proposal)
+        aim = self._descend(prepared, target, proposal, seeds).command[0, 0, :, 2]
+        kept = planar_thrust(prepared.commands, previous)
+        seeds = np.concatenate([kept[None, None], seeds], axis=1)
+        for width in TURNS:
+            near = turn_little(prepared, previous, aim, width)
+            pool = self._descend(near, target, proposal, seeds, steady=True)
+            if pool.error[0, 0] <= TOLERANCE:
+                break
+        command = wrap_directions(pool.command, prepared.commands.wraps)
+        return pool._replace(command=command), proposal
+
+    def _descend(
+        self, prepared: Prepared, target: Array, proposal: Proposal, seeds: Array, steady: bool = False
+    ) -> Pool:
+        """Search from thrust seeds (N, S, n), refine, and insist where that did not reach the target."""
+        command = self._search(prepared, target, seeds, steady)
+        pool = self._refine(prepared, target, command, self.refine_steps, steady)
         for steps, extra in PATIENCE:
             missed = pool.error[:, 0] > TOLERANCE
             if not missed.any():
                 break
-            more = np.concatenate(
-                [pool.command[missed], proposal.command[missed, :extra].astype(np.float64)], axis=1
-            )
+            raw = prepared.commands.clamp(proposal.command[missed, :extra].astype(np.float64))
+            more = np.concatenate([pool.command[missed], raw], axis=1)
             longer = self._refine(prepared, target[missed], more, steps)
             for kept, new in zip(pool, longer, strict=True):
                 kept[missed] = new[:, : kept.shape[1]]
-        best = pool.command[:, 0]
-        wrench = pool.wrench[:, 0] * std
-        if not keep:
-            return Solution(best, wrench)
-        return Solution(
-            best, wrench, lambda: _candidates(pool, std), lambda: _samples(proposal, prepared, std)
-        )
+        return pool
 
     def _seeds(self, prepared: Prepared, proposal: Proposal) -> Array:
         """Thrust seeds (N, S, n): the best candidate of each component, and sub-layouts."""
@@ -140,25 +215,57 @@ class LearnedAllocator(Allocator):
         shared = np.broadcast_to(prepared.subsets, (len(score), *prepared.subsets.shape))
         return np.concatenate([seeds, shared], axis=1)
 
-    def _search(self, prepared: Prepared, target: Array, thrust: Array) -> Array:
-        """Cheapest commands (N, n_refined, n, 3) reached from thrust seeds (N, S, n)."""
+    def _search(self, prepared: Prepared, target: Array, thrust: Array, steady: bool) -> Array:
+        """Cheapest commands (N, n_refined, n, 3) reached from thrust seeds (N, S, n).
+
+        With `steady`, the first seed is where the robot is; what it leads to stays first.
+        """
         rows, n_seeds, n = thrust.shape
         flat = np.repeat(target, n_seeds, axis=0)
-        planar = force_space.descend(prepared.planar, flat, thrust.reshape(-1, n), self.search_steps)
+        steps = self.search_steps or (4 if n < 6 else 12)
+        planar = force_space.descend(prepared.planar, flat, thrust.reshape(-1, n), steps)
         command, energy = force_space.realize(prepared.planar, planar)
         error = np.einsum("ri,ri->r", planar.residual, planar.residual)
         score = (100.0 * error + self.gamma * energy).reshape(rows, n_seeds)
+        if steady:
+            score[:, 0] = -1.0
         kept = np.argsort(score, axis=1)[:, : self.n_refined] + np.arange(rows)[:, None] * n_seeds
         return command[kept]
 
-    def _refine(self, prepared: Prepared, target: Array, command: Array, steps: int) -> Pool:
-        """Refined commands (N, P, n, 3), best first: the cheapest exact one, or the most exact one."""
+    def _refine(
+        self, prepared: Prepared, target: Array, command: Array, steps: int, steady: bool = False
+    ) -> Pool:
+        """Refined commands (N, P, n, 3), best first: the cheapest exact one, or the most exact one.
+
+        With `steady`, the first command is how the robot moves now; another must save the share
+        `SWITCH_GAIN` of its energy to take its place.
+        """
         rows, p, n, _ = command.shape
-        refined = refine(prepared.commands, np.repeat(target, p, axis=0), command.reshape(-1, n, 3), steps)
+        repeated = np.repeat(target, p, axis=0)
+        refined = refine(prepared.commands, repeated, command.reshape(-1, n, 3), steps)
         energy = command_energy(refined.command, prepared.upper)
-        rank = np.where(refined.error > TOLERANCE, 1e3 + refined.error, energy).reshape(rows, p)
-        order = np.argsort(rank, axis=1) + np.arange(rows)[:, None] * p
+        cost = energy.reshape(rows, p).copy()
+        if steady:
+            cost[:, 0] *= 1.0 - SWITCH_GAIN
+        error = refined.error.reshape(rows, p)
+        order = (
+            np.argsort(np.where(error > TOLERANCE, 1e3 + error, cost), axis=1) + np.arange(rows)[:, None] * p
+        )
         return Pool(refined.command[order], refined.wrench[order], refined.error[order], energy[order])
+
+    def notes(self, layout: Layout) -> tuple[str, ...]:
+        """What the user should know before trusting an answer for this layout."""
+        strangers = [fin.name for fin in layout.fins if _model_of(fin) != self._fin_model]
+        if not strangers:
+            return ()
+        return (
+            f"checkpoint {self.checkpoint!r} knows fins of model {self._fin_model[0]!r} and takes these for "
+            f"such: {', '.join(strangers)}; trust the plant's error or train a surrogate for them",
+        )
+
+
+def _model_of(fin: Fin) -> tuple[str, dict[str, Any]]:
+    return fin.model.type, dict(fin.model.values())
 
 
 class Pool(NamedTuple):

@@ -58,17 +58,32 @@ class Refined(NamedTuple):
 
 
 def refine(
-    problem: CommandProblem, target: Array, command: Array, steps: int, damping: float = 1e-6
+    problem: CommandProblem,
+    target: Array,
+    command: Array,
+    steps: int,
+    *,
+    damping: float = 1e-6,
+    weights: Array | float = 1.0,
 ) -> Refined:
     """Reduce the tracking error of commands (R, n, 3) towards normalized targets (R, 6).
 
     Each step is the smallest change, in units of the limit ranges, that cancels the error to first
     order; commands at a limit that would leave it are held. A step that makes a row worse is undone
     and that row's damping raised.
+
+    Args:
+        problem: the layout.
+        target: normalized wrenches (R, 6).
+        command: where to start (R, n, 3).
+        steps: number of steps.
+        damping: first damping of each row.
+        weights: of the axes of the error (6,); the error and wrench that are answered are weighted too.
     """
     rows, n, _ = command.shape
     span = problem.upper - problem.lower
-    columns = problem.columns.reshape(3 * n, 6)
+    columns = (problem.columns * weights).reshape(3 * n, 6)
+    target = target * weights
     damping_of = np.full(rows, damping)
     best: tuple[Array, Array, Array] | None = None  # command, wrench, squared error
     for step in range(steps + 1):
@@ -81,18 +96,18 @@ def refine(
         error = np.einsum("ri,ri->r", residual, residual)
         if best is not None:
             worse = error > best[2]
+            damping_of = np.where(worse, damping_of * 30.0 + 1e-4, damping_of * 0.3)
             if worse.any():
                 command = np.where(worse[:, None, None], best[0], command)
                 wrench = np.where(worse[:, None], best[1], wrench)
                 error = np.where(worse, best[2], error)
                 residual = target - wrench
-                damping_of = np.where(worse, damping_of * 30.0 + 1e-4, damping_of * 0.3)
                 if step < steps:
                     force, slope = problem.fin.force_and_jacobian(command)
         best = (command, wrench, error)
         if step < steps:
             # (R, n, 3 commands, 6): change of the normalized wrench per unit of each limit range.
-            jacobian = np.matmul(slope.swapaxes(-1, -2), problem.columns)
+            jacobian = np.matmul(slope.swapaxes(-1, -2), columns.reshape(n, 3, 6))
             jacobian *= span[..., None]
             command = problem.clamp(command + _step(problem, command, jacobian, residual, damping_of) * span)
     assert best is not None

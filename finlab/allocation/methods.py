@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +49,11 @@ def load_allocator(
     path = resolve_checkpoint(checkpoint or ("paper" if method == "paper" else "default"))
     module, name = METHODS[method]
     kind = getattr(import_module(module), name)
-    if method in LEARNED:
-        return kind(load_allocator_checkpoint(path), **options)
-    return kind(load_normalization(path), **options)
+    model = load_allocator_checkpoint(path) if method in LEARNED else load_normalization(path)
+    known = list(signature(kind).parameters)[1:]
+    if unknown := [name for name in options if name not in known]:
+        raise AllocationError(
+            f"method {method!r} knows the options {', '.join(known) or 'none'}, got {unknown[0]!r}"
+        )
+    allocator: Allocator = kind(model, **options)
+    return allocator

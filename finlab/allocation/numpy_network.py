@@ -70,7 +70,7 @@ class NumpyNetwork:
             hidden = np.where(hidden > 0, hidden, np.expm1(np.minimum(hidden, 0)))
         hidden = hidden + _apply(self.skip, x)
         wrench = _apply(self.wrench[0], target)
-        wrench = _apply(self.wrench[1], wrench / (1.0 + np.exp(-wrench)))
+        wrench = _apply(self.wrench[1], wrench / (1.0 + np.exp(-np.clip(wrench, -80.0, 80.0))))
         weight, bias = self.join
         width = hidden.shape[-1]
         hidden = hidden @ weight[:width] + (wrench @ weight[width:] + bias)[:, None]

@@ -18,7 +18,7 @@ from finlab.layout import Layout
 
 Array = NDArray[Any]
 
-MAX_SUBSETS = 16
+MAX_SUBSETS = 40
 """Most sub-layouts that are searched beside the network's proposals."""
 FULL_TURN = 2 * np.pi - 1e-6
 """Arc of zero directions [rad] from which a fin counts as able to point anywhere."""

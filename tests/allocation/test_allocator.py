@@ -104,7 +104,6 @@ def test_refuses_a_previous_command_of_another_robot(method: Drawn) -> None:
         method.allocate(ROBOT, SURGE, previous=np.zeros((4, 3)))
 
 
-@pytest.mark.xfail(strict=True, reason="text and infinities are not looked for yet")
 @pytest.mark.parametrize("previous", ["rest", [[math.inf] * 3] * 3])
 def test_refuses_a_previous_command_that_is_none(method: Drawn, previous: object) -> None:
     with pytest.raises(CommandError, match="previous: "):

@@ -98,7 +98,6 @@ def test_commands_without_room_stay_bit_for_bit(learned: LearnedAllocator) -> No
     assert np.ptp(refined.command[:, 1, 0]) > 0.01  # what has room moves
 
 
-@pytest.mark.xfail(strict=True, reason="a row's damping only falls again when another row got worse")
 def test_rows_do_not_see_each_other(learned: LearnedAllocator) -> None:
     problem = problem_of(learned, random_layout(np.random.default_rng(5004), n_fins=4))
     target, start = problem.wrench(draw(problem, 6, 1)), draw(problem, 6, 2)

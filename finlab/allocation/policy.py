@@ -1,0 +1,130 @@
+"""What to do when a robot cannot deliver the wrench it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.errors import CommandError
+
+Array = NDArray[np.float64]
+
+AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+"""The wrench's axes, in order."""
+KINDS = ("closest", "direction", "priority")
+"""`closest`: least weighted error. `direction`: the same direction, scaled down. `priority`: groups of axes,
+each served as far as those before it allow."""
+HELD = 30.0
+"""Weight of an axis that an earlier group has already settled."""
+IGNORED = 1e-3
+"""Weight of an axis whose group has not had its turn."""
+
+
+@dataclass(frozen=True)
+class Policy:
+    """One way to answer an unreachable wrench; reachable ones are delivered whole by all of them."""
+
+    kind: str = "closest"
+    """One of `KINDS`."""
+    axis_weights: tuple[float, ...] = (1.0,) * 6
+    """For `closest`: weight of each axis of the normalized error."""
+    order: tuple[tuple[str, ...], ...] = (("Fz",), ("Tx", "Ty", "Tz"), ("Fx", "Fy"))
+    """For `priority`: groups of axes, most important first; axes that are not named come last."""
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise CommandError(f"policy: expected one of {', '.join(KINDS)}, got {self.kind!r}")
+        weights = np.asarray(self.axis_weights, dtype=np.float64)
+        if weights.shape != (6,) or not (
+            np.isfinite(weights).all() and (weights >= 0).all() and weights.any()
+        ):
+            raise CommandError(
+                f"axis weights: expected six numbers from 0, not all 0, got {self.axis_weights}"
+            )
+        named = [axis for group in self.order for axis in group]
+        if unknown := [axis for axis in named if axis not in AXES]:
+            raise CommandError(f"priority: expected axes among {', '.join(AXES)}, got {unknown[0]!r}")
+        if len(set(named)) < len(named):
+            raise CommandError(f"priority: every axis may be named once, got {', '.join(named)}")
+
+    @property
+    def stages(self) -> list[tuple[Array, NDArray[np.bool_]]]:
+        """For `priority`: for each group, weights (6,) of the error and the axes (6,) settled afterwards."""
+        named = {axis for group in self.order for axis in group}
+        rest = tuple(axis for axis in AXES if axis not in named)
+        settled = np.zeros(6, dtype=bool)
+        stages = []
+        for group in (*self.order, *((rest,) if rest else ())):
+            current = np.array([axis in group for axis in AXES])
+            weights = np.where(settled, HELD, np.where(current, 1.0, IGNORED))
+            settled = settled | current
+            stages.append((weights, settled.copy()))
+        return stages
+
+
+CLOSEST = Policy()
+"""The default."""
+
+
+def as_policy(policy: Policy | str) -> Policy:
+    """A policy from its name."""
+    return policy if isinstance(policy, Policy) else Policy(policy)
+
+
+def largest_share(reached: Callable[[Array], NDArray[np.bool_]], rounds: int = 3, width: int = 16) -> float:
+    """The largest share s in [0, 1] of a wrench that is reached.
+
+    `reached` answers for many shares at once; each round narrows the interval `width`-fold. What a
+    share reaches, smaller ones are taken to reach as well: exactly so where the fins' forces form
+    convex sets around zero.
+    """
+    low, high = 0.0, 1.0
+    for _ in range(rounds):
+        shares = np.linspace(low, high, width + 1)[1:]
+        good = np.flatnonzero(reached(shares))
+        if len(good) == 0:
+            high = float(shares[0])
+            continue
+        best = int(good[-1])
+        if best == width - 1:
+            return float(shares[-1])
+        low, high = float(shares[best]), float(shares[best + 1])
+    return low
+
+
+def describe_binding(names: Sequence[str], command: Array, lower: Array, upper: Array) -> list[str]:
+    """Sentences about the limits that bind: fins at full or least thrust and at the ends of their arcs.
+
+    Args:
+        names: the fins.
+        command: (n, 3), NaN for a failed fin.
+        lower: lower limits (n, 3).
+        upper: upper limits (n, 3).
+    """
+    tolerance = 1e-3 * (upper - lower) + 1e-9
+    at_low, at_high = command <= lower + tolerance, command >= upper - tolerance
+    sentences = []
+    for i, name in enumerate(names):
+        if np.isnan(command[i]).any():
+            continue
+        if at_high[i, 0] and at_high[i, 1]:
+            sentences.append(f"{name} at full thrust")
+        elif at_low[i, 0] and at_low[i, 1]:
+            sentences.append(f"{name} at rest")
+        if upper[i, 2] - lower[i, 2] < 2 * np.pi - 1e-6 and (at_low[i, 2] or at_high[i, 2]):
+            sentences.append(f"{name} at the end of its arc")
+    return sentences
+
+
+def policy_from(kind: str, axis_weights: Any = None, priority: Sequence[str] | None = None) -> Policy:
+    """A policy as the command line names it: groups of `priority` are axes joined by commas."""
+    options: dict[str, Any] = {}
+    if axis_weights is not None:
+        options["axis_weights"] = tuple(float(w) for w in axis_weights)
+    if priority:
+        options["order"] = tuple(tuple(group.split(",")) for group in priority)
+    return Policy(kind, **options)

@@ -1,0 +1,15 @@
+"""What a layout can do, and how to improve it: authority, attainable sets, energy, score cards, optimization.
+
+It works from the fins' own laws with numpy and scipy. Torch is loaded only for fins that follow a table.
+"""
+
+from finlab.analysis.attainable import AttainableSet as AttainableSet
+from finlab.analysis.attainable import attainable_set as attainable_set
+from finlab.analysis.authority import AXES as AXES
+from finlab.analysis.authority import Authority as Authority
+from finlab.analysis.authority import Loss as Loss
+from finlab.analysis.authority import authority as authority
+from finlab.analysis.authority import losses as losses
+from finlab.analysis.least_energy import least_energy as least_energy
+from finlab.analysis.score_card import ScoreCard as ScoreCard
+from finlab.analysis.score_card import score_card as score_card

@@ -1,0 +1,151 @@
+"""Which axes the fins hold, how evenly, and what the loss of each single fin costs."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.analysis.extent import RANK_TOLERANCE, singular_values, strongest, weakest
+from finlab.analysis.fin_sets import SCALE, FinSets, fin_sets
+from finlab.analysis.reach import along_exactly
+from finlab.analysis.thrust_law import thrust_laws
+from finlab.layout import Layout
+
+Array = NDArray[np.float64]
+
+AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+"""Names of the six axes, in the order of a wrench."""
+NOTHING = 1e-4
+"""Largest wrench [N, scaled] below which an axis counts as out of reach; the solver is exact to about 1e-5."""
+
+
+@dataclass(frozen=True)
+class Authority:
+    """What a set of fins holds. Torques are scaled by the lever 0.2 m wherever forces and torques meet."""
+
+    rank: int
+    """How many of the six axes the fins act on independently, before any limit."""
+    singular_values: tuple[float, ...]
+    """Of the matrix whose columns are the fins' scaled wrenches at full thrust (6,) [N], falling."""
+    condition: float | None
+    """Largest over smallest singular value; None below rank 6."""
+    without_authority: tuple[str, ...]
+    """Axes that no fin pushes at all."""
+    coupled: tuple[str, ...]
+    """Axes that are pushed, but never without pushing others too."""
+    largest: tuple[float, ...]
+    """Largest wrench along each axis with the other five at zero (6,) [N, N m]."""
+    most_negative: tuple[float, ...]
+    """The same along the negative axes, as a size (6,) [N, N m]."""
+    beside_others: tuple[float, ...]
+    """Largest wrench along each axis with the others free (6,) [N, N m], the larger of the two signs."""
+    weakest: float
+    """Scaled wrench [N] that is within reach in every direction; 0 below rank 6."""
+    weakest_direction: tuple[float, ...]
+    """Unit scaled wrench (6,) along which no more than `weakest` can be had."""
+    isotropy: float
+    """`weakest` over the largest scaled wrench in any direction: 1 is the same everywhere, 0 none somewhere."""
+    gap: float
+    """`largest` and `most_negative` are too large by at most this [N, scaled]."""
+
+    @property
+    def reachable(self) -> tuple[str, ...]:
+        """Axes along which something can be had both ways with the other five at zero."""
+        both = zip(AXES, self.largest, self.most_negative, SCALE, strict=True)
+        return tuple(name for name, a, b, unit in both if min(a, b) > NOTHING * unit)
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What the loss of one fin costs."""
+
+    fin: str
+    """Its name."""
+    rank: int
+    """Rank that is left."""
+    reachable: tuple[str, ...]
+    """Axes still reachable alone."""
+    lost: tuple[str, ...]
+    """Axes that were and no longer are."""
+    share_left: tuple[float | None, ...]
+    """Share of the largest wrench along each axis that is left (6,), the smaller of both signs; None where there
+    was nothing."""
+    weakest: float
+    """Scaled wrench [N] that is within reach in every direction afterwards."""
+
+
+def authority(layout: Layout, failed: Collection[str] = ()) -> Authority:
+    """Returns what the working fins hold.
+
+    Raises:
+        LayoutError: there is no fin of a name in `failed`.
+    """
+    layout.indices(tuple(failed))
+    sets = fin_sets([layout], failed)
+    values, vectors = singular_values(sets)
+    kept = values[0] > RANK_TOLERANCE * max(values[0, 0], 1e-9)
+    # Onto the span of what the fins can give: an axis that the span holds whole can be pushed alone.
+    span = vectors[0][:, kept]
+    held = np.linalg.norm(span, axis=1)
+    pushed, alone = held > RANK_TOLERANCE, held > 1.0 - RANK_TOLERANCE
+    axes = np.concatenate([np.eye(6), -np.eye(6)])
+    size, gap = along_exactly(sets, axes)
+    free = sets.take(np.zeros(12, dtype=np.intp)).farthest(axes)[0].reshape(2, 6).max(axis=0)
+    size, free = (np.where(value > NOTHING, value, 0.0) for value in (size, free))
+    least, most = weakest(sets), strongest(sets)
+    full = bool(kept.all())
+    return Authority(
+        rank=int(kept.sum()),
+        singular_values=_floats(values[0]),
+        condition=float(values[0, 0] / values[0, 5]) if full else None,
+        without_authority=tuple(name for name, p in zip(AXES, pushed, strict=True) if not p),
+        coupled=tuple(name for name, p, a in zip(AXES, pushed, alone, strict=True) if p and not a),
+        largest=_floats(size[:6] * SCALE),
+        most_negative=_floats(size[6:] * SCALE),
+        beside_others=_floats(free * SCALE),
+        weakest=float(least.size[0]),
+        weakest_direction=_floats(least.direction[0]),
+        isotropy=float(least.size[0] / most.size[0]) if most.size[0] > 0.0 else 0.0,
+        gap=gap,
+    )
+
+
+def losses(layout: Layout, failed: Collection[str] = ()) -> tuple[Loss, ...]:
+    """Returns what the loss of each working fin, on top of `failed`, would cost; none when but one is left."""
+    working = [name for name in layout.names if name not in failed]
+    if len(working) < 2:
+        return ()
+    before = authority(layout, failed)
+    return tuple(_loss(layout, before, name, authority(layout, (*failed, name))) for name in working)
+
+
+def _loss(layout: Layout, before: Authority, name: str, after: Authority) -> Loss:
+    had = np.array([before.largest, before.most_negative])
+    left = np.array([after.largest, after.most_negative])
+    share = np.where(had > 0.0, left / np.where(had > 0.0, had, 1.0), np.inf).min(axis=0)
+    return Loss(
+        fin=name,
+        rank=after.rank,
+        reachable=after.reachable,
+        lost=tuple(axis for axis in before.reachable if axis not in after.reachable),
+        share_left=tuple(None if np.isinf(value) else float(min(value, 1.0)) for value in share),
+        weakest=after.weakest,
+    )
+
+
+def model_error(layout: Layout, failed: Collection[str] = ()) -> Array:
+    """Returns by how much (6,) [N, N m] the fins may depart from their convex sets, at most.
+
+    A fin cannot go below its least thrust where its set lets it rest, and a table may give less in some
+    directions than in its strongest one.
+    """
+    sets = fin_sets([layout], failed)
+    off = np.array([law.minimum + law.spread for law in thrust_laws(layout)]) * (sets.radius[0] > 0.0)
+    return (np.linalg.norm(sets.columns[0], axis=1) * off[:, None]).sum(axis=0) * SCALE
+
+
+def _floats(values: Array) -> tuple[float, ...]:
+    return tuple(float(value) for value in values + 0.0)

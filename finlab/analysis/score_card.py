@@ -1,0 +1,93 @@
+"""Everything that a layout can do, for one glance."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from finlab.analysis.authority import AXES, Authority, Loss, authority, losses, model_error
+from finlab.analysis.fin_sets import fin_sets, pieces
+from finlab.analysis.least_energy import least_energy
+from finlab.layout import Layout
+
+UNIT = (1.0, 1.0, 1.0, 0.1, 0.1, 0.1)
+"""Wrench along each axis whose energy is told [N, N m]."""
+
+
+@dataclass(frozen=True)
+class ScoreCard:
+    """What a layout's working fins can do. Torques meet forces at the lever 0.2 m."""
+
+    layout: str
+    """The layout's name."""
+    failed: tuple[str, ...]
+    """Fins that push nothing."""
+    n_fins: int
+    """Fins that work."""
+    authority: Authority
+    """Rank, conditioning, largest wrenches, weakest direction."""
+    losses: tuple[Loss, ...]
+    """What losing one more fin costs, fin by fin; none when but one works."""
+    unit_wrench: tuple[float, ...]
+    """Size of the wrench along each axis whose energy follows (6,) [N, N m]."""
+    unit_energy: tuple[float | None, ...]
+    """Least energy found for it along each positive axis (6,), other axes zero; None where out of reach."""
+    unit_energy_negative: tuple[float | None, ...]
+    """The same along the negative axes."""
+    model_error: tuple[float, ...]
+    """By how much each entry of a wrench may differ because fins cannot rest fully, or a table is uneven
+    (6,) [N, N m]."""
+    exact: bool
+    """Whether the sets are those of the fins, not a convex hull of them and not sampled from a table. Largest
+    wrenches are exact even where arcs are wide, unless there are too many such arcs."""
+
+    @property
+    def worst_loss(self) -> Loss | None:
+        """The loss that leaves least: the lowest rank, then the weakest direction, then the smallest shares."""
+        return min(self.losses, key=_left, default=None)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns the card as numbers, strings, lists and None, for JSON."""
+        record = asdict(self)
+        record["axes"] = list(AXES)
+        record["reachable"] = list(self.authority.reachable)
+        worst = self.worst_loss
+        record["worst_loss"] = None if worst is None else worst.fin
+        return record
+
+
+def score_card(layout: Layout, failed: Collection[str] = ()) -> ScoreCard:
+    """Returns the score card of a layout whose fins called `failed` push nothing.
+
+    Raises:
+        LayoutError: there is no fin of a name in `failed`.
+    """
+    sets = fin_sets([layout], failed)
+    wide = (sets.half < np.pi) & (sets.half > np.pi / 2) & (sets.radius > 0.0)
+    tables = any(fin.model.type == "table" for fin in layout.fins if fin.name not in failed)
+    wrenches = np.diag(UNIT)
+    energy = [
+        None if np.isnan(value) else float(value)
+        for value in least_energy(layout, np.concatenate([wrenches, -wrenches]), failed=failed)
+    ]
+    return ScoreCard(
+        layout=layout.name,
+        failed=tuple(name for name in layout.names if name in failed),
+        n_fins=layout.n_fins - len(set(failed)),
+        authority=authority(layout, failed),
+        losses=losses(layout, failed),
+        unit_wrench=UNIT,
+        unit_energy=tuple(energy[:6]),
+        unit_energy_negative=tuple(energy[6:]),
+        model_error=tuple(float(value) for value in model_error(layout, failed)),
+        exact=not tables and not (wide.any() or pieces(sets) is None),
+    )
+
+
+def _left(loss: Loss) -> tuple[float, ...]:
+    """What is left after a loss, to compare losses by."""
+    shares = [share for share in loss.share_left if share is not None]
+    return loss.rank, round(loss.weakest, 6), len(loss.reachable), round(sum(shares), 6)
