@@ -1,7 +1,7 @@
 """How a fin answers a pull: the force within its set that goes furthest along it, made unique and smooth.
 
-Both answers work in the fin's own view of its thrust plane: x along the middle of its arc, and across it, mirrored
-to the left where only one stop matters.
+Both answers work in the fin's own view of its thrust plane: x along the middle of its arc, and across it,
+mirrored to the left where only one stop matters.
 """
 
 from __future__ import annotations
@@ -16,12 +16,13 @@ from finlab.analysis.fin_sets import FinSets
 Array = NDArray[np.float64]
 
 Answer = Callable[[FinSets, Array, Array], tuple[Array, Array, Array]]
-"""Sets, pulls (R, n, 2) and softness (R, n) to a smoothed support function h of each fin (R, n), its gradient, which
-is a force within the set (R, n, 2), and its Hessian (R, n, 2, 2)."""
+"""Sets, pulls (R, n, 2) and softness (R, n) to a smoothed support function h of each fin (R, n), its
+gradient, which is a force within the set (R, n, 2), and its Hessian (R, n, 2, 2)."""
 
 
 def strong(sets: FinSets, pull: Array, softness: Array) -> tuple[Array, Array, Array]:
-    """Answers with nearly the largest thrust: h = T sqrt(|q|^2 + softness^2), q the pull seen through the stops.
+    """Answers with nearly the largest thrust: h = T sqrt(|q|^2 + softness^2), q the pull seen through the
+    stops.
 
     h exceeds the true support function by at most T times the softness, twice for a hull.
     """
@@ -49,8 +50,9 @@ def cheap(sets: FinSets, pull: Array, softness: Array) -> tuple[Array, Array, Ar
     """Answers with the force y that maximizes pull . y - softness |y|^2 / 2 within the set: exact."""
     x, side, sign, turn = _view(sets, pull / softness[..., None])
     narrow = sets.half <= np.pi / 2
-    seen = _through_stops(sets.half, x, side)
-    x, y, xx, xy, yy = (np.where(narrow, a, b) for a, b in zip(seen, (x, side, 1.0, 0.0, 1.0), strict=True))
+    # A wide sector's hull has no such rays; a full circle looks past them.
+    half = np.where(narrow, sets.half, np.pi)
+    x, y, xx, xy, yy = _through_stops(half, x, side)
     size = np.sqrt(x * x + y * y)
     far = size > sets.radius
     safe = np.where(size > 0.0, size, 1.0)
@@ -71,7 +73,8 @@ def cheap(sets: FinSets, pull: Array, softness: Array) -> tuple[Array, Array, Ar
 
 
 def _view(sets: FinSets, pull: Array) -> tuple[Array, Array, Array, Array]:
-    """Pulls as the fins see them: along the middle, across it without and as a sign, and the turn (R, n, 2, 2)."""
+    """Pulls as the fins see them: along the middle, across it without and as a sign, and the turn (R, n, 2,
+    2)."""
     cos, sin = np.cos(sets.middle), np.sin(sets.middle)
     x = cos * pull[..., 0] + sin * pull[..., 1]
     side = cos * pull[..., 1] - sin * pull[..., 0]

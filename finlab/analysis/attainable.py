@@ -46,8 +46,8 @@ class AttainableSet:
     gap: float
     """Nothing attainable lies further than this outside any face [N] or [N m]."""
     hull: bool
-    """Whether it is the convex hull of a set that is not convex, because a fin's arc is wider than half a turn
-    but no full circle."""
+    """Whether it is the convex hull of a set that is not convex, because a fin's arc is wider than half a
+    turn but no full circle."""
     sampled: bool
     """Whether a fin follows a table, so that its largest thrust was sampled."""
 

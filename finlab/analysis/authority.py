@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.analysis.extent import RANK_TOLERANCE, singular_values, strongest, weakest
-from finlab.analysis.fin_sets import SCALE, FinSets, fin_sets
+from finlab.analysis.fin_sets import SCALE, fin_sets
 from finlab.analysis.reach import along_exactly
 from finlab.analysis.thrust_law import thrust_laws
 from finlab.layout import Layout
@@ -19,7 +19,8 @@ Array = NDArray[np.float64]
 AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 """Names of the six axes, in the order of a wrench."""
 NOTHING = 1e-4
-"""Largest wrench [N, scaled] below which an axis counts as out of reach; the solver is exact to about 1e-5."""
+"""Largest wrench [N, scaled] below which an axis counts as out of reach; the solver is exact to about
+1e-5."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,8 @@ class Authority:
     weakest_direction: tuple[float, ...]
     """Unit scaled wrench (6,) along which no more than `weakest` can be had."""
     isotropy: float
-    """`weakest` over the largest scaled wrench in any direction: 1 is the same everywhere, 0 none somewhere."""
+    """`weakest` over the largest scaled wrench in any direction: 1 is the same everywhere, 0 none
+    somewhere."""
     gap: float
     """`largest` and `most_negative` are too large by at most this [N, scaled]."""
 
@@ -71,8 +73,8 @@ class Loss:
     lost: tuple[str, ...]
     """Axes that were and no longer are."""
     share_left: tuple[float | None, ...]
-    """Share of the largest wrench along each axis that is left (6,), the smaller of both signs; None where there
-    was nothing."""
+    """Share of the largest wrench along each axis that is left (6,), the smaller of both signs; None where
+    there was nothing."""
     weakest: float
     """Scaled wrench [N] that is within reach in every direction afterwards."""
 
@@ -114,7 +116,8 @@ def authority(layout: Layout, failed: Collection[str] = ()) -> Authority:
 
 
 def losses(layout: Layout, failed: Collection[str] = ()) -> tuple[Loss, ...]:
-    """Returns what the loss of each working fin, on top of `failed`, would cost; none when but one is left."""
+    """Returns what the loss of each working fin, on top of `failed`, would cost; none when but one is
+    left."""
     working = [name for name in layout.names if name not in failed]
     if len(working) < 2:
         return ()

@@ -50,9 +50,9 @@ def singular_values(sets: FinSets) -> tuple[Array, Array]:
 def weakest(sets: FinSets, n_random: int = N_RANDOM, n_walks: int = N_WALKS, fine: bool = True) -> Extent:
     """Returns the direction in which the sets of wrenches end soonest, and where.
 
-    Every wrench of that size, in any direction, is within reach. The walk starts from axes, singular vectors and
-    random directions, goes to the face of the set that lies that way, turns to the face's normal and goes again;
-    each step ends nearer. The least end of all walks is returned: an end that truly is there.
+    Every wrench of that size, in any direction, is within reach. The walk starts from axes, singular vectors
+    and random directions, goes to the face of the set that lies that way, turns to the face's normal and goes
+    again; each step ends nearer. The least end of all walks is returned: an end that truly is there.
     """
     values, vectors = singular_values(sets)
     size = np.zeros(len(values))
@@ -83,7 +83,8 @@ def weakest(sets: FinSets, n_random: int = N_RANDOM, n_walks: int = N_WALKS, fin
 
 
 def strongest(sets: FinSets) -> Extent:
-    """Returns the largest scaled wrench of each robot, other axes free: walks from axes and singular vectors."""
+    """Returns the largest scaled wrench of each robot, other axes free: walks from axes and singular
+    vectors."""
     _, vectors = singular_values(sets)
     robots = len(vectors)
     starts = np.concatenate(

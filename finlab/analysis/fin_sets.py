@@ -1,9 +1,9 @@
 """What each fin can push, as a convex set in its thrust plane, and how that adds up to a wrench.
 
 A fin that may turn a full circle pushes anywhere within a disc whose radius is its largest thrust. A fin with
-stops pushes within a sector of that disc. A sector wider than half a turn is not convex: here it stands for its
-convex hull, the disc cut off along the chord between the stops, unless `pieces` has cut it in two sectors that
-are convex. Every fin may rest: the tiny thrust that it cannot go below is left out.
+stops pushes within a sector of that disc. A sector wider than half a turn is not convex: here it stands for
+its convex hull, the disc cut off along the chord between the stops, unless `pieces` has cut it in two sectors
+that are convex. Every fin may rest: the tiny thrust that it cannot go below is left out.
 
 Wrenches are scaled: torques are divided by `LEVER`, so that all six entries are in newton.
 """
@@ -44,12 +44,13 @@ class FinSets(NamedTuple):
     half: Array
     """Half of the arc (R, n) [rad]; pi for a full circle."""
 
-    def take(self, rows: Array | NDArray[np.intp]) -> FinSets:
+    def take(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> FinSets:
         """Returns some of the robots, in the order asked for, repeated where asked for twice."""
         return FinSets(*(field[rows] for field in self))
 
     def pull(self, normal: Array) -> Array:
-        """Returns what each fin feels (R, n, 2) of the direction `normal` (R, 6): the columns' dot products."""
+        """Returns what each fin feels (R, n, 2) of the direction `normal` (R, 6): the columns' dot
+        products."""
         return np.einsum("rnck,rk->rnc", self.columns, normal)
 
     def wrench(self, force: Array) -> Array:
@@ -59,8 +60,8 @@ class FinSets(NamedTuple):
     def farthest(self, normal: Array) -> tuple[Array, Array]:
         """Returns how far the sets reach along `normal` (R, 6), and the planar forces (R, n, 2) that do it.
 
-        The first, (R,), is the support function of the set of all wrenches: exact, or exact for the hull where
-        a sector is wider than half a turn.
+        The first, (R,), is the support function of the set of all wrenches: exact, or exact for the hull
+        where a sector is wider than half a turn.
         """
         pull = self.pull(normal)
         size = np.sqrt((pull**2).sum(-1))

@@ -1,11 +1,11 @@
 """The least energy for a wrench, from the fins' own laws; no checkpoint is asked.
 
 Energy is the paper's proxy `J_en`. Each fin gives its thrust by the cheapest pair of amplitude and frequency.
-That cost grows about like the square root of thrust: it is concave, so it pays to let some fins rest, and there
-are many local optima. From each of many starts the search goes downhill by touching the cost from above with a
-quadratic, solving the convex problem that results exactly, and touching again. Starts rest every fin and every
-pair of fins in turn, and some are random. Where a fin's arc is wider than half a turn, each half is tried.
-The small cost of the zero direction is left out of the search and counted in the result.
+That cost grows about like the square root of thrust: it is concave, so it pays to let some fins rest, and
+there are many local optima. From each of many starts the search goes downhill by touching the cost from above
+with a quadratic, solving the convex problem that results exactly, and touching again. Starts rest every fin
+and every pair of fins in turn, and some are random. Where a fin's arc is wider than half a turn, each half is
+tried. The small cost of the zero direction is left out of the search and counted in the result.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.energy import DEFAULT_WEIGHTS, energy_scale
 from finlab.analysis.answers import cheap
-from finlab.analysis.dual import minimize_dual
+from finlab.analysis.dual import Dual, minimize_dual
 from finlab.analysis.fin_sets import SCALE, FinSets, fin_sets, pieces
 from finlab.analysis.reach import along
 from finlab.analysis.thrust_law import thrust_laws
@@ -89,7 +89,7 @@ def descend(rows: FinSets, target: Array, thrust: Array) -> tuple[Array, NDArray
         held = np.clip(thrust, REST * top, top)
         # The slope of sqrt(T) over T, which is what a quadratic that touches there bends by.
         softness = held**-1.5 * top**-0.5
-        x = minimize_dual(rows, cheap, softness, origin, basis, target, x)
+        x = minimize_dual(Dual(cheap, rows, softness, origin, basis, target), x)
         force = cheap(rows, rows.pull(x), softness)[1]
         thrust = np.linalg.norm(force, axis=-1)
     return force, np.abs(rows.wrench(force) - target).max(-1) <= OFF

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.analysis.answers import strong
-from finlab.analysis.dual import minimize_dual
+from finlab.analysis.dual import Dual, minimize_dual
 from finlab.analysis.fin_sets import FinSets, pieces
 
 Array = NDArray[np.float64]
@@ -48,9 +48,10 @@ def largest(sets: FinSets, origin: Array, basis: Array, softness: tuple[float, .
     for factor in softness:
         # Only the last, hardest answer is what counts.
         tolerance = 1e-9 if factor == softness[-1] else 1e-3
-        x = minimize_dual(sets, strong, factor * unit, origin, basis, nothing, x, tolerance)
-    normal = origin + (basis @ x[..., None])[..., 0]
-    wrench = sets.wrench(strong(sets, sets.pull(normal), softness[-1] * unit)[1])
+        dual = Dual(strong, sets, factor * unit, origin, basis, nothing)
+        x = minimize_dual(dual, x, tolerance)
+    normal = dual.normal(x)
+    wrench = sets.wrench(strong(sets, sets.pull(normal), dual.softness)[1])
     size = sets.farthest(normal)[0]
     beside = np.abs((wrench[:, None] @ basis)[:, 0]).max(-1)
     # A wrench that is not where it was asked for proves nothing.
@@ -66,8 +67,8 @@ def along(sets: FinSets, direction: Array, softness: tuple[float, ...] = FINE) -
 def along_exactly(sets: FinSets, direction: Array) -> tuple[Array, float]:
     """Returns the largest wrench (R,) of one robot along each unit `direction` (R, 6), and the largest gap.
 
-    Sectors wider than half a turn are taken in pieces, so that the result is theirs and not their hull's; with
-    too many of them the hull's, larger, result is returned.
+    Sectors wider than half a turn are taken in pieces, so that the result is theirs and not their hull's;
+    with too many of them the hull's, larger, result is returned.
     """
     parts = pieces(sets)
     if parts is None:

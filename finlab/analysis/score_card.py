@@ -40,13 +40,13 @@ class ScoreCard:
     model_error: tuple[float, ...]
     """By how much each entry of a wrench may differ because fins cannot rest fully, or a table is uneven
     (6,) [N, N m]."""
-    exact: bool
-    """Whether the sets are those of the fins, not a convex hull of them and not sampled from a table. Largest
-    wrenches are exact even where arcs are wide, unless there are too many such arcs."""
+    notes: tuple[str, ...]
+    """Sentences on where these numbers are not exact; none when they are."""
 
     @property
     def worst_loss(self) -> Loss | None:
-        """The loss that leaves least: the lowest rank, then the weakest direction, then the smallest shares."""
+        """The loss that leaves least: the lowest rank, then the weakest direction, then the smallest
+        shares."""
         return min(self.losses, key=_left, default=None)
 
     def to_dict(self) -> dict[str, Any]:
@@ -65,9 +65,6 @@ def score_card(layout: Layout, failed: Collection[str] = ()) -> ScoreCard:
     Raises:
         LayoutError: there is no fin of a name in `failed`.
     """
-    sets = fin_sets([layout], failed)
-    wide = (sets.half < np.pi) & (sets.half > np.pi / 2) & (sets.radius > 0.0)
-    tables = any(fin.model.type == "table" for fin in layout.fins if fin.name not in failed)
     wrenches = np.diag(UNIT)
     energy = [
         None if np.isnan(value) else float(value)
@@ -83,7 +80,7 @@ def score_card(layout: Layout, failed: Collection[str] = ()) -> ScoreCard:
         unit_energy=tuple(energy[:6]),
         unit_energy_negative=tuple(energy[6:]),
         model_error=tuple(float(value) for value in model_error(layout, failed)),
-        exact=not tables and not (wide.any() or pieces(sets) is None),
+        notes=_notes(layout, failed),
     )
 
 
@@ -91,3 +88,19 @@ def _left(loss: Loss) -> tuple[float, ...]:
     """What is left after a loss, to compare losses by."""
     shares = [share for share in loss.share_left if share is not None]
     return loss.rank, round(loss.weakest, 6), len(loss.reachable), round(sum(shares), 6)
+
+
+def _notes(layout: Layout, failed: Collection[str]) -> tuple[str, ...]:
+    """What is not exact."""
+    sets = fin_sets([layout], failed)
+    notes = []
+    if ((sets.half < np.pi) & (sets.half > np.pi / 2) & (sets.radius > 0.0)).any():
+        what = "Weakest direction and isotropy are"
+        if pieces(sets) is None:
+            what = "Largest wrenches, weakest direction, isotropy and energies are"
+        notes.append(
+            f"{what} those of the convex hull: some arcs are wider than half a turn but not full circles."
+        )
+    if any(fin.model.type == "table" for fin in layout.fins if fin.name not in failed):
+        notes.append("Fins that follow a table count with the largest thrust that was sampled from it.")
+    return tuple(notes)
