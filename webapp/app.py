@@ -63,6 +63,7 @@ class App:
         self._server = server
         self._solver = solver
         self._worker = Worker()
+        self._analysis = Worker()
         self._store = SessionStore(
             lambda: Session(layout, display), None if folder is None else SessionFiles(folder)
         )
@@ -82,6 +83,7 @@ class App:
         with contextlib.suppress(TimeoutError, RuntimeError):  # one turn of the loop, so that the clock ends
             asyncio.run_coroutine_threadsafe(asyncio.sleep(0.01), self._loop).result(2.0)
         self._worker.stop()
+        self._analysis.stop()
         self._store.keep()
 
     def _connected(self, client: viser.ClientHandle) -> None:
@@ -105,7 +107,9 @@ class App:
         if key not in remembered:
             remembered = [key, *remembered]
         client.local_storage.set_item(STORAGE_KEY, json.dumps(remembered[:MAX_KEYS]))
-        self.views[client.client_id] = View(client, session, self._solver, self._worker, self._loop)
+        self.views[client.client_id] = View(
+            client, session, self._solver, self._worker, self._loop, self._analysis
+        )
 
     async def _disconnected(self, client: viser.ClientHandle) -> None:
         self._drop(client.client_id)

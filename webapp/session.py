@@ -12,6 +12,7 @@ from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.body import Hull
 from webapp import editing, hull_editing
+from webapp.analyst import DRAWN
 from webapp.arrow_scale import NEWTONS
 from webapp.history import History
 from webapp.links import followed, partner, unlinked
@@ -55,6 +56,10 @@ class Display:
     """Fins slide on the hull, shafts along its normal."""
     ghost: bool = True
     """Show where moved fins stood when the layout was opened or saved."""
+    drawn: str = "none"
+    """Key of `webapp.analyst.DRAWN`: the attainable set that is shown."""
+    alone: bool = True
+    """Attainable forces without torques, torques without forces."""
     center: bool = False
     """Mark the centre of gravity."""
 
@@ -299,7 +304,11 @@ class Session:
 
     def set_display(self, key: str, value: Any) -> None:
         """One field of `Display`."""
-        choices = {"position_snap": POSITION_STEPS, "angle_snap": ANGLE_STEPS}
+        choices: dict[str, Any] = {
+            "position_snap": POSITION_STEPS,
+            "angle_snap": ANGLE_STEPS,
+            "drawn": DRAWN,
+        }
         if key in choices and value not in choices[key]:
             raise FinlabError(f"{key}: expected one of {', '.join(choices[key])}, got {value!r:.40}")
         if key == "newtons" and value not in (0.0, *NEWTONS):

@@ -1,13 +1,12 @@
 """Target wrenches to start from, and how much of each axis a layout can give."""
 
 import math
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.layout import Fin, FinModelSpec, Layout, Limits, planar_effectiveness
-from finlab.physics import Plant
+from finlab.analysis.fin_sets import SCALE, fin_sets
+from finlab.layout import Layout
 
 PRESETS: dict[str, tuple[float, float, float, float, float, float]] = {
     "Cruise": (2.0, 0.0, 0.0, 0.0, 0.0, 0.0),
@@ -23,29 +22,15 @@ FIRST = PRESETS["Turn"]
 
 
 def axis_reach(layout: Layout, failed: tuple[str, ...] = ()) -> NDArray[np.float64]:
-    """Largest size of each wrench component (6,) [N, N m] that the working fins give if nothing else matters.
-
-    Each fin pushes with its full thrust in the best direction for that axis; the other axes are free, and
-    limits of the zero direction are not looked at, so this is an upper bound.
-    """
-    healthy = layout.without(failed) if failed else layout
-    position = np.array([fin.position for fin in healthy.fins])
-    angle = np.array([fin.mounting_angle for fin in healthy.fins])
-    gain = np.linalg.norm(planar_effectiveness(position, angle), axis=-1)  # (n, 6), N or N m per N
-    return (gain * full_thrust(healthy)[:, None]).sum(axis=0)
+    """Largest size of each wrench component (6,) [N, N m] that the working fins give with the others free."""
+    sets = fin_sets([layout], failed)
+    both = sets.take(np.zeros(12, dtype=np.intp)).farthest(np.concatenate([np.eye(6), -np.eye(6)]))[0]
+    return np.asarray(both.reshape(2, 6).max(axis=0) * SCALE)
 
 
 def full_thrust(layout: Layout) -> NDArray[np.float64]:
     """Mean thrust (n,) of each fin at its largest amplitude and frequency [N]."""
-    return np.array([_full_thrust(fin.limits, fin.model) for fin in layout.fins])
-
-
-@lru_cache(maxsize=256)
-def _full_thrust(limits: Limits, model: FinModelSpec) -> float:
-    """Full thrust of one fin [N]; where it sits does not matter, so a drag asks for the same one again."""
-    alone = Layout("alone", (Fin("fin", (0.0, 0.0, 0.0), 0.0, limits, model),))
-    command = [[*limits.upper[:2], sum(limits.zero_direction) / 2]]
-    return float(np.linalg.norm(Plant(alone).fin_forces(command)))
+    return fin_sets([layout]).radius[0]
 
 
 def slider_end(reach: float) -> float:

@@ -14,6 +14,7 @@ import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
+from webapp.analyst import Analyst, Question
 from webapp.commands import add_commands
 from webapp.comparison import Comparison
 from webapp.density import Densities
@@ -24,6 +25,7 @@ from webapp.panels.display import DisplayPanel
 from webapp.panels.header import Header
 from webapp.panels.host import Panel
 from webapp.panels.layout import LayoutPanel
+from webapp.panels.limits import LimitsPanel
 from webapp.panels.modes import ModesPanel
 from webapp.panels.take_home import TakeHomePanel
 from webapp.panels.wrench import WrenchPanel
@@ -50,8 +52,18 @@ class View:
         solver: Solver,
         worker: Worker,
         loop: asyncio.AbstractEventLoop,
+        analysis: Worker,
     ) -> None:
-        """Build the page and ask for a first answer."""
+        """Build the page and ask for a first answer.
+
+        Args:
+            client: the browser.
+            session: what it shows.
+            solver: answers its questions.
+            worker: on whose thread they are answered.
+            loop: viser's event loop.
+            analysis: a second worker, for what takes longer.
+        """
         self.client = client
         self.session = session
         self._solver = solver
@@ -63,6 +75,7 @@ class View:
         self._best_revision = -1
         self._modes: tuple[Mode, ...] = ()
         self.densities: Densities | None = None
+        self.analyst = Analyst(analysis, loop, self._post, self._refresh)
         self.comparison = Comparison(solver, worker, self._post, self._refresh)
         self._error: str | None = None
         self._error_revision = -1
@@ -90,6 +103,8 @@ class View:
             self._panels.append(LayoutPanel(gui, self))
         with tabs.add_tab("Modes"):
             self._panels.append(ModesPanel(gui, self))
+        with tabs.add_tab("Limits"):
+            self._panels.append(LimitsPanel(gui, self))
         with tabs.add_tab("Compare"):
             self._panels.append(ComparePanel(gui, self))
         with tabs.add_tab("View"):
@@ -236,7 +251,10 @@ class View:
     # From the session to the solver and back.
 
     def _ask(self) -> None:
-        """Have the worker answer the present state, unless it was asked already."""
+        """Have the workers answer the present state, unless they were asked already."""
+        session = self.session
+        display, state = session.display, session.state
+        self.analyst.ask(Question(state.layout, state.failed, session.saved, display.drawn, display.alone))
         if self._asked == self.session.revision:
             return
         self._asked = self.session.revision
@@ -282,4 +300,5 @@ class View:
         """The browser has gone."""
         self._closed = True
         self.comparison.cancel()
+        self.analyst.close()
         self._worker.forget(id(self))

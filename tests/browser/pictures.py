@@ -34,9 +34,30 @@ def _layout(page: Page) -> None:
 def _modes(page: Page) -> None:
     page.key("x")
     page.tab("Modes")
+    page.type("Temperature T", "0.5")
+    page.press("What the network proposes")
+    page.until(lambda: not page.view.busy)
+
+
+def _limits(page: Page) -> None:
+    page.key("Control+z")
+    page.tab("Limits")
+    page.press("forces")
+    page.key("f")
+    page.until(lambda: not page.view.analyst.busy)
+
+
+def _compare(page: Page) -> None:
+    page.key("Control+z")
+    page.press("none")
+    page.tab("Compare")
+    page.press("Compare the methods")
+    page.until(lambda: not page.view.comparison.running)
+    page.press("sqp")
 
 
 def _failure(page: Page) -> None:
+    page.press("none")
     page.tab("Wrench")
     page.press("2")
     page.until(lambda: not page.view.busy)
@@ -53,6 +74,10 @@ SCENES: dict[str, Callable[[Page], object]] = {
     "app": lambda page: None,
     "app-layout": _layout,
     "app-modes": _modes,
+    "app-limits": _limits,
+    "app-compare": _compare,
+    "app-view": lambda page: page.tab("View"),
+    "app-files": lambda page: page.tab("Files"),
     "app-failure": _failure,
     "app-tour": _tour,
 }

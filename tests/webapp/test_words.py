@@ -1,15 +1,18 @@
 """What the app says about an answer, and what it writes into files."""
 
-import numpy as np
 import pytest
 
+from finlab.analysis import score_card
 from finlab.assets import shipped_layouts
 from finlab.errors import LayoutError
 from finlab.layout import load_layout
 from tests.webapp.stand_in import StandIn
 from webapp import files
+from webapp.analyst import Question, find
 from webapp.arrow_scale import LENGTH, LONGEST, fitting_newtons
-from webapp.checks import check
+from webapp.checks import warnings
+from webapp.markup.check_card import check_card
+from webapp.markup.score_card import score_table
 from webapp.session import Session
 from webapp.state import State
 from webapp.targets import PRESETS, axis_reach, full_thrust
@@ -80,16 +83,26 @@ def test_candidates_as_csv() -> None:
         files.candidates_csv(None)
 
 
-def test_checks_of_a_layout() -> None:
-    ucat = check(load_layout(shipped_layouts()["ucat"]))
-    assert ucat.rank == 6 and ucat.remaining == pytest.approx(0.75) and ucat.warnings == ()
-    blind = check(load_layout(shipped_layouts()["no_yaw"]))
-    assert blind.rank < 6 and blind.condition == np.inf and blind.reach[5] < 1e-6
+def test_fins_in_the_way_are_told() -> None:
     layout = load_layout(shipped_layouts()["ucat"])
+    assert warnings(layout) == ()
     crowded = layout.replace_fin("front_left", position=layout.fins[0].position)
-    assert "may touch" in check(crowded).warnings[0]
+    assert "may touch" in warnings(crowded)[0]
     inside = layout.replace_fin("front_left", position=(0.0, 0.0, 0.0))
-    assert any("inside the hull" in text for text in check(inside).warnings)
+    assert any("inside the hull" in text for text in warnings(inside))
+
+
+def test_cards_say_what_a_layout_can_do() -> None:
+    ucat, blind = (load_layout(shipped_layouts()[name]) for name in ("ucat", "no_yaw"))
+    found = find(Question(ucat, ("front_left",), blind, "forces", True))
+    assert found.now is not None and found.whole is not None and found.before is None
+    table = score_table(ucat, found.card, None)
+    assert "6 of 6" in table and table.count("without") == 3
+    both = score_table(ucat, score_card(ucat), score_card(blind))
+    assert "before" in both and "▲" in both and "none" in both
+    card = check_card(score_card(blind), False, ("<b>",))
+    assert "yaw" in card and "&lt;b&gt;" in card
+    assert "computing" in check_card(None, True, ())
 
 
 def test_every_stop_of_the_tour_stands() -> None:

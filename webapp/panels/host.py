@@ -6,6 +6,7 @@ from typing import Protocol
 import viser
 
 from finlab.allocation.allocation import Allocation
+from webapp.analyst import Analyst
 from webapp.comparison import Comparison
 from webapp.density import Densities
 from webapp.modes import Mode
@@ -48,6 +49,8 @@ class Host(Protocol):
     def densities(self) -> Densities | None:
         """What the network proposed for the newest answer, where the method has a network."""
 
+    analyst: Analyst
+    """What the layout can do."""
     comparison: Comparison
     """Other methods on the same question."""
 

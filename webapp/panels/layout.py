@@ -7,7 +7,7 @@ from html import escape
 import viser
 
 from finlab.layout import Layout
-from webapp.checks import check
+from webapp.checks import warnings
 from webapp.handles import on_user_change, on_user_click, put
 from webapp.markup.check_card import check_card
 from webapp.panels.host import Host
@@ -69,6 +69,7 @@ class LayoutPanel:
         self._hull = HullPanel(gui, host)
         self._card = gui.add_html("")
         self._checked: Layout | None = None
+        self._warnings: tuple[str, ...] = ()
 
     def _open(self, name: str) -> None:
         if name in shipped():
@@ -128,5 +129,7 @@ class LayoutPanel:
         )
         put(self._about, content=f"<div class='fl'><div class='dim'>{escape(first)}</div>{pairs}</div>")
         if layout != self._checked:
-            self._checked = layout
-            put(self._card, content=check_card(layout, check(layout)))
+            self._checked, self._warnings = layout, warnings(layout)
+        analyst = self._host.analyst
+        card = None if analyst.findings is None else analyst.findings.card
+        put(self._card, content=check_card(card, analyst.busy, self._warnings))

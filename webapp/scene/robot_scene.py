@@ -9,8 +9,10 @@ import viser
 from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
+from webapp.analyst import Findings
 from webapp.arrow_scale import LENGTH, fitting_newtons
 from webapp.meshes.hull import hull_of
+from webapp.scene.attainable_nodes import AttainableNodes
 from webapp.scene.fin_node import FinNode
 from webapp.scene.ghost import Ghost
 from webapp.scene.lines import Lines
@@ -58,6 +60,7 @@ class RobotScene:
         self._lines = Lines(scene)
         self._ghost = Ghost(scene)
         self._overlay = Overlay(scene)
+        self._attainable = AttainableNodes(scene)
         self._fins: list[FinNode] = []
         self._dragged: int | None = None
         self._phase: NDArray[Any] = np.zeros(0)
@@ -74,17 +77,25 @@ class RobotScene:
             camera.position = CAMERAS[view]
             camera.look_at = (0.0, 0.0, 0.03)
 
-    def refresh(self, allocation: Allocation | None, other: Allocation | None = None) -> None:
+    def refresh(
+        self,
+        allocation: Allocation | None,
+        other: Allocation | None = None,
+        findings: Findings | None = None,
+    ) -> None:
         """Show the session's layout, and the answer to it if there is one for this very layout.
 
         Args:
             allocation: the answer.
             other: another method's answer, whose forces are shown beside it.
+            findings: what the layout can attain, where that is to be shown.
         """
         state, display = self._session.state, self._session.display
         hull = hull_of(state.layout)
         if self._dragged is None:  # a hull that breathes with the fin one drags is hard to aim at
-            self._stage.refresh(hull, display.dark, display.shadows, display.graph, display.center)
+            self._stage.refresh(
+                hull, display.dark, display.shadows, display.graph or display.drawn != "none", display.center
+            )
         while len(self._fins) < state.layout.n_fins:
             self._fins.append(FinNode(self._client.scene, len(self._fins), self._clicked, self._drag))
         for node in self._fins[state.layout.n_fins :]:
@@ -108,6 +119,7 @@ class RobotScene:
         self._ghost.refresh(self._session.saved if display.ghost else None, state.layout)
         self._overlay.refresh(other, scale)
         target = np.array(state.target)
+        self._attainable.refresh(findings if display.drawn != "none" else None, target)
         given = allocation.wrench if allocation is not None else None
         missing = np.zeros(6) if allocation is None else missing_part(allocation)
         self._wrench.refresh(target, given, missing, hull.center[2] + hull.half[2], scale)

@@ -46,8 +46,8 @@ class Stage:
 
     def refresh(self, hull: AnyHull, dark: bool, shadows: bool, glass: bool, center: bool) -> None:
         """Show another hull, theme or quality; a hull of glass lets one look at the lines inside."""
-        put(self._body, opacity=0.35 if glass or center else None)
-        put(self._bow, opacity=0.35 if glass or center else None)
+        put(self._body, opacity=0.35 if glass else None)
+        put(self._bow, opacity=0.35 if glass else None)
         put(self._center, visible=center)
         if hull != self._hull:
             self._hull = hull

@@ -1,0 +1,105 @@
+"""What a layout can do, as one card; with the saved layout beside it where the two differ."""
+
+from html import escape
+
+from finlab.analysis import AXES, ScoreCard
+from finlab.layout import Layout
+from webapp.figures import listed, three_digits
+from webapp.markup.fins import swatch
+from webapp.state import AXIS_UNITS
+
+
+def score_table(layout: Layout, card: ScoreCard, before: ScoreCard | None) -> str:
+    """The score card.
+
+    Args:
+        layout: the robot, for its fins' colours.
+        card: what it can do.
+        before: what the saved layout can do, None where it is the same.
+    """
+    parts = [_summary(card, before), _axes(card, before), _losses(layout, card)]
+    parts += [f"<div class='said dim'>{escape(note)}</div>" for note in card.notes]
+    return f"<div class='fl score'>{''.join(parts)}</div>"
+
+
+def rank_sentence(card: ScoreCard) -> str:
+    """Rank, conditioning and what is missing, in words."""
+    a = card.authority
+    text = f"<b>{a.rank} of 6</b> axes independent"
+    if a.condition is not None:
+        text += f", condition number {three_digits(a.condition)}"
+    text += "."
+    if a.without_authority:
+        text += f" <span class='missing'>It cannot {listed(a.without_authority)}.</span>"
+    if a.coupled:
+        text += f" <span class='missing'>{listed(a.coupled).capitalize()} only together with others.</span>"
+    return text
+
+
+def _summary(card: ScoreCard, before: ScoreCard | None) -> str:
+    now, old = card.authority, None if before is None else before.authority
+    rows = [
+        _row("weakest direction [N]", now.weakest, None if old is None else old.weakest),
+        _row("isotropy", now.isotropy, None if old is None else old.isotropy),
+    ]
+    if card.worst_loss is not None:
+        lost = None if before is None or before.worst_loss is None else before.worst_loss.weakest
+        rows.append(_row("weakest after the worst loss [N]", card.worst_loss.weakest, lost))
+    head = "<tr><th></th><th>before</th><th>now</th><th></th></tr>" if before is not None else ""
+    return f"<div class='said'>{rank_sentence(card)}</div><table>{head}{''.join(rows)}</table>"
+
+
+def _row(name: str, now: float, old: float | None) -> str:
+    if old is None:
+        return f"<tr><td>{name}</td><td>{three_digits(now)}</td></tr>"
+    change = now - old
+    kind = "" if abs(change) < 1e-3 * max(abs(now), abs(old), 1e-9) else "given" if change > 0 else "missing"
+    sign = "=" if not kind else "▲" if change > 0 else "▼"
+    return (
+        f"<tr><td>{name}</td><td>{three_digits(old)}</td><td>{three_digits(now)}</td>"
+        f"<td class='{kind}'>{sign}</td></tr>"
+    )
+
+
+def _axes(card: ScoreCard, before: ScoreCard | None) -> str:
+    rows = []
+    for k, word in enumerate(AXES):
+        now = card.authority
+        largest = _both(now.largest[k], now.most_negative[k])
+        old = ""
+        if before is not None:
+            a = before.authority
+            old = f"<td>{_both(a.largest[k], a.most_negative[k])}</td>"
+        shares = [loss.share_left[k] for loss in card.losses]
+        left = [share for share in shares if share is not None]
+        least = f"{100 * min(left):.0f} %" if left else "–"
+        energy = card.unit_energy[k]
+        rows.append(
+            f"<tr><td>{word} <span class='dim'>{AXIS_UNITS[k]}</span></td>{old}<td>{largest}</td>"
+            f"<td>{least}</td><td>{'–' if energy is None else three_digits(energy)}</td></tr>"
+        )
+    old = "<th>before</th>" if before is not None else ""
+    head = (
+        f"<tr><th>axis alone</th>{old}<th>largest</th><th title='after the worst loss of a fin'>one lost</th>"
+        f"<th title='energy of 1 N, or 0.1 N m'>energy</th></tr>"
+    )
+    return f"<table>{head}{''.join(rows)}</table>"
+
+
+def _both(positive: float, negative: float) -> str:
+    """Both signs; one number where they are equal to what is shown of them."""
+    a, b = three_digits(positive), three_digits(negative)
+    if positive == negative == 0.0:
+        return "<span class='missing'>none</span>"
+    return f"±{a}" if a == b else f"+{a} −{b}"
+
+
+def _losses(layout: Layout, card: ScoreCard) -> str:
+    if not card.losses:
+        return ""
+    rows = []
+    for loss in card.losses:
+        cost = f"<span class='missing'>loses {escape(listed(loss.lost))}</span>" if loss.lost else ""
+        name = f"{swatch(layout.index(loss.fin))}{escape(loss.fin)}"
+        rows.append(f"<tr><td>without {name}</td><td>{three_digits(loss.weakest)} N</td><td>{cost}</td></tr>")
+    return f"<table><tr><th>one fin lost</th><th>weakest</th><th></th></tr>{''.join(rows)}</table>"

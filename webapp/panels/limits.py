@@ -1,0 +1,53 @@
+"""What this layout can do: attainable sets in the view, and the score card."""
+
+from functools import partial
+
+import viser
+
+from webapp.analyst import DRAWN
+from webapp.figures import three_digits
+from webapp.handles import on_user_change, put
+from webapp.markup.score_card import score_table
+from webapp.panels.host import Host
+from webapp.scene.attainable_nodes import set_scale
+
+
+class LimitsPanel:
+    """Switches and the card."""
+
+    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+        """Build the widgets."""
+        self._host = host
+        self._drawn = gui.add_button_group(
+            "Draw the set of", tuple(DRAWN), hint="Everything that the fins can give, as a body in the view."
+        )
+        on_user_change(self._drawn, partial(self._set, "drawn"))
+        self._alone = gui.add_checkbox(
+            "Alone", True, hint="Forces without any torque, torques without any force; else they are free."
+        )
+        on_user_change(self._alone, partial(self._set, "alone"))
+        self._card = gui.add_html("")
+
+    def _set(self, key: str, value: object) -> None:
+        self._host.do(partial(self._host.session.set_display, key, value))
+
+    def refresh(self) -> None:
+        """Write the findings."""
+        analyst, display = self._host.analyst, self._host.session.display
+        put(self._alone, value=display.alone, visible=display.drawn != "none")
+        found = analyst.findings
+        if analyst.error is not None:
+            put(self._card, content="<div class='fl missing'>This layout cannot be analysed.</div>")
+        elif found is None:
+            put(self._card, content="<div class='fl dim'>computing …</div>")
+        else:
+            note = "<span class='dim'>computing …</span> " if analyst.busy else ""
+            if found.now is not None:
+                unit = "N" if found.now.kind == "force" else "N m"
+                note += (
+                    f"0.1 m of the body is {three_digits(0.1 / set_scale(found))} {unit}; green: working fins"
+                    f"{', grey: all fins' if found.whole else ''}, blue ball: asked; no point lies further "
+                    f"than {three_digits(found.now.gap)} {unit} outside."
+                )
+            table = score_table(found.question.layout, found.card, found.before)
+            put(self._card, content=f"<div class='fl'>{note}</div>{table}")
