@@ -1,0 +1,120 @@
+"""What a layout may be improved towards, measured for many variants of one layout at once.
+
+These measures are for comparing variants: they are quicker and a little coarser than the score card. Fins
+whose arc is wider than half a turn count with the convex hull of what they can push.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from finlab.analysis.extent import weakest
+from finlab.analysis.fin_sets import SCALE, FinSets
+from finlab.analysis.least_energy import descend, planar_energy, starts
+from finlab.analysis.reach import COARSE, along
+from finlab.errors import LayoutError
+from finlab.layout import Layout
+
+Array = NDArray[np.float64]
+
+GoalName = Literal["weakest_direction", "mission_energy", "worst_single_failure"]
+GOALS: tuple[GoalName, ...] = get_args(GoalName)
+"""Names of the goals."""
+Goal = Callable[[FinSets], Array]
+"""What variants (P) are worth (P,): more is better."""
+
+MISSION = (
+    (2.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    (1.2, 0.0, 0.0, 0.0, 0.0, 0.25),
+    (1.2, 0.0, 0.0, 0.0, 0.0, -0.25),
+    (0.8, 0.0, -1.5, 0.0, 0.0, 0.0),
+)
+"""Wrenches [N, N m] of a mission when none are given: cruise, turn left, turn right, dive."""
+UNREACHED = 100.0
+"""What a wrench out of reach costs, more than any allocation does."""
+LEAST_FINS = 4
+"""Fewest fins of which one may fail while six axes remain."""
+STARTS = (8, 4)
+"""Random directions and walks to find a weakest direction with."""
+
+
+def make_goal(name: str, layout: Layout, mission: ArrayLike = MISSION) -> Goal:
+    """Returns the measure called `name` for variants of a layout.
+
+    Args:
+        name: `weakest_direction`: the scaled wrench that is within reach in every direction [N].
+            `worst_single_failure`: the same after the loss of the fin that leaves least of it [N].
+            `mission_energy`: minus the mean least energy of the mission's wrenches.
+        layout: its limits and fin models hold for all variants.
+        mission: wrenches (N, 6) [N, N m].
+
+    Raises:
+        LayoutError: unknown goal, too few fins for a failure, or a mission that is not wrenches.
+    """
+    if name == "weakest_direction":
+        return _weakest
+    if name == "worst_single_failure":
+        if layout.n_fins < LEAST_FINS:
+            raise LayoutError(
+                f"the goal {name} needs {LEAST_FINS} fins or more, layout {layout.name} has {layout.n_fins}; "
+                "with fewer, none can fail without losing an axis"
+            )
+        return _after_worst_failure
+    if name == "mission_energy":
+        return _mission_energy(layout, _wrenches(mission))
+    raise LayoutError(f"goal: expected one of {', '.join(GOALS)}, got {name!r:.60}")
+
+
+def _weakest(sets: FinSets) -> Array:
+    return weakest(sets, *STARTS, fine=False).size
+
+
+def _after_worst_failure(sets: FinSets) -> Array:
+    robots, n = sets.radius.shape
+    rows = sets.take(np.repeat(np.arange(robots), n))
+    rows.radius[np.arange(robots * n), np.tile(np.arange(n), robots)] = 0.0
+    return weakest(rows, *STARTS, fine=False).size.reshape(robots, n).min(axis=1)
+
+
+def _mission_energy(layout: Layout, mission: Array) -> Goal:
+    """Energy from starts in which no or one fin rests; a wrench out of reach costs by what is missing."""
+    target = mission / SCALE
+    size = np.linalg.norm(target, axis=-1)
+    unit = np.where(size[:, None] > 0.0, target / np.maximum(size, 1e-300)[:, None], np.eye(6)[0])
+
+    def goal(sets: FinSets) -> Array:
+        robots = len(sets.radius)
+        rows = sets.take(np.repeat(np.arange(robots), len(target)))
+        reach = along(rows, np.tile(unit, (robots, 1)), COARSE).wrench
+        given = np.minimum((reach * np.tile(unit, (robots, 1))).sum(-1), np.tile(size, robots))
+        missing = 1.0 - np.where(
+            np.tile(size, robots) > 0.0, given / np.maximum(np.tile(size, robots), 1e-12), 1
+        )
+        cost = UNREACHED * (1.0 + missing)
+        seeds = starts(sets.radius[0], n_random=0, most_resting=1)
+        able = np.flatnonzero(missing < 1e-9)
+        if len(able):
+            force, good = descend(
+                rows.take(np.repeat(able, len(seeds))),
+                np.repeat(np.tile(target, (robots, 1))[able], len(seeds), axis=0),
+                np.tile(seeds, (len(able), 1)),
+            )
+            energy = np.where(good, planar_energy(layout, (), force), UNREACHED)
+            cost[able] = energy.reshape(len(able), len(seeds)).min(axis=1)
+        return -cost.reshape(robots, len(target)).mean(axis=1)
+
+    return goal
+
+
+def _wrenches(mission: ArrayLike) -> Array:
+    try:
+        values = np.atleast_2d(np.asarray(mission, dtype=np.float64))
+    except (TypeError, ValueError):
+        values = np.zeros((0, 0))
+    if values.ndim != 2 or values.shape[1] != 6 or not len(values) or not np.isfinite(values).all():
+        raise LayoutError("mission: expected wrenches of six finite numbers [N, N m], got something else")
+    return values

@@ -1,0 +1,173 @@
+"""Improve a layout: move chosen fins within bounds until a goal is as good as it gets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import differential_evolution
+
+from finlab.analysis.fin_sets import fin_sets
+from finlab.analysis.goals import MISSION, Goal, make_goal
+from finlab.analysis.moves import Bounds, Moves, mirror_pairs
+from finlab.analysis.score_card import ScoreCard, score_card
+from finlab.layout import Layout
+
+Array = NDArray[np.float64]
+
+CLEARANCE = 0.10
+"""Least distance between two fins [m], or what there is now if that is less."""
+PENALTY = 1e3
+"""Cost of fins that are too close, per metre; far beyond any goal."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a search stands."""
+
+    round: int
+    """Rounds done."""
+    n_rounds: int
+    """Most rounds there will be; it may settle earlier."""
+    before: float
+    """The goal's measure at the start, more is better."""
+    best: float
+    """The best so far."""
+
+
+@dataclass(frozen=True)
+class Improvement:
+    """What a search found."""
+
+    layout: Layout
+    """The improved layout, or the one given when nothing better was found."""
+    improved: bool
+    """Whether it is better than before."""
+    cancelled: bool
+    """Whether the search was stopped before its end."""
+    goal: str
+    """Name of the goal."""
+    value_before: float
+    """The goal's measure at the start: more is better; energies are negative."""
+    value_after: float
+    """The same for `layout`."""
+    moved: tuple[str, ...]
+    """Fins that were free to move, twins included."""
+    card_before: ScoreCard
+    """Score card at the start."""
+    card_after: ScoreCard
+    """Score card of `layout`."""
+
+
+def optimize_layout(
+    layout: Layout,
+    fins: Sequence[str],
+    bounds: Mapping[str, Bounds] | None = None,
+    goal: str = "weakest_direction",
+    mirror: Sequence[tuple[str, str]] | None = None,
+    *,
+    mission: ArrayLike = MISSION,
+    rounds: int = 40,
+    seed: int = 0,
+    clearance: float = CLEARANCE,
+    progress: Callable[[Progress], None] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> Improvement:
+    """Moves fins to raise a goal, by SciPy's differential evolution.
+
+    The same arguments and seed give the same layout. The present layout is among the first candidates, so the
+    result is never worse.
+
+    Args:
+        layout: where to start; its limits and fin models stay.
+        fins: names of those that move.
+        bounds: where each may go; 5 cm and a quarter turn around where it is when left out.
+        goal: `weakest_direction`, `mission_energy` or `worst_single_failure`, see `make_goal`.
+        mirror: pairs that stay each other's mirror image; when None, all that are so now.
+        mission: wrenches (N, 6) [N, N m] for the goal `mission_energy`.
+        rounds: most rounds of the search.
+        seed: of its random numbers.
+        clearance: least distance between fins [m]; fins that are closer already need not part.
+        progress: called after each round.
+        cancelled: asked after each round; the search stops when it answers True.
+
+    Raises:
+        LayoutError: something about the fins, bounds, pairs, goal or mission does not fit; it says what.
+    """
+    bounds = bounds or {}
+    known = {name: bounds.get(name) or Bounds.around(layout.fins[layout.index(name)]) for name in fins}
+    pairs = mirror_pairs(layout) if mirror is None else mirror
+    moves = Moves(layout, fins, known, pairs)
+    measure = make_goal(goal, layout, mission)
+    before = float(measure(fin_sets([layout]))[0])
+    found, stopped = _search(moves, measure, before, clearance, rounds, seed, progress, cancelled)
+    best = moves.moved(found)
+    after = float(measure(fin_sets([best]))[0])
+    improved = after > before + 1e-9 * abs(before)
+    card = score_card(layout)
+    return Improvement(
+        layout=best if improved else layout,
+        improved=improved,
+        cancelled=stopped,
+        goal=goal,
+        value_before=before,
+        value_after=after if improved else before,
+        moved=moves.names,
+        card_before=card,
+        card_after=score_card(best) if improved else card,
+    )
+
+
+def _search(
+    moves: Moves,
+    measure: Goal,
+    before: float,
+    clearance: float,
+    rounds: int,
+    seed: int,
+    progress: Callable[[Progress], None] | None,
+    cancelled: Callable[[], bool] | None,
+) -> tuple[Array, bool]:
+    """The best vector (D,), and whether the search was stopped."""
+    needed = np.minimum(_gaps(moves.start_position[None])[0], clearance)
+    best, done, stopped = before, 0, False
+
+    def cost(vectors: Array) -> Array:
+        nonlocal best
+        columns = vectors.reshape(len(moves.start), -1).T
+        value = measure(moves.sets(columns))
+        close = np.maximum(needed - _gaps(moves.geometry(columns)[0]), 0.0).sum(-1)
+        fine = value[close <= 0.0]
+        best = max(best, float(fine.max())) if len(fine) else best
+        return np.asarray(-value + PENALTY * close)
+
+    def after_round(vector: Array, convergence: float = 0.0) -> bool:
+        nonlocal done, stopped
+        done += 1
+        if progress is not None:
+            progress(Progress(done, rounds, before, best))
+        stopped = cancelled is not None and cancelled()
+        return stopped
+
+    result = differential_evolution(
+        cost,
+        np.stack([moves.lower, moves.upper], axis=1),
+        x0=moves.start,
+        popsize=max(4, -(-24 // len(moves.start))),
+        maxiter=rounds,
+        tol=1e-4,
+        seed=seed,
+        polish=False,
+        vectorized=True,
+        updating="deferred",
+        callback=after_round,
+    )
+    return result.x, stopped
+
+
+def _gaps(position: Array) -> Array:
+    """Distances (P, pairs) [m] between the fins at positions (P, n, 3)."""
+    first, second = np.triu_indices(position.shape[1], k=1)
+    return np.linalg.norm(position[:, first] - position[:, second], axis=-1)
