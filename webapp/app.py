@@ -26,7 +26,7 @@ from webapp.targets import FIRST
 from webapp.uploads import cache_folder
 from webapp.view import View
 from webapp.viser_internals import disable_sharing, start_guarded, stop_server
-from webapp.worker import Worker
+from webapp.workers import Workers
 
 FIRST_LAYOUT = "ucat"
 """The shipped layout that a new session opens."""
@@ -62,8 +62,7 @@ class App:
         """
         self._server = server
         self._solver = solver
-        self._worker = Worker()
-        self._analysis = Worker()
+        self._workers = Workers()
         self._store = SessionStore(
             lambda: Session(layout, display), None if folder is None else SessionFiles(folder)
         )
@@ -82,8 +81,7 @@ class App:
         self._clock.cancel()
         with contextlib.suppress(TimeoutError, RuntimeError):  # one turn of the loop, so that the clock ends
             asyncio.run_coroutine_threadsafe(asyncio.sleep(0.01), self._loop).result(2.0)
-        self._worker.stop()
-        self._analysis.stop()
+        self._workers.stop()
         self._store.keep()
 
     def _connected(self, client: viser.ClientHandle) -> None:
@@ -107,9 +105,7 @@ class App:
         if key not in remembered:
             remembered = [key, *remembered]
         client.local_storage.set_item(STORAGE_KEY, json.dumps(remembered[:MAX_KEYS]))
-        self.views[client.client_id] = View(
-            client, session, self._solver, self._worker, self._loop, self._analysis
-        )
+        self.views[client.client_id] = View(client, session, self._solver, self._workers, self._loop)
 
     async def _disconnected(self, client: viser.ClientHandle) -> None:
         self._drop(client.client_id)

@@ -40,6 +40,7 @@ def add_commands(gui: viser.GuiApi, host: Host) -> None:
     add("Tour: start, or next stop", session.next_stop, "T")
     add("Start over", session.start_over)
     add("Freeze or move the fins", lambda: toggle("frozen"), "P")
+    add("Drag the wrench in 3D, or stop it", lambda: toggle("grips"), "G")
     add("Show or hide the fin graph", lambda: toggle("graph"))
     add("Show or hide the centre of gravity", lambda: toggle("center"))
     add("Dark or light theme", lambda: toggle("dark"))

@@ -5,6 +5,7 @@ with a sentence for the user and changes nothing.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -56,6 +57,8 @@ class Display:
     """Fins slide on the hull, shafts along its normal."""
     ghost: bool = True
     """Show where moved fins stood when the layout was opened or saved."""
+    grips: bool = False
+    """Show handles on the arrows of the asked wrench."""
     drawn: str = "none"
     """Key of `webapp.analyst.DRAWN`: the attainable set that is shown."""
     alone: bool = True
@@ -119,6 +122,15 @@ class Session:
         """One component of the target wrench [N or N m]."""
         self._commit(f"Set {AXES[axis]}", self.state.with_target(axis, value), f"target{axis}")
 
+    def drag_target(self, first: int, vector: Sequence[float], over: bool) -> None:
+        """Force (`first` 0) or torque (3) of the target in the user's hand; one step of undo for the drag."""
+        state, word = self.state, "force" if first == 0 else "torque"
+        for axis, value in enumerate(vector, start=first):
+            state = state.with_target(axis, round(float(value), 2 if first == 0 else 3))
+        self._commit(f"Drag the {word}", state, f"drag {word}", timed=False)
+        if over:
+            self.history.end_merge()
+
     def set_preset(self, name: str) -> None:
         """The target wrench of a preset."""
         if name not in PRESETS:
@@ -140,6 +152,10 @@ class Session:
         """Another layout; the target stays, failures and links are forgotten."""
         self._commit(f"Open {layout.name}", replace(self.state, layout=layout, failed=(), links=()))
         self.saved = layout
+
+    def accept_layout(self, layout: Layout) -> None:
+        """A better layout that was found for this one."""
+        self._edit("Improve the layout", layout)
 
     def note_saved(self) -> None:
         """The layout has been saved as it is."""

@@ -10,7 +10,9 @@ from dataclasses import replace
 from functools import partial
 
 import imageio.v3 as iio
+import numpy as np
 import viser
+from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
@@ -19,6 +21,7 @@ from webapp.commands import add_commands
 from webapp.comparison import Comparison
 from webapp.density import Densities
 from webapp.files import file_stem, graph_bytes
+from webapp.improving import Improver
 from webapp.modes import Mode, distinct_modes
 from webapp.panels.compare import ComparePanel
 from webapp.panels.display import DisplayPanel
@@ -34,7 +37,7 @@ from webapp.scene.robot_scene import RobotScene
 from webapp.session import Session
 from webapp.solver import Solver
 from webapp.theme import BRAND, GREEN, VERMILLION
-from webapp.worker import Worker
+from webapp.workers import Workers
 
 PICTURE_SIZE = (1080, 1620)
 """Height and width of an exported picture [px]."""
@@ -50,9 +53,8 @@ class View:
         client: viser.ClientHandle,
         session: Session,
         solver: Solver,
-        worker: Worker,
+        workers: Workers,
         loop: asyncio.AbstractEventLoop,
-        analysis: Worker,
     ) -> None:
         """Build the page and ask for a first answer.
 
@@ -60,14 +62,13 @@ class View:
             client: the browser.
             session: what it shows.
             solver: answers its questions.
-            worker: on whose thread they are answered.
+            workers: on whose threads everything is computed.
             loop: viser's event loop.
-            analysis: a second worker, for what takes longer.
         """
         self.client = client
         self.session = session
         self._solver = solver
-        self._worker = worker
+        self._worker = workers.answers
         self._loop = loop
         self._closed = False
         self._asked = -1
@@ -75,8 +76,9 @@ class View:
         self._best_revision = -1
         self._modes: tuple[Mode, ...] = ()
         self.densities: Densities | None = None
-        self.analyst = Analyst(analysis, loop, self._post, self._refresh)
-        self.comparison = Comparison(solver, worker, self._post, self._refresh)
+        self.analyst = Analyst(workers.cards, loop, self._post, self._refresh)
+        self.improver = Improver(workers.searches, self._post, self._refresh)
+        self.comparison = Comparison(solver, workers.answers, self._post, self._refresh)
         self._error: str | None = None
         self._error_revision = -1
         self._shown: tuple[Allocation, int, Allocation] | None = None
@@ -93,7 +95,11 @@ class View:
         gui.main_panel.set_width(PANEL_WIDTH)
         gui.set_panel_label("finlab")
         self.scene = RobotScene(
-            self.client, self.session, lambda name: self.do(partial(self.session.select, name)), self._drag
+            self.client,
+            self.session,
+            lambda name: self.do(partial(self.session.select, name)),
+            self._drag,
+            self._drag_wrench,
         )
         self._panels.append(Header(gui, self))
         tabs = gui.add_tab_group()
@@ -248,6 +254,12 @@ class View:
         else:
             self.do(partial(self.session.drag_fin, name, position, angle))
 
+    def _drag_wrench(self, first: int, phase: str, vector: NDArray[np.float64]) -> None:
+        if phase == "start":
+            self.session.history.end_merge()
+        else:
+            self.do(partial(self.session.drag_target, first, vector.tolist(), phase == "end"))
+
     # From the session to the solver and back.
 
     def _ask(self) -> None:
@@ -301,4 +313,5 @@ class View:
         self._closed = True
         self.comparison.cancel()
         self.analyst.close()
+        self.improver.close()
         self._worker.forget(id(self))

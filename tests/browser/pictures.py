@@ -35,7 +35,7 @@ def _modes(page: Page) -> None:
     page.key("x")
     page.tab("Modes")
     page.type("Temperature T", "0.5")
-    page.press("What the network proposes")
+    page.tab("What the network proposes")
     page.until(lambda: not page.view.busy)
 
 

@@ -62,7 +62,7 @@ def view(server: viser.ViserServer, app: App) -> Iterator[View]:
     client: Any = FakeClient(server)
     loop = server.get_event_loop()
     session = Session(load_layout(shipped_layouts()["ucat"]))
-    view = on_loop(server, lambda: View(client, session, app._solver, app._worker, loop, app._analysis))
+    view = on_loop(server, lambda: View(client, session, app._solver, app._workers, loop))
     yield view
     view.close()
     on_loop(server, lambda: (server.gui.reset(), server.scene.reset()))

@@ -9,6 +9,7 @@ from finlab.allocation.allocation import Allocation
 from webapp.analyst import Analyst
 from webapp.comparison import Comparison
 from webapp.density import Densities
+from webapp.improving import Improver
 from webapp.modes import Mode
 from webapp.session import Session
 
@@ -51,6 +52,8 @@ class Host(Protocol):
 
     analyst: Analyst
     """What the layout can do."""
+    improver: Improver
+    """The search for a better layout."""
     comparison: Comparison
     """Other methods on the same question."""
 

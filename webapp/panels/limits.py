@@ -9,6 +9,7 @@ from webapp.figures import three_digits
 from webapp.handles import on_user_change, put
 from webapp.markup.score_card import score_table
 from webapp.panels.host import Host
+from webapp.panels.improve import ImprovePanel
 from webapp.scene.attainable_nodes import set_scale
 
 
@@ -27,12 +28,14 @@ class LimitsPanel:
         )
         on_user_change(self._alone, partial(self._set, "alone"))
         self._card = gui.add_html("")
+        self._improve = ImprovePanel(gui, host)
 
     def _set(self, key: str, value: object) -> None:
         self._host.do(partial(self._host.session.set_display, key, value))
 
     def refresh(self) -> None:
         """Write the findings."""
+        self._improve.refresh()
         analyst, display = self._host.analyst, self._host.session.display
         put(self._alone, value=display.alone, visible=display.drawn != "none")
         found = analyst.findings

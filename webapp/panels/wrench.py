@@ -38,6 +38,10 @@ class WrenchPanel:
         ]
         for k, slider in enumerate(self._sliders):
             on_user_change(slider, partial(self._set_target, k))
+        self._grips = gui.add_checkbox(
+            "Drag in 3D", False, hint="Handles on the blue arrows: drag the force, or the torque as a vector."
+        )
+        on_user_change(self._grips, lambda value: host.do(partial(host.session.set_display, "grips", value)))
         self._paint = gui.add_html("")
         self._failures = gui.add_button_group(
             "Fail a fin", ("1",), hint="Press a fin's number: fail or repair it."
@@ -67,6 +71,7 @@ class WrenchPanel:
             low, high = min(slider.min, value), max(slider.max, value)
             put(slider, min=low, max=high)
             put(slider, value=value)
+        put(self._grips, value=host.session.display.grips)
         put(
             self._failures,
             options=tuple(

@@ -1,4 +1,4 @@
-"""Where the fins stood when the layout was opened or saved: pale blades at the places that were left."""
+"""Pale blades: where fins stood when the layout was opened or saved, or where a search would put them."""
 
 import math
 
@@ -33,7 +33,7 @@ class Ghost:
         )
 
     def refresh(self, saved: Layout | None, layout: Layout) -> None:
-        """Show the fins of `saved` that stand elsewhere in `layout`, or nothing at all for None."""
+        """Show the fins of another version, `saved`, that stand elsewhere in `layout`; nothing for None."""
         left = () if saved is None or saved.name != layout.name else _left(saved, layout)
         put(self._shape.node, visible=bool(left))
         if left:

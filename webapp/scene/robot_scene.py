@@ -9,12 +9,14 @@ import viser
 from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
+from finlab.layout import Layout
 from webapp.analyst import Findings
 from webapp.arrow_scale import LENGTH, fitting_newtons
 from webapp.meshes.hull import hull_of
 from webapp.scene.attainable_nodes import AttainableNodes
 from webapp.scene.fin_node import FinNode
 from webapp.scene.ghost import Ghost
+from webapp.scene.grips import Grips
 from webapp.scene.lines import Lines
 from webapp.scene.overlay import Overlay
 from webapp.scene.stage import Stage
@@ -41,6 +43,7 @@ class RobotScene:
         session: Session,
         on_select: Callable[[str | None], None],
         on_drag: Callable[[str, str, tuple[float, float, float], float], None],
+        on_wrench: Callable[[int, str, NDArray[np.float64]], None],
     ) -> None:
         """Build the nodes of a client's scene.
 
@@ -49,6 +52,7 @@ class RobotScene:
             session: what it shows.
             on_select: called with the name of a clicked fin.
             on_drag: called with name, phase, position [m] and mounting angle [rad] while a fin is dragged.
+            on_wrench: called with first axis, phase and vector (3,) while the asked wrench is dragged.
         """
         self._client = client
         self._session = session
@@ -61,6 +65,7 @@ class RobotScene:
         self._ghost = Ghost(scene)
         self._overlay = Overlay(scene)
         self._attainable = AttainableNodes(scene)
+        self._grips = Grips(scene, on_wrench)
         self._fins: list[FinNode] = []
         self._dragged: int | None = None
         self._phase: NDArray[Any] = np.zeros(0)
@@ -82,6 +87,7 @@ class RobotScene:
         allocation: Allocation | None,
         other: Allocation | None = None,
         findings: Findings | None = None,
+        offered: Layout | None = None,
     ) -> None:
         """Show the session's layout, and the answer to it if there is one for this very layout.
 
@@ -89,6 +95,7 @@ class RobotScene:
             allocation: the answer.
             other: another method's answer, whose forces are shown beside it.
             findings: what the layout can attain, where that is to be shown.
+            offered: a better layout, whose fins are shown as ghosts.
         """
         state, display = self._session.state, self._session.display
         hull = hull_of(state.layout)
@@ -100,7 +107,8 @@ class RobotScene:
             self._fins.append(FinNode(self._client.scene, len(self._fins), self._clicked, self._drag))
         for node in self._fins[state.layout.n_fins :]:
             node.hide()
-        self.newtons = display.newtons or fitting_newtons(_largest(state, allocation), self.newtons)
+        if self._grips.dragged is None:  # a scale that changes would pull the handle out of the hand
+            self.newtons = display.newtons or fitting_newtons(_largest(state, allocation), self.newtons)
         scale = LENGTH / self.newtons
         fits = allocation is not None and allocation.layout.names == state.layout.names
         for i, fin in enumerate(state.layout.fins):
@@ -116,13 +124,15 @@ class RobotScene:
                 self._fins[i].command(allocation.command[i], force * scale, angle, display.fans)
         if fits and allocation is not None:
             self._take_command(allocation.command)
-        self._ghost.refresh(self._session.saved if display.ghost else None, state.layout)
+        self._ghost.refresh(offered or (self._session.saved if display.ghost else None), state.layout)
         self._overlay.refresh(other, scale)
         target = np.array(state.target)
         self._attainable.refresh(findings if display.drawn != "none" else None, target)
         given = allocation.wrench if allocation is not None else None
         missing = np.zeros(6) if allocation is None else missing_part(allocation)
-        self._wrench.refresh(target, given, missing, hull.center[2] + hull.half[2], scale)
+        top = hull.center[2] + hull.half[2]
+        self._wrench.refresh(target, given, missing, top, scale)
+        self._grips.refresh(display.grips, target, self._wrench.hub(top), scale)
         shown = self._session.selected if display.dimensions else None
         self._lines.refresh(state.layout, state.healthy, shown, display.graph)
 

@@ -43,6 +43,11 @@ class WrenchNodes:
         self._given = node("delivered_force", DELIVERED, None), node("delivered_torque", DELIVERED, None)
         self._missing = node("missing_force", MISSING, None), node("missing_torque", MISSING, None)
 
+    @staticmethod
+    def hub(top: float) -> Array:
+        """Where the arrows begin (3,), given the height of the hull's top [m]."""
+        return np.array([0.0, 0.0, top + HEIGHT])
+
     def refresh(self, target: Array, wrench: Array | None, missing: Array, top: float, scale: float) -> None:
         """Show a target (6,) and what is delivered of it (6,), None while unknown.
 
@@ -53,7 +58,7 @@ class WrenchNodes:
             top: height of the hull's top [m].
             scale: length of a force arrow per newton [m/N].
         """
-        put(self._root, position=np.array([0.0, 0.0, top + HEIGHT]))
+        put(self._root, position=self.hub(top))
         zero = np.zeros(3)
         self._asked[0].show(force_arrow, target[:3] * scale, zero, 0.011)
         self._asked[1].show(torque_ring, target[3:], zero, 0.0085)

@@ -1,0 +1,103 @@
+"""A search for a better layout that can be watched, stopped, and taken or left."""
+
+import threading
+from collections.abc import Callable
+from functools import partial
+
+from finlab.analysis import Bounds, Improvement, Progress, optimize_layout
+from finlab.errors import FinlabError
+from finlab.layout import Layout
+from webapp.state import number
+from webapp.worker import Worker
+
+GOAL_WORDS = {
+    "weakest direction": "weakest_direction",
+    "energy of a mission": "mission_energy",
+    "worst single failure": "worst_single_failure",
+}
+"""What may be improved, in words, and the name that the search knows."""
+
+
+class Improver:
+    """One search at a time for one page."""
+
+    def __init__(
+        self, worker: Worker, post: Callable[[Callable[[], object]], None], changed: Callable[[], None]
+    ) -> None:
+        """Prepare.
+
+        Args:
+            worker: whose thread searches.
+            post: brings a call to the event loop.
+            changed: called there when there is progress.
+        """
+        self._worker, self._post, self._changed = worker, post, changed
+        self._stop = threading.Event()
+        self.start_layout: Layout | None = None
+        """Where the search began; None while there is none."""
+        self.progress: Progress | None = None
+        """How far it is."""
+        self.found: Improvement | None = None
+        """What came of it."""
+        self.error: str | None = None
+        """Why nothing came of it."""
+
+    @property
+    def running(self) -> bool:
+        """True from the start to the result."""
+        return self.start_layout is not None and self.found is None and self.error is None
+
+    def start(self, layout: Layout, fins: tuple[str, ...], goal: str, reach: float) -> None:
+        """Search.
+
+        Args:
+            layout: where to start; mirror pairs in it stay mirror pairs.
+            fins: names of those that may move.
+            goal: key of `GOAL_WORDS`.
+            reach: how far a fin may go along each axis [m].
+
+        Raises:
+            FinlabError: unknown goal or a reach that is no sensible length.
+        """
+        if self.running:
+            raise FinlabError("a search is running already; cancel it first")
+        if goal not in GOAL_WORDS:
+            raise FinlabError(f"goal: expected one of {', '.join(GOAL_WORDS)}, got {goal!r:.40}")
+        reach = number(reach, "reach of the fins [m]", 0.001, 0.5)
+        self._stop = stop = threading.Event()
+        self.start_layout, self.progress, self.found, self.error = layout, None, None, None
+        bounds = {name: Bounds.around(layout.fins[layout.index(name)], reach) for name in fins}
+
+        def report(progress: Progress) -> None:
+            self._post(partial(self._take, stop, "progress", progress))
+
+        def job() -> None:
+            try:
+                found = optimize_layout(
+                    layout, fins, bounds, GOAL_WORDS[goal], progress=report, cancelled=stop.is_set
+                )
+                self._post(partial(self._take, stop, "found", found))
+            except FinlabError as error:
+                self._post(partial(self._take, stop, "error", str(error)))
+
+        self._worker.submit((id(self), "search"), job)
+
+    def cancel(self) -> None:
+        """Stop after the present round; what has been found by then is offered."""
+        self._stop.set()
+
+    def forget(self) -> None:
+        """The result has been taken or left."""
+        self._stop.set()
+        self._stop = threading.Event()
+        self.start_layout = self.progress = self.found = self.error = None
+
+    def close(self) -> None:
+        """Nobody wants to know any more."""
+        self._stop.set()
+        self._worker.forget((id(self), "search"))
+
+    def _take(self, stop: threading.Event, name: str, value: object) -> None:
+        if stop is self._stop:  # else it belongs to a search that was forgotten
+            setattr(self, name, value)
+            self._changed()

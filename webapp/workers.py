@@ -1,0 +1,22 @@
+"""The threads that compute, so that a long search keeps nobody waiting for a quick answer."""
+
+from dataclasses import dataclass, field
+
+from webapp.worker import Worker
+
+
+@dataclass(frozen=True)
+class Workers:
+    """One thread for each kind of work; all pages share them."""
+
+    answers: Worker = field(default_factory=Worker)
+    """Allocations: milliseconds."""
+    cards: Worker = field(default_factory=Worker)
+    """What a layout can do: about a second."""
+    searches: Worker = field(default_factory=Worker)
+    """Better layouts: up to minutes."""
+
+    def stop(self) -> None:
+        """End all threads."""
+        for worker in (self.answers, self.cards, self.searches):
+            worker.stop()
