@@ -21,6 +21,8 @@ N_DIRECTIONS = 120
 """Directions that are looked at first; faces that are too far off add theirs."""
 MAX_ROUNDS = 4
 """Most times that directions are added."""
+SPECK = 1e-5
+"""Share of the sum of all thrusts below which a point counts as the origin; the solver is no more exact."""
 TOLERANCE = 0.01
 """Gap at which no more directions are added, as a share of the farthest vertex."""
 
@@ -78,7 +80,9 @@ def attainable_set(
     layout.indices(tuple(failed))
     sets = fin_sets([layout], failed)
     wide = bool(((sets.half < np.pi) & (sets.half > np.pi / 2) & (sets.radius > 0.0)).any())
-    support = _alone_support(sets, kind) if alone else _free_support(sets, kind)
+    support = _without_specks(
+        _alone_support(sets, kind) if alone else _free_support(sets, kind), SPECK * float(sets.radius.sum())
+    )
     axes = np.concatenate([np.eye(3), -np.eye(3)])
     extent = np.maximum(support(axes)[1].reshape(2, 3).max(axis=0), 0.0)
     # Flat robots have flat sets: directions are spread over the sphere that the set would be if scaled.
@@ -117,6 +121,17 @@ def _grown(found: Hull, points: Array, new: Array) -> tuple[Hull, Array]:
     """The hull with more points in it."""
     points = np.concatenate([found.vertices, new])
     return hull_of(points), points
+
+
+def _without_specks(support: Support, speck: float) -> Support:
+    """The same, but points nearer to the origin than `speck` are the origin."""
+
+    def clean(directions: Array) -> tuple[Array, Array]:
+        points, reach = support(directions)
+        near = np.linalg.norm(points, axis=-1) <= speck
+        return np.where(near[:, None], 0.0, points), np.where(near, 0.0, reach)
+
+    return clean
 
 
 def _free_support(sets: FinSets, kind: Kind) -> Support:

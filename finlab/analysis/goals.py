@@ -1,6 +1,6 @@
 """What a layout may be improved towards, measured for many variants of one layout at once.
 
-These measures are for comparing variants: they are quicker and a little coarser than the score card. Fins
+A search asks for quick measures, which are within about a percent of the fine ones on the score card. Fins
 whose arc is wider than half a turn count with the convex hull of what they can push.
 """
 
@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from finlab.analysis.extent import weakest
 from finlab.analysis.fin_sets import SCALE, FinSets
 from finlab.analysis.least_energy import descend, planar_energy, starts
-from finlab.analysis.reach import COARSE, along
+from finlab.analysis.reach import COARSE, FINE, along
 from finlab.errors import LayoutError
 from finlab.layout import Layout
 
@@ -36,13 +36,15 @@ MISSION = (
 """Wrenches [N, N m] of a mission when none are given: cruise, turn left, turn right, dive."""
 UNREACHED = 100.0
 """What a wrench out of reach costs, more than any allocation does."""
+ALL_THERE = 1e-6
+"""Share of a wrench that may be missing when it counts as within reach."""
 LEAST_FINS = 4
 """Fewest fins of which one may fail while six axes remain."""
-STARTS = (8, 4)
-"""Random directions and walks to find a weakest direction with."""
+QUICK_STARTS = (8, 4)
+"""Random directions and walks to find a weakest direction with when it has to be quick."""
 
 
-def make_goal(name: str, layout: Layout, mission: ArrayLike = MISSION) -> Goal:
+def make_goal(name: str, layout: Layout, mission: ArrayLike = MISSION, *, fine: bool = True) -> Goal:
     """Returns the measure called `name` for variants of a layout.
 
     Args:
@@ -51,63 +53,73 @@ def make_goal(name: str, layout: Layout, mission: ArrayLike = MISSION) -> Goal:
             `mission_energy`: minus the mean least energy of the mission's wrenches.
         layout: its limits and fin models hold for all variants.
         mission: wrenches (N, 6) [N, N m].
+        fine: as the score card has it; otherwise quick.
 
     Raises:
         LayoutError: unknown goal, too few fins for a failure, or a mission that is not wrenches.
     """
     if name == "weakest_direction":
-        return _weakest
+        return _fine if fine else _quick
     if name == "worst_single_failure":
         if layout.n_fins < LEAST_FINS:
             raise LayoutError(
                 f"the goal {name} needs {LEAST_FINS} fins or more, layout {layout.name} has {layout.n_fins}; "
                 "with fewer, none can fail without losing an axis"
             )
-        return _after_worst_failure
+        return _after_worst_failure(_fine if fine else _quick)
     if name == "mission_energy":
-        return _mission_energy(layout, _wrenches(mission))
+        return _mission_energy(layout, _wrenches(mission), fine)
     raise LayoutError(f"goal: expected one of {', '.join(GOALS)}, got {name!r:.60}")
 
 
-def _weakest(sets: FinSets) -> Array:
-    return weakest(sets, *STARTS, fine=False).size
+def _fine(sets: FinSets) -> Array:
+    return weakest(sets).size
 
 
-def _after_worst_failure(sets: FinSets) -> Array:
-    robots, n = sets.radius.shape
-    rows = sets.take(np.repeat(np.arange(robots), n))
-    rows.radius[np.arange(robots * n), np.tile(np.arange(n), robots)] = 0.0
-    return weakest(rows, *STARTS, fine=False).size.reshape(robots, n).min(axis=1)
+def _quick(sets: FinSets) -> Array:
+    return weakest(sets, *QUICK_STARTS, fine=False).size
 
 
-def _mission_energy(layout: Layout, mission: Array) -> Goal:
-    """Energy from starts in which no or one fin rests; a wrench out of reach costs by what is missing."""
-    target = mission / SCALE
-    size = np.linalg.norm(target, axis=-1)
-    unit = np.where(size[:, None] > 0.0, target / np.maximum(size, 1e-300)[:, None], np.eye(6)[0])
+def _after_worst_failure(of_rest: Goal) -> Goal:
+    def goal(sets: FinSets) -> Array:
+        robots, n = sets.radius.shape
+        rows = sets.take(np.repeat(np.arange(robots), n))
+        rows.radius[np.arange(robots * n), np.tile(np.arange(n), robots)] = 0.0
+        return of_rest(rows).reshape(robots, n).min(axis=1)
+
+    return goal
+
+
+def _mission_energy(layout: Layout, mission: Array, fine: bool) -> Goal:
+    """Energy from starts in which a few fins rest; a wrench out of reach costs by what is missing."""
+    wanted = mission / SCALE
+    softness, most_resting = (FINE, 2) if fine else (COARSE, 1)
 
     def goal(sets: FinSets) -> Array:
         robots = len(sets.radius)
-        rows = sets.take(np.repeat(np.arange(robots), len(target)))
-        reach = along(rows, np.tile(unit, (robots, 1)), COARSE).wrench
-        given = np.minimum((reach * np.tile(unit, (robots, 1))).sum(-1), np.tile(size, robots))
-        missing = 1.0 - np.where(
-            np.tile(size, robots) > 0.0, given / np.maximum(np.tile(size, robots), 1e-12), 1
-        )
+        rows = sets.take(np.repeat(np.arange(robots), len(wanted)))
+        target = np.tile(wanted, (robots, 1))
+        missing = _missing(rows, target, softness)
         cost = UNREACHED * (1.0 + missing)
-        seeds = starts(sets.radius[0], n_random=0, most_resting=1)
-        able = np.flatnonzero(missing < 1e-9)
+        able = np.flatnonzero(missing < ALL_THERE)
         if len(able):
-            force, good = descend(
-                rows.take(np.repeat(able, len(seeds))),
-                np.repeat(np.tile(target, (robots, 1))[able], len(seeds), axis=0),
-                np.tile(seeds, (len(able), 1)),
-            )
+            seeds = starts(sets.radius[0], n_random=0, most_resting=most_resting)
+            each = np.repeat(able, len(seeds))
+            force, good = descend(rows.take(each), target[each], np.tile(seeds, (len(able), 1)))
             energy = np.where(good, planar_energy(layout, (), force), UNREACHED)
             cost[able] = energy.reshape(len(able), len(seeds)).min(axis=1)
-        return -cost.reshape(robots, len(target)).mean(axis=1)
+        return np.asarray(-cost.reshape(robots, len(wanted)).mean(axis=1))
 
     return goal
+
+
+def _missing(sets: FinSets, target: Array, softness: tuple[float, ...]) -> Array:
+    """Share (R,) of scaled wrenches (R, 6) that is out of reach."""
+    size = np.linalg.norm(target, axis=-1)
+    asked = size > 0.0
+    unit = np.where(asked[:, None], target / np.where(asked, size, 1.0)[:, None], np.eye(6)[0])
+    given = (along(sets, unit, softness).wrench * unit).sum(-1)
+    return np.where(asked, 1.0 - np.clip(given / np.where(asked, size, 1.0), 0.0, 1.0), 0.0)
 
 
 def _wrenches(mission: ArrayLike) -> Array:

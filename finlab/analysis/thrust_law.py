@@ -17,7 +17,9 @@ Array = NDArray[np.float64]
 LEVELS = 129
 """Thrust levels of a cheapest-command curve, evenly spaced in the fourth root of thrust."""
 GRID = 201
-"""Amplitudes, and for tables of forces also frequencies, that are looked at."""
+"""Amplitudes and frequencies that are looked at."""
+TABLE_GRID = (41, 21, 13)
+"""Amplitudes, frequencies and zero directions at which a table is looked at."""
 
 
 class ThrustLaw(NamedTuple):
@@ -48,11 +50,11 @@ def thrust_laws(layout: Layout) -> tuple[ThrustLaw, ...]:
 @lru_cache(maxsize=256)
 def _law(limits: Limits, model: FinModelSpec) -> ThrustLaw:
     """Thrusts on a grid of amplitudes and frequencies, then the cheapest way to each level."""
-    amplitude = np.linspace(*limits.amplitude, GRID)
     if model.type == "table":
-        frequency, thrust, spread = _table_thrust(limits, model, amplitude)
+        amplitude, frequency, thrust, spread = _table_thrust(limits, model)
     else:
-        frequency, spread = np.linspace(*limits.frequency, GRID), 0.0
+        amplitude, frequency = np.linspace(*limits.amplitude, GRID), np.linspace(*limits.frequency, GRID)
+        spread = 0.0
         thrust = np.outer(_formula(model, amplitude), frequency**2)
     low, high = float(thrust.min()), float(thrust.max())
     level = low + (high - low) * np.linspace(0.0, 1.0, LEVELS) ** 4
@@ -79,18 +81,17 @@ def _formula(model: FinModelSpec, amplitude: Array) -> Array:
     return factor * (2.0 * np.pi) ** 2 * shape
 
 
-def _table_thrust(limits: Limits, model: FinModelSpec, amplitude: Array) -> tuple[Array, Array, float]:
-    """Frequencies, thrusts (GRID, frequencies) [N] in the strongest direction, and their spread [N].
+def _table_thrust(limits: Limits, model: FinModelSpec) -> tuple[Array, Array, Array, float]:
+    """Amplitudes, frequencies, thrusts (amplitudes, frequencies) [N] in the strongest direction, the spread.
 
     The plant is asked, so this alone loads torch.
     """
     from finlab.physics import Plant
 
     alone = Plant(Layout("alone", (Fin("fin", (0.0, 0.0, 0.0), 0.0, limits, model),)))
-    frequency = np.linspace(*limits.frequency, 41)
-    direction = np.linspace(*limits.zero_direction, 25)
-    grid = np.stack(np.meshgrid(amplitude, frequency, direction, indexing="ij"), axis=-1)
-    force = alone.fin_forces(grid[..., None, :])[..., 0, :]
+    ends = (limits.amplitude, limits.frequency, limits.zero_direction)
+    axes = [np.linspace(*pair, n) for pair, n in zip(ends, TABLE_GRID, strict=True)]
+    force = alone.fin_forces(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)[..., None, :])[..., 0, :]
     thrust = np.linalg.norm(force[..., 1:], axis=-1)  # at angle zero, e_h is y; the shaft's part is left out
     strongest = thrust.max(axis=(0, 1))
-    return frequency, thrust.max(axis=2), float(strongest.max() - strongest.min())
+    return axes[0], axes[1], thrust.max(axis=2), float(strongest.max() - strongest.min())

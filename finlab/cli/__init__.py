@@ -68,7 +68,7 @@ def _command_line() -> SubcommandApp:
 
     root = SubcommandApp()
     root.command(allocate.allocate)
-    root.command(layout.verbs, name="layout", help="Check and show layout files.")
+    root.command(layout.verbs, name="layout", help="Check, show and optimize layout files.")
     root.command(data.verbs, name="data", help="Generate training data.")
     root.command(train.verbs, name="train", help="Train the surrogate and the allocator.")
     root.command(evaluate.verbs, name="eval", help="Measure methods against the analytic fin model.")

@@ -1,20 +1,25 @@
-"""`finlab layout check|show`: look at layout files. Loads numpy, never torch."""
+"""`finlab layout check|show|optimize`: look at layout files and improve them.
+
+Torch is loaded only where a fin follows a table of forces.
+"""
 
 from __future__ import annotations
 
+import json as json_format
 import math
 import sys
 from typing import TYPE_CHECKING, Annotated
 
-from tyro.conf import Positional, arg
+from tyro.conf import Positional, UseAppendAction, arg
 from tyro.extras import SubcommandApp
+
+from finlab.cli.optimize import optimize
 
 if TYPE_CHECKING:
     from finlab.layout import Layout
 
 verbs = SubcommandApp()
-
-_AXES = {"Fx": "surge", "Fy": "sway", "Fz": "heave", "Tx": "roll", "Ty": "pitch", "Tz": "yaw"}
+verbs.command(optimize)
 
 
 @verbs.command
@@ -42,19 +47,32 @@ def check(layouts: Annotated[Positional[tuple[str, ...]], arg(metavar="LAYOUT...
 
 
 @verbs.command
-def show(layout: Annotated[Positional[str], arg(metavar="LAYOUT")]) -> None:
-    """Print the fins of a layout, the rank of their forces, and the axes out of their reach.
+def show(
+    layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
+    failed: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = (),
+    json: bool = False,
+) -> None:
+    """Print the fins of a layout and its score card: what it can do, what that costs, what it can lose.
 
     Args:
-        layout: file or name of a shipped layout.
+        layout: layout file, layout graph file, or the name of a shipped layout.
+        failed: name of a fin that does not work.
+        json: print one JSON object instead of tables.
     """
+    from finlab.analysis import score_card
     from finlab.cli.inputs import open_robot
+    from finlab.cli.score_card import score_card_text
 
-    print(layout_text(open_robot(layout).layout))
+    robot = open_robot(layout)
+    card = score_card(robot.layout, robot.with_failed(failed))
+    if json:
+        print(json_format.dumps(card.to_dict(), allow_nan=False))
+    else:
+        print(layout_text(robot.layout), score_card_text(card), sep="\n\n")
 
 
 def layout_text(layout: Layout) -> str:
-    """A layout in words and a table: what it is, its fins, what they can push."""
+    """A layout in words and a table: what it is, and its fins."""
     width = max(len("fin"), *(len(name) for name in layout.names))
     lines = [f"{layout.name}: {layout.description}" if layout.description else layout.name, ""]
     lines.append(
@@ -70,27 +88,4 @@ def layout_text(layout: Layout) -> str:
             f"  {fin.limits.amplitude[1]:11.3f}  {fin.limits.frequency[1]:10.3f}  {directions:>16}"
             f"  {fin.model.type}"
         )
-    return "\n".join([*lines, "", *authority_text(layout)])
-
-
-def authority_text(layout: Layout) -> list[str]:
-    """Which axes the fins push at all, and which they push alone, before any limit."""
-    import numpy as np
-
-    from finlab.layout.arrays import layout_effectiveness
-
-    effectiveness = layout_effectiveness(layout)
-    rank = int(np.linalg.matrix_rank(effectiveness, tol=1e-9))
-    # Onto the span of what the fins can give: an axis that the span holds whole can be pushed alone.
-    projector = effectiveness @ np.linalg.pinv(effectiveness, rcond=1e-9)
-    pushed = np.abs(effectiveness).max(axis=1) > 1e-9
-    alone = np.abs(projector - np.eye(6)).max(axis=0) < 1e-6
-    names = list(_AXES.values())
-    lines = [f"{layout.n_fins} fins push in {rank} of 6 independent directions."]
-    missing = [n for n, p in zip(names, pushed, strict=True) if not p]
-    if missing:
-        lines.append("Out of reach: " + ", ".join(missing) + ".")
-    coupled = [n for n, p, a in zip(names, pushed, alone, strict=True) if p and not a]
-    if coupled:
-        lines.append("Only together with other axes: " + ", ".join(coupled) + ".")
-    return lines
+    return "\n".join(lines)

@@ -1,0 +1,139 @@
+"""`finlab layout optimize`: move chosen fins until a goal is as good as it gets. Never loads torch."""
+
+from __future__ import annotations
+
+import json as json_format
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, UseAppendAction, arg
+
+if TYPE_CHECKING:
+    from finlab.analysis import Bounds, Improvement
+    from finlab.layout import Layout
+
+Box = tuple[float, float, float, float, float, float]
+Wrench = tuple[float, float, float, float, float, float]
+
+
+def optimize(
+    layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
+    fins: Annotated[tuple[str, ...], arg(metavar="NAME...")],
+    output: Annotated[Path, arg(metavar="FILE.yaml", aliases=["-o"])],
+    goal: Annotated[str, arg(metavar="NAME")] = "weakest_direction",
+    bounds: Annotated[Box | None, arg(metavar="X0 X1 Y0 Y1 Z0 Z1")] = None,
+    reach: Annotated[float, arg(metavar="M")] = 0.05,
+    turn: Annotated[float, arg(metavar="DEG")] = 90.0,
+    mirror: bool = True,
+    wrench: Annotated[UseAppendAction[tuple[Wrench, ...]], arg(metavar="FX FY FZ TX TY TZ")] = (),
+    rounds: Annotated[int, arg(metavar="N")] = 40,
+    seed: Annotated[int, arg(metavar="N")] = 0,
+    json: bool = False,
+) -> None:
+    """Move fins within bounds to raise a goal, and write the layout that results.
+
+    Args:
+        layout: layout file, layout graph file, or the name of a shipped layout.
+        fins: fins that may move; mirrored twins follow.
+        output: layout file to write.
+        goal: weakest_direction, mission_energy or worst_single_failure.
+        bounds: box in the body frame that the fins may not leave [m]; overrides --reach.
+        reach: how far each fin may go from where it is, either way along x, y and z [m].
+        turn: how far each shaft may turn from where it points, either way [deg].
+        mirror: keep fins that are each other's mirror image so.
+        wrench: a wrench of the mission for mission_energy [N, N m]; may be given several times.
+        rounds: most rounds of the search.
+        seed: same arguments and seed, same layout.
+        json: print one JSON object instead of a table.
+    """
+    from tqdm import tqdm
+
+    from finlab.analysis import Progress, optimize_layout
+    from finlab.analysis.goals import MISSION
+    from finlab.cli.inputs import open_robot
+    from finlab.layout import save_layout
+
+    robot = open_robot(layout).layout
+    _check(output, reach, turn, rounds)
+    space = {name: _bounds(robot, name, bounds, reach, math.radians(turn)) for name in fins}
+    bar = tqdm(total=rounds, desc=goal, unit="round", disable=None, leave=False, file=sys.stderr)
+
+    def report(progress: Progress) -> None:
+        bar.update()
+        bar.set_postfix_str(f"{progress.before:.4g} -> {progress.best:.4g}")
+
+    with bar:
+        found = optimize_layout(
+            robot,
+            fins,
+            space,
+            goal,
+            None if mirror else (),
+            mission=wrench or MISSION,
+            rounds=rounds,
+            seed=seed,
+            progress=report,
+        )
+    save_layout(found.layout, output)
+    if json:
+        print(json_format.dumps(improvement_record(found), allow_nan=False))
+    else:
+        print(improvement_text(found, output))
+
+
+def improvement_record(found: Improvement) -> dict[str, object]:
+    """The JSON object of `finlab layout optimize --json`."""
+    from finlab.layout import layout_to_dict
+
+    return {
+        "goal": found.goal,
+        "improved": found.improved,
+        "value_before": found.value_before,
+        "value_after": found.value_after,
+        "moved": list(found.moved),
+        "before": found.card_before.to_dict(),
+        "after": found.card_after.to_dict(),
+        "layout": layout_to_dict(found.layout),
+    }
+
+
+def improvement_text(found: Improvement, output: Path) -> str:
+    """Where the fins went, both cards side by side, and where the layout was written."""
+    from finlab.cli.score_card import comparison_text
+
+    lines = [f"{found.goal}: {found.value_before:.4g} -> {found.value_after:.4g}", ""]
+    for name in found.moved:
+        fin = found.layout.fins[found.layout.index(name)]
+        place = "  ".join(f"{value:6.3f}" for value in fin.position)
+        lines.append(f"{name:<16}  {place} m  {math.degrees(fin.mounting_angle):7.1f} deg")
+    lines += ["", comparison_text(found.card_before, found.card_after), ""]
+    lines.append(
+        f"{output}: written." if found.improved else f"{output}: written unchanged, nothing better was found."
+    )
+    return "\n".join(lines)
+
+
+def _check(output: Path, reach: float, turn: float, rounds: int) -> None:
+    """Refuse before the search what would fail after it."""
+    from finlab.errors import FinlabError
+
+    if output.is_dir() or not output.absolute().parent.is_dir():
+        raise FinlabError(f"{output}: expected a file to write in a folder that exists")
+    if not (math.isfinite(reach) and reach >= 0.0):
+        raise FinlabError(f"--reach: expected metres, 0 or more, got {reach:g}")
+    if not (0.0 <= turn <= 180.0):
+        raise FinlabError(f"--turn: expected degrees from 0 to 180, got {turn:g}")
+    if rounds < 1:
+        raise FinlabError(f"--rounds: expected 1 or more, got {rounds}")
+
+
+def _bounds(layout: Layout, name: str, box: Box | None, reach: float, turn: float) -> Bounds:
+    from finlab.analysis import Bounds
+
+    fin = layout.fins[layout.index(name)]
+    if box is None:
+        return Bounds.around(fin, reach, turn)
+    angle = (fin.mounting_angle - turn, fin.mounting_angle + turn)
+    return Bounds((box[0], box[1]), (box[2], box[3]), (box[4], box[5]), angle)

@@ -1,0 +1,149 @@
+"""The score card of a layout as text, and two of them side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from finlab.analysis import Authority, Loss, ScoreCard
+
+_UNITS = ("N", "N", "N", "N m", "N m", "N m")
+
+
+def score_card_text(card: ScoreCard) -> str:
+    """Everything on the card, as tables and sentences."""
+    lines = [*_span_lines(card), "", *_axis_table(card), "", *_evenness(card.authority)]
+    if card.losses:
+        lines += ["", *_loss_table(card)]
+    error = max(a / unit for a, unit in zip(card.model_error, _LEVERS, strict=True))
+    lines += [
+        "",
+        f"Largest wrenches are exact to {max(card.authority.gap, 1e-6):.0e} N. Fins at rest may still push "
+        f"{error:.0e} N together.",
+        *card.notes,
+    ]
+    return "\n".join(lines)
+
+
+_LEVERS = (1.0, 1.0, 1.0, 0.2, 0.2, 0.2)
+
+
+def comparison_text(before: ScoreCard, after: ScoreCard) -> str:
+    """What has become of the numbers: before and after."""
+    old, new = before.authority, after.authority
+    rows = [
+        ("rank", f"{old.rank}", f"{new.rank}"),
+        ("weakest direction [N]", f"{old.weakest:.2f}", f"{new.weakest:.2f}"),
+        ("isotropy", f"{old.isotropy:.3f}", f"{new.isotropy:.3f}"),
+        ("condition", _condition(old.condition), _condition(new.condition)),
+    ]
+    for axis, a, b, unit in zip(_axes(), _least(old), _least(new), _UNITS, strict=True):
+        rows.append((f"largest {axis} [{unit}]", f"{a:.3f}", f"{b:.3f}"))
+    for k, (axis, size, unit) in enumerate(zip(_axes(), before.unit_wrench, _UNITS, strict=True)):
+        rows.append(
+            (
+                f"energy of {axis} {size:g} {unit}",
+                _number(before.unit_energy[k], 2),
+                _number(after.unit_energy[k], 2),
+            )
+        )
+    if before.worst_loss and after.worst_loss:
+        rows.append(
+            (
+                "weakest after worst loss [N]",
+                f"{before.worst_loss.weakest:.2f}",
+                f"{after.worst_loss.weakest:.2f}",
+            )
+        )
+    return "\n".join(_table(("", "before", "after"), rows))
+
+
+def _span_lines(card: ScoreCard) -> list[str]:
+    """Which axes the fins push at all, and which they push alone, before any limit."""
+    held = card.authority
+    lines = [f"{card.n_fins} fins push in {held.rank} of 6 independent directions."]
+    if card.failed:
+        lines.append("Failed: " + ", ".join(card.failed) + ".")
+    if held.without_authority:
+        lines.append("Out of reach: " + ", ".join(held.without_authority) + ".")
+    if held.coupled:
+        lines.append("Only together with other axes: " + ", ".join(held.coupled) + ".")
+    return lines
+
+
+def _axis_table(card: ScoreCard) -> list[str]:
+    held = card.authority
+    head = ("axis", "largest +", "largest -", "others free", "", "energy of", "+", "-")
+    rows = [
+        (
+            axis,
+            f"{held.largest[k]:.3f}",
+            f"{held.most_negative[k]:.3f}",
+            f"{held.beside_others[k]:.3f}",
+            _UNITS[k],
+            f"{card.unit_wrench[k]:g} {_UNITS[k]}",
+            _number(card.unit_energy[k], 2),
+            _number(card.unit_energy_negative[k], 2),
+        )
+        for k, axis in enumerate(_axes())
+    ]
+    return _table(head, rows)
+
+
+def _evenness(held: Authority) -> list[str]:
+    """Weakest direction, isotropy, conditioning."""
+    parts = sorted(zip(held.weakest_direction, _axes(), strict=True), key=lambda part: -abs(part[0]))
+    direction = ", ".join(f"{axis} {value:+.2f}" for value, axis in parts if abs(value) > 0.05)
+    values = " ".join(f"{value:.2f}" for value in held.singular_values)
+    return [
+        f"Weakest direction: {held.weakest:.2f} N along {direction} (torques over 0.2 m).",
+        f"Isotropy {held.isotropy:.3f}, condition {_condition(held.condition)}, singular values {values} N.",
+    ]
+
+
+def _loss_table(card: ScoreCard) -> list[str]:
+    head = ("without", "rank", "weakest [N]", *_axes(), "lost")
+    rows = [_loss_row(loss, loss is card.worst_loss) for loss in card.losses]
+    return [
+        "Share of the largest wrench that is left without one fin (* the worst to lose):",
+        *_table(head, rows),
+    ]
+
+
+def _loss_row(loss: Loss, worst: bool) -> tuple[str, ...]:
+    shares = ("-" if share is None else f"{100 * share:.0f} %" for share in loss.share_left)
+    name = f"{loss.fin} *" if worst else loss.fin
+    return (name, f"{loss.rank}", f"{loss.weakest:.2f}", *shares, ", ".join(loss.lost) or "nothing")
+
+
+def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
+    """Rows under a head; the first column and a last one of words are flush left, numbers are flush right."""
+    widths = [max(len(row[k]) for row in [head, *rows]) for k in range(len(head))]
+    words = {0, len(head) - 1} if head[-1] == "lost" else {0}
+    return [
+        "  ".join(
+            cell.ljust(width) if k in words else cell.rjust(width)
+            for k, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in [head, *rows]
+    ]
+
+
+def _axes() -> tuple[str, ...]:
+    from finlab.analysis import AXES
+
+    return AXES
+
+
+def _least(held: Authority) -> tuple[float, ...]:
+    """The smaller of both signs of the largest wrenches (6,)."""
+    return tuple(min(pair) for pair in zip(held.largest, held.most_negative, strict=True))
+
+
+def _condition(value: float | None) -> str:
+    return "infinite" if value is None else f"{value:.2f}"
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"

@@ -1,0 +1,81 @@
+"""Rank, weakest directions, isotropy, and the cost of each failure."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from finlab.analysis import authority, losses
+from finlab.analysis.extent import strongest, weakest
+from finlab.analysis.fin_sets import fin_sets
+from finlab.layout import Layout
+from tests.analysis.conftest import THRUST
+
+Layouts = Callable[[str], Layout]
+
+
+def test_layout_a_in_closed_form(shipped: Layouts) -> None:
+    held = authority(shipped("A"))
+    assert held.rank == 6
+    assert held.without_authority == held.coupled == ()
+    # Along one pair's shafts that pair is useless; the other two push at 60 degrees to their axes.
+    assert held.weakest == pytest.approx(2 * THRUST * np.sin(np.radians(60)), rel=1e-4)
+    assert np.abs(held.weakest_direction[:2]) == pytest.approx([0.5, np.sqrt(0.75)], abs=1e-2)
+
+
+def test_no_yaw_has_no_yaw(shipped: Layouts) -> None:
+    held = authority(shipped("no_yaw"))
+    assert held.rank == 5
+    assert held.without_authority == ("yaw",)
+    assert held.condition is None
+    assert held.weakest == 0.0
+    assert np.abs(held.weakest_direction) == pytest.approx(np.eye(6)[5])
+    assert held.reachable == ("surge", "sway", "heave", "roll", "pitch")
+
+
+def test_layout_d_has_no_sway(shipped: Layouts) -> None:
+    held = authority(shipped("D"))
+    assert held.without_authority == ("sway",)
+    assert held.largest[1] == held.beside_others[1] == 0.0
+
+
+@pytest.mark.parametrize("name", ["A", "B", "mixed", "restricted", "hexa"])
+def test_extremes_are_those_of_all_directions(shipped: Layouts, name: str) -> None:
+    sets = fin_sets([shipped(name)])
+    drawn = np.random.default_rng(5).standard_normal((20_000, 6))
+    drawn /= np.linalg.norm(drawn, axis=1, keepdims=True)
+    near, far = weakest(sets), strongest(sets)
+    # Around the weakest direction, too, nothing is weaker.
+    close = near.direction[0] + 0.05 * drawn[:2000]
+    close /= np.linalg.norm(close, axis=1, keepdims=True)
+    directions = np.concatenate([drawn, close])
+    reach = sets.take(np.zeros(len(directions), dtype=np.intp)).farthest(directions)[0]
+    assert reach.min() >= near.size[0] - 1e-4
+    assert reach.max() <= far.size[0] + 1e-9
+    assert sets.farthest(near.direction)[0] == pytest.approx(near.size, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["C", "D", "restricted"])
+def test_failures_never_help(shipped: Layouts, name: str) -> None:
+    layout = shipped(name)
+    before = authority(layout)
+    for loss in losses(layout):
+        after = authority(layout, (loss.fin,))
+        assert loss.rank == after.rank <= before.rank
+        assert loss.weakest <= before.weakest + 1e-4
+        assert set(loss.reachable) | set(loss.lost) == set(before.reachable)
+        assert np.all(np.array(after.largest) <= np.array(before.largest) + 1e-4)
+        assert np.all(np.array(after.beside_others) <= np.array(before.beside_others) + 1e-9)
+        assert all(share is None or 0.0 <= share <= 1.0 for share in loss.share_left)
+
+
+def test_layout_a_keeps_half_after_any_failure(shipped: Layouts) -> None:
+    for loss in losses(shipped("A")):
+        assert loss.lost == ()
+        assert loss.share_left == pytest.approx([0.5] * 6, abs=1e-4)
+
+
+def test_a_last_fin_has_no_loss_to_tell(shipped: Layouts) -> None:
+    layout = shipped("A")
+    assert losses(layout, layout.names[1:]) == ()
+    assert authority(layout, layout.names).rank == 0

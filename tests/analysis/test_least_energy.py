@@ -1,0 +1,44 @@
+"""Least energies against closed forms and against random multistart on the commands."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from finlab.allocation.multistart import Multistart
+from finlab.analysis import least_energy
+from finlab.analysis.thrust_law import thrust_laws
+from finlab.data.normalization import Normalization
+from finlab.layout import Layout
+
+Layouts = Callable[[str], Layout]
+WRENCHES = np.concatenate([np.diag([1, 1, 1, 0.1, 0.1, 0.1]), [[1.2, 0, 0.5, 0, 0, 0.15]]])
+
+
+def test_a_pair_shares_heave_evenly(shipped: Layouts) -> None:
+    layout = shipped("pair")
+    law = thrust_laws(layout)[0]
+    up = 0.1 * 0.25  # the zero direction's cost at a quarter turn
+    energy = least_energy(layout, [[0, 0, 4.0, 0, 0, 0], [0, 0, 0, 0, 0.5, 0], [0, 0, 40.0, 0, 0, 0]])
+    assert energy[0] == pytest.approx(2 * (law.energy_at(np.array(2.0)) + up), rel=1e-3)
+    assert np.isnan(energy[1:]).all()  # a torque it has not, a force beyond its reach
+
+
+@pytest.mark.parametrize("name", ["A", "mixed", "restricted"])
+def test_no_multistart_finds_much_less(shipped: Layouts, name: str) -> None:
+    layout = shipped(name)
+    energy = least_energy(layout, WRENCHES)
+    sigma = np.array([1.0, 1.0, 1.0, 0.1, 0.1, 0.1])
+    method = Multistart(Normalization(np.zeros(6), sigma), n_candidates=24, n_steps=30, energy_weight=1e-3)
+    for wrench, least in zip(WRENCHES, energy, strict=True):
+        found = method.allocate(layout, wrench)
+        if found.err_norm < 1e-2:
+            assert least <= 1.03 * found.energy
+
+
+def test_wide_arcs_and_failures(wide: Layout) -> None:
+    wrench = [[0.5, 0.0, 0.5, 0.0, 0.0, 0.05]]
+    whole = least_energy(wide, wrench)
+    assert np.isfinite(whole).all()
+    assert np.isnan(least_energy(wide, wrench, failed=wide.names[:3])).all()
+    assert least_energy(wide, np.zeros((1, 6))) < whole

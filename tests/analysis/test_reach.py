@@ -1,0 +1,101 @@
+"""Largest wrenches: in closed form, against linear programmes, against the plant."""
+
+from collections.abc import Callable
+from itertools import product
+
+import numpy as np
+import pytest
+
+from finlab.analysis import authority
+from finlab.analysis.answers import strong
+from finlab.analysis.fin_sets import SCALE, fin_sets, pieces
+from finlab.analysis.reach import across, along, along_exactly
+from finlab.layout import Layout
+from finlab.physics import Plant
+from tests.analysis.conftest import THRUST, largest_by_polygons
+
+Layouts = Callable[[str], Layout]
+BOTH_WAYS = np.concatenate([np.eye(6), -np.eye(6)])
+
+
+def test_layout_b_in_closed_form(shipped: Layouts) -> None:
+    # Fins at the ends of a cross with arms d push forward in twos, up in fours, and all around for yaw.
+    layout = shipped("B")
+    arm = max(np.linalg.norm(fin.position) for fin in layout.fins)
+    held = authority(layout)
+    expected = np.array([2, 2, 4, 2 * arm, 2 * arm, 4 * arm]) * THRUST
+    assert held.largest == pytest.approx(expected, rel=1e-4)
+    assert held.most_negative == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize("name", ["A", "D", "no_yaw", "restricted", "mixed", "octo"])
+def test_bracketed_by_linear_programmes(shipped: Layouts, name: str) -> None:
+    sets = fin_sets([shipped(name)])
+    mixture = np.random.default_rng(0).standard_normal((3, 6))
+    directions = np.concatenate([BOTH_WAYS[::3], mixture / np.linalg.norm(mixture, axis=1, keepdims=True)])
+    size, gap = along_exactly(sets, directions)
+    assert gap < 2e-5
+    for direction, value in zip(directions, size, strict=True):
+        inside = largest_by_polygons(sets, direction, 180, outer=False)
+        outside = largest_by_polygons(sets, direction, 180, outer=True)
+        assert inside - 1e-6 <= value <= outside + gap + 1e-6
+
+
+def test_wide_arcs_count_piece_by_piece(wide: Layout) -> None:
+    sets = fin_sets([wide])
+    size, _ = along_exactly(sets, BOTH_WAYS)
+    parts = pieces(sets)
+    assert parts is not None
+    assert len(parts.radius) == 4
+    by_piece = np.array(
+        [
+            [
+                largest_by_polygons(parts.take(np.array([part])), direction, 180, outer=False)
+                for direction in BOTH_WAYS
+            ]
+            for part in range(4)
+        ]
+    )
+    assert size == pytest.approx(by_piece.max(axis=0), rel=1e-3, abs=1e-4)
+    hull = along(sets.take(np.zeros(12, dtype=np.intp)), BOTH_WAYS).size
+    assert (hull >= size - 1e-4).all()
+    assert (hull > size + 1e-3).any()
+
+
+def test_the_plant_gives_the_largest_wrench(shipped: Layouts) -> None:
+    layout = shipped("mixed")
+    sets = fin_sets([layout])
+    for direction in BOTH_WAYS:
+        found = along(sets, direction[None])
+        unit = np.maximum(np.sqrt((sets.pull(direction[None]) ** 2).sum(-1)).max(-1), 1e-6)
+        force = strong(sets, sets.pull(found.normal), 1e-6 * unit[:, None] * np.ones((1, 4)))[1][0]
+        thrust, angle = np.hypot(*force.T), np.arctan2(force[:, 1], force[:, 0])
+        wrench = Plant(layout).wrench(_commands(layout, thrust, angle))
+        assert wrench / SCALE == pytest.approx(found.size[0] * direction, abs=1e-3)
+
+
+def _commands(layout: Layout, thrust: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Commands at full amplitude whose frequency gives the thrusts; both laws grow with its square."""
+    upper = np.array([fin.limits.upper for fin in layout.fins])
+    full = np.linalg.norm(Plant(layout).fin_forces(np.where([True, True, False], upper, 0.0)), axis=-1)
+    return np.stack([upper[:, 0], upper[:, 1] * np.sqrt(thrust / full), angle], axis=-1)
+
+
+def test_no_sampled_command_goes_beyond(shipped: Layouts) -> None:
+    for name, sign in product(("A", "restricted", "mixed"), (1.0, -1.0)):
+        layout = shipped(name)
+        rng = np.random.default_rng(2)
+        lower = np.array([fin.limits.lower for fin in layout.fins])
+        upper = np.array([fin.limits.upper for fin in layout.fins])
+        wrench = Plant(layout).wrench(rng.uniform(lower, upper, (20_000, layout.n_fins, 3))) / SCALE
+        size, _ = fin_sets([layout]).take(np.zeros(6, dtype=np.intp)).farthest(sign * np.eye(6))
+        assert ((sign * wrench).max(axis=0) <= size + 1e-3).all()
+        # Full thrust in the best direction is far from common, but half of it is.
+        assert ((sign * wrench).max(axis=0) >= 0.35 * size).all()
+
+
+def test_across_is_a_basis() -> None:
+    drawn = np.random.default_rng(0).standard_normal((20, 6))
+    directions = np.concatenate([BOTH_WAYS, drawn / np.linalg.norm(drawn, axis=1, keepdims=True)])
+    whole = np.concatenate([directions[:, :, None], across(directions)], axis=-1)
+    assert np.allclose(np.swapaxes(whole, -1, -2) @ whole, np.eye(6))
