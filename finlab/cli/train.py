@@ -11,6 +11,7 @@ from tyro.conf import arg
 from tyro.extras import SubcommandApp
 
 if TYPE_CHECKING:
+    from finlab.layout import FinModelSpec
     from finlab.model.checkpoint import Checkpoint
 
 verbs = SubcommandApp()
@@ -27,6 +28,7 @@ def surrogate(
     seed: Annotated[int, arg(metavar="N")] = 0,
     steps: _Count = None,
     stop_after: _Count = None,
+    fin_model: Annotated[str, arg(metavar="NAME|FILE.csv")] = "drag",
 ) -> None:
     """Train the learned fin physics and write a checkpoint folder with it alone.
 
@@ -36,11 +38,16 @@ def surrogate(
         seed: seed of the data and of the first weights.
         steps: optimizer steps instead of the recipe's.
         stop_after: stop after so many steps; call again to go on.
+        fin_model: what to learn: drag, lighthill, or a table of measured forces.
     """
     from finlab.training.surrogate import train_surrogate
 
     _check_counts(steps=steps, stop_after=stop_after)
-    _report(output, train_surrogate(preset, output, seed=seed, steps=steps, stop_after=stop_after))
+    spec = _fin_model(fin_model)
+    checkpoint = train_surrogate(
+        preset, output, seed=seed, steps=steps, stop_after=stop_after, fin_model=spec
+    )
+    _report(output, checkpoint)
 
 
 @verbs.command
@@ -80,6 +87,15 @@ def allocator(
         stop_after=stop_after,
     )
     _report(output, checkpoint)
+
+
+def _fin_model(name: str) -> "FinModelSpec":
+    """A fin model by its name, or a table by its file."""
+    from finlab.layout import FinModelSpec
+
+    if name.lower().endswith(".csv"):
+        return FinModelSpec("table", (("path", str(Path(name).resolve())),))
+    return FinModelSpec(name)
 
 
 def _check_counts(**counts: int | None) -> None:

@@ -52,24 +52,39 @@ class Mixture(NamedTuple):
             return torch.logsumexp(log_weight + (log_normal * mask[..., None]).sum(1), dim=-1)
         return (torch.logsumexp(log_weight + log_normal, dim=-1) * mask).sum(1)
 
-    def sample(self, n_samples: int, temperature: float, generator: torch.Generator | None = None) -> Tensor:
+    def sample(
+        self,
+        n_samples: int,
+        temperature: float,
+        generator: torch.Generator | None = None,
+        *,
+        share: tuple[slice, int] | None = None,
+    ) -> Tensor:
         """Draw normalized commands (B, n_samples, n, 3).
 
         Temperature T sharpens the choice of component (weights to the power 1/T) and scales the
         variance of each Gaussian by T, as usual for mixture density networks; T = 1 samples the
         density itself.
+
+        Args:
+            n_samples: how many.
+            temperature: T, from 0.
+            generator: source of randomness.
+            share: which rows of a larger batch these are, and its size; the noise is that of the larger
+                batch, however it is shared among processes.
         """
         batch, n, m, _ = self.mean.shape
-        probability = (self.logits / max(temperature, 1e-6)).softmax(-1)
+        rows, total = share or (slice(0, batch), batch)
+        size = (total, n_samples) if self.joint else (total, n, n_samples)
+        dtype, device = self.mean.dtype, self.mean.device
+        draw = torch.rand(size, generator=generator, dtype=dtype, device=device)[rows]
+        noise = torch.randn((total, n, n_samples, 3), generator=generator, dtype=dtype, device=device)[rows]
+        cumulative = (self.logits / max(temperature, 1e-6)).softmax(-1).cumsum(-1)
+        choice = (draw[..., None] > cumulative[..., None, :]).sum(-1).clamp(max=m - 1)
         if self.joint:
-            choice = torch.multinomial(probability, n_samples, replacement=True, generator=generator)
             choice = choice[:, None].expand(batch, n, n_samples)
-        else:
-            flat = torch.multinomial(probability.reshape(batch * n, m), n_samples, True, generator=generator)
-            choice = flat.view(batch, n, n_samples)
         index = choice[..., None].expand(-1, -1, -1, 3)
         mean, std = self.mean.gather(2, index), self.log_std.gather(2, index).exp()
-        noise = torch.randn(mean.shape, generator=generator, dtype=mean.dtype, device=mean.device)
         return (mean + math.sqrt(temperature) * std * noise).transpose(1, 2)
 
 

@@ -11,15 +11,20 @@ import torch
 from torch import Tensor, nn
 
 from finlab.data.features import SIZES, fin_frame_features, geometry, raw_features
-from finlab.data.sampling import Batch, ForwardSampler
-from finlab.errors import DataError
+from finlab.data.sampling import Batch, ForwardSampler, seeded_generator
 from finlab.layout import FinModelSpec
 from finlab.model.allocator_network import AllocatorNetwork, NetworkConfig
 from finlab.model.checkpoint import Checkpoint, load_checkpoint, resolve_checkpoint, save_checkpoint
 from finlab.physics import make_fin_model
 from finlab.training import losses
 from finlab.training.curves import plot_log
-from finlab.training.device import autocast_dtype, join_processes, leave_processes, training_device
+from finlab.training.device import (
+    autocast_dtype,
+    join_processes,
+    leave_processes,
+    share_of_batch,
+    training_device,
+)
 from finlab.training.loop import LoopSettings, train
 from finlab.training.presets import AllocatorTraining, get_preset
 from finlab.training.surrogate import TRAIN_SEED
@@ -58,8 +63,6 @@ def train_allocator(
     changes = {"steps": steps, "batch_size": batch_size, "learning_rate": learning_rate, **(overrides or {})}
     training = replace(recipe.allocator_training, **{k: v for k, v in changes.items() if v is not None})
     rank, world = join_processes()
-    if training.batch_size % world:
-        raise DataError(f"batch size {training.batch_size} does not divide among {world} processes")
     device = training_device()
     torch.manual_seed(seed)
     network = AllocatorNetwork(recipe.network, SIZES[recipe.network.features]).to(device)
@@ -111,7 +114,7 @@ def make_terms(
         TRAIN_SEED + seed, training.batch_size, fin_model=model, varied_limits=training.varied_limits
     )
     mean, std = (torch.tensor(v, dtype=torch.float32, device=device) for v in base.normalization)
-    share = slice(rank * training.batch_size // world, (rank + 1) * training.batch_size // world)
+    share = share_of_batch(training.batch_size, rank, world)
     # Only the network runs in reduced precision; statistics, losses and physics stay in float32.
     dtype = autocast_dtype(device.type)
     autocast = torch.autocast(device.type, dtype, enabled=dtype is not None)
@@ -129,8 +132,11 @@ def make_terms(
         # The surrogate's wrench is compared to the absolute target: mean and std cancel in the difference.
         shifted = target + mean / std
         if training.guide == "samples":
-            noise = torch.Generator(device).manual_seed((TRAIN_SEED + seed) * 1_000_003 + step * world + rank)
-            guidance = losses.sample_guidance(mixture, base.surrogate, batch, shifted, std, noise).mean()
+            noise = seeded_generator(TRAIN_SEED + seed, step, device)
+            whole = (share, training.batch_size)
+            guidance = losses.sample_guidance(
+                mixture, base.surrogate, batch, shifted, std, noise, whole
+            ).mean()
         else:
             soft, best = losses.mode_guidance(
                 mixture,

@@ -7,6 +7,8 @@ import os
 import torch
 import torch.distributed as dist
 
+from finlab.errors import DataError
+
 
 def training_device() -> torch.device:
     """CUDA (the card of this process) where present, else the CPU."""
@@ -22,6 +24,13 @@ def join_processes() -> tuple[int, int]:
     if not dist.is_initialized():
         dist.init_process_group("nccl" if torch.cuda.is_available() else "gloo")
     return dist.get_rank(), dist.get_world_size()
+
+
+def share_of_batch(batch_size: int, rank: int, world: int) -> slice:
+    """The rows of each batch that are this process's; `DataError` where they do not divide evenly."""
+    if batch_size % world:
+        raise DataError(f"batch size {batch_size} does not divide among {world} processes; choose a multiple")
+    return slice(rank * batch_size // world, (rank + 1) * batch_size // world)
 
 
 def leave_processes() -> None:

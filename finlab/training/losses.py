@@ -41,10 +41,16 @@ def energy(command: Tensor, batch: Batch) -> Tensor:
 
 
 def sample_guidance(
-    mixture: Mixture, surrogate: Surrogate, batch: Batch, target: Tensor, std: Tensor, noise: torch.Generator
+    mixture: Mixture,
+    surrogate: Surrogate,
+    batch: Batch,
+    target: Tensor,
+    std: Tensor,
+    noise: torch.Generator,
+    share: tuple[slice, int] | None = None,
 ) -> Tensor:
-    """The paper's L_guide: squared normalized error of one sample of the mixture."""
-    x = mixture.sample(1, 1.0, noise)
+    """The paper's L_guide: squared normalized error of one sample; `share` as in `Mixture.sample`."""
+    x = mixture.sample(1, 1.0, noise, share=share)
     lower, upper = batch.lower[:, None], batch.upper[:, None]
     raw = to_command(x, lower, upper)
     # The gradient passes the clamp, or samples outside the limits would teach nothing.

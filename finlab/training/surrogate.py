@@ -18,7 +18,7 @@ from finlab.model.checkpoint import Checkpoint, save_checkpoint
 from finlab.model.surrogate import CoefficientSurrogate, Surrogate, make_surrogate
 from finlab.physics import FinModel, make_fin_model
 from finlab.training.curves import plot_log
-from finlab.training.device import training_device
+from finlab.training.device import join_processes, leave_processes, share_of_batch, training_device
 from finlab.training.loop import LoopSettings, train
 from finlab.training.presets import get_preset
 
@@ -57,14 +57,16 @@ def train_surrogate(
     model = make_fin_model(spec)
     training = recipe.surrogate_training
     total = steps or training.steps
+    rank, world = join_processes()
+    share = share_of_batch(training.batch_size, rank, world)
     device = training_device()
     torch.manual_seed(seed)
     surrogate = make_surrogate(recipe.surrogate).to(device)
     normalization = measure_normalization(model, seed)
     if isinstance(surrogate, CoefficientSurrogate):
-        terms = _coefficient_terms(model, training.batch_size, seed, device)
+        terms = _coefficient_terms(model, training.batch_size, seed, device, share)
     else:
-        terms = _wrench_terms(model, training.batch_size, seed, normalization, device)
+        terms = _wrench_terms(model, training.batch_size, seed, normalization, device, share)
     identity: dict[str, Any] = {
         "preset": preset,
         "seed": seed,
@@ -88,8 +90,10 @@ def train_surrogate(
         training={"surrogate": identity | {"samples": total * training.batch_size}},
         metrics={"surrogate": surrogate_metrics(surrogate, model, seed + 1)},
     )
-    save_checkpoint(out, checkpoint)
-    plot_log(out)
+    if rank == 0:
+        save_checkpoint(out, checkpoint)
+        plot_log(out)
+    leave_processes()
     return checkpoint
 
 
@@ -127,32 +131,42 @@ def surrogate_metrics(surrogate: Surrogate, model: FinModel, seed: int) -> dict[
     return metrics
 
 
-def _coefficient_terms(model: FinModel, batch_size: int, seed: int, device: torch.device) -> Terms:
+def _coefficient_terms(
+    model: FinModel, batch_size: int, seed: int, device: torch.device, share: slice
+) -> Terms:
     """Mean squared error of force coefficients over single fins: the same relative weight for all forces."""
     low, high = (
         torch.tensor(v, dtype=torch.float32, device=device) for v in zip(*COMMAND_RANGE, strict=True)
     )
     a0, f0 = CoefficientSurrogate.REFERENCE
+    # Of a lone fin at the origin, shaft along x, the wrench's force is the force in the fin frame.
+    position, angle = torch.zeros(1, 3, device=device), torch.zeros(1, device=device)
 
     def terms(net: nn.Module, step: int) -> dict[str, Tensor]:
-        draw = torch.Generator().manual_seed((TRAIN_SEED + seed) * 1_000_003 + step)
-        command = low + (high - low) * torch.rand(batch_size, 3, generator=draw).to(device)
+        generator = torch.Generator().manual_seed((TRAIN_SEED + seed) * 1_000_003 + step)
+        draw = torch.rand(batch_size, 3, generator=generator)[share]
+        command = low + (high - low) * draw.to(device)
         scale = (command[:, 0] * command[:, 1] / (a0 * f0)).square()[:, None]
-        error = (net.fin_force(command) - model.force(command)) / scale  # type: ignore[operator]
-        return {"loss": error.square().sum(-1).mean()}
+        force = net(command[:, None], position, angle, low, high)[:, :3]
+        return {"loss": ((force - model.force(command)) / scale).square().sum(-1).mean()}
 
     return terms
 
 
 def _wrench_terms(
-    model: FinModel, batch_size: int, seed: int, normalization: Normalization, device: torch.device
+    model: FinModel,
+    batch_size: int,
+    seed: int,
+    normalization: Normalization,
+    device: torch.device,
+    share: slice,
 ) -> Terms:
     """The paper's L_phys: squared error of the normalized wrench of whole robots."""
     sampler = ForwardSampler(TRAIN_SEED + seed, batch_size, fin_model=model)
     std = torch.tensor(normalization.std, dtype=torch.float32, device=device)
 
     def terms(net: nn.Module, step: int) -> dict[str, Tensor]:
-        b = Batch(*(t.to(device) for t in sampler.batch(step)))
+        b = Batch(*(t[share].to(device) for t in sampler.batch(step)))
         wrench = net(b.command, b.position, b.mounting_angle, b.lower, b.upper, b.mask)
         return {"loss": ((wrench - b.wrench) / std).square().sum(-1).mean()}
 
