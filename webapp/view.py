@@ -233,9 +233,10 @@ class View:
 
     def _refresh(self) -> None:
         with self.client.atomic():
-            self.scene.refresh(
-                self.shown, self._overlaid
-            )  # first: it settles the scale that the legend tells
+            found = self.improver.found
+            offered = found.layout if found is not None and found.improved else None
+            # First: it settles the scale that the legend tells.
+            self.scene.refresh(self.shown, self._overlaid, self.analyst.findings, offered)
             for panel in self._panels:
                 panel.refresh()
 

@@ -3,6 +3,7 @@
 import re
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 WAIT_MS = 45_000
@@ -42,6 +43,7 @@ class Page:
         self.ready()
         self.until(lambda: bool(set(served.app.views) - before))
         self.session = served.app.views[max(set(served.app.views) - before)].session
+        self._display = self.session.display
 
     def ready(self) -> None:
         """Wait for panel, robot and first answer."""
@@ -60,6 +62,8 @@ class Page:
 
         def restart() -> None:
             self.session.start_over()
+            self.session.display = self._display
+            self.view.improver.forget()
             self.view.look_from("3D")
 
         self._served.server.get_event_loop().call_soon_threadsafe(self.view.do, restart)
@@ -115,6 +119,17 @@ class Page:
         options = self.page.locator("div[role=option]:visible")
         options.filter(has_text=re.compile(f"^{re.escape(entry)}")).first.click()
         self._pause()
+
+    def switch(self, label: str) -> None:
+        """Click a checkbox."""
+        self.row(label).first.click()
+        self._pause()
+
+    def upload(self, button: str, path: Path) -> None:
+        """Press a button that asks for a file, and give it one."""
+        with self.page.expect_file_chooser() as chooser:
+            self.press(button)
+        chooser.value.set_files(path)
 
     def key(self, keys: str) -> None:
         """Press a key outside any input."""

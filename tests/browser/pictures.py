@@ -20,6 +20,7 @@ SIZE = {"width": 1400, "height": 860}
 def save(page: Page, path: Path) -> None:
     """A screenshot without the notes, squeezed as far as it goes without losing anything."""
     page.close_notes()
+    page.page.mouse.move(200, 60)  # off the buttons, so that no hint covers anything
     page.page.wait_for_timeout(2500)
     picture = Image.open(io.BytesIO(page.page.screenshot())).convert("RGB")
     picture.save(path, optimize=True)
@@ -56,8 +57,12 @@ def _compare(page: Page) -> None:
     page.press("sqp")
 
 
-def _failure(page: Page) -> None:
+def _view(page: Page) -> None:
     page.press("none")
+    page.tab("View")
+
+
+def _failure(page: Page) -> None:
     page.tab("Wrench")
     page.press("2")
     page.until(lambda: not page.view.busy)
@@ -76,7 +81,7 @@ SCENES: dict[str, Callable[[Page], object]] = {
     "app-modes": _modes,
     "app-limits": _limits,
     "app-compare": _compare,
-    "app-view": lambda page: page.tab("View"),
+    "app-view": _view,
     "app-files": lambda page: page.tab("Files"),
     "app-failure": _failure,
     "app-tour": _tour,
@@ -106,6 +111,7 @@ def main(folder: Path, wanted: list[str]) -> None:
         )
         for name, prepare in SCENES.items():
             prepare(page)
+            print(name, page.problems, flush=True)
             if not wanted or name in wanted:
                 save(page, folder / f"{name}.png")
         browser.close()

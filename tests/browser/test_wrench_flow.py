@@ -7,6 +7,7 @@ def test_slider_moves_numbers_and_arrows(page: Any) -> None:
     before = page.vertices("/wrench/delivered_force")
     page.slide("Fx [N]", 25)
     page.until(lambda: page.session.state.target[0] > 2.0)
+    page.page.wait_for_timeout(400)  # the last step of the drag may still be on its way
     asked = page.session.state.target[0]
     page.until(lambda: f"{asked:+.2f}" in page.text(".bars"))
     page.until(lambda: not page.view.busy)

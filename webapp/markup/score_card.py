@@ -101,5 +101,6 @@ def _losses(layout: Layout, card: ScoreCard) -> str:
     for loss in card.losses:
         cost = f"<span class='missing'>loses {escape(listed(loss.lost))}</span>" if loss.lost else ""
         name = f"{swatch(layout.index(loss.fin))}{escape(loss.fin)}"
-        rows.append(f"<tr><td>without {name}</td><td>{three_digits(loss.weakest)} N</td><td>{cost}</td></tr>")
+        weakest = f"<td>{three_digits(loss.weakest)} N</td>"
+        rows.append(f"<tr><td>without {name}</td>{weakest}<td class='words'>{cost}</td></tr>")
     return f"<table><tr><th>one fin lost</th><th>weakest</th><th></th></tr>{''.join(rows)}</table>"

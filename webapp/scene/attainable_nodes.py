@@ -31,7 +31,6 @@ class AttainableNodes:
                 color=color,
                 opacity=opacity,
                 side="double",
-                flat_shading=True,
                 visible=False,
                 cast_shadow=False,
                 receive_shadow=False,

@@ -26,7 +26,7 @@ from webapp.state import State
 from webapp.words import missing_part
 
 CAMERAS = {
-    "3D": (0.53, 0.50, 0.66),
+    "3D": (0.48, 0.46, 0.58),
     "Top": (-0.001, 0.0, 1.35),
     "Side": (0.0, -1.3, 0.1),
     "Front": (1.3, 0.0, 0.1),

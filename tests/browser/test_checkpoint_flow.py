@@ -1,0 +1,60 @@
+"""The page with the checkpoint that is shipped and the method `learned`, as a user gets it."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from finlab.assets import shipped_checkpoints, shipped_layouts
+from finlab.layout import load_layout
+from tests.browser.conftest import Served
+from tests.browser.page import Page
+from webapp.app import App
+from webapp.session import Display
+from webapp.solver import Solver
+from webapp.viser_internals import start_server, stop_server
+
+pytestmark = pytest.mark.skipif(
+    "default" not in shipped_checkpoints(), reason="no trained checkpoint in checkpoints/default"
+)
+
+
+@pytest.fixture(scope="module")
+def trained(browser: Any) -> Iterator[Page]:
+    """A page of a server with the real solver."""
+    server = start_server("127.0.0.1", 0)
+    ucat = load_layout(shipped_layouts()["ucat"])
+    app = App(server, Solver(), ucat, Display(shadows=False, speed=0.2))
+    context = browser.new_context(viewport={"width": 900, "height": 600})
+    served = Served(f"http://127.0.0.1:{server.get_port()}/?fixedDpr=0.5", app, server)
+    yield Page(context.new_page(), served)
+    context.close()
+    app.stop()
+    stop_server(server)
+
+
+def test_learned_answers_a_slider_and_a_failure(trained: Page) -> None:
+    page = trained
+    assert page.view.best.method == "learned" and page.view.best.checkpoint is not None
+    assert "Reachable" in page.text(".fl-status")
+    page.type("Fy [N]", "0.5")
+    page.until(lambda: page.session.state.target[1] == 0.5 and not page.view.busy)
+    page.until(lambda: "+0.50" in page.text(".bars"))
+    assert page.view.best.err_norm < 0.01
+    page.press("2")
+    page.until(lambda: page.session.state.failed == ("front_left",) and not page.view.busy)
+    assert page.view.best.method == "learned"
+    page.press("2 ✕")
+    page.until(lambda: page.session.state.failed == () and not page.view.busy)
+
+
+def test_its_modes_are_distinct_and_its_densities_are_drawn(trained: Page) -> None:
+    page = trained
+    page.tab("Modes")
+    page.until(lambda: page.page.locator("table.modes tr.pick").count() == len(page.view.modes) > 0)
+    names = [mode.name for mode in page.view.modes]
+    assert len(set(names)) == len(names)
+    assert page.view.densities is not None
+    page.tab("What the network proposes")
+    page.until(lambda: page.page.locator(".uplot").count() == 3)
+    assert page.problems == []

@@ -1,0 +1,111 @@
+"""Design a robot: linked pairs, hulls from files, limits with failures, a better layout, other methods."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import trimesh
+
+
+def test_linked_pair_follows_the_gizmo(page: Any) -> None:
+    page.key("n")
+    page.until(lambda: page.session.selected == "front_right")
+    page.tab("Layout")
+    page.press("Mirror")
+    page.until(lambda: page.session.state.links == (("front_right", "front_left"),))
+    page.until(lambda: page.session.selected == "front_left")
+    page.key("2")
+    page.page.wait_for_timeout(600)
+    grip, further = page.pixel("/fins/1", (0.168, 0, 0)), page.pixel("/fins/1", (0.228, 0, 0))
+    before = page.session.state.layout
+    page.drag(grip, further)
+    page.until(lambda: page.session.state.layout != before and not page.view.busy)
+    right, left = page.session.state.layout.fins[:2]
+    assert left.position[0] == pytest.approx(before.fins[1].position[0] + 0.06, abs=0.02)
+    assert right.position == pytest.approx((left.position[0], -left.position[1], left.position[2]))
+    ghost = "() => window.__viserMutable.nodeRefFromName['/ghost'].visible"
+    page.page.wait_for_function(ghost)
+    page.press("Undo")
+    page.until(lambda: page.session.state.layout == before)
+
+
+def test_hull_from_a_file_and_by_numbers(page: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    path = tmp_path / "hull.stl"
+    path.write_bytes(trimesh.creation.capsule(height=400, radius=90).export(file_type="stl"))
+    page.tab("Layout")
+    page.tab("Hull")  # opens the folder
+    page.upload("Import a hull (STL, OBJ, GLB)", path)
+    page.until(lambda: any("another unit" in note for note in page.notes()))
+    page.choose("Unit of file", "mm")
+    before = page.vertices("/hull")
+    page.upload("Import a hull (STL, OBJ, GLB)", path)
+    page.until(lambda: page.session.state.layout.body.hull.mesh is not None)
+    page.until(lambda: page.vertices("/hull") != before)
+    page.choose("Shape", "torpedo")
+    page.until(lambda: page.session.state.layout.body.hull.shape == "torpedo")
+    page.type("Gravity [m]", "0.02", place=0)
+    page.until(lambda: page.session.state.layout.body.hull.center_m[0] == -0.02)
+    page.tab("Hull")
+
+
+def test_failure_changes_graph_and_attainable_set(page: Any) -> None:
+    page.tab("Limits")
+    page.press("forces")
+    page.page.wait_for_function("() => window.__viserMutable.nodeRefFromName['/attainable/now'].visible")
+    page.until(lambda: not page.view.analyst.busy)
+    whole, card = page.vertices("/attainable/now"), page.text(".score")
+    page.key("f")
+    page.until(lambda: page.session.state.failed == ("front_right",))
+    page.until(lambda: page.vertices("/attainable/now") != whole, seconds=60)
+    page.page.wait_for_function("() => window.__viserMutable.nodeRefFromName['/attainable/whole'].visible")
+    page.until(lambda: page.text(".score") != card and "without" in page.text(".score"))
+    page.until(lambda: page.view.scene._lines._graph.points.shape[0] in (1, 3))
+    page.press("none")
+    hidden = "() => !window.__viserMutable.nodeRefFromName['/attainable/now'].visible"
+    page.page.wait_for_function(hidden)
+
+
+def test_search_is_watched_and_accepted(page: Any) -> None:
+    page.tab("Limits")
+    before = page.session.state.layout
+    page.press("Search")
+    page.until(lambda: page.view.improver.progress is not None, seconds=60)
+    page.press("Cancel")
+    page.until(lambda: page.view.improver.found is not None, seconds=60)
+    page.until(lambda: page.page.get_by_role("button", name="Accept").count() == 1)
+    better = page.view.improver.found.layout
+    page.press("Accept")
+    page.until(lambda: page.session.state.layout == better and page.view.improver.found is None)
+    if better != before:
+        page.press("Undo")
+        page.until(lambda: page.session.state.layout == before)
+
+
+def test_methods_side_by_side(page: Any) -> None:
+    page.tab("Compare")
+    page.press("Compare the methods")
+    page.until(lambda: page.view.comparison.state is not None and not page.view.comparison.running)
+    page.until(lambda: page.page.locator("table.methods tr").count() == 7)
+    page.page.locator("table.methods tr.pick", has_text="analytic").click()
+    page.until(lambda: page.session.overlay == "analytic")
+    page.page.wait_for_function("() => window.__viserMutable.nodeRefFromName['/overlay'].visible")
+    assert "analytic" in page.text("table.methods tr.chosen")
+    page.press("none")
+    page.until(lambda: page.session.overlay is None)
+
+
+def test_wrench_is_dragged_in_the_view(page: Any) -> None:
+    page.switch("Drag in 3D")
+    page.until(lambda: page.session.display.grips)
+    page.key("2")
+    page.page.wait_for_timeout(600)
+    before = page.session.state.target
+    grip, further = page.pixel("/grip/force", (0.112, 0, 0)), page.pixel("/grip/force", (0.192, 0, 0))
+    page.drag(grip, further)
+    page.until(lambda: page.session.state.target[0] > before[0] + 0.2)
+    assert page.session.state.target[1:] == pytest.approx(before[1:], abs=0.02)
+    page.until(lambda: not page.view.busy)
+    assert page.session.history.undo_name == "Drag the force"
+    page.key("Control+z")
+    page.until(lambda: page.session.state.target == before)
