@@ -53,4 +53,6 @@ class Solver:
         Raises:
             FinlabError: the method cannot be loaded or cannot answer.
         """
-        return self.allocator(state).allocate(state.layout, state.target, failed=state.failed, seed=0)
+        return self.allocator(state).allocate(
+            state.layout, state.target, failed=state.failed, policy=state.policy, seed=0
+        )

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from finlab.allocation.methods import METHODS
+from finlab.allocation.policy import KINDS
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.links import Links, kept, linked
@@ -25,7 +26,7 @@ TEMPERATURE_RANGE = (0.0, 2.0)
 """Temperatures T of the mixture."""
 GAMMA_RANGE = (0.0, 1.0)
 """Weights gamma of the energy in the ranking."""
-SETTINGS = ("method", "n_candidates", "temperature", "gamma")
+SETTINGS = ("method", "policy", "n_candidates", "temperature", "gamma")
 """Fields of `State` that say how the question is answered."""
 
 
@@ -47,6 +48,8 @@ class State:
     """Weight of the energy in the ranking."""
     method: str = "learned"
     """Name of the allocation method."""
+    policy: str = "closest"
+    """What to do about a wrench that is out of reach: one of `KINDS`."""
     links: Links = ()
     """Mirror pairs of fins that move together."""
 
@@ -91,6 +94,10 @@ class State:
             if value not in METHODS:
                 raise FinlabError(f"method: expected one of {', '.join(METHODS)}, got {value!r:.60}")
             return replace(self, method=value)
+        if key == "policy":
+            if value not in KINDS:
+                raise FinlabError(f"policy: expected one of {', '.join(KINDS)}, got {value!r:.60}")
+            return replace(self, policy=value)
         if key == "n_candidates":
             return replace(self, n_candidates=round(number(value, "candidates K", *CANDIDATE_RANGE)))
         if key == "temperature":

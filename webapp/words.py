@@ -8,26 +8,21 @@ from finlab.layout import Layout
 from webapp.figures import listed
 from webapp.state import AXIS_UNITS, AXIS_WORDS
 
-REACHED = 0.05
-"""Normalized error below which a target counts as reached."""
+SMALL = 0.05
+"""Normalized error of an axis that is too small to speak of."""
 AT_LIMIT = 0.995
 """Share of the upper limit from which a command counts as saturated."""
-
-
-def is_reached(allocation: Allocation) -> bool:
-    """True if the target is delivered closely enough to call it reached."""
-    return allocation.err_norm <= REACHED
 
 
 def missing_part(allocation: Allocation) -> NDArray[np.float64]:
     """The unallocated wrench (6,) [N, N m] without what is too small to matter."""
     rest = allocation.unallocated
-    return np.where(np.abs(rest / allocation.sigma) > 2 * REACHED, rest, 0.0)
+    return np.where(np.abs(rest / allocation.sigma) > 2 * SMALL, rest, 0.0)
 
 
 def reach_sentence(allocation: Allocation) -> str:
     """One sentence: reachable, or what is missing most and which fins are at their limits."""
-    if is_reached(allocation):
+    if allocation.reachable:
         return "Reachable"
     axis = int(np.argmax(np.abs(allocation.unallocated / allocation.sigma)))
     target, given = allocation.target[axis], allocation.wrench[axis]
@@ -50,7 +45,7 @@ def rest_sentence(allocation: Allocation) -> str:
     parts = [
         f"{abs(rest[k]):.2g} {AXIS_UNITS[k]} of {AXIS_WORDS[k]}"
         for k in np.argsort(-np.abs(rest / allocation.sigma))
-        if abs(rest[k] / allocation.sigma[k]) > REACHED / 2
+        if abs(rest[k] / allocation.sigma[k]) > SMALL / 2
     ]
     if not parts:
         return "Nothing is left undone."

@@ -120,11 +120,6 @@ class Page:
         options.filter(has_text=re.compile(f"^{re.escape(entry)}")).first.click()
         self._pause()
 
-    def switch(self, label: str) -> None:
-        """Click a checkbox."""
-        self.row(label).first.click()
-        self._pause()
-
     def upload(self, button: str, path: Path) -> None:
         """Press a button that asks for a file, and give it one."""
         with self.page.expect_file_chooser() as chooser:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from PIL import Image
+from PIL import Image, ImageOps
 
 from tests.browser.conftest import CHROMIUM, FLAGS, Served
 from tests.browser.page import Page
@@ -18,12 +18,12 @@ SIZE = {"width": 1400, "height": 860}
 
 
 def save(page: Page, path: Path) -> None:
-    """A screenshot without the notes, squeezed as far as it goes without losing anything."""
+    """A screenshot without the notes; one bit less per colour is not seen and makes it a third smaller."""
     page.close_notes()
     page.page.mouse.move(200, 60)  # off the buttons, so that no hint covers anything
     page.page.wait_for_timeout(2500)
     picture = Image.open(io.BytesIO(page.page.screenshot())).convert("RGB")
-    picture.save(path, optimize=True)
+    ImageOps.posterize(picture, 7).save(path, optimize=True)
     print(path, path.stat().st_size // 1000, "kB", flush=True)
 
 
@@ -111,7 +111,6 @@ def main(folder: Path, wanted: list[str]) -> None:
         )
         for name, prepare in SCENES.items():
             prepare(page)
-            print(name, page.problems, flush=True)
             if not wanted or name in wanted:
                 save(page, folder / f"{name}.png")
         browser.close()

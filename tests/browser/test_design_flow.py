@@ -96,7 +96,7 @@ def test_methods_side_by_side(page: Any) -> None:
 
 
 def test_wrench_is_dragged_in_the_view(page: Any) -> None:
-    page.switch("Drag in 3D")
+    page.key("g")
     page.until(lambda: page.session.display.grips)
     page.key("2")
     page.page.wait_for_timeout(600)

@@ -17,16 +17,16 @@ from webapp.session import Session
 from webapp.state import State
 from webapp.targets import PRESETS, axis_reach, full_thrust
 from webapp.tour import STEPS
-from webapp.words import authority_sentence, is_reached, reach_sentence, rest_sentence
+from webapp.words import authority_sentence, reach_sentence, rest_sentence
 
 
 def test_reachable_and_not() -> None:
     layout, allocator = load_layout(shipped_layouts()["ucat"]), StandIn()
     easy = allocator.allocate(layout, PRESETS["Turn"])
-    assert is_reached(easy) and reach_sentence(easy) == "Reachable"
+    assert easy.reachable and reach_sentence(easy) == "Reachable"
     assert rest_sentence(easy) == "Nothing is left undone."
     hard = allocator.allocate(layout, [0, 0, 60, 0, 0, 0])
-    assert not is_reached(hard)
+    assert not hard.reachable
     assert "of the heave force" in reach_sentence(hard) and "at the limit" in reach_sentence(hard)
     assert "N of heave" in rest_sentence(hard) and rest_sentence(hard).endswith("left undone.")
 

@@ -7,7 +7,7 @@ from finlab.allocation.allocation import Allocation
 from webapp.figures import small, three_digits
 from webapp.state import State
 from webapp.theme import ASKED, DELIVERED, MISSING, TORQUE_SCALE, css
-from webapp.words import is_reached, reach_sentence
+from webapp.words import reach_sentence
 
 
 def corner(state: State, newtons: float, allocation: Allocation | None, busy: bool, error: str | None) -> str:
@@ -43,7 +43,7 @@ def _status(state: State, allocation: Allocation | None, busy: bool, error: str 
     elif allocation is None:
         parts.append("<span class='dim'>computing …</span>")
     else:
-        color = DELIVERED if is_reached(allocation) else MISSING
+        color = DELIVERED if allocation.reachable else MISSING
         energy, time = three_digits(allocation.energy), three_digits(allocation.solve_ms)
         parts += [
             f"<span><span class='dim'>error</span> <b class='err'>{small(allocation.err_norm)}</b> σ</span>",

@@ -84,8 +84,9 @@ def _python(state: State, name: str) -> str:
     method = "" if state.method == "learned" else f"method={state.method!r}"
     target = ", ".join(f"{value:g}" for value in state.target)
     failed = f", failed={list(state.failed)!r}" if state.failed else ""
+    policy = "" if state.policy == "closest" else f", policy={state.policy!r}"
     return (
         f"import finlab\nlayout = finlab.load_layout({path!r})\n"
-        f"result = finlab.load_allocator({method}).allocate(layout, [{target}]{failed})\n"
+        f"result = finlab.load_allocator({method}).allocate(layout, [{target}]{failed}{policy})\n"
         "print(result.command, result.wrench)"
     )

@@ -1,10 +1,12 @@
 """The question and its answer: target wrench, failures, bars, and the table of commands."""
 
 from functools import partial
+from html import escape
 
 import numpy as np
 import viser
 
+from finlab.allocation.policy import KINDS
 from finlab.layout import Layout
 from webapp.handles import on_user_change, put
 from webapp.markup.bars import wrench_bars
@@ -38,10 +40,6 @@ class WrenchPanel:
         ]
         for k, slider in enumerate(self._sliders):
             on_user_change(slider, partial(self._set_target, k))
-        self._grips = gui.add_checkbox(
-            "Drag in 3D", False, hint="Handles on the blue arrows: drag the force, or the torque as a vector."
-        )
-        on_user_change(self._grips, lambda value: host.do(partial(host.session.set_display, "grips", value)))
         self._paint = gui.add_html("")
         self._failures = gui.add_button_group(
             "Fail a fin", ("1",), hint="Press a fin's number: fail or repair it."
@@ -49,13 +47,33 @@ class WrenchPanel:
         on_user_change(self._failures, self._toggle_failure)
         self._bars = gui.add_html("")
         self._table = gui.add_html("")
-        self._picker = ModePicker(gui, host, 190, "fl-wrench-modes")
+        self._picker = ModePicker(gui, host, 150, "fl-wrench-modes")
+        with gui.add_folder("More", expand_by_default=False):
+            self._grips = gui.add_checkbox(
+                "Drag in 3D",
+                False,
+                hint="Handles on the blue arrows, for the force and the torque.",
+            )
+            on_user_change(
+                self._grips, lambda value: host.do(partial(host.session.set_display, "grips", value))
+            )
+            self._policy = gui.add_dropdown(
+                "Out of reach",
+                KINDS,
+                hint="Come closest, keep the direction, or serve axes by priority, heave first.",
+            )
+            on_user_change(
+                self._policy, lambda value: host.do(partial(host.session.set_setting, "policy", value))
+            )
         self._ranges_for: tuple[Layout, tuple[str, ...]] | None = None
         self._reach = np.ones(6)
         self._full = np.ones(1)
 
     def _set_target(self, axis: int, value: float) -> None:
         self._host.do(partial(self._host.session.set_target, axis, value))
+
+    def _set_grips(self, value: bool) -> None:
+        self._host.do(partial(self._host.session.set_display, "grips", value))
 
     def _toggle_failure(self, button: str) -> None:
         names = self._host.session.state.layout.names
@@ -71,6 +89,7 @@ class WrenchPanel:
             low, high = min(slider.min, value), max(slider.max, value)
             put(slider, min=low, max=high)
             put(slider, value=value)
+        put(self._policy, value=state.policy)
         put(self._grips, value=host.session.display.grips)
         put(
             self._failures,
@@ -86,6 +105,9 @@ class WrenchPanel:
         self._picker.refresh()
         answer = host.shown
         sentence = "" if answer is None else rest_sentence(answer)
+        if answer is not None and not answer.reachable:
+            told = escape("; ".join((*answer.binding, *answer.notes)))
+            sentence = f"{sentence} {100 * answer.scale:.0f} % of what is asked, {told}."
         blind = authority_sentence(state.layout, state.failed, self._reach)
         if blind is not None:
             sentence = f"<span class='missing'>{blind}</span> {sentence}"

@@ -100,9 +100,9 @@ class RobotScene:
         state, display = self._session.state, self._session.display
         hull = hull_of(state.layout)
         if self._dragged is None:  # a hull that breathes with the fin one drags is hard to aim at
-            self._stage.refresh(
-                hull, display.dark, display.shadows, display.graph or display.drawn != "none", display.center
-            )
+            # Glass within glass is not drawn; inside an attainable set the hull is a net.
+            net, glass = display.drawn != "none", display.graph or display.center
+            self._stage.refresh(hull, display.dark, display.shadows, glass or net, display.center, net)
         while len(self._fins) < state.layout.n_fins:
             self._fins.append(FinNode(self._client.scene, len(self._fins), self._clicked, self._drag))
         for node in self._fins[state.layout.n_fins :]:

@@ -44,10 +44,12 @@ class Stage:
             shadow_opacity=0.22,
         )
 
-    def refresh(self, hull: AnyHull, dark: bool, shadows: bool, glass: bool, center: bool) -> None:
-        """Show another hull, theme or quality; a hull of glass lets one look at the lines inside."""
+    def refresh(self, hull: AnyHull, dark: bool, shadows: bool, glass: bool, center: bool, net: bool) -> None:
+        """Show another hull, theme or quality; a hull of glass, or a mere net, lets one look inside."""
         put(self._body, opacity=0.35 if glass else None)
         put(self._bow, opacity=0.35 if glass else None)
+        put(self._body, wireframe=net)
+        put(self._bow, visible=not net)
         put(self._center, visible=center)
         if hull != self._hull:
             self._hull = hull
