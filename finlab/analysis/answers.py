@@ -26,6 +26,8 @@ def strong(sets: FinSets, pull: Array, softness: Array) -> tuple[Array, Array, A
 
     h exceeds the true support function by at most T times the softness, twice for a hull.
     """
+    if (sets.half >= np.pi).all():
+        return _strong_circles(sets.radius, pull, softness)
     x, side, sign, turn = _view(sets, pull)
     wide = (sets.half > np.pi / 2) & (sets.half < np.pi)
     # The hull of a wide sector has a corner opposite its middle, between the stops; it is rounded.
@@ -44,6 +46,20 @@ def strong(sets: FinSets, pull: Array, softness: Array) -> tuple[Array, Array, A
         sets.radius * size,
         *_back(turn, sign, gx, gy * lean, hxx, hxy * lean, hyy * lean**2 + gy * round_),
     )
+
+
+def _strong_circles(radius: Array, pull: Array, softness: Array) -> tuple[Array, Array, Array]:
+    """`strong` for fins without stops, several times quicker: no stop has to be looked at from its side."""
+    x, y = pull[..., 0], pull[..., 1]
+    square = x * x + y * y + softness**2
+    size = np.sqrt(square)
+    push = radius / size
+    slope = np.empty((*pull.shape, 2))
+    bend = push / square
+    slope[..., 0, 0] = push - bend * x * x
+    slope[..., 1, 1] = push - bend * y * y
+    slope[..., 0, 1] = slope[..., 1, 0] = -bend * x * y
+    return radius * size, push[..., None] * pull, slope
 
 
 def cheap(sets: FinSets, pull: Array, softness: Array) -> tuple[Array, Array, Array]:

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.analysis.fin_sets import SCALE, FinSets, fin_sets, pieces
+from finlab.analysis.fin_sets import SCALE, FinSets, fin_sets, joined, pieces, wide_fins
 from finlab.analysis.hull import Hull, hull_of
 from finlab.analysis.reach import largest
 from finlab.layout import Layout
@@ -79,7 +79,6 @@ def attainable_set(
     """
     layout.indices(tuple(failed))
     sets = fin_sets([layout], failed)
-    wide = bool(((sets.half < np.pi) & (sets.half > np.pi / 2) & (sets.radius > 0.0)).any())
     support = _without_specks(
         _alone_support(sets, kind) if alone else _free_support(sets, kind), SPECK * float(sets.radius.sum())
     )
@@ -108,7 +107,7 @@ def attainable_set(
         outline=found.outline,
         dimension=found.dimension,
         gap=max(float(beyond.max()), 0.0),
-        hull=wide,
+        hull=len(wide_fins(sets)) > 0,
         sampled=any(fin.model.type == "table" for fin in layout.fins),
     )
 
@@ -152,8 +151,7 @@ def _free_support(sets: FinSets, kind: Kind) -> Support:
 def _alone_support(sets: FinSets, kind: Kind) -> Support:
     """Farthest points with all else zero: by the dual, in each convex piece."""
     own, other = (slice(0, 3), slice(3, 6)) if kind == "force" else (slice(3, 6), slice(0, 3))
-    found = pieces(sets)
-    parts = sets if found is None else found
+    parts = joined(pieces(sets))
     n_parts = len(parts.radius)
 
     def support(directions: Array) -> tuple[Array, Array]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.analysis.extent import RANK_TOLERANCE, singular_values, strongest, weakest
+from finlab.analysis.extent import RANK_TOLERANCE, Extent, singular_values, strongest, weakest
 from finlab.analysis.fin_sets import SCALE, fin_sets
 from finlab.analysis.reach import along_exactly
 from finlab.analysis.thrust_law import thrust_laws
@@ -85,47 +85,78 @@ def authority(layout: Layout, failed: Collection[str] = ()) -> Authority:
     Raises:
         LayoutError: there is no fin of a name in `failed`.
     """
-    layout.indices(tuple(failed))
-    sets = fin_sets([layout], failed)
+    return _authorities(layout, [failed])[0]
+
+
+def losses(layout: Layout, failed: Collection[str] = (), before: Authority | None = None) -> tuple[Loss, ...]:
+    """Returns what the loss of each working fin, on top of `failed`, would cost; none when only one is left.
+
+    Args:
+        layout: the robot.
+        failed: fins that are lost already.
+        before: what the working fins hold, if that is known.
+
+    Raises:
+        LayoutError: there is no fin of a name in `failed`.
+    """
+    held = authority(layout, failed) if before is None else before
+    working = [name for name in layout.names if name not in failed]
+    if len(working) < 2:
+        return ()
+    left = _authorities(layout, [(*failed, name) for name in working])
+    return tuple(_loss(held, name, after) for name, after in zip(working, left, strict=True))
+
+
+def _authorities(layout: Layout, failures: Sequence[Collection[str]]) -> list[Authority]:
+    """What is held after each of several failures; one call for all is quicker than many."""
+    sets = fin_sets([layout]).take(np.zeros(len(failures), dtype=np.intp))
+    for row, failed in enumerate(failures):
+        sets.radius[row, list(layout.indices(tuple(failed)))] = 0.0
     values, vectors = singular_values(sets)
-    kept = values[0] > RANK_TOLERANCE * max(values[0, 0], 1e-9)
-    # Onto the span of what the fins can give: an axis that the span holds whole can be pushed alone.
-    span = vectors[0][:, kept]
-    held = np.linalg.norm(span, axis=1)
-    pushed, alone = held > RANK_TOLERANCE, held > 1.0 - RANK_TOLERANCE
     axes = np.concatenate([np.eye(6), -np.eye(6)])
     size, gap = along_exactly(sets, axes)
-    free = sets.take(np.zeros(12, dtype=np.intp)).farthest(axes)[0].reshape(2, 6).max(axis=0)
+    rows = sets.take(np.repeat(np.arange(len(failures)), 12))
+    free = rows.farthest(np.tile(axes, (len(failures), 1)))[0].reshape(-1, 2, 6).max(axis=1)
     size, free = (np.where(value > NOTHING, value, 0.0) for value in (size, free))
     least, most = weakest(sets), strongest(sets)
-    full = bool(kept.all())
+    return [
+        _authority(values[k], vectors[k], size[k], free[k], (least, most), k, gap)
+        for k in range(len(failures))
+    ]
+
+
+def _authority(
+    values: Array,
+    vectors: Array,
+    size: Array,
+    free: Array,
+    extremes: tuple[Extent, Extent],
+    k: int,
+    gap: float,
+) -> Authority:
+    kept = values > RANK_TOLERANCE * max(values[0], 1e-9)
+    # How much of each axis lies in the span of all wrenches: one that is held whole can be pushed alone.
+    held = np.linalg.norm(vectors[:, kept], axis=1)
+    pushed, alone = held > RANK_TOLERANCE, held > 1.0 - RANK_TOLERANCE
+    least, most = extremes
+    near, far = float(least.size[k]), float(most.size[k])
     return Authority(
         rank=int(kept.sum()),
-        singular_values=_floats(values[0]),
-        condition=float(values[0, 0] / values[0, 5]) if full else None,
+        singular_values=_floats(values),
+        condition=float(values[0] / values[5]) if kept.all() else None,
         without_authority=tuple(name for name, p in zip(AXES, pushed, strict=True) if not p),
         coupled=tuple(name for name, p, a in zip(AXES, pushed, alone, strict=True) if p and not a),
         largest=_floats(size[:6] * SCALE),
         most_negative=_floats(size[6:] * SCALE),
         beside_others=_floats(free * SCALE),
-        weakest=float(least.size[0]),
-        weakest_direction=_floats(least.direction[0]),
-        isotropy=float(least.size[0] / most.size[0]) if most.size[0] > 0.0 else 0.0,
+        weakest=near,
+        weakest_direction=_floats(least.direction[k]),
+        isotropy=near / far if far > 0.0 else 0.0,
         gap=gap,
     )
 
 
-def losses(layout: Layout, failed: Collection[str] = ()) -> tuple[Loss, ...]:
-    """Returns what the loss of each working fin, on top of `failed`, would cost; none when but one is
-    left."""
-    working = [name for name in layout.names if name not in failed]
-    if len(working) < 2:
-        return ()
-    before = authority(layout, failed)
-    return tuple(_loss(layout, before, name, authority(layout, (*failed, name))) for name in working)
-
-
-def _loss(layout: Layout, before: Authority, name: str, after: Authority) -> Loss:
+def _loss(before: Authority, name: str, after: Authority) -> Loss:
     had = np.array([before.largest, before.most_negative])
     left = np.array([after.largest, after.most_negative])
     share = np.where(had > 0.0, left / np.where(had > 0.0, had, 1.0), np.inf).min(axis=0)

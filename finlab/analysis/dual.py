@@ -56,11 +56,11 @@ class Dual(NamedTuple):
         normal = self.normal(x)
         each, force, follow = self.answer(self.sets, self.sets.pull(normal), self.softness)
         value = each.sum(-1) - (self.wanted * normal).sum(-1)
-        felt = self.sets.columns @ self.basis[:, None]  # (R, n, 2, k)
-        slope = np.einsum("rnck,rnc->rk", felt, force) - np.einsum("rik,ri->rk", self.basis, self.wanted)
-        rows, n, _, k = felt.shape
-        bend = felt.reshape(rows, 2 * n, k).swapaxes(1, 2) @ (follow @ felt).reshape(rows, 2 * n, k)
-        return Point(x, value, slope, bend)
+        rows, n, k = len(x), force.shape[1], self.basis.shape[-1]
+        felt = self.sets.columns.reshape(rows, 2 * n, 6) @ self.basis
+        missing = (self.sets.wrench(force) - self.wanted)[:, None]
+        bent = (follow @ felt.reshape(rows, n, 2, k)).reshape(rows, 2 * n, k)
+        return Point(x, value, (missing @ self.basis)[:, 0], felt.swapaxes(1, 2) @ bent)
 
 
 class Point(NamedTuple):

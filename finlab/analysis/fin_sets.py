@@ -51,11 +51,13 @@ class FinSets(NamedTuple):
     def pull(self, normal: Array) -> Array:
         """Returns what each fin feels (R, n, 2) of the direction `normal` (R, 6): the columns' dot
         products."""
-        return np.einsum("rnck,rk->rnc", self.columns, normal)
+        rows, n = self.radius.shape
+        return (self.columns.reshape(rows, 2 * n, 6) @ normal[..., None]).reshape(rows, n, 2)
 
     def wrench(self, force: Array) -> Array:
         """Returns the scaled wrenches (R, 6) of planar forces (R, n, 2) [N]."""
-        return np.einsum("rnck,rnc->rk", self.columns, force)
+        rows, n = self.radius.shape
+        return (force.reshape(rows, 1, 2 * n) @ self.columns.reshape(rows, 2 * n, 6))[:, 0]
 
     def farthest(self, normal: Array) -> tuple[Array, Array]:
         """Returns how far the sets reach along `normal` (R, 6), and the planar forces (R, n, 2) that do it.
@@ -91,20 +93,35 @@ def fin_sets(layouts: Sequence[Layout], failed: Collection[str] = ()) -> FinSets
     )
 
 
-def pieces(sets: FinSets) -> FinSets | None:
-    """Returns convex robots whose union is exactly what one robot (R = 1) can push.
+def pieces(sets: FinSets) -> list[FinSets]:
+    """Returns sets of the same robots, all convex, whose union is exactly what each robot can push.
 
     Each fin whose sector is wider than half a turn but no full circle is cut in two along its middle; each
-    combination of halves is one robot. None where that would be more than `MAX_PIECES`.
+    combination of halves is one of the sets. All robots have the same arcs. Where there would be more than
+    `MAX_PIECES`, the sets are returned as they are, with the convex hulls of what is not convex.
     """
-    wide = np.flatnonzero((sets.half[0] > np.pi / 2) & (sets.half[0] < np.pi) & (sets.radius[0] > 0.0))
+    wide = wide_fins(sets)
     if 2 ** len(wide) > MAX_PIECES:
-        return None
-    signs = np.array(list(product((-0.5, 0.5), repeat=len(wide)))).reshape(2 ** len(wide), len(wide))
-    parts = sets.take(np.zeros(len(signs), dtype=np.intp))
-    parts.middle[:, wide] += signs * sets.half[:, wide]
-    parts.half[:, wide] *= 0.5
-    return parts
+        return [sets]
+    cut = []
+    for signs in product((-0.5, 0.5), repeat=len(wide)):
+        part = sets._replace(middle=sets.middle.copy(), half=sets.half.copy())
+        part.middle[:, wide] += np.array(signs) * sets.half[:, wide]
+        part.half[:, wide] *= 0.5
+        cut.append(part)
+    return cut
+
+
+def wide_fins(sets: FinSets) -> NDArray[np.intp]:
+    """Returns the places of working fins whose sets are not convex: wider than half a turn, no full
+    circle."""
+    alive = (sets.radius > 0.0).any(axis=0)
+    return np.flatnonzero((sets.half[0] > np.pi / 2) & (sets.half[0] < np.pi) & alive)
+
+
+def joined(parts: Sequence[FinSets]) -> FinSets:
+    """Returns the robots of several sets as one, in order."""
+    return FinSets(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
 
 
 def _wrapped(angle: Array) -> Array:

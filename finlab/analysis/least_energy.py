@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from finlab.allocation.energy import DEFAULT_WEIGHTS, energy_scale
 from finlab.analysis.answers import cheap
 from finlab.analysis.dual import Dual, minimize_dual
-from finlab.analysis.fin_sets import SCALE, FinSets, fin_sets, pieces
+from finlab.analysis.fin_sets import SCALE, FinSets, fin_sets, joined, pieces
 from finlab.analysis.reach import along
 from finlab.analysis.thrust_law import thrust_laws
 from finlab.layout import Layout, stack_layouts
@@ -32,6 +32,8 @@ N_RANDOM = 8
 """Random starts."""
 N_TOUCHES = 12
 """Times that the cost is touched anew."""
+MAX_ROWS = 2048
+"""Most searches that are run side by side; more would not fit the caches."""
 OFF = 1e-6
 """Scaled wrench [N] by which an answer may miss."""
 
@@ -47,19 +49,19 @@ def least_energy(
     layout.indices(tuple(failed))
     wanted = np.asarray(wrenches, dtype=np.float64).reshape(-1, 6) / SCALE
     sets = fin_sets([layout], failed)
-    found = pieces(sets)
-    parts = sets if found is None else found
-    n_parts, n_wrenches = len(parts.radius), len(wanted)
-    part = np.repeat(np.arange(n_parts), n_wrenches)
-    target = np.tile(wanted, (n_parts, 1))
+    parts = pieces(sets)
+    robots = joined(parts).take(np.repeat(np.arange(len(parts)), len(wanted)))
+    target = np.tile(wanted, (len(parts), 1))
     seeds = starts(sets.radius[0], n_random)
-    energy = np.full(len(part), np.nan)
-    for row in np.flatnonzero(within_reach(parts.take(part), target)):
-        rows = parts.take(np.full(len(seeds), part[row]))
-        force, good = descend(rows, np.tile(target[row], (len(seeds), 1)), seeds)
-        cost = np.where(good, planar_energy(layout, failed, force), np.inf).min()
-        energy[row] = cost if np.isfinite(cost) else np.nan
-    return np.asarray(np.fmin.reduce(energy.reshape(n_parts, n_wrenches), axis=0))
+    energy = np.full(len(target), np.nan)
+    able = np.flatnonzero(within_reach(robots, target))
+    for some in np.array_split(able, -(-len(able) * len(seeds) // MAX_ROWS)) if len(able) else ():
+        each = np.repeat(some, len(seeds))
+        force, good = descend(robots.take(each), target[each], np.tile(seeds, (len(some), 1)))
+        cost = np.where(good, planar_energy(layout, failed, force), np.inf)
+        best = cost.reshape(len(some), len(seeds)).min(axis=1)
+        energy[some] = np.where(np.isfinite(best), best, np.nan)
+    return np.asarray(np.fmin.reduce(energy.reshape(len(parts), len(wanted)), axis=0))
 
 
 def within_reach(sets: FinSets, target: Array) -> NDArray[np.bool_]:

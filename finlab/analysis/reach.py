@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from finlab.analysis.answers import strong
 from finlab.analysis.dual import Dual, minimize_dual
-from finlab.analysis.fin_sets import FinSets, pieces
+from finlab.analysis.fin_sets import FinSets, joined, pieces
 
 Array = NDArray[np.float64]
 
@@ -64,19 +64,17 @@ def along(sets: FinSets, direction: Array, softness: tuple[float, ...] = FINE) -
     return largest(sets, direction, across(direction), softness)
 
 
-def along_exactly(sets: FinSets, direction: Array) -> tuple[Array, float]:
-    """Returns the largest wrench (R,) of one robot along each unit `direction` (R, 6), and the largest gap.
+def along_exactly(sets: FinSets, directions: Array) -> tuple[Array, float]:
+    """Returns the largest wrenches (P, D) of robots (P) along unit `directions` (D, 6), and the largest gap.
 
     Sectors wider than half a turn are taken in pieces, so that the result is theirs and not their hull's;
     with too many of them the hull's, larger, result is returned.
     """
+    robots, n = len(sets.radius), len(directions)
     parts = pieces(sets)
-    if parts is None:
-        parts = sets
-    robot = np.repeat(np.arange(len(parts.radius)), len(direction))
-    found = along(parts.take(robot), np.tile(direction, (len(parts.radius), 1)))
-    size = found.size.reshape(-1, len(direction))
-    return size.max(axis=0), float(found.gap.max())
+    rows = np.repeat(np.arange(len(parts) * robots), n)
+    found = along(joined(parts).take(rows), np.tile(directions, (len(parts) * robots, 1)))
+    return found.size.reshape(len(parts), robots, n).max(axis=0), float(found.gap.max())
 
 
 def across(direction: Array) -> Array:

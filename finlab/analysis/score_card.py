@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from finlab.analysis.authority import AXES, Authority, Loss, authority, losses, model_error
-from finlab.analysis.fin_sets import fin_sets, pieces
+from finlab.analysis.fin_sets import MAX_PIECES, fin_sets, wide_fins
 from finlab.analysis.least_energy import least_energy
 from finlab.layout import Layout
 
@@ -65,6 +65,7 @@ def score_card(layout: Layout, failed: Collection[str] = ()) -> ScoreCard:
     Raises:
         LayoutError: there is no fin of a name in `failed`.
     """
+    held = authority(layout, failed)
     wrenches = np.diag(UNIT)
     energy = [
         None if np.isnan(value) else float(value)
@@ -74,8 +75,8 @@ def score_card(layout: Layout, failed: Collection[str] = ()) -> ScoreCard:
         layout=layout.name,
         failed=tuple(name for name in layout.names if name in failed),
         n_fins=layout.n_fins - len(set(failed)),
-        authority=authority(layout, failed),
-        losses=losses(layout, failed),
+        authority=held,
+        losses=losses(layout, failed, held),
         unit_wrench=UNIT,
         unit_energy=tuple(energy[:6]),
         unit_energy_negative=tuple(energy[6:]),
@@ -94,9 +95,10 @@ def _notes(layout: Layout, failed: Collection[str]) -> tuple[str, ...]:
     """What is not exact."""
     sets = fin_sets([layout], failed)
     notes = []
-    if ((sets.half < np.pi) & (sets.half > np.pi / 2) & (sets.radius > 0.0)).any():
+    n_wide = len(wide_fins(sets))
+    if n_wide:
         what = "Weakest direction and isotropy are"
-        if pieces(sets) is None:
+        if 2**n_wide > MAX_PIECES:
             what = "Largest wrenches, weakest direction, isotropy and energies are"
         notes.append(
             f"{what} those of the convex hull: some arcs are wider than half a turn but not full circles."

@@ -1,0 +1,87 @@
+"""Who may move where, and who follows."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from finlab.analysis import Bounds, mirror_pairs
+from finlab.analysis.fin_sets import fin_sets
+from finlab.analysis.moves import Moves, is_mirrored
+from finlab.errors import LayoutError
+from finlab.layout import Layout
+
+Layouts = Callable[[str], Layout]
+
+
+def test_layout_a_is_two_pairs(shipped: Layouts) -> None:
+    assert mirror_pairs(shipped("A")) == (("front_right", "front_left"), ("back_left", "back_right"))
+
+
+def test_a_twin_follows_and_the_rest_stays(shipped: Layouts) -> None:
+    layout = shipped("A")
+    bounds = {"front_left": Bounds((0.2, 0.3), (0.1, 0.2), (0.0, 0.0), (0.5, 2.0))}
+    moves = Moves(layout, ["front_left", "front_right"], bounds, mirror_pairs(layout))
+    assert moves.leaders == ("front_left",)
+    assert moves.names == ("front_right", "front_left")
+    assert moves.lower == pytest.approx([0.2, 0.1, 0.5])  # z is held
+    moved = moves.moved(np.array([0.25, 0.12, 0.7]))
+    right, left, *rest = moved.fins
+    assert left.position == pytest.approx((0.25, 0.12, 0.0))
+    assert right.position == pytest.approx((0.25, -0.12, 0.0))
+    assert (left.mounting_angle, right.mounting_angle) == pytest.approx((0.7, -0.7))
+    assert is_mirrored(left, right)
+    assert tuple(rest) == layout.fins[2:]
+
+
+def test_sets_are_those_of_the_moved_layout(shipped: Layouts) -> None:
+    layout = shipped("mixed")
+    bounds = {fin.name: Bounds.around(fin) for fin in layout.fins}
+    moves = Moves(layout, layout.names, bounds, mirror_pairs(layout))
+    vectors = np.random.default_rng(0).uniform(moves.lower, moves.upper, (5, len(moves.lower)))
+    for row, vector in enumerate(vectors):
+        expected = fin_sets([moves.moved(vector)])
+        for field, other in zip(moves.sets(vectors), expected, strict=True):
+            assert field[row] == pytest.approx(other[0])
+    still = moves.sets(moves.start[None])
+    assert still.columns == pytest.approx(fin_sets([layout]).columns)
+
+
+def test_angles_come_back_within_half_a_turn(shipped: Layouts) -> None:
+    layout = shipped("A")
+    bounds = {"back_left": Bounds((-0.3, -0.2), (0.1, 0.2), (0.0, 0.0), (2.0, 4.0))}
+    moved = Moves(layout, ["back_left"], bounds).moved(np.array([-0.25, 0.15, 3.5]))
+    assert moved.fins[2].mounting_angle == pytest.approx(3.5 - 2 * math.pi)
+
+
+@pytest.mark.parametrize(
+    ("fins", "pairs", "message"),
+    [
+        ([], (), "expected at least one fin to move"),
+        (["nobody"], (), "has no fin 'nobody'"),
+        (["back_left"], (), "has no bounds"),
+        (["front_left"], (("front_left", "back_left"),), "not each other's mirror image"),
+        (["front_left"], (("front_left", "front_left"),), "not each other's mirror image"),
+        (["front_left"], (("front_left", "front_right"), ("front_right", "front_left")), "one mirror pair"),
+    ],
+)
+def test_wrong_questions(
+    shipped: Layouts, fins: list[str], pairs: tuple[tuple[str, str], ...], message: str
+) -> None:
+    layout = shipped("A")
+    bounds = {"front_left": Bounds.around(layout.fins[1])}
+    with pytest.raises(LayoutError, match=message):
+        Moves(layout, fins, bounds, pairs)
+
+
+def test_bounds_that_leave_nothing_free(shipped: Layouts) -> None:
+    layout = shipped("A")
+    with pytest.raises(LayoutError, match="nothing free to move"):
+        Moves(layout, ["front_left"], {"front_left": Bounds.around(layout.fins[1], 0.0, 0.0)})
+
+
+@pytest.mark.parametrize("wrong", [(1.0, 0.0), (0.0, math.inf), (math.nan, 1.0)])
+def test_bounds_are_checked(wrong: tuple[float, float]) -> None:
+    with pytest.raises(LayoutError, match="bounds of y"):
+        Bounds((0.0, 1.0), wrong, (0.0, 0.0), (0.0, 0.0))

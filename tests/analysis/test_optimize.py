@@ -1,0 +1,101 @@
+"""Searches improve their goals, stay within bounds, keep mirror links, and stop when told."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from finlab.analysis import GOALS, Bounds, Progress, authority, mirror_pairs, optimize_layout
+from finlab.analysis.fin_sets import fin_sets
+from finlab.analysis.goals import UNREACHED, make_goal
+from finlab.errors import LayoutError
+from finlab.layout import Layout
+
+Layouts = Callable[[str], Layout]
+
+
+@pytest.mark.parametrize("goal", GOALS)
+def test_it_improves_within_bounds_and_keeps_the_mirror(shipped: Layouts, goal: str) -> None:
+    layout = shipped("A")
+    bounds = {"back_left": Bounds.around(layout.fins[2], (0.04, 0.04, 0.0), 0.6)}
+    found = optimize_layout(layout, ["back_left"], bounds, goal, rounds=2, seed=1)
+    assert found.improved
+    assert found.value_after > found.value_before
+    assert found.moved == ("back_left", "back_right")
+    assert mirror_pairs(found.layout) == mirror_pairs(layout)
+    assert found.layout.fins[:2] == layout.fins[:2]
+    moved = found.layout.fins[2]
+    assert np.abs(np.subtract(moved.position, layout.fins[2].position)).max() <= 0.04 + 1e-12
+    assert moved.position[2] == layout.fins[2].position[2]
+    assert abs(moved.mounting_angle - layout.fins[2].mounting_angle) <= 0.6 + 1e-12
+    if goal == "weakest_direction":
+        assert found.card_after.authority.weakest == pytest.approx(found.value_after, abs=1e-3)
+        assert found.card_after.authority.weakest > found.card_before.authority.weakest
+
+
+def test_no_yaw_learns_to_yaw(shipped: Layouts) -> None:
+    layout = shipped("no_yaw")
+    found = optimize_layout(layout, ["front"], rounds=2)
+    assert found.value_before == 0.0
+    assert authority(found.layout).rank == 6
+
+
+def test_same_seed_same_layout(shipped: Layouts) -> None:
+    layout = shipped("A")
+    seen: list[Progress] = []
+    runs = [
+        optimize_layout(layout, ["front_right"], rounds=1, seed=3, progress=seen.append) for _ in range(2)
+    ]
+    assert runs[0].layout == runs[1].layout
+    assert [step.round for step in seen] == [1, 1]
+    assert seen[0].before <= seen[0].best == seen[1].best
+
+
+def test_it_stops_when_told(shipped: Layouts) -> None:
+    seen: list[Progress] = []
+    found = optimize_layout(
+        shipped("A"), ["front_right"], rounds=50, progress=seen.append, cancelled=lambda: len(seen) >= 1
+    )
+    assert found.cancelled
+    assert len(seen) == 1
+
+
+def test_nothing_better_leaves_the_layout_as_it_was(shipped: Layouts) -> None:
+    layout = shipped("B")
+    tiny = {layout.names[0]: Bounds.around(layout.fins[0], (1e-9, 0.0, 0.0), 0.0)}
+    found = optimize_layout(layout, layout.names[:1], tiny, rounds=1, mirror=())
+    assert found.value_after >= found.value_before
+    assert found.improved or found.layout is layout
+
+
+def test_fins_keep_their_distance(shipped: Layouts) -> None:
+    layout = shipped("A")
+    box = Bounds((-0.26, 0.26), (0.14, 0.16), (0.0, 0.0), (1.0, 1.1))
+    found = optimize_layout(
+        layout, ["front_left"], {"front_left": box}, "mission_energy", (), rounds=1, clearance=0.2
+    )
+    places = np.array([fin.position for fin in found.layout.fins])
+    assert np.linalg.norm(places[1] - np.delete(places, 1, axis=0), axis=1).min() >= 0.2 - 1e-9
+
+
+def test_an_unreachable_mission_costs_by_what_is_missing(shipped: Layouts) -> None:
+    layout = shipped("no_yaw")
+    goal = make_goal("mission_energy", layout, [[0, 0, 0, 0, 0, 1.0]])
+    assert goal(fin_sets([layout]))[0] == pytest.approx(-2 * UNREACHED)
+    half = make_goal("mission_energy", layout, [[26.6432, 0, 0, 0, 0, 0]])
+    assert half(fin_sets([layout]))[0] == pytest.approx(-1.5 * UNREACHED, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "goal", "mission", "message"),
+    [
+        ("A", "beauty", [[1, 0, 0, 0, 0, 0]], "goal: expected one of weakest_direction"),
+        ("D", "worst_single_failure", [[1, 0, 0, 0, 0, 0]], "needs 4 fins or more"),
+        ("A", "mission_energy", [[1, 2, 3]], "mission: expected wrenches"),
+        ("A", "mission_energy", [[1, 0, 0, 0, 0, float("nan")]], "mission: expected wrenches"),
+    ],
+)
+def test_wrong_goals(shipped: Layouts, name: str, goal: str, mission: object, message: str) -> None:
+    layout = shipped(name)
+    with pytest.raises(LayoutError, match=message):
+        optimize_layout(layout, layout.names[:1], goal=goal, mission=mission)

@@ -1,0 +1,58 @@
+"""The score card: complete, consistent, fit for JSON, and free of torch."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+
+import pytest
+
+from finlab.analysis import authority, score_card
+from finlab.errors import LayoutError
+from finlab.layout import Layout
+
+Layouts = Callable[[str], Layout]
+
+
+def test_a_card_is_json(shipped: Layouts) -> None:
+    card = score_card(shipped("D"))
+    record = json.loads(json.dumps(card.to_dict(), allow_nan=False))
+    assert record["layout"] == "D"
+    assert record["authority"]["condition"] is None
+    assert record["unit_energy"][1] is None  # no sway
+    assert record["unit_energy"][0] > 0.0
+    assert [loss["fin"] for loss in record["losses"]] == list(shipped("D").names)
+    assert record["worst_loss"] in shipped("D").names
+    assert card.notes == ()
+
+
+def test_failed_fins_are_left_out(shipped: Layouts) -> None:
+    layout = shipped("A")
+    card = score_card(layout, ("back_left",))
+    assert card.failed == ("back_left",)
+    assert card.n_fins == 3
+    assert card.authority == authority(layout, ("back_left",))
+    assert "back_left" not in [loss.fin for loss in card.losses]
+    with pytest.raises(LayoutError, match="has no fin"):
+        score_card(layout, ("nobody",))
+
+
+def test_all_fins_failed(shipped: Layouts) -> None:
+    card = score_card(shipped("pair"), shipped("pair").names)
+    assert card.n_fins == card.authority.rank == 0
+    assert card.losses == ()
+    assert card.worst_loss is None
+    assert card.unit_energy == (None,) * 6
+
+
+def test_wide_arcs_are_noted(wide: Layout) -> None:
+    assert "wider than half a turn" in score_card(wide, wide.names[2:]).notes[0]
+
+
+def test_no_torch() -> None:
+    code = (
+        "import sys; from finlab.analysis import optimize_layout, score_card;"
+        "from finlab.assets import shipped_layouts; from finlab.layout import load_layout;"
+        "score_card(load_layout(shipped_layouts()['pair'])); assert 'torch' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=120)

@@ -1,0 +1,87 @@
+"""`finlab layout optimize` and the score card of `layout show`, through `main` in this process."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from finlab.cli import main
+from finlab.layout import load_layout
+
+
+def test_optimize_writes_a_better_layout(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / "better.yaml"
+    arguments = ["layout", "optimize", "A", "--fins", "front_right", "--rounds", "1", "-o", str(output)]
+    assert main(arguments) == 0
+    out, err = capsys.readouterr()
+    assert "weakest_direction: 11.54 -> " in out
+    assert out.endswith(f"{output}: written.\n")
+    assert err == ""  # no progress bar outside of a terminal
+    assert load_layout(output).names == load_layout("layouts/A.yaml").names
+    assert main(["layout", "check", str(output)]) == 0
+
+
+def test_optimize_as_json_within_a_box(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = tmp_path / "better.json"
+    box = ["--bounds", "0.2", "0.3", "-0.2", "-0.1", "0", "0"]
+    mission = ["--goal", "mission_energy", "--wrench", "1", "0", "0", "0", "0", "0"]
+    mission += ["--wrench", "0", "0", "1", "0", "0", "0"]
+    arguments = ["--fins", "front_right", "--rounds", "1", "--seed", "2", "--no-mirror", "--json"]
+    assert main(["layout", "optimize", "A", *arguments, *box, *mission, "-o", str(output)]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert record["goal"] == "mission_energy"
+    assert record["moved"] == ["front_right"]
+    assert record["value_after"] >= record["value_before"]
+    assert record["before"]["layout"] == "A"
+    x, y, z = load_layout(output).fins[0].position
+    assert 0.2 <= x <= 0.3
+    assert -0.2 <= y <= -0.1
+    assert z == 0.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--fins", "nobody"], "has no fin 'nobody'"),
+        (["--fins", "front_right", "--goal", "beauty"], "goal: expected one of"),
+        (["--fins", "front_right", "--reach", "-1"], "--reach: expected metres"),
+        (["--fins", "front_right", "--turn", "200"], "--turn: expected degrees"),
+        (["--fins", "front_right", "--rounds", "0"], "--rounds: expected 1 or more"),
+        (["--fins", "front_right", "--bounds", "1", "0", "0", "0", "0", "0"], "bounds of x"),
+    ],
+)
+def test_wrong_questions(
+    arguments: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / "never.yaml"
+    assert main(["layout", "optimize", "A", *arguments, "-o", str(output)]) == 2
+    assert message in capsys.readouterr().err
+    assert not output.exists()
+
+
+def test_a_folder_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["layout", "optimize", "A", "--fins", "front_right", "-o", "no/where.yaml"]) == 2
+    assert "a folder that exists" in capsys.readouterr().err
+
+
+def test_show_prints_the_score_card(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["layout", "show", "D", "--failed", "back"]) == 0
+    out = capsys.readouterr().out
+    assert "2 fins push in 4 of 6 independent directions." in out
+    assert "Failed: back." in out
+    assert "Out of reach: sway" in out
+    assert "Weakest direction: 0.00 N" in out
+    assert "Share of the largest wrench that is left without one fin" in out
+
+
+def test_show_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["layout", "show", "pair", "--json"]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert record["layout"] == "pair"
+    assert record["authority"]["rank"] == 4
+    assert record["axes"][0] == "surge"
+
+
+def test_show_of_an_unknown_failed_fin(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["layout", "show", "A", "--failed", "nobody"]) == 2
+    assert "has no fin 'nobody'" in capsys.readouterr().err
