@@ -1,9 +1,19 @@
-"""Two tabs are apart; a reload and a dropped connection find the work again."""
+"""Two tabs are apart; a reload, a dropped connection and a new server find the work again; the token."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
-from webapp.viser_internals import disconnect_all
+from finlab.assets import shipped_layouts
+from finlab.layout import load_layout
+from tests.browser.conftest import Served
+from tests.browser.page import Page
+from tests.webapp.stand_in import load_stand_in
+from webapp.app import App
+from webapp.guard import Guard
+from webapp.session import Display
+from webapp.solver import Solver
+from webapp.viser_internals import disconnect_all, start_guarded, stop_server
 
 
 def test_two_tabs_are_apart(page: Any, new_page: Callable[..., Any]) -> None:
@@ -29,3 +39,37 @@ def test_reload_and_reconnect_restore(page: Any, served: Any) -> None:
     page.until(lambda: any(view.session is page.session for view in served.app.views.values()))
     page.ready()
     assert page.page.get_by_role("button", name="Undo").count() == 1, "no widget twice"
+
+
+def test_token_opens_and_a_restart_loses_nothing(browser: Any, tmp_path: Path) -> None:
+    guard, layout = Guard("127.0.0.1", "a-secret-token"), load_layout(shipped_layouts()["ucat"])
+
+    def start(port: int) -> Served:
+        server = start_guarded(guard, port)
+        app = App(server, Solver(load=load_stand_in), layout, Display(shadows=False), folder=tmp_path)
+        address = f"http://127.0.0.1:{server.get_port()}"
+        return Served(f"{address}/?token={guard.token}", app, server)
+
+    first = start(0)
+    port = first.server.get_port()
+    context = browser.new_context(viewport={"width": 900, "height": 600})
+    stranger = context.new_page()
+    stranger.goto(f"http://127.0.0.1:{port}/")
+    assert "token" in stranger.inner_text("body") and stranger.locator("canvas").count() == 0
+    stranger.close()
+    page = Page(context.new_page(), first)
+    assert "token" not in page.page.url
+    page.type("Fy [N]", "0.5")
+    page.until(lambda: page.session.state.target[1] == 0.5)
+    first.app.stop()
+    stop_server(first.server)
+
+    second = start(port)
+    assert second.server.get_port() == port
+    page.until(lambda: len(second.app.views) == 1, seconds=60)
+    session = next(iter(second.app.views.values())).session
+    assert session is not page.session and session.state.target[1] == 0.5
+    page.until(lambda: page.row("Fy [N]").last.input_value() == "0.5")
+    context.close()
+    second.app.stop()
+    stop_server(second.server)
