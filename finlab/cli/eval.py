@@ -1,4 +1,4 @@
-"""`finlab eval wrench|ablation|latency`: measure methods against the analytic fin model."""
+"""`finlab eval wrench|seeds|ablation|latency`: measure methods against the analytic fin model."""
 
 from __future__ import annotations
 
@@ -59,6 +59,40 @@ def wrench(
     }
     _write(json, {"rows": wrench_rows(records, split)})
     print(wrench_report(records, split, single=single))
+
+
+@verbs.command
+def seeds(
+    split: Split = "id",
+    layouts: Count = 40,
+    targets: Count = 25,
+    candidates: Count = 16,
+    seed: Count = 0,
+    checkpoint: Checkpoint = None,
+    json: JsonFile = None,
+) -> None:
+    """What learning buys: the network's seeds against random ones, at equal numbers and refinement steps.
+
+    Args:
+        split: id, ood, ood-fins, limits, failure or near-singular.
+        layouts: layouts of the split.
+        targets: targets on each layout.
+        candidates: seeds per target, of every kind.
+        seed: draws layouts, targets and seeds.
+        checkpoint: trained checkpoint; the shipped one by default.
+        json: file for the rows.
+    """
+    from finlab.allocation.learned import LearnedAllocator
+    from finlab.evaluation.seeds import seed_report, seed_rows
+    from finlab.evaluation.splits import make_split
+
+    _check_positive("candidates", candidates)
+    _check_writable(json)
+    allocator = _load("learned", checkpoint)["learned"]
+    assert isinstance(allocator, LearnedAllocator)
+    rows = seed_rows(allocator, make_split(split, layouts, targets, seed), n_seeds=candidates, seed=seed)
+    _write(json, {"rows": rows})
+    print(seed_report(rows, candidates))
 
 
 @verbs.command
