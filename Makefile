@@ -8,7 +8,7 @@ HOST_PORT ?= 8080
 THREADS := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup app test test-fast check format bench wheel wheel-check clean
+.PHONY: help setup app test test-fast check format checkpoint bench wheel wheel-check clean
 
 help:
 	@echo "make setup        make .venv with everything pinned in constraints.txt"
@@ -17,6 +17,7 @@ help:
 	@echo "make test-fast    every test but those of the browser and the packaging"
 	@echo "make check        ruff, ruff format and mypy"
 	@echo "make format       let ruff mend what it can"
+	@echo "make checkpoint   train what is shipped, PRESET=default or PRESET=paper (hours)"
 	@echo "make bench        print data throughput, accuracy and latency"
 	@echo "make wheel-check  build the wheel, install it in an empty environment and try it there"
 
@@ -47,6 +48,16 @@ check: setup
 format: setup
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+# The shipped checkpoints, each by one command: make checkpoint PRESET=default, make checkpoint PRESET=paper.
+# A run that was stopped goes on where it was.
+PRESET ?= default
+TRAIN_default :=
+TRAIN_paper := --batch-size 512 --learning-rate 4e-4 --steps 12000
+
+checkpoint: setup
+	$(BIN)/finlab train surrogate --preset $(PRESET) -o runs/surrogate-$(PRESET)
+	$(BIN)/finlab train allocator --preset $(PRESET) --surrogate runs/surrogate-$(PRESET) -o runs/$(PRESET) $(TRAIN_$(PRESET))
 
 bench: setup
 	tools/bench
