@@ -9,6 +9,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import load_allocator
 from webapp.density import Densities, densities
+from webapp.refinement import refinement
 from webapp.state import State
 
 Load = Callable[..., Allocator]
@@ -46,6 +47,14 @@ class Solver:
         """What the network proposes for a state; None for methods without one."""
         allocator = self.allocator(state)
         return densities(allocator, state.layout, state.failed, np.array(state.target), state.temperature)
+
+    def refinement(self, state: State, answer: Allocation) -> tuple[Allocation, ...]:
+        """The steps of the refinement behind an answer to a state.
+
+        Raises:
+            FinlabError: the method refines nothing.
+        """
+        return refinement(self.allocator(state), answer)
 
     def solve(self, state: State) -> Allocation:
         """The answer to a state.

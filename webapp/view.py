@@ -33,6 +33,7 @@ from webapp.panels.modes import ModesPanel
 from webapp.panels.take_home import TakeHomePanel
 from webapp.panels.wrench import WrenchPanel
 from webapp.recording import recorded_html
+from webapp.refinement import STEPS
 from webapp.scene.robot_scene import RobotScene
 from webapp.session import Session
 from webapp.solver import Solver
@@ -41,6 +42,8 @@ from webapp.workers import Workers
 
 PICTURE_SIZE = (1080, 1620)
 """Height and width of an exported picture [px]."""
+FRAME_S = 0.9
+"""How long each step of a refinement is shown [s]."""
 PANEL_WIDTH = 410
 """Width of the panel beside the view [px]."""
 
@@ -75,6 +78,7 @@ class View:
         self._best: Allocation | None = None
         self._best_revision = -1
         self._modes: tuple[Mode, ...] = ()
+        self._frames: tuple[Allocation, ...] = ()
         self.densities: Densities | None = None
         self.analyst = Analyst(workers.cards, loop, self._post, self._refresh)
         self.improver = Improver(workers.searches, self._post, self._refresh)
@@ -133,7 +137,9 @@ class View:
 
     @property
     def shown(self) -> Allocation | None:
-        """The newest answer, with the chosen mode's command."""
+        """The newest answer with the chosen mode's command, or the step of the refinement that is played."""
+        if self._frames:
+            return self._frames[0]
         best, mode = self._best, self.session.mode
         if best is None or best.candidates is None or not 0 < mode < len(self._modes):
             return best
@@ -142,6 +148,40 @@ class View:
             other = replace(best, command=best.candidates.command[index], wrench_surrogate=None)
             self._shown = (best, index, other)
         return self._shown[2]
+
+    @property
+    def frame(self) -> int | None:
+        """Which step of the refinement is on the robot, None while none is played."""
+        return STEPS + 2 - len(self._frames) if self._frames else None
+
+    def play_refinement(self) -> None:
+        """Show how the refinement makes a raw candidate exact, step by step."""
+        best, state, revision = self._best, self.session.state, self.session.revision
+        if best is None or self.busy:
+            raise FinlabError("there is no answer yet; wait for one")
+
+        def job() -> None:
+            try:
+                frames = self._solver.refinement(state, best)
+            except FinlabError as error:
+                self._post(partial(self.notify, "Not possible", str(error)))
+            else:
+                for frame in frames:
+                    _ = frame.wrench
+                self._post(partial(self._play, revision, frames))
+
+        self._worker.submit((id(self), "refinement"), job)
+
+    def _play(self, revision: int, frames: tuple[Allocation, ...]) -> None:
+        """Show the first frame, and the rest of them after a while; a change of the state ends it."""
+        self._frames = frames if revision == self.session.revision else ()
+        self._refresh()
+        if self._frames:
+            self._loop.call_later(FRAME_S, self._next_frame, revision, frames)
+
+    def _next_frame(self, revision: int, frames: tuple[Allocation, ...]) -> None:
+        if not self._closed and self._frames is frames:
+            self._play(revision, frames[1:])
 
     @property
     def busy(self) -> bool:
@@ -297,6 +337,7 @@ class View:
     def _take(self, revision: int, allocation: Allocation, densities: Densities | None) -> None:
         if revision < self._best_revision:
             return
+        self._frames = ()
         self._best, self._best_revision = allocation, revision
         self.densities = densities
         self._modes = distinct_modes(allocation.candidates)

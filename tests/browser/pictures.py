@@ -21,7 +21,7 @@ def save(page: Page, path: Path) -> None:
     """A screenshot without the notes; one bit less per colour is not seen and makes it a third smaller."""
     page.close_notes()
     page.page.mouse.move(200, 60)  # off the buttons, so that no hint covers anything
-    page.page.wait_for_timeout(2500)
+    page.page.wait_for_timeout(4500)  # labels come last
     picture = Image.open(io.BytesIO(page.page.screenshot())).convert("RGB")
     ImageOps.posterize(picture, 7).save(path, optimize=True)
     print(path, path.stat().st_size // 1000, "kB", flush=True)

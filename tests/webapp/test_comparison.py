@@ -8,11 +8,13 @@ import pytest
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.methods import load_allocator
 from finlab.assets import shipped_checkpoints, shipped_layouts
+from finlab.errors import AllocationError
 from finlab.layout import load_layout
 from tests.webapp.stand_in import StandIn, load_stand_in
 from webapp.comparison import COMPARED, Comparison
 from webapp.density import densities
 from webapp.markup.comparison import comparison_table
+from webapp.refinement import STEPS
 from webapp.solver import Solver
 from webapp.state import State
 from webapp.targets import PRESETS
@@ -63,3 +65,15 @@ def test_densities_of_the_shipped_network() -> None:
     narrow = densities(allocator, UCAT, (), np.array(PRESETS["Turn"]), 0.0)
     assert wide is not None and narrow is not None and wide.curves.mean() > narrow.curves.mean()
     assert densities(StandIn(), UCAT, (), np.zeros(6), 0.02) is None
+
+
+@pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
+def test_refinement_makes_a_raw_candidate_exact() -> None:
+    solver, state = Solver(), State(UCAT, failed=("back_left",), target=PRESETS["Turn"])
+    answer = solver.solve(state)
+    frames = solver.refinement(state, answer)
+    errors = [frame.err_norm for frame in frames]
+    assert len(frames) == STEPS + 2 and frames[-1] is answer
+    assert errors[0] > 10 * errors[STEPS] and np.isnan(frames[0].command[2]).all()
+    with pytest.raises(AllocationError, match="learned"):
+        Solver(load=load_stand_in).refinement(state, answer)

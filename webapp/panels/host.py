@@ -57,6 +57,13 @@ class Host(Protocol):
     comparison: Comparison
     """Other methods on the same question."""
 
+    @property
+    def frame(self) -> int | None:
+        """Which step of the refinement is on the robot, None while none is played."""
+
+    def play_refinement(self) -> None:
+        """Show the refinement step by step."""
+
     def compare(self) -> None:
         """Ask the other methods."""
 

@@ -5,11 +5,13 @@ from functools import partial
 import viser
 
 from finlab.allocation.methods import METHODS
-from webapp.handles import on_user_change, put
+from webapp.figures import small
+from webapp.handles import on_user_change, on_user_click, put
 from webapp.markup.modes import mode_table
 from webapp.panels.density import DensityPanel
 from webapp.panels.host import Host
 from webapp.panels.mode_picker import ModePicker
+from webapp.refinement import STEPS
 from webapp.state import CANDIDATE_RANGE, GAMMA_RANGE, TEMPERATURE_RANGE
 
 
@@ -40,6 +42,13 @@ class ModesPanel:
             on_user_change(widget, partial(self._set, key))
         self._picker = ModePicker(gui, host, 250, "fl-modes")
         self._table = gui.add_html("")
+        self._play = gui.add_button(
+            "Play the refinement",
+            icon=viser.Icon.PLAYER_PLAY,
+            hint="From the best raw candidate, step by step.",
+        )
+        on_user_click(self._play, lambda: host.do(host.play_refinement))
+        self._step = gui.add_html("")
         self._density = DensityPanel(gui)
 
     def _set(self, key: str, value: object) -> None:
@@ -55,4 +64,14 @@ class ModesPanel:
         self._picker.refresh()
         candidates = None if host.best is None else host.best.candidates
         put(self._table, content=mode_table(candidates, host.modes, self._picker.shown, self._picker.name))
+        put(self._step, content=_step_words(host))
         self._density.refresh(host.densities)
+
+
+def _step_words(host: Host) -> str:
+    """Where the refinement stands while it is played."""
+    if host.frame is None or host.shown is None:
+        return ""
+    words = {0: "Best raw candidate", STEPS + 1: "Answer, the cheapest of all exact ones"}
+    text = words.get(host.frame, f"Step {host.frame} of {STEPS}")
+    return f"<div class='fl step'><b>{text}</b>: error {small(host.shown.err_norm)} σ</div>"

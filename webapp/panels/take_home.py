@@ -80,13 +80,14 @@ class TakeHomePanel:
 
 def _python(state: State, name: str) -> str:
     """The same question as lines of Python."""
-    path = str(shipped_layouts()[name]) if name in shipped_layouts() else name
+    shipped = name in shipped_layouts()
+    path = f"finlab.assets.shipped_layouts()[{name!r}]" if shipped else repr(name)
     method = "" if state.method == "learned" else f"method={state.method!r}"
     target = ", ".join(f"{value:g}" for value in state.target)
     failed = f", failed={list(state.failed)!r}" if state.failed else ""
     policy = "" if state.policy == "closest" else f", policy={state.policy!r}"
     return (
-        f"import finlab\nlayout = finlab.load_layout({path!r})\n"
+        f"import finlab{'.assets' if shipped else ''}\nlayout = finlab.load_layout({path})\n"
         f"result = finlab.load_allocator({method}).allocate(layout, [{target}]{failed}{policy})\n"
         "print(result.command, result.wrench)"
     )
