@@ -21,7 +21,7 @@ def save(page: Page, path: Path) -> None:
     """A screenshot without the notes; one bit less per colour is not seen and makes it a third smaller."""
     page.close_notes()
     page.page.mouse.move(200, 60)  # off the buttons, so that no hint covers anything
-    page.page.wait_for_timeout(4500)  # labels come last
+    page.page.wait_for_timeout(2500)
     picture = Image.open(io.BytesIO(page.page.screenshot())).convert("RGB")
     ImageOps.posterize(picture, 7).save(path, optimize=True)
     print(path, path.stat().st_size // 1000, "kB", flush=True)
@@ -76,7 +76,7 @@ def _tour(page: Page) -> None:
 
 
 SCENES: dict[str, Callable[[Page], object]] = {
-    "app": lambda page: None,
+    "app": lambda page: page.page.wait_for_timeout(10_000),  # the first labels take their time
     "app-layout": _layout,
     "app-modes": _modes,
     "app-limits": _limits,
@@ -113,6 +113,8 @@ def main(folder: Path, wanted: list[str]) -> None:
             prepare(page)
             if not wanted or name in wanted:
                 save(page, folder / f"{name}.png")
+            if name == next(reversed(wanted), None):
+                break
         browser.close()
     app.stop()
     stop_server(server)
