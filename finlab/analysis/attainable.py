@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.analysis.fin_sets import SCALE, FinSets, fin_sets, joined, pieces, wide_fins
-from finlab.analysis.hull import Hull, hull_of
+from finlab.analysis.hull import hull_of
 from finlab.analysis.reach import largest
 from finlab.layout import Layout
 
@@ -19,6 +19,8 @@ Kind = Literal["force", "torque"]
 
 N_DIRECTIONS = 120
 """Directions that are looked at first; faces that are too far off add theirs."""
+MAX_DRAWN_PIECES = 4
+"""Most combinations of convex pieces that a picture is made of; with more, arcs count with their hulls."""
 MAX_ROUNDS = 4
 """Most times that directions are added."""
 SPECK = 1e-5
@@ -29,7 +31,8 @@ TOLERANCE = 0.01
 
 @dataclass(frozen=True)
 class AttainableSet:
-    """A convex polytope of attainable forces or torques. Every vertex is attained."""
+    """A convex polytope of attainable forces or torques. Every vertex is attained, by the fins or, where
+    `hull` says so, by the convex hulls of what they can push."""
 
     kind: Kind
     """What it is a set of: `force` or `torque`."""
@@ -97,7 +100,8 @@ def attainable_set(
         far = beyond > tolerance * size
         if round_ == MAX_ROUNDS or not far.any():
             break
-        found, points = _grown(found, points, new[far])
+        points = np.concatenate([found.vertices, new[far]])
+        found = hull_of(points)
     return AttainableSet(
         kind=kind,
         alone=alone,
@@ -114,12 +118,6 @@ def attainable_set(
 
 Support = Callable[[Array], tuple[Array, Array]]
 """Unit directions (D, 3) to the farthest points (D, 3) and how far they lie along them (D,)."""
-
-
-def _grown(found: Hull, points: Array, new: Array) -> tuple[Hull, Array]:
-    """The hull with more points in it."""
-    points = np.concatenate([found.vertices, new])
-    return hull_of(points), points
 
 
 def _without_specks(support: Support, speck: float) -> Support:
@@ -151,7 +149,7 @@ def _free_support(sets: FinSets, kind: Kind) -> Support:
 def _alone_support(sets: FinSets, kind: Kind) -> Support:
     """Farthest points with all else zero: by the dual, in each convex piece."""
     own, other = (slice(0, 3), slice(3, 6)) if kind == "force" else (slice(3, 6), slice(0, 3))
-    parts = joined(pieces(sets))
+    parts = joined(pieces(sets, MAX_DRAWN_PIECES))
     n_parts = len(parts.radius)
 
     def support(directions: Array) -> tuple[Array, Array]:
@@ -162,7 +160,10 @@ def _alone_support(sets: FinSets, kind: Kind) -> Support:
         answer = largest(parts.take(np.repeat(np.arange(n_parts), rows)), normal, basis)
         reach = answer.size.reshape(n_parts, rows)
         best = reach.argmax(axis=0) * rows + np.arange(rows)
-        return answer.wrench[best][:, own] * SCALE[own], answer.size[best] * SCALE[own][0]
+        # The origin stands in for a point that is not proven to be attained.
+        proven = answer.gap < 1e-3 * (1.0 + answer.size)
+        points = np.where(proven[:, None], answer.wrench[:, own], 0.0)
+        return points[best] * SCALE[own], answer.size[best] * SCALE[own][0]
 
     return support
 

@@ -28,8 +28,8 @@ SCALE = np.array([1.0, 1.0, 1.0, LEVER, LEVER, LEVER])
 """What a wrench is divided by, entry by entry."""
 FULL_TURN = 2 * np.pi - 1e-6
 """Arc of zero directions [rad] from which a fin counts as able to point anywhere."""
-MAX_PIECES = 32
-"""Most combinations of convex pieces that are looked at one by one."""
+MAX_PIECES = 8
+"""Most combinations of convex pieces that are looked at one by one, unless less is asked for."""
 
 
 class FinSets(NamedTuple):
@@ -93,15 +93,15 @@ def fin_sets(layouts: Sequence[Layout], failed: Collection[str] = ()) -> FinSets
     )
 
 
-def pieces(sets: FinSets) -> list[FinSets]:
+def pieces(sets: FinSets, most: int = MAX_PIECES) -> list[FinSets]:
     """Returns sets of the same robots, all convex, whose union is exactly what each robot can push.
 
     Each fin whose sector is wider than half a turn but no full circle is cut in two along its middle; each
     combination of halves is one of the sets. All robots have the same arcs. Where there would be more than
-    `MAX_PIECES`, the sets are returned as they are, with the convex hulls of what is not convex.
+    `most`, the sets are returned as they are, with the convex hulls of what is not convex.
     """
     wide = wide_fins(sets)
-    if 2 ** len(wide) > MAX_PIECES:
+    if 2 ** len(wide) > most:
         return [sets]
     cut = []
     for signs in product((-0.5, 0.5), repeat=len(wide)):

@@ -74,7 +74,10 @@ def along_exactly(sets: FinSets, directions: Array) -> tuple[Array, float]:
     parts = pieces(sets)
     rows = np.repeat(np.arange(len(parts) * robots), n)
     found = along(joined(parts).take(rows), np.tile(directions, (len(parts) * robots, 1)))
-    return found.size.reshape(len(parts), robots, n).max(axis=0), float(found.gap.max())
+    size, proven = (
+        v.reshape(len(parts), robots, n).max(axis=0) for v in (found.size, found.size - found.gap)
+    )
+    return size, float((size - proven).max())
 
 
 def across(direction: Array) -> Array:
