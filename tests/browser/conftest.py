@@ -56,7 +56,7 @@ class Served:
 
 @pytest.fixture(scope="session")
 def served() -> Iterator[Served]:
-    """The app with the stand-in allocator, without shadows, so that software rendering keeps up."""
+    """The app with the stand-in allocator; no shadows and still fins, so that software rendering keeps up."""
     from finlab.assets import shipped_layouts
     from finlab.layout import load_layout
     from tests.webapp.stand_in import load_stand_in
@@ -67,7 +67,7 @@ def served() -> Iterator[Served]:
 
     server = start_server("127.0.0.1", 0)
     layout = load_layout(shipped_layouts()["ucat"])
-    app = App(server, Solver(load=load_stand_in), layout, Display(shadows=False, speed=0.2))
+    app = App(server, Solver(load=load_stand_in), layout, Display(shadows=False, frozen=True))
     yield Served(f"http://127.0.0.1:{server.get_port()}/?fixedDpr=0.5", app, server)
     app.stop()
     stop_server(server)

@@ -98,10 +98,14 @@ def main(folder: Path, wanted: list[str]) -> None:
     from webapp.app import App
     from webapp.session import Display
     from webapp.solver import Solver
+    from webapp.state import State
+    from webapp.targets import FIRST
     from webapp.viser_internals import start_server, stop_server
 
     server = start_server("127.0.0.1", 0)
-    app = App(server, Solver(), load_layout(shipped_layouts()["ucat"]), Display())
+    ucat, solver = load_layout(shipped_layouts()["ucat"]), Solver()
+    solver.solve(State(ucat, target=FIRST))  # as `serve` does, so that the first page finds a warm solver
+    app = App(server, solver, ucat, Display())
     with sync_playwright() as playwright:
         browser: Any = playwright.chromium.launch(
             executable_path=CHROMIUM, headless=True, chromium_sandbox=False, args=FLAGS

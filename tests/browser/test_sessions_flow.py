@@ -46,7 +46,9 @@ def test_token_opens_and_a_restart_loses_nothing(browser: Any, tmp_path: Path) -
 
     def start(port: int) -> Served:
         server = start_guarded(guard, port)
-        app = App(server, Solver(load=load_stand_in), layout, Display(shadows=False), folder=tmp_path)
+        app = App(
+            server, Solver(load=load_stand_in), layout, Display(shadows=False, frozen=True), folder=tmp_path
+        )
         address = f"http://127.0.0.1:{server.get_port()}"
         return Served(f"{address}/?token={guard.token}", app, server)
 

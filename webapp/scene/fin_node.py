@@ -41,6 +41,7 @@ class FinNode:
             on_drag: called with index, phase (`start`, `update`, `end`), position [m] and angle [rad].
         """
         self._color = fin_color(index)
+        self._angle: float | None = None
         name = f"/fins/{index}"
         # Only the ring turns; the arrows stay along the body's axes, like the numbers beside them.
         self._move = scene.add_transform_controls(
@@ -159,7 +160,10 @@ class FinNode:
         self._force.show(force_arrow, in_fin_frame, root, 0.007)
 
     def pose_blade(self, angle: float) -> None:
-        """Turn the blade about its shaft to an angle [rad]."""
+        """Turn the blade about its shaft to an angle [rad]; one that rests is not sent again."""
+        if angle == self._angle:
+            return
+        self._angle = angle
         self._blade.wxyz = (math.cos(angle / 2), math.sin(angle / 2), 0.0, 0.0)
 
 
