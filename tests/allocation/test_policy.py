@@ -1,0 +1,283 @@
+"""What the allocator does when a wrench is out of reach: closest, same direction, or in order of priority."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from finlab.allocation import METHODS, Allocation, load_allocator
+from finlab.allocation.learned import LearnedAllocator
+from finlab.allocation.policy import (
+    AXES,
+    CLOSEST,
+    HELD,
+    IGNORED,
+    Policy,
+    as_policy,
+    describe_binding,
+    largest_share,
+    policy_from,
+)
+from finlab.assets import shipped_layouts
+from finlab.errors import AllocationError, CommandError
+from finlab.layout import Fin, Layout, Limits, load_layout
+from finlab.layout.arrays import layout_effectiveness
+from finlab.physics import Plant
+
+FAR = (30.0, 5.0, 20.0, 1.0, 1.0, 1.0)
+"""A wrench that no shipped layout of the paper's fins delivers."""
+HEAVY = (0.0, 0.0, 20.0, 3.0, 0.0, 0.0)
+SHALLOW = (30.0, 0.0, 6.0, 0.0, 0.0, 0.0)
+"""Its heave alone can be delivered, the whole cannot."""
+PATIENT = ("trf", "slsqp", "ipopt", "multistart")
+"""Methods of the table that are left to their own tests here."""
+
+
+def shipped(name: str) -> Layout:
+    return load_layout(shipped_layouts()[name])
+
+
+def least_error(layout: Layout, target: np.ndarray, weights: np.ndarray, n_starts: int = 3) -> float:
+    """Weighted error that scipy finds on the plant from several starts."""
+    lower = np.array([fin.limits.lower for fin in layout.fins])
+    upper = np.array([fin.limits.upper for fin in layout.fins])
+    plant, rng = Plant(layout), np.random.default_rng(0)
+
+    def residual(command: np.ndarray) -> np.ndarray:
+        return (plant.wrench(command.reshape(-1, 3)) - target) * weights
+
+    starts = lower + rng.uniform(0.05, 0.95, (n_starts, *lower.shape)) * (upper - lower)
+    costs = [
+        least_squares(residual, start.ravel(), bounds=(lower.ravel(), upper.ravel()), max_nfev=50).cost
+        for start in starts
+    ]
+    return float(np.sqrt(2.0 * min(costs)))
+
+
+def proven_error(layout: Layout, result: Allocation, target: np.ndarray) -> float:
+    """An error that no command of fins that turn fully can undercut.
+
+    The wrenches of all fins together lie within a convex set; the plane through its border that faces
+    along the answer's residual is at least this far from the target.
+    """
+    residual = (target - result.wrench) / result.sigma
+    facing = residual / np.linalg.norm(residual)
+    strongest = np.array([[fin.limits.amplitude[1], fin.limits.frequency[1], 0.0] for fin in layout.fins])
+    thrust = np.linalg.norm(Plant(layout).fin_forces(strongest), axis=1)
+    pulls = ((facing / result.sigma) @ layout_effectiveness(layout)).reshape(-1, 2)
+    return float(facing @ (target / result.sigma) - thrust @ np.linalg.norm(pulls, axis=1))
+
+
+def cosine(result: Allocation) -> float:
+    """Between what was asked and what is given, both normalized."""
+    asked, given = result.target / result.sigma, result.wrench / result.sigma
+    return float(asked @ given / (np.linalg.norm(asked) * np.linalg.norm(given)))
+
+
+@pytest.mark.parametrize(
+    ("name", "target"), [("A", FAR), ("pair", FAR), ("restricted", HEAVY), ("restricted", FAR)]
+)
+def test_closest_is_no_worse_than_least_squares_on_the_plant(
+    name: str, target: tuple[float, ...], learned: LearnedAllocator
+) -> None:
+    layout = shipped(name)
+    result = learned.allocate(layout, target)
+    assert not result.reachable
+    assert result.err_norm < 1.02 * least_error(layout, np.array(target), 1.0 / result.sigma)
+
+
+@pytest.mark.parametrize("name", ["A", "B", "penta", "pair", "hexa", "octo"])
+@pytest.mark.parametrize("target", [FAR, (0.0, 60.0, 0.0, 0.0, 0.0, -6.0)])
+def test_closest_is_proven_closest(name: str, target: tuple[float, ...], learned: LearnedAllocator) -> None:
+    layout = shipped(name)
+    result = learned.allocate(layout, target)
+    assert not result.reachable
+    assert result.err_norm < 1.03 * proven_error(layout, result, np.array(target))
+
+
+@pytest.mark.parametrize("axis", range(6))
+def test_weights_move_the_error_away_from_an_axis(axis: int, learned: LearnedAllocator) -> None:
+    layout = shipped("penta")
+    plain = learned.allocate(layout, FAR)
+    weights = np.where(np.arange(6) == axis, 10.0, 1.0)
+    result = learned.allocate(layout, FAR, policy=Policy(axis_weights=tuple(weights)))
+    assert abs(result.unallocated[axis]) < 0.9 * abs(plain.unallocated[axis])
+    # Weighted, the answer is the better one; plainly, the other is.
+    assert np.linalg.norm(weights * result.unallocated / result.sigma) < np.linalg.norm(
+        weights * plain.unallocated / plain.sigma
+    )
+    assert plain.err_norm <= result.err_norm * 1.001
+
+
+def test_weights_are_answered_as_well_as_by_least_squares(learned: LearnedAllocator) -> None:
+    layout = shipped("restricted")
+    weights = np.array([1.0, 1.0, 10.0, 1.0, 1.0, 1.0])
+    result = learned.allocate(layout, FAR, policy=Policy(axis_weights=tuple(weights)))
+    error = np.linalg.norm(weights * result.unallocated / result.sigma)
+    assert error < 1.02 * least_error(layout, np.array(FAR), weights / result.sigma, 2)
+
+
+def test_equal_weights_change_nothing(learned: LearnedAllocator) -> None:
+    layout = shipped("A")
+    plain = learned.allocate(layout, FAR)
+    weighted = learned.allocate(layout, FAR, policy=Policy(axis_weights=(3.0,) * 6))
+    np.testing.assert_array_equal(weighted.command, plain.command)
+
+
+@pytest.mark.parametrize(("name", "target"), [("A", HEAVY), ("pair", SHALLOW), ("penta", FAR)])
+def test_direction_is_kept_at_the_largest_scale(
+    name: str, target: tuple[float, ...], learned: LearnedAllocator
+) -> None:
+    layout = shipped(name)
+    result = learned.allocate(layout, target, policy="direction")
+    assert cosine(result) > 0.999
+    assert 0.0 < result.scale < 1.0 and not result.reachable
+    delivered = learned.normalization.error(result.wrench, result.scale * result.target)
+    assert delivered < 0.011
+    for more in (1.01, 1.03):
+        beyond = more * result.scale * result.target
+        tried = learned.allocate(layout, beyond)
+        assert not tried.reachable
+        assert proven_error(layout, tried, beyond) > 0.0
+
+
+def test_direction_within_arcs(learned: LearnedAllocator) -> None:
+    layout = shipped("restricted")
+    result = learned.allocate(layout, FAR, policy="direction")
+    assert cosine(result) > 0.999
+    more = 1.03 * result.scale * result.target
+    assert least_error(layout, more, 1.0 / result.sigma, 2) > 0.01
+
+
+@pytest.mark.parametrize("policy", ["closest", "direction", "priority"])
+def test_what_is_reachable_is_delivered_whole_by_all(policy: str, learned: LearnedAllocator) -> None:
+    layout, target = shipped("A"), [1.0, 0.5, 2.0, 0.0, 0.1, 0.1]
+    result = learned.allocate(layout, target, policy=policy)
+    assert result.reachable
+    assert result.scale == pytest.approx(1.0, abs=1e-3)
+    np.testing.assert_array_equal(result.command, learned.allocate(layout, target).command)
+
+
+@pytest.mark.parametrize("name", ["A", "penta", "restricted"])
+def test_priority_serves_the_first_group_whole(name: str, learned: LearnedAllocator) -> None:
+    layout = shipped(name)
+    assert learned.allocate(layout, [0.0, 0.0, SHALLOW[2], 0.0, 0.0, 0.0]).reachable
+    plain = learned.allocate(layout, SHALLOW)
+    result = learned.allocate(layout, SHALLOW, policy="priority")
+    assert abs(result.unallocated[2]) < 0.01 * SHALLOW[2] < abs(plain.unallocated[2])
+    assert not result.reachable
+
+
+def test_priority_serves_groups_in_the_order_asked(learned: LearnedAllocator) -> None:
+    layout = shipped("pair")
+    heave = learned.allocate(layout, FAR, policy=Policy("priority", order=(("Fz",), ("Fx",))))
+    surge = learned.allocate(layout, FAR, policy=Policy("priority", order=(("Fx",), ("Fz",))))
+    assert abs(heave.unallocated[2]) < abs(surge.unallocated[2])
+    assert abs(surge.unallocated[0]) < abs(heave.unallocated[0])
+
+
+def test_scale_of_nothing_is_one(learned: LearnedAllocator) -> None:
+    assert learned.allocate(shipped("A"), np.zeros(6)).scale == 1.0
+
+
+def test_binding_limits_are_named(learned: LearnedAllocator) -> None:
+    strong = learned.allocate(shipped("A"), (60.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    assert set(strong.binding) == {f"{name} at full thrust" for name in strong.fins}
+    idle = learned.allocate(shipped("A"), np.zeros(6), failed=["back_left"])
+    assert set(idle.binding) <= {f"{name} at rest" for name in idle.fins if name != "back_left"}
+    stopped = learned.allocate(shipped("restricted"), (0.0, 0.0, -40.0, 0.0, 0.0, 0.0))
+    assert any(sentence.endswith("at the end of its arc") for sentence in stopped.binding)
+
+
+def test_sentences_about_commands() -> None:
+    names = ("full", "rest", "fast", "stop", "lost", "free")
+    lower, upper = np.tile([0.0, 0.0, -1.0], (6, 1)), np.tile([1.0, 2.0, 1.0], (6, 1))
+    lower[5, 2], upper[5, 2] = -np.pi, np.pi
+    command = np.array([[1, 2, 0], [0, 0, 0], [0.5, 2, 0], [0.5, 1, -1], [np.nan] * 3, [0.5, 1, np.pi]])
+    assert describe_binding(names, command, lower, upper) == [
+        "full at full thrust",
+        "rest at rest",
+        "stop at the end of its arc",
+    ]
+
+
+def test_methods_without_weights_say_so() -> None:
+    layout = shipped("pair")
+    for name in METHODS:
+        if name == "learned" or name in PATIENT:
+            continue
+        method = load_allocator(method=name)
+        for policy in (Policy("priority"), Policy(axis_weights=(2.0, 1.0, 1.0, 1.0, 1.0, 1.0))):
+            with pytest.raises(AllocationError, match=f"method '{name}' minimizes the plain error") as caught:
+                method.allocate(layout, FAR, policy=policy)
+            assert "use method 'learned'" in str(caught.value) and "\n" not in str(caught.value)
+        assert np.isfinite(method.allocate(layout, FAR, policy=CLOSEST).command).all()
+
+
+def test_direction_is_known_to_every_method() -> None:
+    layout = shipped("A")
+    result = load_allocator(method="analytic").allocate(layout, HEAVY, policy="direction")
+    assert cosine(result) > 0.999 and 0.5 < result.scale < 0.8
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"kind": "nearest"}, "policy: expected one of closest, direction, priority, got 'nearest'"),
+        ({"axis_weights": (1.0,) * 5}, "axis weights: expected six numbers from 0"),
+        ({"axis_weights": (0.0,) * 6}, "axis weights: expected six numbers from 0, not all 0"),
+        ({"axis_weights": (1.0, -1.0, 1.0, 1.0, 1.0, 1.0)}, "axis weights: expected six numbers from 0"),
+        ({"axis_weights": (np.nan,) * 6}, "axis weights: expected six numbers from 0"),
+        ({"order": (("Fq",),)}, "priority: expected axes among Fx, Fy, Fz, Tx, Ty, Tz, got 'Fq'"),
+        ({"order": (("Fx",), ("Fz", "Fx"))}, "priority: every axis may be named once"),
+    ],
+)
+def test_bad_policies_are_refused(options: dict[str, object], sentence: str) -> None:
+    with pytest.raises(CommandError) as caught:
+        Policy(**options)  # type: ignore[arg-type]
+    assert str(caught.value).startswith(sentence) and "\n" not in str(caught.value)
+
+
+def test_a_name_that_is_no_policy_is_refused(learned: LearnedAllocator) -> None:
+    with pytest.raises(CommandError, match="policy: expected one of"):
+        learned.allocate(shipped("A"), FAR, policy="nearest")
+
+
+def test_policies_from_words() -> None:
+    assert as_policy("closest") == policy_from("closest") == CLOSEST
+    assert as_policy(CLOSEST) is CLOSEST
+    assert policy_from("closest", ["1", 2, 1, 1, 1, 0]).axis_weights == (1.0, 2.0, 1.0, 1.0, 1.0, 0.0)
+    assert policy_from("priority", None, ["Fx,Fy", "Tz"]).order == (("Fx", "Fy"), ("Tz",))
+
+
+def test_stages_hold_what_is_settled_and_end_with_all_axes() -> None:
+    stages = Policy("priority", order=(("Fz",), ("Tx", "Ty"))).stages
+    assert [tuple(np.array(AXES)[settled]) for _, settled in stages] == [
+        ("Fz",),
+        ("Fz", "Tx", "Ty"),
+        AXES,
+    ]
+    np.testing.assert_array_equal(stages[1][0], [IGNORED, IGNORED, HELD, 1.0, 1.0, IGNORED])
+
+
+@pytest.mark.parametrize("share", [0.0, 1e-4, 0.0625, 0.123, 0.5, 0.999, 1.0])
+def test_the_largest_share_is_found(share: float) -> None:
+    found = largest_share(lambda shares: shares <= share)
+    assert found <= share < found + 1e-3
+
+
+def test_weights_ask_the_surrogate_and_notes_stay(learned: LearnedAllocator) -> None:
+    far = learned.allocate(shipped("mixed"), np.array(FAR), policy="priority")
+    assert len(far.notes) == 1 and "trust the plant's error" in far.notes[0]
+    assert far.wrench_surrogate is not None
+
+
+def test_a_fin_without_freedom_still_gets_an_answer(learned: LearnedAllocator) -> None:
+    stiff = Limits((0.3, 0.3), (1.0, 1.0), (0.5, 0.5))
+    pair = shipped("pair")
+    layout = replace(pair, fins=(replace(pair.fins[0], limits=stiff), Fin("b", (0.1, 0.1, 0.0), 1.0)))
+    for policy in ("closest", "direction", "priority"):
+        result = learned.allocate(layout, FAR, policy=policy)
+        np.testing.assert_array_equal(result.command[0], [0.3, 1.0, 0.5])
+        assert np.isfinite(result.command).all()

@@ -1,0 +1,203 @@
+"""What holds for any layout with the shipped checkpoint: limits, symmetries, repeatability, no NaN."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from finlab.allocation import Allocation
+from finlab.allocation.learned import LearnedAllocator
+from finlab.layout import Fin, Layout, Limits, random_layout
+from finlab.physics import Plant
+
+GOOD = 5e-3
+"""Normalized error below which an answer counts as exact here."""
+SEEDS = st.integers(0, 2**32 - 1)
+LIMITS = st.sampled_from(["nominal", "varied"])
+MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+"""What becomes of a wrench when y changes its sign."""
+
+
+def few(examples: int) -> settings:
+    """Always the same examples, and not many."""
+    return settings(derandomize=True, max_examples=examples, deadline=None, database=None)
+
+
+def bounds(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
+    return (
+        np.array([fin.limits.lower for fin in layout.fins]),
+        np.array([fin.limits.upper for fin in layout.fins]),
+    )
+
+
+def inside(layout: Layout, command: np.ndarray) -> bool:
+    """To the last bit."""
+    lower, upper = bounds(layout)
+    return bool(np.isfinite(command).all() and (command >= lower).all() and (command <= upper).all())
+
+
+def drawn(seed: int, limits: str = "nominal") -> tuple[Layout, np.ndarray]:
+    """A layout and a wrench of one of its commands."""
+    rng = np.random.default_rng(seed)
+    layout = random_layout(rng, limits=limits)  # type: ignore[arg-type]
+    return layout, reachable(layout, rng)
+
+
+def reachable(layout: Layout, rng: np.random.Generator) -> np.ndarray:
+    lower, upper = bounds(layout)
+    return Plant(layout).wrench(lower + rng.uniform(size=lower.shape) * (upper - lower))
+
+
+def same_energy(one: Allocation, other: Allocation, share: float) -> bool:
+    return abs(one.energy - other.energy) <= share * one.energy
+
+
+def wrapped(angle: float) -> float:
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
+
+
+@few(20)
+@given(seed=SEEDS, limits=LIMITS, size=st.sampled_from([0.0, 1e-6, 0.5, 1.0, 5.0, 1e5]))
+def test_limits_hold_to_the_last_bit(learned: LearnedAllocator, seed: int, limits: str, size: float) -> None:
+    layout, target = drawn(seed, limits)
+    assert inside(layout, learned.allocate_batch(layout, [size * target, -size * target]).command[0])
+    first = learned.allocate(layout, size * target)
+    again = learned.allocate(layout, -target, previous=first.command)
+    assert inside(layout, first.command) and inside(layout, again.command)
+
+
+@few(5)
+@given(seed=SEEDS, limits=LIMITS, policy=st.sampled_from(["direction", "priority"]))
+def test_limits_hold_out_of_reach(learned: LearnedAllocator, seed: int, limits: str, policy: str) -> None:
+    layout, target = drawn(seed, limits)
+    assert inside(layout, learned.allocate(layout, 20.0 * target, policy=policy).command)
+
+
+@few(20)
+@given(seed=SEEDS)
+def test_the_order_of_the_fins_does_not_matter(learned: LearnedAllocator, seed: int) -> None:
+    layout, target = drawn(seed)
+    order = np.random.default_rng(seed).permutation(layout.n_fins)
+    shuffled = replace(layout, fins=tuple(layout.fins[i] for i in order))
+    one, other = learned.allocate(layout, target), learned.allocate(shuffled, target)
+    assert one.err_norm < GOOD and other.err_norm < GOOD
+    assert learned.normalization.error(one.wrench, other.wrench) < GOOD
+    assert same_energy(one, other, 0.01)
+
+
+@few(20)
+@given(seed=SEEDS, limits=LIMITS, yaw=st.floats(-math.pi, math.pi))
+def test_a_turned_robot_gets_the_turned_answer(
+    learned: LearnedAllocator, seed: int, limits: str, yaw: float
+) -> None:
+    layout, target = drawn(seed, limits)
+    c, s = math.cos(yaw), math.sin(yaw)
+    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    fins = [
+        replace(
+            fin,
+            position=tuple((rotation @ fin.position).tolist()),
+            mounting_angle=wrapped(fin.mounting_angle + yaw),
+        )
+        for fin in layout.fins
+    ]
+    turned = replace(layout, fins=tuple(fins))
+    one = learned.allocate(layout, target)
+    other = learned.allocate(turned, np.concatenate([rotation @ target[:3], rotation @ target[3:]]))
+    assert one.err_norm < GOOD and other.err_norm < GOOD
+    assert same_energy(one, other, 0.02)
+
+
+@few(20)
+@given(seed=SEEDS, limits=LIMITS)
+def test_a_mirrored_robot_gets_the_mirrored_answer(learned: LearnedAllocator, seed: int, limits: str) -> None:
+    layout, target = drawn(seed, limits)
+    # The thrust axis e_h is mirrored, so zero directions and with them the energy stay what they are.
+    fins = [
+        replace(
+            fin,
+            position=(fin.position[0], -fin.position[1], fin.position[2]),
+            mounting_angle=wrapped(math.pi - fin.mounting_angle),
+        )
+        for fin in layout.fins
+    ]
+    one = learned.allocate(layout, target)
+    other = learned.allocate(replace(layout, fins=tuple(fins)), MIRROR * target)
+    assert one.err_norm < GOOD and other.err_norm < GOOD
+    assert same_energy(one, other, 0.02)
+
+
+@few(15)
+@given(seed=SEEDS, limits=LIMITS, lost=st.integers(0, 4), policy=st.sampled_from(["closest", "priority"]))
+def test_failed_is_removed(learned: LearnedAllocator, seed: int, limits: str, lost: int, policy: str) -> None:
+    layout, target = drawn(seed, limits)
+    name = layout.names[lost % layout.n_fins]
+    failed = learned.allocate(layout, target, failed=[name], policy=policy)
+    removed = learned.allocate(layout.without([name]), target, policy=policy)
+    alive = [i for i, fin in enumerate(layout.names) if fin != name]
+    np.testing.assert_array_equal(failed.command[alive], removed.command)
+    assert np.isnan(failed.command[layout.index(name)]).all()
+    np.testing.assert_allclose(failed.wrench, removed.wrench, atol=1e-12)
+    assert failed.energy == pytest.approx(removed.energy)
+
+
+@few(10)
+@given(seed=SEEDS, draw=st.integers(0, 1000), scale=st.sampled_from([1.0, 10.0]))
+def test_the_same_seed_gives_the_same_answer(
+    learned: LearnedAllocator, seed: int, draw: int, scale: float
+) -> None:
+    layout, target = drawn(seed)
+    first = learned.allocate(layout, scale * target, seed=draw, previous=None)
+    learned.allocate(layout, -target, seed=draw + 1, previous=first.command)
+    again = learned.allocate(layout, scale * target, seed=draw)
+    np.testing.assert_array_equal(again.command, first.command)
+
+
+@st.composite
+def degenerate_layouts(draw: st.DrawFn) -> Layout:
+    """Layouts in which fins coincide, are parallel, cannot move, or are alone."""
+    kind = draw(st.sampled_from(["coincident", "parallel", "stiff", "alone", "line"]))
+    n = 1 if kind == "alone" else draw(st.integers(2, 5))
+    layout = random_layout(np.random.default_rng(draw(SEEDS)), n_fins=n)
+    first = layout.fins[0]
+    fins: list[Fin] = []
+    for i, fin in enumerate(layout.fins):
+        if kind == "coincident":
+            fin = replace(fin, position=first.position, mounting_angle=first.mounting_angle)
+        elif kind == "parallel":
+            fin = replace(fin, mounting_angle=first.mounting_angle)
+        elif kind == "line":
+            fin = replace(fin, position=(0.1 * i, 0.0, 0.0), mounting_angle=0.0)
+        elif kind == "stiff" and draw(st.booleans()):
+            amplitude, frequency, direction = draw(
+                st.tuples(st.floats(0.01, 1.0), st.floats(0.01, 3.0), st.floats(-3.0, 3.0))
+            )
+            fin = replace(fin, limits=Limits((amplitude,) * 2, (frequency,) * 2, (direction,) * 2))
+        fins.append(fin)
+    return replace(layout, fins=tuple(fins))
+
+
+@few(25)
+@given(layout=degenerate_layouts(), seed=SEEDS, size=st.sampled_from([0.0, 1.0, 10.0]))
+def test_degenerate_layouts_get_numbers_inside_the_limits(
+    learned: LearnedAllocator, layout: Layout, seed: int, size: float
+) -> None:
+    target = size * np.random.default_rng(seed).normal(size=6)
+    first = learned.allocate(layout, target)
+    again = learned.allocate(layout, -target, previous=first.command)
+    for result in (first, again):
+        assert inside(layout, result.command)
+        assert np.isfinite(result.wrench).all() and math.isfinite(result.energy)
+        assert math.isfinite(result.err_norm) and math.isfinite(result.scale)
+
+
+@few(5)
+@given(layout=degenerate_layouts(), seed=SEEDS, policy=st.sampled_from(["direction", "priority"]))
+def test_degenerate_layouts_out_of_reach(
+    learned: LearnedAllocator, layout: Layout, seed: int, policy: str
+) -> None:
+    target = 10.0 * np.random.default_rng(seed).normal(size=6)
+    assert inside(layout, learned.allocate(layout, target, policy=policy).command)

@@ -1,0 +1,211 @@
+"""From tick to tick: with the previous command the fins turn little, and the wrench is still delivered."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from finlab.allocation.learned import LearnedAllocator
+from finlab.allocation.steady import TURNS, planar_thrust, turn_little, wrap_directions
+from finlab.assets import shipped_layouts
+from finlab.errors import CommandError
+from finlab.layout import Layout, load_layout
+from finlab.physics import Plant
+
+TICKS = np.arange(200) * 0.1
+"""20 s at 10 Hz."""
+CALM = np.array([0.98, 0.98, 1.4, 0.175, 0.175, 0.175])
+"""Amplitudes of the path [N, N m], about 0.7 standard deviations of what random commands give."""
+TARGET = [1.0, 0.5, 2.0, 0.0, 0.1, 0.1]
+
+
+class Drive(NamedTuple):
+    """One ride along a path."""
+
+    command: np.ndarray
+    """(T, n, 3)."""
+    energy: np.ndarray
+    """(T,)."""
+    error: np.ndarray
+    """(T,), by the plant."""
+
+    @property
+    def turns(self) -> np.ndarray:
+        """What each fin turns from tick to tick (T - 1, n), the shorter way round [rad]."""
+        return np.abs(difference(self.command[1:, :, 2], self.command[:-1, :, 2]))
+
+
+def difference(new: np.ndarray, old: np.ndarray) -> np.ndarray:
+    return (new - old + math.pi) % (2.0 * math.pi) - math.pi
+
+
+def drive(method: LearnedAllocator, layout: Layout, path: np.ndarray, *, steady: bool) -> Drive:
+    previous, results = None, []
+    for wrench in path:
+        result = method.allocate(layout, wrench, previous=previous)
+        previous = result.command if steady else None
+        results.append(result)
+    return Drive(
+        np.array([result.command for result in results]),
+        np.array([result.energy for result in results]),
+        np.array([result.err_norm for result in results]),
+    )
+
+
+def smooth_path(seed: int) -> np.ndarray:
+    """Slow sines (T, 6) in all axes."""
+    rng = np.random.default_rng(seed)
+    return CALM * np.sin(rng.uniform(0.15, 0.6, 6) * TICKS[:, None] + rng.uniform(0.0, 2.0 * math.pi, 6))
+
+
+def limits(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
+    return (
+        np.array([fin.limits.lower for fin in layout.fins]),
+        np.array([fin.limits.upper for fin in layout.fins]),
+    )
+
+
+@pytest.fixture(scope="module")
+def penta() -> Layout:
+    return load_layout(shipped_layouts()["penta"])
+
+
+@pytest.fixture(scope="module")
+def free(learned: LearnedAllocator, penta: Layout) -> Drive:
+    return drive(learned, penta, smooth_path(0), steady=False)
+
+
+@pytest.fixture(scope="module")
+def steady(learned: LearnedAllocator, penta: Layout) -> Drive:
+    return drive(learned, penta, smooth_path(0), steady=True)
+
+
+def test_fins_turn_at_most_a_fifth_as_far(free: Drive, steady: Drive) -> None:
+    assert steady.turns.max() <= 0.2 * free.turns.max()
+    assert steady.turns.sum() < free.turns.sum()
+    # Nearly always what the pole of a fin allows in one tick.
+    assert (steady.turns.max(1) <= TURNS[0] + 1e-6).mean() > 0.98
+
+
+def test_the_path_is_still_tracked_at_about_the_same_energy(free: Drive, steady: Drive) -> None:
+    assert steady.error.max() < 5e-3
+    assert steady.energy.mean() < 1.05 * free.energy.mean()
+
+
+def test_commands_stay_inside_the_limits_across_the_seam(steady: Drive, penta: Layout) -> None:
+    lower, upper = limits(penta)
+    assert ((steady.command >= lower) & (steady.command <= upper)).all()
+    jumps = np.abs(np.diff(steady.command[..., 2], axis=0)) > math.pi
+    assert jumps.any()  # fins do pass the seam
+    assert steady.turns[jumps].max() <= TURNS[1] + 1e-6
+
+
+def test_a_fin_follows_a_turning_force_over_the_seam(learned: LearnedAllocator) -> None:
+    layout = load_layout(shipped_layouts()["pair"])
+    lower, upper = limits(layout)
+    previous = None
+    for angle in np.linspace(0.0, 4.0 * math.pi, 80):
+        command = np.column_stack([np.full(2, 0.4), np.full(2, 1.5), np.full(2, angle)])
+        command[:, 2] = difference(command[:, 2], np.zeros(2))
+        result = learned.allocate(layout, Plant(layout).wrench(command), previous=previous)
+        assert result.err_norm < 5e-3
+        assert ((result.command >= lower) & (result.command <= upper)).all()
+        if previous is not None:
+            assert np.abs(difference(result.command[:, 2], previous[:, 2])).max() < TURNS[0]
+        previous = result.command
+
+
+def test_arcs_are_kept(learned: LearnedAllocator) -> None:
+    layout = load_layout(shipped_layouts()["restricted"])
+    lower, upper = limits(layout)
+    ride = drive(learned, layout, smooth_path(1)[:60], steady=True)
+    assert ((ride.command >= lower) & (ride.command <= upper)).all()
+
+
+def test_a_previous_command_that_is_the_answer_stays(
+    learned: LearnedAllocator, penta: Layout, free: Drive
+) -> None:
+    for tick in (0, 50, 120):
+        before = free.command[tick]
+        result = learned.allocate(penta, smooth_path(0)[tick], previous=before)
+        assert np.abs(difference(result.command[:, 2], before[:, 2])).max() < 1e-3
+        np.testing.assert_allclose(result.command[:, :2], before[:, :2], atol=1e-3)
+        assert result.energy < 1.03 * free.energy[tick]
+
+
+def test_the_first_tick_knows_no_past(free: Drive, steady: Drive) -> None:
+    np.testing.assert_array_equal(steady.command[0], free.command[0])
+
+
+def test_what_nothing_is_known_of_is_free(learned: LearnedAllocator, penta: Layout) -> None:
+    alone = learned.allocate(penta, TARGET)
+    unknown = learned.allocate(penta, TARGET, previous=np.full((5, 3), np.nan))
+    assert unknown.err_norm < 5e-3
+    assert unknown.energy == pytest.approx(alone.energy, rel=0.03)
+
+
+def test_a_failed_fin_comes_back(learned: LearnedAllocator, penta: Layout) -> None:
+    lost = learned.allocate(penta, TARGET, failed=["port_back"])
+    still = learned.allocate(penta, TARGET, failed=["port_back"], previous=lost.command)
+    assert np.isnan(still.command[2]).all() and np.isfinite(still.command[[0, 1, 3, 4]]).all()
+    back = learned.allocate(penta, TARGET, previous=lost.command)
+    assert np.isfinite(back.command).all() and back.err_norm < 5e-3
+    known = [0, 1, 3, 4]
+    assert np.abs(difference(back.command[known, 2], lost.command[known, 2])).max() <= TURNS[0] + 1e-6
+
+
+def test_a_target_that_needs_a_turn_gets_it(learned: LearnedAllocator, penta: Layout) -> None:
+    target = np.array([0.0, 0.0, 12.0, 0.0, 0.0, 0.0])
+    before = learned.allocate(penta, target).command
+    result = learned.allocate(penta, -target, previous=before)
+    assert result.err_norm < 5e-3
+    assert np.abs(difference(result.command[:, 2], before[:, 2])).max() > 1.0
+
+
+@pytest.mark.parametrize(
+    ("previous", "sentence"),
+    [
+        (np.zeros((4, 3)), "previous: expected a command of shape (5, 3) for layout 'penta'"),
+        (np.full((5, 3), np.inf), "previous: expected finite commands"),
+        ("yesterday", "previous: expected a command of shape (5, 3)"),
+    ],
+)
+def test_a_previous_that_is_no_command_is_refused(
+    previous: object, sentence: str, learned: LearnedAllocator, penta: Layout
+) -> None:
+    with pytest.raises(CommandError) as caught:
+        learned.allocate(penta, TARGET, previous=previous)  # type: ignore[arg-type]
+    assert sentence in str(caught.value)
+
+
+def test_arcs_are_narrowed_around_where_the_fins_point(learned: LearnedAllocator) -> None:
+    prepared = learned.prepare(load_layout(shipped_layouts()["restricted"]))
+    previous = np.column_stack([np.full(4, 0.3), np.full(4, 1.0), [0.0, 1.6, np.nan, -0.6]])
+    near = turn_little(prepared, previous, np.zeros(4), 0.35)
+    lower, upper = near.commands.lower[:, 2], near.commands.upper[:, 2]
+    old_lower, old_upper = prepared.commands.lower[:, 2], prepared.commands.upper[:, 2]
+    np.testing.assert_allclose(lower, [-0.35, old_lower[1], old_lower[2], -0.95])
+    np.testing.assert_allclose(upper, [0.35, 1.95, old_upper[2], old_upper[3]])
+    np.testing.assert_array_equal(near.commands.lower[:, :2], prepared.commands.lower[:, :2])
+    for untouched in (np.full((4, 3), np.nan), previous):
+        width = TURNS[-1] if untouched is previous else 0.1
+        assert turn_little(prepared, untouched, np.zeros(4), width) is prepared
+
+
+def test_only_fins_that_turn_fully_are_wrapped() -> None:
+    command = np.array([[0.1, 1.0, 3.5], [0.1, 1.0, 3.5], [0.1, 1.0, -math.pi]])
+    wrapped = wrap_directions(command, np.array([True, False, True]))
+    np.testing.assert_allclose(wrapped[:, 2], [3.5 - 2.0 * math.pi, 3.5, -math.pi])
+    np.testing.assert_array_equal(wrapped[:, :2], command[:, :2])
+    assert command[0, 2] == 3.5
+
+
+def test_thrust_of_a_command(learned: LearnedAllocator, penta: Layout) -> None:
+    command = np.tile([0.6, 2.1, 0.4], (5, 1))
+    command[4] = np.nan
+    thrust = planar_thrust(learned.prepare(penta).commands, command)
+    least, _ = limits(penta)
+    command[4] = least[4]
+    expected = np.linalg.norm(Plant(penta).fin_forces(command), axis=1)
+    np.testing.assert_allclose(thrust, expected, rtol=1e-2, atol=2e-3)
