@@ -26,7 +26,7 @@ from finlab.layout.arrays import layout_effectiveness
 from finlab.physics import Plant
 
 FAR = (30.0, 5.0, 20.0, 1.0, 1.0, 1.0)
-"""A wrench that no shipped layout of the paper's fins delivers."""
+"""A wrench that robots of up to six such fins do not deliver."""
 HEAVY = (0.0, 0.0, 20.0, 3.0, 0.0, 0.0)
 SHALLOW = (30.0, 0.0, 6.0, 0.0, 0.0, 0.0)
 """Its heave alone can be delivered, the whole cannot."""
@@ -87,7 +87,7 @@ def test_closest_is_no_worse_than_least_squares_on_the_plant(
     assert result.err_norm < 1.02 * least_error(layout, np.array(target), 1.0 / result.sigma)
 
 
-@pytest.mark.parametrize("name", ["A", "B", "penta", "pair", "hexa", "octo"])
+@pytest.mark.parametrize("name", ["A", "B", "penta", "pair", "hexa"])
 @pytest.mark.parametrize("target", [FAR, (0.0, 60.0, 0.0, 0.0, 0.0, -6.0)])
 def test_closest_is_proven_closest(name: str, target: tuple[float, ...], learned: LearnedAllocator) -> None:
     layout = shipped(name)
