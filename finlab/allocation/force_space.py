@@ -30,6 +30,10 @@ REST = 1e-5
 """Share of the largest thrust below which a fin's mobility no longer shrinks; it can still come back."""
 
 
+EVEN_STEPS = 20
+"""Newton steps of `spread_evenly`; a dozen reach full precision where there is an answer."""
+
+
 class PlanarProblem(NamedTuple):
     """One layout as the planar search sees it."""
 
@@ -80,14 +84,27 @@ def descend(problem: PlanarProblem, target: Array, thrust: Array, steps: int) ->
     """
     if problem.turns_fully:
         return _descend_freely(problem, target, thrust, steps)
-    weight = mobility(problem, thrust)
+    return _newton(problem, target, mobility(problem, thrust), steps, 2)
+
+
+def spread_evenly(problem: PlanarProblem, target: Array) -> Planar:
+    """The allocation that loads all fins evenly: one convex problem, no reweighting, no seed.
+
+    Dear, but exact up to the border of what the robot can do, where the cheap ways stall.
+    """
+    weight = np.broadcast_to(problem.curves.maximum, (len(target), len(problem.columns)))
+    return _newton(problem, target, weight, 0, EVEN_STEPS)
+
+
+def _newton(problem: PlanarProblem, target: Array, weight: Array, reweighted: int, plain: int) -> Planar:
+    """Semismooth Newton steps on the multiplier, the first of them followed by a new weight."""
     multiplier = np.linalg.solve(_gram(problem, weight), target[..., None])[..., 0]
-    for step in range(steps + 2):
+    for step in range(reweighted + plain):
         wanted = _answer(problem, weight, multiplier)
         planar, slope = _project(problem, wanted, target)
         gram = _gram(problem, weight, slope)
         multiplier = multiplier + np.linalg.solve(gram, planar.residual[..., None])[..., 0]
-        if step < steps:
+        if step < reweighted:
             size = np.linalg.norm(_answer(problem, weight, multiplier), axis=-1)
             weight = mobility(problem, np.minimum(size, problem.curves.maximum))
     return _project(problem, _answer(problem, weight, multiplier), target)[0]

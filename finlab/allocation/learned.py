@@ -27,7 +27,7 @@ from finlab.allocation.numpy_network import NumpyNetwork
 from finlab.allocation.policy import Policy
 from finlab.allocation.prepared import Prepared, prepare
 from finlab.allocation.proposal import Proposal, propose
-from finlab.allocation.steady import TURNS, planar_thrust, turn_little, wrap_directions
+from finlab.allocation.steady import TURNS, planar_thrust, turn_little
 from finlab.allocation.unreachable import serve_in_turn
 from finlab.errors import AllocationError, CheckpointError
 from finlab.layout import Fin, FinModelSpec, Layout
@@ -41,8 +41,8 @@ CHUNK = 256
 TOLERANCE = 2e-4
 """Normalized error (by the surrogate) below which an answer counts as exact and energy decides."""
 PATIENCE = ((5, 0), (25, 32))
-"""For the few targets that the quick way did not reach: Levenberg-Marquardt steps, and how many of the
-network's raw candidates join, in stages."""
+"""For the few targets that the quick way did not reach: Levenberg-Marquardt steps, and how many fresh
+starts join, in stages."""
 RESTARTS = 32
 """Raw candidates from which an unreachable target is approached under weights or priorities."""
 SWITCH_GAIN = 0.02
@@ -185,8 +185,8 @@ class LearnedAllocator(Allocator):
             pool = self._descend(near, target, proposal, seeds, steady=True)
             if pool.error[0, 0] <= TOLERANCE:
                 break
-        command = wrap_directions(pool.command, prepared.commands.wraps)
-        return pool._replace(command=command), proposal
+        # Arcs that pass the seam are brought back inside the fin's own limits.
+        return pool._replace(command=prepared.commands.clamp(pool.command)), proposal
 
     def _descend(
         self, prepared: Prepared, target: Array, proposal: Proposal, seeds: Array, steady: bool = False
@@ -198,8 +198,8 @@ class LearnedAllocator(Allocator):
             missed = pool.error[:, 0] > TOLERANCE
             if not missed.any():
                 break
-            raw = prepared.commands.clamp(proposal.command[missed, :extra].astype(np.float64))
-            more = np.concatenate([pool.command[missed], raw], axis=1)
+            fresh = _fresh_starts(prepared, target[missed], proposal.command[missed], extra)
+            more = np.concatenate([pool.command[missed], fresh], axis=1)
             longer = self._refine(prepared, target[missed], more, steps)
             for kept, new in zip(pool, longer, strict=True):
                 kept[missed] = new[:, : kept.shape[1]]
@@ -266,6 +266,22 @@ class LearnedAllocator(Allocator):
 
 def _model_of(fin: Fin) -> tuple[str, dict[str, Any]]:
     return fin.model.type, dict(fin.model.values())
+
+
+def _fresh_starts(prepared: Prepared, target: Array, proposed: Array, count: int) -> Array:
+    """Commands (N, count, n, 3): all fins loaded evenly, raw candidates of the network, random ones.
+
+    Near the border of what a robot can do, all of the network's candidates may lie in one blind alley.
+    """
+    rows, _, n, _ = proposed.shape
+    if count == 0:
+        return np.empty((rows, 0, n, 3))
+    even, _ = force_space.realize(prepared.planar, force_space.spread_evenly(prepared.planar, target))
+    raw = proposed[:, : count // 2].astype(np.float64)
+    lower, upper = prepared.commands.lower, prepared.commands.upper
+    unit = np.random.default_rng(0).random((count - 1 - raw.shape[1], n, 3))
+    spread = np.broadcast_to(lower + unit * (upper - lower), (rows, *unit.shape))
+    return prepared.commands.clamp(np.concatenate([even[:, None], raw, spread], axis=1))
 
 
 class Pool(NamedTuple):

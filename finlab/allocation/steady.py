@@ -56,14 +56,6 @@ def turn_little(prepared: Prepared, previous: Array, aim: Array, width: float) -
     return prepared._replace(planar=planar, commands=commands)
 
 
-def wrap_directions(command: Array, wraps: NDArray[np.bool_]) -> Array:
-    """Commands (..., n, 3) with the zero directions of fins that turn fully brought back to [-pi, pi]."""
-    turned = np.mod(command[..., 2] + np.pi, 2 * np.pi) - np.pi
-    wrapped = command.copy()
-    wrapped[..., 2] = np.where(wraps, turned, command[..., 2])
-    return wrapped
-
-
 def planar_thrust(problem: CommandProblem, command: Array) -> Array:
     """Planar force (n,) [N] of a command (n, 3) by the surrogate; NaN commands count as rest."""
     safe = np.where(np.isfinite(command), command, problem.lower)

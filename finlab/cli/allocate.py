@@ -22,6 +22,9 @@ def allocate(
     failed: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = (),
     method: Annotated[str, arg(metavar="NAME")] = "learned",
     checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
+    policy: Annotated[str, arg(metavar="NAME")] = "closest",
+    axis_weights: Annotated[Wrench | None, arg(metavar="W1 ... W6")] = None,
+    priority: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="AXES")] = (),
     seed: Annotated[int, arg(metavar="N")] = 0,
     json: bool = False,
 ) -> None:
@@ -33,15 +36,22 @@ def allocate(
         failed: name of a fin that does not work.
         method: learned, paper, qp, sqp, analytic, multistart, trf, slsqp or ipopt.
         checkpoint: trained checkpoint; the shipped one of the method by default.
+        policy: for a wrench out of reach: closest, direction (same direction, scaled down) or priority.
+        axis_weights: for `closest`: weight of each axis of the error.
+        priority: for `priority`: a group of axes with commas between, most important first, such as Fz,Tz.
         seed: same target, layout and seed, same answer.
         json: print one JSON object instead of a table.
     """
     from finlab.allocation import load_allocator
+    from finlab.allocation.policy import policy_from
     from finlab.cli.inputs import open_robot
 
     robot = open_robot(layout)
     allocator = load_allocator(checkpoint, method)
-    result = allocator.allocate(robot.layout, wrench, failed=robot.with_failed(failed), seed=seed)
+    answer = policy_from(policy, axis_weights, priority)
+    result = allocator.allocate(
+        robot.layout, wrench, failed=robot.with_failed(failed), policy=answer, seed=seed
+    )
     if json:
         print(json_format.dumps(allocation_record(result), allow_nan=False))
     else:
@@ -95,8 +105,18 @@ def allocation_text(result: Allocation) -> str:
         "",
         f"err_norm {result.err_norm:.2e}   energy {result.energy:.3f}   {result.solve_ms:.1f} ms   "
         f"method {result.method}{source}",
+        *_words(result),
     ]
     return "\n".join(lines)
+
+
+def _words(result: Allocation) -> list[str]:
+    """Sentences about a wrench out of reach, and what else the user should read."""
+    words = list(result.notes)
+    if not result.reachable:
+        limits = f"; {', '.join(result.binding)}" if result.binding else ""
+        words.insert(0, f"not reached: {100 * result.scale:.0f} % of the wrench is delivered{limits}")
+    return words
 
 
 _AXIS_WIDTHS = (6, 6, 6, 8, 8, 8)

@@ -1,13 +1,14 @@
 """From tick to tick: with the previous command the fins turn little, and the wrench is still delivered."""
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from finlab.allocation.learned import LearnedAllocator
-from finlab.allocation.steady import TURNS, planar_thrust, turn_little, wrap_directions
+from finlab.allocation.steady import TURNS, planar_thrust, turn_little
 from finlab.assets import shipped_layouts
 from finlab.errors import CommandError
 from finlab.layout import Layout, load_layout
@@ -193,12 +194,15 @@ def test_arcs_are_narrowed_around_where_the_fins_point(learned: LearnedAllocator
         assert turn_little(prepared, untouched, np.zeros(4), width) is prepared
 
 
-def test_only_fins_that_turn_fully_are_wrapped() -> None:
-    command = np.array([[0.1, 1.0, 3.5], [0.1, 1.0, 3.5], [0.1, 1.0, -math.pi]])
-    wrapped = wrap_directions(command, np.array([True, False, True]))
-    np.testing.assert_allclose(wrapped[:, 2], [3.5 - 2.0 * math.pi, 3.5, -math.pi])
-    np.testing.assert_array_equal(wrapped[:, :2], command[:, :2])
-    assert command[0, 2] == 3.5
+def test_a_full_circle_that_starts_elsewhere_is_kept(learned: LearnedAllocator, penta: Layout) -> None:
+    limits_of = replace(penta.fins[0].limits, zero_direction=(0.0, 2.0 * math.pi))
+    turned = replace(penta, fins=tuple(replace(fin, limits=limits_of) for fin in penta.fins))
+    previous = None
+    for surge in (1.0, 0.5, -0.5, -1.0):
+        result = learned.allocate(turned, [surge, 0.3, 0.5, 0.0, 0.0, 0.1], previous=previous)
+        previous = result.command
+        assert ((previous[:, 2] >= 0.0) & (previous[:, 2] <= 2.0 * math.pi)).all()
+        assert result.err_norm < 5e-3
 
 
 def test_thrust_of_a_command(learned: LearnedAllocator, penta: Layout) -> None:

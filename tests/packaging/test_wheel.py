@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-CORE = {"numpy", "torch", "scipy", "pyyaml", "safetensors", "tyro", "tqdm"}
+CORE = {"numpy", "torch", "scipy", "pyyaml", "safetensors", "threadpoolctl", "tyro", "tqdm"}
 
 
 @pytest.fixture(scope="module")
