@@ -107,8 +107,21 @@ def test_table_for_people(allocate: Callable[..., tuple[int, str, str]]) -> None
     ]
     assert lines[2].split() == ["front_left", "failed"]
     labels = [line.split()[0] for line in lines if line]
-    assert labels[5:] == ["Fx", "asked", "delivered", "missing", "err_norm"]
+    assert labels[5:10] == ["Fx", "asked", "delivered", "missing", "err_norm"]
     assert "1.000   0.000  -0.500     0.000     0.000     0.100" in out
+
+
+def test_says_in_words_what_is_not_reached(allocate: Callable[..., tuple[int, str, str]]) -> None:
+    code, out, _ = allocate("A", "--wrench", "500", "0", "0", "0", "0", "0", "--policy", "direction")
+    assert code == 0
+    assert "not reached: " in out.splitlines()[-1]
+    assert "% of the wrench is delivered" in out.splitlines()[-1]
+
+
+def test_refuses_an_unknown_policy(allocate: Callable[..., tuple[int, str, str]]) -> None:
+    code, _, err = allocate("A", *WRENCH, "--policy", "hope")
+    assert code == 2
+    assert "closest, direction, priority" in err
 
 
 def test_shipped_name_works_from_any_folder(
