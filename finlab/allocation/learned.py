@@ -40,6 +40,11 @@ CHUNK = 256
 """Targets that are solved together; keeps memory flat for any number of targets."""
 TOLERANCE = 2e-4
 """Normalized error (by the surrogate) below which an answer counts as exact and energy decides."""
+PROMISING = 0.02
+"""Normalized error below which a search counts as successful: refinement removes the rest."""
+INEXACT = 1e9
+"""Rank of inexact answers, behind every exact one. Energies reach thousands where an arc of zero directions
+ends near zero, since the energy divides by that end."""
 PATIENCE = ((5, 0), (25, 32))
 """For the few targets that the quick way did not reach: Levenberg-Marquardt steps, and how many fresh
 starts join, in stages."""
@@ -226,7 +231,7 @@ class LearnedAllocator(Allocator):
         planar = force_space.descend(prepared.planar, flat, thrust.reshape(-1, n), steps)
         command, energy = force_space.realize(prepared.planar, planar)
         error = np.einsum("ri,ri->r", planar.residual, planar.residual)
-        score = (100.0 * error + self.gamma * energy).reshape(rows, n_seeds)
+        score = np.where(error > PROMISING**2, INEXACT * (1.0 + error), energy).reshape(rows, n_seeds)
         if steady:
             score[:, 0] = -1.0
         kept = np.argsort(score, axis=1)[:, : self.n_refined] + np.arange(rows)[:, None] * n_seeds
@@ -249,7 +254,8 @@ class LearnedAllocator(Allocator):
             cost[:, 0] *= 1.0 - SWITCH_GAIN
         error = refined.error.reshape(rows, p)
         order = (
-            np.argsort(np.where(error > TOLERANCE, 1e3 + error, cost), axis=1) + np.arange(rows)[:, None] * p
+            np.argsort(np.where(error > TOLERANCE, INEXACT * (1.0 + error), cost), axis=1)
+            + np.arange(rows)[:, None] * p
         )
         return Pool(refined.command[order], refined.wrench[order], refined.error[order], energy[order])
 
