@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from finlab.allocation.policy import AXES
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.body import Hull
@@ -17,7 +18,7 @@ from webapp.analyst import DRAWN
 from webapp.arrow_scale import NEWTONS
 from webapp.history import History
 from webapp.links import followed, partner, unlinked
-from webapp.state import AXES, State, number
+from webapp.state import State, number
 from webapp.targets import FIRST, PRESETS
 from webapp.tour import STEPS
 

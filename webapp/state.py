@@ -4,13 +4,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from finlab.allocation.methods import METHODS
-from finlab.allocation.policy import KINDS
+from finlab.allocation.policy import AXES, KINDS
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.links import Links, kept, linked
 
-AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
-"""Names of the wrench's components, in the order of the library."""
 AXIS_WORDS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 """What a pilot calls them."""
 AXIS_UNITS = ("N", "N", "N", "N m", "N m", "N m")

@@ -30,7 +30,7 @@ from finlab.allocation.proposal import Proposal, propose
 from finlab.allocation.steady import TURNS, planar_thrust, turn_little
 from finlab.allocation.unreachable import serve_in_turn
 from finlab.errors import AllocationError, CheckpointError
-from finlab.layout import Fin, FinModelSpec, Layout
+from finlab.layout import FinModelSpec, Layout
 from finlab.model.checkpoint import Checkpoint
 from finlab.model.surrogate import FORCE_UNIT, CoefficientSurrogate
 
@@ -113,13 +113,12 @@ class LearnedAllocator(Allocator):
         self.subsets = subsets
         # All products here are too small to be shared among threads; chunks of targets are not.
         self._threads = ThreadpoolController()
-        parameters = tuple((k, v) for k, v in checkpoint.fin_model.items() if k != "type")
-        spec = FinModelSpec(checkpoint.fin_model["type"], parameters)
-        self._fin_model = spec.type, dict(spec.values())
+        self._fin_model = FinModelSpec.from_values(checkpoint.fin_model)
         state = {k: v.numpy() for k, v in checkpoint.surrogate.state_dict().items()}
         fin = LearnedFin(state, CoefficientSurrogate.REFERENCE, FORCE_UNIT)
         std = self.normalization.std
         self.prepare = lru_cache(maxsize=128)(lambda layout: prepare(layout, fin, std))
+        self.notes = lru_cache(maxsize=128)(self._notes)
 
     def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         prepared = self.prepare(layout)
@@ -259,19 +258,20 @@ class LearnedAllocator(Allocator):
         )
         return Pool(refined.command[order], refined.wrench[order], refined.error[order], energy[order])
 
-    def notes(self, layout: Layout) -> tuple[str, ...]:
+    def _notes(self, layout: Layout) -> tuple[str, ...]:
         """What the user should know before trusting an answer for this layout."""
-        strangers = [fin.name for fin in layout.fins if _model_of(fin) != self._fin_model]
+        known = self._fin_model
+        strangers = [
+            fin.name
+            for fin in layout.fins
+            if fin.model.type != known.type or fin.model.values() != known.values()
+        ]
         if not strangers:
             return ()
         return (
-            f"checkpoint {self.checkpoint!r} knows fins of model {self._fin_model[0]!r} and takes these for "
+            f"checkpoint {self.checkpoint!r} knows fins of model {known.type!r} and takes these for "
             f"such: {', '.join(strangers)}; trust the plant's error or train a surrogate for them",
         )
-
-
-def _model_of(fin: Fin) -> tuple[str, dict[str, Any]]:
-    return fin.model.type, dict(fin.model.values())
 
 
 def _fresh_starts(prepared: Prepared, target: Array, proposed: Array, count: int) -> Array:

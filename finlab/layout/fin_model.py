@@ -1,5 +1,6 @@
 """Which fin model a fin follows, by name and numbers; the formulas live in `finlab.physics`."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -47,6 +48,15 @@ class FinModelSpec:
         if self.type == "table" and not checked:
             raise LayoutError("required key is missing; name the CSV file of forces", "path")
         object.__setattr__(self, "parameters", tuple(checked))
+
+    @classmethod
+    def from_values(cls, values: Mapping[str, float | str]) -> "FinModelSpec":
+        """The spec of a mapping with the model's name under `type` and its parameters beside it.
+
+        Raises:
+            LayoutError: unknown model, unknown parameter, or a value that is none.
+        """
+        return cls(str(values["type"]), tuple((k, v) for k, v in values.items() if k != "type"))
 
     def values(self) -> dict[str, float | str]:
         """Returns all parameters of the model, those given and those left at their defaults."""

@@ -108,8 +108,7 @@ def make_terms(
     world: int = 1,
 ) -> Callable[[nn.Module, int], dict[str, Tensor]]:
     """The loss terms of a step, for this process's share of the batch."""
-    parameters = tuple((k, v) for k, v in base.fin_model.items() if k != "type")
-    model = make_fin_model(FinModelSpec(base.fin_model["type"], parameters))
+    model = make_fin_model(FinModelSpec.from_values(base.fin_model))
     sampler = ForwardSampler(
         TRAIN_SEED + seed, training.batch_size, fin_model=model, varied_limits=training.varied_limits
     )

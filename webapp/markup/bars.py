@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from webapp.state import AXES, AXIS_UNITS, AXIS_WORDS
+from finlab.allocation.policy import AXES
+from webapp.state import AXIS_UNITS, AXIS_WORDS
 from webapp.targets import nice_limit
 from webapp.theme import ASKED, DELIVERED, MISSING, css
 

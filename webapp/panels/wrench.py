@@ -6,7 +6,7 @@ from html import escape
 import numpy as np
 import viser
 
-from finlab.allocation.policy import KINDS
+from finlab.allocation.policy import AXES, KINDS
 from finlab.layout import Layout
 from webapp.handles import on_user_change, put
 from webapp.markup.bars import wrench_bars
@@ -14,7 +14,7 @@ from webapp.markup.fins import fin_table
 from webapp.markup.picking import button_colors
 from webapp.panels.host import Host
 from webapp.panels.mode_picker import ModePicker
-from webapp.state import AXES, AXIS_UNITS, AXIS_WORDS
+from webapp.state import AXIS_UNITS, AXIS_WORDS
 from webapp.targets import PRESETS, axis_reach, full_thrust, slider_end
 from webapp.theme import DEAD, css, fin_color
 from webapp.words import authority_sentence, rest_sentence
