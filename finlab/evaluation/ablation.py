@@ -13,8 +13,8 @@ from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import load_allocator
-from finlab.evaluation.metrics import Records, join_records
 from finlab.evaluation.paper_figures import paper_figures
+from finlab.evaluation.records import Records, join_records
 from finlab.evaluation.splits import Case
 from finlab.evaluation.tables import text_table
 from finlab.evaluation.wrench import score

@@ -1,73 +1,30 @@
-"""Error measures: per-target records in, one row of the table out. Pure functions, numpy only."""
+"""Tables from records: pure functions, records in, rows out. Numpy only."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from finlab.evaluation.bootstrap import (
+    Interval,
+    mean_interval,
+    quantile_interval,
+    ratio_interval,
+    share_interval,
+)
+from finlab.evaluation.records import Records, same_targets
+
+Row = dict[str, Any]
 
 SUCCESS_LEVELS = (0.01, 0.05, 0.5, 1.0)
 """Levels t of `success@t`, the share of targets with `err_norm <= t`."""
+MET = 0.05
+"""Normalized error up to which a target counts as met when energies are compared."""
 
 
-@dataclass(frozen=True)
-class Records:
-    """What one method did on N targets, one entry per target."""
-
-    err_norm: Array
-    """`||(w - target) / sigma||`, shape (N,)."""
-    err_phys: Array
-    """The same without sigma, newton and newton metre mixed, shape (N,)."""
-    energy: Array
-    """Energy proxy of the command, shape (N,)."""
-    solve_ms: Array
-    """Time to solve [ms], shape (N,)."""
-    n_fins: NDArray[np.int64]
-    """Healthy fins of the layout, shape (N,)."""
-
-    def __len__(self) -> int:
-        return len(self.err_norm)
-
-    def select(self, keep: NDArray[np.bool_]) -> Records:
-        """The records where `keep` (N,) holds."""
-        return Records(**{field.name: getattr(self, field.name)[keep] for field in fields(self)})
-
-
-def make_records(
-    wrench: Array, target: Array, sigma: Array, energy: Array, solve_ms: Array, n_fins: int
-) -> Records:
-    """Records of N targets on one layout.
-
-    Args:
-        wrench: delivered wrenches (N, 6) [N, N m], by whatever model scores.
-        target: desired wrenches (N, 6).
-        sigma: per-axis standard deviation (6,).
-        energy: energy proxy (N,).
-        solve_ms: time per target (N,) [ms].
-        n_fins: healthy fins of the layout.
-    """
-    difference = wrench - target
-    return Records(
-        err_norm=np.linalg.norm(difference / sigma, axis=-1),
-        err_phys=np.linalg.norm(difference, axis=-1),
-        energy=np.asarray(energy, np.float64),
-        solve_ms=np.asarray(solve_ms, np.float64),
-        n_fins=np.full(len(target), n_fins, np.int64),
-    )
-
-
-def join_records(parts: list[Records]) -> Records:
-    """One after the other."""
-    return Records(
-        **{field.name: np.concatenate([getattr(p, field.name) for p in parts]) for field in fields(Records)}
-    )
-
-
-def wrench_row(records: Records, *, split: str, method: str, scored_by: str = "plant") -> dict[str, Any]:
+def wrench_row(records: Records, *, split: str, method: str, scored_by: str = "plant") -> Row:
     """One row of the wrench table.
 
     Args:
@@ -77,7 +34,7 @@ def wrench_row(records: Records, *, split: str, method: str, scored_by: str = "p
         scored_by: the model that computed the delivered wrench, `plant` or `surrogate`.
     """
     error = records.err_norm
-    row: dict[str, Any] = {
+    row: Row = {
         "split": split,
         "method": method,
         "n": len(records),
@@ -97,21 +54,72 @@ def wrench_row(records: Records, *, split: str, method: str, scored_by: str = "p
     return row
 
 
-def rows_by_fin_count(records: Records, *, method: str) -> list[dict[str, Any]]:
+def wrench_intervals(records: Records) -> dict[str, Interval]:
+    """Where the columns of `wrench_row` would lie in a rerun with another seed, by column."""
+    error, group = records.err_norm, records.layout
+    found = {
+        "err_norm_mean": mean_interval(error, group),
+        "err_norm_median": quantile_interval(error, 0.5, group),
+        "err_norm_p95": quantile_interval(error, 0.95, group),
+        "err_phys_mean": mean_interval(records.err_phys, group),
+        "energy_mean": mean_interval(records.energy, group),
+    }
+    found |= {f"success_{level}": share_interval(error <= level, group) for level in SUCCESS_LEVELS}
+    return found
+
+
+def rows_by_fin_count(records: Records, *, method: str) -> list[Row]:
     """Error and energy for each number of healthy fins (the paper's figure B as a table)."""
-    rows = []
-    for n_fins in np.unique(records.n_fins):
-        part = records.select(records.n_fins == n_fins)
-        rows.append(
-            {
-                "method": method,
-                "fins": int(n_fins),
-                "n": len(part),
-                "err_norm_mean": float(part.err_norm.mean()),
-                "err_norm_median": float(np.median(part.err_norm)),
-                "err_norm_p95": float(np.quantile(part.err_norm, 0.95)),
-                "success_0.01": float((part.err_norm <= 0.01).mean()),
-                "energy_mean": float(part.energy.mean()),
-            }
-        )
-    return rows
+    return [
+        {
+            "method": method,
+            "fins": int(n_fins),
+            "n": len(part),
+            "err_norm_mean": float(part.err_norm.mean()),
+            "err_norm_median": float(np.median(part.err_norm)),
+            "err_norm_p95": float(np.quantile(part.err_norm, 0.95)),
+            "success_0.01": float((part.err_norm <= 0.01).mean()),
+            "energy_mean": float(part.energy.mean()),
+        }
+        for n_fins, part in _by_fins(records)
+    ]
+
+
+def energy_rows(records: Records, reference: Records, *, method: str) -> list[Row]:
+    """Energy over the reference's on the targets that both met, and resting fins: one row per fin count, and
+    one over all of them, whose `fins` is "all"."""
+    ours, theirs = same_targets(records, reference)
+    both = (ours.err_norm <= MET) & (theirs.err_norm <= MET)
+    counts: list[int | str] = [*np.unique(ours.n_fins).tolist(), "all"]
+    return [
+        _energy_row(ours, theirs, both, ours.n_fins == fins if fins != "all" else both | True, method, fins)
+        for fins in counts
+    ]
+
+
+def _energy_row(
+    ours: Records,
+    theirs: Records,
+    both: NDArray[np.bool_],
+    chosen: NDArray[np.bool_],
+    method: str,
+    fins: int | str,
+) -> Row:
+    a, b = ours.select(both & chosen), theirs.select(both & chosen)
+    row: Row = {"method": method, "fins": fins, "n": int(chosen.sum()), "met_by_both": len(a)}
+    row["success_0.01"] = float((ours.err_norm[chosen] <= 0.01).mean())
+    if len(a) == 0:
+        return row | {"energy_mean": None, "energy_ratio": None, "cheaper": None, "resting": None}
+    ends = ratio_interval(a.energy, b.energy, a.layout)
+    return row | {
+        "energy_mean": float(a.energy.mean()),
+        "energy_ratio": float(a.energy.sum() / b.energy.sum()),
+        "energy_ratio_low": ends.low,
+        "energy_ratio_high": ends.high,
+        "cheaper": float((a.energy < b.energy).mean()),
+        "resting": float(a.resting.mean()),
+    }
+
+
+def _by_fins(records: Records) -> list[tuple[int, Records]]:
+    return [(int(n), records.select(records.n_fins == n)) for n in np.unique(records.n_fins)]

@@ -14,7 +14,10 @@ def columns_of(rows: Sequence[Row]) -> list[str]:
 
 
 def format_cell(value: object) -> str:
-    """A cell as text: small and large numbers with three significant digits, nothing for a missing one."""
+    """A cell as text: small and large numbers with three significant digits, nothing for a missing one, an
+    interval in brackets."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(format_cell, value))}]"
     if value is None or isinstance(value, str):
         return value or ""
     if isinstance(value, bool) or not isinstance(value, float):

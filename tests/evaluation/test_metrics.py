@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from finlab.evaluation.metrics import Records, join_records, make_records, rows_by_fin_count, wrench_row
+from finlab.evaluation.metrics import energy_rows, rows_by_fin_count, wrench_intervals, wrench_row
 from finlab.evaluation.paper_figures import paper_figures, paper_wrench_rows
+from finlab.evaluation.records import Records, join_records
 from finlab.evaluation.tables import format_cell, markdown_table, text_table
 
 KEYS = [
@@ -16,21 +17,19 @@ KEYS = [
 """Keys of a row, in the order that users rely on."""
 
 
-def _records(err_norm: list[float], n_fins: int = 3) -> Records:
+def _records(err_norm: list[float], n_fins: int = 3, energy: list[float] | None = None) -> Records:
     error = np.array(err_norm)
+    n = len(error)
     return Records(
-        error, 2 * error, error + 1, np.arange(len(error), dtype=float), np.full(len(error), n_fins)
+        layout=np.zeros(n, np.int64),
+        target=np.arange(n),
+        n_fins=np.full(n, n_fins),
+        err_norm=error,
+        err_phys=2 * error,
+        energy=error + 1 if energy is None else np.array(energy),
+        resting=np.ones(n, np.int64),
+        solve_ms=np.arange(n, dtype=float),
     )
-
-
-def test_errors_from_wrenches() -> None:
-    target = np.zeros((2, 6))
-    wrench = np.array([[3.0, 4, 0, 0, 0, 0], [0, 0, 0, 0, 0, 2.0]])
-    sigma = np.array([3.0, 4, 1, 1, 1, 0.5])
-    records = make_records(wrench, target, sigma, np.ones(2), np.ones(2), 4)
-    np.testing.assert_allclose(records.err_phys, [5.0, 2.0])
-    np.testing.assert_allclose(records.err_norm, [np.sqrt(2), 4.0])
-    assert records.n_fins.tolist() == [4, 4]
 
 
 def test_row_of_known_errors() -> None:
@@ -51,6 +50,28 @@ def test_rows_by_fin_count() -> None:
     both = join_records([_records([0.0, 0.02], 2), _records([1.0], 5)])
     rows = rows_by_fin_count(both, method="qp")
     assert [(row["fins"], row["n"], row["success_0.01"]) for row in rows] == [(2, 2, 0.5), (5, 1, 0.0)]
+
+
+def test_intervals_hold_their_means() -> None:
+    records = _records([0.01, 0.05, 0.5, 1.0, 3.44])
+    row, found = wrench_row(records, split="id", method="qp"), wrench_intervals(records)
+    assert set(found) < set(row)
+    assert all(interval.holds(row[column]) for column, interval in found.items())
+    assert found["success_1.0"].high == 1.0 and found["success_0.01"].high < 1.0
+
+
+def test_energy_over_a_reference() -> None:
+    reference = _records([0.0, 0.0, 0.2, 0.0], energy=[1.0, 2.0, 9.0, 1.0])
+    ours = _records([0.0, 0.0, 0.0, 0.9], energy=[0.5, 2.5, 1.0, 1.0])
+    by_fins, whole = energy_rows(ours, reference, method="learned")
+    assert (by_fins["fins"], whole["fins"]) == (3, "all")
+    # Only the first two targets are met by both.
+    assert (whole["n"], whole["met_by_both"]) == (4, 2)
+    assert whole["energy_ratio"] == pytest.approx(1.0) and whole["cheaper"] == 0.5
+    assert whole["resting"] == 1.0 and whole["success_0.01"] == 0.75
+    assert whole["energy_ratio_low"] <= 1.0 <= whole["energy_ratio_high"]
+    nothing = energy_rows(_records([1.0]), _records([0.0]), method="qp")[-1]
+    assert nothing["met_by_both"] == 0 and nothing["energy_ratio"] is None
 
 
 def test_paper_rows_have_our_columns() -> None:
@@ -74,7 +95,10 @@ def test_markdown_table() -> None:
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(0.0, "0.0000"), (0.5, "0.5000"), (1.234e-5, "1.23e-05"), (2e7, "2.00e+07"), (None, "")],
+    [
+        *((0.0, "0.0000"), (0.5, "0.5000"), (1.234e-5, "1.23e-05"), (2e7, "2.00e+07"), (None, "")),
+        ([0.5, 2e-4], "[0.5000, 2.00e-04]"),
+    ],
 )
 def test_cells(value: object, text: str) -> None:
     assert format_cell(value) == text

@@ -1,0 +1,60 @@
+"""Methods as they enter a comparison: a name, with a number of starts where a method has them: `ipopt-32`."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.methods import LEARNED, METHODS, load_allocator
+from finlab.errors import AllocationError
+
+SLOW = ("trf", "slsqp", "ipopt")
+"""Methods that take a tenth of a second per target, each from several starts; they run on a subsample."""
+FAST = tuple(name for name in METHODS if name not in SLOW)
+"""Methods that run on every target."""
+_WITH_STARTS = re.compile(r"(\w+)-(\d+)")
+
+
+def is_slow(name: str) -> bool:
+    """Whether an entrant runs on a subsample only."""
+    return _parse(name)[0] in SLOW
+
+
+def load_entrant(name: str, checkpoint: str | Path | None = None) -> Allocator:
+    """The allocator of an entrant, as `finlab.load_allocator` makes it.
+
+    Args:
+        name: `sqp`, say, or `ipopt-32` for 32 starts.
+        checkpoint: as in `load_allocator`.
+
+    Raises:
+        AllocationError: unknown method, or starts for a method that has none.
+    """
+    method, starts = _parse(name)
+    if starts is None:
+        return load_allocator(checkpoint, method)
+    if method not in SLOW or starts < 1:
+        raise AllocationError(
+            f"methods: a number of starts, from 1, goes with {', '.join(SLOW)} only, got {name!r}"
+        )
+    return load_allocator(checkpoint, method, n_starts=starts)
+
+
+def fingerprint(name: str, checkpoint: str | Path | None = None) -> str:
+    """What an entrant's answers depend on besides its settings: the weights' SHA-256 for a learned method,
+    a digest of the normalization for the others."""
+    from finlab.model.checkpoint import load_checkpoint, load_normalization, resolve_checkpoint
+
+    method = _parse(name)[0]
+    path = resolve_checkpoint(checkpoint or ("paper" if method == "paper" else "default"))
+    if method in LEARNED:
+        return load_checkpoint(path).sha256
+    return hashlib.sha256(b"".join(values.tobytes() for values in load_normalization(path))).hexdigest()
+
+
+def _parse(name: str) -> tuple[str, int | None]:
+    """Method and number of starts."""
+    found = _WITH_STARTS.fullmatch(name)
+    return (name, None) if found is None else (found[1], int(found[2]))
