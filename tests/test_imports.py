@@ -104,3 +104,14 @@ def test_front_door_and_layouts_load_no_torch() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
     )
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_the_learned_pipeline_needs_only_numpy() -> None:
+    """What a robot's computer runs; DEVELOPMENT.md promises it."""
+    code = (
+        "import sys\n"
+        "for name in ('torch', 'scipy', 'yaml', 'safetensors', 'threadpoolctl', 'tqdm', 'tyro'):\n"
+        "    sys.modules[name] = None\n"
+        "import finlab.allocation.learned, finlab.deploy.graph_file"
+    )
+    subprocess.run([sys.executable, "-c", code], timeout=60, check=True)

@@ -48,7 +48,7 @@ def densities(
     healthy = layout.without(failed) if failed else layout
     normalization = allocator.normalization
     centred = (np.asarray(target)[None] - normalization.mean) / normalization.std
-    mixture = predict(allocator.network, allocator.prepare(healthy), centred)
+    mixture = predict(allocator.pipeline.network, allocator.pipeline.prepare(healthy), centred)
     weight, mean, std = (np.asarray(v[0], dtype=float) for v in (mixture.weight, mixture.mean, mixture.std))
     std = np.maximum(std * np.sqrt(temperature), NARROWEST)
     lower = np.array([fin.limits.lower for fin in healthy.fins])

@@ -11,7 +11,8 @@ from finlab.allocation.allocator import Allocator
 from finlab.deploy.graph_file import parse_graph
 from finlab.errors import FinlabError, LayoutError
 from finlab.layout import Layout, parse_layout, save_layout
-from finlab.layout.reading import MAX_BYTES, parse_json, parse_yaml
+from finlab.layout.reading import MAX_BYTES, parse_json
+from finlab.layout.yaml_file import parse_yaml
 
 GRAPH_SUFFIX = ".graph.json"
 """Ending of the name of a layout graph file."""

@@ -25,7 +25,7 @@ def refinement(allocator: Allocator, answer: Allocation) -> tuple[Allocation, ..
         raise AllocationError("only the method learned refines candidates; choose it to see how")
     layout = answer.layout.without(answer.failed) if answer.failed else answer.layout
     alive = np.isfinite(answer.command[:, 0])
-    problem = allocator.prepare(layout).commands
+    problem = allocator.pipeline.prepare(layout).commands
     target = (answer.target / allocator.normalization.std)[None]
     raw = answer.samples.command[0][alive]
     frames = []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from inspect import signature
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,6 +32,11 @@ class Allocator(ABC):
     name: str
     normalization: Normalization
     checkpoint: str | None = None
+
+    @classmethod
+    def option_names(cls) -> list[str]:
+        """Names of what can be set when the method is made."""
+        return list(signature(cls).parameters)[1:]
 
     @abstractmethod
     def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from importlib import import_module
-from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +49,7 @@ def load_allocator(
     module, name = METHODS[method]
     kind = getattr(import_module(module), name)
     model = load_allocator_checkpoint(path) if method in LEARNED else load_normalization(path)
-    known = list(signature(kind).parameters)[1:]
+    known = kind.option_names()
     if unknown := [name for name in options if name not in known]:
         raise AllocationError(
             f"method {method!r} knows the options {', '.join(known) or 'none'}, got {unknown[0]!r}"

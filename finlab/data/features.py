@@ -26,10 +26,10 @@ index       meaning
 from __future__ import annotations
 
 import math
+import sys
 from typing import Any, NamedTuple
 
 import numpy as np
-import torch
 
 RAW_SIZE = 10
 """Number of raw node features (paper: x_i in R^10)."""
@@ -98,7 +98,7 @@ def geometry(
     rows = pairs.reshape(batch, 2 * n, 6)
     columns = xp.swapaxes(rows, -1, -2)  # (B, 6, 2n)
     identity = xp.eye(6, dtype=position.dtype)
-    if xp is torch:
+    if xp is not np:
         identity = identity.to(position.device)
     inverse = xp.linalg.inv(columns @ rows + RIDGE * identity)
     solver = rows @ inverse  # (B, 2n, 6)
@@ -136,5 +136,5 @@ def _unbind(position: Array) -> tuple[Array, Array, Array]:
 
 
 def _library(array: Array) -> Any:
-    """numpy for numpy arrays, torch for tensors; both know the functions used here."""
-    return np if isinstance(array, np.ndarray) else torch
+    """numpy for numpy arrays, torch (whoever made the tensor loaded it) for tensors."""
+    return np if isinstance(array, np.ndarray) else sys.modules["torch"]

@@ -17,8 +17,9 @@ from scipy.stats import qmc
 from tqdm import tqdm
 
 from finlab.allocation.energy import command_energy
-from finlab.allocation.learned import TOLERANCE, LearnedAllocator
+from finlab.allocation.learned import LearnedAllocator
 from finlab.allocation.levenberg_marquardt import refine
+from finlab.allocation.pipeline import TOLERANCE
 from finlab.allocation.prepared import Prepared
 from finlab.allocation.proposal import propose
 from finlab.evaluation.splits import Case
@@ -52,7 +53,7 @@ def seed_rows(
     found: dict[tuple[int, str, int], list[tuple[Array, Array]]] = {}
     for case in tqdm(cases, unit="layout", disable=None, leave=False, file=sys.stderr):
         layout = case.layout.without(case.failed) if case.failed else case.layout
-        prepared, plant = allocator.prepare(layout), Plant(layout)
+        prepared, plant = allocator.pipeline.prepare(layout), Plant(layout)
         for kind in KINDS:
             start = _commands(kind, allocator, prepared, case.targets, n_seeds, seed)
             for steps in STEPS:
@@ -83,9 +84,15 @@ def _commands(
         target = targets / allocator.normalization.std
         centred = target - allocator.normalization.mean / allocator.normalization.std
         drawn = propose(
-            allocator.network, prepared, centred, target, allocator.n_candidates, allocator.temperature, seed
+            allocator.pipeline.network,
+            prepared,
+            centred,
+            target,
+            allocator.settings.n_candidates,
+            allocator.settings.temperature,
+            seed,
         )
-        score = drawn.error**2 + allocator.gamma * drawn.energy
+        score = drawn.error**2 + allocator.settings.gamma * drawn.energy
         best = np.argsort(score, axis=1)[:, :n_seeds]
         command = np.take_along_axis(drawn.command, best[..., None, None], axis=1).astype(np.float64)
         return np.clip(command, lower, upper)

@@ -13,14 +13,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from finlab.errors import LayoutError
 from finlab.layout.body import BODY_KEYS, HULL_KEYS, Body, Hull
 from finlab.layout.fin import Fin, Limits
 from finlab.layout.fin_model import FinModelSpec
 from finlab.layout.layout import MAX_FINS, Layout
-from finlab.layout.reading import parse_json, parse_yaml, read_text
+from finlab.layout.reading import parse_json, read_text
 from finlab.layout.rules import mapping, number, shown, text
 
 FORMAT = "finlab-layout"
@@ -46,8 +44,13 @@ def load_layout(path: str | os.PathLike[str]) -> Layout:
     file = Path(path)
     source = str(path)
     content = read_text(file, source)
-    parse = parse_json if file.suffix.lower() == ".json" else parse_yaml
-    return parse_layout(parse(content, source), source=source, folder=file.resolve().parent)
+    if file.suffix.lower() == ".json":
+        data = parse_json(content, source)
+    else:
+        from finlab.layout.yaml_file import parse_yaml  # a robot's computer reads JSON and may lack PyYAML
+
+        data = parse_yaml(content, source)
+    return parse_layout(data, source=source, folder=file.resolve().parent)
 
 
 def parse_layout(data: Any, source: str = "layout", folder: Path | None = None) -> Layout:
@@ -95,9 +98,9 @@ def save_layout(layout: Layout, path: str | os.PathLike[str]) -> None:
     if file.suffix.lower() == ".json":
         content = json.dumps(data, indent=2) + "\n"
     else:
-        content = yaml.safe_dump(
-            data, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110
-        )
+        from finlab.layout.yaml_file import yaml_text  # as in `load_layout`
+
+        content = yaml_text(data)
     # Written beside and renamed, so that a kill or a full disk never leaves half a layout.
     part = file.with_name(f".{file.name}.{os.getpid()}.part")
     try:

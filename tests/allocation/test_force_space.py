@@ -31,7 +31,7 @@ def full_thrust(prepared: Prepared, rows: int) -> np.ndarray:
 def test_reaches_what_can_be_reached(learned: LearnedAllocator) -> None:
     error = []
     for layout in robots("nominal"):
-        prepared = learned.prepare(layout)
+        prepared = learned.pipeline.prepare(layout)
         target = reachable(prepared)
         planar = descend(prepared.planar, target, full_thrust(prepared, len(target)), 30)
         error.append(np.linalg.norm(planar.residual, axis=1))
@@ -41,7 +41,7 @@ def test_reaches_what_can_be_reached(learned: LearnedAllocator) -> None:
 @pytest.mark.parametrize("limits", ["nominal", "varied"])
 def test_the_residual_is_what_the_forces_leave(limits: str, learned: LearnedAllocator) -> None:
     for layout in robots(limits):
-        prepared = learned.prepare(layout)
+        prepared = learned.pipeline.prepare(layout)
         target = reachable(prepared)
         planar = descend(prepared.planar, target, full_thrust(prepared, len(target)), 6)
         unit = np.stack([np.cos(planar.direction), np.sin(planar.direction)], axis=-1)
@@ -55,7 +55,7 @@ def test_forces_keep_the_limits_wherever_the_target_lies(
     limits: str, scale: float, learned: LearnedAllocator
 ) -> None:
     for layout in robots(limits):
-        prepared = learned.prepare(layout)
+        prepared = learned.pipeline.prepare(layout)
         problem = prepared.planar
         target = scale * reachable(prepared)
         planar = descend(problem, target, full_thrust(prepared, len(target)), 6)
@@ -72,7 +72,7 @@ def test_forces_keep_the_limits_wherever_the_target_lies(
 def test_is_cheaper_than_the_pseudo_inverse(learned: LearnedAllocator) -> None:
     ratio = []
     for layout in robots("nominal", n_fins=(4, 5)):
-        prepared = learned.prepare(layout)
+        prepared = learned.pipeline.prepare(layout)
         problem = prepared.planar
         target = 0.5 * reachable(prepared)
         columns = problem.columns.reshape(-1, 6)
@@ -91,7 +91,7 @@ def test_is_cheaper_than_the_pseudo_inverse(learned: LearnedAllocator) -> None:
 
 
 def test_resting_fins_point_where_it_costs_least(learned: LearnedAllocator) -> None:
-    prepared = learned.prepare(robots("varied")[0])
+    prepared = learned.pipeline.prepare(robots("varied")[0])
     low = prepared.planar.curves.minimum[None]
     command, _ = realize(prepared.planar, Planar(low, np.full_like(low, 1.0), np.zeros((1, 6))))
     expected = np.clip(0.0, prepared.lower[:, 2], prepared.upper[:, 2])

@@ -11,7 +11,7 @@ from finlab.layout import Fin, Layout, Limits, random_layout
 
 
 def problem_of(learned: LearnedAllocator, layout: Layout) -> CommandProblem:
-    return learned.prepare(layout).commands
+    return learned.pipeline.prepare(layout).commands
 
 
 def draw(problem: CommandProblem, rows: int, seed: int) -> np.ndarray:

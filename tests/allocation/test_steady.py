@@ -181,7 +181,7 @@ def test_a_previous_that_is_no_command_is_refused(
 
 
 def test_arcs_are_narrowed_around_where_the_fins_point(learned: LearnedAllocator) -> None:
-    prepared = learned.prepare(load_layout(shipped_layouts()["restricted"]))
+    prepared = learned.pipeline.prepare(load_layout(shipped_layouts()["restricted"]))
     previous = np.column_stack([np.full(4, 0.3), np.full(4, 1.0), [0.0, 1.6, np.nan, -0.6]])
     near = turn_little(prepared, previous, np.zeros(4), 0.35)
     lower, upper = near.commands.lower[:, 2], near.commands.upper[:, 2]
@@ -208,7 +208,7 @@ def test_a_full_circle_that_starts_elsewhere_is_kept(learned: LearnedAllocator, 
 def test_thrust_of_a_command(learned: LearnedAllocator, penta: Layout) -> None:
     command = np.tile([0.6, 2.1, 0.4], (5, 1))
     command[4] = np.nan
-    thrust = planar_thrust(learned.prepare(penta).commands, command)
+    thrust = planar_thrust(learned.pipeline.prepare(penta).commands, command)
     least, _ = limits(penta)
     command[4] = least[4]
     expected = np.linalg.norm(Plant(penta).fin_forces(command), axis=1)
