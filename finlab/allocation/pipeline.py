@@ -1,0 +1,219 @@
+"""From a network's proposal to the cheapest exact commands, in numpy alone.
+
+Predict (mixture of the network) -> sample K candidates -> rank by the surrogate's error and energy ->
+drive the best ones, and a few sub-layouts, to the nearest cheap exact allocation in force space ->
+Levenberg-Marquardt on the commands. Nothing here knows the analytic fin model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation import force_space
+from finlab.allocation.energy import command_energy
+from finlab.allocation.learned_fin import LearnedFin
+from finlab.allocation.levenberg_marquardt import refine
+from finlab.allocation.numpy_network import NumpyNetwork
+from finlab.allocation.prepared import Prepared, prepare
+from finlab.allocation.proposal import Proposal, propose
+from finlab.allocation.steady import TURNS, planar_thrust, turn_little
+from finlab.allocation.weights import LearnedWeights
+from finlab.errors import AllocationError
+
+Array = NDArray[Any]
+
+TOLERANCE = 2e-4
+"""Normalized error (by the surrogate) below which an answer counts as exact and energy decides."""
+PROMISING = 0.02
+"""Normalized error below which a search counts as successful: refinement removes the rest."""
+INEXACT = 1e9
+"""Rank of inexact answers, behind every exact one. Energies reach thousands where an arc of zero directions
+ends near zero, since the energy divides by that end."""
+PATIENCE = ((5, 0), (25, 32))
+"""For the few targets that the quick way did not reach: Levenberg-Marquardt steps, and how many fresh
+starts join, in stages."""
+SWITCH_GAIN = 0.02
+"""Share of its energy that a robot in motion must save before it changes the way it moves."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How widely and how long the pipeline searches."""
+
+    n_candidates: int = 64
+    """Number K of candidates drawn from the mixture."""
+    temperature: float = 0.02
+    """T of the sampling; 0.02 in the paper."""
+    gamma: float = 1e-2
+    """Weight of the energy in the ranking J = J_norm + gamma J_en."""
+    n_seeds: int = 6
+    """Candidates that enter the search."""
+    n_refined: int = 4
+    """Allocations that are refined and offered as candidates."""
+    search_steps: int | None = None
+    """Reweighting steps of the search in force space; None: 4, and 12 from six fins on, where there is
+    more to choose from."""
+    refine_steps: int = 1
+    """Levenberg-Marquardt steps."""
+    subsets: bool = True
+    """Whether sub-layouts are searched as well."""
+
+    def __post_init__(self) -> None:
+        if self.n_candidates < 1 or self.n_seeds < 1 or self.n_refined < 1 or not self.temperature >= 0.0:
+            raise AllocationError(
+                "method 'learned' needs at least one candidate, seed and refined answer and a temperature "
+                f"from 0, got n_candidates={self.n_candidates}, n_seeds={self.n_seeds}, "
+                f"n_refined={self.n_refined}, temperature={self.temperature}"
+            )
+
+
+class Pipeline:
+    """Answers targets on layouts without failures; every array is numpy's."""
+
+    def __init__(self, weights: LearnedWeights, settings: Settings) -> None:
+        """Take over trained weights."""
+        self.settings, self.normalization = settings, weights.normalization
+        self.network = NumpyNetwork(weights.network, weights.heads, weights.n_components)
+        fin = LearnedFin(weights.surrogate, weights.reference, weights.force_unit)
+        std = self.normalization.std
+        self.prepare = lru_cache(maxsize=128)(lambda layout: prepare(layout, fin, std))
+
+    def solve(
+        self, prepared: Prepared, targets: Array, seed: int, previous: Array | None
+    ) -> tuple[Pool, Proposal]:
+        """Refined answers, best first, to a few targets (N, 6), and the network's raw proposal."""
+        std, settings = self.normalization.std, self.settings
+        target = targets / std
+        centred = target - self.normalization.mean / std
+        proposal = propose(
+            self.network, prepared, centred, target, settings.n_candidates, settings.temperature, seed
+        )
+        if previous is None:
+            return self._descend(prepared, target, proposal, self._seeds(prepared, proposal)), proposal
+        # The fins turn as little as the target allows, those at rest towards where they would be cheapest.
+        seeds = self._seeds(prepared, proposal)
+        aim = self._descend(prepared, target, proposal, seeds).command[0, 0, :, 2]
+        kept = planar_thrust(prepared.commands, previous)
+        seeds = np.concatenate([kept[None, None], seeds], axis=1)
+        for width in TURNS:
+            near = turn_little(prepared, previous, aim, width)
+            pool = self._descend(near, target, proposal, seeds, steady=True)
+            if pool.error[0, 0] <= TOLERANCE:
+                break
+        # Arcs that pass the seam are brought back inside the fin's own limits.
+        return pool._replace(command=prepared.commands.clamp(pool.command)), proposal
+
+    def _descend(
+        self, prepared: Prepared, target: Array, proposal: Proposal, seeds: Array, steady: bool = False
+    ) -> Pool:
+        """Search from thrust seeds (N, S, n), refine, and insist where that did not reach the target."""
+        command = self._search(prepared, target, seeds, steady)
+        pool = self._refine(prepared, target, command, self.settings.refine_steps, steady)
+        for steps, extra in PATIENCE:
+            missed = pool.error[:, 0] > TOLERANCE
+            if not missed.any():
+                break
+            fresh = _fresh_starts(prepared, target[missed], proposal.command[missed], extra)
+            more = np.concatenate([pool.command[missed], fresh], axis=1)
+            longer = self._refine(prepared, target[missed], more, steps)
+            for kept, new in zip(pool, longer, strict=True):
+                kept[missed] = new[:, : kept.shape[1]]
+        return pool
+
+    def _seeds(self, prepared: Prepared, proposal: Proposal) -> Array:
+        """Thrust seeds (N, S, n): the best candidate of each component, and sub-layouts."""
+        score = proposal.error * proposal.error + self.settings.gamma * proposal.energy
+        chosen = _best_of_each_component(proposal.component, score, self.settings.n_seeds)
+        seeds = proposal.thrust[np.arange(len(score))[:, None], chosen].astype(np.float64)
+        if not self.settings.subsets:
+            return seeds
+        shared = np.broadcast_to(prepared.subsets, (len(score), *prepared.subsets.shape))
+        return np.concatenate([seeds, shared], axis=1)
+
+    def _search(self, prepared: Prepared, target: Array, thrust: Array, steady: bool) -> Array:
+        """Cheapest commands (N, n_refined, n, 3) reached from thrust seeds (N, S, n).
+
+        With `steady`, the first seed is where the robot is; what it leads to stays first.
+        """
+        rows, n_seeds, n = thrust.shape
+        flat = np.repeat(target, n_seeds, axis=0)
+        steps = self.settings.search_steps or (4 if n < 6 else 12)
+        planar = force_space.descend(prepared.planar, flat, thrust.reshape(-1, n), steps)
+        command, energy = force_space.realize(prepared.planar, planar)
+        error = np.einsum("ri,ri->r", planar.residual, planar.residual)
+        score = np.where(error > PROMISING**2, INEXACT * (1.0 + error), energy).reshape(rows, n_seeds)
+        if steady:
+            score[:, 0] = -1.0
+        kept = np.argsort(score, axis=1)[:, : self.settings.n_refined] + np.arange(rows)[:, None] * n_seeds
+        return command[kept]
+
+    def _refine(
+        self, prepared: Prepared, target: Array, command: Array, steps: int, steady: bool = False
+    ) -> Pool:
+        """Refined commands (N, P, n, 3), best first: the cheapest exact one, or the most exact one.
+
+        With `steady`, the first command is how the robot moves now; another must save the share
+        `SWITCH_GAIN` of its energy to take its place.
+        """
+        rows, p, n, _ = command.shape
+        repeated = np.repeat(target, p, axis=0)
+        refined = refine(prepared.commands, repeated, command.reshape(-1, n, 3), steps)
+        energy = command_energy(refined.command, prepared.upper)
+        cost = energy.reshape(rows, p).copy()
+        if steady:
+            cost[:, 0] *= 1.0 - SWITCH_GAIN
+        error = refined.error.reshape(rows, p)
+        order = (
+            np.argsort(np.where(error > TOLERANCE, INEXACT * (1.0 + error), cost), axis=1)
+            + np.arange(rows)[:, None] * p
+        )
+        return Pool(refined.command[order], refined.wrench[order], refined.error[order], energy[order])
+
+
+def _fresh_starts(prepared: Prepared, target: Array, proposed: Array, count: int) -> Array:
+    """Commands (N, count, n, 3): all fins loaded evenly, raw candidates of the network, random ones.
+
+    Near the border of what a robot can do, all of the network's candidates may lie in one blind alley.
+    """
+    rows, _, n, _ = proposed.shape
+    if count == 0:
+        return np.empty((rows, 0, n, 3))
+    even, _ = force_space.realize(prepared.planar, force_space.spread_evenly(prepared.planar, target))
+    raw = proposed[:, : count // 2].astype(np.float64)
+    lower, upper = prepared.commands.lower, prepared.commands.upper
+    unit = np.random.default_rng(0).random((count - 1 - raw.shape[1], n, 3))
+    spread = np.broadcast_to(lower + unit * (upper - lower), (rows, *unit.shape))
+    return prepared.commands.clamp(np.concatenate([even[:, None], raw, spread], axis=1))
+
+
+class Pool(NamedTuple):
+    """P refined answers to each of N targets, best first."""
+
+    command: Array
+    """(N, P, n, 3)."""
+    wrench: Array
+    """Normalized wrench (N, P, 6) by the surrogate."""
+    error: Array
+    """Normalized error (N, P) by the surrogate."""
+    energy: Array
+    """(N, P)."""
+
+
+def _best_of_each_component(component: NDArray[np.int64], score: Array, n_seeds: int) -> NDArray[np.int64]:
+    """Indices (N, n_seeds) of the best candidates, at most one from each mixture component.
+
+    At low temperature the samples of one component lie close together and would all descend to the
+    same allocation.
+    """
+    rows = np.arange(len(score))[:, None]
+    worst_first = np.argsort(-score, axis=1)
+    best = np.zeros((len(score), int(component.max()) + 1), dtype=np.int64)
+    # Later assignments win, so the best candidate of each component is what stays.
+    best[rows, component[rows, worst_first]] = worst_first
+    order = np.argsort(score[rows, best], axis=1)[:, :n_seeds]
+    return best[rows, order]
