@@ -43,7 +43,7 @@ def test_reruns_land_inside(kind: str) -> None:
 
     seen = [look(seed) for seed in range(24)]
     inside = [interval.holds(value) for value, _ in seen for _, interval in seen]
-    assert np.mean(inside) > 0.85
+    assert np.mean(inside) > (0.8 if kind == "p90" else 0.88)  # tails of few layouts are narrow
 
 
 def test_no_failure_is_no_proof() -> None:
