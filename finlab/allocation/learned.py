@@ -54,6 +54,7 @@ class LearnedAllocator(Allocator):
             CheckpointError: the checkpoint's networks are of another kind.
         """
         self.settings = Settings(**settings)
+        self.trained = None if isinstance(weights, LearnedWeights) else weights
         self.weights = weights if isinstance(weights, LearnedWeights) else weights_of(weights)
         self.checkpoint = self.weights.checkpoint
         self.normalization = self.weights.normalization
