@@ -1,4 +1,4 @@
-"""`finlab export`: write the layout graph file that a robot takes home."""
+"""`finlab export`: write what a robot takes home, the whole bundle or the layout graph file alone."""
 
 from pathlib import Path
 from typing import Annotated
@@ -8,26 +8,49 @@ from tyro.conf import Positional, UseAppendAction, arg
 
 def export(
     layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
-    output: Annotated[Path, arg(metavar="FILE.graph.json", aliases=["-o"])],
+    output: Annotated[Path, arg(metavar="DIR|FILE.graph.json", aliases=["-o"])],
+    zip: bool = False,
     failed: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = (),
     checkpoint: Annotated[str, arg(metavar="NAME|FOLDER")] = "default",
 ) -> None:
-    """Write the layout graph for deployment: fins, features, normalization and a self-test.
+    """Write the deployment bundle: layout graph, networks in ONNX, README and checksums.
 
     Args:
         layout: layout file, layout graph file, or the name of a shipped layout.
-        output: file to write; its name ends in .graph.json.
+        output: folder to write; a name that ends in .graph.json takes the layout graph file alone.
+        zip: write one archive, DIR.zip, instead of a folder.
         failed: name of a fin that does not work.
-        checkpoint: trained checkpoint the graph is made for.
+        checkpoint: trained checkpoint the robot shall use.
     """
-    from finlab.cli.inputs import open_robot
-    from finlab.deploy import build_graph, write_graph
-    from finlab.deploy.graph_file import check_graph_name
+    from finlab.cli.inputs import GRAPH_SUFFIX, open_robot
+    from finlab.errors import FinlabError
 
-    check_graph_name(output)  # before the seconds it takes to load the network
-    robot = open_robot(layout)
+    graph_alone = output.name.endswith(GRAPH_SUFFIX)
+    if zip and graph_alone:
+        raise FinlabError(f"{output}: a graph file alone is not zipped; name a folder, or leave out --zip")
+    if output.suffix == ".json" and not graph_alone:
+        raise FinlabError(f"{output}: expected a file name that ends in {GRAPH_SUFFIX}, or a folder")
+    robot = open_robot(layout)  # before the seconds it takes to load the network
+    failed = robot.with_failed(failed)
     from finlab.allocation import load_allocator
 
-    graph = build_graph(robot.layout, load_allocator(checkpoint), failed=robot.with_failed(failed))
-    write_graph(graph, output)
-    print(f"{output}: {graph.layout.n_fins} fins, {len(graph.self_test)} self-tests, checkpoint {checkpoint}")
+    allocator = load_allocator(checkpoint)
+    if graph_alone:
+        from finlab.deploy import build_graph, write_graph
+
+        graph = build_graph(robot.layout, allocator, failed)
+        write_graph(graph, output)
+        n_tests = len(graph.self_test)
+        print(f"{output}: {robot.layout.n_fins} fins, {n_tests} self-tests, checkpoint {checkpoint}")
+        return
+    from finlab.deploy.bundle import make_bundle
+
+    bundle = make_bundle(robot.layout, allocator, failed)
+    if zip:
+        output = output if output.suffix == ".zip" else output.with_name(output.name + ".zip")
+        bundle.write_zip(output)
+    else:
+        bundle.write(output)
+    size = sum(map(len, bundle.files.values())) / 1e6
+    print(f"{output}: {robot.layout.n_fins} fins, {len(bundle.files)} files, {size:.2f} MB")
+    print(f"check it on the robot: finlab-runtime check {output.name}")

@@ -1,0 +1,189 @@
+"""Reading a bundle that may come from a stranger: bounded, checked before it is believed, never unpacked.
+
+Checksums come first. Then each file is read strictly, and an ONNX file is accepted only if it is, byte for
+byte, what finlab writes for the weights in it: whatever runs the file can only run our networks.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+import zipfile
+import zlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from finlab.allocation.weights import LearnedWeights
+from finlab.deploy import metadata
+from finlab.deploy.bundle import CHECKSUMS, FILES, GRAPH, NETWORK, README, SURROGATE, checksums
+from finlab.deploy.graph import LayoutGraph
+from finlab.deploy.graph_file import parse_graph
+from finlab.deploy.onnx.model import Model, model_bytes
+from finlab.deploy.onnx.network import network_model, network_weights
+from finlab.deploy.onnx.reading import MAX_BYTES, read_model
+from finlab.deploy.onnx.surrogate import surrogate_model, surrogate_weights
+from finlab.errors import DataError
+from finlab.layout import FinModelSpec
+
+LARGEST = {GRAPH: 1_000_000, README: 100_000, CHECKSUMS: 10_000}
+"""Largest size of the files that are no ONNX [bytes]."""
+REQUIRED = (GRAPH, NETWORK, SURROGATE, CHECKSUMS)
+
+
+@dataclass(frozen=True)
+class RobotBundle:
+    """What a robot needs, read and checked."""
+
+    graph: LayoutGraph
+    """The robot, and self-tests."""
+    weights: LearnedWeights
+    """The trained networks as arrays."""
+    settings: Mapping[str, Any]
+    """Fields of the pipeline's `Settings`."""
+    files: Mapping[str, bytes]
+    """The files as they are."""
+
+
+def read_bundle(path: str | os.PathLike[str]) -> RobotBundle:
+    """Read a bundle from its folder or zip archive.
+
+    Raises:
+        FinlabError: it cannot be read, was changed after it was written, or is not what finlab writes.
+    """
+    source = str(path)
+    files = _folder(Path(path), source) if os.path.isdir(source) else _archive(source)
+    return parse_bundle(files, source)
+
+
+def parse_bundle(files: Mapping[str, bytes], source: str = "bundle") -> RobotBundle:
+    """A bundle from the contents of its files; errors as in `read_bundle`."""
+    for name in REQUIRED:
+        if name not in files:
+            raise DataError(f"{source}: {name} is missing; a bundle is made by `finlab export LAYOUT -o DIR`")
+    _check_sums(files, source)
+    try:
+        text = files[GRAPH].decode()
+    except UnicodeDecodeError:
+        raise DataError(f"{source}: {GRAPH} is not UTF-8 text") from None
+    graph = parse_graph(text, f"{source}: {GRAPH}")
+    network, surrogate = (read_model(files[name], f"{source}: {name}") for name in (NETWORK, SURROGATE))
+    weights = _weights(network, surrogate, files, source)
+    _check_kinship(graph, network, surrogate, source)
+    settings = metadata.settings_of(network, f"{source}: {NETWORK}")
+    return RobotBundle(graph, weights, settings, dict(files))
+
+
+def _weights(network: Model, surrogate: Model, files: Mapping[str, bytes], source: str) -> LearnedWeights:
+    """The arrays in two models, each of which must be exactly what finlab writes for them."""
+    place = f"{source}: {NETWORK}"
+    metadata.check_format(network, metadata.NETWORK_FORMAT, place)
+    heads = metadata.whole_of(network, "heads", 64, place)
+    n_components = metadata.whole_of(network, "n_components", 256, place)
+    state = network_weights(network)
+    _check_same(lambda: network_model(state, heads, n_components, network.metadata), files[NETWORK], place)
+    place = f"{source}: {SURROGATE}"
+    metadata.check_format(surrogate, metadata.SURROGATE_FORMAT, place)
+    amplitude, frequency = metadata.numbers_of(surrogate, "reference", 2, place)
+    (unit,) = metadata.numbers_of(surrogate, "force_unit_n", 1, place)
+    if amplitude <= 0 or frequency <= 0 or unit <= 0:
+        raise DataError(f"{place}: reference and force_unit_n must be above 0")
+    physics = surrogate_weights(surrogate)
+    _check_same(
+        lambda: surrogate_model(physics, (amplitude, frequency), unit, surrogate.metadata),
+        files[SURROGATE],
+        place,
+    )
+    fin_model = metadata.value_of(surrogate, "fin_model", place)
+    if not isinstance(fin_model, dict) or "type" not in fin_model:
+        raise DataError(f"{place}: fin_model must name a fin model, got {fin_model!r:.40}")
+    FinModelSpec.from_values(fin_model)
+    return LearnedWeights(
+        network.metadata.get("checkpoint", ""),
+        state,
+        heads,
+        n_components,
+        physics,
+        (amplitude, frequency),
+        unit,
+        metadata.normalization_of(network, f"{source}: {NETWORK}"),
+        fin_model,
+    )
+
+
+def _check_same(make: Callable[[], Model], content: bytes, place: str) -> None:
+    """Refuse a file that is not what finlab writes for the weights that were found in it."""
+    try:
+        same = model_bytes(make()) == content
+    except (KeyError, ValueError, IndexError, TypeError, AttributeError, OverflowError):
+        same = False
+    if not same:
+        raise DataError(f"{place}: is not what this finlab writes for such weights; export it again")
+
+
+def _check_kinship(graph: LayoutGraph, network: Model, surrogate: Model, source: str) -> None:
+    """Refuse parts that come from different exports."""
+    for model, name in ((network, NETWORK), (surrogate, SURROGATE)):
+        if model.metadata.get("checkpoint_sha256") != graph.checkpoint_sha256:
+            raise DataError(f"{source}: {name} and {GRAPH} are of different checkpoints; export again")
+        statistics = metadata.normalization_of(model, f"{source}: {name}")
+        if not all(np.array_equal(a, b) for a, b in zip(statistics, graph.normalization, strict=True)):
+            raise DataError(f"{source}: {name} and {GRAPH} differ in normalization; export again")
+
+
+def _check_sums(files: Mapping[str, bytes], source: str) -> None:
+    rest = {name: content for name, content in files.items() if name != CHECKSUMS}
+    if checksums(rest) == files[CHECKSUMS]:
+        return
+    listed = {line[66:]: line[:64] for line in files[CHECKSUMS].decode("utf-8", "replace").splitlines()}
+    actual = {line[66:]: line[:64] for line in checksums(rest).decode().splitlines()}
+    wrong = next((name for name in actual if listed.get(name) != actual[name]), CHECKSUMS)
+    raise DataError(f"{source}: {wrong} does not fit {CHECKSUMS}; it was changed; copy the bundle again")
+
+
+def _folder(path: Path, source: str) -> dict[str, bytes]:
+    files = {}
+    try:
+        for name in FILES:
+            file = path / name
+            try:
+                about = file.lstat()
+            except FileNotFoundError:
+                continue
+            if not stat.S_ISREG(about.st_mode):
+                raise DataError(f"{source}: {name} is no regular file")
+            with file.open("rb") as stream:
+                files[name] = _bounded(stream.read, name, source)
+    except OSError as error:
+        raise DataError(f"{source}: cannot be read: {error.strerror}") from None
+    return files
+
+
+def _archive(source: str) -> dict[str, bytes]:
+    files: dict[str, bytes] = {}
+    try:
+        with zipfile.ZipFile(source) as archive:
+            entries = archive.infolist()
+            for entry in entries[: len(FILES) + 1]:
+                # Nothing is unpacked, so a name can do no harm; still, a bundle holds these files only.
+                if entry.filename not in FILES or entry.filename in files:
+                    raise DataError(f"{source}: holds {entry.filename!r:.60}, which is no part of a bundle")
+                with archive.open(entry) as stream:
+                    files[entry.filename] = _bounded(stream.read, entry.filename, source)
+    except OSError as error:
+        raise DataError(f"{source}: cannot be read: {error.strerror or error}") from None
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, ValueError, zlib.error) as error:
+        reason = str(error).splitlines()[0][:80] if str(error) else type(error).__name__
+        raise DataError(f"{source}: is neither a bundle's folder nor its zip archive ({reason})") from None
+    return files
+
+
+def _bounded(read: Callable[[int], bytes], name: str, source: str) -> bytes:
+    largest = LARGEST.get(name, MAX_BYTES)
+    content = read(largest + 1)
+    if len(content) > largest:
+        raise DataError(f"{source}: {name} is larger than {largest:,} bytes")
+    return content

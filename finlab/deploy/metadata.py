@@ -1,0 +1,131 @@
+"""What stands beside the weights in a bundle's ONNX files, and its way back. numpy only.
+
+Every value is text; numbers and lists are JSON. `format` and `version` say what the rest means.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from typing import Any
+
+import numpy as np
+
+import finlab
+from finlab.allocation.pipeline import Settings
+from finlab.allocation.weights import LearnedWeights
+from finlab.data.normalization import Normalization
+from finlab.deploy.graph import LayoutGraph
+from finlab.deploy.onnx.model import Model
+from finlab.errors import DataError
+
+VERSION = "1"
+"""Version of the bundle; a reader knows exactly one."""
+NETWORK_FORMAT, SURROGATE_FORMAT = "finlab-network", "finlab-surrogate"
+
+_MOST = {"n_candidates": 4096, "n_seeds": 256, "n_refined": 256, "search_steps": 100, "refine_steps": 100}
+"""Largest settings that a robot accepts from a file; more would keep it from answering."""
+
+
+def network_metadata(graph: LayoutGraph, weights: LearnedWeights, settings: Settings) -> dict[str, str]:
+    """What to write into `network.onnx`."""
+    return _shared(NETWORK_FORMAT, graph, weights) | {
+        "features": graph.feature_set,
+        "heads": str(weights.heads),
+        "n_components": str(weights.n_components),
+        "settings": json.dumps(asdict(settings)),
+        "fins": json.dumps(list(graph.layout.names), ensure_ascii=False),
+        "limits_lower": json.dumps([fin.limits.lower for fin in graph.layout.fins]),
+        "limits_upper": json.dumps([fin.limits.upper for fin in graph.layout.fins]),
+        "command": "amplitude [rad], frequency [Hz], zero direction [rad], each -1..1 between its limits",
+    }
+
+
+def surrogate_metadata(graph: LayoutGraph, weights: LearnedWeights) -> dict[str, str]:
+    """What to write into `surrogate.onnx`."""
+    return _shared(SURROGATE_FORMAT, graph, weights) | {
+        "reference": json.dumps(list(weights.reference)),
+        "force_unit_n": json.dumps(weights.force_unit),
+        "fin_model": json.dumps(dict(weights.fin_model), sort_keys=True),
+    }
+
+
+def _shared(form: str, graph: LayoutGraph, weights: LearnedWeights) -> dict[str, str]:
+    mean, std = weights.normalization
+    return {
+        "format": form,
+        "version": VERSION,
+        "finlab": finlab.__version__,
+        "layout": graph.layout.name,
+        "checkpoint": graph.checkpoint,
+        "checkpoint_sha256": graph.checkpoint_sha256,
+        "wrench_mean": json.dumps(mean.tolist()),
+        "wrench_std": json.dumps(std.tolist()),
+        "frame": "FLU, origin at the centre of gravity; wrench [Fx, Fy, Fz, Tx, Ty, Tz] in N and N m",
+    }
+
+
+def check_format(model: Model, form: str, source: str) -> None:
+    """Refuse a model of another format or version."""
+    found = model.metadata.get("format")
+    if found != form:
+        raise DataError(f"{source}: expected format {form}, got {found!r:.40}")
+    if model.metadata.get("version") != VERSION:
+        got = model.metadata.get("version")
+        raise DataError(f"{source}: this finlab reads version {VERSION}, got {got!r:.40}; export it again")
+
+
+def value_of(model: Model, key: str, source: str) -> Any:
+    """One value of the metadata, read as JSON; text that is no JSON is refused."""
+    if key not in model.metadata:
+        raise DataError(f"{source}: the metadata lacks {key!r}")
+    try:
+        return json.loads(model.metadata[key])
+    except (ValueError, RecursionError):
+        raise DataError(f"{source}: {key} is not readable") from None
+
+
+def whole_of(model: Model, key: str, most: int, source: str) -> int:
+    """A whole number from 1 to `most` in the metadata."""
+    value = value_of(model, key, source)
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
+        raise DataError(f"{source}: {key} must be a whole number from 1 to {most}, got {value!r:.40}")
+    return value
+
+
+def numbers_of(model: Model, key: str, count: int, source: str) -> tuple[float, ...]:
+    """Positive or negative finite numbers in the metadata."""
+    value = value_of(model, key, source)
+    values = value if isinstance(value, list) else [value]
+    plain = all(isinstance(item, int | float) and not isinstance(item, bool) for item in values)
+    if not plain or len(values) != count or not np.isfinite(np.array(values, dtype=np.float64)).all():
+        raise DataError(f"{source}: {key} must be {count} finite numbers, got {value!r:.40}")
+    return tuple(float(item) for item in values)
+
+
+def normalization_of(model: Model, source: str) -> Normalization:
+    """The statistics of the wrench."""
+    mean, std = (numbers_of(model, key, 6, source) for key in ("wrench_mean", "wrench_std"))
+    if min(std) <= 0:
+        raise DataError(f"{source}: wrench_std must be above 0, got {min(std):g}")
+    return Normalization(np.array(mean), np.array(std))
+
+
+def settings_of(model: Model, source: str) -> dict[str, Any]:
+    """Fields of `Settings`, checked one by one."""
+    values = value_of(model, "settings", source)
+    known = {field.name: field.default for field in fields(Settings)}
+    if not isinstance(values, Mapping) or set(values) != set(known):
+        raise DataError(f"{source}: settings must be {', '.join(known)}")
+    for name, value in values.items():
+        if name == "search_steps" and value is None:
+            continue
+        kind = bool if name == "subsets" else int if name in _MOST else (int, float)
+        if not isinstance(value, kind) or (name != "subsets" and isinstance(value, bool)):
+            raise DataError(f"{source}: settings: {name} cannot be {value!r:.40}")
+        if name != "subsets" and not 0 <= value <= _MOST.get(name, 100):
+            raise DataError(
+                f"{source}: settings: {name} must lie within 0..{_MOST.get(name, 100)}, got {value}"
+            )
+    return dict(values)
