@@ -85,6 +85,14 @@ class NumpyNetwork:
         std = np.exp(_LOG_STD_LOW + _LOG_STD_RANGE / (1.0 + np.exp(-raw[..., 4:])))
         return MixtureArrays(_softmax(logits), mean, std)
 
+    def attention(self, x: Array) -> Array:
+        """How much each fin looks at each (N, n, n) in the first layer, mean of its heads; rows sum to 1.
+
+        Args:
+            x: node features (N, n, F).
+        """
+        return np.asarray(self.graph[0].attention(x)[0].mean(-1))
+
 
 class _Graph:
     """One dense GATv2 layer."""
@@ -102,12 +110,16 @@ class _Graph:
             self.score[head * attention.shape[1] : (head + 1) * attention.shape[1], head] = attention[head]
         self.bias = w[f"{name}.bias"]
 
-    def __call__(self, x: Array) -> Array:
-        batch, n, _ = x.shape
+    def attention(self, x: Array) -> tuple[Array, Array]:
+        """Weights (N, n, n, heads) with which each fin looks at each, and what it sees (N, n, width)."""
         both = _apply(self.both, x)
         source, target = both[..., : self.width], both[..., self.width :]
         pair = source[:, None] + target[:, :, None]
-        weight = _softmax(np.maximum(pair, np.float32(0.2) * pair) @ self.score, axis=2)  # (N, i, j, heads)
+        return _softmax(np.maximum(pair, np.float32(0.2) * pair) @ self.score, axis=2), source
+
+    def __call__(self, x: Array) -> Array:
+        batch, n, _ = x.shape
+        weight, source = self.attention(x)
         split = source.reshape(batch, n, self.heads, -1).transpose(0, 2, 1, 3)
         out = weight.transpose(0, 3, 1, 2) @ split
         return out.transpose(0, 2, 1, 3).reshape(batch, n, self.width) + self.bias
