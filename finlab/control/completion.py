@@ -1,0 +1,59 @@
+"""The axes that a controller leaves open: as near zero as the fins can hold them.
+
+A controller commands some axes of the wrench and asks for zero on the others. Few fins, or few that are left,
+may not be able to hold those zeros: two fins have four forces to choose for six axes. A target that asks for
+the impossible spoils what the controller wants, so the open axes are set to what the fins give with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.layout import Layout
+from finlab.layout.arrays import layout_effectiveness
+
+Array = NDArray[np.float64]
+
+AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+LEVER_M = 0.25
+"""Torques count as forces at this lever when open axes are traded against each other [m]; about U-CAT's."""
+RANK_TOLERANCE = 1e-6
+"""Singular values below this share of the largest count as zero."""
+
+
+class Completion:
+    """Wanted axes to whole wrenches, for one layout with some fins lost. Linear in the wanted axes."""
+
+    def __init__(self, layout: Layout, failed: Sequence[str], axes: Sequence[str]) -> None:
+        """Prepares for the working fins.
+
+        Args:
+            layout: the robot, lost fins included.
+            failed: names of lost fins; at least one is left.
+            axes: names of the wanted axes.
+
+        Raises:
+            LayoutError: an unknown name, or no fin is left.
+        """
+        scale = np.array([1.0, 1.0, 1.0, 1 / LEVER_M, 1 / LEVER_M, 1 / LEVER_M])
+        planar = layout_effectiveness(layout.without(failed) if failed else layout) * scale[:, None]
+        chosen = np.array([axis in axes for axis in AXES])
+        wanted, rest = planar[chosen], planar[~chosen]
+        left, values, right = np.linalg.svd(wanted)
+        rank = int((values > RANK_TOLERANCE * max(float(values[0]), 1e-9)).sum())
+        self.controllable = rank == len(wanted)
+        """Whether the working fins can give any small combination of the wanted axes."""
+        inverse = right[:rank].T @ np.diag(1.0 / values[:rank]) @ left[:, :rank].T
+        free = right[rank:].T
+        give = inverse - free @ np.linalg.pinv(rest @ free, rcond=RANK_TOLERANCE) @ rest @ inverse
+        scaled = planar @ give * scale[chosen] / scale[:, None]
+        self.matrix = np.zeros((6, 6))
+        """Wrench with the wanted axes filled in, to the whole wrench (6, 6)."""
+        self.matrix[:, chosen] = np.where(np.abs(scaled) < 1e-9, 0.0, scaled)
+
+    def __call__(self, wrench: Array) -> Array:
+        """The wrench (6,) whose wanted axes are asked for, whole."""
+        return self.matrix @ wrench

@@ -1,0 +1,36 @@
+"""Simulation of a robot that swims: body, fins, sensors, and the closed loop around an allocator.
+
+    swim = Swim(layout, finlab.load_allocator(), make_trajectory("lissajous"), failures=[("front_left", 30.0)])
+    log = swim.run()
+
+World: z up. Body: x forward, y left, z up. SI and radians.
+"""
+
+from finlab.sim.fin_motion import Servo
+from finlab.sim.log import SwimLog, Tick, load_log
+from finlab.sim.parameters import VehicleParameters, vehicle_parameters
+from finlab.sim.plants import PLANTS
+from finlab.sim.sensors import NO_NOISE, SensorSettings
+from finlab.sim.swim import Swim
+from finlab.sim.task import Cruise, Task
+from finlab.sim.trajectory import SHIPPED, Trajectory, make_trajectory
+from finlab.sim.vehicle import Vehicle
+
+__all__ = [
+    "NO_NOISE",
+    "PLANTS",
+    "SHIPPED",
+    "Cruise",
+    "SensorSettings",
+    "Servo",
+    "Swim",
+    "SwimLog",
+    "Task",
+    "Tick",
+    "Trajectory",
+    "Vehicle",
+    "VehicleParameters",
+    "load_log",
+    "make_trajectory",
+    "vehicle_parameters",
+]

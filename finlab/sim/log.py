@@ -1,0 +1,121 @@
+"""The record of a swim: one row per control tick, as arrays, in memory and in an NPZ file."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.errors import DataError
+
+Array = NDArray[Any]
+
+FORMAT = "finlab-swim"
+VERSION = 1
+
+
+class Tick(NamedTuple):
+    """What happened in one control period; N ticks of n fins make the columns of a `SwimLog`."""
+
+    time: float
+    """At the beginning of the period [s]."""
+    position: Array
+    """Position (3,) in the world, z up [m]."""
+    quaternion: Array
+    """Attitude (4,) as w, x, y, z, body to world."""
+    motion: Array
+    """Velocity (3,) [m/s] and angular rates (3,) [rad/s] in the body frame."""
+    reference: Array
+    """Where the robot should be at `time` (3,) [m]; NaN where the task does not say."""
+    reference_surge: float
+    """How fast it should be along x [m/s]."""
+    asked: Array
+    """Wrench (6,) that the controller asks for [N, N m], body frame."""
+    allocated: Array
+    """Wrench (6,) that the commands give once the fins have followed them, by the fin law [N, N m]."""
+    delivered: Array
+    """Wrench (6,) of the fins, mean over the period [N, N m]."""
+    command: Array
+    """Command (n, 3): amplitude [rad], frequency [Hz], zero direction [rad]; NaN for a lost fin."""
+    fin_motion: Array
+    """What the fins did at the end of the period (n, 3), in the same units."""
+    fin_angle: Array
+    """Angle of each fin (n,) at the end of the period [rad]."""
+    fin_force: Array
+    """Force of each fin (n, 3) in the body frame, mean over the period [N]."""
+    inertial_power: Array
+    """|I alpha omega| of each fin (n,), mean over the period [W]."""
+    torque_power: Array
+    """max(torque times speed, 0) of each fin (n,), mean over the period [W]."""
+    alive: Array
+    """Which fins work (n,)."""
+    solve_ms: float
+    """Time of the allocation [ms]."""
+
+
+@dataclass(frozen=True)
+class SwimLog:
+    """A whole swim: each column of `Tick` as an array with N rows, and what was swum."""
+
+    layout: str
+    """Name of the layout."""
+    fins: tuple[str, ...]
+    """Names of the fins, in the order of the columns."""
+    method: str
+    """Name of the allocation method."""
+    controller: str
+    """Name of the controller."""
+    task: str
+    """Name of the trajectory or cruise."""
+    plant: str
+    """How the fins' forces were simulated."""
+    seed: int
+    """Seed of the sensors' noise."""
+    columns: dict[str, Array]
+    """Column name, as in `Tick`, to array (N, ...)."""
+
+    def __getattr__(self, name: str) -> Array:
+        columns = self.__dict__.get("columns", {})
+        if name not in columns:
+            raise AttributeError(f"a swim log has no column {name!r}; it has {', '.join(columns)}")
+        column: Array = columns[name]
+        return column
+
+    @property
+    def n_ticks(self) -> int:
+        """How many ticks there are."""
+        return len(self.columns["time"])
+
+    def save(self, path: str | Path) -> None:
+        """Writes an NPZ file: one array per column, and `meta`, a JSON object with the rest."""
+        meta: dict[str, Any] = {"format": FORMAT, "version": VERSION}
+        meta |= {field.name: getattr(self, field.name) for field in fields(self) if field.name != "columns"}
+        with Path(path).open("wb") as file:
+            np.savez_compressed(file, meta=np.array(json.dumps(meta)), **self.columns)
+
+
+def log_of_ticks(ticks: list[Tick], **about: Any) -> SwimLog:
+    """The log of ticks in order; `about` holds the other fields of `SwimLog`."""
+    columns = {name: np.array([getattr(tick, name) for tick in ticks]) for name in Tick._fields}
+    return SwimLog(columns=columns, **about)
+
+
+def load_log(path: str | Path) -> SwimLog:
+    """Reads what `SwimLog.save` wrote.
+
+    Raises:
+        DataError: the file is missing, or no log of this version.
+    """
+    try:
+        with np.load(Path(path), allow_pickle=False) as file:
+            meta = json.loads(str(file["meta"]))
+            columns = {name: file[name] for name in Tick._fields}
+    except (OSError, ValueError, KeyError) as error:
+        raise DataError(f"{path}: expected a swim log written by finlab simulate: {error}") from None
+    if (meta.pop("format", None), meta.pop("version", None)) != (FORMAT, VERSION):
+        raise DataError(f"{path}: expected a swim log of version {VERSION}")
+    return SwimLog(columns=columns, **{**meta, "fins": tuple(meta["fins"])})
