@@ -1,0 +1,112 @@
+"""Jobs: pieces of work with their settings, run on all cores, each kept in the store when it is done."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, field
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from finlab.evaluation.report.work import WORK
+from finlab.evaluation.store import Result, Store
+
+
+@dataclass(frozen=True)
+class Job:
+    """One piece of work."""
+
+    name: str
+    """What it is, for people; leads the name of its file."""
+    work: str
+    """Key of `WORK`."""
+    settings: dict[str, Any]
+    """Arguments of the work that decide the result, plain values."""
+    prints: str
+    """Fingerprint of what was loaded: checkpoint or normalization."""
+    context: dict[str, Any] = field(default_factory=dict)
+    """Arguments that do not decide the result, such as the folder of a checkpoint."""
+    alone: bool = False
+    """Whether nothing may run beside it, because it measures time."""
+
+    @property
+    def key(self) -> dict[str, Any]:
+        """What the result depends on."""
+        return {"work": self.work, "prints": self.prints, **self.settings}
+
+    def done(self, store: Store) -> bool:
+        """Whether its result is there."""
+        return store.has(self.name, self.key)
+
+    def result(self, store: Store) -> Result:
+        """Its result; `DataError` if it is not there."""
+        return store.load(self.name, self.key)
+
+    def run(self, store: Store, commit: str) -> None:
+        """Do the work, unless it is done."""
+        arguments = {**self.settings, **self.context}
+        store.keep(self.name, self.key, lambda: WORK[self.work](**arguments), commit=commit)
+
+
+def run_jobs(jobs: Sequence[Job], store: Store, *, commit: str, processes: int | None = None) -> None:
+    """Run what is not done yet: together first, then one by one what measures time.
+
+    Args:
+        jobs: in any order; those listed first start first.
+        store: keeps each result as soon as it is there, so that a run that was stopped goes on.
+        commit: kept with the results.
+        processes: how many at once; the number of cores by default, 0 for this process alone.
+    """
+    left = [job for job in jobs if not job.done(store)]
+    together = [job for job in left if not job.alone]
+    bar = tqdm(total=len(left), unit="part", disable=None, file=sys.stderr)
+    processes = os.cpu_count() or 1 if processes is None else processes
+    with bar:
+        if processes == 0:
+            for job in together:
+                _show(bar, job)
+                job.run(store, commit)
+                bar.update()
+        elif together:
+            _run_pool(together, store.folder, commit, min(processes, len(together)), bar)
+        for job in left:
+            if job.alone:
+                _show(bar, job)
+                job.run(store, commit)
+                bar.update()
+
+
+def _run_pool(jobs: Sequence[Job], folder: Path, commit: str, processes: int, bar: tqdm[Any]) -> None:
+    # Fresh processes: a fork would copy the threads of torch and BLAS in whatever state they are.
+    pool = ProcessPoolExecutor(processes, mp_context=get_context("spawn"), initializer=_calm)
+    try:
+        waiting = {pool.submit(_run_one, job, folder, commit): job for job in jobs}
+        for done in as_completed(waiting):
+            done.result()
+            _show(bar, waiting[done])
+            bar.update()
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _calm() -> None:
+    """One thread for each process, and no bars of its own."""
+    import torch
+    from threadpoolctl import threadpool_limits
+
+    torch.set_num_threads(1)
+    threadpool_limits(1)
+    sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 - for the life of the process
+
+
+def _run_one(job: Job, folder: Path, commit: str) -> None:
+    job.run(Store(folder), commit)
+
+
+def _show(bar: tqdm[Any], job: Job) -> None:
+    bar.set_description(job.name)

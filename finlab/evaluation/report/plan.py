@@ -1,0 +1,179 @@
+"""Which jobs a report needs, by table. Sections look their results up here, by method, split or setting."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from finlab.evaluation.ablation import REFINEMENTS, VARIANTS
+from finlab.evaluation.entrants import FAST, SLOW, fingerprint, is_slow
+from finlab.evaluation.paper_figures import paper_figures
+from finlab.evaluation.report.jobs import Job
+from finlab.evaluation.report.sizes import Sizes
+from finlab.evaluation.splits import SPLITS
+from finlab.evaluation.temperature import PAPER_TEMPERATURE, TEMPERATURES
+from finlab.evaluation.training import CHANGES
+
+REFERENCE = "ipopt-32"
+"""Whose energies the others are measured by."""
+ENERGY_METHODS = ("learned", "paper", "analytic", "sqp", "multistart", "trf", "slsqp", "ipopt")
+"""Methods whose energies are compared with it."""
+LATENCY_METHODS = ("learned", "analytic", "qp", "sqp", "multistart", "paper", "trf", "slsqp", "ipopt")
+"""Methods that are timed side by side."""
+N_CANDIDATES = 64
+"""Candidates of the ablation, as in the paper."""
+N_SEEDS = 16
+"""Seeds per target in the comparison of seeds."""
+SCATTER_FINS, SCATTER_TARGETS = 4, 3
+"""Fins of the layout, and its targets, whose candidates are drawn before and after refinement."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All jobs of a report."""
+
+    energy: dict[str, Job] = field(default_factory=dict)
+    """By method; the reference is among them where it is installed."""
+    wrench: dict[tuple[str, str], Job] = field(default_factory=dict)
+    """By split and method."""
+    ablation: dict[tuple[str, str], Job] = field(default_factory=dict)
+    """By variant and refinement, of the paper's network."""
+    temperature: dict[float, Job] = field(default_factory=dict)
+    """By temperature."""
+    scatter: dict[str, Job] = field(default_factory=dict)
+    """One job, `paper`."""
+    seeds: dict[str, Job] = field(default_factory=dict)
+    """One job, `id`."""
+    training: dict[str, Job] = field(default_factory=dict)
+    """By change."""
+    latency: dict[str, Job] = field(default_factory=dict)
+    """One job, `calls`."""
+
+    def __iter__(self) -> Iterator[Job]:
+        """Every job once, the longest kinds first."""
+        jobs = (job for group in fields(self) for job in getattr(self, group.name).values())
+        yield from {job.name: job for job in jobs}.values()
+
+
+@dataclass(frozen=True)
+class Checkpoints:
+    """The checkpoints under test: names of shipped ones, or folders."""
+
+    learned: str | None = None
+    """Of method `learned`, which also gives the yardstick of the baselines."""
+    paper: str | None = None
+    """Of method `paper`."""
+
+    def of(self, method: str) -> str | None:
+        """The checkpoint of a method."""
+        return self.paper if method == "paper" else self.learned
+
+
+def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) -> Plan:
+    """The jobs of a report.
+
+    Args:
+        sizes: how much of everything.
+        seed: of all draws.
+        checkpoints: under test.
+        runs: folder for the small trainings.
+    """
+    casadi = importlib.util.find_spec("casadi") is not None
+    slow = [name for name in SLOW if casadi or name != "ipopt"]
+    names = [*FAST, *slow, *([REFERENCE] if casadi else [])]
+    prints = {name: fingerprint(name, checkpoints.of(name)) for name in names}
+    plan = Plan()
+
+    def job(name: str, work: str, entrant: str, **settings: Any) -> Job:
+        context = {"checkpoint": checkpoints.of(entrant)}
+        return Job(name, work, {"seed": seed, **settings}, prints[entrant], context)
+
+    layouts, targets = sizes.energy
+    for method in (REFERENCE, *ENERGY_METHODS):
+        if method in prints:
+            plan.energy[method] = job(
+                f"energy-{method}", "energy", method, method=method, layouts=layouts, targets=targets
+            )
+    for method in sorted(names, key=lambda name: name != "paper"):
+        for split in SPLITS:
+            if is_slow(method) and split == "id":
+                plan.wrench[split, method] = plan.energy[method]  # the same targets, and more of them
+                continue
+            layouts, targets = _size(sizes, split, method)
+            plan.wrench[split, method] = job(
+                f"wrench-{split}-{method}",
+                "wrench",
+                method,
+                split=split,
+                method=method,
+                layouts=layouts,
+                targets=targets,
+            )
+    layouts, targets = sizes.ablation
+    for refinement in REFINEMENTS:
+        for variant in VARIANTS:
+            plan.ablation[variant, refinement] = job(
+                f"ablation-{variant}-{refinement}",
+                "ablation",
+                "paper",
+                variant=variant,
+                refinement=refinement,
+                layouts=layouts,
+                targets=targets,
+                candidates=N_CANDIDATES,
+                temperature=PAPER_TEMPERATURE,
+            )
+    layouts, targets = sizes.temperature
+    for value in TEMPERATURES:
+        plan.temperature[value] = job(
+            f"temperature-{value:.3g}",
+            "temperature",
+            "paper",
+            temperature=value,
+            layouts=layouts,
+            targets=targets,
+        )
+    plan.scatter["paper"] = job("scatter", "scatter", "paper", fins=SCATTER_FINS, targets=SCATTER_TARGETS)
+    layouts, targets = sizes.seeds
+    plan.seeds["id"] = job("seeds", "seeds", "learned", layouts=layouts, targets=targets, candidates=N_SEEDS)
+    _add_training(plan, sizes, seed, prints["learned"] + prints["paper"], runs)
+    calls, budget_s = sizes.latency
+    methods = [name for name in LATENCY_METHODS if name in prints]
+    plan.latency["calls"] = Job(
+        "latency",
+        "latency",
+        {"seed": seed, "methods": methods, "calls": calls, "budget_s": budget_s},
+        prints["learned"] + prints["paper"],
+        {"checkpoint": checkpoints.learned, "paper_checkpoint": checkpoints.paper},
+        alone=True,
+    )
+    return plan
+
+
+def _size(sizes: Sizes, split: str, method: str) -> tuple[int, int]:
+    """Layouts and targets of a split, the paper's or another, for a fast or a slow method."""
+    if split in paper_figures()["wrench_tracking"]:
+        return (sizes.main[0], sizes.slow_main) if is_slow(method) else sizes.main
+    return sizes.slow_other if is_slow(method) else sizes.other
+
+
+def _add_training(plan: Plan, sizes: Sizes, seed: int, prints: str, runs: Path) -> None:
+    preset, steps, batch_size, _ = sizes.training
+    layouts, targets = sizes.seeds
+    for change in CHANGES:
+        settings = {
+            "change": change,
+            "preset": preset,
+            "steps": steps,
+            "batch_size": batch_size,
+            "layouts": layouts,
+            "targets": targets,
+            "seed": seed,
+        }
+        folder = runs / f"{change}-{preset}-{steps}x{batch_size}-seed{seed}"
+        plan.training[change] = Job(
+            f"training-{change}", "training", settings, prints, {"folder": str(folder)}
+        )

@@ -1,0 +1,83 @@
+"""How much of everything a report measures: `quick` in minutes, `full` at the paper's size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Numbers of cases of a report."""
+
+    name: str
+    """`quick`, `full` or `tiny` (tests)."""
+    main: tuple[int, int]
+    """Layouts, and targets on each, of the splits that the paper has."""
+    other: tuple[int, int]
+    """Layouts, and targets on each, of the other splits."""
+    slow_main: int
+    """First targets of each layout of `ood` for methods of a tenth of a second; on `id` they take those of
+    `energy`."""
+    slow_other: tuple[int, int]
+    """Layouts, and first targets of each, for those methods on the other splits."""
+    energy: tuple[int, int]
+    """Layouts of split `id`, and first targets of each, for the energies beside 32 starts of IPOPT."""
+    ablation: tuple[int, int]
+    """Layouts and targets of the ablation."""
+    temperature: tuple[int, int]
+    """Layouts and targets at each temperature."""
+    seeds: tuple[int, int]
+    """Layouts and targets of the comparison of seeds."""
+    latency: tuple[int, float]
+    """Timed calls of each method, and the seconds after which a slow one stops."""
+    training: tuple[str, int, int, int]
+    """Preset, optimizer steps and samples per step of each training, and how many seeds."""
+    closed_loop: int
+    """Seeds of the closed-loop runs."""
+
+
+SIZES = {
+    "tiny": Sizes(
+        "tiny",
+        main=(2, 3),
+        other=(2, 2),
+        slow_main=1,
+        slow_other=(1, 1),
+        energy=(2, 1),
+        ablation=(2, 2),
+        temperature=(2, 2),
+        seeds=(2, 2),
+        latency=(3, 0.5),
+        training=("smoke", 4, 32, 1),
+        closed_loop=1,
+    ),
+    "quick": Sizes(
+        "quick",
+        main=(40, 25),
+        other=(20, 10),
+        slow_main=1,
+        slow_other=(10, 1),
+        energy=(40, 1),
+        ablation=(20, 10),
+        temperature=(20, 2),
+        seeds=(20, 10),
+        latency=(60, 2.0),
+        training=("smoke", 300, 128, 1),
+        closed_loop=1,
+    ),
+    "full": Sizes(
+        "full",
+        main=(100, 1000),
+        other=(100, 100),
+        slow_main=1,
+        slow_other=(50, 1),
+        energy=(100, 10),
+        ablation=(100, 20),
+        temperature=(100, 2),
+        seeds=(40, 25),
+        latency=(200, 20.0),
+        training=("default", 600, 256, 1),
+        closed_loop=3,
+    ),
+}
+"""Name -> sizes."""
