@@ -41,6 +41,7 @@ def train_allocator(
     learning_rate: float | None = None,
     stop_after: int | None = None,
     overrides: dict[str, Any] | None = None,
+    network_overrides: dict[str, Any] | None = None,
 ) -> Checkpoint:
     """Train a preset's allocator network and write a whole checkpoint folder.
 
@@ -57,8 +58,10 @@ def train_allocator(
         learning_rate: peak learning rate instead of the preset's.
         stop_after: stop (resumable) after so many steps.
         overrides: other fields of `AllocatorTraining` to change, for ablations.
+        network_overrides: fields of `NetworkConfig` to change, for ablations.
     """
     recipe = get_preset(preset)
+    recipe = replace(recipe, network=replace(recipe.network, **(network_overrides or {})))
     base = load_checkpoint(resolve_checkpoint(surrogate))
     changes = {"steps": steps, "batch_size": batch_size, "learning_rate": learning_rate, **(overrides or {})}
     training = replace(recipe.allocator_training, **{k: v for k, v in changes.items() if v is not None})
