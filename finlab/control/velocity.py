@@ -17,7 +17,7 @@ class VelocityController:
     """Surge PID on the filtered DVL speed, depth PID on pressure, damping of the yaw rate, saturation."""
 
     name = "velocity"
-    axes = ("Fx", "Fz", "Tz")
+    axes: tuple[str, ...] = ("Fx", "Fz", "Tz")
     lead_s = 0.0
 
     def __init__(self, gains: VelocityGains | None = None) -> None:

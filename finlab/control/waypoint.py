@@ -27,7 +27,7 @@ class WaypointController:
     """
 
     name = "waypoint"
-    axes = ("Fx", "Fz", "Tz")
+    axes: tuple[str, ...] = ("Fx", "Fz", "Tz")
 
     def __init__(self, gains: WaypointGains | None = None) -> None:
         """Takes gains; the shipped file `waypoint` by default."""

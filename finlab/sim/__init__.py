@@ -1,6 +1,6 @@
 """Simulation of a robot that swims: body, fins, sensors, and the closed loop around an allocator.
 
-    swim = Swim(layout, finlab.load_allocator(), make_trajectory("lissajous"), failures=[("front_left", 30.0)])
+    swim = Swim(layout, finlab.load_allocator(), make_trajectory("circle"), failures=[("front_left", 30.0)])
     log = swim.run()
 
 World: z up. Body: x forward, y left, z up. SI and radians.

@@ -13,8 +13,8 @@ from finlab.sim.fin_motion import FinMotion
 Array = NDArray[np.float64]
 
 FIN_INERTIA = 0.0097
-"""Of a fin about its shaft [kg m^2]: U-CAT's robot description has a plate of 0.8 kg, 0.22 x 0.10 x 0.02 m, its
-centre 0.09 m from the shaft."""
+"""Of a fin about its shaft [kg m^2]: U-CAT's robot description has a plate of 0.8 kg, 0.22 x 0.10 x 0.02 m,
+its centre 0.09 m from the shaft."""
 
 
 class FinPower(NamedTuple):
@@ -29,7 +29,8 @@ class FinPower(NamedTuple):
 def fin_power(motion: FinMotion, shape: FinShape | None = None, inertia: float = FIN_INERTIA) -> FinPower:
     """The power of fins as they move now.
 
-    The torque is that of a rigid plate in still water: (I + m L^3/3) theta'' + 1/8 rho Cd W L^4 theta' |theta'|.
+    The torque is that of a rigid plate in still water:
+    (I + m L^3/3) theta'' + 1/8 rho Cd W L^4 theta' |theta'|.
     """
     plate = FinShape() if shape is None else shape
     speed, acceleration = motion.speed, motion.acceleration

@@ -6,9 +6,9 @@ large-amplitude elongated body (M. J. Lighthill, Proc. R. Soc. Lond. B 179, 1971
     F = -d/dt (m integral w n ds) + [m w u n - 1/2 m w^2 t] at the tip - integral 1/2 rho Cd W w |w| n ds
 
 with w and u the normal and tangential speed of the fin, n and t its normal and tangent (outwards) and m the
-water moved per metre. The tip's angle follows from the torques about its joint. Thrust comes from the wake and
-the bending alone; no fin law enters. Over the fin law's range it is from a third less to a third more, rising
-faster with the frequency.
+water moved per metre. The tip's angle follows from the torques about its joint. Thrust comes from the wake
+and the bending alone; no fin law enters. Over the fin law's range it is from a third less to a third more,
+rising faster with the frequency.
 """
 
 from __future__ import annotations

@@ -95,7 +95,7 @@ class SwimLog:
         meta: dict[str, Any] = {"format": FORMAT, "version": VERSION}
         meta |= {field.name: getattr(self, field.name) for field in fields(self) if field.name != "columns"}
         with Path(path).open("wb") as file:
-            np.savez_compressed(file, meta=np.array(json.dumps(meta)), **self.columns)
+            np.savez_compressed(file, allow_pickle=False, meta=np.array(json.dumps(meta)), **self.columns)
 
 
 def log_of_ticks(ticks: list[Tick], **about: Any) -> SwimLog:

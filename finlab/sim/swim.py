@@ -80,9 +80,7 @@ class Swim:
         self.layout = layout
         self.allocator = allocator
         self.task = task
-        if controller is None:
-            controller = VelocityController() if isinstance(task, Cruise) else WaypointController()
-        self.controller = controller
+        self.controller = _usual_controller(task) if controller is None else controller
         self.plant = plant
         self.seed = seed
         self.vehicle = Vehicle(vehicle_parameters(layout), current)
@@ -98,13 +96,13 @@ class Swim:
         self._completion: dict[tuple[str, ...], Completion] = {}
         self._ticks: list[Tick] = []
         self._command: Array | None = None
-        self.period_s = controller.period_s
+        self.period_s = self.controller.period_s
         """Length of a step [s]."""
         start, heading = task.start()
         self.state = np.zeros(STATE_SIZE)
         """State (13,): position (world), quaternion (w, x, y, z), velocity and rates (body); SI."""
         self.state[:3], self.state[3:7] = start, quaternion_of_yaw(heading)
-        controller.reset()
+        self.controller.reset()
 
     @property
     def time(self) -> float:
@@ -212,11 +210,7 @@ class Swim:
             self.fins.step(command, dt)
             force = np.einsum("nij,nj->ni", self._axes, self._fin_force.step(self.fins, dt))
             force[~alive] = 0.0
-            x, y, z = self._position.T
-            fx, fy, fz = force.T
-            wrench = np.array(
-                [fx.sum(), fy.sum(), fz.sum(), y @ fz - z @ fy, z @ fx - x @ fz, x @ fy - y @ fx]
-            )
+            wrench = _wrench(force, self._position)
             self.state = self.vehicle.step(self.state, wrench.tolist(), dt)
             if k + 1 < n_steps:  # the sample at the end belongs to the next period
                 self._sensors.measure(time + (k + 1) * dt, self.state)
@@ -246,6 +240,18 @@ class Swim:
             alive=alive,
             solve_ms=solve_ms,
         )
+
+
+def _usual_controller(task: Task) -> Controller:
+    """Velocity and depth for a cruise, waypoints for all else."""
+    return VelocityController() if isinstance(task, Cruise) else WaypointController()
+
+
+def _wrench(force: Array, position: Array) -> Array:
+    """The wrench (6,) of forces (n, 3) [N] at positions (n, 3) [m]."""
+    x, y, z = position.T
+    fx, fy, fz = force.T
+    return np.array([*force.sum(axis=0), y @ fz - z @ fy, z @ fx - x @ fz, x @ fy - y @ fx])
 
 
 def _geometry(layout: Layout) -> tuple[Array, Array]:
