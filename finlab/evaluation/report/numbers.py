@@ -1,0 +1,68 @@
+"""Numbers as people read them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+
+def error(value: float) -> str:
+    """Two significant digits: 0.00029, 0.086, 1.8, 3.1e-7."""
+    if value == 0:
+        return "0"
+    if not math.isfinite(value):
+        return "–"
+    if abs(value) < 9.5e-5:
+        mantissa, _, power = f"{value:.1e}".partition("e")
+        return f"{mantissa}e{int(power)}"
+    digits = max(0, 1 - math.floor(math.log10(abs(value))))
+    return f"{value:.{digits}f}"
+
+
+def three(value: float) -> str:
+    """Three significant digits: 2.86, 0.0857, 178."""
+    if value == 0 or not math.isfinite(value):
+        return "0" if value == 0 else "–"
+    digits = max(0, 2 - math.floor(math.log10(abs(value))))
+    return f"{value:.{digits}f}" if digits < 7 else f"{value:.2e}"
+
+
+def share(value: float) -> str:
+    """As a percentage, with more digits the nearer it is to 100: 48.8 %, 99.97 %, 100 %."""
+    if value >= 1.0:
+        return "100 %"
+    missing = 100 * (1 - value)
+    digits = 1 if missing >= 1 else min(4, 1 - math.floor(math.log10(missing)))
+    return f"{100 * value:.{digits}f} %"
+
+
+def count(value: int) -> str:
+    """Thousands with commas."""
+    return f"{value:,}"
+
+
+def factor(value: float) -> str:
+    """How many times: 1.4, 12, 300."""
+    return f"{value:.1f}" if value < 9.95 else f"{float(f'{value:.2g}'):,.0f}"
+
+
+def ratio(value: float) -> str:
+    """Three decimals: 1.002."""
+    return f"{value:.3f}"
+
+
+def metres(value: float) -> str:
+    """Four decimals, as the paper prints them."""
+    return f"{value:.4f}"
+
+
+def text(value: Any) -> str:
+    """As it is."""
+    return str(value)
+
+
+FORMATS: dict[str, Callable[[Any], str]] = {
+    function.__name__: function for function in (error, three, share, count, factor, ratio, metres, text)
+}
+"""Name -> how a value is shown."""

@@ -1,0 +1,115 @@
+"""One look for all pictures: Okabe-Ito colours, one for each method wherever it appears."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from finlab.errors import DataError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+BLUE, ORANGE, GREEN, SKY = "#0072B2", "#E69F00", "#009E73", "#56B4E9"
+VERMILION, PURPLE, YELLOW, BLACK, GREY = "#D55E00", "#CC79A7", "#F0E442", "#000000", "#8A949E"
+INK, SOFT, LINE = "#1c2733", "#5c6b7a", "#e3e8ed"
+
+COLOURS = {
+    "learned": BLUE,
+    "paper": ORANGE,
+    "analytic": GREEN,
+    "sqp": PURPLE,
+    "qp": GREY,
+    "multistart": SKY,
+    "trf": VERMILION,
+    "slsqp": "#B8A800",
+    "ipopt": BLACK,
+    "ipopt-32": BLACK,
+}
+"""Method -> colour."""
+WIDTH = 9.6
+"""Inches of a picture across the page."""
+FONT = 9.5
+"""Points."""
+
+
+@contextmanager
+def picture(rows: int = 1, columns: int = 1, *, height: float = 3.2, **options: Any) -> Iterator[Picture]:
+    """Axes to draw on, in the common look.
+
+    Args:
+        rows: of axes.
+        columns: of axes.
+        height: of the picture in inches.
+        options: of `Figure.subplots`.
+
+    Raises:
+        DataError: matplotlib is not installed.
+    """
+    try:
+        import matplotlib
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise DataError("pictures need matplotlib; run: pip install 'finlab[plot]'") from error
+    with matplotlib.rc_context(_LOOK):
+        figure = Figure(figsize=(WIDTH, height), layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.subplots(rows, columns, squeeze=False, **options)
+        yield Picture(figure, [axis for line in axes for axis in line])
+
+
+class Picture:
+    """A figure and its axes, in reading order."""
+
+    def __init__(self, figure: Figure, axes: list[Axes]) -> None:
+        self.figure, self.axes = figure, axes
+
+    def legend(self, **options: Any) -> None:
+        """One legend for all axes, above them; a name that several share is shown once."""
+        found: dict[str, Any] = {}
+        for axis in self.axes:
+            for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
+                found.setdefault(label, handle)
+        settings = {"loc": "outside upper left", "ncols": min(len(found), 10), "frameon": False, **options}
+        self.figure.legend(list(found.values()), list(found), **settings)
+
+    def svg(self, name: str) -> str:
+        """The picture; `name` keeps its identifiers apart from those of other pictures on the page."""
+        import matplotlib
+
+        text = io.StringIO()
+        with matplotlib.rc_context({**_LOOK, "svg.hashsalt": name}):
+            self.figure.savefig(text, format="svg", dpi=160, metadata={"Date": None, "Creator": None})
+        return text.getvalue()
+
+
+def clean(axis: Axes, *, grid: str = "both") -> None:
+    """Hairlines behind the data, no box around it."""
+    axis.grid(True, axis=grid, color=LINE, linewidth=0.7)  # type: ignore[arg-type]
+    axis.set_axisbelow(True)
+    for side in ("top", "right"):
+        axis.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        axis.spines[side].set_color("#b8c2cc")
+    axis.tick_params(colors=SOFT, labelcolor=INK, length=3, width=0.7, which="both")
+
+
+_LOOK: dict[str, Any] = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": FONT,
+    "axes.titlesize": FONT + 0.5,
+    "axes.titlelocation": "left",
+    "axes.titleweight": "bold",
+    "axes.labelsize": FONT,
+    "axes.labelcolor": SOFT,
+    "axes.titlecolor": INK,
+    "text.color": INK,
+    "legend.fontsize": FONT,
+    "lines.linewidth": 1.8,
+    "svg.fonttype": "none",
+}
