@@ -95,7 +95,9 @@ def _table(table: Table) -> str:
             cells.append(f"<td{names.get(column.key, '')}>{_inline(big)}{below}</td>")
         kind = f' class="{row["_kind"]}"' if "_kind" in row else ""
         lines.append(f"<tr{kind}>{''.join(cells)}</tr>")
-    return f'<div class="table"><table><thead><tr>{head}</tr></thead><tbody>{"".join(lines)}</tbody></table></div>'
+    body = "".join(lines)
+    whole = f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody>"
+    return f'<div class="table"><table>{whole}</table></div>'
 
 
 def _inline(text: str) -> str:

@@ -57,17 +57,8 @@ def training_bars(rows: Sequence[dict[str, Any]], titles: Mapping[str, str]) -> 
             value = [row[key] for row in rows]
             low = [max(0.0, row[key] - row[f"{key}_interval"][0]) for row in rows]
             high = [max(0.0, row[f"{key}_interval"][1] - row[key]) for row in rows]
-            place = range(len(rows))
-            axis.errorbar(
-                value,
-                place,
-                xerr=[low, high],
-                fmt="o",
-                color=colour,
-                markersize=6,
-                elinewidth=1.3,
-                label=name,
-            )
+            style: dict[str, Any] = {"color": colour, "markersize": 6, "elinewidth": 1.3, "label": name}
+            axis.errorbar(value, range(len(rows)), xerr=[low, high], fmt="o", **style)
         axis.set(xscale="log", xlabel="mean normalized error, by the plant")
         axis.set_yticks(range(len(rows)), [titles[row["change"]] for row in rows])
         axis.invert_yaxis()

@@ -98,7 +98,7 @@ def clean(axis: Axes, *, grid: str = "both") -> None:
     axis.tick_params(colors=SOFT, labelcolor=INK, length=3, width=0.7, which="both")
 
 
-_LOOK: dict[str, Any] = {
+_LOOK: Any = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
     "font.size": FONT,

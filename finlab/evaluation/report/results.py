@@ -1,0 +1,120 @@
+"""What the jobs of a plan gave, as the sections want it."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.evaluation.ablation import ablation_row
+from finlab.evaluation.metrics import energy_rows
+from finlab.evaluation.recheck import recheck
+from finlab.evaluation.records import Records, records_of_columns
+from finlab.evaluation.report.jobs import Job
+from finlab.evaluation.report.plan import REFERENCE, Plan
+from finlab.evaluation.splits import SPLITS, make_split
+from finlab.evaluation.store import Columns, Store, rows_of_columns
+from finlab.evaluation.temperature import temperature_row
+from finlab.evaluation.training import training_row
+
+Row = dict[str, Any]
+
+
+class Results:
+    """Records and rows by table; everything is computed from the files of the store."""
+
+    def __init__(self, plan: Plan, store: Store, sigma: NDArray[np.float64]) -> None:
+        """Look into a store.
+
+        Args:
+            plan: the jobs.
+            store: their results.
+            sigma: the yardstick of the error, per axis (6,).
+        """
+        self.plan, self.store, self.sigma = plan, store, sigma
+
+    def columns(self, job: Job) -> Columns:
+        """The arrays of a job."""
+        return job.result(self.store).columns
+
+    @cached_property
+    def wrench(self) -> dict[str, dict[str, Records]]:
+        """Split -> method -> records."""
+        found: dict[str, dict[str, Records]] = {split: {} for split in SPLITS}
+        for (split, method), job in self.plan.wrench.items():
+            found[split][method] = records_of_columns(self.columns(job))
+        return found
+
+    @cached_property
+    def energy(self) -> dict[str, Records]:
+        """Method -> records on the targets of the comparison of energies."""
+        return {name: records_of_columns(self.columns(job)) for name, job in self.plan.energy.items()}
+
+    @cached_property
+    def energy_rows(self) -> list[Row]:
+        """Rows of the comparison of energies; none where the reference is not installed."""
+        if REFERENCE not in self.energy:
+            return []
+        reference = self.energy[REFERENCE]
+        return [
+            row for name, part in self.energy.items() for row in energy_rows(part, reference, method=name)
+        ]
+
+    @cached_property
+    def recheck_rows(self) -> list[Row]:
+        """Each method's wins over the reference, computed again."""
+        job = self.plan.energy[REFERENCE]
+        cases = make_split("id", job.settings["layouts"], job.settings["targets"], job.settings["seed"])
+        rows = []
+        for name, other in self.plan.energy.items():
+            if name != REFERENCE:
+                command = self.columns(other)["command"]
+                found = recheck(cases, self.energy[name], command, self.energy[REFERENCE], self.sigma)
+                rows.append({"method": name, **found})
+        return rows
+
+    @cached_property
+    def ablation_rows(self) -> list[Row]:
+        """Each variant and refinement, scored by plant and surrogate."""
+        rows = []
+        for (variant, refinement), job in self.plan.ablation.items():
+            columns = self.columns(job)
+            by_plant = records_of_columns(columns)
+            believed = {
+                "err_norm": columns["surrogate_err_norm"],
+                "err_phys": columns["surrogate_err_phys"],
+            }
+            by_surrogate = records_of_columns({**columns, **believed})
+            for scored_by, records in (("plant", by_plant), ("surrogate", by_surrogate)):
+                rows.append(ablation_row(variant, refinement, scored_by, records, float(columns["call_s"])))
+        return rows
+
+    @cached_property
+    def temperature_rows(self) -> list[Row]:
+        """One row per temperature."""
+        return [temperature_row(value, self.columns(job)) for value, job in self.plan.temperature.items()]
+
+    @cached_property
+    def scatter(self) -> dict[str, NDArray[Any]]:
+        """Candidates of the middle one of the drawn targets, before and after refinement."""
+        columns = self.columns(self.plan.scatter["paper"])
+        chosen = columns["target"] == int(np.median(np.unique(columns["target"])))
+        return {name: values[chosen] for name, values in columns.items()}
+
+    @cached_property
+    def seed_rows(self) -> list[Row]:
+        """Rows of the comparison of seeds."""
+        return rows_of_columns(self.columns(self.plan.seeds["id"]))
+
+    @cached_property
+    def latency_rows(self) -> list[Row]:
+        """Rows of the comparison of times, the fastest first."""
+        rows = rows_of_columns(self.columns(self.plan.latency["calls"]))
+        return sorted(rows, key=lambda row: row["p50_ms"])
+
+    @cached_property
+    def training_rows(self) -> list[Row]:
+        """One row per small training."""
+        return [training_row(name, self.columns(job)) for name, job in self.plan.training.items()]

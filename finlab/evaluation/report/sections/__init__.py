@@ -1,0 +1,1 @@
+"""The report's sections: results in, blocks of the document out."""
