@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.errors import FinlabError
 from finlab.layout import Fin, Layout
@@ -14,6 +15,8 @@ from webapp.state import MAX_FINS, number
 
 MAX_COORDINATE = 2.0
 """How far out a fin may be placed in the browser [m]."""
+AXES = ("x", "y", "z")
+"""Body axes that copies can stand around: forward, left, up."""
 STAND_OFF = 0.02
 """Distance of a fin that sticks to the hull from its surface: room for the servo [m]."""
 
@@ -50,19 +53,36 @@ def mirrored(layout: Layout, name: str) -> tuple[Layout, str]:
     return (layout, there) if there is not None else _added(layout, image(fin), _mirror_name(name))
 
 
-def ring(layout: Layout, name: str, count: int) -> Layout:
-    """The layout with copies of a fin, so that `count` of them stand evenly around the vertical axis."""
+def ring(layout: Layout, name: str, count: int, axis: str = "z") -> Layout:
+    """The layout with copies of a fin, so that `count` of them stand evenly around a body axis.
+
+    Shafts are horizontal, so around x and y only the azimuth of a turned shaft is kept; one that would point
+    straight up or down keeps that of the fin.
+    """
+    if axis not in AXES:
+        raise FinlabError(f"axis: expected one of {', '.join(AXES)}, got {axis!r:.40}")
     fin = layout.fins[layout.index(name)]
-    x, y, z = fin.position
-    if math.hypot(x, y) < 1e-3:
-        raise FinlabError(f"{name} stands on the vertical axis, so its copies would all be in one place")
+    place = np.array(fin.position)
+    if np.linalg.norm(np.delete(place, AXES.index(axis))) < 1e-3:
+        raise FinlabError(f"{name} stands on the axis {axis}, so its copies would all be in one place")
+    shaft = np.array([math.cos(fin.mounting_angle), math.sin(fin.mounting_angle), 0.0])
     for k in range(1, round(number(count, "fins around the axis", 2, MAX_FINS))):
-        turn = 2 * math.pi * k / count
-        cos, sin = math.cos(turn), math.sin(turn)
-        place = (x * cos - y * sin, x * sin + y * cos, z)
-        copy = replace(fin, position=place, mounting_angle=wrapped(fin.mounting_angle + turn))
+        turn = _rotation(axis, 2 * math.pi * k / count)
+        x, y, z = (round(float(v), 9) for v in turn @ place)
+        ahead, left, _ = turn @ shaft
+        azimuth = fin.mounting_angle if math.hypot(ahead, left) < 0.2 else math.atan2(left, ahead)
+        copy = replace(fin, position=(x, y, z), mounting_angle=wrapped(azimuth))
         layout, _ = _added(layout, copy, name)
     return layout
+
+
+def _rotation(axis: str, angle: float) -> NDArray[np.float64]:
+    """The matrix (3, 3) of a right-handed turn [rad] about a body axis."""
+    a, b = ((1, 2), (2, 0), (0, 1))[AXES.index(axis)]
+    turn = np.eye(3)
+    turn[a, a] = turn[b, b] = math.cos(angle)
+    turn[b, a], turn[a, b] = math.sin(angle), -math.sin(angle)
+    return turn
 
 
 def stuck(layout: Layout, name: str) -> Layout:

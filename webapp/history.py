@@ -1,7 +1,7 @@
 """Undo and redo: a stack of named snapshots of an immutable state."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Generic, TypeVar
 
 State = TypeVar("State")
@@ -48,6 +48,28 @@ class History(Generic[State]):
     def end_merge(self) -> None:
         """The next change starts a step of its own."""
         self.merge_key = None
+
+    def abandon(self) -> bool:
+        """Take the step back that is being merged into, leaving no trace of it; False if there is none."""
+        if self.merge_key is None or not self._past:
+            return False
+        _, self.state = self._past.pop()
+        self.merge_key = None
+        return True
+
+    @property
+    def past(self) -> tuple[tuple[str, State], ...]:
+        """Steps that can be undone, oldest first: names, and the states before them."""
+        return tuple(self._past)
+
+    @property
+    def future(self) -> tuple[tuple[str, State], ...]:
+        """Steps that can be redone, last one first: names, and the states after them."""
+        return tuple(self._future)
+
+    def restore(self, past: Iterable[tuple[str, State]], future: Iterable[tuple[str, State]]) -> None:
+        """Take over steps that were kept."""
+        self._past, self._future = list(past), list(future)
 
     @property
     def undo_name(self) -> str | None:

@@ -4,18 +4,11 @@ import threading
 from collections.abc import Callable
 from functools import partial
 
-from finlab.analysis import Bounds, Improvement, Progress, optimize_layout
+from finlab.analysis import Improvement, Progress, optimize_layout
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from webapp.state import number
+from webapp.wishes import GOAL_WORDS, Wish
 from webapp.worker import Worker
-
-GOAL_WORDS = {
-    "weakest direction": "weakest_direction",
-    "energy of a mission": "mission_energy",
-    "worst single failure": "worst_single_failure",
-}
-"""What may be improved, in words, and the name that the search knows."""
 
 
 class Improver:
@@ -47,26 +40,17 @@ class Improver:
         """True from the start to the result."""
         return self.start_layout is not None and self.found is None and self.error is None
 
-    def start(self, layout: Layout, fins: tuple[str, ...], goal: str, reach: float) -> None:
-        """Search.
-
-        Args:
-            layout: where to start; mirror pairs in it stay mirror pairs.
-            fins: names of those that may move.
-            goal: key of `GOAL_WORDS`.
-            reach: how far a fin may go along each axis [m].
+    def start(self, layout: Layout, wish: Wish) -> None:
+        """Search from a layout; mirror pairs in it stay mirror pairs.
 
         Raises:
-            FinlabError: unknown goal or a reach that is no sensible length.
+            FinlabError: a search is running, or a fin of the wish is not there.
         """
         if self.running:
             raise FinlabError("a search is running already; cancel it first")
-        if goal not in GOAL_WORDS:
-            raise FinlabError(f"goal: expected one of {', '.join(GOAL_WORDS)}, got {goal!r:.40}")
-        reach = number(reach, "reach of the fins [m]", 0.001, 0.5)
+        bounds, goal = wish.bounds(layout), GOAL_WORDS[wish.goal]
         self._stop = stop = threading.Event()
         self.start_layout, self.progress, self.found, self.error = layout, None, None, None
-        bounds = {name: Bounds.around(layout.fins[layout.index(name)], reach) for name in fins}
 
         def report(progress: Progress) -> None:
             self._post(partial(self._take, stop, "progress", progress))
@@ -74,7 +58,13 @@ class Improver:
         def job() -> None:
             try:
                 found = optimize_layout(
-                    layout, fins, bounds, GOAL_WORDS[goal], progress=report, cancelled=stop.is_set
+                    layout,
+                    wish.fins,
+                    bounds,
+                    goal,
+                    mission=wish.wrenches,
+                    progress=report,
+                    cancelled=stop.is_set,
                 )
                 self._post(partial(self._take, stop, "found", found))
             except FinlabError as error:

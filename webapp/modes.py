@@ -59,6 +59,24 @@ def distinct_modes(candidates: Candidates | None) -> tuple[Mode, ...]:
     )
 
 
+def nearest_modes(
+    samples: Candidates | None, candidates: Candidates | None, modes: tuple[Mode, ...]
+) -> NDArray[np.intp] | None:
+    """For each raw sample (K,) the mode whose thrusts are nearest to its own; None where there are none."""
+    if samples is None or candidates is None or not modes:
+        return None
+    raw = _push(samples.command)
+    refined = _push(candidates.command[[mode.index for mode in modes]])
+    gap = np.abs(raw[:, None] - refined[None]) ** 2
+    return np.asarray(np.argmin(gap.sum(axis=-1), axis=1))
+
+
+def _push(command: Array) -> NDArray[np.complex128]:
+    """Thrusts (..., n) in each fin's plane as complex numbers, up to a common factor; 0 for failed fins."""
+    strength = np.sin(command[..., 0]) ** 2 * command[..., 1] ** 2
+    return np.asarray(np.nan_to_num(strength * np.exp(1j * command[..., 2])))
+
+
 def _way(command: Array) -> _Way:
     with np.errstate(divide="ignore"):
         thrust = 2 * np.log(np.sin(command[:, 0])) + 2 * np.log(command[:, 1])  # grows with sin^2(A) f^2

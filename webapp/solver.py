@@ -1,6 +1,7 @@
 """From a state to an answer: picks the allocator for the state's settings and keeps it."""
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import load_allocator
+from webapp.attention import Attention, attention
 from webapp.density import Densities, densities
 from webapp.refinement import refinement
 from webapp.state import State
@@ -16,6 +18,18 @@ Load = Callable[..., Allocator]
 
 SAMPLING_METHODS = ("learned", "paper")
 """Methods that K, T and gamma mean something to."""
+
+
+@dataclass(frozen=True)
+class Reply:
+    """An answer and what belongs to it."""
+
+    answer: Allocation
+    """The answer itself."""
+    densities: Densities | None
+    """What the network proposed, for methods with one."""
+    attention: Attention | None
+    """How much its fins look at each other, for methods with a network."""
 
 
 class Solver:
@@ -38,15 +52,23 @@ class Solver:
             self._allocators[state.method] = self._load(checkpoint, method=state.method)
         allocator = self._allocators[state.method]
         if state.method in SAMPLING_METHODS:
-            # They take effect on the next answer; a network is not loaded again for each step of a slider.
-            for key in ("n_candidates", "temperature", "gamma"):
-                setattr(allocator, key, getattr(state, key))
+            _take_settings(allocator, state)
         return allocator
 
-    def densities(self, state: State) -> Densities | None:
-        """What the network proposes for a state; None for methods without one."""
-        allocator = self.allocator(state)
-        return densities(allocator, state.layout, state.failed, np.array(state.target), state.temperature)
+    def reply(self, state: State) -> Reply:
+        """The answer to a state with all that a page shows of it, computed to the end.
+
+        Raises:
+            FinlabError: the method cannot be loaded or cannot answer.
+        """
+        answer, allocator, target = self.solve(state), self.allocator(state), np.array(state.target)
+        # What is computed when first asked for belongs to this thread too.
+        _ = answer.wrench, answer.energy, answer.fin_forces, answer.candidates, answer.samples
+        return Reply(
+            answer,
+            densities(allocator, state.layout, state.failed, target, state.temperature),
+            attention(allocator, state.layout, state.failed, target),
+        )
 
     def refinement(self, state: State, answer: Allocation) -> tuple[Allocation, ...]:
         """The steps of the refinement behind an answer to a state.
@@ -65,3 +87,15 @@ class Solver:
         return self.allocator(state).allocate(
             state.layout, state.target, failed=state.failed, policy=state.policy, seed=0
         )
+
+
+def _take_settings(allocator: Allocator, state: State) -> None:
+    """Let K, T and gamma take effect on the next answer; no network is loaded again for a slider's step."""
+    from finlab.allocation.learned import LearnedAllocator
+
+    values = {key: getattr(state, key) for key in ("n_candidates", "temperature", "gamma")}
+    if isinstance(allocator, LearnedAllocator):
+        allocator.settings = allocator.pipeline.settings = replace(allocator.settings, **values)
+        return
+    for key, value in values.items():
+        setattr(allocator, key, value)

@@ -18,7 +18,8 @@ class SessionStore:
         """`make` gives a fresh session; `files` keep sessions beyond the life of the server."""
         self._make = make
         self._files = files
-        self._kept: dict[str, int] = {}
+        self._fresh = make()
+        self._kept: dict[str, object] = {}
         self._sessions: dict[str, Session] = {}
         self._open: set[str] = set()
         self._left: dict[str, float] = {}
@@ -51,10 +52,10 @@ class SessionStore:
         """Bring a session back that an earlier server has kept."""
         if self._files is None or key in self._sessions:
             return
-        state = self._files.read(key)
-        if state is not None:
-            self._sessions[key] = self._make()
-            self._sessions[key].resume(state)
+        session = self._make()
+        if self._files.read(key, session):
+            self._sessions[key] = session
+            self._kept[key] = _mark(session)
             self._forget_old()
 
     def keep(self) -> None:
@@ -62,9 +63,9 @@ class SessionStore:
         if self._files is None:
             return
         for key, session in self._sessions.items():
-            if session.revision != self._kept.get(key, 0):
-                self._kept[key] = session.revision
-                self._files.write(key, session.state)
+            if _mark(session) != self._kept.get(key, _mark(self._fresh)):
+                self._kept[key] = _mark(session)
+                self._files.write(key, session)
 
     def _forget_old(self) -> None:
         waiting = sorted(
@@ -74,3 +75,8 @@ class SessionStore:
             del self._sessions[key]
             self._left.pop(key, None)
             self._kept.pop(key, None)
+
+
+def _mark(session: Session) -> object:
+    """Differs whenever there is something new to keep."""
+    return session.revision, session.display, session.saved, session.pinned, session.beside

@@ -36,6 +36,18 @@ FIN_COLORS: tuple[Rgb, ...] = (
 )
 """One colour per fin, in order; asked, delivered and missing keep their three colours to themselves."""
 
+MODE_COLORS: tuple[Rgb, ...] = (
+    (51, 34, 136),  # indigo, teal, wine, olive, ...: Paul Tol's "muted" set, told apart by every eye
+    (68, 170, 153),
+    (136, 34, 85),
+    (153, 153, 51),
+    (17, 119, 51),
+    (204, 102, 119),
+    (136, 204, 238),
+    (170, 68, 153),
+)
+"""One colour per mode, in order."""
+
 TORQUE_SCALE = math.pi
 """Angle of a torque ring per newton metre [rad/(N m)]: 1 N m is half a turn."""
 
@@ -92,6 +104,11 @@ def look(dark: bool) -> Look:
 def fin_color(index: int) -> Rgb:
     """Colour of the fin at this place in the layout."""
     return FIN_COLORS[index % len(FIN_COLORS)]
+
+
+def mode_color(index: int) -> Rgb:
+    """Colour of the mode at this place."""
+    return MODE_COLORS[index % len(MODE_COLORS)]
 
 
 def css(color: Rgb, alpha: float = 1.0) -> str:

@@ -55,6 +55,13 @@ def _guarded(guard: Guard) -> Iterator[None]:
         yield
 
 
+def put_marks(slider: viser.GuiSliderHandle, marks: tuple[tuple[float, str], ...]) -> None:
+    """Other marks (value and text) on a slider that stands already; viser takes them only when it is made."""
+    wanted = tuple(_messages.GuiSliderMark(value=value, label=text) for value, text in marks)
+    if slider._marks != wanted:
+        slider._marks = wanted
+
+
 def stop_server(server: viser.ViserServer) -> None:
     """Stop a server, silently."""
     with contextlib.redirect_stdout(io.StringIO()):

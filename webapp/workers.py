@@ -11,6 +11,8 @@ class Workers:
 
     answers: Worker = field(default_factory=Worker)
     """Allocations: milliseconds."""
+    marks: Worker = field(default_factory=Worker)
+    """Reachable ranges: tens of milliseconds, after the answer."""
     cards: Worker = field(default_factory=Worker)
     """What a layout can do: about a second."""
     searches: Worker = field(default_factory=Worker)
@@ -18,5 +20,5 @@ class Workers:
 
     def stop(self) -> None:
         """End all threads."""
-        for worker in (self.answers, self.cards, self.searches):
+        for worker in (self.answers, self.marks, self.cards, self.searches):
             worker.stop()

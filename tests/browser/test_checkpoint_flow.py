@@ -35,15 +35,15 @@ def trained(browser: Any) -> Iterator[Page]:
 
 def test_learned_answers_a_slider_and_a_failure(trained: Page) -> None:
     page = trained
-    assert page.view.best.method == "learned" and page.view.best.checkpoint is not None
+    assert page.view.answering.best.method == "learned" and page.view.answering.best.checkpoint is not None
     assert "Reachable" in page.text(".fl-status")
     page.type("Fy [N]", "0.5")
     page.until(lambda: page.session.state.target[1] == 0.5 and not page.view.busy)
     page.until(lambda: "+0.50" in page.text(".bars"))
-    assert page.view.best.err_norm < 0.01
+    assert page.view.answering.best.err_norm < 0.01
     page.press("2")
     page.until(lambda: page.session.state.failed == ("front_left",) and not page.view.busy)
-    assert page.view.best.method == "learned"
+    assert page.view.answering.best.method == "learned"
     page.press("2 ✕")
     page.until(lambda: page.session.state.failed == () and not page.view.busy)
 
@@ -51,14 +51,14 @@ def test_learned_answers_a_slider_and_a_failure(trained: Page) -> None:
 def test_its_modes_are_distinct_and_its_densities_are_drawn(trained: Page) -> None:
     page = trained
     page.tab("Modes")
-    page.until(lambda: page.page.locator("table.modes tr.pick").count() == len(page.view.modes) > 0)
-    names = [mode.name for mode in page.view.modes]
+    page.until(lambda: page.page.locator("table.modes tr.pick").count() == len(page.view.answering.modes) > 0)
+    names = [mode.name for mode in page.view.answering.modes]
     assert len(set(names)) == len(names)
-    assert page.view.densities is not None
+    assert page.view.answering.densities is not None
     page.press("Play the refinement")
     page.page.locator(".step", has_text="Best raw candidate").wait_for()
     page.page.locator(".step", has_text="Answer").wait_for()
-    page.until(lambda: page.view.frame is None)
+    page.until(lambda: page.view.playback.frame is None)
     page.tab("What the network proposes")
     page.until(lambda: page.page.locator(".uplot").count() == 3)
     assert page.problems == []

@@ -48,8 +48,8 @@ def test_last_fin_cannot_fail(page: Any) -> None:
 
 def test_mode_is_picked_in_plot_and_table(page: Any) -> None:
     page.tab("Modes")
-    page.until(lambda: len(page.view.modes) > 1 and page.page.locator("table.modes tr.pick").count() > 1)
-    best = page.view.best
+    page.until(lambda: len(page.view.answering.modes) > 1 and page.page.locator("table.modes tr.pick").count() > 1)
+    best = page.view.answering.best
     page.page.locator("table.modes tr.pick").nth(1).click()
     page.until(lambda: page.session.mode == 1)
     page.until(lambda: page.view.shown is not best)
@@ -58,7 +58,7 @@ def test_mode_is_picked_in_plot_and_table(page: Any) -> None:
     page.until(lambda: page.session.mode == 0)
     page.type("Candidates K", "16")
     page.until(lambda: page.session.state.n_candidates == 16 and not page.view.busy)
-    assert len(page.view.best.samples.energy) == 16
+    assert len(page.view.answering.best.samples.energy) == 16
 
 
 def test_method_that_fails_says_so_and_the_page_goes_on(page: Any) -> None:

@@ -1,7 +1,6 @@
 """Foreign origins and strangers stay out; a session survives the server."""
 
 import http.client
-import json
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,7 @@ from finlab.layout import load_layout
 from tests.webapp.stand_in import load_stand_in
 from webapp.app import App
 from webapp.guard import COOKIE, Guard, is_loopback
-from webapp.keeping import SessionFiles, from_dict, to_dict
+from webapp.keeping import SessionFiles, to_dict
 from webapp.session import Session
 from webapp.solver import Solver
 from webapp.store import SessionStore
@@ -100,25 +99,39 @@ def test_session_survives_the_server(tmp_path: Path) -> None:
             session.select("front_left")
             session.mirror_fin()
             session.move_fin("front_left", (0.2, 0.2, 0.0))
-            state = session.state
+            session.set_display("dark", True)
+            session.undo()
+            session.pin()
+            before = session
         else:
-            assert key == keys[0] and to_dict(session.state) == to_dict(state)
+            assert key == keys[0] and to_dict(session) == to_dict(before)
+            assert session.history.undo_name == "Mirror front_left" and session.display.dark
+            assert session.redo() == "Move front_left"
+            assert session.state.layout.fins[1].position == (0.2, 0.2, 0.0)
+            while session.history.undo_name is not None:
+                session.undo()
+            assert session.state.target == before.history.past[0][1].target
         app.stop()
         stop_server(server)
 
 
 def test_kept_files_are_checked(tmp_path: Path) -> None:
     files = SessionFiles(tmp_path)
-    state = Session(load_layout(shipped_layouts()["A"])).state
-    assert from_dict(json.loads(json.dumps(to_dict(state)))) == state
-    files.write("../../escape", state)
-    assert list(tmp_path.iterdir()) == [] and files.read("../../etc/passwd") is None
-    files.write("a" * 16, state)
+    session = Session(load_layout(shipped_layouts()["A"]))
+
+    def fresh() -> Session:
+        return Session(load_layout(shipped_layouts()["ucat"]))
+
+    files.write("../../escape", session)
+    assert list(tmp_path.iterdir()) == [] and not files.read("../../etc/passwd", fresh())
+    files.write("a" * 16, session)
+    found = fresh()
+    assert files.read("a" * 16, found) and found.state == session.state
     path = tmp_path / f"{'a' * 16}.json"
     assert path.stat().st_mode & 0o077 == 0
     for text in ("", "{", "[]", "{}", '{"layout": 1}', path.read_text().replace("learned", "<script>")):
         path.write_text(text)
-        assert files.read("a" * 16) is None
+        assert not files.read("a" * 16, fresh())
     store = SessionStore(lambda: Session(load_layout(shipped_layouts()["A"])), files)
     assert store.enter(["a" * 16])[1].state.layout.name == "A", (
         "a broken file costs the session, not the page"

@@ -9,7 +9,7 @@ from tests.webapp.stand_in import StandIn
 from webapp.figures import small, three_digits
 from webapp.markup.mode_plot import mode_plot
 from webapp.markup.modes import mode_table
-from webapp.modes import distinct_modes
+from webapp.modes import distinct_modes, nearest_modes
 from webapp.targets import PRESETS
 
 PUSH, REST = (0.3, 1.1, 0.0), (0.05, 0.1, 0.0)
@@ -60,9 +60,15 @@ def test_real_candidates_are_drawn_and_listed() -> None:
     modes = distinct_modes(answer.candidates)
     assert answer.candidates is not None and answer.samples is not None
     assert sum(mode.size for mode in modes) == len(answer.candidates.energy)
-    plot = mode_plot(answer, modes, 0, 200, "here")
-    assert plot.count("onclick") == len(modes)
-    assert plot.count("r='2.4'") == 1 + len(answer.samples.energy), "one more in the legend"
+    nearest = nearest_modes(answer.samples, answer.candidates, modes)
+    assert nearest is not None and len(nearest) == len(answer.samples.energy)
+    raw = answer.samples._replace(command=answer.candidates.command[[mode.index for mode in modes]])
+    again = nearest_modes(raw, answer.candidates, modes)
+    assert again is not None and list(again) == list(range(len(modes))), "each mode is nearest to itself"
+    plot = mode_plot(answer, modes, nearest, 0, None, 200, "here")
+    assert plot.count("onclick") == len(modes) + 1, "one for all samples together"
+    assert plot.count("data-k") == len(answer.samples.energy)
+    assert mode_plot(answer, modes, nearest, None, 3, 200, "here").count("class='ring'") == 2
     table = mode_table(answer.candidates, modes, 0, "here")
     assert table.count("onclick") == len(modes) and "0.0000" not in table
     assert "no candidates" in mode_table(None, (), 0, "here")

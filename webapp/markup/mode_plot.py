@@ -3,11 +3,13 @@
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
+from webapp.channel import send
 from webapp.markup.picking import pick
 from webapp.modes import Mode
-from webapp.theme import DELIVERED, SKY, VERMILLION, css
+from webapp.theme import css, mode_color
 
 WIDTH = 388
 """Width of the plot [px]."""
@@ -15,14 +17,34 @@ LEFT, RIGHT, TOP, BOTTOM = 54, 8, 24, 34
 """Margins of the plot [px]."""
 STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 1e9)
 """Distances that ticks of the energy may have."""
-LEGEND = (("sampled", SKY, 2.4, 6), ("refined", DELIVERED, 5.0, 74), ("on the robot", VERMILLION, 5.0, 140))
-"""Word, colour, radius and place of what is drawn."""
+LEGEND = (("sampled", 2.6, 6), ("refined", 5.0, 78), ("on the robot", 0.0, 144))
+"""Word, radius and place of what is drawn; radius 0 is the ring."""
+SAMPLES = "fl-sample"
+"""Channel that hears which sample is clicked."""
 
 Scale = Callable[[float], float]
 
 
-def mode_plot(answer: Allocation, modes: tuple[Mode, ...], shown: int, height: int, picker: str) -> str:
-    """Energy against error: raw samples as small dots, modes as numbered ones to click on."""
+def mode_plot(
+    answer: Allocation,
+    modes: tuple[Mode, ...],
+    nearest: NDArray[np.intp] | None,
+    shown: int | None,
+    sample: int | None,
+    height: int,
+    picker: str,
+) -> str:
+    """Energy against error: raw samples as small dots, modes as numbered ones; all can be clicked.
+
+    Args:
+        answer: what the dots are of.
+        modes: its modes.
+        nearest: mode (K,) that gives each sample its colour.
+        shown: mode on the robot, None while it is another command.
+        sample: sample on the robot.
+        height: of the plot [px].
+        picker: class of the marker before the buttons that choose a mode, and of the channel for samples.
+    """
     samples, refined = answer.samples, answer.candidates
     if refined is None or not modes:
         return ""
@@ -47,18 +69,31 @@ def mode_plot(answer: Allocation, modes: tuple[Mode, ...], shown: int, height: i
 
     parts = [_axes(x, y, (low, high), (int(bottom), int(top)), height)]
     if samples is not None:
-        parts += [
-            f"<circle cx='{x(e):.1f}' cy='{y(r):.1f}' r='2.4' fill='{css(SKY, 0.75)}'/>"
-            for e, r in zip(samples.energy, samples.err_norm, strict=True)
+        pick_sample = send(f"{picker}-{SAMPLES}", "event.target.dataset.k + ',' + Date.now()")
+        kinds = np.zeros(len(samples.energy), dtype=int) if nearest is None else nearest
+        dots = [
+            f"<circle data-k='{k}' cx='{x(e):.1f}' cy='{y(r):.1f}' r='3' "
+            f"fill='{css(mode_color(kind), 0.6)}'/>"
+            for k, (e, r, kind) in enumerate(zip(samples.energy, samples.err_norm, kinds, strict=True))
         ]
+        click = f"if (event.target.dataset.k) {{ {pick_sample} }}"
+        parts.append(f'<g class="pick samples" onclick="{click}">{"".join(dots)}</g>')
+        if sample is not None and sample < len(dots):
+            parts.append(_ring(x(float(samples.energy[sample])), y(float(samples.err_norm[sample])), 6.5))
     places = _apart([(x(float(refined.energy[i])), y(float(refined.err_norm[i]))) for i in index])
     for k, (cx, cy) in reversed(list(enumerate(places))):  # the best one on top
-        color = css(VERMILLION if k == shown else DELIVERED)
         parts.append(
-            f"<g class='pick' {pick(picker, k)}><circle cx='{cx:.1f}' cy='{cy:.1f}' r='8.5' fill='{color}'/>"
+            f"<g class='pick' {pick(picker, k)}>"
+            f"<circle cx='{cx:.1f}' cy='{cy:.1f}' r='8.5' fill='{css(mode_color(k))}'/>"
             f"<text x='{cx:.1f}' y='{cy + 3.8:.1f}' class='digit'>{k + 1}</text></g>"
         )
+        if k == shown:
+            parts.append(_ring(cx, cy, 11))
     return f"<div class='fl'><svg class='plot' viewBox='0 0 {WIDTH} {height}'>{''.join(parts)}</svg></div>"
+
+
+def _ring(x: float, y: float, radius: float) -> str:
+    return f"<circle class='ring' cx='{x:.1f}' cy='{y:.1f}' r='{radius:g}'/>"
 
 
 def _apart(places: list[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -73,11 +108,11 @@ def _apart(places: list[tuple[float, float]]) -> list[tuple[float, float]]:
 
 def _axes(x: Scale, y: Scale, energies: tuple[float, float], powers: tuple[int, int], height: int) -> str:
     floor = height - BOTTOM
-    parts = [
-        f"<circle cx='{LEFT + place}' cy='10' r='{radius}' fill='{css(color)}'/>"
-        f"<text x='{LEFT + place + 9}' y='14'>{word}</text>"
-        for word, color, radius, place in LEGEND
-    ]
+    parts = []
+    for word, radius, place in LEGEND:
+        dot = f"<circle cx='{LEFT + place}' cy='10' r='{radius}' fill='currentColor' opacity='.55'/>"
+        parts.append(dot if radius else _ring(LEFT + place, 10, 5.5))
+        parts.append(f"<text x='{LEFT + place + 9}' y='14'>{word}</text>")
     bottom, top = powers
     for power in range(bottom, top + 1, max(1, round((top - bottom) / 5))):
         at, digits = y(10.0**power), str(power).replace("-", "−")

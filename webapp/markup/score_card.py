@@ -2,29 +2,31 @@
 
 from html import escape
 
-from finlab.analysis import AXES, ScoreCard
+from finlab.analysis import AXES, Authority, ScoreCard
+from finlab.analysis.quick import QuickCheck
 from finlab.layout import Layout
 from webapp.figures import listed, three_digits
 from webapp.markup.fins import swatch
 from webapp.state import AXIS_UNITS
 
 
-def score_table(layout: Layout, card: ScoreCard, before: ScoreCard | None) -> str:
+def score_table(layout: Layout, card: ScoreCard, before: ScoreCard | None, name: str = "before") -> str:
     """The score card.
 
     Args:
         layout: the robot, for its fins' colours.
         card: what it can do.
-        before: what the saved layout can do, None where it is the same.
+        before: what the layout beside it can do, None where it is the same.
+        name: what that one is called.
     """
-    parts = [_summary(card, before), _axes(card, before), _losses(layout, card)]
+    name = escape(name)
+    parts = [_summary(card, before, name), _axes(card, before, name), _losses(layout, card)]
     parts += [f"<div class='said dim'>{escape(note)}</div>" for note in card.notes]
     return f"<div class='fl score'>{''.join(parts)}</div>"
 
 
-def rank_sentence(card: ScoreCard) -> str:
+def rank_sentence(a: Authority | QuickCheck) -> str:
     """Rank, conditioning and what is missing, in words."""
-    a = card.authority
     text = f"<b>{a.rank} of 6</b> axes independent"
     if a.condition is not None:
         text += f", condition number {three_digits(a.condition)}"
@@ -36,17 +38,19 @@ def rank_sentence(card: ScoreCard) -> str:
     return text
 
 
-def _summary(card: ScoreCard, before: ScoreCard | None) -> str:
+def _summary(card: ScoreCard, before: ScoreCard | None, name: str) -> str:
     now, old = card.authority, None if before is None else before.authority
-    rows = [
+    rank = None if old is None else f"{old.rank} of 6"
+    rows = [_words("axes independent", f"{now.rank} of 6", rank)] if before is not None else []
+    rows += [
         _row("weakest direction [N]", now.weakest, None if old is None else old.weakest),
         _row("isotropy", now.isotropy, None if old is None else old.isotropy),
     ]
     if card.worst_loss is not None:
         lost = None if before is None or before.worst_loss is None else before.worst_loss.weakest
         rows.append(_row("weakest after the worst loss [N]", card.worst_loss.weakest, lost))
-    head = "<tr><th></th><th>before</th><th>now</th><th></th></tr>" if before is not None else ""
-    return f"<div class='said'>{rank_sentence(card)}</div><table>{head}{''.join(rows)}</table>"
+    head = f"<tr><th></th><th>{name}</th><th>now</th><th></th></tr>" if before is not None else ""
+    return f"<div class='said'>{rank_sentence(card.authority)}</div><table>{head}{''.join(rows)}</table>"
 
 
 def _row(name: str, now: float, old: float | None) -> str:
@@ -61,7 +65,11 @@ def _row(name: str, now: float, old: float | None) -> str:
     )
 
 
-def _axes(card: ScoreCard, before: ScoreCard | None) -> str:
+def _words(name: str, now: str, old: str | None) -> str:
+    return f"<tr><td>{name}</td><td>{old or '–'}</td><td>{now}</td><td></td></tr>"
+
+
+def _axes(card: ScoreCard, before: ScoreCard | None, name: str) -> str:
     rows = []
     for k, word in enumerate(AXES):
         now = card.authority
@@ -78,7 +86,7 @@ def _axes(card: ScoreCard, before: ScoreCard | None) -> str:
             f"<tr><td>{word} <span class='dim'>{AXIS_UNITS[k]}</span></td>{old}<td>{largest}</td>"
             f"<td>{least}</td><td>{'–' if energy is None else three_digits(energy)}</td></tr>"
         )
-    old = "<th>before</th>" if before is not None else ""
+    old = f"<th>{name}</th>" if before is not None else ""
     head = (
         f"<tr><th>axis alone</th>{old}<th>largest</th><th title='after the worst loss of a fin'>one lost</th>"
         f"<th title='energy of 1 N, or 0.1 N m'>energy</th></tr>"

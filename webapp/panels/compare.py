@@ -22,7 +22,7 @@ class ComparePanel:
         self._run = gui.add_button(
             "Compare the methods", icon=viser.Icon.SCALE, hint="On the wrench and the failures of now."
         )
-        on_user_click(self._run, lambda: host.do(host.compare))
+        on_user_click(self._run, lambda: host.do(lambda: host.comparison.start(host.session.state)))
         gui.add_html(marker(PICKER))
         self._overlay = gui.add_button_group(
             "Overlay", ("none", *COMPARED), hint="Dark arrows: the fins' forces by that method."

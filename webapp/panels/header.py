@@ -40,7 +40,7 @@ class Header:
         host, history = self._host, self._host.session.history
         put(
             self._corner,
-            content=corner(host.session.state, host.newtons, host.shown, host.busy, host.error),
+            content=corner(host.session.state, host.newtons, host.shown, host.busy, host.answering.error),
         )
         undo, redo = history.undo_name or "nothing", history.redo_name or "nothing"
         put(self._history, hint=f"Undo: {undo} (Ctrl+Z). Redo: {redo} (Ctrl+Shift+Z). A tour in five steps.")

@@ -6,12 +6,16 @@ from typing import Protocol
 import viser
 
 from finlab.allocation.allocation import Allocation
-from webapp.analyst import Analyst
+from finlab.analysis.beside import Ranges
+from webapp.analyst import Findings, Question
+from webapp.answering import Answering
 from webapp.comparison import Comparison
-from webapp.density import Densities
 from webapp.improving import Improver
-from webapp.modes import Mode
+from webapp.playback import Playback
+from webapp.ranging import Beside
+from webapp.resting import Resting
 from webapp.session import Session
+from webapp.sweeping import Sweep
 
 
 class Host(Protocol):
@@ -22,50 +26,32 @@ class Host(Protocol):
     session: Session
     """What it shows."""
 
-    @property
-    def best(self) -> Allocation | None:
-        """The newest answer; it may be older than the state."""
-
-    @property
-    def modes(self) -> tuple[Mode, ...]:
-        """Its distinct modes."""
+    answering: Answering
+    """The newest answer, its modes and what of it is on the robot."""
+    playback: Playback
+    """The refinement, step by step."""
+    analyst: Resting[Question, Findings]
+    """What the layout can do."""
+    ranging: Resting[Beside, Ranges]
+    """How far each component of the target can go."""
+    improver: Improver
+    """The search for a better layout."""
+    comparison: Comparison
+    """Other methods on the same question."""
+    sweep: Sweep
+    """A component of the target on its way through a range."""
 
     @property
     def shown(self) -> Allocation | None:
-        """The answer with the chosen mode's command."""
+        """The answer with the command that is on the robot."""
 
     @property
     def busy(self) -> bool:
         """True while a newer answer is being computed."""
 
     @property
-    def error(self) -> str | None:
-        """Why there is no answer to the present state, if there is none."""
-
-    @property
     def newtons(self) -> float:
         """Force [N] that an arrow of 0.1 m stands for."""
-
-    @property
-    def densities(self) -> Densities | None:
-        """What the network proposed for the newest answer, where the method has a network."""
-
-    analyst: Analyst
-    """What the layout can do."""
-    improver: Improver
-    """The search for a better layout."""
-    comparison: Comparison
-    """Other methods on the same question."""
-
-    @property
-    def frame(self) -> int | None:
-        """Which step of the refinement is on the robot, None while none is played."""
-
-    def play_refinement(self) -> None:
-        """Show the refinement step by step."""
-
-    def compare(self) -> None:
-        """Ask the other methods."""
 
     def do(self, act: Callable[[], object]) -> None:
         """Carry out an intent: show what changed, or tell the user why not."""

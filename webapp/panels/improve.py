@@ -5,14 +5,16 @@ from functools import partial
 import viser
 
 from finlab.analysis import Improvement
-from finlab.errors import FinlabError
 from webapp.figures import listed, three_digits
 from webapp.handles import on_user_change, on_user_click, put
-from webapp.improving import GOAL_WORDS
+from webapp.markup.picking import button_colors
 from webapp.markup.score_card import score_table
 from webapp.panels.host import Host
+from webapp.theme import css, fin_color
+from webapp.wishes import GOAL_WORDS, WAY, Way, Wish, checked_way, parsed_mission
 
-WHICH = ("all fins", "selected fin")
+ALL = "all"
+"""Entry of the list of fins with bounds for those that have none of their own."""
 
 
 class ImprovePanel:
@@ -21,28 +23,76 @@ class ImprovePanel:
     def __init__(self, gui: viser.GuiApi, host: Host) -> None:
         """Build the widgets."""
         self._host = host
+        self._held: set[str] = set()
+        self._ways: dict[str, Way] = {}
+        self._names: tuple[str, ...] = ()
         with gui.add_folder("Improve this layout"):
             self._goal = gui.add_dropdown("Goal", tuple(GOAL_WORDS), hint="What to raise.")
-            self._which = gui.add_dropdown("Move", WHICH, hint="Mirror pairs stay mirror pairs.")
-            self._reach = gui.add_slider(
-                "Reach [cm]", 1.0, 20.0, 1.0, 5.0, hint="How far a fin may go along each axis."
+            on_user_change(self._goal, lambda _: self.refresh())
+            self._paint = gui.add_html("")
+            self._fins = gui.add_button_group(
+                "May move",
+                ("1",),
+                hint="Press a number to hold a fin, or to let it move. Pairs stay pairs.",
             )
-            self._start = gui.add_button("Search", icon=viser.Icon.SPARKLES)
+            on_user_change(self._fins, self._hold)
+            self._whose = gui.add_dropdown(
+                "Bounds of", (ALL,), hint="All fins, or one that gets bounds of its own."
+            )
+            on_user_change(self._whose, lambda _: self.refresh())
+            self._reach = gui.add_vector3(
+                "Reach ± [m]", WAY[:3], min=(0.0,) * 3, max=(0.5,) * 3, step=0.01, hint="Along x, y and z."
+            )
+            on_user_change(self._reach, lambda reach: self._bound((*reach, self._turn.value)))
+            self._turn = gui.add_slider(
+                "Turn ± [°]", 0.0, 180.0, 5.0, WAY[3], hint="How far its shaft may turn either way."
+            )
+            on_user_change(self._turn, lambda turn: self._bound((*self._reach.value, turn)))
+            self._mission = gui.add_text(
+                "Mission",
+                "",
+                multiline=True,
+                hint="Wrenches, one line each: Fx Fy Fz Tx Ty Tz [N, N m]. Empty: the common ones.",
+                visible=False,
+            )
+            self._take = gui.add_button(
+                "Add the present wrench", icon=viser.Icon.PLUS, hint="To the mission.", visible=False
+            )
+            on_user_click(self._take, self._add_wrench)
+            self._start = gui.add_button(
+                "Search", icon=viser.Icon.SPARKLES, hint="Takes up to a minute; it can be stopped any time."
+            )
             on_user_click(self._start, lambda: host.do(self._search))
             self._bar = gui.add_progress_bar(0.0, visible=False)
-            self._cancel = gui.add_button("Cancel", icon=viser.Icon.X, visible=False)
+            self._cancel = gui.add_button(
+                "Cancel", icon=viser.Icon.X, visible=False, hint="What was found so far is offered."
+            )
             on_user_click(self._cancel, host.improver.cancel)
             self._card = gui.add_html("")
-            self._verdict = gui.add_button_group("Result", ("Accept", "Leave"), visible=False)
+            self._verdict = gui.add_button_group(
+                "Result", ("Accept", "Leave"), visible=False, hint="Accepting can be undone."
+            )
             on_user_change(self._verdict, self._decide)
 
+    def _hold(self, button: str) -> None:
+        index = int("".join(c for c in button if c.isdigit()) or 0) - 1
+        if 0 <= index < len(self._names):
+            self._held ^= {self._names[index]}
+        self.refresh()
+
+    def _bound(self, way: tuple[float, ...]) -> None:
+        self._host.do(lambda: self._ways.update({self._whose.value: checked_way(way)}))
+
+    def _add_wrench(self) -> None:
+        line = " ".join(f"{value:g}" for value in self._host.session.state.target)
+        put(self._mission, value=f"{self._mission.value.rstrip()}\n{line}".lstrip())
+
     def _search(self) -> None:
-        session = self._host.session
-        if self._which.value == WHICH[1] and session.selected is None:
-            raise FinlabError("no fin is selected; click one, or let all fins move")
-        layout = session.state.layout
-        fins = (session.selected,) if self._which.value == WHICH[1] and session.selected else layout.names
-        self._host.improver.start(layout, fins, self._goal.value, 0.01 * self._reach.value)
+        fins = tuple(name for name in self._names if name not in self._held)
+        own = {name: way for name, way in self._ways.items() if name != ALL}
+        mission = parsed_mission(self._mission.value)
+        wish = Wish(self._goal.value, fins, self._ways.get(ALL, WAY), own, mission)
+        self._host.improver.start(self._host.session.state.layout, wish)
 
     def _decide(self, button: str) -> None:
         improver = self._host.improver
@@ -55,6 +105,7 @@ class ImprovePanel:
 
     def refresh(self) -> None:
         """Write how far the search is."""
+        self._refresh_wish()
         improver = self._host.improver
         running, progress, found = improver.running, improver.progress, improver.found
         put(self._start, disabled=running)
@@ -74,6 +125,27 @@ class ImprovePanel:
         elif running:
             text = "Searching …"
         put(self._card, content=f"<div class='fl'>{text}</div>")
+
+    def _refresh_wish(self) -> None:
+        """Write which fins may move, and how far."""
+        names = self._host.session.state.layout.names
+        if names != self._names:
+            self._names = names
+            self._held &= set(names)
+            self._ways = {name: way for name, way in self._ways.items() if name in (ALL, *names)}
+        put(self._fins, options=tuple(str(i + 1) for i in range(len(names))))
+        colors = [
+            ("transparent", "inherit") if n in self._held else (css(fin_color(i)), "#111")
+            for i, n in enumerate(names)
+        ]
+        put(self._paint, content=button_colors("fl-movers", colors))
+        put(self._whose, options=(ALL, *names))
+        way = self._ways.get(self._whose.value, self._ways.get(ALL, WAY))
+        put(self._reach, value=way[:3])
+        put(self._turn, value=way[3])
+        mission = self._goal.value == "energy of a mission"
+        put(self._mission, visible=mission)
+        put(self._take, visible=mission)
 
 
 def _before_and_after(found: Improvement) -> str:

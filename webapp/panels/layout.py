@@ -1,11 +1,13 @@
 """The layout: pick one, and place its fins by numbers or by hand."""
 
 import math
+from collections.abc import Callable
 from functools import partial
 from html import escape
 
 import viser
 
+from finlab.analysis.quick import quick_check
 from finlab.layout import Layout
 from webapp.checks import warnings
 from webapp.handles import on_user_change, on_user_click, put
@@ -18,6 +20,8 @@ from webapp.state import MAX_FINS
 
 NONE = "none"
 """Entry of the list of fins that selects nothing."""
+RINGS = {"z, up": "z", "x, forward": "x", "y, to the left": "y"}
+"""Axes that copies can stand around, by what they are called."""
 OWN = "(edited)"
 """Entry of the list of layouts while the robot is none of them."""
 
@@ -54,22 +58,24 @@ class LayoutPanel:
             on_user_change(self._stick, partial(self._set_display, "stick"))
         self._edit = gui.add_button_group(
             "Selected fin",
-            ("Mirror", "Unlink", "Duplicate", "Delete", "To hull"),
-            hint="A mirror image moves with its fin until it is unlinked.",
+            ("Mirror", "Mirror once", "Unlink", "Duplicate", "To hull", "Delete"),
+            hint="What Mirror makes moves along until it is unlinked; Mirror once links nothing.",
         )
         on_user_change(self._edit, self._edit_fin)
+        self._axis = gui.add_dropdown(
+            "Copies around", tuple(RINGS), hint="Axis through the centre of gravity that copies stand around."
+        )
         self._ring = gui.add_button_group(
-            "Around axis",
+            "How many",
             ("2", "3", "4", "5", "6", "8"),
-            hint="Copies, so that so many stand around the vertical axis.",
+            hint="Copies of the selected fin, so that so many stand evenly around the axis.",
         )
         on_user_change(self._ring, self._copy_around)
         self._add = gui.add_button("Add a fin", icon=viser.Icon.PLUS, hint=f"Up to {MAX_FINS} fins.")
         on_user_click(self._add, lambda: host.do(host.session.add_fin))
         self._hull = HullPanel(gui, host)
         self._card = gui.add_html("")
-        self._checked: Layout | None = None
-        self._warnings: tuple[str, ...] = ()
+        self._checked: tuple[Layout, tuple[str, ...]] | None = None
 
     def _open(self, name: str) -> None:
         if name in shipped():
@@ -92,8 +98,9 @@ class LayoutPanel:
 
     def _edit_fin(self, button: str) -> None:
         session = self._host.session
-        acts = {
+        acts: dict[str, Callable[[], object]] = {
             "Mirror": session.mirror_fin,
+            "Mirror once": partial(session.mirror_fin, linked=False),
             "Unlink": session.unlink_fin,
             "Duplicate": session.duplicate_fin,
             "Delete": session.delete_fin,
@@ -104,7 +111,8 @@ class LayoutPanel:
 
     def _copy_around(self, button: str) -> None:
         if button.isdigit():
-            self._host.do(partial(self._host.session.ring_of_fins, int(button)))
+            axis = RINGS.get(self._axis.value, "z")
+            self._host.do(partial(self._host.session.ring_of_fins, int(button), axis))
 
     def refresh(self) -> None:
         """Write the layout and the selected fin."""
@@ -128,8 +136,8 @@ class LayoutPanel:
             f"<div>{escape(a)} ⇄ {escape(b)} move together.</div>" for a, b in session.state.links
         )
         put(self._about, content=f"<div class='fl'><div class='dim'>{escape(first)}</div>{pairs}</div>")
-        if layout != self._checked:
-            self._checked, self._warnings = layout, warnings(layout)
-        analyst = self._host.analyst
-        card = None if analyst.findings is None else analyst.findings.card
-        put(self._card, content=check_card(card, analyst.busy, self._warnings))
+        state = session.state
+        if (layout, state.failed) != self._checked:
+            self._checked = (layout, state.failed)
+            quick = quick_check(layout, state.failed)
+            put(self._card, content=check_card(quick, len(state.healthy) > 1, warnings(layout)))

@@ -1,16 +1,22 @@
 """What this layout can do: attainable sets in the view, and the score card."""
 
 from functools import partial
+from html import escape
 
 import viser
 
-from webapp.analyst import DRAWN
+from webapp.analyst import DRAWN, Findings
 from webapp.figures import three_digits
-from webapp.handles import on_user_change, put
+from webapp.handles import on_user_change, on_user_click, put
 from webapp.markup.score_card import score_table
 from webapp.panels.host import Host
 from webapp.panels.improve import ImprovePanel
 from webapp.scene.attainable_nodes import set_scale
+from webapp.session.looking import PINNED
+from webapp.shipped import shipped
+
+SAVED = "saved state"
+"""Entry of the list of layouts for the one that was opened or saved last."""
 
 
 class LimitsPanel:
@@ -27,14 +33,29 @@ class LimitsPanel:
             "Alone", True, hint="Forces without any torque, torques without any force; else they are free."
         )
         on_user_change(self._alone, partial(self._set, "alone"))
+        self._beside = gui.add_dropdown(
+            "Beside", (SAVED, *shipped()), hint="The layout that stands next to this one on the card."
+        )
+        on_user_change(self._beside, self._compare)
+        self._pin = gui.add_button(
+            "Pin this layout", icon=viser.Icon.PIN, hint="Put it aside as it is now, to compare others with."
+        )
+        on_user_click(self._pin, lambda: host.do(host.session.pin))
         self._card = gui.add_html("")
         self._improve = ImprovePanel(gui, host)
 
     def _set(self, key: str, value: object) -> None:
         self._host.do(partial(self._host.session.set_display, key, value))
 
+    def _compare(self, name: str) -> None:
+        self._host.do(partial(self._host.session.compare_with, None if name == SAVED else name))
+
     def refresh(self) -> None:
         """Write the findings."""
+        session = self._host.session
+        names = (SAVED, *((PINNED,) if session.pinned is not None else ()), *shipped())
+        put(self._beside, options=names)
+        put(self._beside, value=session.beside or SAVED)
         self._improve.refresh()
         analyst, display = self._host.analyst, self._host.session.display
         put(self._alone, value=display.alone, visible=display.drawn != "none")
@@ -49,8 +70,16 @@ class LimitsPanel:
                 unit = "N" if found.now.kind == "force" else "N m"
                 note += (
                     f"0.1 m of the body is {three_digits(0.1 / set_scale(found))} {unit}; green: working fins"
-                    f"{', grey: all fins' if found.whole else ''}, blue ball: asked; no point lies further "
+                    f"{_grey(found)}, blue ball: asked; no point lies further "
                     f"than {three_digits(found.now.gap)} {unit} outside."
                 )
-            table = score_table(found.question.layout, found.card, found.before)
+            name = "before" if session.beside is None else session.beside
+            table = score_table(found.question.layout, found.card, found.before, name)
             put(self._card, content=f"<div class='fl'>{note}</div>{table}")
+
+
+def _grey(found: Findings) -> str:
+    """What the grey body stands for."""
+    if found.whole is None:
+        return ""
+    return ", grey: all fins" if found.question.failed else f", grey: {escape(found.question.beside.name)}"

@@ -4,8 +4,9 @@ from functools import partial
 
 import viser
 
+from webapp.channel import Channel
 from webapp.handles import on_user_change, put
-from webapp.markup.mode_plot import mode_plot
+from webapp.markup.mode_plot import SAMPLES, mode_plot
 from webapp.markup.picking import marker
 from webapp.panels.host import Host
 
@@ -19,9 +20,12 @@ class ModePicker:
         self._height = height
         self.name = name
         self._plot = gui.add_html("")
+        Channel(gui, f"{name}-{SAMPLES}", self._choose_sample)
         gui.add_html(marker(name))
         self._choice = gui.add_button_group(
-            "Mode", ("1",), hint="Which mode moves the fins; a click on a numbered dot does the same."
+            "Mode",
+            ("1",),
+            hint="Which mode moves the fins. A click on a dot does it too, on a small one for a raw sample.",
         )
         on_user_change(self._choice, self._choose)
 
@@ -29,14 +33,23 @@ class ModePicker:
         if entry.isdigit():
             self._host.do(partial(self._host.session.show_mode, int(entry) - 1))
 
+    def _choose_sample(self, word: list[str]) -> None:
+        if word[0].isdigit():
+            self._host.do(partial(self._host.session.show_sample, int(word[0])))
+
     @property
-    def shown(self) -> int:
-        """The mode on the robot."""
-        return min(self._host.session.mode, max(len(self._host.modes) - 1, 0))
+    def shown(self) -> int | None:
+        """The mode on the robot; None while a raw sample is."""
+        session, modes = self._host.session, self._host.answering.modes
+        return None if session.sample is not None else min(session.mode, max(len(modes) - 1, 0))
 
     def refresh(self) -> None:
         """Write the modes of the newest answer."""
-        best, modes = self._host.best, self._host.modes
+        answering, sample = self._host.answering, self._host.session.sample
+        best, modes = answering.best, answering.modes
         put(self._choice, options=tuple(str(k + 1) for k in range(len(modes))) or ("1",))
-        plot = "" if best is None else mode_plot(best, modes, self.shown, self._height, self.name)
+        plot = ""
+        if best is not None:
+            nearest = answering.sample_modes
+            plot = mode_plot(best, modes, nearest, self.shown, sample, self._height, self.name)
         put(self._plot, content=plot)

@@ -5,7 +5,7 @@ from functools import partial
 import viser
 
 from finlab.allocation.methods import METHODS
-from webapp.figures import small
+from webapp.figures import small, three_digits
 from webapp.handles import on_user_change, on_user_click, put
 from webapp.markup.modes import mode_table
 from webapp.panels.density import DensityPanel
@@ -47,7 +47,7 @@ class ModesPanel:
             icon=viser.Icon.PLAYER_PLAY,
             hint="From the best raw candidate, step by step.",
         )
-        on_user_click(self._play, lambda: host.do(host.play_refinement))
+        on_user_click(self._play, lambda: host.do(host.playback.start))
         self._step = gui.add_html("")
         self._density = DensityPanel(gui)
 
@@ -62,16 +62,24 @@ class ModesPanel:
         put(self._temperature, value=state.temperature)
         put(self._gamma, value=state.gamma)
         self._picker.refresh()
-        candidates = None if host.best is None else host.best.candidates
-        put(self._table, content=mode_table(candidates, host.modes, self._picker.shown, self._picker.name))
+        answering, picker = host.answering, self._picker
+        candidates = None if answering.best is None else answering.best.candidates
+        put(self._table, content=mode_table(candidates, answering.modes, picker.shown, picker.name))
         put(self._step, content=_step_words(host))
-        self._density.refresh(host.densities)
+        self._density.refresh(host.answering.densities)
 
 
 def _step_words(host: Host) -> str:
-    """Where the refinement stands while it is played."""
-    if host.frame is None or host.shown is None:
+    """What is on the robot while it is neither the answer nor one of its modes."""
+    frame, sample, shown = host.playback.frame, host.session.sample, host.shown
+    if shown is None or (frame is None and sample is None):
         return ""
-    words = {0: "Best raw candidate", STEPS + 1: "Answer, the cheapest of all exact ones"}
-    text = words.get(host.frame, f"Step {host.frame} of {STEPS}")
-    return f"<div class='fl step'><b>{text}</b>: error {small(host.shown.err_norm)} σ</div>"
+    if frame is not None:
+        words = {0: "Best raw candidate", STEPS + 1: "Answer, the cheapest of all exact ones"}
+        text = words.get(frame, f"Step {frame} of {STEPS}")
+    else:
+        text = f"Raw sample {sample}"
+        if host.answering.sample_modes is not None and sample is not None:
+            text += f", nearest to mode {host.answering.sample_modes[sample] + 1}"
+    error, energy = small(shown.err_norm), three_digits(shown.energy)
+    return f"<div class='fl step'><b>{text}</b>: error {error} σ, energy {energy}</div>"

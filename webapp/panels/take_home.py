@@ -56,7 +56,7 @@ class TakeHomePanel:
 
     def _send_candidates(self) -> None:
         self._host.client.send_file_download(
-            "candidates.csv", files.candidates_csv(self._host.best), save_immediately=True
+            "candidates.csv", files.candidates_csv(self._host.answering.best), save_immediately=True
         )
 
     def refresh(self) -> None:

@@ -6,7 +6,6 @@ from html import escape
 import numpy as np
 import viser
 
-from finlab.allocation.policy import AXES, KINDS
 from finlab.layout import Layout
 from webapp.handles import on_user_change, put
 from webapp.markup.bars import wrench_bars
@@ -14,8 +13,10 @@ from webapp.markup.fins import fin_table
 from webapp.markup.picking import button_colors
 from webapp.panels.host import Host
 from webapp.panels.mode_picker import ModePicker
-from webapp.state import AXIS_UNITS, AXIS_WORDS
-from webapp.targets import PRESETS, axis_reach, full_thrust, slider_end
+from webapp.panels.pilot import PilotPanel
+from webapp.panels.sweep import SweepPanel
+from webapp.panels.target import TargetPanel
+from webapp.targets import full_thrust
 from webapp.theme import DEAD, css, fin_color
 from webapp.words import authority_sentence, rest_sentence
 
@@ -26,20 +27,7 @@ class WrenchPanel:
     def __init__(self, gui: viser.GuiApi, host: Host) -> None:
         """Build the widgets."""
         self._host = host
-        self._presets = gui.add_button_group("Preset", tuple(PRESETS), hint="Target wrenches to start from.")
-        on_user_change(self._presets, lambda name: host.do(partial(host.session.set_preset, name)))
-        self._sliders = [
-            gui.add_slider(
-                f"{AXES[k]} [{AXIS_UNITS[k]}]",
-                -10.0,
-                10.0,
-                0.01 if k < 3 else 0.001,
-                0.0,
-            )
-            for k in range(6)
-        ]
-        for k, slider in enumerate(self._sliders):
-            on_user_change(slider, partial(self._set_target, k))
+        self._target = TargetPanel(gui, host)
         self._paint = gui.add_html("")
         self._failures = gui.add_button_group(
             "Fail a fin", ("1",), hint="Press a fin's number: fail or repair it."
@@ -48,32 +36,10 @@ class WrenchPanel:
         self._bars = gui.add_html("")
         self._table = gui.add_html("")
         self._picker = ModePicker(gui, host, 150, "fl-wrench-modes")
-        with gui.add_folder("More", expand_by_default=False):
-            self._grips = gui.add_checkbox(
-                "Drag in 3D",
-                False,
-                hint="Handles on the blue arrows, for the force and the torque.",
-            )
-            on_user_change(
-                self._grips, lambda value: host.do(partial(host.session.set_display, "grips", value))
-            )
-            self._policy = gui.add_dropdown(
-                "Out of reach",
-                KINDS,
-                hint="Come closest, keep the direction, or serve axes by priority, heave first.",
-            )
-            on_user_change(
-                self._policy, lambda value: host.do(partial(host.session.set_setting, "policy", value))
-            )
-        self._ranges_for: tuple[Layout, tuple[str, ...]] | None = None
-        self._reach = np.ones(6)
+        self._pilot = PilotPanel(gui, host, self._target)
+        self._sweep = SweepPanel(gui, host)
+        self._full_for: Layout | None = None
         self._full = np.ones(1)
-
-    def _set_target(self, axis: int, value: float) -> None:
-        self._host.do(partial(self._host.session.set_target, axis, value))
-
-    def _set_grips(self, value: bool) -> None:
-        self._host.do(partial(self._host.session.set_display, "grips", value))
 
     def _toggle_failure(self, button: str) -> None:
         names = self._host.session.state.layout.names
@@ -84,51 +50,35 @@ class WrenchPanel:
     def refresh(self) -> None:
         """Write target, failures and answer."""
         host, state = self._host, self._host.session.state
-        self._refresh_ranges()
-        for slider, value in zip(self._sliders, state.target, strict=True):
-            low, high = min(slider.min, value), max(slider.max, value)
-            put(slider, min=low, max=high)
-            put(slider, value=value)
-        put(self._policy, value=state.policy)
-        put(self._grips, value=host.session.display.grips)
-        put(
-            self._failures,
-            options=tuple(
-                f"{i + 1} ✕" if n in state.failed else str(i + 1) for i, n in enumerate(state.layout.names)
-            ),
-        )
+        self._target.refresh()
+        self._refresh_failures()
+        self._picker.refresh()
+        self._pilot.refresh()
+        self._sweep.refresh()
+        answer = host.shown
+        given = None if answer is None else answer.wrench
+        put(self._bars, content=wrench_bars(state.target, given, self._sentence()))
+        fitting = answer if answer is not None and answer.layout.names == state.layout.names else None
+        if self._full_for != state.layout:
+            self._full_for, self._full = state.layout, full_thrust(state.layout)
+        put(self._table, content=fin_table(state.layout, fitting, self._full, host.session.selected))
+
+    def _refresh_failures(self) -> None:
+        state = self._host.session.state
+        names, failed = state.layout.names, state.failed
+        options = tuple(f"{i + 1} ✕" if n in failed else str(i + 1) for i, n in enumerate(names))
+        put(self._failures, options=options)
         colors = [
-            (css(DEAD), "#fff") if n in state.failed else (css(fin_color(i)), "#111")
-            for i, n in enumerate(state.layout.names)
+            (css(DEAD), "#fff") if n in failed else (css(fin_color(i)), "#111") for i, n in enumerate(names)
         ]
         put(self._paint, content=button_colors("fl-fails", colors))
-        self._picker.refresh()
-        answer = host.shown
+
+    def _sentence(self) -> str:
+        """What is left undone, and why."""
+        answer, state = self._host.shown, self._host.session.state
         sentence = "" if answer is None else rest_sentence(answer)
         if answer is not None and not answer.reachable:
             told = escape("; ".join((*answer.binding, *answer.notes)))
             sentence = f"{sentence} {100 * answer.scale:.0f} % of what is asked, {told}."
-        blind = authority_sentence(state.layout, state.failed, self._reach)
-        if blind is not None:
-            sentence = f"<span class='missing'>{blind}</span> {sentence}"
-        put(
-            self._bars, content=wrench_bars(state.target, None if answer is None else answer.wrench, sentence)
-        )
-        fitting = answer if answer is not None and answer.layout.names == state.layout.names else None
-        put(self._table, content=fin_table(state.layout, fitting, self._full, host.session.selected))
-
-    def _refresh_ranges(self) -> None:
-        """Slider ranges and reach marks follow the layout and its failures."""
-        state = self._host.session.state
-        if self._ranges_for == (state.layout, state.failed):
-            return
-        self._ranges_for = (state.layout, state.failed)
-        self._reach = axis_reach(state.layout, state.failed)
-        self._full = full_thrust(state.layout)
-        for k, slider in enumerate(self._sliders):
-            end, reach = slider_end(float(self._reach[k])), self._reach[k]
-            put(slider, min=-end, max=end)
-            put(
-                slider,
-                hint=f"{AXIS_WORDS[k].capitalize()}: the fins give at most ±{reach:.3g} {AXIS_UNITS[k]}.",
-            )
+        blind = authority_sentence(state.layout, state.failed, self._target.reach)
+        return sentence if blind is None else f"<span class='missing'>{blind}</span> {sentence}"

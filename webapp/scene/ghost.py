@@ -1,4 +1,4 @@
-"""Pale blades: where fins stood when the layout was opened or saved, or where a search would put them."""
+"""Pale blades: where fins stood, where a search would put them, or where one in the hand would land."""
 
 import math
 
@@ -11,33 +11,37 @@ from webapp.meshes import fin as fin_mesh
 from webapp.meshes.arrows import NOTHING
 from webapp.meshes.mesh import Mesh, joined
 from webapp.scene.shape import Shape
-from webapp.theme import DEAD
+from webapp.theme import DEAD, Rgb
 
 
 class Ghost:
     """One node for all of them."""
 
-    def __init__(self, scene: viser.SceneApi) -> None:
+    def __init__(self, scene: viser.SceneApi, name: str, color: Rgb = DEAD, opacity: float = 0.3) -> None:
         """Build the node, showing nothing."""
         self._shape = Shape(
             scene.add_mesh_simple(
-                "/ghost",
+                name,
                 NOTHING.vertices,
                 NOTHING.faces,
-                color=DEAD,
-                opacity=0.3,
+                color=color,
+                opacity=opacity,
                 visible=False,
                 cast_shadow=False,
                 receive_shadow=False,
             )
         )
 
-    def refresh(self, saved: Layout | None, layout: Layout) -> None:
-        """Show the fins of another version, `saved`, that stand elsewhere in `layout`; nothing for None."""
-        left = () if saved is None or saved.name != layout.name else _left(saved, layout)
-        put(self._shape.node, visible=bool(left))
-        if left:
-            self._shape.show(_blades, left)
+    def show(self, fins: tuple[Fin, ...]) -> None:
+        """Show fins; none hides the node."""
+        put(self._shape.node, visible=bool(fins))
+        if fins:
+            self._shape.show(_blades, fins)
+
+
+def moved_fins(other: Layout | None, layout: Layout) -> tuple[Fin, ...]:
+    """The fins of another version of a layout that stand elsewhere now."""
+    return () if other is None or other.name != layout.name else _left(other, layout)
 
 
 def _left(saved: Layout, layout: Layout) -> tuple[Fin, ...]:

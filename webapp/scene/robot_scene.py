@@ -9,13 +9,14 @@ import viser
 from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
-from finlab.layout import Layout
+from finlab.layout import Fin, Layout
 from webapp.analyst import Findings
 from webapp.arrow_scale import LENGTH, fitting_newtons
+from webapp.attention import Attention
 from webapp.meshes.hull import hull_of
 from webapp.scene.attainable_nodes import AttainableNodes
 from webapp.scene.fin_node import FinNode
-from webapp.scene.ghost import Ghost
+from webapp.scene.ghost import Ghost, moved_fins
 from webapp.scene.grips import Grips
 from webapp.scene.lines import Lines
 from webapp.scene.overlay import Overlay
@@ -23,6 +24,7 @@ from webapp.scene.stage import Stage
 from webapp.scene.wrench_nodes import WrenchNodes
 from webapp.session import Session
 from webapp.state import State
+from webapp.theme import ASKED
 from webapp.words import missing_part
 
 CAMERAS = {
@@ -62,7 +64,8 @@ class RobotScene:
         self._stage = Stage(scene, hull_of(session.state.layout))
         self._wrench = WrenchNodes(scene)
         self._lines = Lines(scene)
-        self._ghost = Ghost(scene)
+        self._ghost = Ghost(scene, "/ghost")
+        self._landing = Ghost(scene, "/landing", ASKED, 0.45)
         self._overlay = Overlay(scene)
         self._attainable = AttainableNodes(scene)
         self._grips = Grips(scene, on_wrench)
@@ -88,6 +91,7 @@ class RobotScene:
         other: Allocation | None = None,
         findings: Findings | None = None,
         offered: Layout | None = None,
+        attention: Attention | None = None,
     ) -> None:
         """Show the session's layout, and the answer to it if there is one for this very layout.
 
@@ -96,6 +100,7 @@ class RobotScene:
             other: another method's answer, whose forces are shown beside it.
             findings: what the layout can attain, where that is to be shown.
             offered: a better layout, whose fins are shown as ghosts.
+            attention: how much the fins look at each other.
         """
         state, display = self._session.state, self._session.display
         hull = hull_of(state.layout)
@@ -124,7 +129,9 @@ class RobotScene:
                 self._fins[i].command(allocation.command[i], force * scale, angle, display.fans)
         if fits and allocation is not None:
             self._take_command(allocation.command)
-        self._ghost.refresh(offered or (self._session.saved if display.ghost else None), state.layout)
+        left = offered or (self._session.saved if display.ghost else None)
+        self._ghost.show(moved_fins(left, state.layout))
+        self._landing.show(self._landings())
         self._overlay.refresh(other, scale)
         target = np.array(state.target)
         self._attainable.refresh(findings if display.drawn != "none" else None, target)
@@ -134,7 +141,15 @@ class RobotScene:
         self._wrench.refresh(target, given, missing, top, scale)
         self._grips.refresh(display.grips, target, self._wrench.hub(top), scale)
         shown = self._session.selected if display.dimensions else None
-        self._lines.refresh(state.layout, state.healthy, shown, display.graph)
+        self._lines.refresh(state.layout, state.healthy, shown, display.graph, attention)
+
+    def _landings(self) -> tuple[Fin, ...]:
+        """Where the fin in the user's hand would come to stand: its gizmo must not be moved meanwhile."""
+        names = self._session.state.layout.names
+        if self._dragged is None or self._dragged >= len(names):
+            return ()
+        landing = self._session.landing(names[self._dragged], *self._fins[self._dragged].pose())
+        return () if landing is None else (landing,)
 
     def _take_command(self, command: NDArray[np.float64]) -> None:
         if len(command) != len(self._command):

@@ -1,0 +1,123 @@
+"""Ways to ask: one axis alone, a stick that springs back, a sweep; and what is seen of a fin on its way."""
+
+import asyncio
+import math
+from typing import Any
+
+import pytest
+
+from finlab.assets import shipped_layouts
+from finlab.errors import FinlabError
+from finlab.layout import load_layout
+from tests.webapp.stand_in import load_stand_in
+from webapp import sweeping
+from webapp.answering import Answering
+from webapp.session import Session
+from webapp.solver import Solver
+from webapp.sweeping import POINTS, Sweep
+
+
+@pytest.fixture
+def session() -> Session:
+    return Session(load_layout(shipped_layouts()["ucat"]))
+
+
+def test_an_axis_alone_and_the_other_way_round(session: Session) -> None:
+    session.set_only_axis(5)
+    first = session.state.target
+    assert first[5] > 0 and first[:5] == (0.0,) * 5
+    session.set_only_axis(5)
+    assert session.state.target[5] == -first[5]
+    session.set_only_axis(0)
+    assert session.state.target[5] == 0.0 and session.state.target[0] > 0
+    session.open_layout(load_layout(shipped_layouts()["no_yaw"]))
+    with pytest.raises(FinlabError, match="acts on yaw"):
+        session.set_only_axis(5)
+
+
+def test_a_stick_that_springs_back_leaves_no_trace(session: Session) -> None:
+    before, step = session.state, session.history.undo_name
+    for k in range(5):
+        session.steer({0: 0.5 * k, 5: -0.1 * k})
+    assert session.state.target[0] == 2.0
+    revision = session.revision
+    session.release(spring_back=True)
+    assert session.state == before and session.history.undo_name == step and session.revision > revision
+    session.steer({0: 3.0})
+    session.release(spring_back=False)
+    assert session.state.target[0] == 3.0 and session.history.undo_name == "Steer"
+    session.release(spring_back=True)
+    assert session.state.target[0] == 3.0, "nothing is held any more"
+    session.undo()
+    assert session.state == before
+
+
+def test_a_sweep_is_one_step_and_ends_when_someone_else_steers(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sweeping, "STEP_S", 0.001)
+    solver = Solver(load=load_stand_in)
+
+    async def run() -> Sweep:
+        loop = asyncio.get_running_loop()
+        answering: Any = None
+
+        class AtOnce:
+            """A worker that is never busy."""
+
+            def submit(self, key: object, job: Any) -> None:
+                job()
+
+        def changed() -> None:
+            sweep.note(answering)
+
+        def do(act: Any) -> None:
+            act()
+            answering.ask()
+
+        worker: Any = AtOnce()
+        answering = Answering(session, solver, worker, lambda act: act(), changed, lambda _: None)
+        sweep = Sweep(session, loop, do)
+        with pytest.raises(FinlabError, match="smaller end first"):
+            sweep.start(0, 2.0, -2.0)
+        sweep.start(0, -2.0, 2.0)
+        while not all(abs(sweep.error) < 9.0):
+            await asyncio.sleep(0.01)
+        assert sweep.running
+        session.set_target(1, 0.5)
+        while sweep.running:
+            await asyncio.sleep(0.01)
+        return sweep
+
+    sweep = asyncio.run(run())
+    assert sweep.force.shape == (4, POINTS) and (sweep.force >= 0).all()
+    session.undo()
+    assert session.history.undo_name == "Sweep Fx"
+    session.undo()
+    assert session.state.target[0] == 1.2
+
+
+def test_landing_tells_where_a_held_fin_would_go(session: Session) -> None:
+    name = session.state.layout.names[0]
+    assert session.landing(name, (0.3, -0.2, 0.0), 0.1) is None
+    session.set_display("stick", True)
+    session.set_display("angle_snap", "45°")
+    landing = session.landing(name, (0.3, -0.2, 0.0), 0.1)
+    session.end_drag(name, (0.3, -0.2, 0.0), 0.1)
+    assert landing == session.state.layout.fins[0], "the ghost tells the truth"
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_copies_stand_evenly_around_any_axis(session: Session, axis: str) -> None:
+    session.select("front_left")
+    session.ring_of_fins(3, axis)
+    layout = session.state.layout
+    fins = [layout.fins[1], *layout.fins[4:]]
+    assert len(fins) == 3
+    across = [k for k in range(3) if "xyz"[k] != axis]
+    turns = sorted(math.atan2(*(fin.position[k] for k in reversed(across))) for fin in fins)
+    gaps = [(b - a) % (2 * math.pi) for a, b in zip(turns, turns[1:] + turns[:1], strict=True)]
+    assert gaps == pytest.approx([2 * math.pi / 3] * 3)
+    assert len({round(math.hypot(*(fin.position[k] for k in across)), 6) for fin in fins}) == 1
+    with pytest.raises(FinlabError, match="axis"):
+        session.ring_of_fins(3, "w")

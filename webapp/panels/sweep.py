@@ -1,0 +1,108 @@
+"""Play one axis of the target through a range, and see what each fin does along the way."""
+
+import time
+
+import numpy as np
+import viser
+from viser import uplot
+
+from finlab.layout.layout import MAX_FINS
+from webapp.handles import on_user_change, on_user_click, put
+from webapp.panels.host import Host
+from webapp.state import AXIS_UNITS, AXIS_WORDS
+from webapp.sweeping import POINTS
+from webapp.theme import MISSING, css, fin_color
+
+FONT = "11px sans-serif"
+EVERY_S = 0.25
+"""How often the plots are drawn while the sweep runs [s]."""
+
+
+class SweepPanel:
+    """Widgets of one folder."""
+
+    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+        """Build the widgets."""
+        self._host = host
+        self._drawn = 0.0
+        with gui.add_folder("Sweep an axis", expand_by_default=False):
+            self._axis = gui.add_dropdown(
+                "Axis", AXIS_WORDS, hint="Which component of the target goes through the range."
+            )
+            on_user_change(self._axis, lambda _: self._fit_range())
+            self._range = gui.add_vector2(
+                "From, to", (-5.0, 5.0), step=0.05, hint="Ends of the range [N or N m]."
+            )
+            self._play = gui.add_button(
+                "Play the sweep", icon=viser.Icon.PLAYER_PLAY, hint="To and fro until you stop it."
+            )
+            on_user_click(self._play, self._toggle)
+            empty = np.zeros(2) * np.nan
+            self._force = gui.add_uplot(
+                (np.array([0.0, 1.0]), *(empty for _ in range(MAX_FINS))),
+                (
+                    uplot.Series(label="x"),
+                    *(
+                        uplot.Series(label=str(i + 1), stroke=css(fin_color(i)), width=2, spanGaps=True)
+                        for i in range(MAX_FINS)
+                    ),
+                ),
+                **_look("force of each fin [N]"),
+                visible=False,
+            )
+            self._error = gui.add_uplot(
+                (np.array([0.0, 1.0]), empty),
+                (uplot.Series(label="x"), uplot.Series(label="error", stroke=css(MISSING), width=2)),
+                **_look("error [σ]"),
+                visible=False,
+            )
+
+    def _toggle(self) -> None:
+        sweep = self._host.sweep
+        if sweep.running:
+            self._host.do(sweep.stop)
+        else:
+            axis = AXIS_WORDS.index(self._axis.value) if self._axis.value in AXIS_WORDS else 0
+            self._host.do(lambda: sweep.start(axis, *self._range.value))
+
+    def _fit_range(self) -> None:
+        """Half of what is within reach, both ways: the ends are where it becomes interesting."""
+        ranges = self._host.ranging.findings
+        axis = AXIS_WORDS.index(self._axis.value) if self._axis.value in AXIS_WORDS else 0
+        if ranges is not None and np.isfinite(ranges.high[axis]):
+            low, high = float(ranges.low[axis]), float(ranges.high[axis])
+            put(self._range, value=(round(0.5 * low, 2), round(0.5 * high, 2)))
+
+    def refresh(self) -> None:
+        """Write the state of the sweep; the plots at most a few times a second."""
+        sweep = self._host.sweep
+        put(
+            self._play,
+            label="Stop the sweep" if sweep.running else "Play the sweep",
+            icon=viser.Icon.PLAYER_STOP if sweep.running else viser.Icon.PLAYER_PLAY,
+        )
+        if not sweep.fins or time.monotonic() - self._drawn < EVERY_S:
+            return
+        self._drawn = time.monotonic()
+        put(self._force, visible=True)
+        put(self._error, visible=True)
+        lines = np.full((MAX_FINS, POINTS), np.nan)
+        lines[: len(sweep.force)] = sweep.force
+        put(self._force, data=(sweep.values, *np.ascontiguousarray(lines)))
+        put(self._error, data=(sweep.values, sweep.error))
+        name = f"{AXIS_WORDS[sweep.axis]} asked [{AXIS_UNITS[sweep.axis]}]"
+        put(self._error, axes=_look("error [σ]", name)["axes"])
+
+
+def _look(title: str, below: str = "") -> dict:
+    """How both plots look."""
+    return {
+        "scales": {"x": uplot.Scale(time=False)},
+        "axes": (
+            uplot.Axis(label=below, labelSize=18 if below else 0, size=26, labelFont=FONT, font=FONT),
+            uplot.Axis(label=title, labelSize=18, size=46, labelFont=FONT, font=FONT),
+        ),
+        "legend": uplot.Legend(show=False),
+        "cursor": uplot.Cursor(show=False),
+        "height": 130,
+    }

@@ -1,0 +1,96 @@
+"""The wrench that is asked for: presets, and a slider for each axis with its reachable range marked."""
+
+from functools import partial
+
+import numpy as np
+import viser
+
+from finlab.allocation.policy import AXES
+from finlab.layout import Layout
+from webapp.figures import three_digits
+from webapp.handles import on_user_change, put
+from webapp.markup.picking import marker
+from webapp.panels.host import Host
+from webapp.state import AXIS_UNITS, AXIS_WORDS
+from webapp.targets import PRESETS, axis_reach, slider_end
+from webapp.viser_internals import put_marks
+
+
+class TargetPanel:
+    """Buttons and sliders."""
+
+    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+        """Build the widgets."""
+        self._host = host
+        self._presets = gui.add_button_group("Preset", tuple(PRESETS), hint="Target wrenches to start from.")
+        on_user_change(self._presets, lambda name: host.do(partial(host.session.set_preset, name)))
+        self._only = gui.add_button_group(
+            "Only",
+            AXES,
+            hint="This axis alone, at a quarter of what the fins can give; press again to reverse it.",
+        )
+        on_user_change(self._only, self._set_only)
+        gui.add_html(marker("fl-reach"))
+        self._sliders = [
+            gui.add_slider(
+                f"{AXES[k]} [{AXIS_UNITS[k]}]",
+                -10.0,
+                10.0,
+                0.01 if k < 3 else 0.001,
+                0.0,
+            )
+            for k in range(6)
+        ]
+        for k, slider in enumerate(self._sliders):
+            on_user_change(slider, partial(self._set_target, k))
+        self._ends_for: tuple[Layout, tuple[str, ...]] | None = None
+        self._marked: object = None
+        self.reach = np.ones(6)
+        """Largest size of each component with the others free (6,) [N, N m]."""
+
+    def _set_only(self, axis: str) -> None:
+        if axis in AXES:
+            self._host.do(partial(self._host.session.set_only_axis, AXES.index(axis)))
+
+    def _set_target(self, axis: int, value: float) -> None:
+        self._host.do(partial(self._host.session.set_target, axis, value))
+
+    def refresh(self) -> None:
+        """Write the target, the sliders' ends and the marks on them."""
+        state = self._host.session.state
+        if self._ends_for != (state.layout, state.failed):
+            self._ends_for = (state.layout, state.failed)
+            self.reach = axis_reach(state.layout, state.failed)
+        for slider, value, reach in zip(self._sliders, state.target, self.reach, strict=True):
+            end = slider_end(float(reach))
+            put(slider, min=min(-end, value), max=max(end, value))
+            put(slider, value=value)
+        ranges = self._host.ranging.findings
+        if ranges is None or ranges is self._marked:
+            return
+        self._marked = ranges
+        for k, slider in enumerate(self._sliders):
+            low, high = float(ranges.low[k]), float(ranges.high[k])
+            put_marks(slider, _marks(low, high))
+            put(slider, hint=_hint(k, low, high, float(self.reach[k])))
+
+
+def _marks(low: float, high: float) -> tuple[tuple[float, str], ...]:
+    """Both ends of a range; one mark where it is a point, none where there is no range."""
+    if not np.isfinite(low):
+        return ()
+    marks = ((round(low, 3), _short(low)), (round(high, 3), _short(high)))
+    return marks if high - low > 1e-3 else marks[:1]
+
+
+def _short(value: float) -> str:
+    return f"{value + 0.0:.2g}".replace("-", "−") if abs(value) < 10 else f"{value:.0f}".replace("-", "−")
+
+
+def _hint(axis: int, low: float, high: float, reach: float) -> str:
+    word, unit = AXIS_WORDS[axis].capitalize(), AXIS_UNITS[axis]
+    at_most = f"±{three_digits(reach)} {unit} if nothing else is asked to stay"
+    if not np.isfinite(low):
+        return f"{word}: the other five are out of reach as they are. {at_most.capitalize()}."
+    ends = f"{three_digits(low)} to {three_digits(high)} {unit}"
+    return f"{word}: the marks show {ends}, what is within reach with the others as they are; {at_most}."

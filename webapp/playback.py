@@ -1,0 +1,74 @@
+"""Plays the refinement of an answer step by step on the robot."""
+
+import asyncio
+from collections.abc import Callable
+from functools import partial
+
+from finlab.allocation.allocation import Allocation
+from finlab.errors import FinlabError
+from webapp.answering import Answering
+from webapp.refinement import STEPS
+from webapp.session import Session
+from webapp.solver import Solver
+from webapp.worker import Worker
+
+FRAME_S = 0.9
+"""How long each step of a refinement is shown [s]."""
+
+
+class Playback:
+    """Puts one frame after another in the place of the answer; a change of the state ends it."""
+
+    def __init__(
+        self,
+        session: Session,
+        answering: Answering,
+        solver: Solver,
+        worker: Worker,
+        loop: asyncio.AbstractEventLoop,
+        post: Callable[[Callable[[], object]], None],
+        changed: Callable[[], None],
+        failed: Callable[[str], None],
+    ) -> None:
+        """Prepare; `changed` and `failed` are called on the event loop."""
+        self._session, self._answering, self._solver = session, answering, solver
+        self._worker, self._loop, self._post = worker, loop, post
+        self._changed, self._failed = changed, failed
+
+    @property
+    def frame(self) -> int | None:
+        """Which step of the refinement is on the robot, None while none is played."""
+        left = len(self._answering.frames)
+        return STEPS + 2 - left if left else None
+
+    def start(self) -> None:
+        """Show how the refinement makes a raw candidate exact.
+
+        Raises:
+            FinlabError: there is no answer to the present state yet.
+        """
+        best, state, revision = self._answering.best, self._session.state, self._session.revision
+        if best is None or self._answering.busy:
+            raise FinlabError("there is no answer yet; wait for one")
+
+        def job() -> None:
+            try:
+                frames = self._solver.refinement(state, best)
+            except FinlabError as error:
+                self._post(partial(self._failed, str(error)))
+            else:
+                for frame in frames:
+                    _ = frame.wrench
+                self._post(partial(self._play, revision, frames))
+
+        self._worker.submit((id(self), "refinement"), job)
+
+    def _play(self, revision: int, frames: tuple[Allocation, ...]) -> None:
+        self._answering.frames = frames if revision == self._session.revision else ()
+        self._changed()
+        if self._answering.frames:
+            self._loop.call_later(FRAME_S, self._next, revision, frames)
+
+    def _next(self, revision: int, frames: tuple[Allocation, ...]) -> None:
+        if self._answering.frames is frames:  # else it was ended, or started again
+            self._play(revision, frames[1:])

@@ -1,0 +1,92 @@
+"""What all intents of a session share: its state with undo, and what is selected and shown."""
+
+from finlab.errors import FinlabError
+from finlab.layout import Layout
+from webapp.history import History
+from webapp.session.display import Display
+from webapp.state import State
+from webapp.targets import FIRST
+
+
+class Core:
+    """State, history and selection."""
+
+    def __init__(self, layout: Layout, display: Display | None = None) -> None:
+        """Start with a layout, no failures, and a gentle wrench forward and to the left."""
+        self._first = State(layout, target=FIRST)
+        self.history: History[State] = History(self._first)
+        self.display = display or Display()
+        self.selected: str | None = None
+        """The selected fin."""
+        self.saved = layout
+        """The layout as it was opened or saved last."""
+        self.pinned: Layout | None = None
+        """A layout that was put aside to compare others with."""
+        self.beside: str | None = None
+        """With what the score card compares: a shipped layout's name, `PINNED`, or None for the saved one."""
+        self.mode = 0
+        """Which of the answer's modes is shown; 0 is the best one."""
+        self.sample: int | None = None
+        """Which of the answer's raw samples is shown instead of a mode."""
+        self.overlay: str | None = None
+        """Method whose forces are shown beside those on the robot."""
+        self.revision = 0
+        """Grows with every change of the state; an answer carries the revision it was made for."""
+
+    def resume(self, state: State) -> None:
+        """Go on from a state that was kept; what led there is not known any more."""
+        self.history = History(state)
+        self.saved = state.layout
+
+    @property
+    def state(self) -> State:
+        """The present state."""
+        return self.history.state
+
+    def _commit(self, name: str, state: State, merge_key: str | None = None, timed: bool = True) -> None:
+        if state != self.state:
+            self.history.commit(name, state, merge_key, timed)
+            self._settled()
+
+    def _settled(self) -> None:
+        """After any change of the state: a choice of mode is void, a lost fin is not selected."""
+        self.revision += 1
+        self.mode, self.sample = 0, None
+        if self.selected not in self.state.layout.names:
+            self.selected = None
+
+    def select(self, name: str | None) -> None:
+        """Select a fin, or none."""
+        if name is not None:
+            self.state.layout.index(name)
+        self.selected = name
+        self.history.end_merge()
+
+    def select_next(self) -> None:
+        """Select the fin after the selected one."""
+        names = self.state.layout.names
+        self.select(names[(names.index(self.selected) + 1) % len(names)] if self.selected else names[0])
+
+    def _selected_name(self) -> str:
+        if self.selected is None:
+            raise FinlabError("no fin is selected; click one, or choose it in the list")
+        return self.selected
+
+    def start_over(self) -> None:
+        """Everything as at first sight; the way here can be undone."""
+        self._commit("Start over", self._first)
+        self.selected = None
+
+    def undo(self) -> str:
+        """Take back the last step; returns its name."""
+        return self._stepped(self.history.undo(), "undo")
+
+    def redo(self) -> str:
+        """Bring back the step taken back last; returns its name."""
+        return self._stepped(self.history.redo(), "redo")
+
+    def _stepped(self, name: str | None, verb: str) -> str:
+        if name is None:
+            raise FinlabError(f"there is nothing to {verb}")
+        self._settled()
+        return name

@@ -1,0 +1,78 @@
+"""How the robot is shown; not part of undo."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from finlab.errors import FinlabError
+from webapp.analyst import DRAWN
+from webapp.arrow_scale import NEWTONS
+from webapp.state import number
+
+POSITION_STEPS = {"off": 0.0, "5 mm": 0.005, "1 cm": 0.01, "5 cm": 0.05}
+"""Grids [m] that a fin's position can snap to."""
+ANGLE_STEPS = {"off": 0.0, "5°": 5.0, "15°": 15.0, "45°": 45.0}
+"""Grids [deg] that a mounting angle can snap to."""
+
+
+@dataclass(frozen=True)
+class Display:
+    """Switches of one page."""
+
+    frozen: bool = False
+    """Fins hold still at their zero direction."""
+    speed: float = 0.5
+    """Time of the animation per real time."""
+    fans: bool = True
+    """Show the sweep of each fin."""
+    labels: bool = True
+    """Show the numbers of the fins."""
+    graph: bool = False
+    """Show the graph that the network sees, its edges as wide as the attention along them."""
+    dimensions: bool = True
+    """Show the selected fin's distance from the centre of gravity."""
+    shadows: bool = True
+    """Cast shadows; slow without a graphics card."""
+    dark: bool = False
+    """Dark theme."""
+    newtons: float = 0.0
+    """Force that an arrow of 0.1 m stands for [N]; 0 lets the app choose."""
+    position_snap: str = "off"
+    """Key of `POSITION_STEPS`."""
+    angle_snap: str = "off"
+    """Key of `ANGLE_STEPS`."""
+    stick: bool = False
+    """Fins slide on the hull, shafts along its normal."""
+    ghost: bool = True
+    """Show where moved fins stood when the layout was opened or saved."""
+    grips: bool = False
+    """Show handles on the arrows of the asked wrench."""
+    drawn: str = "none"
+    """Key of `webapp.analyst.DRAWN`: the attainable set that is shown."""
+    alone: bool = True
+    """Attainable forces without torques, torques without forces."""
+    center: bool = False
+    """Mark the centre of gravity."""
+
+    def with_value(self, key: str, value: Any) -> "Display":
+        """One field changed; the page may send anything.
+
+        Raises:
+            FinlabError: there is no such field, or not with this value.
+        """
+        now = getattr(self, key, None)
+        if now is None:
+            raise FinlabError(f"there is no switch {key!r:.40}")
+        choices: dict[str, Any] = {
+            "position_snap": POSITION_STEPS,
+            "angle_snap": ANGLE_STEPS,
+            "drawn": DRAWN,
+        }
+        if key in choices and value not in choices[key]:
+            raise FinlabError(f"{key}: expected one of {', '.join(choices[key])}, got {value!r:.40}")
+        if key == "newtons" and value not in (0.0, *NEWTONS):
+            raise FinlabError(f"arrow scale: expected one of {NEWTONS} N per 0.1 m, got {value!r:.40}")
+        if key == "speed":
+            value = number(value, "speed of the animation", 0.02, 1.0)
+        if isinstance(now, bool) and not isinstance(value, bool):
+            raise FinlabError(f"{key}: expected on or off, got {value!r:.40}")
+        return replace(self, **{key: value})

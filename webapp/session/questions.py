@@ -1,0 +1,85 @@
+"""Intents about the question: what wrench is asked for, of which fins, answered how."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from finlab.allocation.policy import AXES
+from finlab.errors import FinlabError
+from webapp.session.core import Core
+from webapp.state import AXIS_WORDS, number
+from webapp.targets import PRESETS, axis_reach
+
+SHARE = 0.25
+"""Share of the largest wrench along an axis that its preset asks for."""
+STEER = "steer"
+"""Merge key of a wrench that is steered."""
+
+
+class Questions(Core):
+    """Target wrench, failures and settings."""
+
+    def set_target(self, axis: int, value: Any) -> None:
+        """One component of the target wrench [N or N m]."""
+        self._commit(f"Set {AXES[axis]}", self.state.with_target(axis, value), f"target{axis}")
+
+    def drag_target(self, first: int, vector: Sequence[float], over: bool) -> None:
+        """Force (`first` 0) or torque (3) of the target in the user's hand; one step of undo for the drag."""
+        state, word = self.state, "force" if first == 0 else "torque"
+        for axis, value in enumerate(vector, start=first):
+            state = state.with_target(axis, round(float(value), 2 if first == 0 else 3))
+        self._commit(f"Drag the {word}", state, f"drag {word}", timed=False)
+        if over:
+            self.history.end_merge()
+
+    def steer(self, values: dict[int, float]) -> None:
+        """Some components [N or N m] of the target under the user's thumb: one step of undo."""
+        state = self.state
+        for axis, value in values.items():
+            state = state.with_target(axis, round(float(value), 2 if axis < 3 else 3))
+        self._commit("Steer", state, STEER, timed=False)
+
+    def release(self, spring_back: bool) -> None:
+        """The thumb is off: the target stays, or goes back to what it was before without leaving a trace."""
+        if spring_back and self.history.merge_key == STEER and self.history.abandon():
+            self._settled()
+        self.history.end_merge()
+
+    def sweep_target(self, axis: int, value: float) -> None:
+        """One component of the target [N or N m] on its way through a range; one step of undo in all."""
+        self._commit(f"Sweep {AXES[axis]}", self.state.with_target(axis, value), f"sweep{axis}", timed=False)
+
+    def set_preset(self, name: str) -> None:
+        """The target wrench of a preset."""
+        if name not in PRESETS:
+            raise FinlabError(f"there is no preset {name!r:.40}")
+        self._commit(f"Preset {name}", replace(self.state, target=PRESETS[name]))
+
+    def set_only_axis(self, axis: int) -> None:
+        """Nothing but one axis, at a quarter of what the working fins give at most; again turns it round.
+
+        Raises:
+            FinlabError: the fins cannot act on this axis.
+        """
+        if not 0 <= axis < 6:
+            raise FinlabError(f"axis: expected 0 to 5, got {axis!r:.40}")
+        state = self.state
+        reach = float(axis_reach(state.layout, state.failed)[axis])
+        if reach < 1e-6:
+            raise FinlabError(f"no working fin of this robot acts on {AXIS_WORDS[axis]}")
+        value = float(f"{SHARE * reach:.2g}")
+        alone = all(v == 0.0 for k, v in enumerate(state.target) if k != axis)
+        sign = -1.0 if alone and state.target[axis] > 0.0 else 1.0
+        target = [0.0] * 6
+        target[axis] = number(sign * value, AXES[axis], -1000.0, 1000.0)
+        fx, fy, fz, tx, ty, tz = target
+        self._commit(f"Only {AXIS_WORDS[axis]}", replace(state, target=(fx, fy, fz, tx, ty, tz)))
+
+    def set_setting(self, key: str, value: Any) -> None:
+        """K, T, gamma or the method; `key` is the field of `State`."""
+        self._commit(f"Set {key.replace('_', ' ')}", self.state.with_setting(key, value), key)
+
+    def toggle_failure(self, name: str) -> None:
+        """A fin fails, or is repaired."""
+        verb = "Repair" if name in self.state.failed else "Fail"
+        self._commit(f"{verb} {name}", self.state.with_failure_toggled(name))
