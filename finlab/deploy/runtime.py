@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from finlab.allocation.energy import command_energy
 from finlab.allocation.learned import LearnedAllocator
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.deploy.bundle_file import RobotBundle, read_bundle
@@ -104,6 +105,10 @@ class Runtime:
             solve_ms=result.solve_ms,
             notes=result.notes,
         )
+
+    def energy(self, command: Array) -> float:
+        """Energy proxy of a command (n, 3), NaN for failed fins."""
+        return float(command_energy(command, np.array([fin.limits.upper for fin in self.layout.fins])))
 
     def neutral(self, failed: Sequence[str] = ()) -> Array:
         """Commands (n, 3) that push least: least amplitude and frequency, zero direction nearest to 0."""

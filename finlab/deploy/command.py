@@ -1,0 +1,149 @@
+"""`finlab-runtime check|allocate|serve BUNDLE`: the command that runs on the robot."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Sequence
+
+from finlab.errors import FinlabError
+
+POLICIES = ("closest", "direction", "priority")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; 0 is good, 1 a self-test that failed, 2 an error told in one sentence."""
+    arguments = _parser().parse_args(argv)
+    # Before numpy is loaded: every product here is too small to be shared among cores.
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    try:
+        code: int = arguments.run(arguments)
+        sys.stdout.flush()
+        return code
+    except FinlabError as error:
+        print(f"finlab-runtime: error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
+
+
+def check(arguments: argparse.Namespace) -> int:
+    """Print each question of the self-test with its answer."""
+    start = time.perf_counter()
+    from finlab.deploy.runtime import load
+    from finlab.deploy.self_check import self_check
+
+    runtime = load(arguments.bundle, arguments.engine)
+    print(
+        f"{arguments.bundle}: {runtime.layout.name}, {runtime.layout.n_fins} fins, "
+        f"checkpoint {runtime.bundle.graph.checkpoint}, ready in {time.perf_counter() - start:.2f} s"
+    )
+    findings = self_check(runtime)
+    for finding in findings:
+        word = "skipped" if finding.value != finding.value else "ok" if finding.good else "FAILED"
+        print(f"  {word:7} {finding.question}: {finding.value:.2g}, allowed {finding.limit:.2g}")
+    if all(finding.good for finding in findings):
+        print("this computer answers as the one that made the bundle")
+        return 0
+    print("do not use this bundle here: the answers differ from those of the computer that made it")
+    return 1
+
+
+def allocate(arguments: argparse.Namespace) -> int:
+    """Print the commands for one target."""
+    from finlab.deploy.runtime import load
+
+    runtime = load(arguments.bundle, arguments.engine)
+    answer = runtime.allocate(
+        arguments.wrench, failed=arguments.failed, policy=arguments.policy, seed=arguments.seed
+    )
+    rows = [None if row[0] != row[0] else row.tolist() for row in answer.command]
+    if arguments.json:
+        values = {
+            "fins": list(answer.fins),
+            "failed": [name for name, row in zip(answer.fins, rows, strict=True) if row is None],
+            "command": rows,
+            "target": list(arguments.wrench),
+            "wrench_surrogate": answer.wrench.tolist(),
+            "unallocated": answer.unallocated.tolist(),
+            "err_norm": answer.err_norm,
+            "energy": answer.energy,
+            "solve_ms": answer.solve_ms,
+        }
+        print(json.dumps(values, allow_nan=False))
+        return 0
+    width = max(map(len, ("fin", *answer.fins)))
+    print(f"{'fin':<{width}}  A [rad]  f [Hz]  zero direction [rad]")
+    for name, row in zip(answer.fins, rows, strict=True):
+        values_text = "failed" if row is None else f"{row[0]:7.3f}  {row[1]:6.3f}  {row[2]:20.3f}"
+        print(f"{name:<{width}}  {values_text}")
+    print(f"err_norm {answer.err_norm:.2e}   energy {answer.energy:.3f}   {answer.solve_ms:.1f} ms")
+    for note in answer.notes:
+        print(note)
+    return 0
+
+
+def serve(arguments: argparse.Namespace) -> int:
+    """Answer requests until they end."""
+    from finlab.deploy.runtime import load
+    from finlab.deploy.serve import Server, Timing, Transport
+    from finlab.deploy.transport import LoopbackUdp, StandardStreams
+
+    runtime = load(arguments.bundle, arguments.engine)
+    deadline = None if arguments.deadline_ms is None else arguments.deadline_ms / 1e3
+    timing = Timing(deadline, arguments.watchdog_s or None)
+    transport: Transport
+    if arguments.udp is None:
+        transport = StandardStreams(sys.stdin.buffer, sys.stdout.buffer)
+    else:
+        transport = LoopbackUdp(arguments.udp)
+        print(f"listening on 127.0.0.1:{transport.port}", file=sys.stderr, flush=True)
+    Server(runtime, timing, arguments.steady).run(transport)
+    return 0
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0 < value < 1e6:
+        raise argparse.ArgumentTypeError(f"must be above 0, got {text}")
+    return value
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser("finlab-runtime", description="Control allocation on board.")
+    verbs = parser.add_subparsers(required=True, metavar="check|allocate|serve")
+
+    def verb(run: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
+        made = verbs.add_parser(run.__name__, help=text, description=text)
+        made.set_defaults(run=run)
+        made.add_argument("bundle", metavar="BUNDLE", help="folder or zip archive made by `finlab export`")
+        made.add_argument("--engine", choices=("numpy", "onnx"), default="numpy", help="runs the network")
+        return made
+
+    verb(check, "Run the self-test; do this on the robot before first use.")
+    one = verb(allocate, "Commands for one target.")
+    names = ("FX", "FY", "FZ", "TX", "TY", "TZ")
+    one.add_argument("--wrench", nargs=6, type=float, required=True, metavar=names, help="[N, N m]")
+    one.add_argument("--failed", action="append", default=[], metavar="NAME", help="fin that is lost")
+    one.add_argument("--policy", choices=POLICIES, default="closest", help="what to do out of reach")
+    one.add_argument("--seed", type=int, default=0, help="seed of the candidates")
+    one.add_argument("--json", action="store_true", help="print one JSON object")
+    loop = verb(serve, "Read targets as JSON lines, write commands as JSON lines.")
+    loop.add_argument("--udp", type=int, metavar="PORT", help="UDP on 127.0.0.1, not stdin and stdout")
+    loop.add_argument("--deadline-ms", type=_positive, metavar="MS", help="answer no later than this")
+    loop.add_argument(
+        "--watchdog-s", type=float, default=1.0, metavar="S", help="silence before the fins rest; 0: never"
+    )
+    loop.add_argument("--steady", action="store_true", help="let fins turn slowly between answers")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,179 @@
+"""`finlab-runtime serve`: targets in, commands out, as lines of JSON; safe when nobody speaks any more.
+
+A request is `{"wrench": [Fx, Fy, Fz, Tx, Ty, Tz]}`, with `id`, `failed` and `policy` if wanted. Each answer
+says in `status` what it is:
+
+=========  ============================================================================================
+status     meaning
+=========  ============================================================================================
+`ok`       commands for the newest target
+`late`     the deadline passed; the last commands that were sent, or neutral ones, are repeated
+`neutral`  no target for longer than the watchdog allows; the fins are told to rest
+`error`    the request was not understood; `error` holds one sentence and there are no commands
+=========  ============================================================================================
+
+Only the newest request counts: those that waited behind it are skipped, since a robot wants the present, not
+the past. A late answer is thrown away.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import TimeoutError as TooLate
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.deploy.runtime import Answer, Runtime
+from finlab.errors import CommandError, FinlabError
+
+Array = NDArray[np.float64]
+
+MAX_LINE = 65_536
+"""Longest request that is read [bytes]."""
+KEYS = ("wrench", "id", "failed", "policy")
+"""What a request may hold."""
+
+
+class Transport(Protocol):
+    """How requests come and answers go."""
+
+    def newest(self, timeout: float | None) -> bytes | None:
+        """The newest request that waits; None after `timeout` seconds without one. EOFError at the end."""
+
+    def send(self, line: bytes) -> None:
+        """Send one answer to whoever asked last."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """When to wait no longer."""
+
+    deadline: float | None = None
+    """Longest time for an answer [s]; None to wait for it however long it takes."""
+    watchdog: float | None = 1.0
+    """Longest silence before the fins rest [s]; None to keep the last commands for ever."""
+
+
+class Server:
+    """Answers requests until they end."""
+
+    def __init__(self, runtime: Runtime, timing: Timing, steady: bool = False) -> None:
+        """Make it.
+
+        Args:
+            runtime: the robot.
+            timing: deadline and watchdog.
+            steady: whether fins turn slowly from one answer to the next (`previous`).
+        """
+        self._runtime, self._timing, self._steady = runtime, timing, steady
+        self._worker = ThreadPoolExecutor(1)
+        self._sent: Array | None = None  # the last commands, None while the fins rest
+        self._failed: tuple[str, ...] = ()
+        self._busy: Future[Answer] | None = None
+
+    def run(self, transport: Transport) -> None:
+        """Serve until the requests end; then the fins rest."""
+        fresh = time.monotonic()  # when the last good target came
+        try:
+            while True:
+                patience = self._timing.watchdog
+                if patience is not None:
+                    patience = max(patience - (time.monotonic() - fresh), 0.0)
+                line = transport.newest(patience)
+                reply = self._rest() if line is None else self.answer(line)
+                if reply["status"] != "error":  # nonsense does not keep the fins beating
+                    fresh = time.monotonic()
+                transport.send(_line(reply))
+        except EOFError:
+            transport.send(_line(self._rest()))
+        finally:
+            self._worker.shutdown(wait=False, cancel_futures=True)
+
+    def answer(self, line: bytes) -> dict[str, Any]:
+        """The answer to one request, as plain values."""
+        start = time.perf_counter()
+        name: Any = None
+        try:
+            request = _request(line)
+            name = request.get("id")
+            self._failed = tuple(request.get("failed", ()))
+            answer = self._solve(request, start)
+        except TooLate:
+            held = self._neutral() if self._sent is None else self._sent.copy()
+            held[np.isnan(self._neutral())] = np.nan
+            return _reply(name, "late", self._runtime.layout.names, held)
+        except FinlabError as error:
+            return {"id": name, "status": "error", "error": str(error)}
+        self._sent = answer.command
+        return _reply(name, "ok", answer.fins, answer.command) | {
+            "wrench": answer.wrench.tolist(),
+            "unallocated": answer.unallocated.tolist(),
+            "err_norm": answer.err_norm,
+            "energy": answer.energy,
+            "solve_ms": answer.solve_ms,
+        }
+
+    def _solve(self, request: Mapping[str, Any], start: float) -> Answer:
+        """The runtime's answer, or `TooLate` when the deadline passes first."""
+        previous = self._sent if self._steady else None
+
+        def work() -> Answer:
+            return self._runtime.allocate(
+                request["wrench"],
+                failed=self._failed,
+                previous=previous,
+                policy=request.get("policy", "closest"),
+            )
+
+        if self._timing.deadline is None:
+            return work()
+        if self._busy is not None:
+            # What came too late for its own target is of no use to this one, but must end first.
+            wait([self._busy], max(self._timing.deadline - (time.perf_counter() - start), 0.0))
+            if not self._busy.done():
+                raise TooLate
+        self._busy = self._worker.submit(work)
+        return self._busy.result(max(self._timing.deadline - (time.perf_counter() - start), 0.0))
+
+    def _rest(self) -> dict[str, Any]:
+        self._sent = None
+        return _reply(None, "neutral", self._runtime.layout.names, self._neutral())
+
+    def _neutral(self) -> Array:
+        known = [name for name in self._failed if name in self._runtime.layout.names]
+        return self._runtime.neutral(known)
+
+
+def _request(line: bytes) -> Mapping[str, Any]:
+    """A request, checked as far as the allocator does not check it itself."""
+    if len(line) > MAX_LINE:
+        raise CommandError(f"request: longer than {MAX_LINE} bytes")
+    try:
+        request = json.loads(line)
+    except (ValueError, RecursionError):
+        raise CommandError("request: expected one JSON object in a line") from None
+    if not isinstance(request, dict) or "wrench" not in request:
+        raise CommandError('request: expected {"wrench": [Fx, Fy, Fz, Tx, Ty, Tz]}')
+    if unknown := [key for key in request if key not in KEYS]:
+        raise CommandError(f"request: unknown key {unknown[0]!r:.40}, expected {', '.join(KEYS)}")
+    failed = request.get("failed", [])
+    if not isinstance(failed, list) or not all(isinstance(name, str) for name in failed):
+        raise CommandError("failed: expected a list of fin names")
+    if not isinstance(request.get("policy", ""), str):
+        raise CommandError("policy: expected a name")
+    return request
+
+
+def _reply(name: Any, status: str, fins: tuple[str, ...], command: Array) -> dict[str, Any]:
+    rows = [None if np.isnan(row).any() else row.tolist() for row in command]
+    return {"id": name, "status": status, "fins": list(fins), "command": rows}
+
+
+def _line(reply: Mapping[str, Any]) -> bytes:
+    return json.dumps(reply).encode() + b"\n"
