@@ -19,12 +19,9 @@ def energy_by_fins(rows: Sequence[dict[str, Any]], reference: str) -> str:
             mine = [row for row in rows if row["method"] == method and row["fins"] != "all"]
             known = [row for row in mine if row["energy_ratio"] is not None]
             place = [row["fins"] + offset for row in known]
-            colour, hollow = COLOURS[method], method == reference
-            style: dict[str, Any] = {
-                "color": colour,
-                "markerfacecolor": "white" if hollow else colour,
-                "markersize": 5,
-            }
+            colour = COLOURS[method]
+            inside = "white" if method == reference else colour
+            style: dict[str, Any] = {"color": colour, "markerfacecolor": inside, "markersize": 5}
             if method != reference:
                 low = [row["energy_ratio"] - row["energy_ratio_low"] for row in known]
                 high = [row["energy_ratio_high"] - row["energy_ratio"] for row in known]

@@ -49,8 +49,8 @@ def energy_blocks(results: Results) -> list[Block]:
         Fold("The same by number of fins", (Table(COLUMNS, by_fins),)),
         Heading("Every win checked again", 3),
         Text(
-            f"Each answer that is cheaper than `{REFERENCE}`'s was computed once more in double precision, by "
-            "the fin law written out apart from the plant, and held against the limits of its fins bit for bit."
+            f"Each answer that is cheaper than `{REFERENCE}`'s was computed once more in double precision, "
+            "by the fin law written out apart from the plant, and held against the limits bit for bit."
         ),
         Table(CHECKS, [{**row, "method": f"`{row['method']}`"} for row in results.recheck_rows]),
     ]

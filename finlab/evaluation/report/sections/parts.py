@@ -65,11 +65,11 @@ def ablation_blocks(results: Results) -> list[Block]:
     blocks: list[Block] = [
         Heading("Ablation"),
         Text(
-            "The paper's five rows with the network of the checkpoint `paper`: the same cases, 64 candidates, "
-            f"temperature {PAPER_TEMPERATURE} and refinement budget, one stage changed in each row. The paper "
-            "does not say which model scored its table; its 0.0003 here and 0.0857 above cannot be the same "
-            "one. So the same commands are scored twice: by the surrogate that refined them and by the "
-            "analytic fin model."
+            "The paper's five rows with the network of the checkpoint `paper`: the same cases, 64 "
+            f"candidates, temperature {PAPER_TEMPERATURE} and refinement budget, one stage changed in each "
+            "row. The paper does not say which model scored its table; its 0.0003 here and 0.0857 above "
+            "cannot be the same one. So the same commands are scored twice: by the surrogate that refined "
+            "them and by the analytic fin model."
         ),
         Figure(
             "ablation",
@@ -120,10 +120,10 @@ def temperature_blocks(results: Results) -> list[Block]:
         Heading("Temperature"),
         Text(
             "Figure A of the paper, for the network of the checkpoint `paper`. Diversity grows with the "
-            f"temperature of the draw; the best cost among 64 candidates is lowest at T = "
+            "temperature of the draw; the best cost among 64 candidates is lowest at T = "
             f"{three(best['temperature'])} here (the paper uses {PAPER_TEMPERATURE}). Diversity is the mean "
-            "distance between two candidates in units of the command ranges; J is squared error plus weighted "
-            "energy, by the surrogate, before refinement."
+            "distance between two candidates in units of the command ranges; J is squared error plus "
+            "weighted energy, by the surrogate, before refinement."
         ),
         Figure(
             "figure-a",
@@ -151,8 +151,8 @@ def seed_blocks(results: Results) -> list[Block]:
     return [
         Heading("What learning buys"),
         Text(
-            "The network's best 16 candidates against 16 random and 16 quasi-random ones, refined by the same "
-            "number of Levenberg-Marquardt steps on the surrogate, scored by the plant."
+            "The network's best 16 candidates against 16 random and 16 quasi-random ones, refined by the "
+            "same number of Levenberg-Marquardt steps on the surrogate, scored by the plant."
         ),
         Figure("seeds", seed_lines(results.seed_rows), "Mean error against the number of refinement steps."),
         Fold("The numbers", (Table(columns, rows),)),
@@ -176,8 +176,9 @@ def training_blocks(results: Results) -> list[Block]:
         Heading("What the parts of the training bring"),
         Text(
             f"Trainings of {settings['steps']} steps of {settings['batch_size']} samples each (preset "
-            f"`{settings['preset']}`), one thing changed at a time. Such budgets are far below those of the shipped "
-            "networks: read the order, not the size. The same surrogate ranks and refines in all of them."
+            f"`{settings['preset']}`), one thing changed at a time. Such budgets are far below those of the "
+            "shipped networks: read the order, not the size. The same surrogate ranks and refines in all "
+            "of them."
         ),
         Figure("training", training_bars(rows, titles), "Mean error with the interval of a rerun."),
         Table(columns, [{**row, "title": titles[row["change"]]} for row in rows]),

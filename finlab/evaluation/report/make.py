@@ -1,0 +1,120 @@
+"""`finlab eval report`: run what is missing, then write the page, its Markdown twin and the pictures."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from finlab.evaluation.report.document import Block, Document, figures_of
+from finlab.evaluation.report.jobs import run_jobs
+from finlab.evaluation.report.page_html import to_html
+from finlab.evaluation.report.page_markdown import to_markdown
+from finlab.evaluation.report.plan import Checkpoints, make_plan
+from finlab.evaluation.report.provenance import Provenance, make_provenance, source_commit
+from finlab.evaluation.report.results import Results
+from finlab.evaluation.report.sections.energy import energy_blocks
+from finlab.evaluation.report.sections.making import making_blocks
+from finlab.evaluation.report.sections.parts import (
+    ablation_blocks,
+    latency_blocks,
+    seed_blocks,
+    temperature_blocks,
+    training_blocks,
+)
+from finlab.evaluation.report.sections.summary import summary_blocks, wrench_tables
+from finlab.evaluation.report.sections.wrench import wrench_blocks
+from finlab.evaluation.report.sizes import SIZES, Sizes
+from finlab.evaluation.store import Store
+from finlab.model.checkpoint import load_checkpoint, load_normalization, resolve_checkpoint
+
+PAGE, TWIN, TABLES, PICTURES = "index.html", "report.md", "tables.json", "pictures"
+"""What a report's folder holds."""
+
+
+def make_report(
+    out: Path,
+    *,
+    size: str,
+    seed: int,
+    checkpoints: Checkpoints,
+    records: Path,
+    command: str,
+    processes: int | None = None,
+) -> Path:
+    """Make the whole report; parts that are done are taken from `records`.
+
+    Args:
+        out: folder for the page; made if need be.
+        size: key of `SIZES`.
+        seed: of all draws.
+        checkpoints: under test.
+        records: folder of the results of the parts.
+        command: that makes the report, shown on the page.
+        processes: parts that run at once; the number of cores by default.
+
+    Returns:
+        The page.
+    """
+    sizes = SIZES[size]
+    plan = make_plan(sizes, seed=seed, checkpoints=checkpoints, runs=records / "trainings")
+    store = Store(records)
+    run_jobs(list(plan), store, commit=source_commit(), processes=processes)
+    paths = {
+        "learned": resolve_checkpoint(checkpoints.learned or "default"),
+        "paper": resolve_checkpoint(checkpoints.paper or "paper"),
+    }
+    prints = {f"{path.name} ({name})": load_checkpoint(path).sha256 for name, path in paths.items()}
+    results = Results(plan, store, load_normalization(paths["learned"]).std)
+    provenance = make_provenance(prints, seed, command)
+    write_report(out, make_document(results, provenance, sizes), tables_of(results, provenance))
+    return out / PAGE
+
+
+def make_document(results: Results, provenance: Provenance, sizes: Sizes) -> Document:
+    """The page's blocks, from results."""
+    blocks: list[Block] = [
+        *summary_blocks(results),
+        *wrench_blocks(results),
+        *energy_blocks(results),
+        *latency_blocks(results),
+        *seed_blocks(results),
+        *ablation_blocks(results),
+        *temperature_blocks(results),
+        *training_blocks(results),
+        *making_blocks(results, provenance, sizes),
+    ]
+    note = "" if sizes.name == "full" else f" A {sizes.name} look on few cases; intervals are wide."
+    subtitle = (
+        "Control allocation for robots with fins: the learned allocator beside the paper's method and seven "
+        f"that know the fin law, every answer scored by the analytic fin model.{note}"
+    )
+    return Document("finlab evaluation", subtitle, tuple(blocks))
+
+
+def tables_of(results: Results, provenance: Provenance) -> dict[str, Any]:
+    """Every table as rows, for scripts."""
+    return {
+        "commit": provenance.commit,
+        "checkpoints": provenance.checkpoints,
+        "seed": provenance.seed,
+        "machine": provenance.machine,
+        "wrench": [row for rows in wrench_tables(results).values() for row in rows],
+        "energy": results.energy_rows,
+        "latency": results.latency_rows,
+        "seeds": results.seed_rows,
+        "ablation": results.ablation_rows,
+        "temperature": results.temperature_rows,
+        "training": results.training_rows,
+    }
+
+
+def write_report(out: Path, document: Document, tables: dict[str, Any]) -> None:
+    """Page, twin, pictures and rows."""
+    pictures = out / PICTURES
+    pictures.mkdir(parents=True, exist_ok=True)
+    for figure in figures_of(document.blocks):
+        (pictures / f"{figure.name}.svg").write_text(figure.svg, "utf-8")
+    (out / PAGE).write_text(to_html(document), "utf-8")
+    (out / TWIN).write_text(to_markdown(document, PICTURES), "utf-8")
+    (out / TABLES).write_text(json.dumps(tables, indent=1) + "\n", "utf-8")
