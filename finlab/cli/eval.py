@@ -2,26 +2,33 @@
 
 from __future__ import annotations
 
-import json as json_format
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 from tyro.conf import arg
 from tyro.extras import SubcommandApp
 
-if TYPE_CHECKING:
-    from finlab.allocation import Allocator
+from finlab.cli.eval_files import (
+    Checkpoint,
+    Count,
+    Folder,
+    JsonFile,
+    Methods,
+    Split,
+    check_folder,
+    check_positive,
+    check_writable,
+    load_methods,
+    write_json,
+)
 
 verbs = SubcommandApp()
 
-Count = Annotated[int, arg(metavar="N")]
-Split = Annotated[str, arg(metavar="NAME")]
-Methods = Annotated[str, arg(metavar="A,B,...")]
-Checkpoint = Annotated[str | None, arg(metavar="NAME|FOLDER")]
-JsonFile = Annotated[Path | None, arg(metavar="FILE")]
-
 LATENCY_LAYOUTS = 5
 """Layouts whose calls are timed."""
+
+
+SUBSAMPLE = 10
+"""Targets of each layout that methods of a tenth of a second solve unless told otherwise."""
 
 
 @verbs.command
@@ -32,33 +39,52 @@ def wrench(
     methods: Methods = "learned,paper",
     seed: Count = 0,
     single: Annotated[int | None, arg(metavar="N")] = None,
+    subsample: Count = SUBSAMPLE,
     checkpoint: Checkpoint = None,
     json: JsonFile = None,
+    records: Folder = None,
 ) -> None:
     """Track reachable wrenches on held-out layouts; error, energy and time of each method.
 
     Args:
-        split: id, ood, ood-fins, limits, failure or near-singular.
+        split: id, ood, ood-fins, limits, failure, near-singular, or all of them.
         layouts: layouts of the split.
         targets: targets on each layout.
-        methods: names with commas between: learned, paper, qp, sqp, analytic, multistart, trf, slsqp, ipopt.
+        methods: names with commas between: learned, paper, qp, sqp, analytic, multistart, trf, slsqp, ipopt;
+            a number of starts may follow the last three, as in ipopt-32.
         seed: draws layouts and targets; same numbers, same cases.
         single: solve only the first N targets of each layout, one call each, and time the calls.
+        subsample: trf, slsqp and ipopt solve only the first N targets of each layout; column n says how many.
         checkpoint: trained checkpoint; the shipped one of each method by default.
         json: file for the rows.
+        records: folder for the records, one NPZ file for each split and method.
     """
-    from finlab.evaluation.splits import make_split
-    from finlab.evaluation.wrench import run_method, wrench_report, wrench_rows
+    from finlab.evaluation.entrants import is_slow
+    from finlab.evaluation.records import columns_of_records, save_columns
+    from finlab.evaluation.splits import SPLITS, make_split
+    from finlab.evaluation.wrench import interval_rows, run_method, wrench_report, wrench_rows
 
-    _check_positive("single", single)
-    _check_writable(json)
-    cases = make_split(split, layouts, targets, seed)
-    records = {
-        name: run_method(allocator, cases, single=single)
-        for name, allocator in _load(methods, checkpoint).items()
-    }
-    _write(json, {"rows": wrench_rows(records, split)})
-    print(wrench_report(records, split, single=single))
+    for name, value in (("single", single), ("subsample", subsample)):
+        check_positive(name, value)
+    check_writable(json)
+    check_folder("records", records)
+    allocators = load_methods(methods, checkpoint)
+    rows, intervals = [], []
+    for k, part in enumerate(SPLITS if split == "all" else (split,)):
+        cases = make_split(part, layouts, targets, seed)
+        found = {
+            name: run_method(allocator, cases, single=single, first=subsample if is_slow(name) else None)
+            for name, allocator in allocators.items()
+        }
+        if records is not None:
+            settings = {"split": part, "layouts": layouts, "targets": targets, "seed": seed}
+            for name, each in found.items():
+                made = {**settings, "method": name, "checkpoint": allocators[name].checkpoint}
+                save_columns(records / f"wrench-{part}-{name}.npz", columns_of_records(each), made)
+        rows += wrench_rows(found, part)
+        intervals += interval_rows(found, part)
+        print(("\n" if k else "") + wrench_report(found, part, single=single))
+    write_json(json, {"rows": rows, "intervals": intervals})
 
 
 @verbs.command
@@ -86,12 +112,12 @@ def seeds(
     from finlab.evaluation.seeds import seed_report, seed_rows
     from finlab.evaluation.splits import make_split
 
-    _check_positive("candidates", candidates)
-    _check_writable(json)
-    allocator = _load("learned", checkpoint)["learned"]
+    check_positive("candidates", candidates)
+    check_writable(json)
+    allocator = load_methods("learned", checkpoint)["learned"]
     assert isinstance(allocator, LearnedAllocator)
     rows = seed_rows(allocator, make_split(split, layouts, targets, seed), n_seeds=candidates, seed=seed)
-    _write(json, {"rows": rows})
+    write_json(json, {"rows": rows})
     print(seed_report(rows, candidates))
 
 
@@ -121,10 +147,12 @@ def ablation(
     from finlab.evaluation.ablation import ablation_report, ablation_rows
     from finlab.evaluation.splits import make_split
 
-    _check_writable(json)
+    check_writable(json)
     cases = make_split(split, layouts, targets, seed)
-    rows = ablation_rows(cases, checkpoint=checkpoint, n_candidates=candidates, temperature=temperature)
-    _write(json, {"rows": rows})
+    rows = ablation_rows(
+        cases, checkpoint=checkpoint, n_candidates=candidates, temperature=temperature, seed=seed
+    )
+    write_json(json, {"rows": rows})
     print(ablation_report(rows))
 
 
@@ -153,43 +181,14 @@ def latency(
     from finlab.evaluation.latency import latency_report, latency_rows, machine
     from finlab.evaluation.splits import make_split
 
-    _check_positive("calls", calls)
-    _check_writable(json)
+    check_positive("calls", calls)
+    check_writable(json)
     if not 2 <= fins <= 5:
         raise DataError(f"fins: expected 2 to 5, the fin counts of split id, got {fins}")
     cases = [case for case in make_split("id", 100, 50, seed) if case.layout.n_fins == fins]
-    rows = latency_rows(_load(methods, checkpoint), cases[:LATENCY_LAYOUTS], n_calls=calls, budget_s=budget)
+    rows = latency_rows(
+        load_methods(methods, checkpoint), cases[:LATENCY_LAYOUTS], n_calls=calls, budget_s=budget
+    )
     described = machine()
-    _write(json, {"rows": rows, "machine": described})
+    write_json(json, {"rows": rows, "machine": described})
     print(latency_report(rows, described))
-
-
-def _load(methods: str, checkpoint: str | None) -> dict[str, Allocator]:
-    """All methods, loaded before the first one runs so that a wrong name costs no time."""
-    from finlab.allocation import load_allocator
-    from finlab.errors import AllocationError
-
-    names = list(dict.fromkeys(name.strip() for name in methods.split(",") if name.strip()))
-    if not names:
-        raise AllocationError(f"methods: expected names with commas between (learned,paper), got {methods!r}")
-    return {name: load_allocator(checkpoint, name) for name in names}
-
-
-def _check_positive(name: str, value: int | None) -> None:
-    from finlab.errors import DataError
-
-    if value is not None and value < 1:
-        raise DataError(f"{name}: expected a number of at least 1, got {value}")
-
-
-def _check_writable(path: Path | None) -> None:
-    """Refuse a file that cannot be written before the work, not after."""
-    from finlab.errors import DataError
-
-    if path is not None and (path.is_dir() or not path.absolute().parent.is_dir()):
-        raise DataError(f"json: expected a file in an existing folder, got {path}")
-
-
-def _write(path: Path | None, content: dict[str, Any]) -> None:
-    if path is not None:
-        path.write_text(json_format.dumps(content, indent=1, allow_nan=False) + "\n", "utf-8")

@@ -139,7 +139,11 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
     plan.scatter["paper"] = job("scatter", "scatter", "paper", fins=SCATTER_FINS, targets=SCATTER_TARGETS)
     layouts, targets = sizes.seeds
     plan.seeds["id"] = job("seeds", "seeds", "learned", layouts=layouts, targets=targets, candidates=N_SEEDS)
-    _add_training(plan, sizes, seed, prints["learned"] + prints["paper"], runs)
+    preset, steps, batch_size = sizes.training
+    settings = {"preset": preset, "steps": steps, "batch_size": batch_size}
+    plan.training.update(
+        training_jobs({**settings, "layouts": layouts, "targets": targets, "seed": seed}, runs)
+    )
     calls, budget_s = sizes.latency
     methods = [name for name in LATENCY_METHODS if name in prints]
     plan.latency["calls"] = Job(
@@ -160,20 +164,22 @@ def _size(sizes: Sizes, split: str, method: str) -> tuple[int, int]:
     return sizes.slow_other if is_slow(method) else sizes.other
 
 
-def _add_training(plan: Plan, sizes: Sizes, seed: int, prints: str, runs: Path) -> None:
-    preset, steps, batch_size, _ = sizes.training
-    layouts, targets = sizes.seeds
-    for change in CHANGES:
-        settings = {
-            "change": change,
-            "preset": preset,
-            "steps": steps,
-            "batch_size": batch_size,
-            "layouts": layouts,
-            "targets": targets,
-            "seed": seed,
-        }
-        folder = runs / f"{change}-{preset}-{steps}x{batch_size}-seed{seed}"
-        plan.training[change] = Job(
-            f"training-{change}", "training", settings, prints, {"folder": str(folder)}
+def training_jobs(settings: dict[str, Any], folder: Path) -> dict[str, Job]:
+    """The small trainings, by change.
+
+    Args:
+        settings: `preset`, `steps`, `batch_size`, `layouts`, `targets` and `seed`.
+        folder: for the training runs.
+    """
+    prints = "".join(fingerprint(name) for name in ("learned", "paper"))
+    size = "{preset}-{steps}x{batch_size}-seed{seed}".format(**settings)
+    return {
+        change: Job(
+            f"training-{change}",
+            "training",
+            {"change": change, **settings},
+            prints,
+            {"folder": str(folder / f"{change}-{size}-{prints[:8]}")},
         )
+        for change in CHANGES
+    }

@@ -30,8 +30,8 @@ class Sizes:
     """Layouts and targets of the comparison of seeds."""
     latency: tuple[int, float]
     """Timed calls of each method, and the seconds after which a slow one stops."""
-    training: tuple[str, int, int, int]
-    """Preset, optimizer steps and samples per step of each training, and how many seeds."""
+    training: tuple[str, int, int]
+    """Preset, optimizer steps and samples per step of each small training."""
     closed_loop: int
     """Seeds of the closed-loop runs."""
 
@@ -48,7 +48,7 @@ SIZES = {
         temperature=(2, 2),
         seeds=(2, 2),
         latency=(3, 0.5),
-        training=("smoke", 4, 32, 1),
+        training=("smoke", 4, 32),
         closed_loop=1,
     ),
     "quick": Sizes(
@@ -62,7 +62,7 @@ SIZES = {
         temperature=(20, 2),
         seeds=(20, 10),
         latency=(60, 2.0),
-        training=("smoke", 300, 128, 1),
+        training=("smoke", 300, 128),
         closed_loop=1,
     ),
     "full": Sizes(
@@ -76,7 +76,7 @@ SIZES = {
         temperature=(100, 2),
         seeds=(40, 25),
         latency=(200, 20.0),
-        training=("default", 600, 256, 1),
+        training=("default", 600, 256),
         closed_loop=3,
     ),
 }

@@ -1,0 +1,159 @@
+"""`finlab eval temperature|training|report`: the studies behind the pictures, and the whole page."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import arg
+
+from finlab.cli.eval import verbs
+from finlab.cli.eval_files import (
+    Checkpoint,
+    Count,
+    Folder,
+    JsonFile,
+    Split,
+    check_folder,
+    check_positive,
+    check_writable,
+    write_json,
+)
+
+
+@verbs.command
+def temperature(
+    split: Split = "id",
+    layouts: Count = 100,
+    targets: Count = 2,
+    candidates: Count = 64,
+    seed: Count = 0,
+    checkpoint: Checkpoint = None,
+    json: JsonFile = None,
+) -> None:
+    """Diversity and best J of the candidates against the temperature of the draw (the paper's figure A).
+
+    Args:
+        split: id, ood, ood-fins, limits, failure or near-singular.
+        layouts: layouts of the split.
+        targets: targets on each layout.
+        candidates: candidates drawn per target.
+        seed: draws layouts, targets and candidates.
+        checkpoint: trained checkpoint of method paper; the shipped one by default.
+        json: file for the rows.
+    """
+    from tqdm import tqdm
+
+    from finlab.evaluation.splits import make_split
+    from finlab.evaluation.temperature import (
+        TEMPERATURES,
+        temperature_columns,
+        temperature_report,
+        temperature_row,
+    )
+
+    check_positive("candidates", candidates)
+    check_writable(json)
+    cases = make_split(split, layouts, targets, seed)
+    rows = []
+    for value in tqdm(TEMPERATURES, unit="temperature", disable=None, leave=False, file=sys.stderr):
+        columns = temperature_columns(cases, value, checkpoint=checkpoint, n_candidates=candidates, seed=seed)
+        rows.append(temperature_row(value, columns))
+    write_json(json, {"rows": rows})
+    print(temperature_report(rows))
+
+
+@verbs.command
+def training(
+    out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")] = Path("runs/training-study"),
+    preset: Annotated[str, arg(metavar="NAME")] = "default",
+    steps: Count = 600,
+    batch_size: Count = 256,
+    layouts: Count = 40,
+    targets: Count = 25,
+    seed: Count = 0,
+    json: JsonFile = None,
+) -> None:
+    """What each part of the training brings: small trainings on equal budgets, one thing changed at a time.
+
+    What is done is kept in the folder; a study that was stopped goes on where it was.
+
+    Args:
+        out: folder for trainings and records.
+        preset: recipe that is changed: default, paper or smoke.
+        steps: optimizer steps of each training.
+        batch_size: samples per step.
+        layouts: layouts of split id on which the networks are tried.
+        targets: targets on each layout.
+        seed: draws data, weights, layouts and targets.
+        json: file for the rows.
+    """
+    from finlab.evaluation.report.jobs import run_jobs
+    from finlab.evaluation.report.plan import training_jobs
+    from finlab.evaluation.report.provenance import source_commit
+    from finlab.evaluation.splits import make_split
+    from finlab.evaluation.store import Store
+    from finlab.evaluation.training import training_report, training_row
+    from finlab.training.presets import get_preset
+
+    for name, value in (("steps", steps), ("batch-size", batch_size)):
+        check_positive(name, value)
+    check_writable(json)
+    check_folder("out", out)
+    get_preset(preset)
+    make_split("id", layouts, targets, seed)
+    settings = {"preset": preset, "steps": steps, "batch_size": batch_size}
+    jobs = training_jobs({**settings, "layouts": layouts, "targets": targets, "seed": seed}, out)
+    store = Store(out)
+    run_jobs(list(jobs.values()), store, commit=source_commit(), processes=0)
+    rows = [training_row(name, job.result(store).columns) for name, job in jobs.items()]
+    write_json(json, {"rows": rows})
+    print(training_report(rows, preset, steps, batch_size))
+
+
+@verbs.command
+def report(
+    out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
+    quick: bool = False,
+    seed: Count = 0,
+    checkpoint: Checkpoint = None,
+    paper_checkpoint: Checkpoint = None,
+    records: Folder = None,
+    processes: Annotated[int | None, arg(metavar="N")] = None,
+) -> None:
+    """Make the whole evaluation: one HTML page, its Markdown twin, pictures and rows.
+
+    A report that was stopped goes on where it was: each part is kept with its settings and the fingerprint of
+    the weights.
+
+    Args:
+        out: folder for the page.
+        quick: a look on few cases, about 3 minutes on two cores; the full size takes up to an hour.
+        seed: draws layouts, targets and candidates.
+        checkpoint: trained checkpoint of method learned; the shipped one by default.
+        paper_checkpoint: trained checkpoint of method paper; the shipped one by default.
+        records: folder for the records; DIR/records by default.
+        processes: parts that run at once; the number of cores by default.
+    """
+    from finlab.evaluation.report.make import make_report
+    from finlab.evaluation.report.plan import Checkpoints
+
+    check_positive("processes", processes)
+    check_folder("out", out)
+    check_folder("records", records)
+    words = ["finlab", "eval", "report", "-o", str(out), *(["--quick"] if quick else [])]
+    words += ["--seed", str(seed)] if seed else []
+    words += ["--checkpoint", checkpoint] if checkpoint else []
+    words += ["--paper-checkpoint", paper_checkpoint] if paper_checkpoint else []
+    page = make_report(
+        out,
+        size="quick" if quick else "full",
+        seed=seed,
+        checkpoints=Checkpoints(checkpoint, paper_checkpoint),
+        records=records or out / "records",
+        command=shlex.join(words),
+        processes=processes,
+    )
+    print(page)
