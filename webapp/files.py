@@ -68,6 +68,21 @@ def graph_bytes(layout: Layout, failed: tuple[str, ...], allocator: Allocator) -
         return path.read_bytes()
 
 
+def bundle_bytes(layout: Layout, failed: tuple[str, ...], allocator: Allocator) -> bytes:
+    """The bundle for the robot as a zip file: graph, networks, README and checksums.
+
+    Raises:
+        FinlabError: the allocator has no trained network.
+    """
+    from finlab.allocation.learned import LearnedAllocator
+    from finlab.deploy.bundle import make_bundle
+
+    if isinstance(allocator, LearnedAllocator):
+        # As the command line has it: what was tried out with K and T on the page does not go to the robot.
+        allocator = LearnedAllocator(allocator.trained or allocator.weights)
+    return make_bundle(layout, allocator, failed).zip_bytes()
+
+
 def candidates_csv(allocation: Allocation | None) -> bytes:
     """The refined candidates of an answer, one line each, SI units and radians."""
     if allocation is None or allocation.candidates is None:

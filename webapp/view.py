@@ -17,7 +17,7 @@ from webapp.analyst import Question, find
 from webapp.answering import Answering
 from webapp.commands import add_commands
 from webapp.comparison import Comparison
-from webapp.files import file_stem, graph_bytes
+from webapp.files import bundle_bytes, file_stem, graph_bytes
 from webapp.improving import Improver
 from webapp.panels.host import Panel
 from webapp.panels.tabs import PANEL_WIDTH, build_panels
@@ -144,6 +144,14 @@ class View:
         name = f"{file_stem(state.layout.name)}.graph.json"
         self._sender.send(
             name, lambda: graph_bytes(state.layout, state.failed, self._solver.allocator(state))
+        )
+
+    def export_bundle(self) -> None:
+        """Make the bundle for the robot and send it: the same bytes as `finlab export --zip`."""
+        state = self.session.state
+        name = f"{file_stem(state.layout.name)}.zip"
+        self._sender.send(
+            name, lambda: bundle_bytes(state.layout, state.failed, self._solver.allocator(state))
         )
 
     def export_html(self) -> None:

@@ -6,15 +6,31 @@ from html import escape
 from finlab.allocation.allocation import Allocation
 from webapp.figures import small, three_digits
 from webapp.state import State
-from webapp.theme import ASKED, DELIVERED, MISSING, TORQUE_SCALE, css
+from webapp.theme import ASKED, DEAD, DELIVERED, MISSING, TORQUE_SCALE, css
 from webapp.words import reach_sentence
 
 
-def corner(state: State, newtons: float, allocation: Allocation | None, busy: bool, error: str | None) -> str:
-    """Legend and status line in the lower left corner of the page."""
+def corner(
+    state: State,
+    newtons: float,
+    allocation: Allocation | None,
+    busy: bool,
+    error: str | None,
+    raw: bool = False,
+) -> str:
+    """Legend and status line in the lower left corner of the page.
+
+    Args:
+        state: what is asked.
+        newtons: force [N] that an arrow of 0.1 m stands for.
+        allocation: what is on the robot.
+        busy: whether a newer answer is on its way.
+        error: why there is no answer.
+        raw: whether it is a raw command on show, of which nobody expects that it is exact.
+    """
     return (
         f"<div class='fl-corner'><div class='fl fl-card fl-legend-card'>{_legend(newtons)}</div>"
-        f"<div class='fl fl-card fl-status'>{_status(state, allocation, busy, error)}</div></div>"
+        f"<div class='fl fl-card fl-status'>{_status(state, allocation, busy, error, raw)}</div></div>"
     )
 
 
@@ -35,7 +51,7 @@ def _arrow(color: str) -> str:
     )
 
 
-def _status(state: State, allocation: Allocation | None, busy: bool, error: str | None) -> str:
+def _status(state: State, allocation: Allocation | None, busy: bool, error: str | None, raw: bool) -> str:
     fins = f"{len(state.healthy)} of {state.layout.n_fins} fins"
     parts = [f"<b>{escape(state.layout.name)}</b>", f"<span>{fins}</span>"]
     if error is not None:
@@ -43,13 +59,14 @@ def _status(state: State, allocation: Allocation | None, busy: bool, error: str 
     elif allocation is None:
         parts.append("<span class='dim'>computing …</span>")
     else:
-        color = DELIVERED if allocation.reachable else MISSING
+        color = DEAD if raw else DELIVERED if allocation.reachable else MISSING
+        verdict = "Raw, not refined" if raw else reach_sentence(allocation)
         energy, time = three_digits(allocation.energy), three_digits(allocation.solve_ms)
         parts += [
             f"<span><span class='dim'>error</span> <b class='err'>{small(allocation.err_norm)}</b> σ</span>",
             f"<span><span class='dim'>energy</span> <b class='energy'>{energy}</b></span>",
             f"<span><span class='dim'>{escape(allocation.method)}</span> {time} ms</span>",
-            f"<span class='pill' style='background:{css(color)}'>{escape(reach_sentence(allocation))}</span>",
+            f"<span class='pill' style='background:{css(color)}'>{escape(verdict)}</span>",
         ]
         if busy:
             parts.append("<span class='dim'>computing …</span>")

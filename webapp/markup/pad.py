@@ -37,8 +37,8 @@ def pad(axes: Pad, channel: str, spring: bool) -> str:
     knob = "this.querySelector('.knob')"
     place = (
         f"const r = this.getBoundingClientRect(), k = {knob};"
-        "let x = (event.clientX - r.left) / r.width * 200 - 100,"
-        " y = (event.clientY - r.top) / r.height * 160 - 80;"
+        "let x = (event.clientX - r.left) / r.width * 250 - 125,"
+        " y = (event.clientY - r.top) / r.height * 172 - 89;"
         f"const far = Math.max(1, Math.hypot(x, y) / {RADIUS}); x /= far; y /= far;"
         "k.setAttribute('cx', x); k.setAttribute('cy', y);"
     )
@@ -58,7 +58,7 @@ def pad(axes: Pad, channel: str, spring: bool) -> str:
         f"<text x='{RADIUS + 4}' y='4'>{_side(axes, -1.0)}</text>"
     )
     return (
-        f"<div class='fl'><svg class='pad' viewBox='-100 -80 200 160' "
+        f"<div class='fl'><svg class='pad' viewBox='-125 -89 250 172' "
         f'onpointerdown="{down}" onpointermove="{move}" onpointerup="{up}" onpointercancel="{up}">'
         f"<circle r='{RADIUS}' class='field'/>"
         f"<path d='M-{RADIUS} 0H{RADIUS}M0 -{RADIUS}V{RADIUS}' class='grid'/>"

@@ -38,9 +38,12 @@ class Header:
     def refresh(self) -> None:
         """Write the status line."""
         host, history = self._host, self._host.session.history
+        raw = host.session.sample is not None or host.playback.frame is not None
         put(
             self._corner,
-            content=corner(host.session.state, host.newtons, host.shown, host.busy, host.answering.error),
+            content=corner(
+                host.session.state, host.newtons, host.shown, host.busy, host.answering.error, raw
+            ),
         )
         undo, redo = history.undo_name or "nothing", history.redo_name or "nothing"
         put(self._history, hint=f"Undo: {undo} (Ctrl+Z). Redo: {redo} (Ctrl+Shift+Z). A tour in five steps.")

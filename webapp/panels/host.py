@@ -68,6 +68,9 @@ class Host(Protocol):
     def export_picture(self) -> None:
         """Make a picture of the 3D view and send it to the browser."""
 
+    def export_bundle(self) -> None:
+        """Make the bundle for the robot and send it to the browser."""
+
     def export_graph(self) -> None:
         """Make the layout graph file and send it to the browser."""
 

@@ -55,10 +55,10 @@ class ImprovePanel:
                 hint="Wrenches, one line each: Fx Fy Fz Tx Ty Tz [N, N m]. Empty: the common ones.",
                 visible=False,
             )
-            self._take = gui.add_button(
-                "Add the present wrench", icon=viser.Icon.PLUS, hint="To the mission.", visible=False
+            self._take = gui.add_button_group(
+                " ", ("Add the present wrench",), hint="To the mission.", visible=False
             )
-            on_user_click(self._take, self._add_wrench)
+            on_user_change(self._take, lambda _: self._add_wrench())
             self._start = gui.add_button(
                 "Search", icon=viser.Icon.SPARKLES, hint="Takes up to a minute; it can be stopped any time."
             )

@@ -7,7 +7,7 @@ import viser
 
 from webapp.analyst import DRAWN, Findings
 from webapp.figures import three_digits
-from webapp.handles import on_user_change, on_user_click, put
+from webapp.handles import on_user_change, put
 from webapp.markup.score_card import score_table
 from webapp.panels.host import Host
 from webapp.panels.improve import ImprovePanel
@@ -37,10 +37,10 @@ class LimitsPanel:
             "Beside", (SAVED, *shipped()), hint="The layout that stands next to this one on the card."
         )
         on_user_change(self._beside, self._compare)
-        self._pin = gui.add_button(
-            "Pin this layout", icon=viser.Icon.PIN, hint="Put it aside as it is now, to compare others with."
+        self._pin = gui.add_button_group(
+            "Put aside", ("Pin this layout",), hint="As it is now, to compare others with."
         )
-        on_user_click(self._pin, lambda: host.do(host.session.pin))
+        on_user_change(self._pin, lambda _: host.do(host.session.pin))
         self._card = gui.add_html("")
         self._improve = ImprovePanel(gui, host)
 

@@ -7,15 +7,19 @@ import viser
 from viser import uplot
 
 from finlab.layout.layout import MAX_FINS
+from webapp.figures import small
 from webapp.handles import on_user_change, on_user_click, put
 from webapp.panels.host import Host
 from webapp.state import AXIS_UNITS, AXIS_WORDS
-from webapp.sweeping import POINTS
-from webapp.theme import MISSING, css, fin_color
+from webapp.sweeping import POINTS, Sweep
+from webapp.targets import nice_limit
+from webapp.theme import css, fin_color
 
 FONT = "11px sans-serif"
+EXACT = 0.01
+"""Error [σ] up to which a wrench counts as delivered."""
 EVERY_S = 0.25
-"""How often the plots are drawn while the sweep runs [s]."""
+"""How often the plot is drawn while the sweep runs [s]."""
 
 
 class SweepPanel:
@@ -38,7 +42,7 @@ class SweepPanel:
             )
             on_user_click(self._play, self._toggle)
             empty = np.zeros(2) * np.nan
-            self._force = gui.add_uplot(
+            self._plot = gui.add_uplot(
                 (np.array([0.0, 1.0]), *(empty for _ in range(MAX_FINS))),
                 (
                     uplot.Series(label="x"),
@@ -47,15 +51,14 @@ class SweepPanel:
                         for i in range(MAX_FINS)
                     ),
                 ),
-                **_look("force of each fin [N]"),
+                scales={"x": uplot.Scale(time=False), "y": uplot.Scale(auto=False, range=(0.0, 1.0))},
+                axes=_axes(""),
+                legend=uplot.Legend(show=False),
+                cursor=uplot.Cursor(show=False),
+                height=170,
                 visible=False,
             )
-            self._error = gui.add_uplot(
-                (np.array([0.0, 1.0]), empty),
-                (uplot.Series(label="x"), uplot.Series(label="error", stroke=css(MISSING), width=2)),
-                **_look("error [σ]"),
-                visible=False,
-            )
+            self._said = gui.add_html("")
 
     def _toggle(self) -> None:
         sweep = self._host.sweep
@@ -74,7 +77,7 @@ class SweepPanel:
             put(self._range, value=(round(0.5 * low, 2), round(0.5 * high, 2)))
 
     def refresh(self) -> None:
-        """Write the state of the sweep; the plots at most a few times a second."""
+        """Write the state of the sweep; the plot at most a few times a second."""
         sweep = self._host.sweep
         put(
             self._play,
@@ -84,25 +87,34 @@ class SweepPanel:
         if not sweep.fins or time.monotonic() - self._drawn < EVERY_S:
             return
         self._drawn = time.monotonic()
-        put(self._force, visible=True)
-        put(self._error, visible=True)
         lines = np.full((MAX_FINS, POINTS), np.nan)
         lines[: len(sweep.force)] = sweep.force
-        put(self._force, data=(sweep.values, *np.ascontiguousarray(lines)))
-        put(self._error, data=(sweep.values, sweep.error))
+        top = nice_limit(float(np.nanmax(sweep.force, initial=0.0)) / 1.2)
+        # A scale of its own: the lines of fins that are not there would spoil an automatic one.
+        scales = {"x": uplot.Scale(time=False), "y": uplot.Scale(auto=False, range=(0.0, top))}
         name = f"{AXIS_WORDS[sweep.axis]} asked [{AXIS_UNITS[sweep.axis]}]"
-        put(self._error, axes=_look("error [σ]", name)["axes"])
+        put(self._plot, visible=True, scales=scales, axes=_axes(name))
+        put(self._plot, data=(sweep.values, *np.ascontiguousarray(lines)))
+        put(self._said, content=f"<div class='fl'>{_sentence(sweep)}</div>")
 
 
-def _look(title: str, below: str = "") -> dict:
-    """How both plots look."""
-    return {
-        "scales": {"x": uplot.Scale(time=False)},
-        "axes": (
-            uplot.Axis(label=below, labelSize=18 if below else 0, size=26, labelFont=FONT, font=FONT),
-            uplot.Axis(label=title, labelSize=18, size=46, labelFont=FONT, font=FONT),
-        ),
-        "legend": uplot.Legend(show=False),
-        "cursor": uplot.Cursor(show=False),
-        "height": 130,
-    }
+def _sentence(sweep: Sweep) -> str:
+    """Where along the way the wrench is exact."""
+    known = np.isfinite(sweep.error)
+    if not known.any():
+        return ""
+    exact = known & (sweep.error <= EXACT)
+    if not exact.any():
+        return "<span class='missing'>Nowhere along the way is the wrench delivered exactly.</span>"
+    if exact[known].all():
+        return f"Exact all the way: the largest error is {small(float(np.nanmax(sweep.error)))} σ."
+    low, high = (f"{value:.3g}".replace("-", "−") for value in sweep.values[exact][[0, -1]])
+    beyond = "<span class='missing'>beyond, something is missing.</span>"
+    return f"Exact from {low} to {high} {AXIS_UNITS[sweep.axis]}; {beyond}"
+
+
+def _axes(below: str) -> tuple[uplot.Axis, uplot.Axis]:
+    return (
+        uplot.Axis(label=below, labelSize=18, size=26, labelFont=FONT, font=FONT),
+        uplot.Axis(label="force of each fin [N]", labelSize=18, size=40, labelFont=FONT, font=FONT),
+    )

@@ -1,7 +1,7 @@
 """Files: open and save a layout, export the graph for deployment, copy the command line."""
 
 import shlex
-from functools import partial
+from collections.abc import Callable
 from html import escape
 from typing import Any
 
@@ -9,7 +9,7 @@ import viser
 
 from finlab.assets import shipped_layouts
 from webapp import files
-from webapp.handles import on_user_click, put
+from webapp.handles import on_user_change, put
 from webapp.panels.host import Host
 from webapp.shipped import shipped_name
 from webapp.state import State
@@ -22,30 +22,42 @@ class TakeHomePanel:
         """Build the widgets."""
         self._host = host
         self._open = gui.add_upload_button(
-            "Open a layout file", icon=viser.Icon.FOLDER_OPEN, mime_type=".yaml,.yml,.json"
+            "Open a layout file",
+            icon=viser.Icon.FOLDER_OPEN,
+            mime_type=".yaml,.yml,.json",
+            hint="A layout file (YAML or JSON) or a layout graph file.",
         )
-        self._save = gui.add_button("Save the layout", icon=viser.Icon.DOWNLOAD, hint="A YAML layout file.")
-        self._export = gui.add_button(
-            "Export the graph file", icon=viser.Icon.FILE_EXPORT, hint="For deployment on the robot."
+        self._save = gui.add_button_group(
+            "Save",
+            ("Layout (YAML)", "Candidates (CSV)", "Picture (PNG)", "3D view (HTML)"),
+            hint="The HTML page moves by itself and needs no server.",
         )
-        self._candidates = gui.add_button("Save the candidates (CSV)", icon=viser.Icon.TABLE_EXPORT)
-        self._html = gui.add_button(
-            "Save the moving 3D view (HTML)", icon=viser.Icon.BRAND_HTML5, hint="One file."
+        on_user_change(self._save, self._press)
+        self._robot = gui.add_button_group(
+            "For the robot",
+            ("Graph file", "Bundle (ZIP)"),
+            hint="The layout graph alone, or with networks, README and checksums: what finlab export makes.",
         )
-        self._picture = gui.add_button(
-            "Save a picture (PNG)", icon=viser.Icon.PHOTO, hint="What the view shows."
-        )
-        on_user_click(self._html, partial(host.do, host.export_html))
-        on_user_click(self._picture, host.export_picture)
-        on_user_click(self._save, partial(host.do, self._send_layout))
-        on_user_click(self._export, partial(host.do, host.export_graph))
-        on_user_click(self._candidates, partial(host.do, self._send_candidates))
+        on_user_change(self._robot, self._press)
         self._command = gui.add_html("")
 
         @self._open.on_upload
         async def _opened(event: Any) -> None:
             upload = event.target.value
             host.do(lambda: host.session.open_layout(files.read_layout(upload.name, upload.content)))
+
+    def _press(self, button: str) -> None:
+        host = self._host
+        acts: dict[str, Callable[[], object]] = {
+            "Layout (YAML)": self._send_layout,
+            "Candidates (CSV)": self._send_candidates,
+            "Picture (PNG)": host.export_picture,
+            "3D view (HTML)": host.export_html,
+            "Graph file": host.export_graph,
+            "Bundle (ZIP)": host.export_bundle,
+        }
+        if button in acts:
+            host.do(acts[button])
 
     def _send_layout(self) -> None:
         layout = self._host.session.state.layout
@@ -69,12 +81,17 @@ class TakeHomePanel:
             words += ["--failed", name]
         if state.method != "learned":
             words += ["--method", state.method]
+        export = ["finlab", "export", words[2], "-o", files.file_stem(state.layout.name), "--zip"]
+        for name in state.failed:
+            export += ["--failed", name]
+        bundle = escape(shlex.join(export))
         shell, python = escape(shlex.join(words)), escape(_python(state, words[2]))
         put(
             self._command,
             content=f"<div class='fl'><span class='dim'>The same question on the command line:</span>"
             f"<pre class='command'>{shell}</pre><span class='dim'>And in Python:</span>"
-            f"<pre class='command'>{python}</pre></div>",
+            f"<pre class='command'>{python}</pre><span class='dim'>The bundle for the robot:</span>"
+            f"<pre class='command'>{bundle}</pre></div>",
         )
 
 
