@@ -30,9 +30,11 @@ class WaypointGains:
     heave: float
     """Fz per metre of height [N/m]."""
     heave_damping: float
-    """Fz against the rate of depth [N s/m]; 0 is the paper's law."""
-    rate_filter_s: float
-    """Time constant of the filter of that rate [s]."""
+    """Fz against the speed of climbing [N s/m]; 0 is the paper's law."""
+    climb_filter_s: float
+    """Time constant of the filter of the speed that is damped [s]."""
+    odometry_filter_s: float
+    """Time constant with which markers and pressure correct the odometry [s]."""
     yaw: float
     """Tz per radian of heading error [N m/rad]."""
     yaw_damping: float

@@ -9,21 +9,16 @@ from numpy.typing import NDArray
 
 from finlab.control.controller import Measurement, Setpoint
 from finlab.control.gains import WaypointGains, load_gains
-from finlab.control.rate import Rate
+from finlab.control.odometry import Odometry, wrap
 
 Array = NDArray[np.float64]
-
-
-def wrap(angle: float) -> float:
-    """The same angle in [-pi, pi) [rad]."""
-    return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
 class WaypointController:
     """Heads for a waypoint: Fx = k d max(0, cos e), Fz = k dz, Tz = k e, with e the wrapped yaw error.
 
-    To the paper's law we add damping of the depth rate and of the yaw rate; both gains are zero in
-    `waypoint_paper`. Depth comes from the pressure sensor, the rest from odometry.
+    To the paper's law we add damping of the climb and of the yaw rate; both gains are zero in
+    `waypoint_paper`. Pose and climb come from `Odometry`.
     """
 
     name = "waypoint"
@@ -34,24 +29,22 @@ class WaypointController:
         self.gains = load_gains(WaypointGains, "waypoint") if gains is None else gains
         self.lead_s = self.gains.lead_s
         self.period_s = self.gains.period_s
-        self._height_rate = Rate(self.gains.rate_filter_s, self.period_s)
+        self._odometry = Odometry(self.gains.odometry_filter_s, self.gains.climb_filter_s, self.period_s)
 
     def reset(self) -> None:
-        """Forget the depth rate."""
-        self._height_rate.reset()
+        """Forget the pose."""
+        self._odometry.reset()
 
     def wrench(self, measurement: Measurement, setpoint: Setpoint) -> Array:
         """Returns the wrench (6,) towards the waypoint [N, N m]."""
         g = self.gains
-        dx = float(setpoint.position[0] - measurement.position[0])
-        dy = float(setpoint.position[1] - measurement.position[1])
+        position, heading, climb = self._odometry.step(measurement)
+        dx, dy, dz = (setpoint.position - position).tolist()
         distance = math.hypot(dx, dy)
-        yaw_error = wrap(math.atan2(dy, dx) - measurement.yaw)
+        yaw_error = wrap(math.atan2(dy, dx) - heading)
         nearness = min(1.0, distance / g.near_m) if g.near_m > 0.0 else 1.0
-        height = -measurement.depth
         surge = g.surge * distance * max(0.0, math.cos(yaw_error))
-        climb = self._height_rate.step(height)
-        heave = g.heave * (float(setpoint.position[2]) - height) - g.heave_damping * climb
+        heave = g.heave * dz - g.heave_damping * climb
         yaw = g.yaw * nearness * yaw_error - g.yaw_damping * float(measurement.rates[2])
         return np.array(
             [

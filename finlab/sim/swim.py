@@ -49,6 +49,7 @@ class Swim:
         controller: Controller | None = None,
         *,
         plant: str = "mean",
+        steady: bool = False,
         sensors: SensorSettings | None = None,
         servo: Servo | None = None,
         current: Sequence[float] = (0.0, 0.0, 0.0),
@@ -64,6 +65,7 @@ class Swim:
             controller: by default the waypoint controller for trajectories, the velocity controller for
                 cruises.
             plant: `mean`, `ripple` or `flexible`; see `PLANTS`.
+            steady: whether the allocator is told its previous command, so that fins turn little per tick.
             sensors: rates and noise; the defaults of `SensorSettings`.
             servo: what drives the fins.
             current: velocity of the water (3,) in the world [m/s].
@@ -82,6 +84,7 @@ class Swim:
         self.task = task
         self.controller = _usual_controller(task) if controller is None else controller
         self.plant = plant
+        self.steady = steady
         self.seed = seed
         self.vehicle = Vehicle(vehicle_parameters(layout), current)
         self.fins = FinMotion(layout, servo)
@@ -172,8 +175,9 @@ class Swim:
         asked = self._complete()(
             self.controller.wrench(now, self.task.setpoint(time + self.controller.lead_s))
         )
+        previous = self._command if self.steady else None
         answer = self.allocator.allocate(
-            self.layout, asked, failed=self.failed, previous=self._command, seed=self.seed
+            self.layout, asked, failed=self.failed, previous=previous, seed=self.seed
         )
         tick = self._move(time, now, asked, answer.command, answer.solve_ms)
         self._command = answer.command
