@@ -11,9 +11,11 @@ from finlab.allocation.allocator import Allocator
 from finlab.allocation.analytic import Analytic
 from finlab.cli import main
 from finlab.data.normalization import Normalization
-from finlab.evaluation.ablation import VARIANTS, ablation_report, paper_ablation_rows
+from finlab.evaluation.ablation import REFINEMENTS, VARIANTS, ablation_report, paper_ablation_rows
 from finlab.evaluation.latency import latency_report, latency_rows, machine
-from finlab.evaluation.splits import make_split
+from finlab.evaluation.metrics import wrench_row
+from finlab.evaluation.records import load_columns, records_of_columns
+from finlab.evaluation.splits import SPLITS, make_split
 from finlab.evaluation.wrench import run_method, wrench_report, wrench_rows
 from finlab.layout import Layout
 from finlab.physics import Plant
@@ -95,7 +97,28 @@ def test_eval_wrench(statistics: str, tmp_path: Path, capsys: pytest.CaptureFixt
         ("limits", "analytic", 6),
         ("limits", "qp", 6),
     ]
-    assert "scored by the plant" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "scored by the plant" in out and "where a rerun with another seed lands" in out
+    for row, ends in zip(rows, json.loads(file.read_text())["intervals"], strict=True):
+        low, high = ends["err_norm_mean"]
+        assert ends["method"] == row["method"] and low <= row["err_norm_mean"] <= high
+
+
+def test_eval_wrench_on_all_splits_keeps_records(
+    statistics: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sizes = ["--split", "all", "--layouts", "1", "--targets", "3", "--subsample", "2"]
+    arguments = ["eval", "wrench", *sizes, "--methods", "qp,trf-1", "--checkpoint", statistics]
+    file, folder = tmp_path / "rows.json", tmp_path / "records"
+    assert main([*arguments, "--json", str(file), "--records", str(folder)]) == 0
+    rows = json.loads(file.read_text())["rows"]
+    pairs = [(split, method) for split in SPLITS for method in ("qp", "trf-1")]
+    assert [(row["split"], row["method"]) for row in rows] == pairs
+    assert {row["method"]: row["n"] for row in rows} == {"qp": 3, "trf-1": 2}
+    assert len(list(folder.iterdir())) == len(pairs)
+    columns, meta = load_columns(folder / "wrench-limits-qp.npz")
+    again = wrench_row(records_of_columns(columns), split="limits", method="qp")
+    assert again == rows[pairs.index(("limits", "qp"))] and meta["method"] == "qp"
 
 
 def test_eval_latency(statistics: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -111,6 +134,8 @@ def test_eval_latency(statistics: str, capsys: pytest.CaptureFixture[str]) -> No
         ("wrench --methods ,", "methods: expected names with commas between"),
         ("wrench --split nowhere --methods qp", "split: expected one of id, ood"),
         ("wrench --layouts 0 --methods qp", "layouts: expected a number of at least 1, got 0"),
+        ("wrench --methods qp-3", "a number of starts, from 1, goes with trf, slsqp, ipopt only, got 'qp-3'"),
+        ("wrench --subsample 0 --methods qp", "subsample: expected a number of at least 1, got 0"),
         ("wrench --single 0 --methods qp", "single: expected a number of at least 1, got 0"),
         (
             "wrench --methods qp --json missing/folder/rows.json",
@@ -138,7 +163,10 @@ def test_eval_ablation(
     arguments = ["eval", "ablation", "--layouts", "2", "--targets", "2", "--candidates", "8"]
     assert main([*arguments, "--checkpoint", str(untrained_checkpoint), "--json", str(file)]) == 0
     rows = json.loads(file.read_text())["rows"]
-    shown = [(row["variant"], row["scored_by"]) for row in rows]
-    assert shown == [(name, model) for name in VARIANTS for model in ("surrogate", "plant")]
+    shown = [(row["variant"], row["refinement"], row["scored_by"]) for row in rows]
+    models = ("surrogate", "plant")
+    assert shown == [(name, by, model) for name in VARIANTS for by in REFINEMENTS for model in models]
+    alike = [row["err_norm_mean"] for row in rows if row["variant"] == "mean_only"]
+    assert alike[:2] == alike[2:]  # where nothing is refined, how it would be makes no difference
     assert all(row["n"] == 4 and row["time_s"] > 0 for row in rows)
     assert "(printed in the paper)" in capsys.readouterr().out

@@ -33,7 +33,7 @@ def share(value: float) -> str:
     if value >= 1.0:
         return "100 %"
     missing = 100 * (1 - value)
-    digits = 1 if missing >= 1 else min(4, 1 - math.floor(math.log10(missing)))
+    digits = 1 if missing >= 1 else min(4, -math.floor(math.log10(missing)))
     return f"{100 * value:.{digits}f} %"
 
 

@@ -69,7 +69,7 @@ def _cards(results: Results, tables: dict[str, list[Row]]) -> list[Card]:
             )
         )
     ours = [row for row in results.energy_rows if (row["method"], row["fins"]) == (claims.OURS, "all")]
-    for row in ours:
+    for row in (row for row in ours if row["energy_ratio"] is not None):
         cards.append(
             Card(
                 f"{row['energy_ratio']:.3f}",

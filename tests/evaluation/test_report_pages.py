@@ -1,0 +1,83 @@
+"""The two writers, and numbers as people read them."""
+
+import pytest
+
+from finlab.evaluation.report.document import (
+    Bullets,
+    Card,
+    Cards,
+    Column,
+    Document,
+    Figure,
+    Fold,
+    Heading,
+    Table,
+    Text,
+    TwoSides,
+    figures_of,
+)
+from finlab.evaluation.report.numbers import FORMATS
+from finlab.evaluation.report.page_html import to_html
+from finlab.evaluation.report.page_markdown import to_markdown
+
+COLUMNS = (Column("name", "method"), Column("value", "error <", "error", "ends"))
+ROWS = [
+    {"name": "`ours`", "value": 0.00029, "ends": [0.0002, 0.0004], "_kind": "ours"},
+    {"name": "theirs", "_kind": "printed"},
+]
+PICTURE = Figure("dots", '<?xml version="1.0"?>\n<!DOCTYPE svg>\n<svg><path/></svg>', "Some dots.")
+DOCUMENT = Document(
+    "A title & more",
+    "One **line**.",
+    (
+        Cards((Card("1.8 ms", "a call", "others 90"),)),
+        TwoSides(("good", "bad"), (("this",), ("that",))),
+        Heading("First section"),
+        Text("See [the docs](docs/x.md), `code` and 1 < 2."),
+        Table(COLUMNS, ROWS),
+        Fold("More", (PICTURE, Bullets(("one", "two")))),
+    ),
+)
+
+
+def test_html() -> None:
+    page = to_html(DOCUMENT)
+    assert "<title>A title &amp; more</title>" in page and "<strong>line</strong>" in page
+    assert '<a href="#first-section">First section</a>' in page and '<h2 id="first-section">' in page
+    assert '<a href="docs/x.md">the docs</a>, <code>code</code> and 1 &lt; 2.' in page
+    assert '<tr class="ours">' in page and "0.00029<small>0.00020 – 0.00040</small>" in page
+    assert '<tr class="printed"><td class="name">theirs</td><td></td></tr>' in page
+    assert "<details><summary>More</summary><figure><svg><path/></svg>" in page
+    for outside in ("<?xml", "<script", "http://", "src=", "@import", "url("):
+        assert outside not in page
+
+
+def test_markdown() -> None:
+    text = to_markdown(DOCUMENT, "pictures")
+    assert text.startswith("# A title & more\n\nOne **line**.")
+    assert "| method | error < |\n| --- | ---: |\n| **`ours`** | 0.00029 (0.00020 – 0.00040) |" in text
+    assert "![Some dots.](pictures/dots.svg)" in text and "- **1.8 ms** a call: others 90" in text
+    assert "**good**\n\n- this\n\n**bad**\n\n- that" in text
+
+
+def test_folded_pictures_are_found() -> None:
+    assert figures_of(DOCUMENT.blocks) == [PICTURE]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "shown"),
+    [
+        *(("error", v, s) for v, s in ((0.0, "0"), (2.9e-4, "0.00029"), (3.1e-13, "3.1e-13"), (1.84, "1.8"))),
+        *(("three", v, s) for v, s in ((2.857, "2.86"), (178.4, "178"), (0.0, "0"))),
+        *(
+            ("share", v, s)
+            for v, s in ((1.0, "100 %"), (0.9997, "99.97 %"), (0.488, "48.8 %"), (0.0, "0.0 %"))
+        ),
+        *(("factor", v, s) for v, s in ((1.44, "1.4"), (297.0, "300"), (12.2, "12"))),
+        ("count", 100_000, "100,000"),
+        ("ratio", 1.0021, "1.002"),
+        ("metres", 0.1335, "0.1335"),
+    ],
+)
+def test_numbers(name: str, value: float, shown: str) -> None:
+    assert FORMATS[name](value) == shown
