@@ -16,10 +16,15 @@ Array = NDArray[np.float64]
 class Task(Protocol):
     """A setpoint for every time, and where to begin."""
 
-    name: str
-    """What it is called in logs and tables."""
-    duration_s: float
-    """When it is over [s]."""
+    @property
+    def name(self) -> str:
+        """What it is called in logs and tables."""
+        ...
+
+    @property
+    def duration_s(self) -> float:
+        """When it is over [s]."""
+        ...
 
     def setpoint(self, time: float) -> Setpoint:
         """Where to be, or how fast, at `time` [s]; after the end as at the end."""

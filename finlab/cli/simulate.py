@@ -1,0 +1,143 @@
+"""`finlab simulate`: a robot swims a trajectory, fins fail on the way, a log and pictures are written."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, UseAppendAction, arg
+
+if TYPE_CHECKING:
+    from finlab.sim import SwimLog
+
+
+def simulate(
+    layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
+    trajectory: Annotated[str, arg(metavar="NAME|FILE")] = "lissajous",
+    fail: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME@SECONDS")] = (),
+    method: Annotated[str, arg(metavar="NAME")] = "learned",
+    duration: Annotated[float | None, arg(metavar="SECONDS")] = None,
+    plant: Annotated[str, arg(metavar="NAME")] = "mean",
+    gains: Annotated[str, arg(metavar="NAME|FILE")] = "waypoint",
+    current: Annotated[tuple[float, float, float], arg(metavar="VX VY VZ")] = (0.0, 0.0, 0.0),
+    steady: bool = False,
+    noise: bool = True,
+    seed: Annotated[int, arg(metavar="N")] = 0,
+    checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
+    output: Annotated[Path | None, arg(metavar="FOLDER", aliases=["-o"])] = None,
+) -> None:
+    """Let a robot follow a trajectory in simulation, and say how well it did.
+
+    Args:
+        layout: layout file, layout graph file, or the name of a shipped layout.
+        trajectory: circle, lissajous, square, or a CSV file with the columns t, x, y, z.
+        fail: a fin and when it is lost, such as front_left@30.
+        method: learned, paper, qp, sqp, analytic, multistart, trf, slsqp, ipopt or on-board.
+        duration: time for a shipped trajectory.
+        plant: mean (the fin law), ripple (within the flapping cycle) or flexible (fins with soft tips).
+        gains: waypoint, waypoint_paper (proportional terms alone), or a YAML file.
+        current: velocity of the water in the world [m/s].
+        steady: tell the allocator its previous command.
+        noise: whether the sensors are noisy.
+        seed: of the noise.
+        checkpoint: trained checkpoint; the shipped one of the method by default.
+        output: new or empty folder for the log (log.npz) and pictures; without it only the summary is
+            printed.
+    """
+    from tqdm import tqdm
+
+    from finlab.cli.inputs import open_robot
+    from finlab.control import WaypointController, WaypointGains, load_gains
+    from finlab.evaluation.swims import load_methods
+    from finlab.sim import NO_NOISE, Swim, make_trajectory
+
+    robot = open_robot(layout)
+    failures = [(name, 0.0) for name in robot.failed] + [_failure(text) for text in fail]
+    _check_folder(output)
+    swim = Swim(
+        robot.layout,
+        load_methods(method, checkpoint)[method],
+        make_trajectory(trajectory, duration),
+        WaypointController(load_gains(WaypointGains, gains)),
+        plant=plant,
+        steady=steady,
+        sensors=None if noise else NO_NOISE,
+        current=current,
+        failures=failures,
+        seed=seed,
+    )
+    for sentence in _warnings(swim, failures):
+        print(sentence, file=sys.stderr)
+    seconds = round(swim.task.duration_s, 1)
+    with tqdm(total=seconds, unit="s", disable=None, leave=False, file=sys.stderr) as bar:
+        log = swim.run(bar.update)
+    print(summary(log))
+    if output is not None:
+        from finlab.evaluation.swim_pictures import save_pictures
+
+        output.mkdir(parents=True, exist_ok=True)
+        log.save(output / "log.npz")
+        names = ", ".join(path.name for path in save_pictures(log, output))
+        print(f"\n{output}: written log.npz, {names}.")
+
+
+def summary(log: SwimLog) -> str:
+    """The run in a few lines."""
+    from finlab.evaluation.swims import LOST_M, follow_row
+    from finlab.evaluation.trajectory_errors import RTE_DELTA_S
+
+    row = follow_row(log)
+    lost = [name for name, works in zip(log.fins, log.alive[-1], strict=True) if not works]
+    lines = [
+        f"{log.layout} along {log.task} by {log.method}, plant {log.plant}, {log.time[-1]:.0f} s"
+        + (f", lost: {', '.join(lost)}" if lost else ""),
+        f"ATE {row['ate']:.4f} m   RTE over {RTE_DELTA_S:g} s {row['rte']:.4f} m   "
+        f"depth RMSE {row['depth_rmse']:.4f} m   farthest {row['max']:.3f} m",
+        f"power {row['inertial_w']:.2f} W inertial, {row['torque_w']:.2f} W by torque   "
+        f"allocation {row['solve_ms']:.2f} ms (median)",
+    ]
+    if row["max"] >= LOST_M:
+        lines.append(f"the robot lost its reference: it was more than {LOST_M:g} m away")
+    return "\n".join(lines)
+
+
+def _failure(text: str) -> tuple[str, float]:
+    """Name and time of `NAME@SECONDS`."""
+    from finlab.errors import FinlabError
+
+    name, at, number = text.rpartition("@")
+    try:
+        time = float(number)
+    except ValueError:
+        time = math.nan
+    if not at or not name or not (math.isfinite(time) and time >= 0.0):
+        raise FinlabError(f"--fail: expected NAME@SECONDS such as front_left@30, got {text!r:.60}")
+    return name, time
+
+
+def _check_folder(output: Path | None) -> None:
+    """Refuse before the run what would fail after it."""
+    from finlab.errors import FinlabError
+
+    if output is not None and output.exists() and (not output.is_dir() or any(output.iterdir())):
+        raise FinlabError(f"{output}: expected a new or empty folder")
+
+
+def _warnings(swim: object, failures: list[tuple[str, float]]) -> list[str]:
+    """What will not be controllable, said before the run."""
+    from finlab.control import Completion
+    from finlab.sim import Swim
+
+    assert isinstance(swim, Swim)
+    sentences, lost = [], []
+    for name, time in [("", 0.0), *sorted(failures, key=lambda failure: failure[1])]:
+        lost += [name] if name else []
+        if not Completion(swim.layout, tuple(lost), swim.controller.axes).controllable:
+            without = f" without {', '.join(lost)}" if lost else ""
+            sentences.append(
+                f"finlab: from {time:g} s on, {swim.layout.name}{without} cannot give surge, heave and yaw "
+                "independently"
+            )
+    return sentences

@@ -1,0 +1,52 @@
+"""U-CAT's own way to allocate, the layout-specific baseline of the paper's experiments, as far as known.
+
+The force of each fin comes from a pseudo-inverse made for the layout; all fins flap at one fixed frequency
+and the thrust law gives the amplitude. With fins lost, their columns leave the matrix: the one-fin
+fault-tolerant form. The published allocation and its fault rule are known to us by abstract only; frequency,
+thrust law and scaling at the limit are those of the robot's open software.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.actuation import Actuation
+from finlab.allocation.model_based import ModelBased
+from finlab.data.normalization import Normalization
+
+Array = NDArray[np.float64]
+
+FREQUENCY_HZ = 2.0
+"""Of the wrench driver in U-CAT's simulator; the robot itself has modes of 1.1 and 2.1 Hz."""
+TABLE_SIZE = 400
+
+
+class OnBoard(ModelBased):
+    """Pseudo-inverse, fixed frequency, amplitude by the thrust law.
+
+    Where a fin would need more than its largest amplitude, the amplitudes of all are scaled down together.
+    """
+
+    name = "on-board"
+
+    def __init__(self, normalization: Normalization, *, frequency_hz: float = FREQUENCY_HZ) -> None:
+        """Takes the yardstick of errors and the frequency of all fins [Hz]."""
+        super().__init__(normalization)
+        self.frequency_hz = frequency_hz
+
+    def _commands(self, actuation: Actuation, targets: Array, seed: int) -> Array:
+        planar = np.stack([actuation.horizontal, actuation.vertical], axis=-1).reshape(6, -1)
+        force = (targets @ np.linalg.pinv(planar, rcond=1e-6).T).reshape(len(targets), actuation.n_fins, 2)
+        frequency = np.clip(self.frequency_hz, actuation.lower[:, 1], actuation.upper[:, 1])
+        # Beyond the limit too, so that the scaling sees how much too large an amplitude is.
+        amplitudes = np.linspace(0.0, 0.5 * np.pi, TABLE_SIZE)
+        thrust = actuation.thrust(amplitudes[:, None] + np.zeros(actuation.n_fins), frequency)
+        wanted = np.linalg.norm(force, axis=-1)
+        amplitude = np.empty_like(wanted)
+        for i, column in enumerate(np.maximum.accumulate(thrust, axis=0).T):
+            amplitude[:, i] = np.interp(wanted[:, i], column, amplitudes)
+        excess = (amplitude / actuation.upper[:, 0]).max(axis=1, keepdims=True)
+        amplitude /= np.maximum(excess, 1.0)
+        direction = np.arctan2(force[..., 1], force[..., 0])
+        return np.stack([amplitude, np.broadcast_to(frequency, amplitude.shape), direction], axis=-1)

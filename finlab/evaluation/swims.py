@@ -1,0 +1,86 @@
+"""What the closed-loop experiments share: methods, rows of single runs, means over seeds."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from finlab.allocation import load_allocator
+from finlab.allocation.allocator import Allocator
+from finlab.errors import AllocationError
+from finlab.evaluation.on_board import OnBoard
+from finlab.evaluation.trajectory_errors import RTE_DELTA_S, absolute_error, depth_error, relative_error
+from finlab.sim import Swim, SwimLog
+
+Row = dict[str, Any]
+
+LOST_M = 1.0
+"""A robot that is ever farther than this from its reference has lost it."""
+
+
+def load_methods(names: str, checkpoint: str | None = None) -> dict[str, Allocator]:
+    """Allocators by name, from names with commas between; `on-board` is U-CAT's own.
+
+    Raises:
+        AllocationError: an unknown method, or none.
+    """
+    wanted = list(dict.fromkeys(name.strip() for name in names.split(",") if name.strip()))
+    if not wanted:
+        raise AllocationError(f"methods: expected names with commas between, got {names!r}")
+    return {name: _load(name, checkpoint) for name in wanted}
+
+
+def _load(name: str, checkpoint: str | None) -> Allocator:
+    if name != OnBoard.name:
+        return load_allocator(checkpoint, name)
+    return OnBoard(load_allocator(checkpoint, "analytic").normalization)
+
+
+def follow_row(log: SwimLog) -> Row:
+    """Errors of one run along a trajectory [m], power [W] and time."""
+    position, reference = log.position, log.reference
+    period = float(log.time[1] - log.time[0])
+    return {
+        "ate": absolute_error(position, reference),
+        "rte": relative_error(position, reference, round(RTE_DELTA_S / period)),
+        "depth_rmse": depth_error(position, reference),
+        "max": float(np.linalg.norm(position - reference, axis=1).max()),
+        **power_row(log),
+    }
+
+
+def power_row(log: SwimLog) -> Row:
+    """Mean power of all fins [W] by both measures, and the median time of an allocation."""
+    return {
+        "inertial_w": float(log.inertial_power.sum(axis=1).mean()),
+        "torque_w": float(log.torque_power.sum(axis=1).mean()),
+        "solve_ms": float(np.median(log.solve_ms)),
+    }
+
+
+def over_seeds(rows: Sequence[Row]) -> Row:
+    """Mean of each number over runs, and under `<name>_std` its spread (0 for a single run)."""
+    means: Row = {}
+    for key in rows[0]:
+        values = np.array([row[key] for row in rows])
+        means[key], means[f"{key}_std"] = float(values.mean()), float(values.std(ddof=min(1, len(rows) - 1)))
+    return means
+
+
+def run_all(swims: Iterable[tuple[Any, Callable[[], Swim]]], total: int) -> list[tuple[Any, SwimLog]]:
+    """Swims one after the other, with a bar on stderr; each comes with a label."""
+    done = []
+    for label, make in tqdm(swims, total=total, unit="run", disable=None, leave=False, file=sys.stderr):
+        done.append((label, make().run()))
+    return done
+
+
+def spread(row: Row, key: str) -> str:
+    """Mean and spread of a number as text, or a dash."""
+    if row.get(key) is None:
+        return "-"
+    return f"{row[key]:.3f} +- {row[f'{key}_std']:.3f}"
