@@ -14,11 +14,11 @@ LEVELS = (
     ("errors", "geometry"),
     ("assets",),
     ("layout",),
-    ("physics",),
+    ("physics", "exchange"),
     ("data", "control"),
     ("model",),
     ("training", "allocation"),
-    ("sim", "analysis"),
+    ("sim", "analysis", "distill"),
     ("evaluation", "deploy"),
     ("cli",),
 )

@@ -1,4 +1,4 @@
-"""`finlab layout check|show|optimize`: look at layout files and improve them.
+"""`finlab layout check|show|optimize|import|export`: look at layout files, improve and exchange them.
 
 Torch is loaded only where a fin follows a table of forces.
 """
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, UseAppendAction, arg
 from tyro.extras import SubcommandApp
 
+from finlab.cli.exchange import export_layout, import_layout
 from finlab.cli.optimize import optimize
 
 if TYPE_CHECKING:
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 verbs = SubcommandApp()
 verbs.command(optimize)
+verbs.command(name="import")(import_layout)
+verbs.command(name="export")(export_layout)
 
 
 @verbs.command

@@ -1,0 +1,160 @@
+"""From a robot description to a layout: each named link is a fin, its joint says where and how it sits.
+
+The robot description is taken in its zero position. A joint's origin is where the fin's force acts, its axis
+is the fin's shaft. REP-103 frames (x forward, y left, z up) are finlab's own; only the origin moves, to the
+centre of gravity.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.errors import LayoutError
+from finlab.layout import Body, Fin, Layout
+
+Array = NDArray[np.float64]
+
+MAX_BYTES = 5_000_000
+"""Largest file that is read; meshes are files of their own and are not touched."""
+MAX_TILT = math.radians(5.0)
+"""Most that a shaft may leave the horizontal plane [rad], in which finlab's fins have theirs."""
+ORIGINS = ("gravity", "base")
+"""Where the layout's origin goes: the centre of gravity of all links, or the frame of the root link."""
+
+
+def read_urdf(path: str | os.PathLike[str], fins: Sequence[str], origin: str = "gravity") -> Layout:
+    """The layout in a URDF file.
+
+    Args:
+        path: the file; expand xacro first.
+        fins: names of the links that are fins, in the order of the layout.
+        origin: one of `ORIGINS`. With `gravity`, links need masses.
+
+    Raises:
+        LayoutError: it cannot be read, lacks a link, or a shaft is not horizontal.
+    """
+    source = str(path)
+    if origin not in ORIGINS:
+        raise LayoutError(f"origin: expected one of {', '.join(ORIGINS)}, got {origin!r:.40}")
+    if not fins:
+        raise LayoutError("name the links that are fins: --fins LINK...", source=source)
+    robot = _robot(Path(path), source)
+    joints = {joint.child: joint for joint in robot.joints}
+    poses = _poses(robot, joints, source)
+    mass, center, inertia = _masses(robot, poses)
+    if origin == "gravity" and mass <= 0:
+        raise LayoutError(
+            "has no masses, so its centre of gravity is unknown; use --origin base if that is at it",
+            source=source,
+        )
+    start = center if origin == "gravity" else np.zeros(3)
+    made = []
+    for name in fins:
+        if name not in joints:
+            links = ", ".join(sorted(joints)) or "none"
+            raise LayoutError(
+                f"has no link {name!r:.60} that a joint moves; such links: {links}", source=source
+            )
+        made.append(_fin(joints[name], poses[name], start, source))
+    # The inertia is about the centre of gravity; a layout keeps its diagonal.
+    diagonal = tuple(np.diag(inertia).tolist())
+    body = None
+    if origin == "gravity":
+        body = Body(mass_kg=mass, inertia_kgm2=diagonal if min(diagonal) > 0 else None)
+    description = f"From {Path(path).name}, origin at the {'centre of gravity' if body else 'base frame'}."
+    return Layout(str(robot.name or Path(path).stem), tuple(made), description, body)
+
+
+def _robot(path: Path, source: str) -> Any:
+    """The parsed description; nothing but its text is read."""
+    try:
+        from yourdfpy import URDF
+    except ImportError:
+        raise LayoutError("reading URDF needs yourdfpy; pip install 'finlab[urdf]'", source=source) from None
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise LayoutError(f"cannot be read: {reason}", source=source) from None
+    if len(content) > MAX_BYTES:
+        raise LayoutError(f"is larger than {MAX_BYTES:,} bytes; expected a URDF file", source=source)
+    # Entities could pull in other files or grow without bound; robot descriptions have no use for them.
+    if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
+        raise LayoutError("declares a DOCTYPE or entities, which are not allowed; remove them", source=source)
+    try:
+        with_files = {"build_scene_graph": False, "load_meshes": False, "load_collision_meshes": False}
+        return URDF.load(io.BytesIO(content), **with_files).robot
+    except Exception as error:  # the reader raises whatever its own parser and conversions do
+        reason = str(error).splitlines()[0][:120] if str(error) else type(error).__name__
+        raise LayoutError(f"is not a readable URDF: {reason}", source=source) from None
+
+
+def _poses(robot: Any, joints: dict[str, Any], source: str) -> dict[str, Array]:
+    """Pose (4, 4) of every link in the root link's frame, all joints at zero."""
+    poses: dict[str, Array] = {}
+    for link in robot.links:
+        chain: list[Any] = []
+        name = link.name
+        while name in joints and name not in poses:
+            chain.append(joints[name])
+            name = joints[name].parent
+            if len(chain) > len(robot.links):
+                raise LayoutError(f"has joints in a circle around link {link.name!r:.60}", source=source)
+        pose = poses.setdefault(name, np.eye(4))
+        for joint in reversed(chain):
+            pose = pose @ (np.eye(4) if joint.origin is None else np.asarray(joint.origin, dtype=np.float64))
+            poses[joint.child] = pose
+    return poses
+
+
+def _masses(robot: Any, poses: dict[str, Array]) -> tuple[float, Array, Array]:
+    """Mass [kg], centre of gravity (3,) [m] and inertia (3, 3) about it [kg m^2] of all links together."""
+    parts = []
+    for link in robot.links:
+        inertial = link.inertial
+        if inertial is None or not inertial.mass:
+            continue
+        pose = poses[link.name] @ (np.eye(4) if inertial.origin is None else np.asarray(inertial.origin))
+        own = np.zeros((3, 3)) if inertial.inertia is None else np.asarray(inertial.inertia, dtype=np.float64)
+        parts.append((float(inertial.mass), pose[:3, 3], pose[:3, :3] @ own @ pose[:3, :3].T))
+    mass = sum(part[0] for part in parts)
+    if mass <= 0:
+        return 0.0, np.zeros(3), np.zeros((3, 3))
+    center = sum((m * at for m, at, _ in parts), np.zeros(3)) / mass
+    inertia = np.zeros((3, 3))
+    for m, at, own in parts:
+        arm = at - center
+        inertia += own + m * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return mass, center, inertia
+
+
+def _fin(joint: Any, pose: Array, origin: Array, source: str) -> Fin:
+    """The fin that a joint moves."""
+    if joint.type not in ("revolute", "continuous"):
+        raise LayoutError(
+            f"joint {joint.name!r:.60} is {joint.type}; a fin's joint turns: revolute or continuous",
+            source=source,
+        )
+    axis = pose[:3, :3] @ np.asarray((1.0, 0.0, 0.0) if joint.axis is None else joint.axis, dtype=np.float64)
+    size = float(np.linalg.norm(axis))
+    tilt = math.asin(min(abs(axis[2]) / size, 1.0)) if size > 0 else math.pi / 2
+    if tilt > MAX_TILT:
+        raise LayoutError(
+            f"the axis of joint {joint.name!r:.60} leaves the horizontal plane by {math.degrees(tilt):.0f} "
+            f"degrees; finlab's fins have horizontal shafts (up to {math.degrees(MAX_TILT):.0f})",
+            source=source,
+        )
+    position = pose[:3, 3] - origin
+    # A joint may turn about the same line the other way round; finlab's shafts point out of the hull.
+    outward = axis if axis[:2] @ position[:2] >= 0 else -axis
+    x, y, z = position.tolist()
+    return Fin(str(joint.child), (x, y, z), math.atan2(outward[1], outward[0]))
