@@ -123,7 +123,7 @@ class App:
             now = time.monotonic()
             for view in list(self.views.values()):
                 # A long pause (a busy machine) must not become a leap of the fins.
-                view.scene.animate(min(now - before, 0.2))
+                view.animate(min(now - before, 0.2))
             before = now
             if now - kept > KEEP_S:
                 kept = now

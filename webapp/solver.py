@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +41,11 @@ class Solver:
         self._checkpoint = checkpoint
         self._load = load
         self._allocators: dict[str, Allocator] = {}
+
+    @cached_property
+    def aside(self) -> "Solver":
+        """Another solver with the same checkpoint, for another thread."""
+        return Solver(self._checkpoint, self._load)
 
     def allocator(self, state: State) -> Allocator:
         """The allocator for the state's method and settings, loaded once per method.

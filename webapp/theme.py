@@ -21,6 +21,8 @@ DELIVERED = GREEN
 """The wrench that the fins give."""
 MISSING = VERMILLION
 """What is left undone, and every warning."""
+OTHER: Rgb = (170, 68, 153)
+"""The second of two robots that swim the same way."""
 DEAD: Rgb = (150, 154, 158)
 """A failed fin."""
 

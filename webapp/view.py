@@ -26,10 +26,12 @@ from webapp.ranging import REST_S, Beside, find_ranges
 from webapp.recording import recorded_html
 from webapp.resting import Resting
 from webapp.scene.robot_scene import RobotScene
+from webapp.scene.swim_scene import SwimScene
 from webapp.sending import Sender
 from webapp.session import Session
 from webapp.solver import Solver
 from webapp.sweeping import Sweep
+from webapp.swimming import Swimming
 from webapp.theme import BRAND, GREEN, VERMILLION
 from webapp.workers import Workers
 
@@ -74,6 +76,7 @@ class View:
         self.analyst = Resting(find, CARD_REST_S, workers.cards, loop, post, changed)
         self.improver = Improver(workers.searches, post, changed)
         self.comparison = Comparison(solver, answers, post, changed)
+        self.swimming = Swimming(solver.aside, workers.swims, post, changed, refused)
         self.sweep = Sweep(session, loop, self.do)
         self._sender = Sender(client, answers, post, self.notify)
         self._build()
@@ -93,6 +96,7 @@ class View:
             self._drag,
             self._drag_wrench,
         )
+        self.swim_scene = SwimScene(self.client, self.swimming)
         self._panels = build_panels(gui, self)
         add_commands(gui, self)
 
@@ -133,6 +137,20 @@ class View:
     def notify(self, title: str, body: str, *, good: bool = False) -> None:
         """Show a note to the user."""
         self.client.add_notification(title, body, auto_close_seconds=8.0, color=GREEN if good else VERMILLION)
+
+    def end_swim(self) -> None:
+        """Go back from the robot that swims to the one that is designed."""
+        if self.swimming.active:
+            self.swimming.stop()
+            self.scene.look_from("3D")
+
+    def animate(self, elapsed: float) -> None:
+        """Let time pass [s]: fins flap, and a robot that swims moves on."""
+        if self.swimming.active:
+            self.swimming.tick(elapsed)
+            self.swim_scene.animate(elapsed)
+        else:
+            self.scene.animate(elapsed)
 
     def look_from(self, view: str) -> None:
         """Move the camera."""
@@ -176,6 +194,8 @@ class View:
             attention = None if reply is None else reply.attention
             # First: it settles the scale that the legend tells.
             self.scene.refresh(self.shown, self._overlaid, self.analyst.findings, offered, attention)
+            self.scene.show(not self.swimming.swimmers)
+            self.swim_scene.refresh(self.session.display.dark)
             for panel in self._panels:
                 panel.refresh()
 
@@ -225,6 +245,7 @@ class View:
         """The browser has gone."""
         self._closed = True
         self.sweep.stop()
+        self.swimming.stop()
         self.answering.frames = ()
         self.comparison.cancel()
         self.analyst.close()

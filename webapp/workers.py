@@ -15,10 +15,12 @@ class Workers:
     """Reachable ranges: tens of milliseconds, after the answer."""
     cards: Worker = field(default_factory=Worker)
     """What a layout can do: about a second."""
+    swims: Worker = field(default_factory=Worker)
+    """Robots that swim: all the time, in short turns."""
     searches: Worker = field(default_factory=Worker)
     """Better layouts: up to minutes."""
 
     def stop(self) -> None:
         """End all threads."""
-        for worker in (self.answers, self.marks, self.cards, self.searches):
+        for worker in (self.answers, self.marks, self.cards, self.swims, self.searches):
             worker.stop()

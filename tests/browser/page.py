@@ -48,7 +48,7 @@ class Page:
     def ready(self) -> None:
         """Wait for panel, robot and first answer."""
         self.page.get_by_role("button", name="Undo").wait_for()
-        self.node("/fins/0/turn/blade")
+        self.node("/robot/fins/0/turn/blade")
         self.page.locator(".fl-status .err").wait_for(state="attached")
         self.close_notes()  # viser's own one on software rendering lies over the view
 

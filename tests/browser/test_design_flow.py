@@ -16,14 +16,14 @@ def test_linked_pair_follows_the_gizmo(page: Any) -> None:
     page.until(lambda: page.session.selected == "front_left")
     page.key("2")
     page.page.wait_for_timeout(600)
-    grip, further = page.pixel("/fins/1", (0.168, 0, 0)), page.pixel("/fins/1", (0.228, 0, 0))
+    grip, further = page.pixel("/robot/fins/1", (0.168, 0, 0)), page.pixel("/robot/fins/1", (0.228, 0, 0))
     before = page.session.state.layout
     page.drag(grip, further)
     page.until(lambda: page.session.state.layout != before and not page.view.busy)
     right, left = page.session.state.layout.fins[:2]
     assert left.position[0] == pytest.approx(before.fins[1].position[0] + 0.06, abs=0.02)
     assert right.position == pytest.approx((left.position[0], -left.position[1], left.position[2]))
-    ghost = "() => window.__viserMutable.nodeRefFromName['/ghost'].visible"
+    ghost = "() => window.__viserMutable.nodeRefFromName['/robot/ghost'].visible"
     page.page.wait_for_function(ghost)
     page.press("Undo")
     page.until(lambda: page.session.state.layout == before)
@@ -38,10 +38,10 @@ def test_hull_from_a_file_and_by_numbers(page: Any, tmp_path: Path, monkeypatch:
     page.upload("Import a hull (STL, OBJ, GLB)", path)
     page.until(lambda: any("another unit" in note for note in page.notes()))
     page.choose("Unit of file", "mm")
-    before = page.vertices("/hull")
+    before = page.vertices("/robot/hull")
     page.upload("Import a hull (STL, OBJ, GLB)", path)
     page.until(lambda: page.session.state.layout.body.hull.mesh is not None)
-    page.until(lambda: page.vertices("/hull") != before)
+    page.until(lambda: page.vertices("/robot/hull") != before)
     page.choose("Shape", "torpedo")
     page.until(lambda: page.session.state.layout.body.hull.shape == "torpedo")
     page.type("Gravity [m]", "0.02", place=0)
@@ -52,17 +52,17 @@ def test_hull_from_a_file_and_by_numbers(page: Any, tmp_path: Path, monkeypatch:
 def test_failure_changes_graph_and_attainable_set(page: Any) -> None:
     page.tab("Limits")
     page.press("forces")
-    page.page.wait_for_function("() => window.__viserMutable.nodeRefFromName['/attainable/now'].visible")
+    page.page.wait_for_function("() => window.__viserMutable.nodeRefFromName['/robot/attainable/now'].visible")
     page.until(lambda: not page.view.analyst.busy)
-    whole, card = page.vertices("/attainable/now"), page.text(".score")
+    whole, card = page.vertices("/robot/attainable/now"), page.text(".score")
     page.key("f")
     page.until(lambda: page.session.state.failed == ("front_right",))
-    page.until(lambda: page.vertices("/attainable/now") != whole, seconds=60)
-    page.page.wait_for_function("() => window.__viserMutable.nodeRefFromName['/attainable/whole'].visible")
+    page.until(lambda: page.vertices("/robot/attainable/now") != whole, seconds=60)
+    page.page.wait_for_function("() => window.__viserMutable.nodeRefFromName['/robot/attainable/whole'].visible")
     page.until(lambda: page.text(".score") != card and "without" in page.text(".score"))
     page.until(lambda: page.view.answering.reply is not None)
     page.press("none")
-    hidden = "() => !window.__viserMutable.nodeRefFromName['/attainable/now'].visible"
+    hidden = "() => !window.__viserMutable.nodeRefFromName['/robot/attainable/now'].visible"
     page.page.wait_for_function(hidden)
 
 
@@ -89,7 +89,7 @@ def test_methods_side_by_side(page: Any) -> None:
     page.until(lambda: page.page.locator("table.methods tr").count() == 7)
     page.page.locator("table.methods tr.pick", has_text="analytic").click()
     page.until(lambda: page.session.overlay == "analytic")
-    page.page.wait_for_function("() => window.__viserMutable.nodeRefFromName['/overlay'].visible")
+    page.page.wait_for_function("() => window.__viserMutable.nodeRefFromName['/robot/overlay'].visible")
     assert "analytic" in page.text("table.methods tr.chosen")
     page.press("none")
     page.until(lambda: page.session.overlay is None)
@@ -101,7 +101,7 @@ def test_wrench_is_dragged_in_the_view(page: Any) -> None:
     page.key("2")
     page.page.wait_for_timeout(600)
     before = page.session.state.target
-    grip, further = page.pixel("/grip/force", (0.112, 0, 0)), page.pixel("/grip/force", (0.192, 0, 0))
+    grip, further = page.pixel("/robot/grip/force", (0.112, 0, 0)), page.pixel("/robot/grip/force", (0.192, 0, 0))
     page.drag(grip, further)
     page.until(lambda: page.session.state.target[0] > before[0] + 0.2)
     assert page.session.state.target[1:] == pytest.approx(before[1:], abs=0.02)

@@ -12,7 +12,7 @@ def test_gizmo_moves_a_fin(page: Any) -> None:
     page.key("2")  # from above, the x arrow lies flat on the screen
     page.page.wait_for_timeout(600)
     start = page.session.state.layout.fins[0].position
-    grip, further = page.pixel("/fins/0", (0.168, 0, 0)), page.pixel("/fins/0", (0.268, 0, 0))
+    grip, further = page.pixel("/robot/fins/0", (0.168, 0, 0)), page.pixel("/robot/fins/0", (0.268, 0, 0))
     page.drag(grip, further)
     page.until(lambda: page.session.state.layout.fins[0].position != start)
     page.until(lambda: not page.view.busy)
@@ -22,11 +22,11 @@ def test_gizmo_moves_a_fin(page: Any) -> None:
     assert page.session.history.undo_name == "Move front_right"
     page.key("Control+z")
     page.until(lambda: page.session.state.layout.fins[0].position == start)
-    page.until(lambda: page.pixel("/fins/0", (0.168, 0, 0)) == pytest.approx(grip, abs=3))
+    page.until(lambda: page.pixel("/robot/fins/0", (0.168, 0, 0)) == pytest.approx(grip, abs=3))
 
 
 def test_click_selects_and_numbers_move(page: Any) -> None:
-    page.page.mouse.click(*page.pixel("/fins/2/turn/shaft", (-0.02, 0, 0)))
+    page.page.mouse.click(*page.pixel("/robot/fins/2/turn/shaft", (-0.02, 0, 0)))
     page.until(lambda: page.session.selected == "back_left")
     page.tab("Layout")
     page.type("Position [m]", "-0.2", place=0)
@@ -46,7 +46,7 @@ def test_add_mirror_and_undo(page: Any) -> None:
     page.press("Mirror")
     page.until(lambda: page.session.state.layout.n_fins == 6)
     assert page.session.state.layout.fins[5].position[1] == -0.1
-    page.node("/fins/5/turn/blade")
+    page.node("/robot/fins/5/turn/blade")
     page.press("Undo")
     page.until(lambda: page.session.state.layout.n_fins == 5)
     page.press("Redo")

@@ -4,7 +4,7 @@ from typing import Any
 
 
 def test_slider_moves_numbers_and_arrows(page: Any) -> None:
-    before = page.vertices("/wrench/delivered_force")
+    before = page.vertices("/robot/wrench/delivered_force")
     page.slide("Fx [N]", 25)
     page.until(lambda: page.session.state.target[0] > 2.0)
     page.page.wait_for_timeout(400)  # the last step of the drag may still be on its way
@@ -12,7 +12,7 @@ def test_slider_moves_numbers_and_arrows(page: Any) -> None:
     page.until(lambda: f"{asked:+.2f}" in page.text(".bars"))
     page.until(lambda: not page.view.busy)
     assert abs(page.view.shown.wrench[0] - asked) < 0.05
-    page.until(lambda: page.vertices("/wrench/delivered_force") != before)
+    page.until(lambda: page.vertices("/robot/wrench/delivered_force") != before)
     assert "Reachable" in page.text(".fl-status")
     assert page.problems == []
 
@@ -25,13 +25,13 @@ def test_unreachable_wrench_is_said_in_words(page: Any) -> None:
 
 
 def test_failed_fin_leaves_table_arrows_and_graph(page: Any) -> None:
-    force = page.vertices("/fins/0/turn/force")
+    force = page.vertices("/robot/fins/0/turn/force")
     page.press("2")
     page.until(lambda: page.session.state.failed == ("front_left",))
     page.until(lambda: "failed" in page.text("table.fins tr.dead"))
     page.until(lambda: "3 of 4 fins" in page.text(".fl-status"))
-    page.until(lambda: page.vertices("/fins/0/turn/force") != force)
-    hidden = "() => window.__viserMutable.nodeRefFromName['/fins/1/turn/force'].visible === false"
+    page.until(lambda: page.vertices("/robot/fins/0/turn/force") != force)
+    hidden = "() => window.__viserMutable.nodeRefFromName['/robot/fins/1/turn/force'].visible === false"
     page.page.wait_for_function(hidden)
     page.press("2 ✕")
     page.until(lambda: page.session.state.failed == ())

@@ -5,8 +5,11 @@ from html import escape
 
 from finlab.allocation.allocation import Allocation
 from webapp.figures import small, three_digits
+from webapp.markup.swim_card import pace
 from webapp.state import State
-from webapp.theme import ASKED, DEAD, DELIVERED, MISSING, TORQUE_SCALE, css
+from webapp.swimmer import ERROR
+from webapp.swimming import Swimming
+from webapp.theme import ASKED, DEAD, DELIVERED, MISSING, OTHER, TORQUE_SCALE, css
 from webapp.words import reach_sentence
 
 
@@ -31,6 +34,33 @@ def corner(
     return (
         f"<div class='fl-corner'><div class='fl fl-card fl-legend-card'>{_legend(newtons)}</div>"
         f"<div class='fl fl-card fl-status'>{_status(state, allocation, busy, error, raw)}</div></div>"
+    )
+
+
+def swim_corner(swimming: Swimming, newtons: float) -> str:
+    """The same while robots swim."""
+    first = swimming.swimmers[0]
+    trails = "".join(
+        f"<svg width='44' height='10'><path d='M0 5H44' stroke='{css(color)}' stroke-width='3.5'/></svg>"
+        f"<span>{word}</span>"
+        for word, color in (
+            ("the path", ASKED),
+            *((s.method, c) for s, c in zip(swimming.swimmers, (DELIVERED, OTHER), strict=False)),
+        )
+    )
+    alive = len(first.fins) - len(first.failed)
+    off = f"{100 * float(first.shown.record[-1, ERROR]):.1f}" if len(first.shown.record) else "–"
+    parts = (
+        f"<b>{escape(first.swim.layout.name)}</b>",
+        f"<span>{alive} of {len(first.fins)} fins</span>",
+        f"<span><b>{first.time:.1f}</b> s of {first.duration_s:.0f} s</span>",
+        f"<span><span class='dim'>off the path</span> <b>{off}</b> cm</span>",
+        f"<span>{pace(swimming)}</span>",
+    )
+    return (
+        f"<div class='fl-corner'><div class='fl fl-card fl-legend-card'><div class='fl-legend'>{trails}</div>"
+        f"<div class='dim' style='margin-top:4px'>arrow 0.1 m = {newtons:g} N</div></div>"
+        f"<div class='fl fl-card fl-status'>{''.join(parts)}</div></div>"
     )
 
 

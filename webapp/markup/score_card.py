@@ -87,9 +87,9 @@ def _axes(card: ScoreCard, before: ScoreCard | None, name: str) -> str:
             f"<td>{least}</td><td>{'–' if energy is None else three_digits(energy)}</td></tr>"
         )
     old = f"<th>{name}</th>" if before is not None else ""
-    now = "" if before is None else "now"
+    column = "" if before is None else "now"
     head = (
-        f"<tr><th>largest on its own</th>{old}<th>{now}</th>"
+        f"<tr><th>largest on its own</th>{old}<th>{column}</th>"
         "<th title='after the worst loss of a fin'>one lost</th>"
         "<th title='energy of 1 N, or 0.1 N m'>energy</th></tr>"
     )

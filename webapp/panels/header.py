@@ -3,10 +3,11 @@
 import viser
 
 from webapp.handles import on_user_change, put
-from webapp.markup.corner import corner
+from webapp.markup.corner import corner, swim_corner
 from webapp.markup.style import STYLE
 from webapp.markup.tour_card import tour_card
 from webapp.panels.host import Host
+from webapp.scene.swim_scene import ARROWS_N
 
 
 class Header:
@@ -39,12 +40,12 @@ class Header:
         """Write the status line."""
         host, history = self._host, self._host.session.history
         raw = host.session.sample is not None or host.playback.frame is not None
-        put(
-            self._corner,
-            content=corner(
-                host.session.state, host.newtons, host.shown, host.busy, host.answering.error, raw
-            ),
-        )
+        if host.swimming.swimmers:
+            content = swim_corner(host.swimming, ARROWS_N)
+        else:
+            answering = host.answering
+            content = corner(host.session.state, host.newtons, host.shown, host.busy, answering.error, raw)
+        put(self._corner, content=content)
         undo, redo = history.undo_name or "nothing", history.redo_name or "nothing"
         put(self._history, hint=f"Undo: {undo} (Ctrl+Z). Redo: {redo} (Ctrl+Shift+Z). A tour in five steps.")
         stop = host.session.stop

@@ -14,8 +14,10 @@ from webapp.improving import Improver
 from webapp.playback import Playback
 from webapp.ranging import Beside
 from webapp.resting import Resting
+from webapp.scene.swim_scene import SwimScene
 from webapp.session import Session
 from webapp.sweeping import Sweep
+from webapp.swimming import Swimming
 
 
 class Host(Protocol):
@@ -38,6 +40,8 @@ class Host(Protocol):
     """The search for a better layout."""
     comparison: Comparison
     """Other methods on the same question."""
+    swimming: Swimming
+    """A robot that swims."""
     sweep: Sweep
     """A component of the target on its way through a range."""
 
@@ -58,6 +62,12 @@ class Host(Protocol):
 
     def notify(self, title: str, body: str, *, good: bool = False) -> None:
         """Show a note to the user."""
+
+    swim_scene: SwimScene
+    """What is seen of it."""
+
+    def end_swim(self) -> None:
+        """Go back from the robot that swims to the one that is designed."""
 
     def look_from(self, view: str) -> None:
         """Move the camera."""

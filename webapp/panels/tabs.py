@@ -11,6 +11,7 @@ from webapp.panels.host import Host, Panel
 from webapp.panels.layout import LayoutPanel
 from webapp.panels.limits import LimitsPanel
 from webapp.panels.modes import ModesPanel
+from webapp.panels.swim import SwimPanel
 from webapp.panels.take_home import TakeHomePanel
 from webapp.panels.wrench import WrenchPanel
 
@@ -22,6 +23,7 @@ TABS: dict[str, Callable[[viser.GuiApi, Host], Panel]] = {
     "Modes": ModesPanel,
     "Limits": LimitsPanel,
     "Compare": ComparePanel,
+    "Swim": SwimPanel,
     "View": DisplayPanel,
     "Files": TakeHomePanel,
 }

@@ -37,10 +37,10 @@ class AttainableNodes:
             )
             return Shape(node)
 
-        self._now = glass("/attainable/now", DELIVERED, 0.34)
-        self._whole = glass("/attainable/whole", DEAD, 0.16)
+        self._now = glass("/robot/attainable/now", DELIVERED, 0.34)
+        self._whole = glass("/robot/attainable/whole", DEAD, 0.16)
         self._asked = scene.add_icosphere(
-            "/attainable/asked", 0.018, color=ASKED, visible=False, cast_shadow=False
+            "/robot/attainable/asked", 0.018, color=ASKED, visible=False, cast_shadow=False
         )
 
     def refresh(self, findings: Findings | None, target: Array) -> None:

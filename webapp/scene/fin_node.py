@@ -42,7 +42,7 @@ class FinNode:
         """
         self._color = fin_color(index)
         self._angle: float | None = None
-        name = f"/fins/{index}"
+        name = f"/robot/fins/{index}"
         # Only the ring turns; the arrows stay along the body's axes, like the numbers beside them.
         self._move = scene.add_transform_controls(
             name,
@@ -91,7 +91,9 @@ class FinNode:
             f"{name}/label", str(index + 1), anchor="center-center", font_screen_scale=0.85
         )
         self._strut = Shape(
-            scene.add_mesh_simple(f"/struts/{index}", NOTHING.vertices, NOTHING.faces, color=LIGHT.metal)
+            scene.add_mesh_simple(
+                f"/robot/struts/{index}", NOTHING.vertices, NOTHING.faces, color=LIGHT.metal
+            )
         )
 
         for node in (self._blade, self._shaft):

@@ -36,7 +36,7 @@ class Grips:
         """Which of them is in the user's hand: 0 force, 1 torque."""
         self._gizmos = [
             scene.add_transform_controls(
-                f"/grip/{name}",
+                f"/robot/grip/{name}",
                 SIZE,
                 line_width=4.0,
                 depth_test=False,
@@ -47,7 +47,7 @@ class Grips:
             for name in ("force", "torque")
         ]
         self._labels = [
-            scene.add_label(f"/grip/{name}/label", name, anchor="bottom-center", font_screen_scale=0.8)
+            scene.add_label(f"/robot/grip/{name}/label", name, anchor="bottom-center", font_screen_scale=0.8)
             for name in ("force", "torque")
         ]
         for k, gizmo in enumerate(self._gizmos):

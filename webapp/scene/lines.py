@@ -28,7 +28,7 @@ class Lines:
         """Build the nodes."""
         self.graph = Shape(
             scene.add_mesh_simple(
-                "/graph",
+                "/robot/graph",
                 NOTHING.vertices,
                 NOTHING.faces,
                 color=LIGHT.line,
@@ -38,9 +38,9 @@ class Lines:
             )
         )
         self._steps = scene.add_line_segments(
-            "/dimension", NO_LINE, LIGHT.line, thickness=2.0, thickness_units="screen"
+            "/robot/dimension", NO_LINE, LIGHT.line, thickness=2.0, thickness_units="screen"
         )
-        self._text = scene.add_label("/dimension/text", "", anchor="top-center", font_screen_scale=0.85)
+        self._text = scene.add_label("/robot/dimension/text", "", anchor="top-center", font_screen_scale=0.85)
 
     def refresh(
         self,

@@ -21,7 +21,12 @@ class Overlay:
         """Build the node, showing nothing."""
         self._shape = Shape(
             scene.add_mesh_simple(
-                "/overlay", NOTHING.vertices, NOTHING.faces, color=COLOR, visible=False, cast_shadow=False
+                "/robot/overlay",
+                NOTHING.vertices,
+                NOTHING.faces,
+                color=COLOR,
+                visible=False,
+                cast_shadow=False,
             )
         )
 

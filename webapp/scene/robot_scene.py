@@ -13,6 +13,7 @@ from finlab.layout import Fin, Layout
 from webapp.analyst import Findings
 from webapp.arrow_scale import LENGTH, fitting_newtons
 from webapp.attention import Attention
+from webapp.handles import put
 from webapp.meshes.hull import hull_of
 from webapp.scene.attainable_nodes import AttainableNodes
 from webapp.scene.fin_node import FinNode
@@ -61,11 +62,12 @@ class RobotScene:
         self._on_select = on_select
         self._on_drag = on_drag
         scene = client.scene
+        self._root = scene.add_frame("/robot", show_axes=False)
         self._stage = Stage(scene, hull_of(session.state.layout))
         self._wrench = WrenchNodes(scene)
         self._lines = Lines(scene)
-        self._ghost = Ghost(scene, "/ghost")
-        self._landing = Ghost(scene, "/landing", ASKED, 0.45)
+        self._ghost = Ghost(scene, "/robot/ghost")
+        self._landing = Ghost(scene, "/robot/landing", ASKED, 0.45)
         self._overlay = Overlay(scene)
         self._attainable = AttainableNodes(scene)
         self._grips = Grips(scene, on_wrench)
@@ -76,6 +78,11 @@ class RobotScene:
         self.newtons = 1.0
         """Force [N] that an arrow of 0.1 m stands for at the moment."""
         self.look_from("3D")
+
+    def show(self, visible: bool) -> None:
+        """Show the robot that is designed, or make room for one that swims."""
+        put(self._root, visible=visible)
+        self._stage.show_floor(visible)
 
     def look_from(self, view: str) -> None:
         """Move the camera to one of `CAMERAS`."""

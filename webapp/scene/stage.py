@@ -21,15 +21,19 @@ class Stage:
         self._shadows: bool | None = None
         self._hull = hull
         mesh, bow = hull.mesh(), hull.bow()
-        self._body = scene.add_mesh_simple("/hull", mesh.vertices, mesh.faces, side="double")
+        self._body = scene.add_mesh_simple("/robot/hull", mesh.vertices, mesh.faces, side="double")
         self._bow = scene.add_mesh_simple(
-            "/hull/bow", bow.vertices, bow.faces, side="double", cast_shadow=False
+            "/robot/hull/bow", bow.vertices, bow.faces, side="double", cast_shadow=False
         )
         self._center = scene.add_label(
-            "/axes/center", "⊕ centre of gravity", anchor="bottom-left", font_screen_scale=0.85, visible=False
+            "/robot/axes/center",
+            "⊕ centre of gravity",
+            anchor="bottom-left",
+            font_screen_scale=0.85,
+            visible=False,
         )
         scene.add_frame(
-            "/axes", axes_length=0.09, axes_radius=0.004, origin_radius=0.009, origin_color=(40, 40, 40)
+            "/robot/axes", axes_length=0.09, axes_radius=0.004, origin_radius=0.009, origin_color=(40, 40, 40)
         )
         self._grid = scene.add_grid(
             "/floor",
@@ -62,6 +66,10 @@ class Stage:
         if dark != self._dark:
             self._dark = dark
             self._paint(look(dark))
+
+    def show_floor(self, visible: bool) -> None:
+        """Show the floor, or leave it to others."""
+        put(self._grid, visible=visible)
 
     @staticmethod
     def floor_height(hull: AnyHull) -> float:

@@ -20,16 +20,16 @@ class WrenchNodes:
 
     def __init__(self, scene: viser.SceneApi) -> None:
         """Build the nodes, showing nothing."""
-        self._root = scene.add_frame("/wrench", show_axes=False)
+        self._root = scene.add_frame("/robot/wrench", show_axes=False)
         stalk = tube(np.array([[0, 0, -HEIGHT - 0.2], [0, 0, 0.0]]), 0.0025, 10)
         scene.add_mesh_simple(
-            "/wrench/stalk", stalk.vertices, stalk.faces, color=LIGHT.line, cast_shadow=False
+            "/robot/wrench/stalk", stalk.vertices, stalk.faces, color=LIGHT.line, cast_shadow=False
         )
-        self._hub = scene.add_icosphere("/wrench/hub", 0.012, color=(70, 78, 86), cast_shadow=False)
+        self._hub = scene.add_icosphere("/robot/wrench/hub", 0.012, color=(70, 78, 86), cast_shadow=False)
 
         def node(name: str, color: tuple[int, int, int], opacity: float | None) -> Shape:
             node = scene.add_mesh_simple(
-                f"/wrench/{name}",
+                f"/robot/wrench/{name}",
                 NOTHING.vertices,
                 NOTHING.faces,
                 color=color,

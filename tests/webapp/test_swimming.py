@@ -1,0 +1,139 @@
+"""A robot swims on the page: at the pace of the clock, never behind it by more than a moment."""
+
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from finlab.assets import shipped_layouts
+from finlab.errors import FinlabError
+from finlab.layout import load_layout
+from tests.webapp.stand_in import load_stand_in
+from webapp.markup.corner import swim_corner
+from webapp.markup.swim_card import swim_card
+from webapp.solver import Solver
+from webapp.swimmer import ERROR, FORCES, POINTS, TIME
+from webapp.swimming import LAG_S, Plan, Swimming
+from webapp.trajectory_file import read_path
+from webapp.worker import Worker
+
+UCAT = load_layout(shipped_layouts()["ucat"])
+SHORT = read_path("short.csv", b"t,x,y,z\n0,0,0,-1\n2,0.2,0,-1\n")
+
+
+def until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
+@pytest.fixture
+def swimming() -> Iterator[Swimming]:
+    worker = Worker()
+    notes: list[str] = []
+    swim = Swimming(Solver(load=load_stand_in), worker, lambda act: act(), lambda: None, notes.append)
+    swim.notes = notes  # type: ignore[attr-defined]
+    yield swim
+    swim.stop()
+    worker.stop()
+
+
+def begin(swimming: Swimming, **wishes: Any) -> None:
+    swimming.start(Plan(UCAT, (), **{"path": SHORT, "methods": ("analytic",), **wishes}))
+    until(lambda: bool(swimming.swimmers))
+
+
+def test_swims_to_the_end_and_tells_how(swimming: Swimming) -> None:
+    assert "Start" in swim_card(swimming)
+    begin(swimming, methods=("analytic", "qp"))
+    while not swimming.done:
+        swimming.tick(0.05)
+        time.sleep(0.002)
+    assert not swimming.running and swimming.time == pytest.approx(2.0)
+    first, second = swimming.swimmers
+    record = first.shown.record
+    assert record.shape == (20, FORCES + 4) and np.isfinite(record).all()
+    assert np.all(np.diff(record[:, TIME]) > 0) and record[0, ERROR] < 0.1
+    assert second.shown.record[-1, TIME] == record[-1, TIME], "both swim the same way at the same time"
+    assert first.track_error is not None and first.track_error < 0.3
+    assert "arrived" in swim_card(swimming) and "qp" in swim_card(swimming)
+    assert "arrived" in swim_corner(swimming, 2.0)
+    swimming.set_running(True)
+    assert not swimming.running, "there is no way left"
+
+
+def test_a_slow_machine_drops_time_instead_of_piling_it_up(swimming: Swimming) -> None:
+    begin(swimming, path="circle")
+    for _ in range(100):
+        swimming.tick(1.0)  # a hundred seconds pass while the first stretch is swum
+    until(lambda: not swimming._busy)
+    assert swimming._owed <= LAG_S and swimming.time <= 3 * LAG_S
+
+
+def test_pause_step_and_speed(swimming: Swimming) -> None:
+    begin(swimming)
+    swimming.set_running(False)
+    swimming.tick(1.0)
+    assert swimming.time == 0.0
+    swimming.step()
+    until(lambda: swimming.time == pytest.approx(0.1))
+    swimming.set_speed(8.0)
+    for wrong in (float("nan"), 0.0, "2", 99.0):
+        with pytest.raises(FinlabError):
+            swimming.set_speed(wrong)
+    assert "paused" in swim_card(swimming)
+
+
+def test_fins_break_and_are_mended_while_it_swims(swimming: Swimming) -> None:
+    with pytest.raises(FinlabError, match="nothing swims"):
+        swimming.toggle("front_left")
+    begin(swimming)
+    swimming.set_running(False)
+    swimming.toggle("front_left")
+    until(lambda: swimming.swimmers[0].failed == ("front_left",))
+    swimming.step()
+    until(lambda: swimming.time > 0)
+    assert not swimming.swimmers[0].shown.force[1].any()
+    for name in ("front_right", "back_left"):
+        swimming.toggle(name)
+        until(lambda name=name: name in swimming.swimmers[0].failed)
+    assert "drift off" in swim_card(swimming)
+    with pytest.raises(FinlabError, match="last fin"):
+        swimming.toggle("back_right")
+    swimming.toggle("front_left")
+    until(lambda: "front_left" not in swimming.swimmers[0].failed)
+
+
+def test_bad_plans_and_methods_out_of_order(swimming: Swimming) -> None:
+    for wrong in (
+        {"path": "moon"},
+        {"methods": ("analytic", "analytic")},
+        {"methods": ("slsqp",)},
+        {"methods": ()},
+        {"plant": "jelly"},
+    ):
+        with pytest.raises(FinlabError):
+            Plan(UCAT, (), **{"path": "circle", "methods": ("qp",), **wrong})  # type: ignore[arg-type]
+    swimming._solver = Solver(load=lambda *_, **__: load_stand_in(method="slsqp"))
+    swimming.start(Plan(UCAT, (), "circle", ("qp",)))
+    until(lambda: bool(swimming.notes))  # type: ignore[attr-defined]
+    assert not swimming.active
+
+
+def test_a_long_record_is_thinned(swimming: Swimming) -> None:
+    begin(swimming, path="circle")
+    swimming.set_running(False)
+    swimmer = swimming.swimmers[0]
+    for _ in range(POINTS + 50):
+        swimmer.step()
+    assert len(swimmer.moment().record) <= POINTS
+
+
+def test_files_with_ways_are_checked() -> None:
+    with pytest.raises(FinlabError, match=r"bad\.csv"):
+        read_path("../bad.csv", b"t,x\n0,1\n")
+    with pytest.raises(FinlabError, match="bytes"):
+        read_path("big.csv", b"0" * 3_000_000)

@@ -1,0 +1,52 @@
+"""How a swim goes, in a few words and a row per robot."""
+
+from html import escape
+
+from webapp.figures import listed, three_digits
+from webapp.swimming import Swimming
+from webapp.theme import DELIVERED, OTHER, css
+
+
+def pace(swimming: Swimming) -> str:
+    """At what pace it goes, in words: what is asked for, or what the machine can do."""
+    if swimming.done:
+        return "arrived"
+    if not swimming.running:
+        return "paused"
+    rate = swimming.rate
+    if rate is None or rate > 0.9 * swimming.speed:
+        return f"running at {swimming.speed:.2g}×"
+    return f"<span class='missing'>running at {rate:.1g}×, as fast as this machine can</span>"
+
+
+def swim_card(swimming: Swimming) -> str:
+    """Time, pace, and per robot: distance from where it should be, depth error, power."""
+    if not swimming.active:
+        return "<div class='fl dim'>Start lets this robot swim, with the fins that work.</div>"
+    if not swimming.swimmers:
+        return "<div class='fl dim'>making ready …</div>"
+    first = swimming.swimmers[0]
+    head = f"<b>{first.time:.1f} s</b> of {first.duration_s:.0f} s, {pace(swimming)}"
+    rows = []
+    for swimmer, color in zip(swimming.swimmers, (DELIVERED, OTHER), strict=False):
+        cells = "".join(
+            f"<td>{'–' if value is None else three_digits(value)}</td>"
+            for value in (swimmer.track_error, swimmer.depth_error, swimmer.power)
+        )
+        dot = f"<span class='swatch' style='background:{css(color)};min-width:10px'>&nbsp;</span>"
+        rows.append(f"<tr><td>{dot}{escape(swimmer.method)}</td>{cells}</tr>")
+    warning = ""
+    if not first.shown.controllable:
+        numbers = listed([str(first.fins.index(name) + 1) for name in first.failed])
+        warning = (
+            f"<div class='missing'>Without fin {numbers} surge, heave and yaw are not free of each other: "
+            "expect it to drift off.</div>"
+        )
+    header = (
+        "<tr><th>method</th>"
+        "<th title='root mean square distance from where it should be'>off the path [m]</th>"
+        "<th title='the same of the depth'>depth [m]</th><th title='inertial, mean'>power [W]</th></tr>"
+    )
+    return (
+        f"<div class='fl'><div class='said'>{head}</div><table>{header}{''.join(rows)}</table>{warning}</div>"
+    )

@@ -1,0 +1,126 @@
+"""Watch the robot swim: a path, a method or two, fins that break; plots of what happens."""
+
+from functools import partial
+from typing import Any
+
+import viser
+
+from finlab.sim import PLANTS, SHIPPED, Trajectory
+from webapp.comparison import COMPARED
+from webapp.handles import on_user_change, put
+from webapp.markup.picking import button_colors
+from webapp.markup.swim_card import swim_card
+from webapp.panels.host import Host
+from webapp.panels.swim_plots import SwimPlots
+from webapp.swimming import SPEEDS, Plan
+from webapp.theme import DEAD, css, fin_color
+from webapp.trajectory_file import read_path
+
+ALONE = "nobody"
+"""Entry of the list of rivals for a robot that swims alone."""
+OWN = "own path"
+"""Entry of the list of paths for one from a file."""
+
+
+class SwimPanel:
+    """Widgets of one tab."""
+
+    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+        """Build the widgets."""
+        self._host = host
+        self._own: Trajectory | None = None
+        self._path = gui.add_dropdown(
+            "Path", tuple(SHIPPED), initial_value="lissajous", hint="Where to swim."
+        )
+        self._method = gui.add_dropdown("Method", COMPARED, hint="Who allocates, ten times a second.")
+        self._rival = gui.add_dropdown(
+            "Beside", (ALONE, *COMPARED), hint="A second robot on the same path, with another method."
+        )
+        self._plant = gui.add_dropdown(
+            "Fin forces", tuple(PLANTS), hint="Mean forces, forces with their ripple, or flexible fins."
+        )
+        self._run = gui.add_button_group(
+            "Run", ("Start", "Pause", "Step", "End"), hint="Step swims for one tick of 0.1 s."
+        )
+        on_user_change(self._run, self._press)
+        self._speed = gui.add_slider(
+            "Speed", *SPEEDS, 0.1, 1.0, hint="Simulated time per real time; a slow machine falls short of it."
+        )
+        on_user_change(self._speed, lambda value: host.do(partial(host.swimming.set_speed, value)))
+        self._follow = gui.add_checkbox("Follow", False, hint="The camera goes along with the first robot.")
+        on_user_change(self._follow, self._look)
+        self._paint = gui.add_html("")
+        self._fins = gui.add_button_group(
+            "Break a fin", ("1",), hint="Press a fin's number: break or mend it while it swims."
+        )
+        on_user_change(self._fins, self._toggle)
+        self._card = gui.add_html("")
+        self._plots = SwimPlots(gui)
+        with gui.add_folder("More", expand_by_default=False):
+            self._upload = gui.add_upload_button(
+                "Open a path (CSV)",
+                icon=viser.Icon.ROUTE,
+                mime_type=".csv",
+                hint="A table with the columns t [s], x, y, z [m].",
+            )
+            self._axis = self._plots.add_axis_choice(gui)
+
+        @self._upload.on_upload
+        async def _uploaded(event: Any) -> None:
+            upload = event.target.value
+            host.do(lambda: self._take_path(upload.name, upload.content))
+
+    def _take_path(self, name: str, content: bytes) -> None:
+        self._own = read_path(name, content)
+        put(self._path, options=(*SHIPPED, OWN))
+        put(self._path, value=OWN)
+
+    def _press(self, button: str) -> None:
+        swimming = self._host.swimming
+        if button == "Start":
+            self._host.do(self._start)
+        elif button == "Pause":
+            self._host.do(lambda: swimming.set_running(not swimming.running))
+        elif button == "Step":
+            self._host.do(swimming.step)
+        elif button == "End":
+            self._host.do(self._host.end_swim)
+
+    def _start(self) -> None:
+        state, method, rival = self._host.session.state, self._method.value, self._rival.value
+        methods = (method,) if rival in (ALONE, method) else (method, rival)
+        path = self._own if self._path.value == OWN and self._own is not None else self._path.value
+        self._host.swimming.start(Plan(state.layout, state.failed, path, methods, self._plant.value))
+
+    def _look(self, follow: bool) -> None:
+        scene = self._host.swim_scene
+        if self._host.swimming.active:
+            scene.follow() if follow else scene.overlook()
+
+    def _toggle(self, button: str) -> None:
+        swimming = self._host.swimming
+        index = int("".join(c for c in button if c.isdigit()) or 0) - 1
+        names = swimming.swimmers[0].fins if swimming.swimmers else ()
+        if 0 <= index < len(names):
+            self._host.do(partial(swimming.toggle, names[index]))
+        else:
+            self._host.notify("Not possible", "Nothing swims yet; press Start.")
+
+    def refresh(self) -> None:
+        """Write how the swim goes."""
+        swimming = self._host.swimming
+        swimmers = swimming.swimmers
+        names = swimmers[0].fins if swimmers else self._host.session.state.layout.names
+        failed = swimmers[0].failed if swimmers else self._host.session.state.failed
+        paused = swimming.active and not swimming.running and not swimming.done
+        put(self._run, options=("Start", "Go on" if paused else "Pause", "Step", "End"))
+        put(
+            self._fins,
+            options=tuple(f"{i + 1} ✕" if n in failed else str(i + 1) for i, n in enumerate(names)),
+        )
+        colors = [
+            (css(DEAD), "#fff") if n in failed else (css(fin_color(i)), "#111") for i, n in enumerate(names)
+        ]
+        put(self._paint, content=button_colors("fl-breaks", colors))
+        put(self._card, content=swim_card(swimming))
+        self._plots.refresh(swimming)

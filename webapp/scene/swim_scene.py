@@ -1,0 +1,137 @@
+"""The water while robots swim: the way to go, where they should be, and up to two of them."""
+
+import numpy as np
+import viser
+
+from webapp.handles import put
+from webapp.meshes.arrows import NOTHING
+from webapp.scene.shape import Shape
+from webapp.scene.swim_robot import SwimRobot, arrow_scale, goal
+from webapp.swimming import Swimming
+from webapp.theme import ASKED, DELIVERED, OTHER, look
+
+ARROWS_N = 1.0
+"""Force that an arrow of 0.1 m stands for while robots swim [N]: one for all, so that they compare."""
+DEPTH_BELOW = 0.6
+"""How far the floor is below the deepest point of the way [m]."""
+
+
+class SwimScene:
+    """Draws a swim; nothing of it is there while nobody swims."""
+
+    def __init__(self, client: viser.ClientHandle, swimming: Swimming) -> None:
+        """Build the nodes, hidden."""
+        self._client, self._swimming = client, swimming
+        scene = client.scene
+        self._goal = Shape(
+            scene.add_mesh_simple(
+                "/swim/goal",
+                NOTHING.vertices,
+                NOTHING.faces,
+                color=ASKED,
+                opacity=0.45,
+                visible=False,
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+        )
+        self._reference = scene.add_icosphere(
+            "/swim/reference", 0.035, color=ASKED, visible=False, cast_shadow=False
+        )
+        self._floor = scene.add_grid(
+            "/swim/floor",
+            14.0,
+            14.0,
+            cell_size=0.25,
+            section_size=1.0,
+            cell_thickness=0.6,
+            section_thickness=1.0,
+            fade_distance=14.0,
+            fade_strength=1.4,
+            shadow_opacity=0.18,
+            visible=False,
+        )
+        self._robots: list[SwimRobot] = []
+        self._shown: tuple[object, ...] = ()
+        self._followed: np.ndarray | None = None
+
+    def refresh(self, dark: bool) -> None:
+        """Show the newest moment."""
+        swimming = self._swimming
+        swimmers = swimming.swimmers
+        visible = bool(swimmers)
+        put(self._goal.node, visible=visible)
+        put(self._reference, visible=visible)
+        colors = look(dark)
+        put(self._floor, visible=visible, cell_color=colors.grid, section_color=colors.grid_section)
+        if not visible:
+            for robot in self._robots:
+                robot.hide()
+            self._shown = ()
+            return
+        if swimmers != self._shown:
+            self._begin()
+        put(self._reference, position=swimmers[0].shown.reference)
+        for robot, swimmer in zip(self._robots, swimmers, strict=False):
+            robot.take(swimmer.shown, arrow_scale(ARROWS_N))
+
+    def _begin(self) -> None:
+        """Another swim: its robots, its way, and the camera where all of it can be seen."""
+        swimming = self._swimming
+        self._shown = swimming.swimmers
+        assert swimming.plan is not None
+        while len(self._robots) < len(swimming.swimmers):  # the second one is made when it is first needed
+            second = len(self._robots) == 1
+            color, opacity = (OTHER, 0.45) if second else (DELIVERED, None)
+            self._robots.append(
+                SwimRobot(self._client.scene, f"/swim/robot{len(self._robots)}", color, opacity)
+            )
+        for robot in self._robots[len(swimming.swimmers) :]:
+            robot.hide()
+        for robot, swimmer in zip(self._robots, swimming.swimmers, strict=False):
+            robot.begin(swimming.plan.layout, swimmer.shown)
+        path = swimming.swimmers[0].path
+        self._goal.show(goal, path)
+        low, high = path.min(axis=0), path.max(axis=0)
+        put(self._floor, position=np.array([0.0, 0.0, low[2] - DEPTH_BELOW]))
+        self.overlook()
+
+    def overlook(self) -> None:
+        """Move the camera to where the whole path can be seen."""
+        self._followed = None
+        if not self._swimming.swimmers:
+            return
+        path = self._swimming.swimmers[0].path
+        low, high = path.min(axis=0), path.max(axis=0)
+        self._look_at((low + high) / 2, max(0.75 * float(np.linalg.norm((high - low)[:2])), 1.2))
+
+    def follow(self) -> None:
+        """Move the camera near the first robot and go along with it."""
+        if self._swimming.swimmers and self._robots:
+            self._followed = self._robots[0].place
+            self._look_at(self._followed, 1.1)
+
+    def _look_at(self, middle: np.ndarray, distance: float) -> None:
+        """Move the camera to where it sees a point (3,) from a distance [m]."""
+        camera = self._client.camera
+        with self._client.atomic():
+            camera.up_direction = (0.0, 0.0, 1.0)
+            camera.position = tuple(middle + distance * np.array([-0.35, -0.75, 0.75]))
+            camera.look_at = tuple(middle + np.array([0.0, 0.0, -0.1]))
+
+    def animate(self, elapsed: float) -> None:
+        """Let the robots move by some time on the wall [s]."""
+        swimming = self._swimming
+        if not swimming.swimmers or swimming.swimmers != self._shown:
+            return
+        names = swimming.swimmers[0].fins
+        rate = swimming.rate or swimming.speed
+        for robot, swimmer in zip(self._robots, swimming.swimmers, strict=False):
+            lost = tuple(names.index(name) for name in swimmer.failed)
+            robot.animate(elapsed * rate, lost)
+        if self._followed is not None:
+            step = self._robots[0].place - self._followed
+            if np.linalg.norm(step) > 0.004:
+                self._followed = self._followed + step
+                # What the camera looks at moves with it, so the user may still turn the view.
+                self._client.camera.position = self._client.camera.position + step

@@ -1,0 +1,133 @@
+"""One robot of a swim: its record for the plots, and where it is at the moment."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.sim import Swim
+from finlab.sim.log import Tick
+
+Array = NDArray[np.float64]
+
+POINTS = 300
+"""Most points of a plotted line; a longer record is thinned out."""
+
+
+class Moment(NamedTuple):
+    """What the page shows of a robot."""
+
+    time: float
+    """Simulated time [s]."""
+    pose: Array
+    """Position (3,) and quaternion w, x, y, z (7,)."""
+    motion: Array
+    """What the fins do (n, 3): amplitude [rad], frequency [Hz], direction [rad]."""
+    force: Array
+    """Force of each fin (n, 3) in the body frame [N]."""
+    asked: Array
+    """Wrench (6,) that the controller asked for [N, N m]."""
+    delivered: Array
+    """Wrench (6,) that the fins gave."""
+    reference: Array
+    """Where the robot should be (3,) [m]."""
+    failed: tuple[str, ...]
+    """Fins that are lost."""
+    controllable: bool
+    """Whether the working fins hold surge, heave and yaw."""
+    done: bool
+    """Whether the task is over."""
+    record: Array
+    """Rows of ticks (N, 20 + n); `TIME` to `FORCES` say where what is."""
+
+
+TIME, ERROR, DEPTH_ERROR, POWER, SOLVE_MS = range(5)
+"""Columns of a record: time [s], distance from where it should be [m], that of the depth [m], inertial power
+of all fins [W], time of the allocation [ms]."""
+ASKED, DELIVERED, PLACE, FORCES = 5, 11, 17, 20
+"""First columns of the asked (6) and delivered (6) wrench [N, N m], the position (3) [m], and of
+the force of each fin (n) [N]."""
+
+
+class Swimmer:
+    """A `Swim` on the worker's thread, and the last moment taken from it for the page."""
+
+    def __init__(self, method: str, swim: Swim) -> None:
+        """Take over a swim that is at its start."""
+        self.method, self.swim = method, swim
+        self.fins, self.period_s = swim.layout.names, swim.period_s
+        times = np.linspace(0.0, swim.task.duration_s, POINTS)
+        self.path: Array = np.array([swim.task.setpoint(float(t)).position for t in times])
+        """The way to go (POINTS, 3) [m]."""
+        self.duration_s = swim.task.duration_s
+        self._rows: list[Array] = []
+        self._last: Tick | None = None
+        self.shown = self.moment()
+        """What the page shows now."""
+
+    def step(self) -> None:
+        """Swim for one control period."""
+        tick = self._last = self.swim.step()
+        off = tick.position - tick.reference
+        power = float(tick.inertial_power.sum())
+        head = (tick.time, float(np.linalg.norm(off)), abs(float(off[2])), power, tick.solve_ms)
+        force = np.linalg.norm(tick.fin_force, axis=1)
+        self._rows.append(np.concatenate([head, tick.asked, tick.delivered, tick.position, force]))
+
+    def moment(self) -> Moment:
+        """What there is to show after the last step; called on the thread that swims."""
+        swim, n, last = self.swim, len(self.fins), self._last
+        rows = self._rows
+        thin = rows[:: max(1, math.ceil(len(rows) / POINTS))]
+        return Moment(
+            time=swim.time,
+            pose=swim.state[:7].copy(),
+            motion=swim.fins.command,
+            force=np.zeros((n, 3)) if last is None else last.fin_force,
+            asked=np.zeros(6) if last is None else last.asked,
+            delivered=np.zeros(6) if last is None else last.delivered,
+            reference=swim.task.setpoint(swim.time).position,
+            failed=swim.failed,
+            controllable=swim.controllable,
+            done=swim.done,
+            record=np.array(thin) if thin else np.zeros((0, FORCES + n)),
+        )
+
+    def take(self, moment: Moment) -> None:
+        """Show another moment."""
+        self.shown = moment
+
+    @property
+    def time(self) -> float:
+        """Simulated time of what is shown [s]."""
+        return self.shown.time
+
+    @property
+    def failed(self) -> tuple[str, ...]:
+        """Fins that are lost."""
+        return self.shown.failed
+
+    @property
+    def done(self) -> bool:
+        """Whether it has arrived."""
+        return self.shown.done
+
+    @property
+    def track_error(self) -> float | None:
+        """Root of the mean square distance from where it should have been so far [m]."""
+        return _root_mean_square(self.shown.record[:, ERROR])
+
+    @property
+    def depth_error(self) -> float | None:
+        """The same of the depth [m]."""
+        return _root_mean_square(self.shown.record[:, DEPTH_ERROR])
+
+    @property
+    def power(self) -> float | None:
+        """Mean inertial power of all fins so far [W]."""
+        return float(self.shown.record[:, POWER].mean()) if len(self.shown.record) else None
+
+
+def _root_mean_square(values: Array) -> float | None:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else None
