@@ -1,0 +1,110 @@
+"""Our derivatives against Fossen's matrices in NED with Euler angles, written apart from the library.
+
+T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control: rotation and Euler rates (2.4, 2.27),
+Coriolis matrix from a mass matrix (3.46), restoring forces of a submerged body (4.6), relative motion (8).
+"""
+
+import numpy as np
+import pytest
+
+from finlab.layout import Layout
+from finlab.sim.attitude import rotation
+from finlab.sim.frames import flip_matrix, flip_vector
+from finlab.sim.parameters import VehicleParameters, vehicle_parameters
+from finlab.sim.vehicle import Vehicle
+
+FLIP = np.diag([1.0, -1.0, -1.0])
+
+
+def skew(a: np.ndarray) -> np.ndarray:
+    return np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+
+
+def coriolis(m: np.ndarray, nu: np.ndarray) -> np.ndarray:
+    """C(nu) = [[0, -S(M11 v + M12 w)], [-S(M11 v + M12 w), -S(M21 v + M22 w)]]."""
+    linear = m[:3, :3] @ nu[:3] + m[:3, 3:] @ nu[3:]
+    angular = m[3:, :3] @ nu[:3] + m[3:, 3:] @ nu[3:]
+    return np.block([[np.zeros((3, 3)), -skew(linear)], [-skew(linear), -skew(angular)]])
+
+
+def euler_of(r: np.ndarray) -> np.ndarray:
+    return np.array([np.arctan2(r[2, 1], r[2, 2]), -np.arcsin(r[2, 0]), np.arctan2(r[1, 0], r[0, 0])])
+
+
+def rotation_of(phi: float, theta: float, psi: float) -> np.ndarray:
+    c, s = np.cos, np.sin
+    rx = np.array([[1, 0, 0], [0, c(phi), -s(phi)], [0, s(phi), c(phi)]])
+    ry = np.array([[c(theta), 0, s(theta)], [0, 1, 0], [-s(theta), 0, c(theta)]])
+    rz = np.array([[c(psi), -s(psi), 0], [s(psi), c(psi), 0], [0, 0, 1]])
+    return rz @ ry @ rx
+
+
+def fossen(p: VehicleParameters, eta: np.ndarray, nu: np.ndarray, current: np.ndarray, tau: np.ndarray):
+    """(eta', nu') in NED for eta = (position, Euler angles), nu, the current in the world and tau."""
+    mass_rigid = np.diag([p.mass] * 3 + list(p.inertia))
+    mass_added = flip_matrix(np.diag(p.added_mass))
+    phi, theta, psi = eta[3:]
+    r = rotation_of(phi, theta, psi)
+    rates = np.array(
+        [
+            [1, np.sin(phi) * np.tan(theta), np.cos(phi) * np.tan(theta)],
+            [0, np.cos(phi), -np.sin(phi)],
+            [0, np.sin(phi) / np.cos(theta), np.cos(phi) / np.cos(theta)],
+        ]
+    )
+    water = np.concatenate([r.T @ current, np.zeros(3)])
+    relative = nu - water
+    water_rate = np.concatenate([-skew(nu[3:]) @ water[:3], np.zeros(3)])
+    damping = flip_matrix(np.diag(np.array(p.linear_damping) + np.array(p.quadratic_damping) * abs(relative)))
+    xb, yb, zb = flip_vector(p.center_of_buoyancy)
+    w, b = p.mass * 9.81, p.mass * 9.81 if p.buoyancy is None else p.buoyancy
+    sp, cp, st, ct = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
+    restoring = np.array(
+        [
+            (w - b) * st,
+            -(w - b) * ct * sp,
+            -(w - b) * ct * cp,
+            yb * b * ct * cp - zb * b * ct * sp,
+            -zb * b * st - xb * b * ct * cp,
+            xb * b * ct * sp + yb * b * st,
+        ]
+    )
+    # Rigid body by its motion over ground, water by the relative motion.
+    force = (
+        tau
+        - coriolis(mass_rigid, nu) @ nu
+        - coriolis(mass_added, relative) @ relative
+        - damping @ relative
+        - restoring
+    )
+    nu_rate = np.linalg.solve(mass_rigid + mass_added, force + mass_added @ water_rate)
+    return np.concatenate([r @ nu[:3], rates @ nu[3:]]), nu_rate
+
+
+@pytest.mark.parametrize("buoyancy", [None, 200.0])
+def test_derivatives_agree_on_random_states(buoyancy: float | None, layout_a: Layout) -> None:
+    rng = np.random.default_rng(1)
+    base = vehicle_parameters(layout_a)
+    for _ in range(50):
+        offset = tuple(rng.uniform(-0.05, 0.05, 3))
+        p = VehicleParameters(
+            base.mass, base.inertia, base.added_mass, base.linear_damping, base.quadratic_damping, offset, buoyancy
+        )
+        current = rng.uniform(-0.3, 0.3, 3)
+        quaternion = rng.standard_normal(4)
+        quaternion /= np.linalg.norm(quaternion)
+        state = np.concatenate([rng.uniform(-5, 5, 3), quaternion, rng.uniform(-1, 1, 6)])
+        tau = rng.uniform(-10, 10, 6)
+        ours = np.array(Vehicle(p, current).derivative(state.tolist(), tau.tolist()))
+
+        r_ned = FLIP @ rotation(quaternion) @ FLIP
+        eta = np.concatenate([FLIP @ state[:3], euler_of(r_ned)])
+        eta_rate, nu_rate = fossen(p, eta, flip_vector(state[7:]), FLIP @ current, flip_vector(tau))
+
+        np.testing.assert_allclose(flip_vector(ours[7:]), nu_rate, atol=1e-10)
+        np.testing.assert_allclose(FLIP @ ours[:3], eta_rate[:3], atol=1e-12)
+        # Attitude: the rotation a moment later, from the quaternion's rate and from the Euler angles' rates.
+        h = 1e-6
+        later = quaternion + h * ours[3:7]
+        ours_later = FLIP @ rotation(later / np.linalg.norm(later)) @ FLIP
+        np.testing.assert_allclose(ours_later, rotation_of(*(eta[3:] + h * eta_rate[3:])), atol=1e-9)

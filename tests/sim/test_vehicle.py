@@ -1,0 +1,119 @@
+"""The vehicle against what can be solved by hand, and against itself with smaller steps."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from finlab.layout import Layout
+from finlab.sim.attitude import euler, quaternion_of_yaw
+from finlab.sim.parameters import VehicleParameters, vehicle_parameters
+from finlab.sim.vehicle import STATE_SIZE, Vehicle
+
+STILL = (0.0,) * 6
+
+
+@pytest.fixture
+def ucat(layout_a: Layout) -> VehicleParameters:
+    """Layout A says nothing of its body, so U-CAT's parameters are used."""
+    return vehicle_parameters(layout_a)
+
+
+def at_rest() -> np.ndarray:
+    state = np.zeros(STATE_SIZE)
+    state[3] = 1.0
+    return state
+
+
+def swim(vehicle: Vehicle, state: np.ndarray, wrench: tuple[float, ...], seconds: float, dt: float) -> np.ndarray:
+    for _ in range(round(seconds / dt)):
+        state = vehicle.step(state, wrench, dt)
+    return state
+
+
+def test_surge_under_quadratic_drag_is_a_hyperbolic_tangent(ucat: VehicleParameters) -> None:
+    """m u' = F - q u |u|: u = sqrt(F / q) tanh(sqrt(F q) t / m)."""
+    force, time = 6.0, 8.0
+    vehicle = Vehicle(replace(ucat, linear_damping=(0.0,) * 6))
+    mass, drag = vehicle.inertia[0], ucat.quadratic_damping[0]
+    state = swim(vehicle, at_rest(), (force, 0, 0, 0, 0, 0), time, 0.01)
+    rate = math.sqrt(force * drag) / mass
+    assert state[7] == pytest.approx(math.sqrt(force / drag) * math.tanh(rate * time), abs=1e-9)
+    assert state[0] == pytest.approx(mass / drag * math.log(math.cosh(rate * time)), abs=1e-8)
+
+
+def test_yaw_under_linear_drag_is_exponential(ucat: VehicleParameters) -> None:
+    vehicle = Vehicle(replace(ucat, quadratic_damping=(0.0,) * 6))
+    torque, time = 0.2, 5.0
+    inertia, drag = vehicle.inertia[5], ucat.linear_damping[5]
+    state = swim(vehicle, at_rest(), (0, 0, 0, 0, 0, torque), time, 0.01)
+    rate = torque / drag * (1 - math.exp(-drag * time / inertia))
+    yaw = torque / drag * (time - inertia / drag * (1 - math.exp(-drag * time / inertia)))
+    assert state[12] == pytest.approx(rate, abs=1e-9)
+    assert euler(state[3:7])[2] == pytest.approx(yaw, abs=1e-8)
+
+
+def test_a_robot_without_thrust_ends_up_drifting_with_the_water(ucat: VehicleParameters) -> None:
+    current = (0.15, -0.1, 0.0)
+    state = at_rest()
+    state[3:7] = quaternion_of_yaw(0.7)
+    vehicle = Vehicle(ucat, current)
+    state = swim(vehicle, state, STILL, 150.0, 0.1)
+    after = vehicle.step(state, STILL, 0.1)
+    np.testing.assert_allclose((after[:3] - state[:3]) / 0.1, current, atol=2e-3)
+
+
+def test_energy_never_grows_without_thrust(ucat: VehicleParameters) -> None:
+    rng = np.random.default_rng(3)
+    vehicle = Vehicle(ucat)
+    for _ in range(5):
+        state = at_rest()
+        state[3:7] = rng.standard_normal(4)
+        state[3:7] /= np.linalg.norm(state[3:7])
+        state[7:] = rng.uniform(-0.5, 0.5, 6)
+        energy = [vehicle.energy(state)]
+        for _ in range(500):
+            state = vehicle.step(state, STILL, 0.02)
+            energy.append(vehicle.energy(state))
+        assert max(np.diff(energy)) <= 1e-9
+        assert energy[-1] < energy[0]
+
+
+def test_without_drag_the_energy_is_kept(ucat: VehicleParameters) -> None:
+    vehicle = Vehicle(replace(ucat, linear_damping=(0.0,) * 6, quadratic_damping=(0.0,) * 6))
+    state = at_rest()
+    state[7:] = (0.3, 0.1, -0.2, 0.4, 0.3, 0.5)
+    before = vehicle.energy(state)
+    assert vehicle.energy(swim(vehicle, state, STILL, 10.0, 0.01)) == pytest.approx(before, abs=1e-5)
+
+
+def test_runge_kutta_is_of_fourth_order(ucat: VehicleParameters) -> None:
+    """Half the step, a sixteenth of the error, for a robot that tumbles under a wrench."""
+    vehicle = Vehicle(ucat, (0.1, 0.05, 0.0))
+    start = at_rest()
+    start[7:] = (0.4, -0.2, 0.1, 0.5, -0.4, 0.6)
+    wrench = (4.0, 1.0, -2.0, 0.3, 0.2, 0.8)
+    fine = swim(vehicle, start, wrench, 2.0, 0.00125)
+    errors = [np.abs(swim(vehicle, start, wrench, 2.0, dt) - fine).max() for dt in (0.08, 0.04, 0.02)]
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert (orders > 3.7).all(), orders
+    assert np.abs(swim(vehicle, start, wrench, 2.0, 0.01) - fine).max() < 1e-7, "the step that is used"
+
+
+def test_a_heavy_robot_sinks_and_a_tilted_one_rights_itself(ucat: VehicleParameters) -> None:
+    heavy = Vehicle(replace(ucat, buoyancy=ucat.weight - 3.0))
+    assert swim(heavy, at_rest(), STILL, 5.0, 0.05)[2] < -0.1
+    tilted = at_rest()
+    tilted[3:7] = (math.cos(0.3), math.sin(0.3), 0.0, 0.0)
+    roll = euler(swim(Vehicle(ucat), tilted, STILL, 60.0, 0.02)[3:7])[0]
+    assert abs(roll) < 0.02
+
+
+def test_a_layout_with_its_own_mass_keeps_ucats_drag(layout_a: Layout) -> None:
+    from finlab.layout import Body
+
+    own = vehicle_parameters(replace(layout_a, body=Body(mass_kg=7.0)))
+    assert own.mass == 7.0
+    assert own.linear_damping == vehicle_parameters(layout_a).linear_damping
+    assert own.lift == own.weight
