@@ -11,6 +11,7 @@ from finlab.errors import AllocationError
 
 METHODS: dict[str, tuple[str, str]] = {
     "learned": ("finlab.allocation.learned", "LearnedAllocator"),
+    "fast": ("finlab.allocation.fast", "FastAllocator"),
     "paper": ("finlab.allocation.paper", "PaperAllocator"),
     "qp": ("finlab.allocation.qp", "Qp"),
     "sqp": ("finlab.allocation.sqp", "Sqp"),
@@ -22,7 +23,7 @@ METHODS: dict[str, tuple[str, str]] = {
 }
 """Name -> module and class; modules are loaded only when their method is asked for."""
 
-LEARNED = ("learned", "paper")
+LEARNED = ("learned", "fast", "paper")
 """Methods that need a trained network; the others take only the normalization from a checkpoint."""
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from finlab.data.normalization import Normalization
 from finlab.errors import CheckpointError
+from finlab.model.fast_weights import FastWeights
 
 if TYPE_CHECKING:
     from finlab.model.checkpoint import Checkpoint
@@ -37,6 +38,8 @@ class LearnedWeights(NamedTuple):
     """Per-axis statistics of the wrench."""
     fin_model: Mapping[str, Any]
     """Fin model that the surrogate learned, as in a layout file."""
+    fast: FastWeights | None = None
+    """The distilled network of the fast path, where one was trained."""
 
 
 def weights_of(checkpoint: Checkpoint) -> LearnedWeights:
@@ -67,4 +70,5 @@ def weights_of(checkpoint: Checkpoint) -> LearnedWeights:
         FORCE_UNIT,
         checkpoint.normalization,
         checkpoint.fin_model,
+        checkpoint.fast,
     )

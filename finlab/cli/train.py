@@ -1,7 +1,7 @@
-"""`finlab train surrogate|allocator`: train the two networks of a checkpoint.
+"""`finlab train surrogate|allocator|fast`: train the networks of a checkpoint.
 
-Both go on from the last saved state when they are called again with the same arguments, and both run on
-several processes or machines under `torchrun ... -m finlab train ...`.
+All go on from the last saved state when they are called again with the same arguments, and the first two
+run on several processes or machines under `torchrun ... -m finlab train ...`.
 """
 
 from pathlib import Path
@@ -87,6 +87,48 @@ def allocator(
         stop_after=stop_after,
     )
     _report(output, checkpoint)
+
+
+@verbs.command
+def fast(
+    output: _Output,
+    checkpoint: Annotated[str, arg(metavar="NAME|FOLDER")] = "default",
+    seed: Annotated[int, arg(metavar="N")] = 0,
+    shards: Annotated[int, arg(metavar="N")] = 80,
+    steps: Annotated[int, arg(metavar="N")] = 20_000,
+    stop_after: _Count = None,
+) -> None:
+    """Train the fast path: a small network that learns the allocator's own best answers.
+
+    Its weights go into the folder `fast` of the checkpoint that they were learned from.
+
+    Args:
+        output: folder for answers, weights, log and resume state.
+        checkpoint: trained checkpoint whose answers are learned.
+        seed: seed of the data and of the first weights.
+        shards: files of 6400 answers to learn from.
+        steps: optimizer steps.
+        stop_after: stop after so many steps; call again to go on.
+    """
+    from finlab.allocation import load_allocator
+    from finlab.allocation.learned import LearnedAllocator
+    from finlab.distill.answers import AnswerSettings
+    from finlab.distill.train import FastSettings, train_fast
+    from finlab.model.fast_network import FastConfig
+
+    _check_counts(shards=shards, steps=steps, stop_after=stop_after)
+    allocator = load_allocator(checkpoint)
+    assert isinstance(allocator, LearnedAllocator)
+    metrics = train_fast(
+        allocator,
+        output,
+        config=FastConfig(),
+        settings=FastSettings(steps=steps, seed=seed),
+        data=AnswerSettings(n_shards=shards, seed=seed),
+        stop_after=stop_after,
+    )
+    for name, value in metrics.items():
+        print(f"{name} {value:.3g}")
 
 
 def _fin_model(name: str) -> "FinModelSpec":

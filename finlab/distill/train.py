@@ -61,7 +61,8 @@ def train_fast(
     """
     write_answers(allocator, out / "answers", data)
     answers = read_answers(out / "answers")
-    cut = max(1, round(len(answers.position) * 0.98))
+    n = len(answers.position)
+    cut = min(round(n * 0.98), n - 1)
     learned, judged = (Answers(*(a[rows] for a in answers)) for rows in (slice(cut), slice(cut, None)))
     torch.manual_seed(SEED + settings.seed)
     network = FastNetwork(config, FIN_FRAME_SIZE)

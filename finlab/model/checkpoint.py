@@ -22,6 +22,8 @@ from finlab.data.features import SIZES
 from finlab.data.normalization import Normalization
 from finlab.errors import CheckpointError
 from finlab.model.allocator_network import AllocatorNetwork, NetworkConfig
+from finlab.model.fast_weights import FOLDER as FAST_FOLDER
+from finlab.model.fast_weights import FastWeights, load_fast
 from finlab.model.surrogate import Surrogate, SurrogateConfig, make_surrogate
 
 FORMAT = "finlab-checkpoint"
@@ -58,6 +60,8 @@ class Checkpoint:
     """Measured figures, each with what scored it."""
     sha256: str = ""
     """SHA-256 of the weights file, filled on loading and saving."""
+    fast: FastWeights | None = None
+    """The distilled network in the folder `fast` beside them, if there is one; filled on loading."""
 
 
 def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
@@ -121,6 +125,7 @@ def load_checkpoint(folder: Path) -> Checkpoint:
             training=dict(config["training"]),
             metrics=dict(config["metrics"]),
             sha256=config["sha256"],
+            fast=load_fast(folder / FAST_FOLDER),
         )
     except (KeyError, TypeError, ValueError, RuntimeError, SafetensorError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__

@@ -1,0 +1,80 @@
+"""The fast path: a distilled network says how hard each fin works, one closed-form step does the rest.
+
+No sampling and no search: the network's shares of thrust weigh the fins, the weighted pseudo-inverse gives
+the planar forces that add up to the target, one reweighting sharpens which fins rest, and the thrust curves
+turn forces into commands. Where that misses the target, because limits bind or arcs stand in the way, the
+full pipeline answers instead.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation import force_space
+from finlab.allocation.allocation import Solution
+from finlab.allocation.fast_network import NumpyFastNetwork
+from finlab.allocation.learned import LearnedAllocator
+from finlab.allocation.weights import LearnedWeights
+from finlab.data.features import fin_frame_features
+from finlab.errors import AllocationError
+from finlab.layout import Layout
+
+if TYPE_CHECKING:
+    from finlab.model.checkpoint import Checkpoint
+
+Array = NDArray[Any]
+
+STEPS = 1
+"""Reweighting steps after the network."""
+GOOD = 2e-3
+"""Normalized error, by the learned thrust curves, up to which the fast answer stands."""
+
+
+class FastAllocator(LearnedAllocator):
+    """Method `fast`: the distilled network first, the full pipeline where it must."""
+
+    name = "fast"
+
+    def __init__(self, weights: LearnedWeights | Checkpoint, **settings: Any) -> None:
+        """Make it from weights that hold a distilled network; settings are those of the full pipeline.
+
+        Raises:
+            AllocationError: there is no distilled network.
+        """
+        super().__init__(weights, **settings)
+        if self.weights.fast is None:
+            raise AllocationError(
+                f"checkpoint {self.checkpoint!r} has no distilled network; train one with `finlab train fast`"
+            )
+        self.network = NumpyFastNetwork(self.weights.fast)
+        std = self.normalization.std
+        self._scaled_mean = self.normalization.mean / std
+
+    def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
+        # Slow turns from tick to tick are a search of their own.
+        if previous is not None:
+            return super()._solve(layout, targets, seed=seed, previous=previous)
+        prepared = self.pipeline.prepare(layout)
+        target = targets / self.normalization.std
+        x = fin_frame_features(prepared.geometry, target - self._scaled_mean).astype(np.float32)
+        share = self.network(x).astype(np.float64)
+        share *= share
+        thrust = share * share * prepared.planar.curves.maximum
+        planar = force_space.descend(prepared.planar, target, thrust, STEPS)
+        missed = np.einsum("ri,ri->r", planar.residual, planar.residual) > GOOD**2
+        if len(targets) == 1:
+            if missed[0]:
+                return super()._solve(layout, targets, seed=seed, previous=None)
+            command, _ = force_space.realize(prepared.planar, planar)
+            wrench = targets - planar.residual * self.normalization.std
+            return Solution(command, wrench, notes=self.notes(layout))
+        command, _ = force_space.realize(prepared.planar, planar)
+        wrench = targets - planar.residual * self.normalization.std
+        if missed.any():
+            slow = super()._solve(layout, targets[missed], seed=seed, previous=None)
+            assert slow.wrench_surrogate is not None
+            command[missed], wrench[missed] = slow.command, slow.wrench_surrogate
+        return Solution(command, wrench, notes=self.notes(layout))

@@ -1,0 +1,113 @@
+"""The fast path: true to its network, as exact as the full pipeline, hardly dearer, and never stuck."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+import finlab
+from finlab.allocation import load_allocator
+from finlab.allocation.energy import command_energy
+from finlab.allocation.fast import FastAllocator
+from finlab.allocation.fast_network import NumpyFastNetwork
+from finlab.allocation.learned import LearnedAllocator
+from finlab.assets import checkpoint_path, shipped_layouts
+from finlab.errors import AllocationError, CheckpointError
+from finlab.layout import random_layout
+from finlab.model.fast_network import FastConfig, FastNetwork
+from finlab.model.fast_weights import FastWeights, load_fast, save_fast
+from finlab.physics import Plant
+
+
+@pytest.fixture(scope="module")
+def fast() -> FastAllocator:
+    allocator = load_allocator(method="fast")
+    assert isinstance(allocator, FastAllocator)
+    return allocator
+
+
+def targets(layout: finlab.Layout, count: int, seed: int = 0) -> np.ndarray:
+    """Wrenches of random commands."""
+    lower = np.array([fin.limits.lower for fin in layout.fins])
+    upper = np.array([fin.limits.upper for fin in layout.fins])
+    draws = np.random.default_rng(seed).random((count, layout.n_fins, 3))
+    return Plant(layout).wrench(lower + draws * (upper - lower))
+
+
+@pytest.mark.parametrize("n_fins", [1, 4, 7])
+def test_numpy_answers_as_torch(n_fins: int) -> None:
+    torch.manual_seed(0)
+    network = FastNetwork(FastConfig(width=32, rounds=2), 25)
+    state = {key: value.detach().numpy() for key, value in network.named_parameters()}
+    x = np.random.default_rng(0).normal(size=(5, n_fins, 25)).astype(np.float32)
+    with torch.inference_mode():
+        truth = network(torch.tensor(x), torch.ones(5, n_fins)).numpy()
+        wider = torch.nn.functional.pad(torch.tensor(x), (0, 0, 0, 2))
+        mask = torch.tensor([[1.0] * n_fins + [0.0] * 2] * 5)
+        padded = network(wider, mask).numpy()[:, :n_fins]
+    np.testing.assert_allclose(NumpyFastNetwork(FastWeights(state, 2))(x), truth, atol=1e-5)
+    np.testing.assert_allclose(padded, truth, atol=1e-5)
+
+
+def test_exact_and_hardly_dearer_on_new_layouts(fast: FastAllocator) -> None:
+    full = LearnedAllocator(fast.weights)
+    rng = np.random.default_rng(5)
+    errors, ratios = [], []
+    for _ in range(12):
+        layout = random_layout(rng)
+        wanted = targets(layout, 40)
+        quick, whole = (a.allocate_batch(layout, wanted).command for a in (fast, full))
+        errors.append(fast.normalization.error(Plant(layout).wrench(quick), wanted))
+        upper = np.array([fin.limits.upper for fin in layout.fins])
+        ratios.append(command_energy(quick, upper) / command_energy(whole, upper))
+    assert np.mean(errors) < 5e-3
+    assert np.mean(ratios) < 1.08
+
+
+def test_answers_stay_inside_limits_also_with_arcs(fast: FastAllocator) -> None:
+    rng = np.random.default_rng(6)
+    for _ in range(10):
+        layout = random_layout(rng, limits="varied")
+        for i, target in enumerate(targets(layout, 4)):
+            result = fast.allocate(layout, target * (1 + 2 * (i == 3)), failed=layout.names[:1] * (i == 2))
+            limits = [fin.limits for fin in layout.fins]
+            alive = ~np.isnan(result.command).any(axis=1)
+            assert (result.command >= [limit.lower for limit in limits])[alive].all()
+            assert (result.command <= [limit.upper for limit in limits])[alive].all()
+
+
+def test_out_of_reach_the_full_pipeline_answers(fast: FastAllocator) -> None:
+    layout = finlab.load_layout(shipped_layouts()["A"])
+    far = [60.0, 0, 0, 0, 0, 0]
+    for policy in ("closest", "direction", "priority"):
+        quick = fast.allocate(layout, far, policy=policy)
+        whole = LearnedAllocator(fast.weights).allocate(layout, far, policy=policy)
+        np.testing.assert_allclose(quick.command, whole.command, atol=1e-9)
+
+
+def test_one_target_as_in_a_batch(fast: FastAllocator) -> None:
+    layout = random_layout(np.random.default_rng(7), n_fins=4)
+    wanted = targets(layout, 6)
+    together = fast.allocate_batch(layout, wanted).command
+    alone = np.array([fast.allocate(layout, target).command for target in wanted])
+    np.testing.assert_allclose(alone, together, atol=1e-5)
+
+
+def test_checkpoint_without_a_distilled_network_says_so(untrained_checkpoint: Path) -> None:
+    with pytest.raises(AllocationError, match="has no distilled network; train one with `finlab train fast`"):
+        load_allocator(untrained_checkpoint, method="fast")
+
+
+def test_changed_weights_are_refused(tmp_path: Path) -> None:
+    shipped = load_fast(checkpoint_path() / "fast")
+    assert shipped is not None and load_fast(tmp_path) is None
+    save_fast(tmp_path, shipped, {"who": "a test"})
+    back = load_fast(tmp_path)
+    assert back is not None and all(np.array_equal(back.state[k], v) for k, v in shipped.state.items())
+    config = json.loads((tmp_path / "config.json").read_text())
+    for key, value, message in (("version", 2, "version 1"), ("sha256", "0" * 64, "SHA-256")):
+        (tmp_path / "config.json").write_text(json.dumps(config | {key: value}))
+        with pytest.raises(CheckpointError, match=message):
+            load_fast(tmp_path)
