@@ -22,7 +22,8 @@ from finlab.evaluation.report.sections.parts import (
     temperature_blocks,
     training_blocks,
 )
-from finlab.evaluation.report.sections.summary import summary_blocks, wrench_tables
+from finlab.evaluation.report.sections.summary import summary_blocks
+from finlab.evaluation.report.sections.swims import swim_blocks
 from finlab.evaluation.report.sections.wrench import wrench_blocks
 from finlab.evaluation.report.sizes import SIZES, Sizes
 from finlab.evaluation.store import Store
@@ -78,6 +79,7 @@ def make_document(results: Results, provenance: Provenance, sizes: Sizes) -> Doc
         *wrench_blocks(results),
         *energy_blocks(results),
         *latency_blocks(results),
+        *swim_blocks(results),
         *seed_blocks(results),
         *ablation_blocks(results),
         *temperature_blocks(results),
@@ -99,9 +101,10 @@ def tables_of(results: Results, provenance: Provenance) -> dict[str, Any]:
         "checkpoints": provenance.checkpoints,
         "seed": provenance.seed,
         "machine": provenance.machine,
-        "wrench": [row for rows in wrench_tables(results).values() for row in rows],
+        "wrench": [row for rows in results.wrench_rows.values() for row in rows],
         "energy": results.energy_rows,
         "latency": results.latency_rows,
+        "closed_loop": results.swim_rows,
         "seeds": results.seed_rows,
         "ablation": results.ablation_rows,
         "temperature": results.temperature_rows,

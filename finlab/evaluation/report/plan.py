@@ -31,6 +31,14 @@ SCATTER_FINS, SCATTER_TARGETS = 4, 3
 """Fins of the layout, and its targets, whose candidates are drawn before and after refinement."""
 
 
+SWIM_METHODS = {
+    "trajectory": "learned,on-board",
+    "faults": "learned,on-board",
+    "velocity": "learned,analytic,on-board",
+}
+"""Closed-loop experiment -> methods."""
+
+
 @dataclass(frozen=True)
 class Plan:
     """All jobs of a report."""
@@ -49,6 +57,8 @@ class Plan:
     """One job, `id`."""
     training: dict[str, Job] = field(default_factory=dict)
     """By change."""
+    swims: dict[str, Job] = field(default_factory=dict)
+    """Closed-loop experiments: `trajectory`, `faults` and `velocity`; none in a tiny report."""
     latency: dict[str, Job] = field(default_factory=dict)
     """One job, `calls`."""
 
@@ -144,6 +154,17 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
     plan.training.update(
         training_jobs({**settings, "layouts": layouts, "targets": targets, "seed": seed}, runs)
     )
+    for experiment, runs_each in zip(SWIM_METHODS, sizes.swims, strict=True):
+        if runs_each:
+            more: dict[str, Any] = {"pairs": sizes.lost_pairs} if experiment == "faults" else {}
+            plan.swims[experiment] = job(
+                f"swim-{experiment}",
+                experiment,
+                "learned",
+                methods=SWIM_METHODS[experiment],
+                runs=runs_each,
+                **more,
+            )
     calls, budget_s = sizes.latency
     methods = [name for name in LATENCY_METHODS if name in prints]
     plan.latency["calls"] = Job(

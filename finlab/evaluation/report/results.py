@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.evaluation.ablation import ablation_row
-from finlab.evaluation.metrics import energy_rows
+from finlab.evaluation.metrics import energy_rows, wrench_intervals, wrench_row
 from finlab.evaluation.recheck import recheck
 from finlab.evaluation.records import Records, records_of_columns
 from finlab.evaluation.report.jobs import Job
@@ -46,6 +46,20 @@ class Results:
         for (split, method), job in self.plan.wrench.items():
             found[split][method] = records_of_columns(self.columns(job))
         return found
+
+    @cached_property
+    def wrench_rows(self) -> dict[str, list[Row]]:
+        """Split -> rows of the wrench table, with intervals under `<column>_interval`."""
+        return {
+            split: [
+                {
+                    **wrench_row(records, split=split, method=method),
+                    **{f"{key}_interval": list(ends) for key, ends in wrench_intervals(records).items()},
+                }
+                for method, records in methods.items()
+            ]
+            for split, methods in self.wrench.items()
+        }
 
     @cached_property
     def energy(self) -> dict[str, Records]:
@@ -113,6 +127,11 @@ class Results:
         """Rows of the comparison of times, the fastest first."""
         rows = rows_of_columns(self.columns(self.plan.latency["calls"]))
         return sorted(rows, key=lambda row: row["p50_ms"])
+
+    @cached_property
+    def swim_rows(self) -> dict[str, list[Row]]:
+        """Closed-loop experiment -> its rows; those that were left out are missing."""
+        return {name: rows_of_columns(self.columns(job)) for name, job in self.plan.swims.items()}
 
     @cached_property
     def training_rows(self) -> list[Row]:

@@ -32,8 +32,10 @@ class Sizes:
     """Timed calls of each method, and the seconds after which a slow one stops."""
     training: tuple[str, int, int]
     """Preset, optimizer steps and samples per step of each small training."""
-    closed_loop: int
-    """Seeds of the closed-loop runs."""
+    swims: tuple[int, int, int]
+    """Closed-loop runs of each case, with other noise: trajectories, faults, speeds; 0 leaves them out."""
+    lost_pairs: bool
+    """Whether pairs of lost fins swim too."""
 
 
 SIZES = {
@@ -49,7 +51,8 @@ SIZES = {
         seeds=(2, 2),
         latency=(3, 0.5),
         training=("smoke", 4, 32),
-        closed_loop=1,
+        swims=(0, 0, 0),
+        lost_pairs=False,
     ),
     "quick": Sizes(
         "quick",
@@ -63,7 +66,8 @@ SIZES = {
         seeds=(20, 10),
         latency=(60, 2.0),
         training=("smoke", 300, 128),
-        closed_loop=1,
+        swims=(1, 1, 1),
+        lost_pairs=False,
     ),
     "full": Sizes(
         "full",
@@ -77,7 +81,8 @@ SIZES = {
         seeds=(40, 25),
         latency=(200, 20.0),
         training=("default", 600, 256),
-        closed_loop=3,
+        swims=(3, 3, 5),
+        lost_pairs=True,
     ),
 }
 """Name -> sizes."""

@@ -2,38 +2,24 @@
 
 from __future__ import annotations
 
-from finlab.evaluation.metrics import wrench_intervals, wrench_row
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.report import claims
 from finlab.evaluation.report.document import Block, Card, Cards, Row, TwoSides
 from finlab.evaluation.report.numbers import error, factor, share, three
 from finlab.evaluation.report.plan import REFERENCE
 from finlab.evaluation.report.results import Results
+from finlab.evaluation.report.sections.swims import swim_claims
 
 NOTHING = ("Nowhere in the tables below.",)
 
 
 def summary_blocks(results: Results) -> list[Block]:
     """Cards and both lists."""
-    tables = wrench_tables(results)
+    tables = results.wrench_rows
     found = _claims(results, tables)
     titles = ("Where the learned allocator leads", "Where it does not")
     sides = (found.leads or NOTHING, found.trails or NOTHING)
     return [Cards(tuple(_cards(results, tables))), TwoSides(titles, sides)]
-
-
-def wrench_tables(results: Results) -> dict[str, list[Row]]:
-    """Split -> rows of the wrench table with the interval of the mean."""
-    tables: dict[str, list[Row]] = {}
-    for split, methods in results.wrench.items():
-        tables[split] = [
-            {
-                **wrench_row(records, split=split, method=method),
-                "err_norm_mean_interval": list(wrench_intervals(records)["err_norm_mean"]),
-            }
-            for method, records in methods.items()
-        ]
-    return tables
 
 
 def _claims(results: Results, tables: dict[str, list[Row]]) -> claims.Claims:
@@ -49,6 +35,7 @@ def _claims(results: Results, tables: dict[str, list[Row]]) -> claims.Claims:
         + claims.accuracy_claims(tables)
         + claims.energy_claims(results.energy_rows, REFERENCE)
         + claims.latency_claims(results.latency_rows, printed["inference"]["cycle_s"] * 1e3)
+        + swim_claims(results.swim_rows)
         + claims.seed_claims(results.seed_rows)
         + claims.rebuild_claims(whole, printed["ablation"]["ours"]["err_norm_mean"])
     )

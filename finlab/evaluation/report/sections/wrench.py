@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from finlab.evaluation.entrants import is_slow
-from finlab.evaluation.metrics import wrench_intervals, wrench_row
 from finlab.evaluation.paper_figures import paper_figures
-from finlab.evaluation.records import Records
+from finlab.evaluation.records import Records, join_records
 from finlab.evaluation.report.document import Block, Column, Figure, Fold, Heading, Row, Table, Text
 from finlab.evaluation.report.pictures.wrench import error_by_fins, error_distribution
 from finlab.evaluation.report.results import Results
@@ -68,8 +69,8 @@ def wrench_blocks(results: Results) -> list[Block]:
             "(6 to 8). Dots are means, bars reach from median to 95th percentile.",
         )
     )
-    for split, methods in results.wrench.items():
-        table = Table(COLUMNS, wrench_table(methods, split))
+    for split, rows in results.wrench_rows.items():
+        table = Table(COLUMNS, wrench_table(rows, split))
         title = f"Split {split}: {SPLIT_WORDS[split]}"
         blocks += [Heading(title, 3), table] if split in printed else [Fold(title, (table,))]
     blocks.append(
@@ -84,18 +85,18 @@ def wrench_blocks(results: Results) -> list[Block]:
     return blocks
 
 
-def wrench_table(methods: dict[str, Records], split: str) -> list[Row]:
+def wrench_table(rows: Sequence[Row], split: str) -> list[Row]:
     """Rows in fixed order, the paper's after the method that each belongs to."""
     printed = paper_figures()["wrench_tracking"].get(split, {})
     places = {"paper": "ours", "qp": "qp", "sqp": "sqp"}
-    rows: list[Row] = []
-    for name in (name for name in ORDER if name in methods):
-        row = wrench_row(methods[name], split=split, method=f"`{name}`")
-        row |= {f"{key}_interval": ends for key, ends in wrench_intervals(methods[name]).items()}
-        rows.append(row | ({"_kind": "ours"} if name == "learned" else {}))
+    shown: list[Row] = []
+    for row in sorted(rows, key=lambda row: ORDER.index(row["method"])):
+        name = row["method"]
+        kind = {"_kind": "ours"} if name == "learned" else {}
+        shown.append({**row, "method": f"`{name}`", **kind})
         if (theirs := places.get(name, "")) in printed:
-            rows.append({"method": PRINTED[theirs], "_kind": "printed", **printed[theirs]})
-    return rows
+            shown.append({"method": PRINTED[theirs], "_kind": "printed", **printed[theirs]})
+    return shown
 
 
 def _fast(methods: dict[str, Records]) -> dict[str, Records]:
@@ -104,8 +105,6 @@ def _fast(methods: dict[str, Records]) -> dict[str, Records]:
 
 
 def _by_fins(results: Results) -> dict[str, Records]:
-    from finlab.evaluation.records import join_records
-
     return {
         name: join_records([results.wrench["id"][name], results.wrench["ood-fins"][name]])
         for name in _fast(results.wrench["id"])
