@@ -88,7 +88,13 @@ def test_derivatives_agree_on_random_states(buoyancy: float | None, layout_a: La
     for _ in range(50):
         offset = tuple(rng.uniform(-0.05, 0.05, 3))
         p = VehicleParameters(
-            base.mass, base.inertia, base.added_mass, base.linear_damping, base.quadratic_damping, offset, buoyancy
+            base.mass,
+            base.inertia,
+            base.added_mass,
+            base.linear_damping,
+            base.quadratic_damping,
+            offset,
+            buoyancy,
         )
         current = rng.uniform(-0.3, 0.3, 3)
         quaternion = rng.standard_normal(4)

@@ -8,10 +8,11 @@ from finlab.sim.attitude import euler, quaternion_of_yaw, rotation
 from finlab.sim.frames import body_from_ned, flip_matrix, flip_vector
 from finlab.sim.parameters import ucat_body
 
-# Signed derivatives as published for U-CAT: CAD inertia and added mass from its on-board dynamics, damping from
-# the simulator's set of September 2024, whose centre of buoyancy lies 0.05 m above the centre of gravity.
+# Signed derivatives as published for U-CAT: CAD inertia and added mass from its on-board dynamics, damping
+# from the simulator's set of September 2024, whose centre of buoyancy is 0.05 m above the centre of gravity.
 PUBLISHED = {
-    "X_udot": -40.0, "Y_vdot": -21.0, "Z_wdot": -149.0, "K_pdot": -0.1269, "M_qdot": -1.2052, "N_rdot": -2.3064,
+    "X_udot": -40.0, "Y_vdot": -21.0, "Z_wdot": -149.0,
+    "K_pdot": -0.1269, "M_qdot": -1.2052, "N_rdot": -2.3064,
     "X_u": -28.542, "Y_v": -100.7, "Z_w": -30.61, "N_r": -0.313,
     "X_uu": -21.98, "Y_vv": -260.0, "Z_ww": -161.0, "K_pp": -3.4244, "M_qq": -2.1014, "N_rr": -0.7226,
 }  # fmt: skip

@@ -1,8 +1,8 @@
 """The rigid body against MuJoCo over a minute: position and attitude under wrenches that turn with the body.
 
-Added mass, damping and buoyancy are off on our side, gravity and fluid on MuJoCo's: its fluid model leaves out
-half of the added mass, so it cannot judge those. What is checked is the rigid body: the Coriolis and gyroscopic
-terms, the attitude, and the integration.
+Added mass, damping and buoyancy are off on our side, gravity and fluid on MuJoCo's: its fluid model leaves
+out half of the added mass, so it cannot judge those. What is checked is the rigid body: the Coriolis and
+gyroscopic terms, the attitude, and the integration.
 """
 
 import numpy as np
@@ -16,6 +16,7 @@ mujoco = pytest.importorskip("mujoco")
 
 MASS, INERTIA = 19.0, (0.1574, 0.4646, 0.51151)
 DT, SECONDS, HOLD = 0.01, 60.0, 50
+AXES = [" ".join("1" if i == k else "0" for i in range(6)) for k in range(6)]
 MODEL = f"""
 <mujoco>
   <option timestep="{DT}" integrator="RK4" gravity="0 0 0" density="0" viscosity="0"/>
@@ -27,7 +28,7 @@ MODEL = f"""
     </body>
   </worldbody>
   <actuator>
-    {"".join(f'<motor site="center" gear="{" ".join("1" if i == k else "0" for i in range(6))}"/>' for k in range(6))}
+    {"".join(f'<motor site="center" gear="{axis}"/>' for axis in AXES)}
   </actuator>
 </mujoco>
 """
@@ -49,7 +50,9 @@ def test_a_minute_under_changing_wrenches_agrees() -> None:
         mujoco.mj_step(model, data)
         state = vehicle.step(state, wrench.tolist(), DT)
         turn = rotation(state[3:7]).T @ rotation(data.qpos[3:7])
-        angle = np.linalg.norm([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / 2
+        angle = (
+            np.linalg.norm([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / 2
+        )
         worst_place = max(worst_place, float(np.abs(state[:3] - data.qpos[:3]).max()))
         worst_angle = max(worst_angle, float(angle))
     assert np.linalg.norm(state[:3]) > 5.0, "it moved"

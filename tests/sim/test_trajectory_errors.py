@@ -35,14 +35,24 @@ def evo_rmse(verb: str, folder: Path, *options: str) -> float:
     if command is None:
         pytest.skip(f"{verb} is not installed")
     done = subprocess.run(
-        [command, "tum", str(folder / "reference.txt"), str(folder / "robot.txt"), "-r", "trans_part", *options],
+        [
+            command,
+            "tum",
+            str(folder / "reference.txt"),
+            str(folder / "robot.txt"),
+            "-r",
+            "trans_part",
+            *options,
+        ],
         capture_output=True,
         text=True,
         timeout=120,
         env={**os.environ, "HOME": str(folder), "MPLBACKEND": "Agg"},
     )
     assert done.returncode == 0, done.stderr
-    return next(float(line.split()[1]) for line in done.stdout.splitlines() if line.strip().startswith("rmse"))
+    return next(
+        float(line.split()[1]) for line in done.stdout.splitlines() if line.strip().startswith("rmse")
+    )
 
 
 def test_evo_finds_the_same_errors(tmp_path: Path) -> None:

@@ -26,7 +26,9 @@ def at_rest() -> np.ndarray:
     return state
 
 
-def swim(vehicle: Vehicle, state: np.ndarray, wrench: tuple[float, ...], seconds: float, dt: float) -> np.ndarray:
+def swim(
+    vehicle: Vehicle, state: np.ndarray, wrench: tuple[float, ...], seconds: float, dt: float
+) -> np.ndarray:
     for _ in range(round(seconds / dt)):
         state = vehicle.step(state, wrench, dt)
     return state

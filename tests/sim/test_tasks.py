@@ -1,0 +1,71 @@
+"""Trajectories, shipped and from files, and what sensors see of a robot."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finlab.errors import DataError
+from finlab.sim import SHIPPED, SensorSettings, make_trajectory
+from finlab.sim.sensors import Sensors
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_trajectories_start_gently_and_stay_slow(name: str) -> None:
+    path = make_trajectory(name)
+    speed = np.linalg.norm(np.diff(path.samples, axis=0), axis=1) / np.diff(path.time)
+    assert speed[0] < 0.03
+    assert speed.max() < 0.27
+    start, heading = path.start()
+    ahead = path.samples[np.argmax(np.linalg.norm(path.samples - start, axis=1) > 0.1)] - start
+    assert abs(np.arctan2(ahead[1], ahead[0]) - heading) < 0.2
+    np.testing.assert_allclose(path.position(path.duration_s + 9.0), path.samples[-1])
+
+
+def test_a_file_of_positions(tmp_path: Path) -> None:
+    file = tmp_path / "line.csv"
+    file.write_text("z, t, x, y\n-1,0,0,0\n-1,10,1,2\n")
+    path = make_trajectory(file)
+    np.testing.assert_allclose(path.position(5.0), [0.5, 1.0, -1.0])
+    assert path.setpoint(5.0).surge == pytest.approx(np.hypot(0.1, 0.2))
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("t,x,y\n0,0,0\n", "column 'z' is missing"),
+        ("t,x,y,z\n0,0,0,0\n", "at least two samples"),
+        ("t,x,y,z\n0,0,0,0\n0,1,1,1\n", "times that rise"),
+        ("t,x,y,z\n0,0,0,0\n1,one,1,1\n", "line 3: expected four numbers"),
+        ("t,x,y,z\n0,0,0,0\n1,nan,1,1\n", "finite numbers"),
+    ],
+)
+def test_bad_files_are_one_sentence(tmp_path: Path, content: str, message: str) -> None:
+    file = tmp_path / "bad.csv"
+    file.write_text(content)
+    with pytest.raises(DataError, match=message):
+        make_trajectory(file)
+
+
+def test_unknown_names_and_durations(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="circle, lissajous, square or a CSV file"):
+        make_trajectory("spiral")
+    with pytest.raises(DataError, match="12 to 3600"):
+        make_trajectory("circle", 1.0)
+
+
+def test_sensors_sample_at_their_rates_with_their_noise() -> None:
+    sensors = Sensors(SensorSettings(), np.random.default_rng(0))
+    state = np.zeros(13)
+    state[:4] = (1.0, 2.0, -3.0, 1.0)
+    state[7] = 0.2
+    seen = [sensors.measure(0.01 * k, state) for k in range(6000)]
+    changes = {
+        "marker": len({s.position[0] for s in seen}),
+        "dvl": len({s.velocity[0] for s in seen}),
+        "pressure": len({s.depth for s in seen}),
+        "imu": len({s.rates[2] for s in seen}),
+    }
+    assert changes == {"marker": 600, "dvl": 300, "pressure": 1200, "imu": 3000}
+    depth = np.unique([s.depth for s in seen])
+    assert depth.mean() == pytest.approx(3.0, abs=1e-3) and depth.std() == pytest.approx(0.005, rel=0.1)
