@@ -15,13 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation import force_space
-from finlab.allocation.energy import command_energy
+from finlab.allocation.energy import DEFAULT_WEIGHTS, EnergyWeights, command_energy
+from finlab.allocation.foresight import foresee
 from finlab.allocation.learned_fin import LearnedFin
 from finlab.allocation.levenberg_marquardt import refine
 from finlab.allocation.numpy_network import NumpyNetwork
 from finlab.allocation.prepared import Prepared, prepare
 from finlab.allocation.proposal import Proposal, propose
-from finlab.allocation.steady import TURNS, planar_thrust, turn_little
+from finlab.allocation.steady import TURNS, planar_thrust, turn_little, turn_short
 from finlab.allocation.weights import LearnedWeights
 from finlab.errors import AllocationError
 
@@ -37,7 +38,9 @@ ends near zero, since the energy divides by that end."""
 PATIENCE = ((5, 0), (25, 32))
 """For the few targets that the quick way did not reach: Levenberg-Marquardt steps, and how many fresh
 starts join, in stages."""
-SWITCH_GAIN = 0.02
+PLAN_STEPS = 4
+"""Levenberg-Marquardt steps on a command that was planned ahead."""
+SWITCH_GAIN = 0.01
 """Share of its energy that a robot in motion must save before it changes the way it moves."""
 
 
@@ -62,6 +65,8 @@ class Settings:
     """Levenberg-Marquardt steps."""
     subsets: bool = True
     """Whether sub-layouts are searched as well."""
+    energy_weights: EnergyWeights = DEFAULT_WEIGHTS
+    """By which energies are compared; `POWER_WEIGHTS` for the least inertial power."""
 
     def __post_init__(self) -> None:
         if self.n_candidates < 1 or self.n_seeds < 1 or self.n_refined < 1 or not self.temperature >= 0.0:
@@ -81,7 +86,7 @@ class Pipeline:
         self.network = NumpyNetwork(weights.network, weights.heads, weights.n_components)
         fin = LearnedFin(weights.surrogate, weights.reference, weights.force_unit)
         std = self.normalization.std
-        self.prepare = lru_cache(maxsize=128)(lambda layout: prepare(layout, fin, std))
+        self.prepare = lru_cache(maxsize=128)(lambda layout: prepare(layout, fin, std, settings.energy_weights))
 
     def solve(
         self, prepared: Prepared, targets: Array, seed: int, previous: Array | None
@@ -95,18 +100,37 @@ class Pipeline:
         )
         if previous is None:
             return self._descend(prepared, target, proposal, self._seeds(prepared, proposal)), proposal
-        # The fins turn as little as the target allows, those at rest towards where they would be cheapest.
-        seeds = self._seeds(prepared, proposal)
-        aim = self._descend(prepared, target, proposal, seeds).command[0, 0, :, 2]
-        kept = planar_thrust(prepared.commands, previous)
-        seeds = np.concatenate([kept[None, None], seeds], axis=1)
-        for width in TURNS:
-            near = turn_little(prepared, previous, aim, width)
-            pool = self._descend(near, target, proposal, seeds, steady=True)
-            if pool.error[0, 0] <= TOLERANCE:
-                break
+        pool = self._descend_steadily(prepared, target, proposal, previous)
         # Arcs that pass the seam are brought back inside the fin's own limits.
         return pool._replace(command=prepared.commands.clamp(pool.command)), proposal
+
+    def _descend_steadily(
+        self, prepared: Prepared, target: Array, proposal: Proposal, previous: Array
+    ) -> Pool:
+        """Answers that turn the fins as little as the target allows, with an eye on the next ticks.
+
+        Fins at rest turn towards where they will be needed, or else where they would be cheapest.
+        """
+        seeds = self._seeds(prepared, proposal)
+        free = self._descend(prepared, target, proposal, seeds)
+        aim = free.command[0, 0, :, 2]
+        kept = planar_thrust(prepared.commands, previous)
+        seeds = np.concatenate([kept[None, None], seeds], axis=1)
+        near = turn_little(prepared, previous, aim, TURNS[0])
+        pool = self._descend(near, target, proposal, seeds, steady=True)
+        plan = foresee(prepared, previous, target[0], pool.command[0, 0], free.command[0])
+        if plan is not None:
+            near = turn_little(prepared, previous, plan.ready, TURNS[1])
+            start = near.commands.clamp(turn_short(near, plan.command))
+            planned = self._refine(near, target, start[None, None], PLAN_STEPS)
+            if planned.error[0, 0] <= max(TOLERANCE, pool.error[0, 0]):
+                pool = Pool(*(np.concatenate(parts, axis=1) for parts in zip(planned, pool, strict=True)))
+        for width in TURNS[1:]:
+            if pool.error[0, 0] <= TOLERANCE:
+                break
+            near = turn_little(prepared, previous, aim, width)
+            pool = self._descend(near, target, proposal, seeds, steady=True)
+        return pool
 
     def _descend(
         self, prepared: Prepared, target: Array, proposal: Proposal, seeds: Array, steady: bool = False
@@ -163,7 +187,7 @@ class Pipeline:
         rows, p, n, _ = command.shape
         repeated = np.repeat(target, p, axis=0)
         refined = refine(prepared.commands, repeated, command.reshape(-1, n, 3), steps)
-        energy = command_energy(refined.command, prepared.upper)
+        energy = command_energy(refined.command, prepared.upper, prepared.weights)
         cost = energy.reshape(rows, p).copy()
         if steady:
             cost[:, 0] *= 1.0 - SWITCH_GAIN

@@ -2,7 +2,7 @@
 
 The zero direction of a real fin follows its command with a pole of about 3.5 rad/s. Given the previous
 command, each fin's arc of zero directions is narrowed around where it points; only if the target is out
-of reach so is the arc widened.
+of reach so is the arc widened. `foresight` sees to it that this is rare.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ from finlab.allocation.prepared import Prepared
 
 Array = NDArray[Any]
 
-TURNS = (0.35, 0.6, 1.2, np.pi)
-"""Largest turns per tick [rad], tried in order; 0.35 rad is what the pole allows in 0.1 s."""
+TURNS = (0.5, 0.58, 1.2, np.pi)
+"""Largest turns per tick [rad], tried in order. At ten ticks a second, a pole of 3.5 rad/s follows the first
+within a few ticks; only a target that leaves no other way gets the larger ones."""
 
 
 def turn_little(prepared: Prepared, previous: Array, aim: Array, width: float) -> Prepared:
@@ -54,6 +55,14 @@ def turn_little(prepared: Prepared, previous: Array, aim: Array, width: float) -
     )
     commands = prepared.commands._replace(lower=lower, upper=upper, wraps=wraps)
     return prepared._replace(planar=planar, commands=commands)
+
+
+def turn_short(near: Prepared, command: Array) -> Array:
+    """The command (n, 3), each zero direction a turn more or less so that it is nearest to its arc."""
+    turned = command.copy()
+    middle = near.planar.middle
+    turned[:, 2] = middle + np.mod(command[:, 2] - middle + np.pi, 2 * np.pi) - np.pi
+    return turned
 
 
 def planar_thrust(problem: CommandProblem, command: Array) -> Array:
