@@ -1,0 +1,57 @@
+"""`finlab eval steadiness|modes`: what an allocator does from tick to tick, and how many ways it knows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import arg
+
+from finlab.cli.eval_files import Checkpoint, Count, JsonFile, check_positive, check_writable, write_json
+from finlab.cli.eval_swim import verbs
+
+if TYPE_CHECKING:
+    from finlab.layout import Layout
+
+Layouts = Annotated[str, arg(metavar="A,B,...")]
+
+
+@verbs.command
+def steadiness(
+    layouts: Layouts = "A,B,C,D,ucat,asymmetric,penta,hexa,octo,restricted,pair",
+    paths: Count = 3,
+    ticks: Count = 600,
+    seed: Count = 0,
+    checkpoint: Checkpoint = None,
+    json: JsonFile = None,
+) -> None:
+    """Follow smooth paths of wrenches at 10 Hz with and without the previous command; turns and energy.
+
+    Args:
+        layouts: files or names of shipped layouts, with commas between.
+        paths: random paths of each layout.
+        ticks: length of a path; 600 are a minute.
+        seed: draws the paths; same numbers, same paths.
+        checkpoint: trained checkpoint; the shipped one by default.
+        json: file for the rows.
+    """
+    from finlab.allocation import load_allocator
+    from finlab.evaluation.steadiness import steadiness_report, steadiness_rows
+
+    check_positive("paths", paths)
+    check_positive("ticks", ticks - 1)
+    check_writable(json)
+    robots = _layouts(layouts)
+    rows = steadiness_rows(load_allocator(checkpoint), robots, n_paths=paths, ticks=ticks, seed=seed)
+    write_json(json, {"rows": rows})
+    print(steadiness_report(rows))
+
+
+def _layouts(names: str) -> list[Layout]:
+    """Layouts from their names, with commas between."""
+    from finlab.cli.inputs import open_robot
+    from finlab.errors import LayoutError
+
+    texts = [text.strip() for text in names.split(",") if text.strip()]
+    if not texts:
+        raise LayoutError(f"layouts: expected names or files with commas between (A,penta), got {names!r}")
+    return [open_robot(text).layout for text in texts]
