@@ -1,0 +1,28 @@
+"""Baselines held against conditions that need no second solver: QP answers against their KKT conditions."""
+
+import numpy as np
+import pytest
+
+from finlab.allocation.actuation import Actuation
+from finlab.allocation.qp import LinearMap, Qp
+from finlab.data.normalization import Normalization
+from finlab.evaluation.splits import make_split
+
+NORMALIZATION = Normalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35]))
+
+
+@pytest.mark.parametrize("split", ["id", "ood-fins", "limits", "near-singular"])
+def test_qp_answers_meet_their_kkt_conditions(split: str) -> None:
+    """Stationary where free, pushing outwards where held: the residual is below 1e-8 of the gradient's size."""
+    method = Qp(NORMALIZATION)
+    for case in make_split(split, 3, 8, 31):
+        actuation = Actuation(case.layout)
+        linear = LinearMap(actuation, NORMALIZATION.std)
+        # Before directions are wrapped: at the seam both ends of the box are one direction.
+        command = method._commands(actuation, case.targets, seed=0)
+        step = ((command - linear.reference) / actuation.width).reshape(len(command), -1)[:, linear.free]
+        wanted = (case.targets - linear.wrench) / NORMALIZATION.std
+        gradient = (step @ linear.matrix.T - wanted) @ linear.matrix + method.regularization * step
+        # A step along the negative gradient, brought back into the box, must not move.
+        residual = np.abs(step - np.clip(step - gradient, -0.5, 0.5)).max()
+        assert residual < 1e-8 * np.abs(wanted @ linear.matrix).max()
