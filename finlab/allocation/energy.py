@@ -1,4 +1,4 @@
-"""The paper's energy proxy `J_en`, a sum of squares and one product of normalized commands."""
+"""The paper's energy proxy `J_en`, a sum of squares and one product of normalized commands, or its power."""
 
 from __future__ import annotations
 
@@ -21,9 +21,15 @@ class EnergyWeights:
     """Weight of the squared normalized zero direction."""
     product: float = 1.0
     """Weight of normalized amplitude times normalized frequency."""
+    inertial: float = 0.0
+    """Weight of the squared normalized amplitude times the cubed normalized frequency, to which the power
+    that the paper measures, I alpha omega, is proportional."""
 
 
 DEFAULT_WEIGHTS = EnergyWeights()
+"""The contract's `J_en`."""
+POWER_WEIGHTS = EnergyWeights(0.0, 0.0, 0.0, 0.0, 1.0)
+"""Inertial power and nothing else: large strokes, slow beats, the load on all fins."""
 
 
 def energy_scale(upper: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -47,7 +53,8 @@ def fin_energy(
     scaled = command / energy_scale(upper).astype(command.dtype)
     a, f, d = scaled[..., 0], scaled[..., 1], scaled[..., 2]
     w = weights
-    return w.amplitude * a * a + w.frequency * f * f + w.zero_direction * d * d + w.product * a * f
+    energy = w.amplitude * a * a + w.frequency * f * f + w.zero_direction * d * d + w.product * a * f
+    return energy + w.inertial * (a * f) ** 2 * f if w.inertial else energy
 
 
 def command_energy(

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation import force_space
 from finlab.allocation.allocation import Solution
+from finlab.allocation.energy import DEFAULT_WEIGHTS
 from finlab.allocation.fast_network import NumpyFastNetwork
 from finlab.allocation.learned import LearnedAllocator
 from finlab.allocation.weights import LearnedWeights
@@ -54,8 +55,8 @@ class FastAllocator(LearnedAllocator):
         self._scaled_mean = self.normalization.mean / std
 
     def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
-        # Slow turns from tick to tick are a search of their own.
-        if previous is not None:
+        # Slow turns from tick to tick are a search of their own; the network learned the usual energy.
+        if previous is not None or self.energy_weights != DEFAULT_WEIGHTS:
             return super()._solve(layout, targets, seed=seed, previous=previous)
         prepared = self.pipeline.prepare(layout)
         target = targets / self.normalization.std

@@ -53,6 +53,8 @@ class PlanarProblem(NamedTuple):
     """Zero direction (n,) [rad] of a fin at rest: the cheapest one."""
     turns_fully: bool
     """Whether every fin may point anywhere."""
+    growth: float = 0.5
+    """Exponent with which a fin's energy grows with its thrust: below 1 some fins rest, above 1 all work."""
 
 
 class Planar(NamedTuple):
@@ -67,10 +69,12 @@ class Planar(NamedTuple):
 
 
 def mobility(problem: PlanarProblem, thrust: Array) -> Array:
-    """m = T / e'(T) up to a constant, for thrusts (R, n): e grows like sqrt(T / T_max)."""
+    """m = T / e'(T) up to a constant, for thrusts (R, n): e grows like (T / T_max)^growth."""
     top = problem.curves.maximum
     kept = np.maximum(thrust, REST * top)
-    return kept * np.sqrt(kept * top)
+    if problem.growth == 0.5:  # the usual weights, and quicker than a power
+        return kept * np.sqrt(kept * top)
+    return kept * kept * (top / kept) ** problem.growth
 
 
 def descend(problem: PlanarProblem, target: Array, thrust: Array, steps: int) -> Planar:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Candidates, Solution
 from finlab.allocation.allocator import Allocator
+from finlab.allocation.energy import DEFAULT_WEIGHTS, EnergyWeights
 from finlab.allocation.pipeline import Pipeline, Pool, Settings
 from finlab.allocation.policy import Policy
 from finlab.allocation.prepared import Prepared
@@ -42,11 +43,19 @@ class LearnedAllocator(Allocator):
 
     name = "learned"
 
-    def __init__(self, weights: LearnedWeights | Checkpoint, **settings: Any) -> None:
+    def __init__(
+        self,
+        weights: LearnedWeights | Checkpoint,
+        *,
+        energy_weights: EnergyWeights = DEFAULT_WEIGHTS,
+        **settings: Any,
+    ) -> None:
         """Make it from a checkpoint, or from the weights of one.
 
         Args:
             weights: trained weights.
+            energy_weights: by which answers are compared; `POWER_WEIGHTS` for the least inertial power. They
+                do not travel with a deployment bundle.
             settings: fields of `Settings`.
 
         Raises:
@@ -58,7 +67,8 @@ class LearnedAllocator(Allocator):
         self.weights = weights if isinstance(weights, LearnedWeights) else weights_of(weights)
         self.checkpoint = self.weights.checkpoint
         self.normalization = self.weights.normalization
-        self.pipeline = Pipeline(self.weights, self.settings)
+        self.energy_weights = energy_weights
+        self.pipeline = Pipeline(self.weights, self.settings, energy_weights)
         # All products here are too small to be shared among threads; chunks of targets are not.
         self._one_thread = single_threaded_products()
         self._fin_model = FinModelSpec.from_values(self.weights.fin_model)
@@ -67,7 +77,7 @@ class LearnedAllocator(Allocator):
     @classmethod
     def option_names(cls) -> list[str]:
         """Names of the settings."""
-        return [field.name for field in fields(Settings)]
+        return ["energy_weights", *(field.name for field in fields(Settings))]
 
     def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         prepared = self.pipeline.prepare(layout)

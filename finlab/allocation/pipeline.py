@@ -65,8 +65,6 @@ class Settings:
     """Levenberg-Marquardt steps."""
     subsets: bool = True
     """Whether sub-layouts are searched as well."""
-    energy_weights: EnergyWeights = DEFAULT_WEIGHTS
-    """By which energies are compared; `POWER_WEIGHTS` for the least inertial power."""
 
     def __post_init__(self) -> None:
         if self.n_candidates < 1 or self.n_seeds < 1 or self.n_refined < 1 or not self.temperature >= 0.0:
@@ -80,13 +78,15 @@ class Settings:
 class Pipeline:
     """Answers targets on layouts without failures; every array is numpy's."""
 
-    def __init__(self, weights: LearnedWeights, settings: Settings) -> None:
-        """Take over trained weights."""
+    def __init__(
+        self, weights: LearnedWeights, settings: Settings, energy_weights: EnergyWeights = DEFAULT_WEIGHTS
+    ) -> None:
+        """Take over trained weights; energies are compared by `energy_weights`."""
         self.settings, self.normalization = settings, weights.normalization
         self.network = NumpyNetwork(weights.network, weights.heads, weights.n_components)
         fin = LearnedFin(weights.surrogate, weights.reference, weights.force_unit)
         std = self.normalization.std
-        self.prepare = lru_cache(maxsize=128)(lambda layout: prepare(layout, fin, std, settings.energy_weights))
+        self.prepare = lru_cache(maxsize=128)(lambda layout: prepare(layout, fin, std, energy_weights))
 
     def solve(
         self, prepared: Prepared, targets: Array, seed: int, previous: Array | None

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.energy import DEFAULT_WEIGHTS, energy_scale
+from finlab.allocation.energy import DEFAULT_WEIGHTS, EnergyWeights, energy_scale
 from finlab.allocation.force_space import PlanarProblem
 from finlab.allocation.learned_fin import LearnedFin
 from finlab.allocation.levenberg_marquardt import CommandProblem
@@ -39,9 +39,13 @@ class Prepared(NamedTuple):
     """The layout for the refinement of commands."""
     subsets: Array
     """Thrust seeds (S, n) [N] of sub-layouts: the fins outside are nearly at rest."""
+    weights: EnergyWeights = DEFAULT_WEIGHTS
+    """By which energies are compared."""
 
 
-def prepare(layout: Layout, fin: LearnedFin, std: Array) -> Prepared:
+def prepare(
+    layout: Layout, fin: LearnedFin, std: Array, weights: EnergyWeights = DEFAULT_WEIGHTS
+) -> Prepared:
     """Prepare a layout whose fins are all healthy; `std` (6,) normalizes wrenches."""
     position = np.array([f.position for f in layout.fins], dtype=np.float64)
     angle = np.array([f.mounting_angle for f in layout.fins], dtype=np.float64)
@@ -53,10 +57,10 @@ def prepare(layout: Layout, fin: LearnedFin, std: Array) -> Prepared:
     )
     torque = np.cross(position[:, None], axes)
     columns = np.concatenate([axes, torque], axis=-1) / std  # (n, 3, 6)
-    curves = thrust_curves(fin, lower, upper)
+    curves = thrust_curves(fin, lower, upper, weights)
     arc = upper[:, 2] - lower[:, 2]
     half = np.where(arc >= FULL_TURN, np.pi, 0.5 * arc)
-    cost = DEFAULT_WEIGHTS.zero_direction / energy_scale(upper)[:, 2] ** 2
+    cost = weights.zero_direction / energy_scale(upper)[:, 2] ** 2
     in_plane = np.ascontiguousarray(columns[:, 1:])
     planar = PlanarProblem(
         columns=in_plane,
@@ -67,6 +71,7 @@ def prepare(layout: Layout, fin: LearnedFin, std: Array) -> Prepared:
         direction_cost=cost,
         idle_direction=np.clip(0.0, lower[:, 2], upper[:, 2]),
         turns_fully=bool((arc >= FULL_TURN).all()),
+        growth=1.5 if weights.inertial else 0.5,
     )
     return Prepared(
         lower,
@@ -75,6 +80,7 @@ def prepare(layout: Layout, fin: LearnedFin, std: Array) -> Prepared:
         planar,
         CommandProblem(fin, columns, lower, upper, arc >= FULL_TURN),
         _subset_seeds(curves.maximum),
+        weights,
     )
 
 

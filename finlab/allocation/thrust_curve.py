@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.energy import DEFAULT_WEIGHTS, energy_scale
+from finlab.allocation.energy import DEFAULT_WEIGHTS, EnergyWeights, energy_scale
 from finlab.allocation.learned_fin import LearnedFin
 
 Array = NDArray[Any]
@@ -22,6 +22,8 @@ Array = NDArray[Any]
 KNOTS = 80
 """Thrust levels per curve, evenly spaced in the fourth root of thrust, in which both commands are
 nearly straight lines. Few enough that the products behind a curve stay on one thread."""
+AMPLITUDE_FIRST = 0.1
+"""Ratio of normalized frequency to amplitude up to the largest amplitude, where inertial power counts."""
 
 
 @dataclass(frozen=True)
@@ -45,10 +47,13 @@ class ThrustCurves:
         return self.table[fin, index] * (1.0 - part) + self.table[fin, index + 1] * part
 
 
-def thrust_curves(fin: LearnedFin, lower: Array, upper: Array) -> ThrustCurves:
-    """Curves of fins with limits (n, 3)."""
+def thrust_curves(
+    fin: LearnedFin, lower: Array, upper: Array, weights: EnergyWeights = DEFAULT_WEIGHTS
+) -> ThrustCurves:
+    """Curves of fins with limits (n, 3), cheapest by these weights."""
     curves = [
-        _curve(fin, tuple(lo), tuple(hi)) for lo, hi in zip(lower.tolist(), upper.tolist(), strict=True)
+        _curve(fin, weights, tuple(lo), tuple(hi))
+        for lo, hi in zip(lower.tolist(), upper.tolist(), strict=True)
     ]
     minimum, maximum, table = zip(*curves, strict=True)
     return ThrustCurves(np.array(minimum), np.array(maximum), np.stack(table))
@@ -56,7 +61,7 @@ def thrust_curves(fin: LearnedFin, lower: Array, upper: Array) -> ThrustCurves:
 
 @lru_cache(maxsize=1024)
 def _curve(
-    fin: LearnedFin, lower: tuple[float, float, float], upper: tuple[float, float, float]
+    fin: LearnedFin, w: EnergyWeights, lower: tuple[float, float, float], upper: tuple[float, float, float]
 ) -> tuple[float, float, Array]:
     """Smallest and largest thrust and the table (KNOTS, 3) of one fin.
 
@@ -64,12 +69,12 @@ def _curve(
     are parallel. With normalized a and g and thrust elasticities alpha = dlnT/dlna, beta = dlnT/dlng
     this is (2 w_a a + w g) a / ((2 w_g g + w a) g) = alpha / beta: a quadratic for the ratio g / a.
     Thrust is nearly (a g)^2, so the elasticities hardly vary along the way and two sweeps settle them.
-    Where the ray of that ratio leaves the limits, the best point is the ray clipped to them.
+    Where the ray of that ratio leaves the limits, the best point is the ray clipped to them. Inertial power,
+    A^2 f^3, falls with the amplitude at a given thrust: there the amplitude goes first.
     """
     scale = energy_scale(np.array(upper))
     direction = np.full(KNOTS, min(max(0.0, lower[2]), upper[2]))
-    w = DEFAULT_WEIGHTS
-    ratio = np.ones(KNOTS)
+    ratio = np.full(KNOTS, AMPLITUDE_FIRST if w.inertial else 1.0)
     for sweep in range(3):
         # s runs along the ray until both commands are at their upper limits.
         s = np.linspace(0.0, max(upper[0] / scale[0], upper[1] / (scale[1] * ratio.min())), KNOTS)
@@ -77,7 +82,7 @@ def _curve(
         frequency = np.clip(s * ratio * scale[1], lower[1], upper[1])
         force, slope = fin.force_and_jacobian(np.stack([amplitude, frequency, direction], axis=-1))
         thrust = np.sqrt((force[:, 1:] ** 2).sum(-1)) + 1e-15
-        if sweep < 2:
+        if sweep < 2 and not w.inertial:
             by = (force[:, 1:, None] * slope[:, 1:, :2]).sum(-2) / thrust[:, None]
             kappa = np.clip(by[:, 0] * amplitude / np.maximum(by[:, 1] * frequency, 1e-12), 0.1, 10.0)
             # 2 w_g kappa r^2 + w (kappa - 1) r - 2 w_a = 0
@@ -88,7 +93,7 @@ def _curve(
     thrust = np.maximum.accumulate(thrust)
     low, high = float(thrust[0]), float(thrust[-1])
     a, f = amplitude / scale[0], frequency / scale[1]
-    energy = w.amplitude * a * a + w.frequency * f * f + w.product * a * f
+    energy = w.amplitude * a * a + w.frequency * f * f + w.product * a * f + w.inertial * (a * f) ** 2 * f
     level = ((thrust - low) / max(high - low, 1e-15)) ** 0.25
     grid = np.linspace(0.0, 1.0, KNOTS)
     return (
