@@ -7,6 +7,7 @@ percentiles are those of a normal variable at sqrt(2) x 1.96, so that the rerun 
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -88,8 +89,9 @@ def _members(group: NDArray[np.int64]) -> tuple[NDArray[np.intp], int]:
     return member, len(found)
 
 
+@lru_cache(maxsize=4)
 def _counts(n_groups: int, seed: int) -> Array:
-    """How often each group is drawn (REPLICATES, n_groups)."""
+    """How often each group is drawn (REPLICATES, n_groups); the same for every table of a report."""
     rng = np.random.default_rng(seed)
     return rng.multinomial(n_groups, np.full(n_groups, 1 / n_groups), size=REPLICATES).astype(np.float64)
 

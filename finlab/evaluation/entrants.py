@@ -54,6 +54,14 @@ def fingerprint(name: str, checkpoint: str | Path | None = None) -> str:
     return hashlib.sha256(b"".join(values.tobytes() for values in load_normalization(path))).hexdigest()
 
 
+def surrogate_fingerprint(checkpoint: str | Path) -> str:
+    """Digest of a checkpoint's surrogate alone, which stays the same while the allocator network learns on."""
+    from finlab.model.checkpoint import load_checkpoint, resolve_checkpoint
+
+    state = load_checkpoint(resolve_checkpoint(checkpoint)).surrogate.state_dict()
+    return hashlib.sha256(b"".join(state[key].numpy().tobytes() for key in sorted(state))).hexdigest()
+
+
 def _parse(name: str) -> tuple[str, int | None]:
     """Method and number of starts."""
     found = _WITH_STARTS.fullmatch(name)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from finlab.evaluation.ablation import REFINEMENTS, VARIANTS
-from finlab.evaluation.entrants import FAST, SLOW, fingerprint, is_slow
+from finlab.evaluation.entrants import FAST, SLOW, fingerprint, is_slow, surrogate_fingerprint
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.report.jobs import Job
 from finlab.evaluation.report.sizes import Sizes
@@ -192,7 +192,7 @@ def training_jobs(settings: dict[str, Any], folder: Path) -> dict[str, Job]:
         settings: `preset`, `steps`, `batch_size`, `layouts`, `targets` and `seed`.
         folder: for the training runs.
     """
-    prints = "".join(fingerprint(name) for name in ("learned", "paper"))
+    prints = "".join(surrogate_fingerprint(name) for name in ("default", "paper"))
     size = "{preset}-{steps}x{batch_size}-seed{seed}".format(**settings)
     return {
         change: Job(

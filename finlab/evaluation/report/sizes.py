@@ -81,7 +81,7 @@ SIZES = {
         seeds=(40, 25),
         latency=(200, 20.0),
         training=("default", 600, 256),
-        swims=(3, 3, 5),
+        swims=(2, 1, 5),
         lost_pairs=True,
     ),
 }
