@@ -55,7 +55,7 @@ def fingerprint(name: str, checkpoint: str | Path | None = None) -> str:
 
 
 def surrogate_fingerprint(checkpoint: str | Path) -> str:
-    """Digest of a checkpoint's surrogate alone, which stays the same while the allocator network learns on."""
+    """Digest of a checkpoint's surrogate alone, which stays the same while the network learns on."""
     from finlab.model.checkpoint import load_checkpoint, resolve_checkpoint
 
     state = load_checkpoint(resolve_checkpoint(checkpoint)).surrogate.state_dict()
