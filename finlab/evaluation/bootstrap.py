@@ -77,7 +77,8 @@ def quantile_interval(values: Array, quantile: float, group: NDArray[np.int64], 
     np.add.at(table, (member, rank), 1.0)
     cumulative = np.cumsum(_counts(n_groups, seed) @ table, axis=1)
     at = (cumulative < quantile * cumulative[:, -1:]).sum(axis=1).clip(max=BINS - 1)
-    edges = values[order][np.minimum(np.arange(BINS) * len(values) // BINS, len(values) - 1)]
+    # The smallest value of each rank, so that a rank without one takes the next.
+    edges = values[order][np.minimum(-(-np.arange(BINS) * len(values) // BINS), len(values) - 1)]
     return _ends(edges[at])
 
 
