@@ -7,6 +7,7 @@ import signal
 import socket
 import threading
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import viser
@@ -36,6 +37,8 @@ KEEP_S = 2.0
 """How often changed sessions are written to disk [s]."""
 STORAGE_KEY = "finlab-sessions"
 """Where a browser keeps the keys of its sessions."""
+PATIENCE_S = (0.5, 1.0, 1.5, 2.0, 4.0, 8.0, 16.0)
+"""How long a page may take to say which sessions it knows [s], try by try."""
 MAX_KEYS = 8
 """Sessions that one browser remembers."""
 
@@ -87,7 +90,7 @@ class App:
     def _connected(self, client: viser.ClientHandle) -> None:
         # Plain `def`: viser runs it on a thread of its pool, where waiting for the page is allowed.
         try:
-            remembered = _session_keys(_stored(client, attempts=20))
+            remembered = _session_keys(_stored(client, PATIENCE_S))
         except (RuntimeError, TimeoutError):  # gone already, or a browser that forbids storage
             remembered = []
         for client_id, key in list(self._keys.items()):
@@ -133,18 +136,19 @@ class App:
 def _answers(client: viser.ClientHandle) -> bool:
     """Whether a page is still there. Waits for it, so not to be called on the event loop."""
     try:
-        _stored(client, attempts=2)
+        _stored(client, (1.0, 1.0))
     except (RuntimeError, TimeoutError):
         return False
     return True
 
 
-def _stored(client: viser.ClientHandle, attempts: int) -> str | None:
-    """What the browser keeps for us; a page that is just reconnecting may drop the question, so ask again."""
-    for _ in range(attempts - 1):
+def _stored(client: viser.ClientHandle, patience: Sequence[float]) -> str | None:
+    """What the browser keeps for us. A page that is just reconnecting may drop the question, so it is asked
+    again; one on a slow machine takes its time, so each time we wait longer [s]."""
+    for seconds in patience[:-1]:
         with contextlib.suppress(TimeoutError):
-            return client.local_storage.get_item(STORAGE_KEY, timeout=1.0)
-    return client.local_storage.get_item(STORAGE_KEY, timeout=1.0)
+            return client.local_storage.get_item(STORAGE_KEY, timeout=seconds)
+    return client.local_storage.get_item(STORAGE_KEY, timeout=patience[-1])
 
 
 def serve(

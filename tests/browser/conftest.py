@@ -68,7 +68,7 @@ def served() -> Iterator[Served]:
     server = start_server("127.0.0.1", 0)
     layout = load_layout(shipped_layouts()["ucat"])
     app = App(server, Solver(load=load_stand_in), layout, Display(shadows=False, frozen=True))
-    yield Served(f"http://127.0.0.1:{server.get_port()}/?fixedDpr=0.5", app, server)
+    yield Served(f"http://127.0.0.1:{server.get_port()}/?fixedDpr=0.3", app, server)
     app.stop()
     stop_server(server)
 

@@ -16,7 +16,7 @@ ROW = "xpath=ancestor::div[contains(@class,'Flex-root')][1]"
 VERTICES = """name => {
   let geometry = null;
   window.__viserMutable.nodeRefFromName[name].traverse(o => { geometry = geometry ?? o.geometry ?? null; });
-  return Array.from(geometry.attributes.position.array.slice(0, 600));
+  return Array.from(geometry.attributes.position.array.slice(0, 6000));
 }"""
 PROJECT = """([name, point]) => {
   const node = window.__viserMutable.nodeRefFromName[name];
@@ -63,7 +63,10 @@ class Page:
         def restart() -> None:
             self.session.start_over()
             self.session.display = self._display
+            self.session.compare_with(None)
             self.view.improver.forget()
+            self.view.sweep.stop()
+            self.view.end_swim()
             self.view.look_from("3D")
 
         self._served.server.get_event_loop().call_soon_threadsafe(self.view.do, restart)
@@ -89,6 +92,11 @@ class Page:
     def node(self, name: str) -> None:
         """Wait for a node of the scene."""
         self.page.wait_for_function("name => window.__viserMutable?.nodeRefFromName[name] != null", arg=name)
+
+    def visible(self, name: str, wanted: bool = True) -> None:
+        """Wait until a node is shown, or hidden."""
+        script = "([name, wanted]) => !!window.__viserMutable.nodeRefFromName[name]?.visible === wanted"
+        self.page.wait_for_function(script, arg=[name, wanted])
 
     def tab(self, name: str) -> None:
         """Open a tab of the panel."""

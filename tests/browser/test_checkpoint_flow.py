@@ -1,11 +1,13 @@
 """The page with the checkpoint that is shipped and the method `learned`, as a user gets it."""
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from finlab.assets import shipped_checkpoints, shipped_layouts
+from finlab.cli import main
 from finlab.layout import load_layout
 from tests.browser.conftest import Served
 from tests.browser.page import Page
@@ -62,3 +64,14 @@ def test_its_modes_are_distinct_and_its_densities_are_drawn(trained: Page) -> No
     page.tab("What the network proposes")
     page.until(lambda: page.page.locator(".uplot").count() == 3)
     assert page.problems == []
+
+
+def test_the_page_gives_the_bundle_that_the_command_writes(trained: Page, tmp_path: Path) -> None:
+    page = trained
+    page.tab("Files")
+    with page.page.expect_download() as download:
+        page.press("Bundle (ZIP)")
+    download.value.save_as(tmp_path / "page.zip")
+    assert main(["export", "ucat", "-o", str(tmp_path / "ucat"), "--zip"]) == 0
+    assert (tmp_path / "page.zip").read_bytes() == (tmp_path / "ucat.zip").read_bytes()
+    assert "finlab export ucat" in page.page.locator("pre.command").last.inner_text()

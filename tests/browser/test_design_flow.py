@@ -23,8 +23,7 @@ def test_linked_pair_follows_the_gizmo(page: Any) -> None:
     right, left = page.session.state.layout.fins[:2]
     assert left.position[0] == pytest.approx(before.fins[1].position[0] + 0.06, abs=0.02)
     assert right.position == pytest.approx((left.position[0], -left.position[1], left.position[2]))
-    ghost = "() => window.__viserMutable.nodeRefFromName['/robot/ghost'].visible"
-    page.page.wait_for_function(ghost)
+    page.visible("/robot/ghost")
     page.press("Undo")
     page.until(lambda: page.session.state.layout == before)
 
@@ -50,34 +49,58 @@ def test_hull_from_a_file_and_by_numbers(page: Any, tmp_path: Path, monkeypatch:
 
 
 def test_failure_changes_graph_and_attainable_set(page: Any) -> None:
+    page.tab("View")
+    page.row("Fin graph").first.click()
+    page.visible("/robot/graph")
+    graph = page.vertices("/robot/graph")
     page.tab("Limits")
     page.press("forces")
-    page.page.wait_for_function("() => window.__viserMutable.nodeRefFromName['/robot/attainable/now'].visible")
+    page.page.wait_for_function(
+        "() => window.__viserMutable.nodeRefFromName['/robot/attainable/now'].visible"
+    )
     page.until(lambda: not page.view.analyst.busy)
     whole, card = page.vertices("/robot/attainable/now"), page.text(".score")
     page.key("f")
     page.until(lambda: page.session.state.failed == ("front_right",))
+    page.until(lambda: len(page.vertices("/robot/graph")) < len(graph), seconds=60)
     page.until(lambda: page.vertices("/robot/attainable/now") != whole, seconds=60)
-    page.page.wait_for_function("() => window.__viserMutable.nodeRefFromName['/robot/attainable/whole'].visible")
+    page.page.wait_for_function(
+        "() => window.__viserMutable.nodeRefFromName['/robot/attainable/whole'].visible"
+    )
     page.until(lambda: page.text(".score") != card and "without" in page.text(".score"))
-    page.until(lambda: page.view.answering.reply is not None)
     page.press("none")
-    hidden = "() => !window.__viserMutable.nodeRefFromName['/robot/attainable/now'].visible"
-    page.page.wait_for_function(hidden)
+    page.visible("/robot/attainable/now", False)
+
+
+def test_any_layout_stands_beside(page: Any) -> None:
+    page.tab("Limits")
+    page.choose("Beside", "pair")
+    page.until(lambda: page.session.beside == "pair")
+    page.until(lambda: not page.view.analyst.busy and "pair" in page.text(".score"), seconds=60)
+    assert "2 of 6" not in page.text(".score") or "axes independent" in page.text(".score")
+    page.press("Pin this layout")
+    page.until(lambda: page.session.beside == "pinned")
+    page.choose("Beside", "saved state")
+    page.until(lambda: page.session.beside is None)
 
 
 def test_search_is_watched_and_accepted(page: Any) -> None:
     page.tab("Limits")
     before = page.session.state.layout
+    page.choose("Goal", "energy of a mission")
+    page.press("Add the present wrench")
+    page.page.get_by_role("button", name="4", exact=True).locator("visible=true").last.click()  # holds fin 4
+    page.type("Reach ± [m]", "0.03", place=0)
     page.press("Search")
     page.until(lambda: page.view.improver.progress is not None, seconds=60)
     page.press("Cancel")
     page.until(lambda: page.view.improver.found is not None, seconds=60)
+    found = page.view.improver.found
+    assert found.goal == "mission_energy"
     page.until(lambda: page.page.get_by_role("button", name="Accept").count() == 1)
-    better = page.view.improver.found.layout
     page.press("Accept")
-    page.until(lambda: page.session.state.layout == better and page.view.improver.found is None)
-    if better != before:
+    page.until(lambda: page.session.state.layout == found.layout and page.view.improver.found is None)
+    if found.layout != before:
         page.press("Undo")
         page.until(lambda: page.session.state.layout == before)
 
@@ -89,7 +112,7 @@ def test_methods_side_by_side(page: Any) -> None:
     page.until(lambda: page.page.locator("table.methods tr").count() == 7)
     page.page.locator("table.methods tr.pick", has_text="analytic").click()
     page.until(lambda: page.session.overlay == "analytic")
-    page.page.wait_for_function("() => window.__viserMutable.nodeRefFromName['/robot/overlay'].visible")
+    page.visible("/robot/overlay")
     assert "analytic" in page.text("table.methods tr.chosen")
     page.press("none")
     page.until(lambda: page.session.overlay is None)
@@ -101,7 +124,10 @@ def test_wrench_is_dragged_in_the_view(page: Any) -> None:
     page.key("2")
     page.page.wait_for_timeout(600)
     before = page.session.state.target
-    grip, further = page.pixel("/robot/grip/force", (0.112, 0, 0)), page.pixel("/robot/grip/force", (0.192, 0, 0))
+    grip, further = (
+        page.pixel("/robot/grip/force", (0.112, 0, 0)),
+        page.pixel("/robot/grip/force", (0.192, 0, 0)),
+    )
     page.drag(grip, further)
     page.until(lambda: page.session.state.target[0] > before[0] + 0.2)
     assert page.session.state.target[1:] == pytest.approx(before[1:], abs=0.02)

@@ -25,6 +25,29 @@ def test_gizmo_moves_a_fin(page: Any) -> None:
     page.until(lambda: page.pixel("/robot/fins/0", (0.168, 0, 0)) == pytest.approx(grip, abs=3))
 
 
+def test_a_ghost_shows_where_a_held_fin_will_stick(page: Any) -> None:
+    page.key("n")
+    page.tab("Layout")
+    page.row("Stick to hull").first.click()
+    page.until(lambda: page.session.display.stick)
+    page.key("2")
+    page.page.wait_for_timeout(600)
+    (x, y), (u, v) = page.pixel("/robot/fins/0", (0.168, 0, 0)), page.pixel("/robot/fins/0", (0.23, 0, 0))
+    mouse = page.page.mouse
+    mouse.move(x, y)
+    page.page.wait_for_timeout(150)
+    mouse.down()
+    for k in range(1, 13):
+        mouse.move(x + (u - x) * k / 12, y + (v - y) * k / 12)
+        page.page.wait_for_timeout(30)
+    page.visible("/robot/landing")
+    mouse.up()
+    page.visible("/robot/landing", False)
+    page.until(lambda: page.session.history.undo_name == "Move front_right")
+    stands = page.view.scene._fins[0].pose()[0]
+    assert stands == pytest.approx(page.session.state.layout.fins[0].position, abs=1e-6)
+
+
 def test_click_selects_and_numbers_move(page: Any) -> None:
     page.page.mouse.click(*page.pixel("/robot/fins/2/turn/shaft", (-0.02, 0, 0)))
     page.until(lambda: page.session.selected == "back_left")
@@ -53,6 +76,16 @@ def test_add_mirror_and_undo(page: Any) -> None:
     page.until(lambda: page.session.state.layout.n_fins == 6)
 
 
+def test_copies_stand_around_another_axis(page: Any) -> None:
+    page.key("n")
+    page.tab("Layout")
+    page.choose("Copies around", "x")
+    page.press("4")
+    page.until(lambda: page.session.state.layout.n_fins == 7)
+    assert page.session.history.undo_name == "4 around x"
+    page.node("/robot/fins/6/turn/blade")
+
+
 def test_bad_number_is_refused_with_a_note(page: Any) -> None:
     page.key("n")
     page.tab("Layout")
@@ -66,12 +99,12 @@ def test_page_picture_and_command_to_take_home(page: Any, tmp_path: Path) -> Non
     page.tab("Files")
     assert "finlab allocate ucat --wrench 1.2 0 0 0 0 0.25" in page.text("pre.command")
     with page.page.expect_download() as download:
-        page.press("Save the moving 3D view (HTML)")
+        page.press("3D view (HTML)")
     download.value.save_as(tmp_path / "robot.html")
     html = (tmp_path / "robot.html").read_text()
     assert "__VISER_EMBED_DATA__" in html and len(html) < 3_000_000
     with page.page.expect_download() as download:
-        page.press("Save a picture (PNG)")
+        page.press("Picture (PNG)")
     download.value.save_as(tmp_path / "robot.png")
     assert (tmp_path / "robot.png").read_bytes().startswith(b"\x89PNG")
 
@@ -79,7 +112,7 @@ def test_page_picture_and_command_to_take_home(page: Any, tmp_path: Path) -> Non
 def test_save_open_and_a_bad_file(page: Any, tmp_path: Path) -> None:
     page.tab("Files")
     with page.page.expect_download() as download:
-        page.press("Save the layout")
+        page.press("Layout (YAML)")
     saved = tmp_path / "saved.yaml"
     download.value.save_as(saved)
     text = saved.read_text()

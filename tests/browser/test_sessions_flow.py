@@ -36,7 +36,8 @@ def test_reload_and_reconnect_restore(page: Any, served: Any) -> None:
     before = page.view
     disconnect_all(served.server)
     page.until(lambda: before not in served.app.views.values())
-    page.until(lambda: any(view.session is page.session for view in served.app.views.values()))
+    back = served.app.views
+    page.until(lambda: any(view.session is page.session for view in back.values()), seconds=60)
     page.ready()
     assert page.page.get_by_role("button", name="Undo").count() == 1, "no widget twice"
 
@@ -72,6 +73,9 @@ def test_token_opens_and_a_restart_loses_nothing(browser: Any, tmp_path: Path) -
     session = next(iter(second.app.views.values())).session
     assert session is not page.session and session.state.target[1] == 0.5
     page.until(lambda: page.row("Fy [N]").last.input_value() == "0.5")
+    assert session.history.undo_name == "Set Fy"
+    page.press("Undo")
+    page.until(lambda: session.state.target[1] == 0.0)
     context.close()
     second.app.stop()
     stop_server(second.server)

@@ -48,7 +48,8 @@ def test_last_fin_cannot_fail(page: Any) -> None:
 
 def test_mode_is_picked_in_plot_and_table(page: Any) -> None:
     page.tab("Modes")
-    page.until(lambda: len(page.view.answering.modes) > 1 and page.page.locator("table.modes tr.pick").count() > 1)
+    page.until(lambda: len(page.view.answering.modes) > 1)
+    page.until(lambda: page.page.locator("table.modes tr.pick").count() > 1)
     best = page.view.answering.best
     page.page.locator("table.modes tr.pick").nth(1).click()
     page.until(lambda: page.session.mode == 1)
@@ -56,6 +57,10 @@ def test_mode_is_picked_in_plot_and_table(page: Any) -> None:
     page.until(lambda: page.text("table.modes tr.chosen").startswith("2"))
     page.page.locator("svg.plot:visible g.pick").last.click()  # the best one is drawn last
     page.until(lambda: page.session.mode == 0)
+    page.page.locator("svg.plot:visible .samples circle").nth(7).dispatch_event("click")
+    page.until(lambda: page.session.sample == 7)
+    page.until(lambda: "Raw sample 7" in page.text(".step"))
+    assert page.view.shown.command.tolist() == best.samples.command[7].tolist()
     page.type("Candidates K", "16")
     page.until(lambda: page.session.state.n_candidates == 16 and not page.view.busy)
     assert len(page.view.answering.best.samples.energy) == 16
@@ -68,3 +73,45 @@ def test_method_that_fails_says_so_and_the_page_goes_on(page: Any) -> None:
     page.key("Control+z")
     page.until(lambda: page.session.state.method == "learned")
     page.until(lambda: "Reachable" in page.text(".fl-status"))
+
+
+def test_one_axis_and_the_marks_of_its_reach(page: Any) -> None:
+    page.press("Tz")
+    page.until(lambda: page.session.state.target[5] > 0 and page.session.state.target[0] == 0.0)
+    page.until(lambda: page.view.ranging.findings is not None and not page.view.ranging.busy)
+    high = float(page.view.ranging.findings.high[0])
+    marks = page.row("Fx [N]").first.locator("xpath=ancestor::div[contains(@class,'Flex-root')][1]")
+    page.until(lambda: f"{high:.0f}" in marks.locator(".mantine-Slider-markLabel").last.inner_text())
+
+
+def test_the_stick_steers_and_springs_back(page: Any) -> None:
+    before = page.session.state
+    page.tab("Steer by hand")
+    stick = page.page.locator("svg.pad")
+    stick.scroll_into_view_if_needed()
+    box = stick.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + 0.52 * box["height"]
+    mouse = page.page.mouse
+    mouse.move(x, y)
+    mouse.down()
+    for k in range(1, 9):
+        mouse.move(x - 4 * k, y - 5 * k)
+        page.page.wait_for_timeout(70)
+    page.until(lambda: page.session.state.target[0] > 3.0 and page.session.state.target[5] > 0.5)
+    assert page.session.history.undo_name == "Steer"
+    mouse.up()
+    page.until(lambda: page.session.state == before)
+    assert page.session.history.undo_name != "Steer"
+    page.tab("Steer by hand")
+
+
+def test_a_sweep_plays_and_stops(page: Any) -> None:
+    page.tab("Sweep an axis")
+    page.press("Play the sweep")
+    page.until(lambda: page.view.sweep.running)
+    page.until(lambda: page.session.state.target[0] > -4.0)
+    page.until(lambda: page.page.locator(".uplot").count() > 0)
+    page.press("Stop the sweep")
+    page.until(lambda: not page.view.sweep.running)
+    assert page.session.history.undo_name == "Sweep Fx"
+    page.tab("Sweep an axis")

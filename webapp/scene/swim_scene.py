@@ -92,8 +92,7 @@ class SwimScene:
             robot.begin(swimming.plan.layout, swimmer.shown)
         path = swimming.swimmers[0].path
         self._goal.show(goal, path)
-        low, high = path.min(axis=0), path.max(axis=0)
-        put(self._floor, position=np.array([0.0, 0.0, low[2] - DEPTH_BELOW]))
+        put(self._floor, position=np.array([0.0, 0.0, path[:, 2].min() - DEPTH_BELOW]))
         self.overlook()
 
     def overlook(self) -> None:
