@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -95,10 +96,11 @@ def _run_pool(jobs: Sequence[Job], folder: Path, commit: str, processes: int, ba
 
 
 def _calm() -> None:
-    """One thread for each process, and no bars of its own."""
+    """One thread for each process, no bars of its own, and an end at once when a user interrupts."""
     import torch
     from threadpoolctl import threadpool_limits
 
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     torch.set_num_threads(1)
     threadpool_limits(1)
     sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 - for the life of the process
