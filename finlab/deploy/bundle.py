@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 
 from finlab.deploy.graph import build_graph
 from finlab.deploy.graph_file import graph_bytes
-from finlab.deploy.metadata import network_metadata, surrogate_metadata
+from finlab.deploy.metadata import fast_metadata, network_metadata, surrogate_metadata
+from finlab.deploy.onnx.fast import fast_model
 from finlab.deploy.onnx.model import model_bytes
 from finlab.deploy.onnx.network import network_model
 from finlab.deploy.onnx.surrogate import surrogate_model
@@ -28,9 +29,10 @@ if TYPE_CHECKING:
     from finlab.allocation import Allocator
 
 GRAPH, NETWORK, SURROGATE = "layout.graph.json", "network.onnx", "surrogate.onnx"
+FAST = "fast.onnx"
 README, CHECKSUMS = "README.md", "SHA256SUMS"
-FILES = (GRAPH, NETWORK, SURROGATE, README, CHECKSUMS)
-"""What a bundle holds."""
+FILES = (GRAPH, NETWORK, SURROGATE, FAST, README, CHECKSUMS)
+"""What a bundle may hold; `fast.onnx` only where the checkpoint has a distilled network."""
 
 
 @dataclass(frozen=True)
@@ -116,8 +118,10 @@ def make_bundle(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = 
         GRAPH: graph_bytes(graph),
         NETWORK: model_bytes(network),
         SURROGATE: model_bytes(surrogate),
-        README: readme_text(graph).encode(),
     }
+    if weights.fast is not None:
+        files[FAST] = model_bytes(fast_model(weights.fast, fast_metadata(graph, weights)))
+    files[README] = readme_text(graph, with_fast=FAST in files).encode()
     return Bundle({**files, CHECKSUMS: checksums(files)})
 
 

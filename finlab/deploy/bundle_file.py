@@ -19,15 +19,17 @@ import numpy as np
 
 from finlab.allocation.weights import LearnedWeights
 from finlab.deploy import metadata
-from finlab.deploy.bundle import CHECKSUMS, FILES, GRAPH, NETWORK, README, SURROGATE, checksums
+from finlab.deploy.bundle import CHECKSUMS, FAST, FILES, GRAPH, NETWORK, README, SURROGATE, checksums
 from finlab.deploy.graph import LayoutGraph
 from finlab.deploy.graph_file import parse_graph
+from finlab.deploy.onnx.fast import fast_model, fast_weights
 from finlab.deploy.onnx.model import Model, model_bytes
 from finlab.deploy.onnx.network import network_model, network_weights
 from finlab.deploy.onnx.reading import MAX_BYTES, read_model
 from finlab.deploy.onnx.surrogate import surrogate_model, surrogate_weights
 from finlab.errors import DataError
 from finlab.layout import FinModelSpec
+from finlab.model.fast_weights import FastWeights
 
 LARGEST = {GRAPH: 1_000_000, README: 100_000, CHECKSUMS: 10_000}
 """Largest size of the files that are no ONNX [bytes]."""
@@ -70,10 +72,13 @@ def parse_bundle(files: Mapping[str, bytes], source: str = "bundle") -> RobotBun
     except UnicodeDecodeError:
         raise DataError(f"{source}: {GRAPH} is not UTF-8 text") from None
     graph = parse_graph(text, f"{source}: {GRAPH}")
-    network, surrogate = (read_model(files[name], f"{source}: {name}") for name in (NETWORK, SURROGATE))
-    weights = _weights(network, surrogate, files, source)
-    _check_kinship(graph, network, surrogate, source)
-    settings = metadata.settings_of(network, f"{source}: {NETWORK}")
+    names = [name for name in (NETWORK, SURROGATE, FAST) if name in files]
+    models = {name: read_model(files[name], f"{source}: {name}") for name in names}
+    weights = _weights(models[NETWORK], models[SURROGATE], files, source)
+    if FAST in models:
+        weights = weights._replace(fast=_fast(models[FAST], files[FAST], f"{source}: {FAST}"))
+    _check_kinship(graph, models, source)
+    settings = metadata.settings_of(models[NETWORK], f"{source}: {NETWORK}")
     return RobotBundle(graph, weights, settings, dict(files))
 
 
@@ -114,6 +119,13 @@ def _weights(network: Model, surrogate: Model, files: Mapping[str, bytes], sourc
     )
 
 
+def _fast(model: Model, content: bytes, place: str) -> FastWeights:
+    metadata.check_format(model, metadata.FAST_FORMAT, place)
+    weights = fast_weights(model)
+    _check_same(lambda: fast_model(weights, model.metadata), content, place)
+    return weights
+
+
 def _check_same(make: Callable[[], Model], content: bytes, place: str) -> None:
     """Refuse a file that is not what finlab writes for the weights that were found in it."""
     try:
@@ -124,9 +136,9 @@ def _check_same(make: Callable[[], Model], content: bytes, place: str) -> None:
         raise DataError(f"{place}: is not what this finlab writes for such weights; export it again")
 
 
-def _check_kinship(graph: LayoutGraph, network: Model, surrogate: Model, source: str) -> None:
+def _check_kinship(graph: LayoutGraph, models: Mapping[str, Model], source: str) -> None:
     """Refuse parts that come from different exports."""
-    for model, name in ((network, NETWORK), (surrogate, SURROGATE)):
+    for name, model in models.items():
         if model.metadata.get("checkpoint_sha256") != graph.checkpoint_sha256:
             raise DataError(f"{source}: {name} and {GRAPH} are of different checkpoints; export again")
         statistics = metadata.normalization_of(model, f"{source}: {name}")

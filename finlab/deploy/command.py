@@ -40,7 +40,7 @@ def check(arguments: argparse.Namespace) -> int:
     from finlab.deploy.runtime import load
     from finlab.deploy.self_check import self_check
 
-    runtime = load(arguments.bundle, arguments.engine)
+    runtime = load(arguments.bundle, arguments.engine, arguments.fast)
     print(
         f"{arguments.bundle}: {runtime.layout.name}, {runtime.layout.n_fins} fins, "
         f"checkpoint {runtime.bundle.graph.checkpoint}, ready in {time.perf_counter() - start:.2f} s"
@@ -60,7 +60,7 @@ def allocate(arguments: argparse.Namespace) -> int:
     """Print the commands for one target."""
     from finlab.deploy.runtime import load
 
-    runtime = load(arguments.bundle, arguments.engine)
+    runtime = load(arguments.bundle, arguments.engine, arguments.fast)
     answer = runtime.allocate(
         arguments.wrench, failed=arguments.failed, policy=arguments.policy, seed=arguments.seed
     )
@@ -96,7 +96,7 @@ def serve(arguments: argparse.Namespace) -> int:
     from finlab.deploy.serve import Server, Timing, Transport
     from finlab.deploy.transport import LoopbackUdp, StandardStreams
 
-    runtime = load(arguments.bundle, arguments.engine)
+    runtime = load(arguments.bundle, arguments.engine, arguments.fast)
     deadline = None if arguments.deadline_ms is None else arguments.deadline_ms / 1e3
     timing = Timing(deadline, arguments.watchdog_s or None)
     transport: Transport
@@ -125,6 +125,7 @@ def _parser() -> argparse.ArgumentParser:
         made.set_defaults(run=run)
         made.add_argument("bundle", metavar="BUNDLE", help="folder or zip archive made by `finlab export`")
         made.add_argument("--engine", choices=("numpy", "onnx"), default="numpy", help="runs the network")
+        made.add_argument("--fast", action="store_true", help="let the distilled network answer")
         return made
 
     verb(check, "Run the self-test; do this on the robot before first use.")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from finlab.errors import DataError
 
 VERSION = "1"
 """Version of the bundle; a reader knows exactly one."""
-NETWORK_FORMAT, SURROGATE_FORMAT = "finlab-network", "finlab-surrogate"
+NETWORK_FORMAT, SURROGATE_FORMAT, FAST_FORMAT = "finlab-network", "finlab-surrogate", "finlab-fast"
 
 _MOST = {"n_candidates": 4096, "n_seeds": 256, "n_refined": 256, "search_steps": 100, "refine_steps": 100}
 """Largest settings that a robot accepts from a file; more would keep it from answering."""
@@ -49,6 +49,11 @@ def surrogate_metadata(graph: LayoutGraph, weights: LearnedWeights) -> dict[str,
         "force_unit_n": json.dumps(weights.force_unit),
         "fin_model": json.dumps(dict(weights.fin_model), sort_keys=True),
     }
+
+
+def fast_metadata(graph: LayoutGraph, weights: LearnedWeights) -> dict[str, str]:
+    """What to write into `fast.onnx`."""
+    return _shared(FAST_FORMAT, graph, weights) | {"features": graph.feature_set}
 
 
 def _shared(form: str, graph: LayoutGraph, weights: LearnedWeights) -> dict[str, str]:
@@ -114,18 +119,26 @@ def normalization_of(model: Model, source: str) -> Normalization:
 
 def settings_of(model: Model, source: str) -> dict[str, Any]:
     """Fields of `Settings`, checked one by one."""
-    values = value_of(model, "settings", source)
-    known = {field.name: field.default for field in fields(Settings)}
+    return _fields_of(Settings(), value_of(model, "settings", source), f"{source}: settings")
+
+
+def _fields_of(default: Any, values: Any, place: str) -> dict[str, Any]:
+    """Values for the fields of a dataclass, each of the kind that its default is."""
+    known = {field.name: getattr(default, field.name) for field in fields(default)}
     if not isinstance(values, Mapping) or set(values) != set(known):
-        raise DataError(f"{source}: settings must be {', '.join(known)}")
+        raise DataError(f"{place} must be {', '.join(known)}")
+    result: dict[str, Any] = {}
     for name, value in values.items():
-        if name == "search_steps" and value is None:
+        usual = known[name]
+        if is_dataclass(usual) and not isinstance(usual, type):
+            result[name] = type(usual)(**_fields_of(usual, value, f"{place}: {name}"))
             continue
-        kind = bool if name == "subsets" else int if name in _MOST else (int, float)
-        if not isinstance(value, kind) or (name != "subsets" and isinstance(value, bool)):
-            raise DataError(f"{source}: settings: {name} cannot be {value!r:.40}")
-        if name != "subsets" and not 0 <= value <= _MOST.get(name, 100):
-            raise DataError(
-                f"{source}: settings: {name} must lie within 0..{_MOST.get(name, 100)}, got {value}"
-            )
-    return dict(values)
+        if not (value is None and usual is None) and not isinstance(usual, bool):
+            kind = (int, float) if isinstance(usual, float) else int
+            most = _MOST.get(name, 100)
+            if isinstance(value, bool) or not isinstance(value, kind) or not 0 <= value <= most:
+                raise DataError(f"{place}: {name} must lie within 0..{most}, got {value!r:.40}")
+        elif isinstance(usual, bool) and not isinstance(value, bool):
+            raise DataError(f"{place}: {name} must be true or false, got {value!r:.40}")
+        result[name] = value
+    return result

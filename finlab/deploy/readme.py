@@ -49,12 +49,14 @@ fin's horizontal axis, pi/2 up).
 | `layout.graph.json` | fins, node features, normalization, self-tests; networkx reads its part `graph` |
 | `network.onnx` | the allocator network: features and target in, mixture of commands out |
 | `surrogate.onnx` | the learned fin physics: commands in, forces and wrench out |
-| `SHA256SUMS` | checksums; `sha256sum -c SHA256SUMS` checks them without finlab |
+{fast}| `SHA256SUMS` | checksums; `sha256sum -c SHA256SUMS` checks them without finlab |
 """
 
+_FAST = "| `fast.onnx` | the distilled network of `--fast`: features in, shares of thrust out |\n"
 
-def readme_text(graph: LayoutGraph) -> str:
-    """The README of a bundle with this graph."""
+
+def readme_text(graph: LayoutGraph, with_fast: bool) -> str:
+    """The README of a bundle with this graph, and with a distilled network or without."""
     rows = []
     for fin in graph.layout.fins:
         x, y, z = fin.position
@@ -71,4 +73,5 @@ def readme_text(graph: LayoutGraph) -> str:
         version=finlab.__version__,
         checkpoint=graph.checkpoint,
         fins="\n".join(rows),
+        fast=_FAST if with_fast else "",
     )

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.energy import command_energy
+from finlab.allocation.fast import FastAllocator
 from finlab.allocation.learned import LearnedAllocator
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.deploy.bundle_file import RobotBundle, read_bundle
@@ -53,12 +54,13 @@ class Answer(NamedTuple):
 class Runtime:
     """One robot, ready to answer."""
 
-    def __init__(self, bundle: RobotBundle, engine: str = "numpy") -> None:
+    def __init__(self, bundle: RobotBundle, engine: str = "numpy", fast: bool = False) -> None:
         """Make it from a bundle.
 
         Args:
             bundle: what `read_bundle` gives.
             engine: what runs the network: `numpy`, or `onnx` for onnxruntime.
+            fast: whether the distilled network answers where it reaches the target.
 
         Raises:
             DataError: the weights do not fit together, or the engine is unknown or missing.
@@ -68,7 +70,8 @@ class Runtime:
         self.failed = bundle.graph.failed
         self.engine = engine
         try:
-            self.allocator = LearnedAllocator(bundle.weights, **bundle.settings)
+            kind = FastAllocator if fast else LearnedAllocator
+            self.allocator = kind(bundle.weights, **bundle.settings)
             use_engine(self.allocator.pipeline, bundle, engine)
             # The first answer prepares the layout, and shows whether the weights fit together at all.
             self.allocate(np.zeros(6))
@@ -120,10 +123,10 @@ class Runtime:
         return command
 
 
-def load(path: str | os.PathLike[str], engine: str = "numpy") -> Runtime:
+def load(path: str | os.PathLike[str], engine: str = "numpy", fast: bool = False) -> Runtime:
     """The runtime of a bundle, a folder or a zip archive.
 
     Raises:
         FinlabError: the bundle is not one, was changed, or cannot be run.
     """
-    return Runtime(read_bundle(path), engine)
+    return Runtime(read_bundle(path), engine, fast)

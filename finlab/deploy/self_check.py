@@ -13,9 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.allocation.fast_network import NumpyFastNetwork
 from finlab.allocation.proposal import predict
 from finlab.data.features import fin_frame_features
-from finlab.deploy.bundle import NETWORK, SURROGATE
+from finlab.deploy.bundle import FAST, NETWORK, SURROGATE
 from finlab.deploy.engine import OnnxNetwork, OnnxSession
 from finlab.deploy.graph import SELF_TEST_TOLERANCE, SelfTest
 from finlab.deploy.runtime import Runtime
@@ -48,7 +49,11 @@ class Finding(NamedTuple):
 
 
 def self_check(runtime: Runtime) -> list[Finding]:
-    """Ask everything; a question that needs onnxruntime has NaN where that is not installed."""
+    """Ask everything; a question that needs onnxruntime has NaN where that is not installed.
+
+    Own answers are those of the full pipeline, also where the fast path runs: they are what was stored.
+    """
+    runtime = Runtime(runtime.bundle, runtime.engine)
     cases = runtime.bundle.graph.self_test
     alive = [i for i, name in enumerate(runtime.layout.names) if name not in runtime.failed]
     healthy = runtime.layout.without(runtime.failed) if runtime.failed else runtime.layout
@@ -102,13 +107,13 @@ def _onnx_findings(runtime: Runtime, alive: list[int]) -> list[Finding]:
     prepared = runtime.allocator.pipeline.prepare(
         runtime.layout.without(runtime.failed) if runtime.failed else runtime.layout
     )
-    normalization = runtime.bundle.graph.normalization
+    normalization, files = runtime.bundle.graph.normalization, runtime.bundle.files
     cases = runtime.bundle.graph.self_test
     scaled = (np.array([case.wrench for case in cases]) - normalization.mean) / normalization.std
     by_numpy = predict(runtime.allocator.pipeline.network, prepared, scaled)
     by_onnx = predict(network, prepared, scaled)  # type: ignore[arg-type]
-    apart = [np.abs(a - b) for a, b in zip(by_numpy, by_onnx, strict=True)]
-    apart[1][..., 2] = np.minimum(apart[1][..., 2], np.abs(2.0 - apart[1][..., 2]))  # an angle: -1 is 1
+    parts = [np.abs(a - b) for a, b in zip(by_numpy, by_onnx, strict=True)]
+    parts[1][..., 2] = np.minimum(parts[1][..., 2], np.abs(2.0 - parts[1][..., 2]))  # an angle: -1 is 1
     command = np.array([[case.command[i] for i in alive] for case in cases], dtype=np.float32)
     _, wrench = surrogate.run(
         command=command,
@@ -116,10 +121,16 @@ def _onnx_findings(runtime: Runtime, alive: list[int]) -> list[Finding]:
         mounting_angle=np.array([fin.mounting_angle for fin in fins], dtype=np.float32),
     )
     truth = prepared.commands.wrench(command.astype(np.float64)) * normalization.std
-    return [
-        Finding(questions[0], max(float(a.max()) for a in apart), ONNX_TOLERANCE),
+    findings = [
+        Finding(questions[0], max(float(a.max()) for a in parts), ONNX_TOLERANCE),
         Finding(questions[1], float(normalization.error(wrench, truth).max()), ONNX_TOLERANCE),
     ]
+    fast = runtime.bundle.weights.fast
+    if fast is not None:
+        x = fin_frame_features(prepared.geometry, scaled).astype(np.float32)
+        apart = np.abs(OnnxSession(files[FAST]).run(features=x)[0] - NumpyFastNetwork(fast)(x))
+        findings.append(Finding("fast.onnx against numpy", float(apart.max()), ONNX_TOLERANCE))
+    return findings
 
 
 def _worst(values: Iterator[float]) -> float:

@@ -76,7 +76,7 @@ class LoopbackUdp:
         self._socket.settimeout(timeout)
         try:
             line, self._sender = self._socket.recvfrom(MAX_LINE + 1)
-        except TimeoutError:
+        except (TimeoutError, BlockingIOError):  # the second where the time allowed was 0
             return None
         self._socket.setblocking(False)
         while True:

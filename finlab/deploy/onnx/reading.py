@@ -22,7 +22,7 @@ MAX_BYTES = 64 * 2**20
 """Largest file that is read."""
 _OPERATORS = """
 Add Atan Concat Cos Div Elu Exp Floor GreaterOrEqual LayerNormalization LeakyRelu Less MatMul Max Min Mul Neg
-ReduceMean ReduceSum Relu Reshape Sigmoid Sin Slice Softmax Split Sub Tanh Transpose Unsqueeze Where
+ReduceMean ReduceSum Relu Reshape Sigmoid Sin Slice Softmax Split Squeeze Sub Tanh Transpose Unsqueeze Where
 """
 OPERATORS = frozenset(_OPERATORS.split())
 """Operators that our models use; others are refused."""
