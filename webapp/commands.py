@@ -7,6 +7,8 @@ from typing import Any
 import viser
 
 from webapp.panels.host import Host
+from webapp.state import AXIS_WORDS
+from webapp.targets import PRESETS
 
 
 def add_commands(gui: viser.GuiApi, host: Host) -> None:
@@ -37,6 +39,17 @@ def add_commands(gui: viser.GuiApi, host: Host) -> None:
     add("Duplicate the selected fin", session.duplicate_fin)
     add("Delete the selected fin", session.delete_fin)
     add("Add a fin", session.add_fin)
+    add("Pin this layout to compare with", session.pin)
+    for name in PRESETS:
+        add(f"Ask for: {name}", partial(session.set_preset, name))
+    for axis, word in enumerate(AXIS_WORDS):
+        add(f"Ask for {word} alone", partial(session.set_only_axis, axis))
+    add("Compare the methods", lambda: host.comparison.start(session.state))
+    add("Play the refinement", host.playback.start)
+    add("Stop the sweep", host.sweep.stop)
+    add("Swim: pause or go on", lambda: host.swimming.set_running(not host.swimming.running), "B")
+    add("Swim: back to the design", host.end_swim)
+    add("Export the bundle for the robot", host.export_bundle)
     add("Tour: start, or next stop", session.next_stop, "T")
     add("Start over", session.start_over)
     add("Freeze or move the fins", lambda: toggle("frozen"), "P")

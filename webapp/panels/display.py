@@ -10,10 +10,13 @@ from webapp.panels.host import Host
 from webapp.scene.robot_scene import CAMERAS
 
 SWITCHES = {
-    "frozen": ("Freeze", "Fins hold still at their zero direction."),
+    "frozen": ("Freeze", "Fins hold still at their zero direction (P)."),
     "fans": ("Sweep fans", "The angle that each fin sweeps."),
     "labels": ("Fin numbers", "A number at the root of each fin."),
-    "graph": ("Fin graph", "Edges between working fins: what the network sees."),
+    "graph": (
+        "Fin graph",
+        "Edges between working fins, thick where the network lets one look at another.",
+    ),
     "dimensions": ("Dimensions", "Coordinates of the selected fin."),
     "ghost": ("Ghost", "Where moved fins stood when the layout was opened or saved."),
     "center": ("Centre of gravity", "Mark it, and look through the hull."),
@@ -37,7 +40,7 @@ class DisplayPanel:
     def __init__(self, gui: viser.GuiApi, host: Host) -> None:
         """Build the widgets."""
         self._host = host
-        self._camera = gui.add_button_group("Camera", tuple(CAMERAS))
+        self._camera = gui.add_button_group("Camera", tuple(CAMERAS), hint="Keys 1, 2, 3, 4.")
         on_user_change(self._camera, host.look_from)
         self._speed = gui.add_slider("Motion speed", 0.05, 1.0, 0.05, 0.5, hint="1 is real time.")
         on_user_change(self._speed, partial(self._set, "speed"))

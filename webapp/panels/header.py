@@ -18,10 +18,14 @@ class Header:
         self._host = host
         gui.add_html(STYLE)
         self._corner = gui.add_html("")
-        self._history = gui.add_button_group("Session", ("Undo", "Redo", "Tour"))
+        self._history = gui.add_button_group(
+            "Session", ("Undo", "Redo", "Tour"), hint="Ctrl+Z, Ctrl+Shift+Z, T."
+        )
         on_user_change(self._history, self._step)
         self._card = gui.add_html("", visible=False)
-        self._stops = gui.add_button_group("Tour", ("Back", "Next", "End"), visible=False)
+        self._stops = gui.add_button_group(
+            "Tour", ("Back", "Next", "End"), hint="T is next; ending brings your work back.", visible=False
+        )
         on_user_change(self._stops, self._walk)
 
     def _step(self, button: str) -> None:

@@ -27,7 +27,12 @@ class HullPanel:
             self._shape = gui.add_dropdown("Shape", (*HULL_SHAPES, MESH), hint="For looks and for sticking.")
             on_user_change(self._shape, self._choose_shape)
             self._size = gui.add_vector3(
-                "Size [m]", (0.5, 0.3, 0.2), min=(0.02,) * 3, max=(5.0,) * 3, step=0.01
+                "Size [m]",
+                (0.5, 0.3, 0.2),
+                min=(0.02,) * 3,
+                max=(5.0,) * 3,
+                step=0.01,
+                hint="Length, width and height of a shape.",
             )
             on_user_change(self._size, self._resize)
             self._center = gui.add_vector3(
@@ -41,7 +46,10 @@ class HullPanel:
             )
             self._unit = gui.add_dropdown("Unit of file", tuple(UNITS), hint="What 1 means in the mesh file.")
             self._upload = gui.add_upload_button(
-                "Import a hull (STL, OBJ, GLB)", icon=viser.Icon.UPLOAD, mime_type=".stl,.obj,.glb,.ply"
+                "Import a hull (STL, OBJ, GLB)",
+                icon=viser.Icon.UPLOAD,
+                mime_type=".stl,.obj,.glb,.ply",
+                hint="Up to 20 MB and 60,000 triangles.",
             )
 
         @self._upload.on_upload

@@ -35,7 +35,7 @@ class LayoutPanel:
         self._layouts = gui.add_dropdown("Layout", (*shipped(), OWN), hint="Shipped layouts to start from.")
         on_user_change(self._layouts, self._open)
         self._about = gui.add_html("")
-        self._fins = gui.add_dropdown("Fin", (NONE,), hint="Or click a fin in the view.")
+        self._fins = gui.add_dropdown("Fin", (NONE,), hint="Or click one in the view; N is next, X none.")
         on_user_change(
             self._fins, lambda name: host.do(partial(host.session.select, None if name == NONE else name))
         )
@@ -59,7 +59,7 @@ class LayoutPanel:
         self._edit = gui.add_button_group(
             "Selected fin",
             ("Mirror", "Mirror once", "Unlink", "Duplicate", "To hull", "Delete"),
-            hint="What Mirror makes moves along until it is unlinked; Mirror once links nothing.",
+            hint="What Mirror (M) makes moves along until it is unlinked; Mirror once links nothing.",
         )
         on_user_change(self._edit, self._edit_fin)
         self._axis = gui.add_dropdown(

@@ -40,7 +40,9 @@ class SwimPanel:
             "Fin forces", tuple(PLANTS), hint="Mean forces, forces with their ripple, or flexible fins."
         )
         self._run = gui.add_button_group(
-            "Run", ("Start", "Pause", "Step", "End"), hint="Step swims for one tick of 0.1 s."
+            "Run",
+            ("Start", "Pause", "Step", "End"),
+            hint="Step swims for 0.1 s; B pauses or goes on.",
         )
         on_user_change(self._run, self._press)
         self._speed = gui.add_slider(

@@ -38,6 +38,7 @@ class TargetPanel:
                 10.0,
                 0.01 if k < 3 else 0.001,
                 0.0,
+                hint=AXIS_WORDS[k].capitalize(),
             )
             for k in range(6)
         ]

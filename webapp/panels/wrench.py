@@ -30,7 +30,9 @@ class WrenchPanel:
         self._target = TargetPanel(gui, host)
         self._paint = gui.add_html("")
         self._failures = gui.add_button_group(
-            "Fail a fin", ("1",), hint="Press a fin's number: fail or repair it."
+            "Fail a fin",
+            ("1",),
+            hint="Press a number to fail or repair a fin; F does it to the selected one.",
         )
         on_user_change(self._failures, self._toggle_failure)
         self._bars = gui.add_html("")
