@@ -1,0 +1,175 @@
+"""The loop on board: newest target first, deadlines kept, silence leads to rest."""
+
+import io
+import json
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from finlab.deploy.bundle import Bundle
+from finlab.deploy.bundle_file import parse_bundle
+from finlab.deploy.runtime import Answer, Runtime
+from finlab.deploy.serve import Server, Timing
+from finlab.deploy.transport import LoopbackUdp, StandardStreams
+from finlab.errors import FinlabError
+
+GOOD = {"wrench": [1, 0, 0.5, 0, 0, 0.1]}
+
+
+@pytest.fixture(scope="module")
+def runtime(bundle: Bundle) -> Runtime:
+    return Runtime(parse_bundle(bundle.files))
+
+
+class Script:
+    """A transport that plays requests (None is silence) and keeps what was sent."""
+
+    def __init__(self, *requests: Any) -> None:
+        self.requests = list(requests)
+        self.sent: list[dict[str, Any]] = []
+        self.waits: list[float | None] = []
+
+    def newest(self, timeout: float | None) -> bytes | None:
+        self.waits.append(timeout)
+        if not self.requests:
+            raise EOFError
+        request = self.requests.pop(0)
+        if request is None:
+            time.sleep(timeout or 0.0)
+            return None
+        return request if isinstance(request, bytes) else json.dumps(request).encode()
+
+    def send(self, line: bytes) -> None:
+        self.sent.append(json.loads(line))
+
+
+def served(runtime: Runtime, *requests: Any, timing: Timing | None = None, steady: bool = False) -> Script:
+    script = Script(*requests)
+    Server(runtime, timing or Timing(), steady).run(script)
+    return script
+
+
+def test_answers_like_the_runtime(runtime: Runtime) -> None:
+    first, end = served(runtime, {**GOOD, "id": 7, "failed": ["back_left"]}).sent
+    truth = runtime.allocate(GOOD["wrench"], failed=["back_left"])
+    assert (first["id"], first["status"]) == (7, "ok") and first["fins"] == list(truth.fins)
+    assert first["command"][2] is None
+    np.testing.assert_allclose(first["command"][0], truth.command[0])
+    assert end["status"] == "neutral" and end["command"][2] is None, "a lost fin gets no command at the end"
+
+
+@pytest.mark.parametrize(
+    ("request_", "message"),
+    [
+        (b"nonsense", "expected one JSON object"),
+        (b"[" * 60_000, "expected one JSON object"),
+        (b"x" * 70_000, "longer than 65536 bytes"),
+        ({"wrench": [1, 2]}, "expected six numbers"),
+        ({"force": [1, 2]}, "expected {.wrench.:"),
+        ({**GOOD, "speed": 3}, "unknown key 'speed'"),
+        ({**GOOD, "failed": "back_left"}, "failed: expected a list of fin names"),
+        ({**GOOD, "failed": ["nobody"]}, "no fin 'nobody'"),
+        ({**GOOD, "policy": "hope"}, "policy: expected one of"),
+        ({**GOOD, "policy": 3}, "policy: expected a name"),
+        ({"wrench": [float("nan")] * 6}, "Fx must be finite"),
+    ],
+)
+def test_bad_requests_get_one_sentence_and_no_commands(request_: Any, message: str, runtime: Runtime) -> None:
+    reply = served(runtime, request_).sent[0]
+    assert reply["status"] == "error" and "command" not in reply
+    with pytest.raises(FinlabError, match=message):
+        raise FinlabError(reply["error"])
+
+
+def test_silence_leads_to_rest_and_nonsense_is_silence(runtime: Runtime) -> None:
+    script = served(runtime, GOOD, b"nonsense", b"nonsense", None, timing=Timing(watchdog=0.2))
+    assert [reply["status"] for reply in script.sent] == ["ok", "error", "error", "neutral", "neutral"]
+    waits = [wait for wait in script.waits[1:4] if wait is not None]
+    assert waits == sorted(waits, reverse=True) and waits[0] <= 0.2, "nonsense does not feed the watchdog"
+    rest = np.array(script.sent[3]["command"])
+    np.testing.assert_array_equal(rest, runtime.neutral())
+
+
+class Slow(Runtime):
+    """A robot whose computer is busy."""
+
+    def __init__(self, runtime: Runtime, delay: float) -> None:
+        vars(self).update(vars(runtime))
+        self.delay = delay
+
+    def allocate(self, *args: Any, **options: Any) -> Answer:
+        time.sleep(self.delay)
+        return super().allocate(*args, **options)
+
+
+def test_deadline_repeats_what_was_sent_last(runtime: Runtime) -> None:
+    slow = Slow(runtime, 0.0)
+    server = Server(slow, Timing(deadline=0.15))
+    line = json.dumps(GOOD).encode()
+    assert server.answer(line)["status"] == "ok"
+    sent = server.answer(line)["command"]
+    slow.delay = 0.4
+    start = time.perf_counter()
+    late = server.answer(json.dumps({"wrench": [0, 0, 2, 0, 0, 0], "id": 1}).encode())
+    assert time.perf_counter() - start < 0.3
+    assert late["status"] == "late" and late["command"] == sent
+    assert server.answer(line)["status"] == "late", "the computer is still busy with the other target"
+    slow.delay = 0.0
+    time.sleep(0.6)
+    assert server.answer(line)["status"] == "ok"
+
+
+def test_first_answer_too_late_is_neutral(runtime: Runtime) -> None:
+    late = Server(Slow(runtime, 0.3), Timing(deadline=0.01)).answer(json.dumps(GOOD).encode())
+    assert late["status"] == "late"
+    np.testing.assert_array_equal(np.array(late["command"]), runtime.neutral())
+
+
+def test_steady_turns_fins_slowly(runtime: Runtime) -> None:
+    wrenches = [[1, 0, 0.5, 0, 0, 0.1], [0.9, 0.1, 0.5, 0, 0, 0.1]]
+    replies = served(runtime, *({"wrench": w} for w in wrenches), steady=True).sent
+    before = np.array(replies[0]["command"])
+    truth = runtime.allocate(wrenches[1], previous=before)
+    np.testing.assert_allclose(np.array(replies[1]["command"]), truth.command, atol=1e-9)
+
+
+def test_streams_keep_only_the_newest_request() -> None:
+    sink = io.BytesIO()
+    streams = StandardStreams(io.BytesIO(b"one\n\ntwo\nthree\n"), sink)
+    time.sleep(0.2)
+    assert streams.newest(1.0) == b"three\n"
+    with pytest.raises(EOFError):
+        streams.newest(1.0)
+    streams.send(b"answer\n")
+    assert sink.getvalue() == b"answer\n"
+
+
+def test_datagrams_on_this_machine_only() -> None:
+    transport = LoopbackUdp(0)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
+        client.settimeout(5)
+        transport.send(b"to nobody")
+        assert transport.newest(0.0) is None and transport.newest(0.01) is None
+        for line in (b"one", b"two"):
+            client.sendto(line, ("127.0.0.1", transport.port))
+        time.sleep(0.05)
+        assert transport.newest(1.0) == b"two"
+        transport.send(b"answer")
+        assert client.recv(100) == b"answer"
+    with pytest.raises(FinlabError, match="cannot listen on 127.0.0.1"):
+        LoopbackUdp(transport.port)
+
+
+def test_command_serves_over_pipes(bundle: Bundle, tmp_path: Path) -> None:
+    bundle.write(tmp_path)
+    command = [sys.executable, "-m", "finlab.deploy.command", "serve", str(tmp_path), "--watchdog-s", "0"]
+    done = subprocess.run(
+        command, input=json.dumps(GOOD).encode() + b"\n", capture_output=True, timeout=120, check=True
+    )
+    assert [json.loads(line)["status"] for line in done.stdout.splitlines()] == ["ok", "neutral"]
