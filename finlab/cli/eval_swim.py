@@ -44,7 +44,8 @@ def trajectory(
     Args:
         layouts: names or files with commas between.
         trajectory: circle, lissajous, square, or a CSV file with the columns t, x, y, z.
-        methods: names with commas between; on-board is U-CAT's own fixed-frequency law.
+        methods: names with commas between; also on-board, U-CAT's own law at a fixed frequency, and
+            learned-power, the learned method with inertial power for its energy.
         runs: runs of each, with other noise.
         seed: of the first run; the others follow on.
         plant: mean, ripple or flexible.
@@ -91,7 +92,8 @@ def faults(
     Args:
         layout: layout file or the name of a shipped layout.
         trajectory: circle, lissajous, square, or a CSV file with the columns t, x, y, z.
-        methods: names with commas between; on-board is U-CAT's own fixed-frequency law.
+        methods: names with commas between; also on-board, U-CAT's own law at a fixed frequency, and
+            learned-power, the learned method with inertial power for its energy.
         runs: runs of each, with other noise.
         seed: of the first run; the others follow on.
         plant: mean, ripple or flexible.
@@ -123,7 +125,7 @@ def faults(
 @verbs.command
 def velocity(
     layout: Annotated[str, arg(metavar="LAYOUT")] = "A",
-    methods: Methods = "learned,analytic,on-board",
+    methods: Methods = "learned-power,learned,analytic,on-board",
     baseline: Name = "analytic",
     runs: Count = 5,
     duration: Annotated[float, arg(metavar="SECONDS")] = 30.0,
@@ -138,7 +140,8 @@ def velocity(
 
     Args:
         layout: layout file or the name of a shipped layout.
-        methods: names with commas between; on-board is U-CAT's own fixed-frequency law.
+        methods: names with commas between; also on-board, U-CAT's own law at a fixed frequency, and
+            learned-power, the learned method with inertial power for its energy.
         baseline: the method that the others are compared with.
         runs: runs at each speed, with other noise.
         duration: of a run.

@@ -34,7 +34,7 @@ def simulate(
         layout: layout file, layout graph file, or the name of a shipped layout.
         trajectory: circle, lissajous, square, or a CSV file with the columns t, x, y, z.
         fail: a fin and when it is lost, such as front_left@30.
-        method: learned, paper, qp, sqp, analytic, multistart, trf, slsqp, ipopt or on-board.
+        method: learned, paper, qp, sqp, analytic, multistart, trf, slsqp, ipopt, on-board or learned-power.
         duration: time for a shipped trajectory.
         plant: mean (the fin law), ripple (within the flapping cycle) or flexible (fins with soft tips).
         gains: waypoint, waypoint_paper (proportional terms alone), or a YAML file.
@@ -58,7 +58,7 @@ def simulate(
     _check_folder(output)
     swim = Swim(
         robot.layout,
-        load_methods(method, checkpoint)[method],
+        next(iter(load_methods(method, checkpoint).values())),
         make_trajectory(trajectory, duration),
         WaypointController(load_gains(WaypointGains, gains)),
         plant=plant,

@@ -10,11 +10,11 @@ import numpy as np
 
 from finlab.evaluation.faults import HEALTHY
 from finlab.evaluation.report.pictures.style import COLOURS, GREY, ORANGE, VERMILION, clean, picture
-from finlab.evaluation.swim_pictures import DPI, failures
+from finlab.evaluation.swim_pictures import failures, save
 from finlab.evaluation.trajectory_errors import absolute_error
 from finlab.sim import SwimLog
 
-METHOD_COLOURS = {**COLOURS, "on-board": ORANGE, "learned, power": VERMILION}
+METHOD_COLOURS = {**COLOURS, "on-board": ORANGE, "learned-power": VERMILION}
 """Method -> colour."""
 MAX_COLUMNS = 4
 
@@ -44,7 +44,7 @@ def save_layouts_figure(runs: Sequence[Run], path: Path) -> None:
         drawn.axes[0].set_ylabel("y [m]")
         drawn.axes[len(layouts)].set_ylabel("z [m]")
         drawn.legend()
-        drawn.figure.savefig(path, dpi=DPI)
+        save(drawn, path)
 
 
 def save_faults_figure(runs: Sequence[Run], path: Path) -> None:
@@ -76,7 +76,7 @@ def save_faults_figure(runs: Sequence[Run], path: Path) -> None:
                 axis.set_xlabel("x [m]")
                 axis.xaxis.set_tick_params(labelbottom=True)
         drawn.legend()
-        drawn.figure.savefig(path, dpi=DPI)
+        save(drawn, path)
 
 
 def save_velocity_figure(runs: Sequence[Run], path: Path) -> None:
@@ -112,7 +112,7 @@ def save_velocity_figure(runs: Sequence[Run], path: Path) -> None:
         for axis in drawn.axes:
             clean(axis)
         drawn.legend(ncols=len(methods))
-        drawn.figure.savefig(path, dpi=DPI)
+        save(drawn, path)
 
 
 def _speeds(runs: Sequence[Run]) -> list[float]:

@@ -11,6 +11,7 @@ from tqdm import tqdm
 
 from finlab.allocation import load_allocator
 from finlab.allocation.allocator import Allocator
+from finlab.allocation.energy import POWER_WEIGHTS
 from finlab.errors import AllocationError
 from finlab.evaluation.on_board import OnBoard
 from finlab.evaluation.trajectory_errors import RTE_DELTA_S, absolute_error, depth_error, relative_error
@@ -23,7 +24,10 @@ LOST_M = 1.0
 
 
 def load_methods(names: str, checkpoint: str | None = None) -> dict[str, Allocator]:
-    """Allocators by name, from names with commas between; `on-board` is U-CAT's own.
+    """Allocators by name, from names with commas between.
+
+    Beside the methods of `load_allocator` there are `on-board`, U-CAT's own, and `learned-power`, the learned
+    method with the inertial power in place of the paper's energy proxy.
 
     Raises:
         AllocationError: an unknown method, or none.
@@ -35,18 +39,21 @@ def load_methods(names: str, checkpoint: str | None = None) -> dict[str, Allocat
 
 
 def _load(name: str, checkpoint: str | None) -> Allocator:
+    if name == "learned-power":
+        return load_allocator(checkpoint, "learned", energy_weights=POWER_WEIGHTS)
     if name != OnBoard.name:
         return load_allocator(checkpoint, name)
     return OnBoard(load_allocator(checkpoint, "analytic").normalization)
 
 
 def follow_row(log: SwimLog) -> Row:
-    """Errors of one run along a trajectory [m], power [W] and time."""
+    """Errors of one run along a trajectory [m], power [W] and time; a run that is shorter than the piece of
+    the relative error counts as one piece."""
     position, reference = log.position, log.reference
-    period = float(log.time[1] - log.time[0])
+    piece = round(RTE_DELTA_S / float(log.time[1] - log.time[0]))
     return {
         "ate": absolute_error(position, reference),
-        "rte": relative_error(position, reference, round(RTE_DELTA_S / period)),
+        "rte": relative_error(position, reference, min(piece, log.n_ticks - 1)),
         "depth_rmse": depth_error(position, reference),
         "max": float(np.linalg.norm(position - reference, axis=1).max()),
         **power_row(log),

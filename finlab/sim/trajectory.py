@@ -19,6 +19,8 @@ RAMP_S = 6.0
 """Time in which a shipped trajectory picks up its speed from rest [s]."""
 STEP_S = 0.05
 """Spacing of the samples of a shipped trajectory [s]."""
+SHORTEST_S = 1.0
+"""Least duration [s]; ten control periods."""
 MAX_BYTES = 20_000_000
 """Largest file that is read."""
 COLUMNS = ("t", "x", "y", "z")
@@ -32,7 +34,8 @@ class Trajectory:
         """Takes a name, rising times (N,) [s] from 0 and positions (N, 3) in the world [m].
 
         Raises:
-            DataError: fewer than two samples, times that do not rise from 0, or values that are not finite.
+            DataError: fewer than two samples, less than a second, times that do not rise from 0, or values
+                that are not finite.
         """
         time, position = np.asarray(time, np.float64), np.asarray(position, np.float64)
         if len(time) < 2 or position.shape != (len(time), 3):
@@ -44,6 +47,8 @@ class Trajectory:
             raise DataError(f"trajectory {name}: expected finite numbers, got NaN or infinity")
         if time[0] != 0.0 or not (np.diff(time) > 0.0).all():
             raise DataError(f"trajectory {name}: expected times that rise from 0, got {time[0]:g} first")
+        if time[-1] < SHORTEST_S:
+            raise DataError(f"trajectory {name}: expected at least {SHORTEST_S:g} s, got {time[-1]:g}")
         self.name = name
         self.time = time
         self.samples = position
