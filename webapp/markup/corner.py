@@ -65,8 +65,9 @@ def swim_corner(swimming: Swimming, newtons: float) -> str:
 
 
 def _legend(newtons: float) -> str:
-    arrows = [("asked", ASKED, 0.65), ("delivered", DELIVERED, 1.0), ("missing", MISSING, 1.0)]
-    rows = [f"{_arrow(css(color, alpha))}<span>{word}</span>" for word, color, alpha in arrows]
+    # By name, so that the dark theme can lighten them.
+    arrows = [("asked", 0.65), ("delivered", 1.0), ("missing", 1.0)]
+    rows = [f"{_arrow(f'var(--fl-{word})', alpha)}<span>{word}</span>" for word, alpha in arrows]
     turn = math.degrees(TORQUE_SCALE)
     return (
         f"<div class='fl-legend'>{''.join(rows)}</div><div class='dim' style='margin-top:4px'>"
@@ -74,9 +75,9 @@ def _legend(newtons: float) -> str:
     )
 
 
-def _arrow(color: str) -> str:
+def _arrow(color: str, opacity: float) -> str:
     return (
-        f"<svg width='44' height='10'><rect x='0' y='3' width='33' height='4' fill='{color}'/>"
+        f"<svg width='44' height='10' opacity='{opacity}'><rect x='0' y='3' width='33' height='4' fill='{color}'/>"
         f"<path d='M32 0 L44 5 L32 10 Z' fill='{color}'/></svg>"
     )
 

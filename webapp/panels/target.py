@@ -25,7 +25,7 @@ class TargetPanel:
         self._presets = gui.add_button_group("Preset", tuple(PRESETS), hint="Target wrenches to start from.")
         on_user_change(self._presets, lambda name: host.do(partial(host.session.set_preset, name)))
         self._only = gui.add_button_group(
-            "Only",
+            "One axis",
             AXES,
             hint="This axis alone, at a quarter of what the fins can give; press again to reverse it.",
         )
