@@ -27,20 +27,55 @@ def save(page: Page, path: Path) -> None:
     print(path, path.stat().st_size // 1000, "kB", flush=True)
 
 
+def _scroll(page: Page) -> None:
+    """To the end of the panel."""
+    page.page.mouse.move(SIZE["width"] - 200, 500)
+    page.page.mouse.wheel(0, 5000)
+    page.page.wait_for_timeout(500)
+
+
+def _steer(page: Page) -> None:
+    page.tab("Steer by hand")
+    page.tab("Sweep an axis")
+    page.choose("Axis", "sway")
+    page.press("Play the sweep")
+    page.until(lambda: page.session.state.target[1] > 3.0, seconds=120)
+    page.until(lambda: page.session.state.target[1] < 3.0, seconds=120)
+    page.press("Stop the sweep")
+    _scroll(page)
+
+
 def _layout(page: Page) -> None:
+    page.tab("Steer by hand")
+    page.tab("Sweep an axis")
+    page.press("Turn")
     page.key("n")
     page.tab("Layout")
 
 
+def _hull(page: Page) -> None:
+    page.tab("Hull")
+    _scroll(page)
+
+
 def _modes(page: Page) -> None:
+    page.tab("Hull")
     page.key("x")
     page.tab("Modes")
     page.type("Temperature T", "0.5")
-    page.tab("What the network proposes")
     page.until(lambda: not page.view.busy)
+    page.page.locator("svg.plot:visible .samples circle").nth(30).dispatch_event("click")
+    page.until(lambda: page.session.sample == 30)
+
+
+def _density(page: Page) -> None:
+    page.press("1")
+    page.tab("What the network proposes")
+    _scroll(page)
 
 
 def _limits(page: Page) -> None:
+    page.tab("What the network proposes")
     page.key("Control+z")
     page.tab("Limits")
     page.press("forces")
@@ -48,21 +83,54 @@ def _limits(page: Page) -> None:
     page.until(lambda: not page.view.analyst.busy)
 
 
-def _compare(page: Page) -> None:
+def _improve(page: Page) -> None:
     page.key("Control+z")
+    page.choose("Beside", "hexa")
+    page.press("Search")
+    page.until(lambda: page.view.improver.found is not None, seconds=300)
+    page.until(lambda: not page.view.analyst.busy)
+    _scroll(page)
+
+
+def _compare(page: Page) -> None:
+    page.press("Leave")
+    page.session.compare_with(None)
+    page.tab("Wrench")
+    page.tab("Limits")
     page.press("none")
     page.tab("Compare")
     page.press("Compare the methods")
-    page.until(lambda: not page.view.comparison.running)
+    page.until(lambda: not page.view.comparison.running, seconds=120)
     page.press("sqp")
 
 
-def _view(page: Page) -> None:
+def _swim(page: Page) -> None:
     page.press("none")
+    page.tab("Swim")
+    page.choose("Beside", "analytic")
+    page.press("Start")
+    page.until(lambda: page.view.swimming.time > 1.0, seconds=120)
+    page.type("Speed", "3")
+    page.until(lambda: page.view.swimming.time > 25.0, seconds=300)
+    page.page.get_by_role("button", name="2", exact=True).locator("visible=true").first.click()
+    page.until(lambda: page.view.swimming.time > 45.0, seconds=300)
+    page.press("Pause")
+
+
+def _view(page: Page) -> None:
+    page.press("End")
     page.tab("View")
+    page.row("Fin graph").first.click()
+
+
+def _dark(page: Page) -> None:
+    page.row("Dark").first.click()
+    page.tab("Wrench")
 
 
 def _failure(page: Page) -> None:
+    page.tab("View")
+    page.row("Dark").first.click()
     page.tab("Wrench")
     page.press("2")
     page.until(lambda: not page.view.busy)
@@ -75,16 +143,29 @@ def _tour(page: Page) -> None:
     page.until(lambda: not page.view.busy)
 
 
+def _palette(page: Page) -> None:
+    page.press("End")
+    page.key("Control+k")
+    page.page.wait_for_timeout(1500)
+
+
 SCENES: dict[str, Callable[[Page], object]] = {
     "app": lambda page: page.page.wait_for_timeout(10_000),  # the first labels take their time
+    "app-steer": _steer,
     "app-layout": _layout,
+    "app-hull": _hull,
     "app-modes": _modes,
+    "app-density": _density,
     "app-limits": _limits,
+    "app-improve": _improve,
     "app-compare": _compare,
+    "app-swim": _swim,
     "app-view": _view,
+    "app-dark": _dark,
     "app-files": lambda page: page.tab("Files"),
     "app-failure": _failure,
     "app-tour": _tour,
+    "app-palette": _palette,
 }
 """Picture and what to do before it; each goes on from the one before."""
 
@@ -104,7 +185,7 @@ def main(folder: Path, wanted: list[str]) -> None:
 
     server = start_server("127.0.0.1", 0)
     ucat, solver = load_layout(shipped_layouts()["ucat"]), Solver()
-    solver.solve(State(ucat, target=FIRST))  # as `serve` does, so that the first page finds a warm solver
+    solver.reply(State(ucat, target=FIRST))  # as `serve` does, so that the first page finds a warm solver
     app = App(server, solver, ucat, Display())
     with sync_playwright() as playwright:
         browser: Any = playwright.chromium.launch(

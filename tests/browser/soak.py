@@ -70,9 +70,8 @@ def main(rounds: int) -> None:
         before, megabytes = nodes(app), memory()
         times = [changed(pages, k) for k in range(1, rounds + 1)]
         p50, p95 = np.percentile(times, [50, 95])
-        print(
-            f"{BROWSERS} browsers, {rounds} rounds: all show their own answer after {p50:.1f} s, p95 {p95:.1f} s"
-        )
+        print(f"{BROWSERS} browsers, {rounds} rounds: all pages show their own answer")
+        print(f"after {p50:.1f} s in the median, {p95:.1f} s at 95 %")
         print(f"memory of the server: {megabytes:.0f} MB before, {memory():.0f} MB after")
         print(f"nodes and widgets: {before} before, {nodes(app)} after")
         print(f"errors on the pages: {sum(len(page.problems) for page in pages)}")

@@ -77,7 +77,8 @@ def _legend(newtons: float) -> str:
 
 def _arrow(color: str, opacity: float) -> str:
     return (
-        f"<svg width='44' height='10' opacity='{opacity}'><rect x='0' y='3' width='33' height='4' fill='{color}'/>"
+        f"<svg width='44' height='10' opacity='{opacity}'>"
+        f"<rect x='0' y='3' width='33' height='4' fill='{color}'/>"
         f"<path d='M32 0 L44 5 L32 10 Z' fill='{color}'/></svg>"
     )
 
