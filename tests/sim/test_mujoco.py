@@ -56,5 +56,5 @@ def test_a_minute_under_changing_wrenches_agrees() -> None:
         worst_place = max(worst_place, float(np.abs(state[:3] - data.qpos[:3]).max()))
         worst_angle = max(worst_angle, float(angle))
     assert np.linalg.norm(state[:3]) > 5.0, "it moved"
-    assert worst_place < 1e-3, "metres"
-    assert worst_angle < 1e-4, "radians"
+    assert worst_place < 1e-6, "metres"
+    assert worst_angle < 1e-8, "radians"
