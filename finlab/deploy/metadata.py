@@ -104,7 +104,7 @@ def numbers_of(model: Model, key: str, count: int, source: str) -> tuple[float, 
     value = value_of(model, key, source)
     values = value if isinstance(value, list) else [value]
     plain = all(isinstance(item, int | float) and not isinstance(item, bool) for item in values)
-    if not plain or len(values) != count or not np.isfinite(np.array(values, dtype=np.float64)).all():
+    if not plain or len(values) != count or not all(abs(item) < 1e300 for item in values):
         raise DataError(f"{source}: {key} must be {count} finite numbers, got {value!r:.40}")
     return tuple(float(item) for item in values)
 

@@ -1,0 +1,110 @@
+"""Ten thousand files of strangers: each is read, or refused by an error of ours; nothing else may happen."""
+
+import json
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import finlab
+from finlab.assets import shipped_layouts
+from finlab.deploy.bundle import CHECKSUMS, GRAPH, NETWORK, SURROGATE, Bundle, checksums, make_bundle
+from finlab.deploy.bundle_file import parse_bundle, read_bundle
+from finlab.deploy.graph_file import _checksum, parse_graph
+from finlab.deploy.runtime import Runtime
+from finlab.errors import FinlabError
+from finlab.layout import load_layout
+
+LAYOUTS, GRAPHS, BUNDLES, ARCHIVES = 3000, 3000, 3500, 500
+ODD = (b"\xff", b"\0", b"9" * 30, b"1e999", b"NaN", b"[", b"{", b'"', b"\n- ", b"&a *a", b"-1", b"null", b"")
+
+
+@pytest.fixture(scope="module")
+def small(untrained_checkpoint: Path) -> Bundle:
+    """A bundle of a small network, so that many fit into a test."""
+    allocator = finlab.load_allocator(untrained_checkpoint)
+    return make_bundle(load_layout(shipped_layouts()["A"]), allocator)
+
+
+def mutated(rng: np.random.Generator, content: bytes) -> bytes:
+    """Content with some bytes changed, cut, doubled, or something odd put in."""
+    changed = bytearray(content)
+    for _ in range(rng.integers(1, 4)):
+        place, kind = int(rng.integers(0, len(changed) + 1)), rng.integers(5)
+        if kind == 0 and place < len(changed):
+            changed[place] = int(rng.integers(256))
+        elif kind == 1:
+            del changed[place : place + int(rng.integers(1, 40))]
+        elif kind == 2:
+            changed[place:place] = changed[place : place + int(rng.integers(1, 200))]
+        elif kind == 3:
+            changed[place:place] = ODD[rng.integers(len(ODD))]
+        elif rng.random() < 0.2:
+            del changed[place:]
+    return bytes(changed)
+
+
+def survive(read: Callable[[], object]) -> int:
+    """1 for a success, 0 for an error of ours; any other error fails the test."""
+    try:
+        read()
+    except FinlabError as error:
+        assert str(error) and "\n" not in str(error)
+        return 0
+    return 1
+
+
+def test_layout_files(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    texts = [path.read_bytes() for path in shipped_layouts().values()]
+    path = tmp_path / "x.yaml"
+    good = 0
+    for i in range(LAYOUTS):
+        path.write_bytes(mutated(rng, texts[i % len(texts)]))
+        good += survive(lambda: load_layout(path))
+    assert 0 < good < LAYOUTS
+
+
+def test_graph_files(small: Bundle) -> None:
+    rng = np.random.default_rng(1)
+    good = 0
+    for i in range(GRAPHS):
+        text = mutated(rng, small.files[GRAPH]).decode("utf-8", "replace")
+        if i % 2:  # a forger mends the checksum
+            try:
+                document = json.loads(text)
+                document["checksum"] = _checksum(document)
+                text = json.dumps(document)
+            except (ValueError, TypeError, RecursionError):
+                pass
+        good += survive(lambda text=text: parse_graph(text))  # type: ignore[misc]
+    assert 0 < good < GRAPHS
+
+
+def test_bundles(small: Bundle) -> None:
+    rng = np.random.default_rng(2)
+    good = 0
+    names = sorted(small.files)
+    for i in range(BUNDLES):
+        name = (NETWORK, SURROGATE, names[i % len(names)])[i % 3]
+        files = {**small.files, name: mutated(rng, small.files[name])}
+        if i % 8 and name != CHECKSUMS:
+            rest = {key: content for key, content in files.items() if key != CHECKSUMS}
+            files[CHECKSUMS] = checksums(rest)
+
+        def run(files: dict[str, bytes] = files) -> None:
+            Runtime(parse_bundle(files))
+
+        good += survive(run)
+    assert 0 < good < BUNDLES
+
+
+def test_archives(small: Bundle, tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    path, content = tmp_path / "x.zip", small.zip_bytes()
+    for _ in range(ARCHIVES):
+        path.write_bytes(mutated(rng, content))
+        survive(lambda: read_bundle(path))
+    assert zipfile.is_zipfile(path) or path.stat().st_size > 0
