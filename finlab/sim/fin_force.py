@@ -44,6 +44,9 @@ class FinShape(NamedTuple):
 class FinForce(Protocol):
     """Fin motion to force."""
 
+    step_s: float
+    """Longest step that resolves the force [s]."""
+
     def step(self, motion: FinMotion, dt: float) -> Array:
         """Force (n, 3) of each fin in its own frame (shaft, e_h, e_z) [N], the mean over the step that has
         just been taken."""
@@ -52,6 +55,8 @@ class FinForce(Protocol):
 
 class MeanForce:
     """The fin law of the layout with the motion of now: no ripple."""
+
+    step_s = 0.02
 
     def __init__(self, layout: Layout) -> None:
         self._n_fins = layout.n_fins
@@ -77,6 +82,8 @@ class RippleForce:
     carries, m L^2/2 theta', and the drag of its strips, 1/8 rho Cd W L^4 theta' |theta'|. Over a cycle both
     have mean zero, so the mean force stays the fin law's. The fin points away from its thrust.
     """
+
+    step_s = 0.01
 
     def __init__(self, layout: Layout, shape: FinShape | None = None) -> None:
         self._mean = MeanForce(layout)

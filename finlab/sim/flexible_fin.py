@@ -47,6 +47,8 @@ class SoftFin:
 class FlexibleForce:
     """Forces of the fins of one layout; all fins are alike. Its `step` is that of `FinForce`."""
 
+    step_s = 0.01
+
     def __init__(self, layout: Layout, fin: SoftFin | None = None) -> None:
         self.fin = SoftFin() if fin is None else fin
         n = layout.n_fins

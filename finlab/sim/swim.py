@@ -26,9 +26,6 @@ from finlab.sim.vehicle import STATE_SIZE, Vehicle
 
 Array = NDArray[np.float64]
 
-STEP_S = 0.01
-"""Longest step of fins and body [s]."""
-
 
 class Swim:
     """One robot under way. Make it, then call `step` until `done`; `fail` and `mend` fins as you like.
@@ -205,7 +202,7 @@ class Swim:
     def _move(self, time: float, now: Measurement, asked: Array, command: Array, solve_ms: float) -> Tick:
         """Fins and body over one period with a constant command."""
         before, setpoint = self.state, self.task.setpoint(time)
-        n_steps = max(1, math.ceil(self.period_s / STEP_S - 1e-9))
+        n_steps = max(1, math.ceil(self.period_s / self._fin_force.step_s - 1e-9))
         dt = self.period_s / n_steps
         alive = np.isfinite(command[:, 0])
         total, wrench_sum = np.zeros((self.layout.n_fins, 3)), np.zeros(6)
