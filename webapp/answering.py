@@ -89,12 +89,13 @@ class Answering:
 
     def _variant(self, best: Allocation, kind: str, index: int) -> Allocation:
         """The answer with another command; kept, because every refresh asks for it."""
-        if self._shown is None or self._shown[:3] != (best, kind, index):
+        known = self._shown
+        if known is None or known[0] is not best or known[1:3] != (kind, index):
             group = best.samples if kind == "sample" else best.candidates
             assert group is not None
             other = replace(best, command=group.command[index], wrench_surrogate=None)
-            self._shown = (best, kind, index, other)
-        return self._shown[3]
+            known = self._shown = (best, kind, index, other)
+        return known[3]
 
     def ask(self) -> None:
         """Have the worker answer the present state, unless it was asked already."""

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 import viser
 
+PLAIN = (str, int, float)
+
 
 def put(handle: Any, **values: Any) -> None:
     """Set properties of a handle, but only those that differ, so that an unchanged page gets no message."""
@@ -20,6 +22,25 @@ def _same(old: Any, new: Any) -> bool:
     if isinstance(old, tuple) and len(old) and isinstance(old[0], np.ndarray):
         return len(old) == len(new) and all(_same(a, b) for a, b in zip(old, new, strict=True))
     return bool(old == new)
+
+
+class Changes:
+    """Tells whether something must be made anew: it remembers what it was made from last.
+
+    Objects count by identity (comparing their arrays would cost more than it saves), plain values by value.
+    """
+
+    def __init__(self) -> None:
+        """Nothing has been made yet."""
+        self._parts: tuple[Any, ...] | None = None
+
+    def __call__(self, *parts: Any) -> bool:
+        """True unless it was asked about the same parts last."""
+        old, self._parts = self._parts, parts
+        return old is None or not all(
+            a is b or (isinstance(a, PLAIN) and isinstance(b, PLAIN) and a == b)
+            for a, b in zip(old, parts, strict=True)
+        )
 
 
 def on_user_change(handle: Any, act: Callable[[Any], None]) -> None:

@@ -1,15 +1,20 @@
 """Candidates that do the same are one mode, and no two modes share a name."""
 
+from typing import Any
+
 import numpy as np
 
 from finlab.allocation.allocation import Candidates
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
-from tests.webapp.stand_in import StandIn
+from tests.webapp.stand_in import StandIn, load_stand_in
+from webapp.answering import Answering
 from webapp.figures import small, three_digits
 from webapp.markup.mode_plot import mode_plot
 from webapp.markup.modes import mode_table
 from webapp.modes import distinct_modes, nearest_modes
+from webapp.session import Session
+from webapp.solver import Solver
 from webapp.targets import PRESETS
 
 PUSH, REST = (0.3, 1.1, 0.0), (0.05, 0.1, 0.0)
@@ -79,3 +84,24 @@ def test_figures_keep_their_width() -> None:
     assert [three_digits(v) for v in (2.319, 0.041, 12.5, 0.0)] == ["2.32", "0.0410", "12.5", "0.00"]
     assert three_digits(float("nan")) == small(float("nan")) == "–"
     assert "−" in small(1e-5) and "-" not in three_digits(-2e-9)
+
+
+def test_another_sample_of_another_answer_is_shown() -> None:
+    layout = load_layout(shipped_layouts()["ucat"])
+    session = Session(layout)
+    jobs: list[Any] = []
+    worker: Any = type("AtOnce", (), {"submit": lambda _, key, job: jobs.append(job)})()
+    answering = Answering(
+        session, Solver(load=load_stand_in), worker, lambda act: act(), lambda: None, lambda _: None
+    )
+    shown = []
+    for value in (0.5, 0.8):
+        session.set_target(1, value)
+        answering.ask()
+        jobs.pop()()
+        session.show_sample(2)
+        shown.append(answering.shown)
+        assert answering.shown is shown[-1], "it is made once"
+        session.show_sample(3)
+        assert answering.shown is not shown[-1]
+    assert shown[0].target[1] == 0.5 and shown[1].target[1] == 0.8

@@ -7,7 +7,7 @@ import viser
 
 from webapp.analyst import DRAWN, Findings
 from webapp.figures import three_digits
-from webapp.handles import on_user_change, put
+from webapp.handles import Changes, on_user_change, put
 from webapp.markup.score_card import score_table
 from webapp.panels.host import Host
 from webapp.panels.improve import ImprovePanel
@@ -43,6 +43,7 @@ class LimitsPanel:
         on_user_change(self._pin, lambda _: host.do(host.session.pin))
         self._card = gui.add_html("")
         self._improve = ImprovePanel(gui, host)
+        self._changes = Changes()
 
     def _set(self, key: str, value: object) -> None:
         self._host.do(partial(self._host.session.set_display, key, value))
@@ -60,6 +61,8 @@ class LimitsPanel:
         analyst, display = self._host.analyst, self._host.session.display
         put(self._alone, value=display.alone, visible=display.drawn != "none")
         found = analyst.findings
+        if not self._changes(found, analyst.busy, analyst.error, session.beside):
+            return
         if analyst.error is not None:
             put(self._card, content="<div class='fl missing'>This layout cannot be analysed.</div>")
         elif found is None:

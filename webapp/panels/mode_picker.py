@@ -5,7 +5,7 @@ from functools import partial
 import viser
 
 from webapp.channel import Channel
-from webapp.handles import on_user_change, put
+from webapp.handles import Changes, on_user_change, put
 from webapp.markup.mode_plot import SAMPLES, mode_plot
 from webapp.markup.picking import marker
 from webapp.panels.host import Host
@@ -19,6 +19,7 @@ class ModePicker:
         self._host = host
         self._height = height
         self.name = name
+        self._changes = Changes()
         self._plot = gui.add_html("")
         Channel(gui, f"{name}-{SAMPLES}", self._choose_sample)
         gui.add_html(marker(name))
@@ -47,6 +48,8 @@ class ModePicker:
         """Write the modes of the newest answer."""
         answering, sample = self._host.answering, self._host.session.sample
         best, modes = answering.best, answering.modes
+        if not self._changes(best, self.shown, sample):
+            return
         put(self._choice, options=tuple(str(k + 1) for k in range(len(modes))) or ("1",))
         plot = ""
         if best is not None:

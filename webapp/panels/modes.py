@@ -6,7 +6,7 @@ import viser
 
 from finlab.allocation.methods import METHODS
 from webapp.figures import small, three_digits
-from webapp.handles import on_user_change, on_user_click, put
+from webapp.handles import Changes, on_user_change, on_user_click, put
 from webapp.markup.modes import mode_table
 from webapp.panels.density import DensityPanel
 from webapp.panels.host import Host
@@ -50,6 +50,7 @@ class ModesPanel:
         on_user_click(self._play, lambda: host.do(host.playback.start))
         self._step = gui.add_html("")
         self._density = DensityPanel(gui)
+        self._changes = Changes()
 
     def _set(self, key: str, value: object) -> None:
         self._host.do(partial(self._host.session.set_setting, key, value))
@@ -63,8 +64,9 @@ class ModesPanel:
         put(self._gamma, value=state.gamma)
         self._picker.refresh()
         answering, picker = host.answering, self._picker
-        candidates = None if answering.best is None else answering.best.candidates
-        put(self._table, content=mode_table(candidates, answering.modes, picker.shown, picker.name))
+        if self._changes(answering.best, picker.shown):
+            candidates = None if answering.best is None else answering.best.candidates
+            put(self._table, content=mode_table(candidates, answering.modes, picker.shown, picker.name))
         put(self._step, content=_step_words(host))
         self._density.refresh(host.answering.densities)
 
