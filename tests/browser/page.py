@@ -31,12 +31,13 @@ PROJECT = """([name, point]) => {
 class Page:
     """One tab."""
 
-    def __init__(self, page: Any, served: Any) -> None:
-        """Open the app and wait until the robot stands."""
+    def __init__(self, page: Any, served: Any, patience: float = 1.0) -> None:
+        """Open the app and wait until the robot stands; `patience` makes all waits longer."""
+        self.patience = patience
         self.page = page
         self._served = served
         self.problems: list[str] = []
-        page.set_default_timeout(WAIT_MS)
+        page.set_default_timeout(WAIT_MS * patience)
         page.on("console", lambda m: self.problems.append(m.text) if m.type == "error" else None)
         before = set(served.app.views)
         page.goto(served.url)
@@ -83,8 +84,8 @@ class Page:
         self.page.evaluate(script)
 
     def until(self, condition: Callable[[], bool], seconds: float = 30.0) -> None:
-        """Wait for the server or the page to come round."""
-        end = time.monotonic() + seconds
+        """Wait for the server or the page to come round; longer on a page that needs patience."""
+        end = time.monotonic() + seconds * self.patience
         while not condition():
             assert time.monotonic() < end, "what was waited for did not happen"
             self.page.wait_for_timeout(50)

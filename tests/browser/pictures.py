@@ -18,12 +18,12 @@ SIZE = {"width": 1400, "height": 860}
 
 
 def save(page: Page, path: Path) -> None:
-    """A screenshot without the notes; one bit less per colour is not seen and makes it a third smaller."""
+    """A screenshot without the notes; two bits less per colour are hardly seen and make it half as large."""
     page.close_notes()
     page.page.mouse.move(200, 60)  # off the buttons, so that no hint covers anything
     page.page.wait_for_timeout(2500)
-    picture = Image.open(io.BytesIO(page.page.screenshot())).convert("RGB")
-    ImageOps.posterize(picture, 7).save(path, optimize=True)
+    picture = Image.open(io.BytesIO(page.page.screenshot(timeout=0))).convert("RGB")
+    ImageOps.posterize(picture, 6).save(path, optimize=True)
     print(path, path.stat().st_size // 1000, "kB", flush=True)
 
 
@@ -191,9 +191,8 @@ def main(folder: Path, wanted: list[str]) -> None:
         browser: Any = playwright.chromium.launch(
             executable_path=CHROMIUM, headless=True, chromium_sandbox=False, args=FLAGS
         )
-        page = Page(
-            browser.new_page(viewport=SIZE), Served(f"http://127.0.0.1:{server.get_port()}/", app, server)
-        )
+        served = Served(f"http://127.0.0.1:{server.get_port()}/", app, server)
+        page = Page(browser.new_page(viewport=SIZE), served, patience=6.0)
         for name, prepare in SCENES.items():
             prepare(page)
             if not wanted or name in wanted:

@@ -64,7 +64,7 @@ def main(rounds: int) -> None:
         )
         pages = []
         for k in range(BROWSERS):  # a context is a browser profile of its own, with its own storage
-            pages.append(Page(browser.new_context(viewport=SIZE).new_page(), served))
+            pages.append(Page(browser.new_context(viewport=SIZE).new_page(), served, patience=6.0))
             print(f"browser {k + 1} is there", flush=True)
         changed(pages, 0)
         before, megabytes = nodes(app), memory()

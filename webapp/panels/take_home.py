@@ -9,7 +9,7 @@ import viser
 
 from finlab.assets import shipped_layouts
 from webapp import files
-from webapp.handles import on_user_change, put
+from webapp.handles import Changes, on_user_change, put
 from webapp.panels.host import Host
 from webapp.shipped import shipped_name
 from webapp.state import State
@@ -40,6 +40,7 @@ class TakeHomePanel:
         )
         on_user_change(self._robot, self._press)
         self._command = gui.add_html("")
+        self._changes = Changes()
 
         @self._open.on_upload
         async def _opened(event: Any) -> None:
@@ -74,6 +75,8 @@ class TakeHomePanel:
     def refresh(self) -> None:
         """Write the command that asks the same question."""
         state = self._host.session.state
+        if not self._changes(state):
+            return
         known = shipped_name(state.layout)
         words = ["finlab", "allocate", known or f"{files.file_stem(state.layout.name)}.yaml", "--wrench"]
         words += [f"{value:g}" for value in state.target]
