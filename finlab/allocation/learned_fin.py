@@ -43,7 +43,7 @@ class LearnedFin:
         flat = command.reshape(-1, 3)
         layers = self._rough if command.dtype == np.float32 else self._layers
         a, f, c, s = self._inputs(flat)
-        hidden = np.stack([a - 0.5, f - 0.5, c, s], axis=1)
+        hidden = _columns(a - 0.5, f - 0.5, c, s)
         for weight, bias in layers[:-1]:
             hidden = hidden @ weight
             hidden += bias
@@ -61,7 +61,7 @@ class LearnedFin:
         flat = command.reshape(-1, 3)
         rows = len(flat)
         a, f, c, s = self._inputs(flat)
-        hidden = np.stack([a - 0.5, f - 0.5, c, s], axis=1)
+        hidden = _columns(a - 0.5, f - 0.5, c, s)
         tangent = np.zeros((rows, 3, 4))  # d inputs / d command
         tangent[:, 0, 0] = 1.0 / self._a0
         tangent[:, 1, 1] = 1.0 / self._f0
@@ -78,7 +78,7 @@ class LearnedFin:
         dk[:, 0] += (2.0 * self._unit / self._a0 * a * f * f)[:, None] * k
         dk[:, 1] += (2.0 * self._unit / self._f0 * a * a * f)[:, None] * k
         k *= scale[:, None]
-        force = np.stack([k[:, 0], c * k[:, 1] - s * k[:, 2], s * k[:, 1] + c * k[:, 2]], axis=1)
+        force = _columns(k[:, 0], c * k[:, 1] - s * k[:, 2], s * k[:, 1] + c * k[:, 2])
         jacobian = np.empty((rows, 3, 3))
         c3, s3 = c[:, None], s[:, None]
         jacobian[:, 0] = dk[:, :, 0]
@@ -90,3 +90,11 @@ class LearnedFin:
 
     def _inputs(self, flat: Array) -> tuple[Array, Array, Array, Array]:
         return flat[:, 0] / self._a0, flat[:, 1] / self._f0, np.cos(flat[:, 2]), np.sin(flat[:, 2])
+
+
+def _columns(*columns: Array) -> Array:
+    """Vectors (R,) side by side; `np.stack` takes four times as long for so few."""
+    result = np.empty((len(columns[0]), len(columns)), dtype=columns[0].dtype)
+    for i, column in enumerate(columns):
+        result[:, i] = column
+    return result

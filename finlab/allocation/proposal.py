@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,16 +55,31 @@ def sample(
     extra = n_samples - kept
     if extra <= 0:
         return means[:, :kept], component
-    rng = np.random.default_rng(seed)
+    raw, normal = _draws_of_one(seed, extra, n) if rows == 1 else _draws(seed, rows, extra, n)
     cumulative = mixture.weight.cumsum(1)
-    draw = rng.random((rows, extra, 1), dtype=np.float32) * cumulative[:, None, -1:]
+    draw = raw * cumulative[:, None, -1:]
     drawn = np.minimum((draw > cumulative[:, None, :]).sum(-1), m - 1)
     row = np.arange(rows)[:, None]
-    noise = rng.standard_normal((rows, extra, n, 3), dtype=np.float32)
-    noise *= np.swapaxes(mixture.std, 1, 2)[row, drawn]
+    noise = normal * np.swapaxes(mixture.std, 1, 2)[row, drawn]
     noise *= np.float32(np.sqrt(temperature))
     noise += means[row, drawn]
     return np.concatenate([means, noise], axis=1), np.concatenate([component, drawn], axis=1)
+
+
+def _draws(seed: int, rows: int, extra: int, n: int) -> tuple[Array, Array]:
+    """Uniform (rows, extra, 1) and normal (rows, extra, n, 3) random numbers of a seed."""
+    rng = np.random.default_rng(seed)
+    uniform = rng.random((rows, extra, 1), dtype=np.float32)
+    return uniform, rng.standard_normal((rows, extra, n, 3), dtype=np.float32)
+
+
+@lru_cache(maxsize=64)
+def _draws_of_one(seed: int, extra: int, n: int) -> tuple[Array, Array]:
+    """The same for a single target, kept: a robot asks with one seed, tick after tick."""
+    uniform, normal = _draws(seed, 1, extra, n)
+    uniform.setflags(write=False)
+    normal.setflags(write=False)
+    return uniform, normal
 
 
 def propose(
