@@ -7,13 +7,15 @@ import re
 from pathlib import Path
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.methods import LEARNED, METHODS, load_allocator
+from finlab.allocation.methods import LEARNED, load_allocator
 from finlab.errors import AllocationError
 
 SLOW = ("trf", "slsqp", "ipopt")
 """Methods that take a tenth of a second per target, each from several starts; they run on a subsample."""
-FAST = tuple(name for name in METHODS if name not in SLOW)
+QUICK = ("learned", "fast", "paper", "qp", "sqp", "analytic", "multistart")
 """Methods that run on every target."""
+DISTILLED = "fast"
+"""Folder of the distilled network in a checkpoint."""
 _WITH_STARTS = re.compile(r"(\w+)-(\d+)")
 
 
@@ -49,9 +51,19 @@ def fingerprint(name: str, checkpoint: str | Path | None = None) -> str:
 
     method = _parse(name)[0]
     path = resolve_checkpoint(checkpoint or ("paper" if method == "paper" else "default"))
+    if method == "fast":
+        weights = b"".join(file.read_bytes() for file in sorted((path / DISTILLED).iterdir()))
+        return load_checkpoint(path).sha256 + hashlib.sha256(weights).hexdigest()
     if method in LEARNED:
         return load_checkpoint(path).sha256
     return hashlib.sha256(b"".join(values.tobytes() for values in load_normalization(path))).hexdigest()
+
+
+def has_distilled(checkpoint: str | Path | None = None) -> bool:
+    """Whether a checkpoint holds the distilled network of method `fast`."""
+    from finlab.model.checkpoint import resolve_checkpoint
+
+    return (resolve_checkpoint(checkpoint or "default") / DISTILLED).is_dir()
 
 
 def surrogate_fingerprint(checkpoint: str | Path) -> str:

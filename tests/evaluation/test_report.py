@@ -19,7 +19,7 @@ pytest.importorskip("casadi")
 def few() -> pytest.MonkeyPatch:
     """Fewer methods, temperatures and trainings than a real report has."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(planning, "FAST", ("learned", "paper", "analytic"))
+        patch.setattr(planning, "QUICK", ("learned", "paper", "analytic"))
         patch.setattr(planning, "SLOW", ("ipopt",))
         patch.setattr(planning, "ENERGY_METHODS", ("learned", "analytic", "ipopt"))
         patch.setattr(planning, "LATENCY_METHODS", ("learned", "paper", "analytic", "ipopt"))

@@ -13,6 +13,8 @@ from finlab.evaluation.report.numbers import error, factor, share, three
 
 Row = dict[str, Any]
 OURS = "learned"
+FAMILY = ("learned", "fast")
+"""Ours, and its distilled form, which is not set against it."""
 
 
 class Claims(NamedTuple):
@@ -61,7 +63,7 @@ def accuracy_claims(tables: Mapping[str, Sequence[Row]]) -> Claims:
     for split, rows in tables.items():
         ours = next((row for row in rows if row["method"] == OURS), None)
         for row in rows if ours is not None else ():
-            if row["method"] == OURS:
+            if row["method"] in FAMILY:
                 continue
             assert ours is not None
             if ours["err_norm_mean_interval"][1] < row["err_norm_mean_interval"][0]:
@@ -104,7 +106,7 @@ def energy_claims(rows: Sequence[Row], reference: str) -> Claims:
     whole, leads, trails = ours["all"], [], []
     for row in rows:
         other = row["energy_ratio"]
-        if row["fins"] != "all" or row["method"] in (OURS, reference) or other is None:
+        if row["fins"] != "all" or row["method"] in (*FAMILY, reference) or other is None:
             continue
         if whole["energy_ratio_high"] < row["energy_ratio_low"]:
             less = share(1 - whole["energy_ratio"] / other)
@@ -133,13 +135,16 @@ def latency_claims(rows: Sequence[Row], paper_ms: float) -> Claims:
     ours = next((row["p50_ms"] for row in rows if row["method"] == OURS), None)
     if ours is None:
         return Claims()
-    slower = [row for row in rows if row["p50_ms"] > 1.2 * ours]
-    faster = [row for row in rows if row["p50_ms"] < ours / 1.2]
+    others = [row for row in rows if row["method"] not in FAMILY]
+    slower = [row for row in others if row["p50_ms"] > 1.2 * ours]
+    faster = [row for row in others if row["p50_ms"] < ours / 1.2]
+    distilled = next((row["p50_ms"] for row in rows if row["method"] == "fast"), None)
+    beside = "" if distilled is None else f", {three(distilled)} ms in its distilled form `fast`"
     leads = []
     if slower:
         times = ", ".join(f"`{row['method']}` {factor(row['p50_ms'] / ours)}" for row in slower)
         leads.append(
-            f"One call takes {three(ours)} ms (the paper's cycle, on a smaller computer: {paper_ms:.0f} ms); "
+            f"One call takes {three(ours)} ms{beside} (the paper's cycle, on a smaller computer: {paper_ms:.0f} ms); "
             f"others take so many times longer: {times}."
         )
     trails = []

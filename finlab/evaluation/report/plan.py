@@ -9,7 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from finlab.evaluation.ablation import REFINEMENTS, VARIANTS
-from finlab.evaluation.entrants import FAST, SLOW, fingerprint, is_slow, surrogate_fingerprint
+from finlab.evaluation.entrants import (
+    QUICK,
+    SLOW,
+    fingerprint,
+    has_distilled,
+    is_slow,
+    surrogate_fingerprint,
+)
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.report.jobs import Job
 from finlab.evaluation.report.sizes import Sizes
@@ -19,9 +26,9 @@ from finlab.evaluation.training import CHANGES
 
 REFERENCE = "ipopt-32"
 """Whose energies the others are measured by."""
-ENERGY_METHODS = ("learned", "paper", "analytic", "sqp", "multistart", "trf", "slsqp", "ipopt")
+ENERGY_METHODS = ("learned", "fast", "paper", "analytic", "sqp", "multistart", "trf", "slsqp", "ipopt")
 """Methods whose energies are compared with it."""
-LATENCY_METHODS = ("learned", "analytic", "qp", "sqp", "multistart", "paper", "trf", "slsqp", "ipopt")
+LATENCY_METHODS = ("learned", "fast", "analytic", "qp", "sqp", "multistart", "paper", "trf", "slsqp", "ipopt")
 """Methods that are timed side by side."""
 N_CANDIDATES = 64
 """Candidates of the ablation, as in the paper."""
@@ -93,7 +100,9 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
     """
     casadi = importlib.util.find_spec("casadi") is not None
     slow = [name for name in SLOW if casadi or name != "ipopt"]
-    names = [*FAST, *slow, *([REFERENCE] if casadi else [])]
+    distilled = has_distilled(checkpoints.learned)
+    quick = [name for name in QUICK if distilled or name != "fast"]
+    names = [*quick, *slow, *([REFERENCE] if casadi else [])]
     prints = {name: fingerprint(name, checkpoints.of(name)) for name in names}
     plan = Plan()
 
@@ -179,7 +188,7 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
 
 
 def _size(sizes: Sizes, split: str, method: str) -> tuple[int, int]:
-    """Layouts and targets of a split, the paper's or another, for a fast or a slow method."""
+    """Layouts and targets of a split, the paper's or another, for a quick or a slow method."""
     if split in paper_figures()["wrench_tracking"]:
         return (sizes.main[0], sizes.slow_main) if is_slow(method) else sizes.main
     return sizes.slow_other if is_slow(method) else sizes.other

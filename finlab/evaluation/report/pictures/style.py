@@ -19,6 +19,7 @@ INK, SOFT, LINE = "#1c2733", "#5c6b7a", "#e3e8ed"
 
 COLOURS = {
     "learned": BLUE,
+    "fast": "#004B78",
     "paper": ORANGE,
     "analytic": GREEN,
     "sqp": PURPLE,

@@ -57,6 +57,7 @@ def energy_blocks(results: Results) -> list[Block]:
 
 
 def _shown(row: Row) -> Row:
-    ends = [row["energy_ratio_low"], row["energy_ratio_high"]] if "energy_ratio_low" in row else None
+    known = row["method"] != REFERENCE and "energy_ratio_low" in row
+    ends = [row["energy_ratio_low"], row["energy_ratio_high"]] if known else None
     kind = {"_kind": "ours"} if row["method"] == "learned" else {}
     return {**row, "method": f"`{row['method']}`", "energy_ratio_interval": ends, **kind}

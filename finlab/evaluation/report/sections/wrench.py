@@ -11,7 +11,19 @@ from finlab.evaluation.report.document import Block, Column, Figure, Fold, Headi
 from finlab.evaluation.report.pictures.wrench import error_by_fins, error_distribution
 from finlab.evaluation.report.results import Results
 
-ORDER = ("learned", "paper", "analytic", "sqp", "qp", "multistart", "trf", "slsqp", "ipopt", "ipopt-32")
+ORDER = (
+    "learned",
+    "fast",
+    "paper",
+    "analytic",
+    "sqp",
+    "qp",
+    "multistart",
+    "trf",
+    "slsqp",
+    "ipopt",
+    "ipopt-32",
+)
 """Methods from top to bottom."""
 SPLIT_WORDS = {
     "id": "2 to 5 fins within 0.30 m, nominal limits, as in training",
@@ -48,8 +60,8 @@ def wrench_blocks(results: Results) -> list[Block]:
             "Every method answers wrenches that the robot can deliver, on layouts that no training has seen. "
             "The error is the distance between asked and delivered wrench in standard deviations of the "
             "training wrenches; the analytic fin model scores every method, whatever the method believed. "
-            "`learned` and `paper` know only networks trained on forward samples; all others know the "
-            "analytic fin model that scores them."
+            "`learned`, `fast` (its distilled form) and `paper` know only networks trained on forward "
+            "samples; all others know the analytic fin model that scores them."
         ),
     ]
     shown = {split: _fast(results.wrench[split]) for split in printed}
