@@ -86,8 +86,6 @@ def run_all(swims: Iterable[tuple[Any, Callable[[], Swim]]], total: int) -> list
     return done
 
 
-def spread(row: Row, key: str) -> str:
-    """Mean and spread of a number as text, or a dash."""
-    if row.get(key) is None:
-        return "-"
-    return f"{row[key]:.3f} +- {row[f'{key}_std']:.3f}"
+def spread(row: Row, key: str, digits: int = 3) -> str:
+    """Mean and spread of a number as text."""
+    return f"{row[key]:.{digits}f} +- {row[f'{key}_std']:.{digits}f}"

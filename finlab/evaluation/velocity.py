@@ -82,7 +82,7 @@ def velocity_report(rows: Sequence[Row], baseline: str, layout: Layout, plant: s
             "speed [m/s]": "all" if row["speed"] is None else f"{row['speed']:.2f}",
             "inertial [W]": spread(row, "inertial_w"),
             "torque [W]": spread(row, "torque_w"),
-            "MAE [m/s]": spread(row, "mae"),
+            "MAE [m/s]": spread(row, "mae", 4),
             "MAE from 10 s": f"{row['mae_settled']:.4f}",
         }
         if row["speed"] in reference and row["method"] != baseline:
