@@ -144,8 +144,8 @@ def latency_claims(rows: Sequence[Row], paper_ms: float) -> Claims:
     if slower:
         times = ", ".join(f"`{row['method']}` {factor(row['p50_ms'] / ours)}" for row in slower)
         leads.append(
-            f"One call takes {three(ours)} ms{beside} (the paper's cycle, on a smaller computer: {paper_ms:.0f} ms); "
-            f"others take so many times longer: {times}."
+            f"One call takes {three(ours)} ms{beside} (the paper's cycle, on a smaller computer: "
+            f"{paper_ms:.0f} ms); others take so many times longer: {times}."
         )
     trails = []
     if faster:
