@@ -53,7 +53,7 @@ format: setup
 # A run that was stopped goes on where it was.
 PRESET ?= default
 TRAIN_default :=
-TRAIN_paper := --batch-size 512 --learning-rate 4e-4 --steps 12000
+TRAIN_paper := --batch-size 512 --learning-rate 4e-4 --steps 18000
 
 checkpoint: setup
 	$(BIN)/finlab train surrogate --preset $(PRESET) -o runs/surrogate-$(PRESET)

@@ -83,7 +83,7 @@ _DEFAULT = Preset(
     "default",
     network=NetworkConfig(width=96, transformer_layers=2, feedforward=192, n_components=16),
     surrogate_training=SurrogateTraining(steps=40_000),
-    allocator_training=AllocatorTraining(steps=18_000, batch_size=1024),
+    allocator_training=AllocatorTraining(steps=20_000, batch_size=1024),
 )
 _PAPER = Preset(
     "paper",
