@@ -19,7 +19,9 @@ from webapp.commands import add_commands
 from webapp.comparison import Comparison
 from webapp.files import bundle_bytes, file_stem, graph_bytes
 from webapp.improving import Improver
+from webapp.panels.header import Header
 from webapp.panels.host import Panel
+from webapp.panels.swim import SwimPanel
 from webapp.panels.tabs import PANEL_WIDTH, build_panels
 from webapp.playback import Playback
 from webapp.ranging import REST_S, Beside, find_ranges
@@ -76,7 +78,7 @@ class View:
         self.analyst = Resting(find, CARD_REST_S, workers.cards, loop, post, changed)
         self.improver = Improver(workers.searches, post, changed)
         self.comparison = Comparison(solver, answers, post, changed)
-        self.swimming = Swimming(solver.aside, workers.swims, post, changed, refused)
+        self.swimming = Swimming(solver.aside, workers.swims, post, self._swam, refused)
         self.sweep = Sweep(session, loop, self.do)
         self._sender = Sender(client, answers, post, self.notify)
         self._build()
@@ -231,6 +233,17 @@ class View:
         )
         self.ranging.ask(Beside(state.layout, state.failed, state.target))
         self.answering.ask()
+
+    def _swam(self) -> None:
+        """The swim has gone on: ten times a second, so only what shows it is written."""
+        if self.scene.shown == bool(self.swimming.swimmers):
+            self._refresh()
+            return
+        with self.client.atomic():
+            self.swim_scene.refresh(self.session.display.dark)
+            for panel in self._panels:
+                if isinstance(panel, (Header, SwimPanel)):
+                    panel.refresh()
 
     def _answered(self) -> None:
         self.sweep.note(self.answering)

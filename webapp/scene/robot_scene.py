@@ -63,6 +63,8 @@ class RobotScene:
         self._on_drag = on_drag
         scene = client.scene
         self._root = scene.add_frame("/robot", show_axes=False)
+        self.shown = True
+        """Whether it is on the screen; else a robot swims."""
         self._stage = Stage(scene, hull_of(session.state.layout))
         self._wrench = WrenchNodes(scene)
         self._lines = Lines(scene)
@@ -81,6 +83,7 @@ class RobotScene:
 
     def show(self, visible: bool) -> None:
         """Show the robot that is designed, or make room for one that swims."""
+        self.shown = visible
         put(self._root, visible=visible)
         self._stage.show_floor(visible)
 
