@@ -109,7 +109,7 @@ def make_bundle(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = 
         )
     graph = build_graph(layout, allocator, failed)
     weights = allocator.weights
-    about = network_metadata(graph, weights, allocator.settings)
+    about = network_metadata(graph, weights, allocator.settings, allocator.energy_weights)
     network = network_model(weights.network, weights.heads, weights.n_components, about)
     surrogate = surrogate_model(
         weights.surrogate, weights.reference, weights.force_unit, surrogate_metadata(graph, weights)

@@ -45,7 +45,7 @@ class RobotBundle:
     weights: LearnedWeights
     """The trained networks as arrays."""
     settings: Mapping[str, Any]
-    """Fields of the pipeline's `Settings`."""
+    """What the allocator is made with: fields of the pipeline's `Settings`, and `energy_weights`."""
     files: Mapping[str, bytes]
     """The files as they are."""
 

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, fields, is_dataclass
+from dataclasses import asdict, fields
 from typing import Any
 
 import numpy as np
 
 import finlab
+from finlab.allocation.energy import EnergyWeights
 from finlab.allocation.pipeline import Settings
 from finlab.allocation.weights import LearnedWeights
 from finlab.data.normalization import Normalization
@@ -28,13 +29,16 @@ _MOST = {"n_candidates": 4096, "n_seeds": 256, "n_refined": 256, "search_steps":
 """Largest settings that a robot accepts from a file; more would keep it from answering."""
 
 
-def network_metadata(graph: LayoutGraph, weights: LearnedWeights, settings: Settings) -> dict[str, str]:
+def network_metadata(
+    graph: LayoutGraph, weights: LearnedWeights, settings: Settings, energy_weights: EnergyWeights
+) -> dict[str, str]:
     """What to write into `network.onnx`."""
     return _shared(NETWORK_FORMAT, graph, weights) | {
         "features": graph.feature_set,
         "heads": str(weights.heads),
         "n_components": str(weights.n_components),
         "settings": json.dumps(asdict(settings)),
+        "energy_weights": json.dumps(asdict(energy_weights)),
         "fins": json.dumps(list(graph.layout.names), ensure_ascii=False),
         "limits_lower": json.dumps([fin.limits.lower for fin in graph.layout.fins]),
         "limits_upper": json.dumps([fin.limits.upper for fin in graph.layout.fins]),
@@ -118,8 +122,11 @@ def normalization_of(model: Model, source: str) -> Normalization:
 
 
 def settings_of(model: Model, source: str) -> dict[str, Any]:
-    """Fields of `Settings`, checked one by one."""
-    return _fields_of(Settings(), value_of(model, "settings", source), f"{source}: settings")
+    """What to make the allocator with: the fields of `Settings`, and `energy_weights`; checked one by one."""
+    settings = _fields_of(Settings(), value_of(model, "settings", source), f"{source}: settings")
+    weights = value_of(model, "energy_weights", source)
+    costs = EnergyWeights(**_fields_of(EnergyWeights(), weights, f"{source}: energy_weights"))
+    return settings | {"energy_weights": costs}
 
 
 def _fields_of(default: Any, values: Any, place: str) -> dict[str, Any]:
@@ -130,9 +137,6 @@ def _fields_of(default: Any, values: Any, place: str) -> dict[str, Any]:
     result: dict[str, Any] = {}
     for name, value in values.items():
         usual = known[name]
-        if is_dataclass(usual) and not isinstance(usual, type):
-            result[name] = type(usual)(**_fields_of(usual, value, f"{place}: {name}"))
-            continue
         if not (value is None and usual is None) and not isinstance(usual, bool):
             kind = (int, float) if isinstance(usual, float) else int
             most = _MOST.get(name, 100)

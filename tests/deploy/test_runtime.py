@@ -11,6 +11,7 @@ import pytest
 
 import finlab
 from finlab.allocation import Allocator
+from finlab.allocation.energy import POWER_WEIGHTS
 from finlab.assets import shipped_layouts
 from finlab.deploy.bundle import NETWORK, Bundle, make_bundle
 from finlab.deploy.bundle_file import parse_bundle
@@ -89,6 +90,14 @@ def test_self_test_notices_other_physics(bundle: Bundle) -> None:
     other = replace(robot, weights=robot.weights._replace(surrogate=bent))
     findings = self_check(Runtime(other))
     assert not all(finding.good for finding in findings)
+
+
+def test_energy_weights_travel() -> None:
+    layout = finlab.load_layout(shipped_layouts()["octo"])
+    desk = finlab.load_allocator(energy_weights=POWER_WEIGHTS)
+    robot = Runtime(parse_bundle(make_bundle(layout, desk).files))
+    wrench = [1, 0, 0.5, 0, 0, 0.1]
+    np.testing.assert_array_equal(robot.allocate(wrench).command, desk.allocate(layout, wrench).command)
 
 
 def test_unknown_engine_and_settings_are_refused(bundle: Bundle) -> None:
