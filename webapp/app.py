@@ -3,34 +3,21 @@
 import asyncio
 import contextlib
 import json
-import signal
-import socket
-import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
 import viser
 
-from finlab.assets import shipped_layouts
-from finlab.deploy.graph_file import read_graph
-from finlab.errors import FinlabError
-from finlab.layout import Layout, load_layout
-from webapp.files import GRAPH_SUFFIX
-from webapp.guard import Guard
+from finlab.layout import Layout
 from webapp.keeping import SessionFiles
 from webapp.session import Display, Session
 from webapp.solver import Solver
-from webapp.state import State
 from webapp.store import SessionStore
-from webapp.targets import FIRST
-from webapp.uploads import cache_folder
 from webapp.view import View
-from webapp.viser_internals import disable_sharing, start_guarded, stop_server
+from webapp.viser_internals import disable_sharing
 from webapp.workers import Workers
 
-FIRST_LAYOUT = "ucat"
-"""The shipped layout that a new session opens."""
 FRAME_S = 1 / 25
 """Time between two poses of the fins [s]."""
 KEEP_S = 2.0
@@ -151,63 +138,6 @@ def _stored(client: viser.ClientHandle, patience: Sequence[float]) -> str | None
     return client.local_storage.get_item(STORAGE_KEY, timeout=patience[-1])
 
 
-def serve(
-    host: str = "127.0.0.1", port: int = 8080, layout: str | None = None, checkpoint: str | Path | None = None
-) -> None:
-    """Serve the app until SIGTERM or Ctrl-C.
-
-    Args:
-        host: address to listen on. Only this machine can reach the default; for any other one the printed
-            address carries a token, without which nothing is shown.
-        port: port to listen on; 0 takes a free one.
-        layout: file, or name of a shipped layout, that a new session opens; None for the U-CAT.
-        checkpoint: folder or name of a checkpoint; None for the shipped one.
-
-    Raises:
-        FinlabError: the port is taken, or layout or checkpoint cannot be read.
-    """
-    first = _first_layout(layout or FIRST_LAYOUT)
-    _check_port(host, port)
-    solver = Solver(checkpoint)
-    # A missing checkpoint is reported now, not in the browser; and the first page finds a warm solver.
-    _ = solver.solve(State(first, target=FIRST)).samples
-    guard = Guard.of(host)
-    server = start_guarded(guard, port)
-    app = App(server, solver, first, folder=cache_folder() / "sessions")
-    try:
-        if port not in (0, server.get_port()):
-            raise FinlabError(f"port {port} was taken while the app started; choose another --port")
-        secret = "" if guard.token is None else f"/?token={guard.token}"
-        print(f"finlab app: http://{host}:{server.get_port()}{secret}  (Ctrl-C stops it)", flush=True)
-        _wait_for_signal()
-    finally:
-        app.stop()
-        stop_server(server)
-
-
-def _first_layout(text: str) -> Layout:
-    shipped = shipped_layouts()
-    if text in shipped and not Path(text).exists():
-        return load_layout(shipped[text])
-    return read_graph(text).layout if text.endswith(GRAPH_SUFFIX) else load_layout(text)
-
-
-def _check_port(host: str, port: int) -> None:
-    """Viser moves to the next port by itself when one is taken; the user would look at the wrong page."""
-    if not 0 <= port <= 65535:
-        raise FinlabError(f"port: expected a number from 0 to 65535, got {port}")
-    try:
-        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        with socket.socket(family, kind, protocol) as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            probe.bind(address)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise FinlabError(
-            f"cannot listen on {host}:{port}: {reason}; choose another --port or --host"
-        ) from None
-
-
 def _session_keys(text: str | None) -> list[str]:
     """The keys in a browser's storage, which may hold anything."""
     try:
@@ -215,11 +145,3 @@ def _session_keys(text: str | None) -> list[str]:
     except ValueError:
         return []
     return [key for key in keys if isinstance(key, str)][:MAX_KEYS] if isinstance(keys, list) else []
-
-
-def _wait_for_signal() -> None:
-    stop = threading.Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stop.set())
-    while not stop.wait(0.5):  # a plain wait would keep Python from seeing the signal
-        pass

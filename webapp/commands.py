@@ -49,7 +49,7 @@ def add_commands(gui: viser.GuiApi, host: Host) -> None:
     add("Stop the sweep", host.sweep.stop)
     add("Swim: pause or go on", lambda: host.swimming.set_running(not host.swimming.running), "B")
     add("Swim: back to the design", host.end_swim)
-    add("Export the bundle for the robot", host.export_bundle)
+    add("Export the bundle for the robot", host.exports.bundle)
     add("Tour: start, or next stop", session.next_stop, "T")
     add("Start over", session.start_over)
     add("Freeze or move the fins", lambda: toggle("frozen"), "P")

@@ -17,7 +17,7 @@ from webapp.analyst import Question, find
 from webapp.answering import Answering
 from webapp.commands import add_commands
 from webapp.comparison import Comparison
-from webapp.files import bundle_bytes, file_stem, graph_bytes
+from webapp.exports import Exports
 from webapp.improving import Improver
 from webapp.panels.header import Header
 from webapp.panels.host import Panel
@@ -25,11 +25,9 @@ from webapp.panels.swim import SwimPanel
 from webapp.panels.tabs import PANEL_WIDTH, build_panels
 from webapp.playback import Playback
 from webapp.ranging import REST_S, Beside, find_ranges
-from webapp.recording import recorded_html
 from webapp.resting import Resting
 from webapp.scene.robot_scene import RobotScene
 from webapp.scene.swim_scene import SwimScene
-from webapp.sending import Sender
 from webapp.session import Session
 from webapp.solver import Solver
 from webapp.sweeping import Sweep
@@ -63,7 +61,6 @@ class View:
         """
         self.client = client
         self.session = session
-        self._solver = solver
         self._loop = loop
         self._closed = False
         self._dark: bool | None = None
@@ -80,7 +77,7 @@ class View:
         self.comparison = Comparison(solver, answers, post, changed)
         self.swimming = Swimming(solver.aside, workers.swims, post, self._swam, refused)
         self.sweep = Sweep(session, loop, self.do)
-        self._sender = Sender(client, answers, post, self.notify)
+        self.exports = Exports(client, session, solver, answers, post, self.notify)
         self._build()
         self._apply_theme()
         self._refresh()
@@ -157,34 +154,6 @@ class View:
     def look_from(self, view: str) -> None:
         """Move the camera."""
         self.scene.look_from(view)
-
-    def export_graph(self) -> None:
-        """Make the layout graph file and send it."""
-        state = self.session.state
-        name = f"{file_stem(state.layout.name)}.graph.json"
-        self._sender.send(
-            name, lambda: graph_bytes(state.layout, state.failed, self._solver.allocator(state))
-        )
-
-    def export_bundle(self) -> None:
-        """Make the bundle for the robot and send it: the same bytes as `finlab export --zip`."""
-        state = self.session.state
-        name = f"{file_stem(state.layout.name)}.zip"
-        self._sender.send(
-            name, lambda: bundle_bytes(state.layout, state.failed, self._solver.allocator(state))
-        )
-
-    def export_html(self) -> None:
-        """Make a standalone page of the 3D view and send it."""
-        shown, twin = self.shown, self.session.twin()
-        if shown is None:
-            raise FinlabError("there is no answer yet; wait for one")
-        name = f"{file_stem(twin.state.layout.name)}.html"
-        self._sender.send(name, lambda: recorded_html(twin, shown))
-
-    def export_picture(self) -> None:
-        """Make a picture of the 3D view and send it."""
-        self._sender.send_picture(f"{file_stem(self.session.state.layout.name)}.png")
 
     # From the session to the page.
 

@@ -25,7 +25,7 @@ def app(
     from finlab.errors import FinlabError
 
     try:
-        from webapp.app import serve
+        from webapp.serving import serve
     except ModuleNotFoundError as error:
         if error.name not in _EXTRA:
             raise

@@ -20,7 +20,8 @@ from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.webapp.stand_in import load_stand_in
-from webapp.app import App, _session_keys, serve
+from webapp.app import App, _session_keys
+from webapp.serving import serve
 from webapp.session import Session
 from webapp.solver import Solver
 from webapp.store import SessionStore
@@ -145,10 +146,10 @@ def test_names_are_escaped(server: viser.ViserServer, view: View) -> None:
 
 def test_html_export_is_one_file(server: viser.ViserServer, view: View) -> None:
     until(lambda: not view.busy)
-    on_loop(server, lambda: view.do(view.export_html))
+    on_loop(server, lambda: view.do(lambda: view.exports.html(view.shown)))
     until(lambda: "ucat.html" in view.client.files)
     assert b"__VISER_EMBED_DATA__" in view.client.files["ucat.html"]
-    on_loop(server, lambda: view.do(view.export_graph))
+    on_loop(server, lambda: view.do(view.exports.graph))
     until(lambda: any("Not exported" in note for note in view.client.notes))
     assert "needs a trained network" in view.client.notes[-1]
 
@@ -188,9 +189,9 @@ def test_taken_port_and_bad_port_are_refused() -> None:
 
 def test_serves_until_sigterm() -> None:
     code = (
-        "import sys; from webapp import app, solver; from tests.webapp.stand_in import load_stand_in\n"
-        "app.Solver = lambda checkpoint: solver.Solver(load=load_stand_in)\n"
-        "app.serve(port=0)"
+        "import sys; from webapp import serving, solver; from tests.webapp.stand_in import load_stand_in\n"
+        "serving.Solver = lambda checkpoint: solver.Solver(load=load_stand_in)\n"
+        "serving.serve(port=0)"
     )
     root = str(shipped_layouts()["A"].parent.parent)
     process = subprocess.Popen(

@@ -10,6 +10,7 @@ from finlab.analysis.beside import Ranges
 from webapp.analyst import Findings, Question
 from webapp.answering import Answering
 from webapp.comparison import Comparison
+from webapp.exports import Exports
 from webapp.improving import Improver
 from webapp.playback import Playback
 from webapp.ranging import Beside
@@ -42,6 +43,8 @@ class Host(Protocol):
     """Other methods on the same question."""
     swimming: Swimming
     """A robot that swims."""
+    exports: Exports
+    """Files to take home."""
     sweep: Sweep
     """A component of the target on its way through a range."""
 
@@ -71,18 +74,6 @@ class Host(Protocol):
 
     def look_from(self, view: str) -> None:
         """Move the camera."""
-
-    def export_html(self) -> None:
-        """Make a standalone page of the 3D view and send it to the browser."""
-
-    def export_picture(self) -> None:
-        """Make a picture of the 3D view and send it to the browser."""
-
-    def export_bundle(self) -> None:
-        """Make the bundle for the robot and send it to the browser."""
-
-    def export_graph(self) -> None:
-        """Make the layout graph file and send it to the browser."""
 
 
 class Panel(Protocol):

@@ -52,10 +52,10 @@ class TakeHomePanel:
         acts: dict[str, Callable[[], object]] = {
             "Layout (YAML)": self._send_layout,
             "Candidates (CSV)": self._send_candidates,
-            "Picture (PNG)": host.export_picture,
-            "3D view (HTML)": host.export_html,
-            "Graph file": host.export_graph,
-            "Bundle (ZIP)": host.export_bundle,
+            "Picture (PNG)": host.exports.picture,
+            "3D view (HTML)": lambda: host.exports.html(host.shown),
+            "Graph file": host.exports.graph,
+            "Bundle (ZIP)": host.exports.bundle,
         }
         if button in acts:
             host.do(acts[button])
