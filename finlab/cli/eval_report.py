@@ -122,6 +122,7 @@ def report(
     paper_checkpoint: Checkpoint = None,
     records: Folder = None,
     processes: Annotated[int | None, arg(metavar="N")] = None,
+    as_is: bool = False,
 ) -> None:
     """Make the whole evaluation: one HTML page, its Markdown twin, pictures and rows.
 
@@ -136,6 +137,7 @@ def report(
         paper_checkpoint: trained checkpoint of method paper; the shipped one by default.
         records: folder for the records; DIR/records by default.
         processes: parts that run at once; the number of cores by default.
+        as_is: do no work; make the page from what is there.
     """
     from finlab.evaluation.report.make import make_report
     from finlab.evaluation.report.plan import Checkpoints
@@ -155,5 +157,6 @@ def report(
         records=records or out / "records",
         command=shlex.join(words),
         processes=processes,
+        as_is=as_is,
     )
     print(page)

@@ -39,7 +39,8 @@ def paper_claims(tables: Mapping[str, Sequence[Row]], printed: Mapping[str, floa
     """
     leads, trails = [], []
     for split, theirs in printed.items():
-        ours, rebuilt = _mean(tables[split], OURS), _mean(tables[split], "paper")
+        rows = tables.get(split, ())
+        ours, rebuilt = _mean(rows, OURS), _mean(rows, "paper")
         if ours is None:
             continue
         beside = "" if rebuilt is None else f", and {error(rebuilt)} by our rebuild of its method"
@@ -156,6 +157,8 @@ def latency_claims(rows: Sequence[Row], paper_ms: float) -> Claims:
 
 def seed_claims(rows: Sequence[Row]) -> Claims:
     """What the network's seeds buy with few steps, and whether random ones catch up with many."""
+    if not rows:
+        return Claims()
     first, last = min((r["steps"] for r in rows if r["steps"] > 0), default=0), max(r["steps"] for r in rows)
 
     def mean(kind: str, steps: int) -> float:
@@ -186,7 +189,7 @@ def rebuild_claims(ours: Mapping[str, float], printed: float) -> Claims:
         ours: `surrogate` and `plant` -> mean error of the whole pipeline.
         printed: the paper's mean error.
     """
-    if ours["surrogate"] <= 1.5 * printed:
+    if not ours or ours["surrogate"] <= 1.5 * printed:
         return Claims()
     return Claims(
         (),

@@ -42,6 +42,7 @@ def make_report(
     records: Path,
     command: str,
     processes: int | None = None,
+    as_is: bool = False,
 ) -> Path:
     """Make the whole report; parts that are done are taken from `records`.
 
@@ -53,6 +54,7 @@ def make_report(
         records: folder of the results of the parts.
         command: that makes the report, shown on the page.
         processes: parts that run at once; the number of cores by default.
+        as_is: do no work; show what is there.
 
     Returns:
         The page.
@@ -60,7 +62,12 @@ def make_report(
     sizes = SIZES[size]
     plan = make_plan(sizes, seed=seed, checkpoints=checkpoints, runs=records / "trainings")
     store = Store(records)
-    run_jobs(list(plan), store, commit=source_commit(), processes=processes)
+    n_parts = len(list(plan))
+    if as_is:
+        plan = plan.only_done(store)
+    else:
+        run_jobs(list(plan), store, commit=source_commit(), processes=processes)
+    left_out = n_parts - len(list(plan))
     paths = {
         "learned": resolve_checkpoint(checkpoints.learned or "default"),
         "paper": resolve_checkpoint(checkpoints.paper or "paper"),
@@ -68,12 +75,12 @@ def make_report(
     prints = {f"{path.name} ({name})": load_checkpoint(path).sha256 for name, path in paths.items()}
     results = Results(plan, store, load_normalization(paths["learned"]).std)
     provenance = make_provenance(prints, seed, command)
-    write_report(out, make_document(results, provenance, sizes), tables_of(results, provenance))
+    write_report(out, make_document(results, provenance, sizes, left_out), tables_of(results, provenance))
     return out / PAGE
 
 
-def make_document(results: Results, provenance: Provenance, sizes: Sizes) -> Document:
-    """The page's blocks, from results."""
+def make_document(results: Results, provenance: Provenance, sizes: Sizes, left_out: int = 0) -> Document:
+    """The page's blocks, from results; `left_out` parts have none yet."""
     blocks: list[Block] = [
         *summary_blocks(results),
         *wrench_blocks(results),
@@ -87,6 +94,7 @@ def make_document(results: Results, provenance: Provenance, sizes: Sizes) -> Doc
         *making_blocks(results, provenance, sizes),
     ]
     note = "" if sizes.name == "full" else f" A {sizes.name} look on few cases; intervals are wide."
+    note += f" {left_out} parts had not been run when this page was made." if left_out else ""
     subtitle = (
         "Control allocation for robots with fins: the learned allocator beside the paper's method and seven "
         f"that know the fin law, every answer scored by the analytic fin model.{note}"

@@ -21,6 +21,7 @@ from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.report.jobs import Job
 from finlab.evaluation.report.sizes import Sizes
 from finlab.evaluation.splits import SPLITS
+from finlab.evaluation.store import Store
 from finlab.evaluation.temperature import PAPER_TEMPERATURE, TEMPERATURES
 from finlab.evaluation.training import CHANGES
 
@@ -38,6 +39,8 @@ SCATTER_FINS, SCATTER_TARGETS = 4, 3
 """Fins of the layout, and its targets, whose candidates are drawn before and after refinement."""
 
 
+WHOLE = ("ablation", "temperature", "scatter", "seeds")
+"""Studies that say something only when all of their jobs are done."""
 SWIM_METHODS = {
     "trajectory": "learned,on-board",
     "faults": "learned,on-board",
@@ -68,6 +71,16 @@ class Plan:
     """Closed-loop experiments: `trajectory`, `faults` and `velocity`; none in a tiny report."""
     latency: dict[str, Job] = field(default_factory=dict)
     """One job, `calls`."""
+
+    def only_done(self, store: Store) -> Plan:
+        """The jobs whose results are there; a study that lacks a part is left out whole."""
+        left: dict[str, Any] = {}
+        for group in fields(self):
+            jobs = getattr(self, group.name)
+            done = {key: job for key, job in jobs.items() if job.done(store)}
+            whole = group.name in WHOLE and len(done) < len(jobs)
+            left[group.name] = {} if whole else done
+        return Plan(**left)
 
     def __iter__(self) -> Iterator[Job]:
         """Every job once, the longest kinds first."""

@@ -41,11 +41,11 @@ class Results:
 
     @cached_property
     def wrench(self) -> dict[str, dict[str, Records]]:
-        """Split -> method -> records."""
-        found: dict[str, dict[str, Records]] = {split: {} for split in SPLITS}
+        """Split -> method -> records; splits without any are missing."""
+        found: dict[str, dict[str, Records]] = {}
         for (split, method), job in self.plan.wrench.items():
-            found[split][method] = records_of_columns(self.columns(job))
-        return found
+            found.setdefault(split, {})[method] = records_of_columns(self.columns(job))
+        return {split: found[split] for split in SPLITS if split in found}
 
     @cached_property
     def wrench_rows(self) -> dict[str, list[Row]]:
@@ -120,12 +120,12 @@ class Results:
     @cached_property
     def seed_rows(self) -> list[Row]:
         """Rows of the comparison of seeds."""
-        return rows_of_columns(self.columns(self.plan.seeds["id"]))
+        return [row for job in self.plan.seeds.values() for row in rows_of_columns(self.columns(job))]
 
     @cached_property
     def latency_rows(self) -> list[Row]:
         """Rows of the comparison of times, the fastest first."""
-        rows = rows_of_columns(self.columns(self.plan.latency["calls"]))
+        rows = [row for job in self.plan.latency.values() for row in rows_of_columns(self.columns(job))]
         return sorted(rows, key=lambda row: row["p50_ms"])
 
     @cached_property

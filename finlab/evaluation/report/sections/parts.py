@@ -26,6 +26,8 @@ REFINED_BY = {"adam": "Adam", "levenberg-marquardt": "Levenberg-Marquardt"}
 
 def latency_blocks(results: Results) -> list[Block]:
     """Methods side by side in one run."""
+    if not results.latency_rows:
+        return []
     paper_ms = paper_figures()["inference"]["cycle_s"] * 1e3
     rows = [
         {
@@ -60,6 +62,8 @@ def latency_blocks(results: Results) -> list[Block]:
 
 def ablation_blocks(results: Results) -> list[Block]:
     """The paper's five rows, twice refined, twice scored."""
+    if not results.ablation_rows:
+        return []
     printed = paper_figures()["ablation"]
     rows = results.ablation_rows
     blocks: list[Block] = [
@@ -107,6 +111,8 @@ def ablation_blocks(results: Results) -> list[Block]:
 
 def temperature_blocks(results: Results) -> list[Block]:
     """The paper's figure A."""
+    if not results.temperature_rows or not results.plan.scatter:
+        return []
     rows = results.temperature_rows
     best = min(rows, key=lambda row: row["best_j_mean"])
     columns = (
@@ -137,6 +143,8 @@ def temperature_blocks(results: Results) -> list[Block]:
 
 def seed_blocks(results: Results) -> list[Block]:
     """The network's seeds against random ones."""
+    if not results.seed_rows:
+        return []
     columns = (
         Column("fins", "fins"),
         Column("steps", "steps"),
@@ -161,6 +169,8 @@ def seed_blocks(results: Results) -> list[Block]:
 
 def training_blocks(results: Results) -> list[Block]:
     """Small trainings with one thing changed."""
+    if not results.training_rows:
+        return []
     rows = results.training_rows
     settings = next(iter(results.plan.training.values())).settings
     columns = (

@@ -45,7 +45,9 @@ def _cards(results: Results, tables: dict[str, list[Row]]) -> list[Card]:
     printed = paper_figures()["wrench_tracking"]
     cards = []
     for split, label in (("id", "mean error, layouts like those of training"), ("ood", "mean error, beyond")):
-        row = next(row for row in tables[split] if row["method"] == claims.OURS)
+        row = next((row for row in tables.get(split, ()) if row["method"] == claims.OURS), None)
+        if row is None:
+            continue
         theirs = printed[split]["ours"]["err_norm_mean"]
         cards.append(
             Card(
@@ -71,4 +73,11 @@ def _cards(results: Results, tables: dict[str, list[Row]]) -> list[Card]:
         others = [f"`{n}` {three(times[n]['p50_ms'])}" for n in ("paper", "ipopt", "trf") if n in times]
         detail = f"99th percentile {three(mine['p99_ms'])}; {', '.join(others)} ms"
         cards.append(Card(f"{three(mine['p50_ms'])} ms", "one call, median, four fins", detail))
+    swum = {r["method"]: r for r in results.swim_rows.get("trajectory", ()) if r["layout"] == "all"}
+    if claims.OURS in swum:
+        beside = paper_figures()["trajectory"]["all"]["ate"]
+        detail = f"in our simulation; paper, in another: {100 * beside:.1f} cm"
+        cards.append(
+            Card(f"{100 * swum[claims.OURS]['ate']:.1f} cm", "trajectory error, layouts A–D", detail)
+        )
     return cards

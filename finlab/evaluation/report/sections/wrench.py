@@ -64,11 +64,13 @@ def wrench_blocks(results: Results) -> list[Block]:
             "samples; all others know the analytic fin model that scores them."
         ),
     ]
-    shown = {split: _fast(results.wrench[split]) for split in printed}
+    if not results.wrench:
+        return []
+    shown = {split: _quick(results.wrench[split]) for split in printed if split in results.wrench}
     blocks.append(
         Figure(
             "error-distribution",
-            error_distribution(shown, {split: printed[split]["ours"]["err_norm_mean"] for split in printed}),
+            error_distribution(shown, {split: printed[split]["ours"]["err_norm_mean"] for split in shown}),
             "How large errors are: the further left and the steeper a curve falls, the better. Errors of "
             "1e-8 are rounding. Dashes: the mean error that the paper prints for its method.",
         )
@@ -111,13 +113,13 @@ def wrench_table(rows: Sequence[Row], split: str) -> list[Row]:
     return shown
 
 
-def _fast(methods: dict[str, Records]) -> dict[str, Records]:
+def _quick(methods: dict[str, Records]) -> dict[str, Records]:
     """Methods with enough targets for a curve, in order."""
     return {name: methods[name] for name in ORDER if name in methods and not is_slow(name)}
 
 
 def _by_fins(results: Results) -> dict[str, Records]:
-    return {
-        name: join_records([results.wrench["id"][name], results.wrench["ood-fins"][name]])
-        for name in _fast(results.wrench["id"])
-    }
+    """Records of both splits, for methods that ran on either."""
+    parts = [results.wrench[split] for split in ("id", "ood-fins") if split in results.wrench]
+    names = dict.fromkeys(name for part in parts for name in _quick(part))
+    return {name: join_records([part[name] for part in parts if name in part]) for name in names}
