@@ -21,7 +21,7 @@ def save(page: Page, path: Path) -> None:
     """A screenshot without the notes; two bits less per colour are hardly seen and make it half as large."""
     page.close_notes()
     page.page.mouse.move(200, 60)  # off the buttons, so that no hint covers anything
-    page.page.wait_for_timeout(2500)
+    page.page.wait_for_timeout(1500)
     picture = Image.open(io.BytesIO(page.page.screenshot(timeout=0))).convert("RGB")
     ImageOps.posterize(picture, 6).save(path, optimize=True)
     print(path, path.stat().st_size // 1000, "kB", flush=True)
@@ -34,124 +34,116 @@ def _scroll(page: Page) -> None:
     page.page.wait_for_timeout(500)
 
 
+def _first(page: Page) -> None:
+    page.tab("View")
+    page.row("Shadows").first.click()
+    page.tab("Wrench")
+    page.page.wait_for_timeout(6000)  # shadows take their time without a graphics card
+
+
+def _failure(page: Page) -> None:
+    page.press("2")
+    page.until(lambda: page.session.state.failed != () and not page.view.busy)
+
+
+def _tour(page: Page) -> None:
+    page.press("Tour")
+    page.press("Next")
+    page.until(lambda: page.session.stop == 1 and not page.view.busy)
+
+
+def _palette(page: Page) -> None:
+    page.key("Control+k")
+    page.page.wait_for_timeout(1000)
+
+
 def _steer(page: Page) -> None:
     page.tab("Steer by hand")
     page.tab("Sweep an axis")
-    page.choose("Axis", "sway")
+    page.choose("Sweep", "sway")
     page.press("Play the sweep")
-    page.until(lambda: page.session.state.target[1] > 3.0, seconds=120)
-    page.until(lambda: page.session.state.target[1] < 3.0, seconds=120)
+    page.until(lambda: page.session.state.target[1] > 4.5)
     page.press("Stop the sweep")
     _scroll(page)
 
 
 def _layout(page: Page) -> None:
-    page.tab("Steer by hand")
-    page.tab("Sweep an axis")
-    page.press("Turn")
     page.key("n")
     page.tab("Layout")
 
 
 def _hull(page: Page) -> None:
+    _layout(page)
     page.tab("Hull")
     _scroll(page)
 
 
 def _modes(page: Page) -> None:
-    page.tab("Hull")
-    page.key("x")
     page.tab("Modes")
     page.type("Temperature T", "0.5")
-    page.until(lambda: not page.view.busy)
+    page.until(lambda: page.session.state.temperature == 0.5 and not page.view.busy)
     page.page.locator("svg.plot:visible .samples circle").nth(30).dispatch_event("click")
     page.until(lambda: page.session.sample == 30)
 
 
 def _density(page: Page) -> None:
-    page.press("1")
+    page.tab("Modes")
+    page.type("Temperature T", "0.5")
     page.tab("What the network proposes")
     _scroll(page)
 
 
 def _limits(page: Page) -> None:
-    page.tab("What the network proposes")
-    page.key("Control+z")
     page.tab("Limits")
     page.press("forces")
     page.key("f")
-    page.until(lambda: not page.view.analyst.busy)
+    page.until(lambda: page.session.state.failed != () and not page.view.analyst.busy)
 
 
 def _improve(page: Page) -> None:
-    page.key("Control+z")
-    page.choose("Beside", "hexa")
+    page.tab("Limits")
     page.press("Search")
-    page.until(lambda: page.view.improver.found is not None, seconds=300)
-    page.until(lambda: not page.view.analyst.busy)
+    page.until(lambda: page.view.improver.progress is not None and page.view.improver.progress.round > 5)
+    page.press("Cancel")
+    page.until(lambda: page.view.improver.found is not None)
+    page.page.wait_for_timeout(500)
     _scroll(page)
 
 
 def _compare(page: Page) -> None:
-    page.press("Leave")
-    page.session.compare_with(None)
-    page.tab("Wrench")
-    page.tab("Limits")
-    page.press("none")
     page.tab("Compare")
     page.press("Compare the methods")
-    page.until(lambda: not page.view.comparison.running, seconds=120)
+    page.until(lambda: page.view.comparison.state is not None and not page.view.comparison.running)
     page.press("sqp")
 
 
 def _swim(page: Page) -> None:
-    page.press("none")
     page.tab("Swim")
     page.choose("Beside", "analytic")
     page.press("Start")
-    page.until(lambda: page.view.swimming.time > 1.0, seconds=120)
-    page.type("Speed", "3")
-    page.until(lambda: page.view.swimming.time > 25.0, seconds=300)
+    page.until(lambda: page.view.swimming.time > 0.5)
+    page.type("Speed", "8")
+    page.until(lambda: page.view.swimming.time > 25.0)
     page.page.get_by_role("button", name="2", exact=True).locator("visible=true").first.click()
-    page.until(lambda: page.view.swimming.time > 45.0, seconds=300)
+    page.until(lambda: page.view.swimming.time > 42.0)
     page.press("Pause")
 
 
 def _view(page: Page) -> None:
-    page.press("End")
     page.tab("View")
     page.row("Fin graph").first.click()
 
 
 def _dark(page: Page) -> None:
-    page.row("Dark").first.click()
-    page.tab("Wrench")
-
-
-def _failure(page: Page) -> None:
     page.tab("View")
     page.row("Dark").first.click()
     page.tab("Wrench")
-    page.press("2")
-    page.until(lambda: not page.view.busy)
-
-
-def _tour(page: Page) -> None:
-    page.press("2 ✕")
-    page.press("Tour")
-    page.press("Next")
-    page.until(lambda: not page.view.busy)
-
-
-def _palette(page: Page) -> None:
-    page.press("End")
-    page.key("Control+k")
-    page.page.wait_for_timeout(1500)
 
 
 SCENES: dict[str, Callable[[Page], object]] = {
-    "app": lambda page: page.page.wait_for_timeout(10_000),  # the first labels take their time
-    "app-steer": _steer,
+    "app": _first,
+    "app-failure": _failure,
+    "app-tour": _tour,
     "app-layout": _layout,
     "app-hull": _hull,
     "app-modes": _modes,
@@ -161,13 +153,12 @@ SCENES: dict[str, Callable[[Page], object]] = {
     "app-compare": _compare,
     "app-swim": _swim,
     "app-view": _view,
-    "app-dark": _dark,
     "app-files": lambda page: page.tab("Files"),
-    "app-failure": _failure,
-    "app-tour": _tour,
+    "app-dark": _dark,
+    "app-steer": _steer,
     "app-palette": _palette,
 }
-"""Picture and what to do before it; each goes on from the one before."""
+"""Picture and what to do before it, from first sight; those that open folders come after the others."""
 
 
 def main(folder: Path, wanted: list[str]) -> None:
@@ -186,7 +177,7 @@ def main(folder: Path, wanted: list[str]) -> None:
     server = start_server("127.0.0.1", 0)
     ucat, solver = load_layout(shipped_layouts()["ucat"]), Solver()
     solver.reply(State(ucat, target=FIRST))  # as `serve` does, so that the first page finds a warm solver
-    app = App(server, solver, ucat, Display())
+    app = App(server, solver, ucat, Display(shadows=False))
     with sync_playwright() as playwright:
         browser: Any = playwright.chromium.launch(
             executable_path=CHROMIUM, headless=True, chromium_sandbox=False, args=FLAGS
@@ -194,11 +185,10 @@ def main(folder: Path, wanted: list[str]) -> None:
         served = Served(f"http://127.0.0.1:{server.get_port()}/", app, server)
         page = Page(browser.new_page(viewport=SIZE), served, patience=6.0)
         for name, prepare in SCENES.items():
-            prepare(page)
             if not wanted or name in wanted:
+                page.start_over()
+                prepare(page)
                 save(page, folder / f"{name}.png")
-            if name == next(reversed(wanted), None):
-                break
         browser.close()
     app.stop()
     stop_server(server)

@@ -31,7 +31,7 @@ class SweepPanel:
         self._drawn = 0.0
         with gui.add_folder("Sweep an axis", expand_by_default=False):
             self._axis = gui.add_dropdown(
-                "Axis", AXIS_WORDS, hint="Which component of the target goes through the range."
+                "Sweep", AXIS_WORDS, hint="Which component of the target goes through the range."
             )
             on_user_change(self._axis, lambda _: self._fit_range())
             self._range = gui.add_vector2(
