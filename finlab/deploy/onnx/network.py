@@ -31,19 +31,8 @@ def network_model(weights: Weights, heads: int, n_components: int, metadata: Map
         metadata: what to write beside the weights.
     """
     g = Builder()
-    width = len(weights["skip.bias"])
+    add_network(g, weights, heads, n_components)
     n_features = weights["skip.weight"].shape[1]
-    hidden = "features"
-    for i in range(_count(weights, "graph.", 1)):
-        hidden = g.add("Elu", _graph_layer(g, hidden, weights, f"graph.{i}", heads, width))
-    hidden = g.add("Add", hidden, g.linear("features", weights, "skip."))
-    wrench = g.linear("target", weights, "wrench.0.")
-    wrench = g.linear(g.add("Mul", wrench, g.add("Sigmoid", wrench)), weights, "wrench.2.")
-    hidden = _join(g, hidden, wrench, weights, width)
-    for i in range(_count(weights, "transformer.layers.", 2)):
-        hidden = _transformer_layer(g, hidden, weights, f"transformer.layers.{i}", heads, width)
-    hidden = g.layer_norm(hidden, weights, "norm")
-    _mixture(g, hidden, weights, n_components)
     return g.model(
         "finlab allocator network",
         {"features": ("N", "n", n_features), "target": ("N", 6), "lower": ("n", 3), "upper": ("n", 3)},
@@ -55,6 +44,22 @@ def network_model(weights: Weights, heads: int, n_components: int, metadata: Map
         metadata,
         "N normalized, centred target wrenches on n fins in, a mixture over their normalized commands out.",
     )
+
+
+def add_network(g: Builder, weights: Weights, heads: int, n_components: int) -> None:
+    """From the tensors `features`, `target`, `lower` and `upper` to `weight`, `mean` and `std`."""
+    width = len(weights["skip.bias"])
+    hidden = "features"
+    for i in range(_count(weights, "graph.", 1)):
+        hidden = g.add("Elu", _graph_layer(g, hidden, weights, f"graph.{i}", heads, width))
+    hidden = g.add("Add", hidden, g.linear("features", weights, "skip."))
+    wrench = g.linear("target", weights, "wrench.0.")
+    wrench = g.linear(g.add("Mul", wrench, g.add("Sigmoid", wrench)), weights, "wrench.2.")
+    hidden = _join(g, hidden, wrench, weights, width)
+    for i in range(_count(weights, "transformer.layers.", 2)):
+        hidden = _transformer_layer(g, hidden, weights, f"transformer.layers.{i}", heads, width)
+    hidden = g.layer_norm(hidden, weights, "norm")
+    _mixture(g, hidden, weights, n_components)
 
 
 def network_weights(model: Model) -> dict[str, NDArray[np.float32]]:

@@ -29,6 +29,21 @@ def surrogate_model(
         metadata: what to write beside the weights.
     """
     g = Builder()
+    shaft, horizontal, vertical = add_fin(g, weights, reference, unit)
+    _sum(g, shaft, horizontal, vertical)
+    return g.model(
+        "finlab surrogate",
+        {"command": ("N", "n", 3), "position": ("n", 3), "mounting_angle": ("n",)},
+        {"fin_force": ("N", "n", 3), "wrench": ("N", 6)},
+        metadata,
+        "Commands of n fins in; forces in their own frames [N] and the wrench [N, N m] of the robot out.",
+    )
+
+
+def add_fin(
+    g: Builder, weights: Weights, reference: tuple[float, float], unit: float
+) -> tuple[str, str, str]:
+    """From the tensor `command` (N, n, 3) to `fin_force`, and its three parts (N, n, 1)."""
     parts = ("amplitude", "frequency", "direction")
     amplitude, frequency, direction = g.add_many(
         "Split", "command", g.integers([1, 1, 1]), names=parts, axis=-1
@@ -51,14 +66,7 @@ def surrogate_model(
     horizontal = g.add("Sub", g.add("Mul", c, along), g.add("Mul", s, across))
     vertical = g.add("Add", g.add("Mul", s, along), g.add("Mul", c, across))
     g.add("Concat", shaft, horizontal, vertical, axis=-1, name="fin_force")
-    _sum(g, shaft, horizontal, vertical)
-    return g.model(
-        "finlab surrogate",
-        {"command": ("N", "n", 3), "position": ("n", 3), "mounting_angle": ("n",)},
-        {"fin_force": ("N", "n", 3), "wrench": ("N", 6)},
-        metadata,
-        "Commands of n fins in; forces in their own frames [N] and the wrench [N, N m] of the robot out.",
-    )
+    return shaft, horizontal, vertical
 
 
 def surrogate_weights(model: Model) -> dict[str, NDArray[np.float32]]:
