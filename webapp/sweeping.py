@@ -99,7 +99,7 @@ class Sweep:
     def note(self, answering: Answering) -> None:
         """Note a new answer, if it is to one of the values."""
         answer = answering.best
-        if answer is None or answer.layout.names != self.fins or not (self.running or answering.busy):
+        if answer is None or not self.running or answer.layout.names != self.fins:
             return
         at = int(np.argmin(np.abs(self.values - answer.target[self.axis])))
         if abs(self.values[at] - answer.target[self.axis]) < 1e-9:
