@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from finlab.allocation.energy import command_energy
 from finlab.allocation.policy import describe_binding
 from finlab.layout import Layout
+from finlab.layout.arrays import layout_effectiveness
 
 Array = NDArray[np.float64]
 
@@ -132,10 +133,14 @@ class Allocation:
 
     @property
     def binding(self) -> tuple[str, ...]:
-        """Sentences about the limits that bind."""
+        """Sentences about the limits that keep the robot from delivering the target; none where it does."""
+        if self.reachable:
+            return ()
         limits = [fin.limits for fin in self.layout.fins]
         lower, upper = (np.array([getattr(limit, end) for limit in limits]) for end in ("lower", "upper"))
-        return tuple(describe_binding(self.fins, self.command, lower, upper))
+        missing = self.unallocated / self.sigma**2
+        pull = (missing @ layout_effectiveness(self.layout)).reshape(-1, 2)
+        return tuple(describe_binding(self.fins, self.command, lower, upper, pull))
 
     @cached_property
     def energy(self) -> float:

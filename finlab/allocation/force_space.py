@@ -30,10 +30,6 @@ REST = 1e-5
 """Share of the largest thrust below which a fin's mobility no longer shrinks; it can still come back."""
 
 
-EVEN_STEPS = 20
-"""Newton steps of `spread_evenly`; a dozen reach full precision where there is an answer."""
-
-
 class PlanarProblem(NamedTuple):
     """One layout as the planar search sees it."""
 
@@ -91,13 +87,12 @@ def descend(problem: PlanarProblem, target: Array, thrust: Array, steps: int) ->
     return _newton(problem, target, mobility(problem, thrust), steps, 2)
 
 
-def spread_evenly(problem: PlanarProblem, target: Array) -> Planar:
-    """The allocation that loads all fins evenly: one convex problem, no reweighting, no seed.
-
-    Dear, but exact up to the border of what the robot can do, where the cheap ways stall.
-    """
-    weight = np.broadcast_to(problem.curves.maximum, (len(target), len(problem.columns)))
-    return _newton(problem, target, weight, 0, EVEN_STEPS)
+def polar(problem: PlanarProblem, force: Array) -> Planar:
+    """Planar forces (R, n, 2) [N] as thrusts and zero directions within the arcs; no residual is told."""
+    angle = np.arctan2(force[..., 1], force[..., 0]) - problem.middle
+    offset = np.clip(angle - 2 * np.pi * np.rint(angle / (2 * np.pi)), -problem.half, problem.half)
+    thrust = np.clip(np.linalg.norm(force, axis=-1), problem.curves.minimum, problem.curves.maximum)
+    return Planar(thrust, problem.middle + offset, np.full((len(force), 6), np.nan))
 
 
 def _newton(problem: PlanarProblem, target: Array, weight: Array, reweighted: int, plain: int) -> Planar:

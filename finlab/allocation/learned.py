@@ -23,7 +23,7 @@ from finlab.allocation.policy import Policy
 from finlab.allocation.prepared import Prepared
 from finlab.allocation.proposal import Proposal
 from finlab.allocation.threads import single_threaded_products
-from finlab.allocation.unreachable import serve_in_turn
+from finlab.allocation.unreachable import serve
 from finlab.allocation.weights import LearnedWeights, weights_of
 from finlab.layout import FinModelSpec, Layout
 
@@ -34,8 +34,6 @@ Array = NDArray[Any]
 
 CHUNK = 256
 """Targets that are solved together; keeps memory flat for any number of targets."""
-RESTARTS = 32
-"""Raw candidates from which an unreachable target is approached under weights or priorities."""
 
 
 class LearnedAllocator(Allocator):
@@ -106,24 +104,14 @@ class LearnedAllocator(Allocator):
     def _solve_by(
         self, policy: Policy, layout: Layout, target: Array, *, seed: int, previous: Array | None
     ) -> Solution:
-        if policy.kind == "direction":
-            return self._solve_direction(layout, target, seed=seed, previous=previous)
         solution = self._solve(layout, target, seed=seed, previous=previous)
         plain = policy.kind == "closest" and len(set(policy.axis_weights)) == 1
         if plain or self._reaches(layout, solution, target)[0]:
             return solution
-        assert solution.candidates is not None and solution.samples is not None
-        starts = np.concatenate([solution.candidates().command, solution.samples().command[:RESTARTS]])
-        stages = (
-            policy.stages
-            if policy.kind == "priority"
-            else [(np.array(policy.axis_weights), np.ones(6, bool))]
-        )
-        command = serve_in_turn(
-            self.pipeline.prepare(layout).commands, target[0] / self.normalization.std, stages, starts
-        )
-        wrench = self.pipeline.prepare(layout).commands.wrench(command[None]) * self.normalization.std
-        return solution._replace(command=command[None], wrench_surrogate=wrench)
+        # What the policy asks for within reach is one wrench; that one is then delivered as any other.
+        std = self.normalization.std
+        served = serve(self.pipeline.prepare(layout).planar, policy, target[0] / std)
+        return self._solve(layout, served[None] * std, seed=seed, previous=previous)
 
     def _notes(self, layout: Layout) -> tuple[str, ...]:
         """What the user should know before trusting an answer for this layout."""

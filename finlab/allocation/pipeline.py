@@ -19,6 +19,7 @@ from finlab.allocation.energy import DEFAULT_WEIGHTS, EnergyWeights, command_ene
 from finlab.allocation.foresight import foresee
 from finlab.allocation.learned_fin import LearnedFin
 from finlab.allocation.levenberg_marquardt import refine
+from finlab.allocation.nearest import nearest
 from finlab.allocation.numpy_network import NumpyNetwork
 from finlab.allocation.prepared import Prepared, prepare
 from finlab.allocation.proposal import Proposal, propose
@@ -35,9 +36,14 @@ PROMISING = 0.02
 INEXACT = 1e9
 """Rank of inexact answers, behind every exact one. Energies reach thousands where an arc of zero directions
 ends near zero, since the energy divides by that end."""
-PATIENCE = ((5, 0), (25, 32))
-"""For the few targets that the quick way did not reach: Levenberg-Marquardt steps, and how many fresh
-starts join, in stages."""
+FIRST_PATIENCE, NEAREST_PATIENCE, LAST_PATIENCE = 5, 8, 25
+"""Levenberg-Marquardt steps for the few targets that the quick way did not reach: at once, from the
+nearest wrench that the fins can deliver, and from fresh starts."""
+RESTARTS = 32
+"""Fresh starts for the very few that even so stay further away than they need to."""
+NEEDLESS = (5e-4, 2e-3)
+"""Normalized error beyond what is proven to be needed that is not worth further starts: a constant and a
+share."""
 PLAN_STEPS = 4
 """Levenberg-Marquardt steps on a command that was planned ahead."""
 SWITCH_GAIN = 0.01
@@ -138,16 +144,45 @@ class Pipeline:
         """Search from thrust seeds (N, S, n), refine, and insist where that did not reach the target."""
         command = self._search(prepared, target, seeds, steady)
         pool = self._refine(prepared, target, command, self.settings.refine_steps, steady)
-        for steps, extra in PATIENCE:
-            missed = pool.error[:, 0] > TOLERANCE
-            if not missed.any():
-                break
-            fresh = _fresh_starts(prepared, target[missed], proposal.command[missed], extra)
-            more = np.concatenate([pool.command[missed], fresh], axis=1)
-            longer = self._refine(prepared, target[missed], more, steps)
-            for kept, new in zip(pool, longer, strict=True):
-                kept[missed] = new[:, : kept.shape[1]]
+        missed = pool.error[:, 0] > TOLERANCE
+        if missed.any():
+            self._insist(prepared, target, proposal, pool, missed)
         return pool
+
+    def _insist(
+        self, prepared: Prepared, target: Array, proposal: Proposal, pool: Pool, missed: NDArray[np.bool_]
+    ) -> None:
+        """Improve, in place, the answers to targets that were missed: they are hard, or out of reach."""
+        self._try(prepared, target, pool, missed, None, FIRST_PATIENCE)
+        missed = pool.error[:, 0] > TOLERANCE
+        if not missed.any():
+            return
+        found = nearest(prepared.planar, target[missed])
+        needed = np.zeros(len(target))
+        needed[missed] = np.linalg.norm(target[missed] - found.wrench, axis=-1)
+        start, _ = force_space.realize(prepared.planar, force_space.polar(prepared.planar, found.force))
+        self._try(prepared, target, pool, missed, start[:, None], NEAREST_PATIENCE)
+        missed &= pool.error[:, 0] > np.maximum(TOLERANCE, NEEDLESS[0] + (1.0 + NEEDLESS[1]) * needed)
+        if missed.any():
+            fresh = _fresh_starts(prepared, proposal.command[missed], RESTARTS)
+            self._try(prepared, target, pool, missed, fresh, LAST_PATIENCE)
+
+    def _try(
+        self,
+        prepared: Prepared,
+        target: Array,
+        pool: Pool,
+        rows: NDArray[np.bool_],
+        starts: Array | None,
+        steps: int,
+    ) -> None:
+        """Refine some rows of a pool further, in place, together with new starts (rows, S, n, 3)."""
+        command = pool.command[rows]
+        if starts is not None:
+            command = np.concatenate([command, prepared.commands.clamp(starts)], axis=1)
+        longer = self._refine(prepared, target[rows], command, steps)
+        for kept, new in zip(pool, longer, strict=True):
+            kept[rows] = new[:, : kept.shape[1]]
 
     def _seeds(self, prepared: Prepared, proposal: Proposal) -> Array:
         """Thrust seeds (N, S, n): the best candidate of each component, and sub-layouts."""
@@ -199,20 +234,13 @@ class Pipeline:
         return Pool(refined.command[order], refined.wrench[order], refined.error[order], energy[order])
 
 
-def _fresh_starts(prepared: Prepared, target: Array, proposed: Array, count: int) -> Array:
-    """Commands (N, count, n, 3): all fins loaded evenly, raw candidates of the network, random ones.
-
-    Near the border of what a robot can do, all of the network's candidates may lie in one blind alley.
-    """
-    rows, _, n, _ = proposed.shape
-    if count == 0:
-        return np.empty((rows, 0, n, 3))
-    even, _ = force_space.realize(prepared.planar, force_space.spread_evenly(prepared.planar, target))
+def _fresh_starts(prepared: Prepared, proposed: Array, count: int) -> Array:
+    """Commands (N, count, n, 3): raw candidates of the network and random ones, half and half."""
     raw = proposed[:, : count // 2].astype(np.float64)
     lower, upper = prepared.commands.lower, prepared.commands.upper
-    unit = np.random.default_rng(0).random((count - 1 - raw.shape[1], n, 3))
-    spread = np.broadcast_to(lower + unit * (upper - lower), (rows, *unit.shape))
-    return prepared.commands.clamp(np.concatenate([even[:, None], raw, spread], axis=1))
+    unit = np.random.default_rng(0).random((count - raw.shape[1], len(lower), 3))
+    spread = np.broadcast_to(lower + unit * (upper - lower), (len(proposed), *unit.shape))
+    return np.concatenate([raw, spread], axis=1)
 
 
 class Pool(NamedTuple):

@@ -18,10 +18,6 @@ AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 KINDS = ("closest", "direction", "priority")
 """`closest`: least weighted error. `direction`: the same direction, scaled down. `priority`: groups of axes,
 each served as far as those before it allow."""
-HELD = 30.0
-"""Weight of an axis that an earlier group has already settled."""
-IGNORED = 1e-3
-"""Weight of an axis whose group has not had its turn."""
 
 
 @dataclass(frozen=True)
@@ -52,18 +48,12 @@ class Policy:
             raise CommandError(f"priority: every axis may be named once, got {', '.join(named)}")
 
     @property
-    def stages(self) -> list[tuple[Array, NDArray[np.bool_]]]:
-        """For `priority`: for each group, weights (6,) of the error and the axes (6,) settled afterwards."""
+    def groups(self) -> list[NDArray[np.bool_]]:
+        """For `priority`: masks (6,) of the groups of axes in order; those that are not named come last."""
         named = {axis for group in self.order for axis in group}
         rest = tuple(axis for axis in AXES if axis not in named)
-        settled = np.zeros(6, dtype=bool)
-        stages = []
-        for group in (*self.order, *((rest,) if rest else ())):
-            current = np.array([axis in group for axis in AXES])
-            weights = np.where(settled, HELD, np.where(current, 1.0, IGNORED))
-            settled = settled | current
-            stages.append((weights, settled.copy()))
-        return stages
+        groups = (*self.order, *((rest,) if rest else ()))
+        return [np.array([axis in group for axis in AXES]) for group in groups if group]
 
 
 CLOSEST = Policy()
@@ -96,26 +86,35 @@ def largest_share(reached: Callable[[Array], NDArray[np.bool_]], rounds: int = 3
     return low
 
 
-def describe_binding(names: Sequence[str], command: Array, lower: Array, upper: Array) -> list[str]:
-    """Sentences about the limits that bind: fins at full or least thrust and at the ends of their arcs.
+def describe_binding(
+    names: Sequence[str], command: Array, lower: Array, upper: Array, pull: Array
+) -> list[str]:
+    """Sentences about the limits that keep a robot from delivering what is missing.
 
     Args:
         names: the fins.
         command: (n, 3), NaN for a failed fin.
         lower: lower limits (n, 3).
         upper: upper limits (n, 3).
+        pull: where each fin would have to push (n, 2), in its thrust plane, to lessen what is missing.
     """
     tolerance = 1e-3 * (upper - lower) + 1e-9
     at_low, at_high = command <= lower + tolerance, command >= upper - tolerance
+    wanted = np.arctan2(pull[:, 1], pull[:, 0])
     sentences = []
     for i, name in enumerate(names):
         if np.isnan(command[i]).any():
             continue
+        rests = at_low[i, 0] and at_low[i, 1]
         if at_high[i, 0] and at_high[i, 1]:
             sentences.append(f"{name} at full thrust")
-        elif at_low[i, 0] and at_low[i, 1]:
-            sentences.append(f"{name} at rest")
-        if upper[i, 2] - lower[i, 2] < 2 * np.pi - 1e-6 and (at_low[i, 2] or at_high[i, 2]):
+        if upper[i, 2] - lower[i, 2] >= 2 * np.pi - 1e-6:
+            continue
+        middle, half = 0.5 * (lower[i, 2] + upper[i, 2]), 0.5 * (upper[i, 2] - lower[i, 2])
+        outside = abs((wanted[i] - middle + np.pi) % (2 * np.pi) - np.pi) > half
+        if rests and outside:
+            sentences.append(f"{name} cannot point where it is needed")
+        elif not rests and outside and (at_low[i, 2] or at_high[i, 2]):
             sentences.append(f"{name} at the end of its arc")
     return sentences
 

@@ -1,43 +1,34 @@
-"""As close as the robot comes to a wrench it cannot deliver, under weights and priorities."""
+"""The one wrench within reach that a policy asks for in place of one that is out of reach."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.force_space import PlanarProblem
+from finlab.allocation.nearest import nearest, nearest_along, nearest_in_turn
+from finlab.allocation.policy import Policy
 
-Array = NDArray[np.float64]
-
-STEPS = 40
-"""Levenberg-Marquardt steps for each group of axes."""
+Array = NDArray[Any]
 
 
-def serve_in_turn(
-    problem: CommandProblem,
-    target: Array,
-    stages: Sequence[tuple[Array, NDArray[np.bool_]]],
-    starts: Array,
-) -> Array:
-    """The command (n, 3) that serves one stage after the other.
+def serve(problem: PlanarProblem, policy: Policy, target: Array) -> Array:
+    """The wrench (6,) to deliver, all normalized.
 
     Args:
         problem: the layout.
-        target: normalized wrench (6,).
-        stages: for each, weights (6,) of the error, and the axes (6,) that later stages must keep
-            where this one brought them.
-        starts: commands (R, n, 3) to start from; the best of all ends counts.
+        policy: what counts.
+        target: the wrench (6,) that was asked for.
     """
-    goal = target
-    command = starts
-    for weights, settled in stages:
-        repeated = np.broadcast_to(goal, (len(command), 6))
-        refined = refine(problem, repeated, command, STEPS, weights=weights)
-        order = np.argsort(refined.error)
-        command = refined.command[order]
-        reached = problem.wrench(command[:1])[0]
-        goal = np.where(settled, reached, target)
-    best: Array = command[0]
-    return best
+    if policy.kind == "direction":
+        found = nearest_along(problem, target)
+    elif policy.kind == "priority":
+        found = nearest_in_turn(problem, target, policy.groups)
+    else:
+        weights = np.array(policy.axis_weights, np.float64)
+        with np.errstate(divide="ignore"):
+            found = nearest(problem, target[None], (weights.max() / weights) ** 2)
+    wrench: Array = found.wrench[0]
+    return wrench

@@ -159,7 +159,7 @@ def _row(layout: Layout, free: list[Ride], steady: list[Ride], forced: list[floa
         "turn_free": float(max(a.turn.max() for a in free)),
         "turn_steady": float(max(b.turn.max() for b in steady)),
         "turn_ratio": float(max(ratios)),
-        "steady": sum(ratio <= GOAL for ratio in ratios),
+        "steady": int(sum(ratio <= GOAL for ratio in ratios)),
         "forced": max(known) if known else None,
         "energy_ratio": float(np.mean(energies)),
         "energy_ratio_worst": float(max(energies)),

@@ -11,8 +11,6 @@ from finlab.allocation.learned import LearnedAllocator
 from finlab.allocation.policy import (
     AXES,
     CLOSEST,
-    HELD,
-    IGNORED,
     Policy,
     as_policy,
     describe_binding,
@@ -184,21 +182,37 @@ def test_scale_of_nothing_is_one(learned: LearnedAllocator) -> None:
 def test_binding_limits_are_named(learned: LearnedAllocator) -> None:
     strong = learned.allocate(shipped("A"), (60.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     assert set(strong.binding) == {f"{name} at full thrust" for name in strong.fins}
-    idle = learned.allocate(shipped("A"), np.zeros(6), failed=["back_left"])
-    assert set(idle.binding) <= {f"{name} at rest" for name in idle.fins if name != "back_left"}
     stopped = learned.allocate(shipped("restricted"), (0.0, 0.0, -40.0, 0.0, 0.0, 0.0))
     assert any(sentence.endswith("at the end of its arc") for sentence in stopped.binding)
 
 
+def test_nothing_binds_where_the_target_is_delivered(learned: LearnedAllocator) -> None:
+    for failed in ([], ["back_left"]):
+        assert learned.allocate(shipped("A"), np.zeros(6), failed=failed).binding == ()
+
+
 def test_sentences_about_commands() -> None:
-    names = ("full", "rest", "fast", "stop", "lost", "free")
-    lower, upper = np.tile([0.0, 0.0, -1.0], (6, 1)), np.tile([1.0, 2.0, 1.0], (6, 1))
+    names = ("full", "rest", "fast", "stop", "lost", "free", "turned away", "at a stop it needs")
+    lower, upper = np.tile([0.0, 0.0, -1.0], (8, 1)), np.tile([1.0, 2.0, 1.0], (8, 1))
     lower[5, 2], upper[5, 2] = -np.pi, np.pi
-    command = np.array([[1, 2, 0], [0, 0, 0], [0.5, 2, 0], [0.5, 1, -1], [np.nan] * 3, [0.5, 1, np.pi]])
-    assert describe_binding(names, command, lower, upper) == [
+    command = np.array(
+        [
+            [1, 2, 0],
+            [0, 0, 0],
+            [0.5, 2, 0],
+            [0.5, 1, -1],
+            [np.nan] * 3,
+            [0.5, 1, np.pi],
+            [0, 0, 0],
+            [0.5, 1, 1],
+        ]
+    )
+    wanted = np.array([0.0, 0.5, 0.0, -2.0, 0.0, 0.0, 3.0, 0.5])
+    pull = np.stack([np.cos(wanted), np.sin(wanted)], axis=-1)
+    assert describe_binding(names, command, lower, upper, pull) == [
         "full at full thrust",
-        "rest at rest",
         "stop at the end of its arc",
+        "turned away cannot point where it is needed",
     ]
 
 
@@ -251,14 +265,9 @@ def test_policies_from_words() -> None:
     assert policy_from("priority", None, ["Fx,Fy", "Tz"]).order == (("Fx", "Fy"), ("Tz",))
 
 
-def test_stages_hold_what_is_settled_and_end_with_all_axes() -> None:
-    stages = Policy("priority", order=(("Fz",), ("Tx", "Ty"))).stages
-    assert [tuple(np.array(AXES)[settled]) for _, settled in stages] == [
-        ("Fz",),
-        ("Fz", "Tx", "Ty"),
-        AXES,
-    ]
-    np.testing.assert_array_equal(stages[1][0], [IGNORED, IGNORED, HELD, 1.0, 1.0, IGNORED])
+def test_groups_end_with_the_axes_that_are_not_named() -> None:
+    groups = Policy("priority", order=(("Fz",), ("Tx", "Ty"))).groups
+    assert [tuple(np.array(AXES)[group]) for group in groups] == [("Fz",), ("Tx", "Ty"), ("Fx", "Fy", "Tz")]
 
 
 @pytest.mark.parametrize("share", [0.0, 1e-4, 0.0625, 0.123, 0.5, 0.999, 1.0])

@@ -1,0 +1,101 @@
+"""The nearest wrench within reach: held against its own proof of optimality and against a general solver."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from finlab.allocation.force_space import PlanarProblem
+from finlab.allocation.learned import LearnedAllocator
+from finlab.allocation.nearest import nearest, nearest_along, nearest_in_turn
+from finlab.assets import shipped_layouts
+from finlab.layout import load_layout, random_layout
+
+GROUPS = [
+    np.array([False, False, True, False, False, False]),
+    np.array([True, True, False, True, True, True]),
+]
+
+
+def problem(learned: LearnedAllocator, seed: int, limits: str) -> tuple[PlanarProblem, np.ndarray]:
+    """A layout in force space and a wrench that is mostly out of its reach, normalized."""
+    rng = np.random.default_rng(seed)
+    layout = random_layout(rng, n_fins=int(rng.integers(2, 8)), limits=limits)  # type: ignore[arg-type]
+    return learned.pipeline.prepare(layout).planar, rng.standard_normal(6) * rng.choice([0.5, 3.0, 8.0])
+
+
+def farthest(planar: PlanarProblem, pull: np.ndarray) -> float:
+    """How far the fins can push along pulls (n, 2), sectors wider than half a turn taken whole."""
+    angle = np.arctan2(pull[:, 1], pull[:, 0]) - planar.middle
+    excess = np.abs((angle + np.pi) % (2 * np.pi) - np.pi) - planar.half
+    share = np.where(excess > 0.0, np.maximum(np.cos(np.minimum(excess, np.pi / 2)), 0.0), 1.0)
+    return float((planar.curves.maximum * np.linalg.norm(pull, axis=1) * share).sum())
+
+
+@pytest.mark.parametrize("limits", ["nominal", "varied"])
+def test_no_wrench_within_reach_is_nearer(learned: LearnedAllocator, limits: str) -> None:
+    proven = 0
+    for seed in range(5000, 5020):
+        planar, target = problem(learned, seed, limits)
+        found = nearest(planar, target[None])
+        assert (np.linalg.norm(found.force[0], axis=1) <= planar.curves.maximum * (1 + 1e-9)).all()
+        missing = target - found.wrench[0]
+        # The plane across what is missing separates the target from all that the fins can do.
+        gap = farthest(planar, planar.columns @ missing) - missing @ found.wrench[0]
+        convex = ((planar.half <= np.pi / 2) | (planar.half > 3.14)).all()
+        if convex:
+            assert abs(gap) < 1e-3 * (1.0 + missing @ missing)
+            proven += 1
+    assert proven >= 8
+
+
+def test_many_targets_are_answered_like_single_ones(learned: LearnedAllocator) -> None:
+    planar, target = problem(learned, 5003, "varied")
+    many = nearest(planar, np.stack([target, -target, 0.1 * target]))
+    for row, wanted in enumerate((target, -target, 0.1 * target)):
+        np.testing.assert_allclose(many.wrench[row], nearest(planar, wanted[None]).wrench[0], atol=1e-4)
+
+
+def test_an_axis_that_is_ignored_costs_nothing(learned: LearnedAllocator) -> None:
+    planar = learned.pipeline.prepare(load_layout(shipped_layouts()["A"])).planar
+    target = np.array([30.0, 0.0, 30.0, 0.0, 0.0, 0.0])
+    heave = nearest(planar, target[None], np.array([np.inf, np.inf, 1.0, np.inf, np.inf, np.inf]))
+    both = nearest(planar, target[None])
+    assert heave.wrench[0, 2] > both.wrench[0, 2] + 0.1
+
+
+@pytest.mark.parametrize("limits", ["nominal", "varied"])
+def test_groups_are_served_strictly_in_order(learned: LearnedAllocator, limits: str) -> None:
+    for seed in range(5020, 5035):
+        planar, target = problem(learned, seed, limits)
+        first = nearest(planar, target[None], np.where(GROUPS[0], 1.0, np.inf)).wrench[0]
+        served = nearest_in_turn(planar, target, GROUPS).wrench[0]
+        assert abs(served[2] - target[2]) < abs(first[2] - target[2]) + 2e-3
+
+
+@pytest.mark.parametrize("limits", ["nominal", "varied"])
+def test_the_direction_is_kept_and_no_more_can_be_had(learned: LearnedAllocator, limits: str) -> None:
+    for seed in range(5040, 5055):
+        planar, target = problem(learned, seed, limits)
+        wrench = nearest_along(planar, target).wrench[0]
+        share = float(wrench @ target / (target @ target))
+        assert -1e-6 <= share <= 1.0 + 1e-6
+        assert np.linalg.norm(wrench - share * target) < 2e-3
+        if share < 0.99:
+            beyond = (share + 0.01) * target
+            assert np.linalg.norm(nearest(planar, beyond[None]).wrench[0] - beyond) > 1e-4
+
+
+def test_a_general_solver_finds_nothing_nearer(learned: LearnedAllocator) -> None:
+    planar = learned.pipeline.prepare(load_layout(shipped_layouts()["penta"])).planar
+    target = 4.0 * np.array([6.0, -4.0, 5.0, 1.0, 2.0, -3.0])
+    columns, top = planar.columns.reshape(-1, 6), planar.curves.maximum
+    found = minimize(
+        lambda y: 0.5 * ((y @ columns - target) ** 2).sum(),
+        np.zeros(len(columns)),
+        jac=lambda y: columns @ (y @ columns - target),
+        constraints={"type": "ineq", "fun": lambda y: top**2 - (y.reshape(-1, 2) ** 2).sum(1)},
+        method="SLSQP",
+        options={"maxiter": 300, "ftol": 1e-12},
+    )
+    mine = 0.5 * ((nearest(planar, target[None]).wrench[0] - target) ** 2).sum()
+    assert mine == pytest.approx(found.fun, rel=1e-5)
