@@ -48,7 +48,7 @@ STEPS = (
     ),
     Step(
         "One wrench has many answers",
-        "Four fins have twelve numbers, the wrench only six. Each green dot in the plot is one answer, "
+        "Four fins have twelve numbers, the wrench only six. Each numbered dot in the plot is one answer, "
         "and this is the second. Choose more under Modes: fins change, the green sum stays.",
         "ucat",
         PRESETS["Turn"],
