@@ -39,6 +39,11 @@ class Guiding(Core):
             self._commit("End the tour", self._before_tour)
         self.stop, self._before_tour = None, None
 
+    def start_over(self) -> None:
+        """Everything as at first sight, outside the tour."""
+        self.stop, self._before_tour = None, None
+        super().start_over()
+
     def _go(self, stop: int) -> None:
         step = STEPS[stop]
         self._commit(f"Tour: {step.title}", step.state(self.state))
