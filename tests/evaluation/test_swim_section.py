@@ -22,7 +22,7 @@ def test_what_is_ahead_leads_and_what_is_behind_trails() -> None:
         "trajectory": [_whole("learned", 0.04), _whole("on-board", 0.03)],
         "faults": [_fault("bow lost", "one fin", 1.1), _fault("bow + port lost", "two fins", 3.0, False)],
         "velocity": [
-            _speed("learned", 0.8, 0.01),
+            _speed("learned-power", 0.8, 0.01),
             _speed("analytic", 1.0, 0.02),
             _speed("on-board", 0.4, 0.01),
         ],
@@ -30,11 +30,15 @@ def test_what_is_ahead_leads_and_what_is_behind_trails() -> None:
     leads, trails = swim_claims(rows)
     assert leads[0].startswith("Closed loop on layouts A to D: ATE 4.0 cm") and "12.4" in leads[0]
     assert leads[1] == "With one fin lost the ATE is at most 1.10 times that of the healthy robot."
-    assert leads[2].startswith("At constant speed 20 % less power than `analytic`, with 50 % smaller")
+    assert leads[2] == (
+        "At constant speed, minimizing inertial power (`learned-power`): 20 % less inertial power than "
+        "`analytic`, speed error 50 % smaller."
+    )
     assert trails == (
         "`on-board` follows the trajectories closer: ATE 3.0 cm.",
         "Loses its way with bow + port lost.",
-        "At constant speed 100 % more power than `on-board`, with 0 % larger speed error.",
+        "At constant speed, minimizing inertial power (`learned-power`): 100 % more inertial power than "
+        "`on-board`, speed error 0 % larger.",
     )
 
 

@@ -44,7 +44,7 @@ WHOLE = ("ablation", "temperature", "scatter", "seeds")
 SWIM_METHODS = {
     "trajectory": "learned,on-board",
     "faults": "learned,on-board",
-    "velocity": "learned,analytic,on-board",
+    "velocity": "learned-power,learned,analytic,on-board",
 }
 """Closed-loop experiment -> methods."""
 

@@ -7,9 +7,9 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from finlab.evaluation.report.pictures.style import BLACK, BLUE, GREEN, GREY, ORANGE, clean, picture
+from finlab.evaluation.report.pictures.style import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, clean, picture
 
-METHODS = {"learned": BLUE, "on-board": ORANGE, "analytic": GREEN}
+METHODS = {"learned": BLUE, "learned-power": SKY, "on-board": ORANGE, "analytic": GREEN}
 """Method -> colour."""
 
 

@@ -69,16 +69,17 @@ def swim_claims(rows: Mapping[str, Sequence[Row]]) -> Claims:
         (leads if max(single) <= 1.15 else trails).append(words)
         trails += [f"Loses its way with {r['fault']}." for r in swum if not r["tracked"]]
     speeds = {r["method"]: r for r in rows.get("velocity", ()) if r["speed"] is None}
-    for name, other in speeds.items():
-        if name == "learned":
-            continue
-        power = speeds["learned"]["inertial_w"] / other["inertial_w"] - 1
-        missed = speeds["learned"]["mae"] / other["mae"] - 1
-        words = (
-            f"At constant speed {abs(100 * power):.0f} % {'less' if power < 0 else 'more'} power than "
-            f"`{name}`, with {abs(100 * missed):.0f} % {'smaller' if missed < 0 else 'larger'} speed error."
-        )
-        (leads if power < 0 and missed <= 0.01 else trails).append(words)
+    for mine in (name for name in ("learned-power", "learned") if name in speeds):
+        for name in (name for name in ("analytic", "on-board") if name in speeds):
+            power = speeds[mine]["inertial_w"] / speeds[name]["inertial_w"] - 1
+            missed = speeds[mine]["mae"] / speeds[name]["mae"] - 1
+            goal = "inertial power" if mine == "learned-power" else "the energy proxy"
+            words = (
+                f"At constant speed, minimizing {goal} (`{mine}`): {abs(100 * power):.0f} % "
+                f"{'less' if power < 0 else 'more'} inertial power than `{name}`, speed error "
+                f"{abs(100 * missed):.0f} % {'smaller' if missed < 0 else 'larger'}."
+            )
+            (leads if power < 0 and missed <= 0.01 else trails).append(words)
     return Claims(tuple(leads), tuple(trails))
 
 
@@ -160,5 +161,5 @@ def _velocity(rows: Sequence[Row]) -> list[Block]:
 
 
 def _ours(row: Row) -> Row:
-    kind = {"_kind": "ours"} if row["method"] == "learned" else {}
+    kind = {"_kind": "ours"} if row["method"].startswith("learned") else {}
     return {**row, "method": f"`{row['method']}`", **kind}
