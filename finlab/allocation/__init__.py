@@ -5,5 +5,6 @@ from finlab.allocation.allocation import BatchAllocation as BatchAllocation
 from finlab.allocation.allocation import Candidates as Candidates
 from finlab.allocation.allocation import Solution as Solution
 from finlab.allocation.allocator import Allocator as Allocator
+from finlab.allocation.health import Health as Health
 from finlab.allocation.methods import METHODS as METHODS
 from finlab.allocation.methods import load_allocator as load_allocator

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.allocation import REACHED, Allocation, BatchAllocation, Candidates, Solution
+from finlab.allocation.health import Health
 from finlab.allocation.policy import AXES, CLOSEST, Policy, as_policy, largest_share
 from finlab.data.normalization import Normalization
 from finlab.errors import AllocationError, CommandError
@@ -57,6 +58,7 @@ class Allocator(ABC):
         failed: Sequence[str] = (),
         previous: ArrayLike | None = None,
         policy: Policy | str = CLOSEST,
+        health: Health | None = None,
         seed: int = 0,
     ) -> Allocation:
         """Commands for one target.
@@ -68,6 +70,8 @@ class Allocator(ABC):
             previous: command (n, 3) of the previous tick: fins then turn slowly, and the robot changes the
                 way it moves only when that pays.
             policy: what to do when the wrench is out of reach; see `Policy`.
+            health: fins that are weak, stuck at an angle or running on; the result's layout has the limits
+                that are left.
             seed: the same target, layout and seed give the same answer.
 
         Raises:
@@ -77,6 +81,7 @@ class Allocator(ABC):
         """
         target, policy = check_wrenches(wrench, single=True), as_policy(policy)
         check_layout_and_seed(layout, seed)
+        layout = layout if health is None else health.applied_to(layout)
         healthy, alive = remove_failed(layout, failed)
         before = None if previous is None else check_previous(previous, layout)[alive]
         start = time.perf_counter()
@@ -134,11 +139,18 @@ class Allocator(ABC):
         return self.normalization.error(wrench, targets) <= REACHED
 
     def allocate_batch(
-        self, layout: Layout, wrenches: ArrayLike, *, failed: Sequence[str] = (), seed: int = 0
+        self,
+        layout: Layout,
+        wrenches: ArrayLike,
+        *,
+        failed: Sequence[str] = (),
+        health: Health | None = None,
+        seed: int = 0,
     ) -> BatchAllocation:
         """Commands for many targets (N, 6) on one layout; errors as in `allocate`."""
         targets = check_wrenches(wrenches, single=False)
         check_layout_and_seed(layout, seed)
+        layout = layout if health is None else health.applied_to(layout)
         healthy, alive = remove_failed(layout, failed)
         start = time.perf_counter()
         if len(targets) == 0:

@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, UseAppendAction, arg
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import numpy as np
 
-    from finlab.allocation import Allocation
+    from finlab.allocation import Allocation, Health
+    from finlab.layout import Layout
 
 Wrench = tuple[float, float, float, float, float, float]
 
@@ -25,6 +28,9 @@ def allocate(
     policy: Annotated[str, arg(metavar="NAME")] = "closest",
     axis_weights: Annotated[Wrench | None, arg(metavar="W1 ... W6")] = None,
     priority: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="AXES")] = (),
+    health: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE")] = (),
+    stuck: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=DEG")] = (),
+    running: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=A,F,DEG")] = (),
     seed: Annotated[int, arg(metavar="N")] = 0,
     json: bool = False,
 ) -> None:
@@ -39,6 +45,9 @@ def allocate(
         policy: for a wrench out of reach: closest, direction (same direction, scaled down) or priority.
         axis_weights: for `closest`: weight of each axis of the error.
         priority: for `priority`: a group of axes with commas between, most important first, such as Fz,Tz.
+        health: a weak fin: share that is left of its largest amplitude and frequency, such as bow=0.5.
+        stuck: a fin that no longer turns: the zero direction at which it stays [deg].
+        running: a fin that no longer listens: the command that it keeps [rad, Hz, deg].
         seed: same target, layout and seed, same answer.
         json: print one JSON object instead of a table.
     """
@@ -49,13 +58,56 @@ def allocate(
     robot = open_robot(layout)
     allocator = load_allocator(checkpoint, method)
     answer = policy_from(policy, axis_weights, priority)
-    result = allocator.allocate(
-        robot.layout, wrench, failed=robot.with_failed(failed), policy=answer, seed=seed
-    )
+    damage = health_from(health, stuck, running)
+    lost = robot.with_failed(failed)
+    result = allocator.allocate(robot.layout, wrench, failed=lost, policy=answer, health=damage, seed=seed)
     if json:
         print(json_format.dumps(allocation_record(result), allow_nan=False))
     else:
         print(allocation_text(result))
+        if lost or damage is not None:
+            print(loss_text(robot.layout, result.layout, lost))
+
+
+def health_from(weak: Sequence[str], stuck: Sequence[str], running: Sequence[str]) -> Health | None:
+    """Damaged fins as the command line names them; None where all are whole."""
+    from finlab.allocation import Health
+
+    if not (weak or stuck or running):
+        return None
+    kept = {name: values for name, values in (_named("running", text, 3) for text in running)}
+    return Health.of(
+        weak=dict((name, share) for name, (share,) in (_named("health", text, 1) for text in weak)),
+        stuck={name: math.radians(angle) for name, (angle,) in (_named("stuck", text, 1) for text in stuck)},
+        running={name: (a, f, math.radians(angle)) for name, (a, f, angle) in kept.items()},
+    )
+
+
+def _named(option: str, text: str, count: int) -> tuple[str, tuple[float, ...]]:
+    """Name and numbers of NAME=NUMBER,...; errors say which option."""
+    from finlab.errors import AllocationError
+
+    name, _, numbers = text.partition("=")
+    try:
+        values = tuple(float(number) for number in numbers.split(","))
+    except ValueError:
+        values = ()
+    if not name or len(values) != count:
+        wanted = "NAME=NUMBER" if count == 1 else "NAME=A,F,DEG"
+        raise AllocationError(f"{option}: expected {wanted}, got {text!r}")
+    return name, values
+
+
+def loss_text(whole: Layout, damaged: Layout, failed: Sequence[str]) -> str:
+    """Which axes can be had alone, before and after what happened to the fins."""
+    from finlab.analysis import authority
+
+    before, after = authority(whole), authority(damaged, failed)
+    lost = [axis for axis in before.reachable if axis not in after.reachable]
+    return (
+        f"reachable alone before: {', '.join(before.reachable) or 'none'}; "
+        f"after: {', '.join(after.reachable) or 'none'}; lost: {', '.join(lost) or 'none'}"
+    )
 
 
 def allocation_record(result: Allocation) -> dict[str, object]:

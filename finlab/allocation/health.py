@@ -1,0 +1,106 @@
+"""Fins that work in part: weaker, no longer turning, or running on as they were when they stopped listening.
+
+Each becomes a layout with other limits, so every method accounts for it and limits hold as always: a fin that
+no longer turns still pushes along its last direction, and the force of one that runs on is part of every
+wrench. A fin that gives no force at all is `failed` and leaves the layout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from finlab.errors import AllocationError
+from finlab.layout import Fin, Layout, Limits
+
+Command = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Health:
+    """What is known of damaged fins, by name; those that are not named are whole. Made with `Health.of`."""
+
+    weak: tuple[tuple[str, float], ...] = ()
+    """Share, above 0 and up to 1, that is left of the largest amplitude and frequency of a fin."""
+    stuck: tuple[tuple[str, float], ...] = ()
+    """Zero direction [rad] at which a fin no longer turns; it still flaps."""
+    running: tuple[tuple[str, Command], ...] = ()
+    """Command (amplitude [rad], frequency [Hz], zero direction [rad]) that a fin keeps, come what may."""
+
+    def __post_init__(self) -> None:
+        for name, share in self.weak:
+            if not 0.0 < share <= 1.0:
+                raise AllocationError(
+                    f"health of {name}: expected a share above 0 and up to 1, got {share}; "
+                    "a fin that gives nothing is failed"
+                )
+        for name, angle in self.stuck:
+            if not np.isfinite(angle):
+                raise AllocationError(f"stuck {name}: expected a finite angle in radians, got {angle}")
+        named = [name for name, _ in (*self.stuck, *self.running)]
+        if len(set(named)) < len(named):
+            raise AllocationError(f"health: a fin is stuck or running once, got {', '.join(named)}")
+
+    @classmethod
+    def of(
+        cls,
+        weak: Mapping[str, float] | None = None,
+        stuck: Mapping[str, float] | None = None,
+        running: Mapping[str, Command] | None = None,
+    ) -> Health:
+        """Health from dictionaries, by the fins' names.
+
+        Raises:
+            AllocationError: a share out of range, an angle that is no number.
+        """
+        kept = {name: (float(a), float(f), float(d)) for name, (a, f, d) in (running or {}).items()}
+        return cls(tuple((weak or {}).items()), tuple((stuck or {}).items()), tuple(kept.items()))
+
+    def applied_to(self, layout: Layout) -> Layout:
+        """The layout with the limits that are left.
+
+        Raises:
+            LayoutError: there is no fin of a name.
+        """
+        return _applied(self, layout)
+
+
+@lru_cache(maxsize=64)
+def _applied(health: Health, layout: Layout) -> Layout:
+    weak, stuck, running = dict(health.weak), dict(health.stuck), dict(health.running)
+    layout.indices((*weak, *stuck, *running))
+    return replace(
+        layout,
+        fins=tuple(
+            _damaged(fin, weak.get(fin.name), stuck.get(fin.name), running.get(fin.name))
+            for fin in layout.fins
+        ),
+    )
+
+
+def _damaged(fin: Fin, share: float | None, angle: float | None, command: Command | None) -> Fin:
+    """The fin with the limits that are left of it."""
+    limits = fin.limits
+    if command is not None:
+        amplitude, frequency, direction = command
+        return replace(fin, limits=Limits(*((value, value) for value in (amplitude, frequency, direction))))
+    if share is not None:
+        limits = replace(
+            limits,
+            amplitude=_weakened(limits.amplitude, share),
+            frequency=_weakened(limits.frequency, share),
+        )
+    if angle is not None:
+        # Whole turns do not matter; the one within the fin's limits is taken where there is one.
+        turns = round((0.5 * sum(limits.zero_direction) - angle) / (2 * np.pi))
+        held = angle + turns * 2 * np.pi
+        limits = replace(limits, zero_direction=(held, held))
+    return fin if limits is fin.limits else replace(fin, limits=limits)
+
+
+def _weakened(interval: tuple[float, float], share: float) -> tuple[float, float]:
+    low, high = interval
+    return min(low, share * high), share * high
