@@ -55,7 +55,7 @@ def sample(
     extra = n_samples - kept
     if extra <= 0:
         return means[:, :kept], component
-    raw, normal = _draws_of_one(seed, extra, n) if rows == 1 else _draws(seed, rows, extra, n)
+    raw, normal = draws_of_one(seed, extra, n) if rows == 1 else _draws(seed, rows, extra, n)
     cumulative = mixture.weight.cumsum(1)
     draw = raw * cumulative[:, None, -1:]
     drawn = np.minimum((draw > cumulative[:, None, :]).sum(-1), m - 1)
@@ -74,7 +74,7 @@ def _draws(seed: int, rows: int, extra: int, n: int) -> tuple[Array, Array]:
 
 
 @lru_cache(maxsize=64)
-def _draws_of_one(seed: int, extra: int, n: int) -> tuple[Array, Array]:
+def draws_of_one(seed: int, extra: int, n: int) -> tuple[Array, Array]:
     """The same for a single target, kept: a robot asks with one seed, tick after tick."""
     uniform, normal = _draws(seed, 1, extra, n)
     uniform.setflags(write=False)
@@ -94,7 +94,8 @@ def propose(
     """Predict, sample, clamp and score.
 
     Args:
-        network: the allocator network.
+        network: the allocator network; one that has a method `propose` of its own does it all by itself, as
+            engines on board do.
         prepared: the layout.
         centred: normalized targets minus the mean (N, 6), which the network sees.
         target: normalized targets (N, 6).
@@ -102,6 +103,23 @@ def propose(
         temperature: T.
         seed: seed of the draw.
     """
+    engine = getattr(network, "propose", None)
+    if engine is not None:
+        answer: Proposal = engine(prepared, centred, target, n_candidates, temperature, seed)
+        return answer
+    return propose_by_steps(network, prepared, centred, target, n_candidates, temperature, seed)
+
+
+def propose_by_steps(
+    network: NumpyNetwork,
+    prepared: Prepared,
+    centred: Array,
+    target: Array,
+    n_candidates: int,
+    temperature: float,
+    seed: int,
+) -> Proposal:
+    """`propose` in numpy, with whatever runs the network."""
     x, component = sample(predict(network, prepared, centred), n_candidates, temperature, seed)
     lower, upper = prepared.lower.astype(np.float32), prepared.upper.astype(np.float32)
     problem = prepared.commands
