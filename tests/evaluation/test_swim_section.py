@@ -32,13 +32,13 @@ def test_what_is_ahead_leads_and_what_is_behind_trails() -> None:
     assert leads[1] == "With one fin lost the ATE is at most 1.10 times that of the healthy robot."
     assert leads[2] == (
         "At constant speed, minimizing inertial power (`learned-power`): 20 % less inertial power than "
-        "`analytic`, speed error 50 % smaller."
+        "`analytic` with 50 % smaller speed error."
     )
     assert trails == (
         "`on-board` follows the trajectories closer: ATE 3.0 cm.",
         "Loses its way with bow + port lost.",
         "At constant speed, minimizing inertial power (`learned-power`): 100 % more inertial power than "
-        "`on-board`, speed error 0 % larger.",
+        "`on-board` with 0 % larger speed error.",
     )
 
 

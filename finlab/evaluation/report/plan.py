@@ -126,8 +126,14 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
     layouts, targets = sizes.energy
     for method in (REFERENCE, *ENERGY_METHODS):
         if method in prints:
+            few = is_slow(method) and method != REFERENCE
             plan.energy[method] = job(
-                f"energy-{method}", "energy", method, method=method, layouts=layouts, targets=targets
+                f"energy-{method}",
+                "energy",
+                method,
+                method=method,
+                layouts=layouts,
+                targets=sizes.energy_slow if few else targets,
             )
     for method in sorted(names, key=lambda name: name != "paper"):
         for split in SPLITS:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from finlab.evaluation.ablation import ablation_row
 from finlab.evaluation.metrics import energy_rows, wrench_intervals, wrench_row
 from finlab.evaluation.recheck import recheck
-from finlab.evaluation.records import Records, records_of_columns
+from finlab.evaluation.records import Records, records_of_columns, same_targets
 from finlab.evaluation.report.jobs import Job
 from finlab.evaluation.report.plan import REFERENCE, Plan
 from finlab.evaluation.splits import SPLITS, make_split
@@ -84,8 +84,9 @@ class Results:
         rows = []
         for name, other in self.plan.energy.items():
             if name != REFERENCE:
-                command = self.columns(other)["command"]
-                found = recheck(cases, self.energy[name], command, self.energy[REFERENCE], self.sigma)
+                # All of a method's targets are among the reference's, in the same order.
+                ours, theirs = same_targets(self.energy[name], self.energy[REFERENCE])
+                found = recheck(cases, ours, self.columns(other)["command"], theirs, self.sigma)
                 rows.append({"method": name, **found})
         return rows
 

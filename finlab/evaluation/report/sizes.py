@@ -22,6 +22,8 @@ class Sizes:
     """Layouts, and first targets of each, for those methods on the other splits."""
     energy: tuple[int, int]
     """Layouts of split `id`, and first targets of each, for the energies beside 32 starts of IPOPT."""
+    energy_slow: int
+    """First targets of each for the methods with 8 starts."""
     ablation: tuple[int, int]
     """Layouts and targets of the ablation."""
     temperature: tuple[int, int]
@@ -46,6 +48,7 @@ SIZES = {
         slow_main=1,
         slow_other=(1, 1),
         energy=(2, 1),
+        energy_slow=1,
         ablation=(2, 2),
         temperature=(2, 2),
         seeds=(2, 2),
@@ -61,6 +64,7 @@ SIZES = {
         slow_main=1,
         slow_other=(10, 1),
         energy=(40, 1),
+        energy_slow=1,
         ablation=(20, 10),
         temperature=(20, 2),
         seeds=(20, 10),
@@ -76,11 +80,12 @@ SIZES = {
         slow_main=1,
         slow_other=(50, 1),
         energy=(100, 10),
+        energy_slow=2,
         ablation=(100, 20),
         temperature=(100, 2),
         seeds=(40, 25),
         latency=(200, 20.0),
-        training=("default", 600, 256),
+        training=("default", 400, 256),
         swims=(2, 1, 5),
         lost_pairs=True,
     ),

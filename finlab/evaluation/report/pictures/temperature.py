@@ -35,7 +35,7 @@ def figure_a(
         best.legend(frameon=False)
         for axis in (spread, best):
             axis.axvline(paper_temperature, color=GREY, linestyle=(0, (2, 2)), linewidth=1.2)
-            axis.set(xscale="log", xlabel="temperature T  (dashes: the paper's 0.02)")
+            axis.set(xscale="log", xlabel="temperature T")
         for refined, colour, name in ((0, GREY, "drawn"), (1, BLUE, "refined")):
             keep = scatter["refined"] == refined
             error = np.maximum(scatter["err_norm"][keep], FLOOR)
@@ -43,7 +43,7 @@ def figure_a(
                 scatter["energy"][keep], error, "o", color=colour, markersize=3.5, alpha=0.6, label=name
             )
         right.set(yscale="log", xlabel="energy J_en", ylabel="normalized error, by the surrogate")
-        right.set_title("candidates before and after refinement")
+        right.set_title("candidates, energy and error")
         right.legend(frameon=False, labelcolor=SOFT)
         for axis in view.axes:
             clean(axis)

@@ -106,7 +106,8 @@ def ablation_blocks(results: Results) -> list[Block]:
             line |= {"printed": theirs["err_norm_mean"], "printed_std": theirs["err_norm_std"]}
             lines.append(line | {"printed_time_s": theirs["time_s"]})
         blocks += [Heading(f"Refined by {words}", 3), Table(columns, lines)]
-    return blocks
+    note = "s per call: single calls, timed while another part of the report ran on the other core."
+    return [*blocks, Text(note, small=True)]
 
 
 def temperature_blocks(results: Results) -> list[Block]:
@@ -134,8 +135,9 @@ def temperature_blocks(results: Results) -> list[Block]:
         Figure(
             "figure-a",
             figure_a(rows, results.scatter, PAPER_TEMPERATURE),
-            "Left and middle: what the temperature does; the band is where a rerun lands. Right: all 64 "
-            "candidates for one target on a robot of four fins, as drawn and after 80 steps of Adam.",
+            "Left and middle: what the temperature does; dashes mark the paper's choice, the band is where "
+            "a rerun lands. Right: all 64 candidates for one target on a robot of four fins, as drawn and "
+            "after 80 steps of Adam.",
         ),
         Fold("The numbers", (Table(columns, rows),)),
     ]

@@ -78,6 +78,6 @@ def _cards(results: Results, tables: dict[str, list[Row]]) -> list[Card]:
         beside = paper_figures()["trajectory"]["all"]["ate"]
         detail = f"in our simulation; paper, in another: {100 * beside:.1f} cm"
         cards.append(
-            Card(f"{100 * swum[claims.OURS]['ate']:.1f} cm", "trajectory error, layouts A–D", detail)
+            Card(f"{100 * swum[claims.OURS]['ate']:.1f} cm", "trajectory error, layouts A to D", detail)
         )
     return cards

@@ -70,16 +70,19 @@ def swim_claims(rows: Mapping[str, Sequence[Row]]) -> Claims:
         trails += [f"Loses its way with {r['fault']}." for r in swum if not r["tracked"]]
     speeds = {r["method"]: r for r in rows.get("velocity", ()) if r["speed"] is None}
     for mine in (name for name in ("learned-power", "learned") if name in speeds):
+        goal = "inertial power" if mine == "learned-power" else "the energy proxy"
+        sides: dict[bool, list[str]] = {True: [], False: []}
         for name in (name for name in ("analytic", "on-board") if name in speeds):
             power = speeds[mine]["inertial_w"] / speeds[name]["inertial_w"] - 1
             missed = speeds[mine]["mae"] / speeds[name]["mae"] - 1
-            goal = "inertial power" if mine == "learned-power" else "the energy proxy"
-            words = (
-                f"At constant speed, minimizing {goal} (`{mine}`): {abs(100 * power):.0f} % "
-                f"{'less' if power < 0 else 'more'} inertial power than `{name}`, speed error "
-                f"{abs(100 * missed):.0f} % {'smaller' if missed < 0 else 'larger'}."
+            sides[power < 0 and missed <= 0.01].append(
+                f"{abs(100 * power):.0f} % {'less' if power < 0 else 'more'} inertial power than `{name}` "
+                f"with {abs(100 * missed):.0f} % {'smaller' if missed < 0 else 'larger'} speed error"
             )
-            (leads if power < 0 and missed <= 0.01 else trails).append(words)
+        for ahead, found in sides.items():
+            if found:
+                sentence = f"At constant speed, minimizing {goal} (`{mine}`): {', '.join(found)}."
+                (leads if ahead else trails).append(sentence)
     return Claims(tuple(leads), tuple(trails))
 
 
