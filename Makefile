@@ -8,7 +8,7 @@ HOST_PORT ?= 8080
 THREADS := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup app test test-fast check format checkpoint bench wheel wheel-check clean
+.PHONY: help setup app test test-fast check format checkpoint bench bench-runtime wheel wheel-check clean
 
 help:
 	@echo "make setup        make .venv with everything pinned in constraints.txt"
@@ -19,6 +19,7 @@ help:
 	@echo "make format       let ruff mend what it can"
 	@echo "make checkpoint   train what is shipped, PRESET=default or PRESET=paper (hours)"
 	@echo "make bench        print data throughput, accuracy and latency"
+	@echo "make bench-runtime  bundles in an environment of numpy and onnxruntime alone: parity, speed, memory"
 	@echo "make wheel-check  build the wheel, install it in an empty environment and try it there"
 
 setup: $(STAMP)
@@ -61,6 +62,9 @@ checkpoint: setup
 
 bench: setup
 	tools/bench
+
+bench-runtime: setup
+	tools/bench-runtime
 
 wheel: setup
 	$(BIN)/python -m pip wheel --disable-pip-version-check --no-deps --no-build-isolation -w dist .
