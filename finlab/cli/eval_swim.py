@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from tyro.conf import arg
 
@@ -18,9 +19,6 @@ from finlab.cli.eval_files import (
     write_json,
 )
 from finlab.cli.eval_report import verbs
-
-if TYPE_CHECKING:
-    from finlab.sim import SwimLog
 
 Name = Annotated[str, arg(metavar="NAME")]
 Source = Annotated[str, arg(metavar="NAME|FILE")]
@@ -119,7 +117,7 @@ def faults(
     if figures is not None:
         from finlab.evaluation.swim_figures import save_faults_figure
 
-        _save(figures, "faults", save_faults_figure, found)
+        _save(figures, "faults", save_faults_figure, rows)
 
 
 @verbs.command
@@ -192,7 +190,8 @@ def _check(runs: int, json: Path | None, figures: Path | None) -> None:
         raise DataError(f"figures: expected a folder that exists, got {figures}")
 
 
-def _save(folder: Path, name: str, draw: Any, runs: list[tuple[Any, SwimLog]]) -> None:
+def _save(folder: Path, name: str, draw: Callable[[Any, Path], None], content: Any) -> None:
+    """Draw into a folder and say so."""
     path = folder / f"{name}.png"
-    draw(runs, path)
+    draw(content, path)
     print(f"\n{path}: written.")

@@ -1,4 +1,4 @@
-"""Figures of the closed-loop experiments: paths by layout, faults, power against error of the speed."""
+"""Figures of the closed-loop experiments: paths by layout, errors by fault, power against error of speed."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ import numpy as np
 
 from finlab.evaluation.faults import HEALTHY
 from finlab.evaluation.report.pictures.style import COLOURS, GREY, ORANGE, VERMILION, clean, picture
-from finlab.evaluation.swim_pictures import failures, save
+from finlab.evaluation.swim_pictures import save
+from finlab.evaluation.swims import Row
 from finlab.evaluation.trajectory_errors import absolute_error
 from finlab.sim import SwimLog
 
 METHOD_COLOURS = {**COLOURS, "on-board": ORANGE, "learned-power": VERMILION}
 """Method -> colour."""
-MAX_COLUMNS = 4
+ALLOWED = 1.15
+"""Growth of the error that one lost fin should not exceed."""
 
 Run = tuple[Any, SwimLog]
 
@@ -47,34 +49,27 @@ def save_layouts_figure(runs: Sequence[Run], path: Path) -> None:
         save(drawn, path)
 
 
-def save_faults_figure(runs: Sequence[Run], path: Path) -> None:
-    """The path of every fault from above; where a fin was lost on the way, the place is marked."""
-    faults = list(dict.fromkeys(fault for (fault, _), _ in runs))
-    columns = min(MAX_COLUMNS, len(faults))
-    rows = -(-len(faults) // columns)
-    with picture(rows, columns, height=2.5 * rows + 0.4, sharex=True, sharey=True) as drawn:
-        for axis in drawn.axes[len(faults) :]:
-            axis.set_axis_off()
-        for axis, fault in zip(drawn.axes, faults, strict=False):
-            logs = [(method, log) for (name, method), log in runs if name == fault]
-            reference = logs[0][1].reference
-            axis.plot(reference[:, 0], reference[:, 1], color=GREY, lw=3.0, label="reference")
-            for method, log in logs:
-                style: dict[str, Any] = {"color": METHOD_COLOURS.get(method, ORANGE), "lw": 0.9, "alpha": 0.8}
-                axis.plot(log.position[:, 0], log.position[:, 1], label=method, **style)
-            for time, _ in failures(logs[0][1]):
-                if time > 0.0:
-                    at = logs[0][1].position[int(np.searchsorted(logs[0][1].time, time))]
-                    axis.plot(at[0], at[1], "X", color=VERMILION, ms=7, label="fin lost here")
-            axis.set_title(_title(fault), fontsize=8.5)
-            axis.set_aspect("equal", adjustable="box")
-            clean(axis)
-        for k, axis in enumerate(drawn.axes):
-            if k % columns == 0:
-                axis.set_ylabel("y [m]")
-            if k + columns >= len(faults):
-                axis.set_xlabel("x [m]")
-                axis.xaxis.set_tick_params(labelbottom=True)
+def save_faults_figure(rows: Sequence[Row], path: Path) -> None:
+    """ATE of every fault and method, mean and spread over runs; dashed: 1.15 times the healthy one."""
+    swum = [row for row in rows if row["controllable"]]
+    faults = list(dict.fromkeys(row["fault"] for row in swum))
+    methods = list(dict.fromkeys(row["method"] for row in swum))
+    with picture(1, 1, height=0.9 + 0.3 * len(faults)) as drawn:
+        (axis,) = drawn.axes
+        for k, method in enumerate(methods):
+            colour = METHOD_COLOURS.get(method, GREY)
+            own = [row for row in swum if row["method"] == method]
+            place = [faults.index(row["fault"]) + 0.16 * (k - 0.5 * (len(methods) - 1)) for row in own]
+            values, spreads = [row["ate"] for row in own], [row["ate_std"] for row in own]
+            axis.errorbar(values, place, xerr=spreads, fmt="o", color=colour, ms=6, lw=1.4, label=method)
+            healthy = [row["ate"] for row in own if row["fault"] == HEALTHY]
+            if healthy:
+                axis.axvline(ALLOWED * healthy[0], color=colour, lw=1.0, ls=(0, (4, 3)))
+        axis.set_yticks(range(len(faults)), [fault.replace("_", " ") for fault in faults])
+        axis.set_ylim(len(faults) - 0.5, -0.5)
+        axis.set_xlim(left=0.0)
+        axis.set_xlabel(f"ATE [m]; dashed: {ALLOWED} times that of the healthy robot")
+        clean(axis)
         drawn.legend()
         save(drawn, path)
 
@@ -117,11 +112,3 @@ def save_velocity_figure(runs: Sequence[Run], path: Path) -> None:
 
 def _speeds(runs: Sequence[Run]) -> list[float]:
     return list(dict.fromkeys(speed for (_, speed), _ in runs))
-
-
-def _title(fault: str) -> str:
-    """A fault in two short lines."""
-    if fault == HEALTHY:
-        return fault
-    fins, _, when = fault.partition(" lost")
-    return f"without {fins}{when}".replace("_", " ").replace(" + ", ",\n")
