@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.energy import command_energy
+from finlab.allocation.modes import Mode, find_modes
 from finlab.allocation.policy import describe_binding
 from finlab.layout import Layout
 from finlab.layout.arrays import layout_effectiveness
@@ -49,6 +50,8 @@ class Solution(NamedTuple):
     """Sentences that the user should read."""
     samples: Callable[[], Candidates] | None = None
     """Gives the raw candidates before refinement, for a single target."""
+    alternatives: Callable[[], Candidates] | None = None
+    """Gives many refined answers to a single target, the chosen one first, by a wider search."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +82,26 @@ class Allocation:
     """Gives `candidates` when they are first asked for."""
     make_samples: Callable[[], Candidates | None] = field(default=lambda: None, repr=False, compare=False)
     """Gives `samples` when they are first asked for."""
+
+    make_alternatives: Callable[[], Candidates | None] = field(
+        default=lambda: None, repr=False, compare=False
+    )
+    """Gives the alternatives among which `modes` are found."""
+    previous: Array | None = field(default=None, repr=False, compare=False)
+    """Command (n, 3) of the previous tick, if it was told."""
+
+    @cached_property
+    def modes(self) -> tuple[Mode, ...]:
+        """Distinct ways to deliver the wrench, the chosen one first; none for methods with a single answer.
+
+        Found by a wider search when first asked for.
+        """
+        alternatives = self.make_alternatives() or self.candidates
+        if alternatives is None:
+            return ()
+        limits = [fin.limits for fin in self.layout.fins]
+        lower, upper = (np.array([getattr(limit, end) for limit in limits]) for end in ("lower", "upper"))
+        return find_modes(alternatives, lower, upper, self.previous)
 
     @cached_property
     def candidates(self) -> Candidates | None:

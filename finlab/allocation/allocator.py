@@ -100,6 +100,8 @@ class Allocator(ABC):
             notes=solution.notes,
             make_candidates=lambda: _candidates_with_failed(solution.candidates, alive),
             make_samples=lambda: _candidates_with_failed(solution.samples, alive),
+            make_alternatives=lambda: _candidates_with_failed(solution.alternatives, alive),
+            previous=None if before is None else _with_failed(before, alive),
         )
 
     def _solve_by(

@@ -36,6 +36,10 @@ CHUNK = 256
 """Targets that are solved together; keeps memory flat for any number of targets."""
 
 
+ALTERNATIVE = 1e-3
+"""Normalized error, by the surrogate, up to which another answer is an alternative."""
+
+
 class LearnedAllocator(Allocator):
     """The product's default method."""
 
@@ -52,8 +56,7 @@ class LearnedAllocator(Allocator):
 
         Args:
             weights: trained weights.
-            energy_weights: by which answers are compared; `POWER_WEIGHTS` for the least inertial power. They
-                do not travel with a deployment bundle.
+            energy_weights: by which answers are compared; `POWER_WEIGHTS` for the least inertial power.
             settings: fields of `Settings`.
 
         Raises:
@@ -90,6 +93,9 @@ class LearnedAllocator(Allocator):
                 notes=notes,
                 candidates=lambda: _candidates(pool, std),
                 samples=lambda: _samples(proposal, prepared, std),
+                alternatives=lambda: _alternatives(
+                    self.pipeline.explore(prepared, targets, pool, proposal), std
+                ),
             )
 
         def solve(start: int) -> Pool:
@@ -133,6 +139,12 @@ def _candidates(pool: Pool, std: Array) -> Candidates:
     """The refined answers to a single target."""
     command, wrench, error, energy = (values[0] for values in pool)
     return Candidates(command, wrench * std, error, energy, ("refined",) * len(command))
+
+
+def _alternatives(pool: Pool, std: Array) -> Candidates:
+    """The exact answers to a single target, the chosen one first; all where none is exact."""
+    exact = pool.error[0] <= max(ALTERNATIVE, 1.01 * pool.error[0, 0])
+    return _candidates(Pool(*(values[:, exact] for values in pool)), std)
 
 
 def _samples(proposal: Proposal, prepared: Prepared, std: Array) -> Candidates:

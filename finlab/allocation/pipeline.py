@@ -41,6 +41,8 @@ FIRST_PATIENCE, NEAREST_PATIENCE, LAST_PATIENCE = 5, 8, 25
 nearest wrench that the fins can deliver, and from fresh starts."""
 RESTARTS = 32
 """Fresh starts for the very few that even so stay further away than they need to."""
+EXPLORERS = 64
+"""Random seeds of the wide search for other ways."""
 NEEDLESS = (5e-4, 2e-3)
 """Normalized error beyond what is proven to be needed that is not worth further starts: a constant and a
 share."""
@@ -109,6 +111,19 @@ class Pipeline:
         pool = self._descend_steadily(prepared, target, proposal, previous)
         # Arcs that pass the seam are brought back inside the fin's own limits.
         return pool._replace(command=prepared.commands.clamp(pool.command)), proposal
+
+    def explore(self, prepared: Prepared, targets: Array, answer: Pool, proposal: Proposal) -> Pool:
+        """Many refined answers to one target (1, 6): the answer itself, then all that wide seeds lead to.
+
+        Every candidate of the network seeds a search of its own, as do random shares of thrust.
+        """
+        target = targets / self.normalization.std
+        top = prepared.planar.curves.maximum
+        drawn = np.random.default_rng(0).random((EXPLORERS, len(top))) ** 2 * top
+        spread = np.concatenate([proposal.thrust[0].astype(np.float64), prepared.subsets, drawn])
+        command = self._search(prepared, target, spread[None], False, keep=len(spread))
+        found = self._refine(prepared, target, command, FIRST_PATIENCE)
+        return Pool(*(np.concatenate(both, axis=1) for both in zip(answer, found, strict=True)))
 
     def _descend_steadily(
         self, prepared: Prepared, target: Array, proposal: Proposal, previous: Array
@@ -194,7 +209,9 @@ class Pipeline:
         shared = np.broadcast_to(prepared.subsets, (len(score), *prepared.subsets.shape))
         return np.concatenate([seeds, shared], axis=1)
 
-    def _search(self, prepared: Prepared, target: Array, thrust: Array, steady: bool) -> Array:
+    def _search(
+        self, prepared: Prepared, target: Array, thrust: Array, steady: bool, keep: int | None = None
+    ) -> Array:
         """Cheapest commands (N, n_refined, n, 3) reached from thrust seeds (N, S, n).
 
         With `steady`, the first seed is where the robot is; what it leads to stays first.
@@ -208,7 +225,10 @@ class Pipeline:
         score = np.where(error > PROMISING**2, INEXACT * (1.0 + error), energy).reshape(rows, n_seeds)
         if steady:
             score[:, 0] = -1.0
-        kept = np.argsort(score, axis=1)[:, : self.settings.n_refined] + np.arange(rows)[:, None] * n_seeds
+        kept = (
+            np.argsort(score, axis=1)[:, : keep or self.settings.n_refined]
+            + np.arange(rows)[:, None] * n_seeds
+        )
         return command[kept]
 
     def _refine(

@@ -1,0 +1,143 @@
+"""The distinct ways in which a robot can deliver a wrench: alternatives that do the same are one mode.
+
+A fin that hardly pushes counts as resting, however it does so. Two commands are the same mode if the same
+fins rest and all others push about as hard in about the same direction, angles compared the shorter way
+round.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from finlab.allocation.allocation import Candidates
+
+Array = NDArray[np.float64]
+
+RESTING = 0.15
+"""Share of the strongest fin's thrust below which a fin counts as resting."""
+SAME_DIRECTION = float(np.radians(25.0))
+"""Zero directions closer than this are the same [rad]."""
+SAME_SIZE = 0.25
+"""Thrusts, and ratios of amplitude to frequency, whose logarithms differ by less are the same."""
+
+
+class Mode(NamedTuple):
+    """One way to deliver the wrench: the best of the alternatives that do the same."""
+
+    command: Array
+    """(n, 3): amplitude [rad], frequency [Hz], zero direction [rad]; NaN for failed fins."""
+    wrench: Array
+    """Wrench (6,) that the method's own model expects [N, N m]."""
+    err_norm: float
+    """Normalized error of that wrench."""
+    energy: float
+    """Energy proxy."""
+    saturation: float
+    """Largest share of any fin's range of amplitude or frequency that is used; 1 is a limit."""
+    distance: float | None
+    """To the previous command, if one was told: root mean square over the fins of the change, amplitude and
+    frequency over their ranges, turns over half a circle."""
+    turn: float | None
+    """Largest turn from the previous command [rad]."""
+    resting: tuple[int, ...]
+    """Places of the fins that hardly push."""
+    members: tuple[int, ...]
+    """Places of the alternatives that do the same, best first."""
+
+
+class Way(NamedTuple):
+    """What matters of one command: numbers per fin (n,), NaN where the fin rests or has failed."""
+
+    resting: tuple[int, ...]
+    """Places of the fins that rest."""
+    thrust: Array
+    """Logarithm of the thrust, up to a constant."""
+    direction: Array
+    """Zero direction [rad]."""
+    style: Array
+    """Logarithm of amplitude over frequency."""
+
+
+def find_modes(
+    candidates: Candidates, lower: Array, upper: Array, previous: Array | None = None
+) -> tuple[Mode, ...]:
+    """The modes among candidates, in their order.
+
+    Args:
+        candidates: alternatives, best first.
+        lower: lower limits (n, 3).
+        upper: upper limits (n, 3).
+        previous: command (n, 3) of the previous tick.
+    """
+    modes = []
+    for members in cluster([way_of(command) for command in candidates.command]):
+        first = members[0]
+        command = candidates.command[first]
+        distance, turn = (None, None) if previous is None else _change(command, previous, lower, upper)
+        span = np.maximum(upper - lower, 1e-9)
+        used = ((command - lower) / span)[:, :2]
+        modes.append(
+            Mode(
+                command=command,
+                wrench=candidates.wrench[first],
+                err_norm=float(candidates.err_norm[first]),
+                energy=float(candidates.energy[first]),
+                saturation=float(np.clip(np.nanmax(used), 0.0, 1.0)),
+                distance=distance,
+                turn=turn,
+                resting=way_of(command).resting,
+                members=tuple(members),
+            )
+        )
+    return tuple(modes)
+
+
+def cluster(ways: list[Way]) -> list[list[int]]:
+    """Places of ways that are the same, each group led by its first."""
+    groups: list[list[int]] = []
+    for k, way in enumerate(ways):
+        home = next((group for group in groups if same_way(ways[group[0]], way)), None)
+        if home is None:
+            groups.append([k])
+        else:
+            home.append(k)
+    return groups
+
+
+def way_of(command: Array) -> Way:
+    """What matters of a command (n, 3)."""
+    with np.errstate(divide="ignore"):
+        thrust = 2 * np.log(np.sin(command[:, 0])) + 2 * np.log(command[:, 1])  # grows with sin^2(A) f^2
+        style = np.log(command[:, 0]) - np.log(command[:, 1])
+    resting = np.isfinite(thrust) & (thrust < np.nanmax(thrust) + np.log(RESTING))
+    pushes = np.isfinite(thrust) & ~resting
+    values = [np.where(pushes, value, np.nan) for value in (thrust, command[:, 2], style)]
+    return Way(tuple(int(i) for i in np.flatnonzero(resting)), *values)
+
+
+def differences(a: Way, b: Way) -> Array:
+    """How `b` differs from `a` (3, n) in direction, thrust and style; 1 is what counts as different."""
+    turn = np.angle(np.exp(1j * (b.direction - a.direction))) / SAME_DIRECTION
+    rest = np.array([b.thrust - a.thrust, b.style - a.style]) / SAME_SIZE
+    told: Array = np.nan_to_num(np.concatenate([turn[None], rest]))
+    return told
+
+
+def same_way(a: Way, b: Way) -> bool:
+    """Whether two ways are one mode."""
+    return a.resting == b.resting and bool((np.abs(differences(a, b)) < 1.0).all())
+
+
+def _change(command: Array, previous: Array, lower: Array, upper: Array) -> tuple[float | None, float | None]:
+    """Distance and largest turn between two commands, over the fins that both know; None where none is."""
+    known = np.isfinite(command).all(1) & np.isfinite(previous).all(1)
+    if not known.any():
+        return None, None
+    change = (command - previous)[known] / np.maximum(upper - lower, 1e-9)[known]
+    turn = np.abs(np.angle(np.exp(1j * (command - previous)[known, 2])))
+    change[:, 2] = turn / np.pi
+    return float(np.sqrt((change**2).sum(1).mean())), float(turn.max())
