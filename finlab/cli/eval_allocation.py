@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from finlab.cli.eval_files import Checkpoint, Count, JsonFile, check_positive, check_writable, write_json
+from finlab.cli.eval_files import (
+    Checkpoint,
+    Count,
+    JsonFile,
+    Split,
+    check_positive,
+    check_writable,
+    write_json,
+)
 from finlab.cli.eval_swim import verbs
 
 if TYPE_CHECKING:
@@ -44,6 +52,39 @@ def steadiness(
     rows = steadiness_rows(load_allocator(checkpoint), robots, n_paths=paths, ticks=ticks, seed=seed)
     write_json(json, {"rows": rows})
     print(steadiness_report(rows))
+
+
+@verbs.command
+def modes(
+    split: Split = "id",
+    layouts: Count = 20,
+    targets: Count = 2,
+    starts: Count = 256,
+    seed: Count = 0,
+    checkpoint: Checkpoint = None,
+    json: JsonFile = None,
+) -> None:
+    """Compare the distinct ways that an answer tells with those that many random starts lead to.
+
+    Args:
+        split: id, ood, ood-fins, limits, failure or near-singular.
+        layouts: layouts of the split.
+        targets: targets on each layout.
+        starts: random starts of the ground truth, per target.
+        seed: draws layouts, targets and starts.
+        checkpoint: trained checkpoint; the shipped one by default.
+        json: file for the rows.
+    """
+    from finlab.allocation import load_allocator
+    from finlab.evaluation.modes import mode_report, mode_rows
+    from finlab.evaluation.splits import make_split
+
+    check_positive("starts", starts)
+    check_writable(json)
+    cases = make_split(split, layouts, targets, seed)
+    rows = mode_rows(load_allocator(checkpoint), cases, n_starts=starts, seed=seed)
+    write_json(json, {"rows": rows})
+    print(mode_report(rows, starts))
 
 
 def _layouts(names: str) -> list[Layout]:

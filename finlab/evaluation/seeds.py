@@ -99,7 +99,9 @@ def _commands(
     if kind == "random":
         unit = np.random.default_rng(seed).random((len(targets), n_seeds, n, 3))
     else:
-        points = qmc.Sobol(3 * n, rng=np.random.default_rng(seed)).random(n_seeds)
+        # The sequence is balanced in blocks of powers of two: one is drawn whole, and its beginning taken.
+        block = int(np.ceil(np.log2(n_seeds)))
+        points = qmc.Sobol(3 * n, rng=np.random.default_rng(seed)).random_base2(block)[:n_seeds]
         unit = np.broadcast_to(points.reshape(1, n_seeds, n, 3), (len(targets), n_seeds, n, 3))
     return lower + unit * (upper - lower)
 

@@ -88,3 +88,12 @@ def test_the_report_says_how_many_seeds_and_what_scored_them(rows: list[Row]) ->
     heading, *_, note = report.splitlines()
     assert heading.split() == COLUMNS
     assert note.startswith("8 seeds per target") and "scored by the plant" in note
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("n_seeds", [1, 3, 8])
+def test_any_number_of_seeds_is_drawn_without_a_warning(
+    n_seeds: int, method: LearnedAllocator, cases: list[Case]
+) -> None:
+    few = [case._replace(targets=case.targets[:1]) for case in cases[:1]]
+    assert len(seed_rows(method, few, n_seeds=n_seeds)) == len(KINDS) * len(STEPS)
