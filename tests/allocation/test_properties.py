@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from finlab.allocation import Allocation
 from finlab.allocation.learned import LearnedAllocator
+from finlab.allocation.modes import same_way, way_of
 from finlab.layout import Fin, Layout, Limits, random_layout
 from finlab.physics import Plant
 
@@ -154,6 +155,25 @@ def test_the_same_seed_gives_the_same_answer(
     learned.allocate(layout, -target, seed=draw + 1, previous=first.command)
     again = learned.allocate(layout, scale * target, seed=draw)
     np.testing.assert_array_equal(again.command, first.command)
+
+
+@few(15)
+@given(seed=SEEDS)
+def test_a_small_change_of_the_layout_changes_the_answer_little(learned: LearnedAllocator, seed: int) -> None:
+    layout, target = drawn(seed)
+    rng = np.random.default_rng(seed + 1)
+    fins = [
+        replace(
+            fin,
+            position=tuple((np.array(fin.position) + rng.uniform(-1e-5, 1e-5, 3)).tolist()),
+            mounting_angle=wrapped(fin.mounting_angle + float(rng.uniform(-1e-5, 1e-5))),
+        )
+        for fin in layout.fins
+    ]
+    one, other = learned.allocate(layout, target), learned.allocate(replace(layout, fins=tuple(fins)), target)
+    assert other.err_norm < GOOD and same_energy(one, other, 0.01)
+    if same_way(way_of(one.command), way_of(other.command)):
+        np.testing.assert_allclose(one.fin_forces, other.fin_forces, atol=0.05)
 
 
 @st.composite

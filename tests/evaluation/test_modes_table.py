@@ -20,7 +20,7 @@ def test_energy_distance_tells_sets_apart() -> None:
     rng = np.random.default_rng(0)
     near, far = rng.normal(size=(40, 3)), rng.normal(size=(40, 3)) + 50.0
     assert _energy_distance(near, near) == pytest.approx(0.0, abs=1e-12)
-    assert _energy_distance(near, far) > 0.9
+    assert _energy_distance(near, far) > 0.5
     assert _energy_distance(near, np.empty((0, 3))) == 0.0
 
 
