@@ -65,6 +65,7 @@ class Page:
             self.session.start_over()
             self.session.display = self._display
             self.session.compare_with(None)
+            self.session.set_overlay(None)
             self.view.improver.forget()
             self.view.sweep.stop()
             self.view.end_swim()
