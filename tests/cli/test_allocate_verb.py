@@ -146,7 +146,7 @@ def test_shipped_name_works_from_any_folder(
             ["D", *WRENCH, *["--failed", "front_right", "--failed", "back", "--failed", "front_left"]],
             "has no fin left",
         ),
-        (["A", *WRENCH, "--method", "magic"], "method: expected one of learned, paper"),
+        (["A", *WRENCH, "--method", "magic"], "method: expected one of learned, fast, paper"),
         (["A", *WRENCH, "--seed", "x"], "--seed"),
         (["missing.yaml", *WRENCH], "neither a file nor a shipped layout"),
         ([".", *WRENCH], "is a folder"),
