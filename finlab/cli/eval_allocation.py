@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from tyro.conf import arg
 
@@ -13,12 +13,10 @@ from finlab.cli.eval_files import (
     Split,
     check_positive,
     check_writable,
+    open_layouts,
     write_json,
 )
 from finlab.cli.eval_swim import verbs
-
-if TYPE_CHECKING:
-    from finlab.layout import Layout
 
 Layouts = Annotated[str, arg(metavar="A,B,...")]
 
@@ -48,7 +46,7 @@ def steadiness(
     check_positive("paths", paths)
     check_positive("ticks", ticks - 1)
     check_writable(json)
-    robots = _layouts(layouts)
+    robots = open_layouts(layouts)
     rows = steadiness_rows(load_allocator(checkpoint), robots, n_paths=paths, ticks=ticks, seed=seed)
     write_json(json, {"rows": rows})
     print(steadiness_report(rows))
@@ -85,14 +83,3 @@ def modes(
     rows = mode_rows(load_allocator(checkpoint), cases, n_starts=starts, seed=seed)
     write_json(json, {"rows": rows})
     print(mode_report(rows, starts))
-
-
-def _layouts(names: str) -> list[Layout]:
-    """Layouts from their names, with commas between."""
-    from finlab.cli.inputs import open_robot
-    from finlab.errors import LayoutError
-
-    texts = [text.strip() for text in names.split(",") if text.strip()]
-    if not texts:
-        raise LayoutError(f"layouts: expected names or files with commas between (A,penta), got {names!r}")
-    return [open_robot(text).layout for text in texts]

@@ -10,6 +10,7 @@ from tyro.conf import arg
 
 if TYPE_CHECKING:
     from finlab.allocation import Allocator
+    from finlab.layout import Layout
 
 Count = Annotated[int, arg(metavar="N")]
 Split = Annotated[str, arg(metavar="NAME")]
@@ -21,13 +22,20 @@ Folder = Annotated[Path | None, arg(metavar="DIR")]
 
 def load_methods(methods: str, checkpoint: str | None) -> dict[str, Allocator]:
     """All methods, loaded before the first one runs so that a wrong name costs no time."""
-    from finlab.errors import AllocationError
-    from finlab.evaluation.entrants import load_entrant
+    from finlab.evaluation.entrants import load_entrant, method_names
 
-    names = list(dict.fromkeys(name.strip() for name in methods.split(",") if name.strip()))
-    if not names:
-        raise AllocationError(f"methods: expected names with commas between (learned,paper), got {methods!r}")
-    return {name: load_entrant(name, checkpoint) for name in names}
+    return {name: load_entrant(name, checkpoint) for name in method_names(methods)}
+
+
+def open_layouts(names: str) -> list[Layout]:
+    """Layouts from their names or files, with commas between."""
+    from finlab.cli.inputs import open_robot
+    from finlab.errors import LayoutError
+
+    texts = [text.strip() for text in names.split(",") if text.strip()]
+    if not texts:
+        raise LayoutError(f"layouts: expected names or files with commas between (A,penta), got {names!r}")
+    return [open_robot(text).layout for text in texts]
 
 
 def check_positive(name: str, value: int | None) -> None:

@@ -16,6 +16,7 @@ from finlab.cli.eval_files import (
     Methods,
     check_positive,
     check_writable,
+    open_layouts,
     write_json,
 )
 from finlab.cli.eval_report import verbs
@@ -52,14 +53,12 @@ def trajectory(
         json: file for the rows.
         figures: folder for pictures.
     """
-    from finlab.cli.inputs import open_robot
     from finlab.evaluation.swims import load_methods
     from finlab.evaluation.trajectory import run_trajectory, trajectory_report, trajectory_rows
     from finlab.sim import make_trajectory
 
     _check(runs, json, figures)
-    robots = [open_robot(text.strip()).layout for text in layouts.split(",") if text.strip()]
-    path = make_trajectory(trajectory)
+    robots, path = open_layouts(layouts), make_trajectory(trajectory)
     found = run_trajectory(
         robots, load_methods(methods, checkpoint), path, _seeds(seed, runs), plant, steady=steady
     )

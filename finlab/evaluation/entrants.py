@@ -19,6 +19,14 @@ DISTILLED = "fast"
 _WITH_STARTS = re.compile(r"(\w+)-(\d+)")
 
 
+def method_names(text: str) -> list[str]:
+    """Names with commas between, each once, in their order; `AllocationError` where there is none."""
+    names = list(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    if not names:
+        raise AllocationError(f"methods: expected names with commas between (learned,paper), got {text!r}")
+    return names
+
+
 def is_slow(name: str) -> bool:
     """Whether an entrant runs on a subsample only."""
     return _parse(name)[0] in SLOW

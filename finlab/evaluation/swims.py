@@ -12,7 +12,7 @@ from tqdm import tqdm
 from finlab.allocation import load_allocator
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.energy import POWER_WEIGHTS
-from finlab.errors import AllocationError
+from finlab.evaluation.entrants import method_names
 from finlab.evaluation.on_board import OnBoard
 from finlab.evaluation.trajectory_errors import RTE_DELTA_S, absolute_error, depth_error, relative_error
 from finlab.sim import Swim, SwimLog
@@ -32,10 +32,7 @@ def load_methods(names: str, checkpoint: str | None = None) -> dict[str, Allocat
     Raises:
         AllocationError: an unknown method, or none.
     """
-    wanted = list(dict.fromkeys(name.strip() for name in names.split(",") if name.strip()))
-    if not wanted:
-        raise AllocationError(f"methods: expected names with commas between, got {names!r}")
-    return {name: _load(name, checkpoint) for name in wanted}
+    return {name: _load(name, checkpoint) for name in method_names(names)}
 
 
 def _load(name: str, checkpoint: str | None) -> Allocator:
