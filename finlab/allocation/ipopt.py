@@ -61,6 +61,13 @@ class Ipopt(SingleTarget):
 
     def _build(self, actuation: Actuation) -> Any:
         """The solver of one layout; its variables are the commands as they are, its parameter the target."""
+        command, target, residual, energy = self._formulas(actuation)
+        objective = self._casadi.sumsqr(residual) + ENERGY_WEIGHT * energy
+        program = {"x": command, "p": target, "f": objective}
+        return self._casadi.nlpsol("allocation", "ipopt", program, SOLVER_OPTIONS)
+
+    def _formulas(self, actuation: Actuation) -> tuple[Any, Any, Any, Any]:
+        """Symbolic command (3n), target (6), normalized error (6) and energy."""
         cs = self._casadi
         command, target = cs.SX.sym("command", 3 * actuation.n_fins), cs.SX.sym("target", 6)
         wrench, energy = cs.SX.zeros(6), 0
@@ -73,9 +80,7 @@ class Ipopt(SingleTarget):
             a, f, d = amplitude / scale[i, 0], frequency / scale[i, 1], direction / scale[i, 2]
             energy += weights.amplitude * a**2 + weights.frequency * f**2
             energy += weights.zero_direction * d**2 + weights.product * a * f
-        residual = (wrench - target) / cs.DM(self.normalization.std)
-        program = {"x": command, "p": target, "f": cs.sumsqr(residual) + ENERGY_WEIGHT * energy}
-        return cs.nlpsol("allocation", "ipopt", program, SOLVER_OPTIONS)
+        return command, target, (wrench - target) / cs.DM(self.normalization.std), energy
 
     def _thrust(self, kind: str, values: dict[str, float | str], amplitude: Any, frequency: Any) -> Any:
         """Symbolic thrust [N] of one fin."""

@@ -43,6 +43,8 @@ RESTARTS = 32
 """Fresh starts for the very few that even so stay further away than they need to."""
 EXPLORERS = 64
 """Random seeds of the wide search for other ways."""
+EXPLORING_STEPS = 40
+"""Reweighting steps of that search: what it tells should be the bottoms of their valleys."""
 NEEDLESS = (5e-4, 2e-3)
 """Normalized error beyond what is proven to be needed that is not worth further starts: a constant and a
 share."""
@@ -121,7 +123,7 @@ class Pipeline:
         top = prepared.planar.curves.maximum
         drawn = np.random.default_rng(0).random((EXPLORERS, len(top))) ** 2 * top
         spread = np.concatenate([proposal.thrust[0].astype(np.float64), prepared.subsets, drawn])
-        command = self._search(prepared, target, spread[None], False, keep=len(spread))
+        command = self._search(prepared, target, spread[None], False, keep=len(spread), steps=EXPLORING_STEPS)
         found = self._refine(prepared, target, command, FIRST_PATIENCE)
         return Pool(*(np.concatenate(both, axis=1) for both in zip(answer, found, strict=True)))
 
@@ -210,7 +212,13 @@ class Pipeline:
         return np.concatenate([seeds, shared], axis=1)
 
     def _search(
-        self, prepared: Prepared, target: Array, thrust: Array, steady: bool, keep: int | None = None
+        self,
+        prepared: Prepared,
+        target: Array,
+        thrust: Array,
+        steady: bool,
+        keep: int | None = None,
+        steps: int | None = None,
     ) -> Array:
         """Cheapest commands (N, n_refined, n, 3) reached from thrust seeds (N, S, n).
 
@@ -218,7 +226,7 @@ class Pipeline:
         """
         rows, n_seeds, n = thrust.shape
         flat = np.repeat(target, n_seeds, axis=0)
-        steps = self.settings.search_steps or (4 if n < 6 else 12)
+        steps = steps or self.settings.search_steps or (4 if n < 6 else 12)
         planar = force_space.descend(prepared.planar, flat, thrust.reshape(-1, n), steps)
         command, energy = force_space.realize(prepared.planar, planar)
         error = np.einsum("ri,ri->r", planar.residual, planar.residual)

@@ -1,8 +1,9 @@
 """How many of a robot's ways to deliver a wrench an allocator knows, against many random starts.
 
-The ground truth is made without any network: random commands descend on error and energy by the analytic
-fin model; the ends that deliver the wrench are clustered into modes. Among those of reasonable energy, a mode
-counts as covered if the allocator's modes hold one that does the same.
+The ground truth is made without any network: from random commands, IPOPT looks for the least energy that
+delivers the wrench by the analytic fin model. Where it converges is a local minimum; these are clustered into
+modes. Among those of reasonable energy, a mode counts as covered if the allocator's modes hold one that does
+the same.
 """
 
 from __future__ import annotations
@@ -16,10 +17,11 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from finlab.allocation.actuation import Actuation
-from finlab.allocation.actuation_descent import DescentOptions, descend
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.energy import command_energy
+from finlab.allocation.ipopt import SOLVER_OPTIONS, Ipopt
 from finlab.allocation.modes import cluster, same_way, way_of
+from finlab.allocation.single_target import Problem
 from finlab.evaluation.splits import Case
 from finlab.evaluation.tables import text_table
 from finlab.layout import Layout
@@ -27,16 +29,41 @@ from finlab.physics import Plant
 
 Array = NDArray[np.float64]
 
-TRUTH = DescentOptions(n_steps=80, energy_weight=1e-4)
-"""How the random starts descend: the objective that the model-based methods share."""
-POLISH = DescentOptions(n_steps=20, damping=1e-6)
-"""Last steps, on the error alone."""
-EXACT = 1e-3
-"""Normalized error up to which an end delivers the wrench."""
+EXACT = 1e-4
+"""Normalized error of each axis up to which a command delivers the wrench; the plant's and the surrogate's
+wrenches differ by more."""
 CHEAP = 1.25
 """Modes that need up to so much of the least energy known are counted."""
 
 Row = dict[str, Any]
+
+
+class CheapestWays(Ipopt):
+    """IPOPT on the energy alone, with the wrench as a constraint; ends that did not converge are NaN."""
+
+    def ends(self, layout: Layout, target: Array, starts: Array) -> Array:
+        """The commands (M, n, 3) that converged, cheapest first, of those from starts (S, n, 3)."""
+        actuation = Actuation(layout)
+        problem = Problem(actuation, target, self.normalization.std)
+        found = np.array([self._minimize(problem, problem.position(start)) for start in starts])
+        found = np.array([problem.command(end) for end in found if np.isfinite(end).all()])
+        command = actuation.feasible(found.reshape(-1, actuation.n_fins, 3))
+        sorted_: Array = command[np.argsort(command_energy(command, actuation.upper))]
+        return sorted_
+
+    def _minimize(self, problem: Problem, start: Array) -> Array:
+        end = super()._minimize(problem, start)
+        converged = self._solver(problem.actuation).stats()["success"]
+        return end if converged else np.full_like(end, np.nan)
+
+    @staticmethod
+    def _bounds(problem: Problem) -> dict[str, Array]:
+        return {**Ipopt._bounds(problem), "lbg": np.full(6, -EXACT), "ubg": np.full(6, EXACT)}
+
+    def _build(self, actuation: Actuation) -> Any:
+        command, target, residual, energy = self._formulas(actuation)
+        program = {"x": command, "p": target, "f": energy, "g": residual}
+        return self._casadi.nlpsol("ways", "ipopt", program, SOLVER_OPTIONS)
 
 
 def mode_rows(
@@ -50,11 +77,12 @@ def mode_rows(
         n_starts: random starts of the ground truth, per target.
         seed: of the starts.
     """
+    truth = CheapestWays(allocator.normalization)
     found: dict[int, list[Row]] = {}
     for case in tqdm(cases, unit="layout", disable=None, leave=False, file=sys.stderr):
         layout = case.layout.without(case.failed) if case.failed else case.layout
         for target in case.targets:
-            told = _compare(allocator, layout, target, n_starts, seed)
+            told = _compare(allocator, truth, layout, target, n_starts, seed)
             if told is not None:
                 found.setdefault(layout.n_fins, []).append(told)
     return [
@@ -66,7 +94,8 @@ def mode_rows(
 def mode_report(rows: Sequence[Row], n_starts: int) -> str:
     """The rows as a table, with what its columns mean."""
     note = (
-        f"Ground truth: {n_starts} random starts per target on the analytic fin model. modes: within "
+        f"Ground truth: {n_starts} random starts of IPOPT per target, energy under exact tracking by the "
+        f"analytic fin model. modes: within "
         f"{CHEAP:g} of the least energy, by the allocator (modes) and by the starts (truth); coverage: share "
         "of those of the starts that the allocator has too; truth_coverage: the reverse; best_energy: the "
         "allocator's least energy over that of the starts; distance: energy distance between the two sets of "
@@ -75,10 +104,11 @@ def mode_report(rows: Sequence[Row], n_starts: int) -> str:
     return f"{text_table(rows)}\n\n{note}"
 
 
-def _compare(allocator: Allocator, layout: Layout, target: Array, n_starts: int, seed: int) -> Row | None:
+def _compare(
+    allocator: Allocator, ways: CheapestWays, layout: Layout, target: Array, n_starts: int, seed: int
+) -> Row | None:
     """Counts and coverage for one target; None where no start delivers it."""
-    sigma = allocator.normalization.std
-    truth = _truth(layout, target, sigma, n_starts, seed)
+    truth = _truth(ways, layout, target, n_starts, seed)
     mine = np.array([mode.command for mode in allocator.allocate(layout, target).modes])
     upper = np.array([fin.limits.upper for fin in layout.fins])
     if not len(truth) or not len(mine):
@@ -86,12 +116,12 @@ def _compare(allocator: Allocator, layout: Layout, target: Array, n_starts: int,
     truth_energy, energy = command_energy(truth, upper), command_energy(mine, upper)
     least = min(truth_energy.min(), energy.min())
     truth_ways = [way_of(command) for command in truth[truth_energy <= CHEAP * least]]
-    ways = [way_of(command) for command in mine[energy <= CHEAP * least]]
+    own_ways = [way_of(command) for command in mine[energy <= CHEAP * least]]
     return {
         "truth": len(truth_ways),
-        "modes": len(ways),
-        "coverage": _covered(truth_ways, ways),
-        "truth_coverage": _covered(ways, truth_ways),
+        "modes": len(own_ways),
+        "coverage": _covered(truth_ways, own_ways),
+        "truth_coverage": _covered(own_ways, truth_ways),
         "best_energy": float(energy.min() / truth_energy.min()),
         "distance": _energy_distance(
             *(_forces(layout, c[e <= CHEAP * least]) for c, e in ((truth, truth_energy), (mine, energy)))
@@ -99,16 +129,10 @@ def _compare(allocator: Allocator, layout: Layout, target: Array, n_starts: int,
     }
 
 
-def _truth(layout: Layout, target: Array, sigma: Array, n_starts: int, seed: int) -> Array:
+def _truth(truth: CheapestWays, layout: Layout, target: Array, n_starts: int, seed: int) -> Array:
     """The best command of each mode (M, n, 3) that random starts lead to, cheapest first."""
-    actuation = Actuation(layout)
-    start = actuation.sample(np.random.default_rng(seed), (n_starts,))
-    targets = np.tile(target, (n_starts, 1))
-    ends = descend(actuation, start, targets, sigma, TRUTH)
-    ends = descend(actuation, ends.command, targets, sigma, POLISH)
-    good = np.linalg.norm((ends.wrench - target) / sigma, axis=1) <= EXACT
-    command = ends.command[good]
-    command = command[np.argsort(command_energy(command, actuation.upper))]
+    starts = Actuation(layout).sample(np.random.default_rng(seed), (n_starts,))
+    command = truth.ends(layout, target, starts)
     first = [group[0] for group in cluster([way_of(one) for one in command])]
     kept: Array = command[first]
     return kept
