@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from finlab.allocation.allocation import Candidates, Solution
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.energy import DEFAULT_WEIGHTS, EnergyWeights
-from finlab.allocation.pipeline import Pipeline, Pool, Settings
+from finlab.allocation.pipeline import Lead, Pipeline, Pool, Settings, nearest_forces
 from finlab.allocation.policy import Policy
 from finlab.allocation.prepared import Prepared
 from finlab.allocation.proposal import Proposal
@@ -80,12 +80,20 @@ class LearnedAllocator(Allocator):
         """Names of the settings."""
         return ["energy_weights", *(field.name for field in fields(Settings))]
 
-    def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
+    def _solve(
+        self,
+        layout: Layout,
+        targets: Array,
+        *,
+        seed: int,
+        previous: Array | None,
+        lead: Lead = nearest_forces,
+    ) -> Solution:
         prepared = self.pipeline.prepare(layout)
         notes = self.notes(layout)
         if len(targets) == 1:
             with self._one_thread():
-                pool, proposal = self.pipeline.solve(prepared, targets, seed, previous)
+                pool, proposal = self.pipeline.solve(prepared, targets, seed, previous, lead=lead)
             std = self.normalization.std
             return Solution(
                 pool.command[:, 0],
@@ -110,14 +118,17 @@ class LearnedAllocator(Allocator):
     def _solve_by(
         self, policy: Policy, layout: Layout, target: Array, *, seed: int, previous: Array | None
     ) -> Solution:
-        solution = self._solve(layout, target, seed=seed, previous=previous)
-        plain = policy.kind == "closest" and len(set(policy.axis_weights)) == 1
-        if plain or self._reaches(layout, solution, target)[0]:
-            return solution
+        if policy.kind == "closest" and len(set(policy.axis_weights)) == 1:
+            return self._solve(layout, target, seed=seed, previous=previous)
+        plain = self._solve(layout, target, seed=seed, previous=previous, lead=lambda *_: None)
+        if self._reaches(layout, plain, target)[0]:
+            return plain
         # What the policy asks for within reach is one wrench; that one is then delivered as any other.
         std = self.normalization.std
         served = serve(self.pipeline.prepare(layout).planar, policy, target[0] / std)
-        return self._solve(layout, served[None] * std, seed=seed, previous=previous)
+        return self._solve(
+            layout, served.wrench * std, seed=seed, previous=previous, lead=lambda *_: served.force
+        )
 
     def _notes(self, layout: Layout) -> tuple[str, ...]:
         """What the user should know before trusting an answer for this layout."""

@@ -87,23 +87,18 @@ def nearest(problem: PlanarProblem, target: Array, c: Array | None = None) -> Ne
     counts = np.isfinite(scale)
     columns = np.where(counts, problem.columns, 0.0)
     wanted, c_ = np.where(counts, target, 0.0), np.where(counts, scale, 1.0)
-    best: tuple[Array, Array, Array] | None = None
-    for middle, half in _convex_parts(problem, columns, wanted, c_):
-        sets = _Sets(columns, problem.curves.maximum, middle, half)
-        force, multiplier = _minimize(sets, wanted, c_)
-        missing = wanted - _sum(columns, force)
-        cost = (missing * missing / c_).sum(-1)
-        if best is None:
-            best = cost, force, multiplier
-        else:
-            better = cost < best[0]
-            best = (
-                np.where(better, cost, best[0]),
-                np.where(better[:, None, None], force, best[1]),
-                np.where(better[:, None], multiplier, best[2]),
-            )
-    assert best is not None
-    return Nearest(best[1], _sum(problem.columns, best[1]), best[2])
+    middle, half = _convex_parts(problem, columns, wanted, c_)
+    n_parts, rows, _ = middle.shape
+    # All parts of all targets are solved together; of each target the best part counts.
+    sets = _Sets(
+        columns, problem.curves.maximum, *(arc.reshape(n_parts * rows, -1) for arc in (middle, half))
+    )
+    repeated = np.tile(wanted, (n_parts, 1))
+    force, multiplier = _minimize(sets, repeated, c_)
+    missing = repeated - wrench_of(columns, force)
+    cost = (missing * missing / c_).sum(-1).reshape(n_parts, rows)
+    best = cost.argmin(0) * rows + np.arange(rows)
+    return Nearest(force[best], wrench_of(problem.columns, force[best]), multiplier[best])
 
 
 def nearest_in_turn(problem: PlanarProblem, target: Array, groups: list[NDArray[np.bool_]]) -> Nearest:
@@ -121,9 +116,11 @@ def nearest_in_turn(problem: PlanarProblem, target: Array, groups: list[NDArray[
         c = np.where(group, 1.0, c)
         radius = np.where(settled, 0.0, problem.curves.maximum)
         rest = problem._replace(curves=replace(problem.curves, maximum=radius))
-        found = nearest(rest, (goal - _sum(problem.columns, (force * settled[:, None])[None])[0])[None], c)
+        found = nearest(
+            rest, (goal - wrench_of(problem.columns, (force * settled[:, None])[None])[0])[None], c
+        )
         served = np.where(settled[:, None], force, found.force[0])
-        wrench = _sum(problem.columns, served[None])[0]
+        wrench = wrench_of(problem.columns, served[None])[0]
         if np.linalg.norm((goal - wrench)[c == HELD]) > SPOILED:
             break  # at a corner of its limits a robot has nothing left to give to later groups
         force = served
@@ -133,7 +130,7 @@ def nearest_in_turn(problem: PlanarProblem, target: Array, groups: list[NDArray[
             felt = np.linalg.norm(found.multiplier[0]) * np.sqrt((problem.columns**2).sum((1, 2)))
             settled |= np.linalg.norm(pull, axis=-1) > UNFELT * felt
         goal, c = np.where(group, wrench, goal), np.where(group, HELD, c)
-    return Nearest(force[None], _sum(problem.columns, force[None]), found.multiplier)
+    return Nearest(force[None], wrench_of(problem.columns, force[None]), found.multiplier)
 
 
 def nearest_along(problem: PlanarProblem, target: Array) -> Nearest:
@@ -163,10 +160,8 @@ def nearest_along(problem: PlanarProblem, target: Array) -> Nearest:
     return Nearest(found.force, wrench, found.multiplier @ turn)
 
 
-def _convex_parts(
-    problem: PlanarProblem, columns: Array, wanted: Array, c: Array
-) -> list[tuple[Array, Array]]:
-    """Arcs (middle and half, (R, n)) whose sectors are convex and together are what the fins have."""
+def _convex_parts(problem: PlanarProblem, columns: Array, wanted: Array, c: Array) -> tuple[Array, Array]:
+    """Arcs, as middle and half (P, R, n), whose sectors are convex and together are what the fins have."""
     rows = len(wanted)
     middle = np.broadcast_to(problem.middle, (rows, len(problem.middle))).copy()
     half = np.broadcast_to(np.minimum(problem.half, np.pi), middle.shape).copy()
@@ -180,13 +175,18 @@ def _convex_parts(
             half[:, i] *= 0.5
             middle[:, i] += np.where(np.sin(angle[:, i]) >= 0.0, 1.0, -1.0) * half[:, i]
         wide = wide[:MAX_WIDE]
-    parts = []
-    for signs in product((-0.5, 0.5), repeat=len(wide)):
-        part, width = middle.copy(), half.copy()
-        part[:, wide] += np.array(signs) * half[:, wide]
-        width[:, wide] *= 0.5
-        parts.append((part, width))
-    return parts
+    signs = np.array(list(product((-0.5, 0.5), repeat=len(wide))))
+    middle, half = (np.repeat(arc[None], len(signs), axis=0) for arc in (middle, half))
+    middle[..., wide] += signs[:, None] * half[..., wide]
+    half[..., wide] *= 0.5
+    return middle, half
+
+
+def wrench_of(columns: Array, force: Array) -> Array:
+    """Normalized wrench (R, 6) of planar forces (R, n, 2)."""
+    n = force.shape[1]
+    wrench: Array = force.reshape(-1, 2 * n) @ columns.reshape(2 * n, 6)
+    return wrench
 
 
 def _minimize(sets: _Sets, wanted: Array, of: Array) -> tuple[Array, Array]:
@@ -234,7 +234,7 @@ def _dual(sets: _Sets, wanted: Array, c: Array, multiplier: Array, soft: Array) 
     share = sets.radius / length
     value = (sets.radius * length).sum(-1) + ((0.5 * c * multiplier - wanted) * multiplier).sum(-1)
     force = share[..., None] * pull
-    gradient = _sum(sets.columns, force) + c * multiplier - wanted
+    gradient = wrench_of(sets.columns, force) + c * multiplier - wanted
     unit = pull / length[..., None]
     bent = share[..., None, None] * (slope - unit[..., :, None] * unit[..., None, :])
     flat = sets.columns.reshape(2 * n, 6)
@@ -260,10 +260,3 @@ def _seen(sets: _Sets, multiplier: Array) -> tuple[Array, Array]:
         np.where(outside[..., None], along[..., None] * edge, pull),
         np.where(outside[..., None, None], on_edge, slope),
     )
-
-
-def _sum(columns: Array, force: Array) -> Array:
-    """Normalized wrench (R, 6) of planar forces (R, n, 2)."""
-    n = force.shape[1]
-    wrench: Array = force.reshape(-1, 2 * n) @ columns.reshape(2 * n, 6)
-    return wrench

@@ -7,6 +7,7 @@ Levenberg-Marquardt on the commands. Nothing here knows the analytic fin model.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -16,10 +17,11 @@ from numpy.typing import NDArray
 
 from finlab.allocation import force_space
 from finlab.allocation.energy import DEFAULT_WEIGHTS, EnergyWeights, command_energy
+from finlab.allocation.force_space import PlanarProblem
 from finlab.allocation.foresight import foresee
 from finlab.allocation.learned_fin import LearnedFin
 from finlab.allocation.levenberg_marquardt import refine
-from finlab.allocation.nearest import nearest
+from finlab.allocation.nearest import nearest, wrench_of
 from finlab.allocation.numpy_network import NumpyNetwork
 from finlab.allocation.prepared import Prepared, prepare
 from finlab.allocation.proposal import Proposal, propose
@@ -85,6 +87,15 @@ class Settings:
             )
 
 
+Lead = Callable[[PlanarProblem, Array], Array | None]
+"""From targets (R, 6) that were missed to planar forces (R, n, 2) [N] that come near them, or None."""
+
+
+def nearest_forces(problem: PlanarProblem, target: Array) -> Array:
+    """The forces (R, n, 2) whose wrench is nearest."""
+    return nearest(problem, target).force
+
+
 class Pipeline:
     """Answers targets on layouts without failures; every array is numpy's."""
 
@@ -99,9 +110,23 @@ class Pipeline:
         self.prepare = lru_cache(maxsize=128)(lambda layout: prepare(layout, fin, std, energy_weights))
 
     def solve(
-        self, prepared: Prepared, targets: Array, seed: int, previous: Array | None
+        self,
+        prepared: Prepared,
+        targets: Array,
+        seed: int,
+        previous: Array | None,
+        *,
+        lead: Lead = nearest_forces,
     ) -> tuple[Pool, Proposal]:
-        """Refined answers, best first, to a few targets (N, 6), and the network's raw proposal."""
+        """Refined answers, best first, to a few targets (N, 6), and the network's raw proposal.
+
+        Args:
+            prepared: the layout.
+            targets: desired wrenches (N, 6).
+            seed: of the samples.
+            previous: command (n, 3) of the previous tick, for a single target.
+            lead: where to start from when targets were missed; None from it gives them up.
+        """
         std, settings = self.normalization.std, self.settings
         target = targets / std
         centred = target - self.normalization.mean / std
@@ -109,8 +134,9 @@ class Pipeline:
             self.network, prepared, centred, target, settings.n_candidates, settings.temperature, seed
         )
         if previous is None:
-            return self._descend(prepared, target, proposal, self._seeds(prepared, proposal)), proposal
-        pool = self._descend_steadily(prepared, target, proposal, previous)
+            seeds = self._seeds(prepared, proposal)
+            return self._descend(prepared, target, proposal, seeds, lead), proposal
+        pool = self._descend_steadily(prepared, target, proposal, previous, lead)
         # Arcs that pass the seam are brought back inside the fin's own limits.
         return pool._replace(command=prepared.commands.clamp(pool.command)), proposal
 
@@ -128,19 +154,19 @@ class Pipeline:
         return Pool(*(np.concatenate(both, axis=1) for both in zip(answer, found, strict=True)))
 
     def _descend_steadily(
-        self, prepared: Prepared, target: Array, proposal: Proposal, previous: Array
+        self, prepared: Prepared, target: Array, proposal: Proposal, previous: Array, lead: Lead
     ) -> Pool:
         """Answers that turn the fins as little as the target allows, with an eye on the next ticks.
 
         Fins at rest turn towards where they will be needed, or else where they would be cheapest.
         """
         seeds = self._seeds(prepared, proposal)
-        free = self._descend(prepared, target, proposal, seeds)
+        free = self._descend(prepared, target, proposal, seeds, lead)
         aim = free.command[0, 0, :, 2]
         kept = planar_thrust(prepared.commands, previous)
         seeds = np.concatenate([kept[None, None], seeds], axis=1)
         near = turn_little(prepared, previous, aim, TURNS[0])
-        pool = self._descend(near, target, proposal, seeds, steady=True)
+        pool = self._descend(near, target, proposal, seeds, lead, steady=True)
         plan = foresee(prepared, previous, target[0], pool.command[0, 0], free.command[0])
         if plan is not None:
             near = turn_little(prepared, previous, plan.ready, TURNS[1])
@@ -152,32 +178,47 @@ class Pipeline:
             if pool.error[0, 0] <= TOLERANCE:
                 break
             near = turn_little(prepared, previous, aim, width)
-            pool = self._descend(near, target, proposal, seeds, steady=True)
+            pool = self._descend(near, target, proposal, seeds, lead, steady=True)
         return pool
 
     def _descend(
-        self, prepared: Prepared, target: Array, proposal: Proposal, seeds: Array, steady: bool = False
+        self,
+        prepared: Prepared,
+        target: Array,
+        proposal: Proposal,
+        seeds: Array,
+        lead: Lead,
+        steady: bool = False,
     ) -> Pool:
         """Search from thrust seeds (N, S, n), refine, and insist where that did not reach the target."""
         command = self._search(prepared, target, seeds, steady)
         pool = self._refine(prepared, target, command, self.settings.refine_steps, steady)
         missed = pool.error[:, 0] > TOLERANCE
         if missed.any():
-            self._insist(prepared, target, proposal, pool, missed)
+            self._insist(prepared, target, proposal, pool, missed, lead)
         return pool
 
     def _insist(
-        self, prepared: Prepared, target: Array, proposal: Proposal, pool: Pool, missed: NDArray[np.bool_]
+        self,
+        prepared: Prepared,
+        target: Array,
+        proposal: Proposal,
+        pool: Pool,
+        missed: NDArray[np.bool_],
+        lead: Lead,
     ) -> None:
         """Improve, in place, the answers to targets that were missed: they are hard, or out of reach."""
         self._try(prepared, target, pool, missed, None, FIRST_PATIENCE)
         missed = pool.error[:, 0] > TOLERANCE
         if not missed.any():
             return
-        found = nearest(prepared.planar, target[missed])
+        force = lead(prepared.planar, target[missed])
+        if force is None:
+            return
         needed = np.zeros(len(target))
-        needed[missed] = np.linalg.norm(target[missed] - found.wrench, axis=-1)
-        start, _ = force_space.realize(prepared.planar, force_space.polar(prepared.planar, found.force))
+        left = target[missed] - wrench_of(prepared.planar.columns, force)
+        needed[missed] = np.linalg.norm(left, axis=-1)
+        start, _ = force_space.realize(prepared.planar, force_space.polar(prepared.planar, force))
         self._try(prepared, target, pool, missed, start[:, None], NEAREST_PATIENCE)
         missed &= pool.error[:, 0] > np.maximum(TOLERANCE, NEEDLESS[0] + (1.0 + NEEDLESS[1]) * needed)
         if missed.any():

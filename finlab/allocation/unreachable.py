@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.force_space import PlanarProblem
-from finlab.allocation.nearest import nearest, nearest_along, nearest_in_turn
+from finlab.allocation.nearest import Nearest, nearest, nearest_along, nearest_in_turn
 from finlab.allocation.policy import Policy
 
 Array = NDArray[Any]
 
 
-def serve(problem: PlanarProblem, policy: Policy, target: Array) -> Array:
-    """The wrench (6,) to deliver, all normalized.
+def serve(problem: PlanarProblem, policy: Policy, target: Array) -> Nearest:
+    """The one wrench to deliver, normalized, and forces that do so.
 
     Args:
         problem: the layout.
@@ -23,12 +23,9 @@ def serve(problem: PlanarProblem, policy: Policy, target: Array) -> Array:
         target: the wrench (6,) that was asked for.
     """
     if policy.kind == "direction":
-        found = nearest_along(problem, target)
-    elif policy.kind == "priority":
-        found = nearest_in_turn(problem, target, policy.groups)
-    else:
-        weights = np.array(policy.axis_weights, np.float64)
-        with np.errstate(divide="ignore"):
-            found = nearest(problem, target[None], (weights.max() / weights) ** 2)
-    wrench: Array = found.wrench[0]
-    return wrench
+        return nearest_along(problem, target)
+    if policy.kind == "priority":
+        return nearest_in_turn(problem, target, policy.groups)
+    weights = np.array(policy.axis_weights, np.float64)
+    with np.errstate(divide="ignore"):
+        return nearest(problem, target[None], (weights.max() / weights) ** 2)
