@@ -1,18 +1,24 @@
 """Keeps one page's answer up to date: asks for the newest state, and knows what of the answer is shown."""
 
+import asyncio
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
-from finlab.errors import FinlabError
+from finlab.allocation.modes import Mode
 from webapp.density import Densities
-from webapp.modes import Mode, distinct_modes, nearest_modes
+from webapp.modes import NamedMode, known_modes, named_modes, nearest_modes, same_mode
+from webapp.resting import Resting
 from webapp.session import Session
 from webapp.solver import Reply, Solver
 from webapp.worker import Worker
+
+SEARCH_REST_S = 0.2
+"""How long there must be no newer answer before all its modes are searched for [s]: that takes a while."""
 
 
 class Answering:
@@ -23,6 +29,7 @@ class Answering:
         session: Session,
         solver: Solver,
         worker: Worker,
+        loop: asyncio.AbstractEventLoop,
         post: Callable[[Callable[[], object]], None],
         changed: Callable[[], None],
         failed: Callable[[str], None],
@@ -33,7 +40,8 @@ class Answering:
             session: whose questions are answered.
             solver: answers them.
             worker: on whose thread.
-            post: brings a call to the event loop.
+            loop: the event loop that everything else here runs on.
+            post: brings a call to it.
             changed: called there when there is a new answer, or none.
             failed: called there with a sentence when a state has no answer.
         """
@@ -43,11 +51,14 @@ class Answering:
         self._revision = -1
         self._error: str | None = None
         self._error_revision = -1
-        self._shown: tuple[Allocation, str, int, Allocation] | None = None
+        self._shown: tuple[Allocation, NDArray, Allocation] | None = None
+        self._search = Resting(solver.modes, SEARCH_REST_S, worker, loop, post, self._take_modes)
         self.reply: Reply | None = None
         """The newest answer with all that belongs to it; it may be older than the state."""
-        self.modes: tuple[Mode, ...] = ()
-        """Its distinct modes."""
+        self.modes: tuple[NamedMode, ...] = ()
+        """Its first modes: at once those that it knows anyway, and after a moment of rest the best of all."""
+        self.n_modes = 0
+        """How many it has; more may be known than are shown."""
         self.sample_modes: NDArray | None = None
         """Which mode each raw sample is nearest to (K,)."""
         self.frames: tuple[Allocation, ...] = ()
@@ -82,20 +93,18 @@ class Answering:
         if best is None:
             return None
         if sample is not None and best.samples is not None and sample < len(best.samples.command):
-            return self._variant(best, "sample", sample)
-        if best.candidates is not None and 0 < mode < len(self.modes):
-            return self._variant(best, "mode", self.modes[mode].index)
+            return self._variant(best, best.samples.command[sample])
+        if 0 < mode < len(self.modes):
+            return self._variant(best, self.modes[mode].mode.command)
         return best
 
-    def _variant(self, best: Allocation, kind: str, index: int) -> Allocation:
+    def _variant(self, best: Allocation, command: NDArray) -> Allocation:
         """The answer with another command; kept, because every refresh asks for it."""
         known = self._shown
-        if known is None or known[0] is not best or known[1:3] != (kind, index):
-            group = best.samples if kind == "sample" else best.candidates
-            assert group is not None
-            other = replace(best, command=group.command[index], wrench_surrogate=None)
-            known = self._shown = (best, kind, index, other)
-        return known[3]
+        if known is None or known[0] is not best or not np.array_equal(known[1], command, equal_nan=True):
+            other = replace(best, command=command, wrench_surrogate=None)
+            known = self._shown = (best, command, other)
+        return known[2]
 
     def ask(self) -> None:
         """Have the worker answer the present state, unless it was asked already."""
@@ -105,32 +114,42 @@ class Answering:
         self._asked = revision
 
         def job() -> None:
-            try:
-                reply = self._solver.reply(state)
-            except FinlabError as error:
-                self._post(partial(self._take_error, revision, str(error)))
-            except Exception as error:  # a fault of a method must not take the page with it
-                self._post(partial(self._take_error, revision, f"{state.method} failed: {error}"))
-                raise
-            else:
-                self._post(partial(self._take, revision, reply))
+            self._post(partial(self._take, revision, self._solver.reply(state)))
 
-        self._worker.submit(id(self), job)
+        def failed(text: str) -> None:
+            self._post(partial(self._take_error, revision, text))
+
+        self._worker.submit(id(self), job, failed)
 
     def close(self) -> None:
         """Nobody wants to know any more."""
         self._worker.forget(id(self))
+        self._search.close()
 
     def _take(self, revision: int, reply: Reply) -> None:
         if revision < self._revision:
             return
         self.frames = ()
         self.reply, self._revision = reply, revision
-        answer = reply.answer
-        self.modes = distinct_modes(answer.candidates)
-        self.sample_modes = nearest_modes(answer.samples, answer.candidates, self.modes)
+        self._name(known_modes(reply.answer))
         self._error = None
+        self._search.ask(reply)
         self._changed()
+
+    def _take_modes(self) -> None:
+        """All modes of the newest answer are known; what is on the robot stays there if it can."""
+        if self._search.error is not None or self._search.busy:
+            return
+        before, mode = self.modes, self._session.mode
+        self._name(self._search.findings or ())
+        if 0 < mode < len(before):
+            self._session.show_mode(same_mode(before[mode].mode, self.modes))
+        self._changed()
+
+    def _name(self, modes: tuple[Mode, ...]) -> None:
+        self.modes, self.n_modes = named_modes(modes), len(modes)
+        samples = None if self.best is None else self.best.samples
+        self.sample_modes = nearest_modes(samples, self.modes)
 
     def _take_error(self, revision: int, text: str) -> None:
         if text != self._error:

@@ -5,7 +5,6 @@ from dataclasses import replace
 from functools import partial
 
 from finlab.allocation.allocation import Allocation
-from finlab.errors import FinlabError
 from webapp.solver import Solver
 from webapp.state import State
 from webapp.worker import Worker
@@ -63,19 +62,16 @@ class Comparison:
 
         # One job per method: questions of this and other pages are answered in between.
         def job() -> None:
-            answer: Answer
-            try:
-                question = replace(state, method=method)
-                self._solver.solve(question)  # the first answer may have to load a network; it is not timed
-                answer = self._solver.solve(question)
-                _ = answer.wrench, answer.energy, answer.fin_forces
-            except FinlabError as error:
-                answer = str(error)
-            except Exception as error:  # a fault of one method must not keep the others from answering
-                answer = f"failed: {error}"
+            question = replace(state, method=method)
+            self._solver.solve(question)  # the first answer may have to load a network; it is not timed
+            answer = self._solver.solve(question)
+            _ = answer.wrench, answer.energy, answer.fin_forces
             self._post(partial(self._take, state, method, answer))
 
-        self._worker.submit((id(self), "comparison"), job)
+        def failed(text: str) -> None:
+            self._post(partial(self._take, state, method, text))
+
+        self._worker.submit((id(self), "comparison"), job, failed)
 
     def _take(self, state: State, method: str, answer: Answer) -> None:
         if state is not self.state:

@@ -75,14 +75,13 @@ class Exports:
         name = f"{file_stem(self._session.state.layout.name)}{suffix}"
 
         def job() -> None:
-            try:
-                content = make()
-            except FinlabError as error:
-                self._post(partial(self._failed, "Not exported", str(error)))
-            else:
-                self._post(partial(self._client.send_file_download, name, content, save_immediately=True))
+            content = make()
+            self._post(partial(self._client.send_file_download, name, content, save_immediately=True))
 
-        self._worker.submit((suffix, id(self)), job)
+        def failed(text: str) -> None:
+            self._post(partial(self._failed, "Not exported", text))
+
+        self._worker.submit((suffix, id(self)), job, failed)
 
     def _take_picture(self, name: str) -> None:
         try:

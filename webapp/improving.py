@@ -56,21 +56,21 @@ class Improver:
             self._post(partial(self._take, stop, "progress", progress))
 
         def job() -> None:
-            try:
-                found = optimize_layout(
-                    layout,
-                    wish.fins,
-                    bounds,
-                    goal,
-                    mission=wish.wrenches,
-                    progress=report,
-                    cancelled=stop.is_set,
-                )
-                self._post(partial(self._take, stop, "found", found))
-            except FinlabError as error:
-                self._post(partial(self._take, stop, "error", str(error)))
+            found = optimize_layout(
+                layout,
+                wish.fins,
+                bounds,
+                goal,
+                mission=wish.wrenches,
+                progress=report,
+                cancelled=stop.is_set,
+            )
+            self._post(partial(self._take, stop, "found", found))
 
-        self._worker.submit((id(self), "search"), job)
+        def failed(text: str) -> None:
+            self._post(partial(self._take, stop, "error", text))
+
+        self._worker.submit((id(self), "search"), job, failed)
 
     def cancel(self) -> None:
         """Stop after the present round; what has been found by then is offered."""

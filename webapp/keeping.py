@@ -11,7 +11,10 @@ from finlab.errors import FinlabError
 from finlab.layout import Layout, layout_to_dict, parse_layout
 from webapp.session import Session
 from webapp.state import SETTINGS, State
+from webapp.wishes import restored_draft
 
+VERSION = 3
+"""Of what stands in the files; others are not read."""
 MAX_FILES = 64
 """Sessions that are kept; the oldest go first."""
 MAX_BYTES = 3_000_000
@@ -78,6 +81,8 @@ def to_dict(session: Session) -> dict[str, Any]:
         return {
             "layout": place(state.layout),
             "failed": list(state.failed),
+            "weak": [list(pair) for pair in state.weak],
+            "stuck": [list(pair) for pair in state.stuck],
             "target": list(state.target),
             "links": [list(pair) for pair in state.links],
             "settings": {key: getattr(state, key) for key in SETTINGS},
@@ -85,7 +90,7 @@ def to_dict(session: Session) -> dict[str, Any]:
 
     history = session.history
     values = {
-        "version": 2,
+        "version": VERSION,
         "state": plain(session.state),
         "past": [[name, plain(state)] for name, state in history.past[-MAX_STEPS:]],
         "future": [[name, plain(state)] for name, state in history.future[-MAX_STEPS:]],
@@ -93,6 +98,8 @@ def to_dict(session: Session) -> dict[str, Any]:
         "pinned": None if session.pinned is None else place(session.pinned),
         "beside": session.beside,
         "display": asdict(session.display),
+        "draft": asdict(session.draft),
+        "swim": asdict(session.swim),
     }
     return {**values, "layouts": [layout_to_dict(layout) for layout in layouts]}
 
@@ -103,8 +110,8 @@ def restore(session: Session, values: dict[str, Any]) -> None:
     Raises:
         FinlabError: a value is not allowed. So may KeyError, TypeError, ValueError and IndexError tell.
     """
-    if values["version"] != 2:
-        raise FinlabError(f"kept session: expected version 2, got {values['version']!r:.20}")
+    if values["version"] != VERSION:
+        raise FinlabError(f"kept session: expected version {VERSION}, got {values['version']!r:.20}")
     layouts = [parse_layout(layout, source="kept session") for layout in values["layouts"]]
 
     def steps(key: str) -> list[tuple[str, State]]:
@@ -115,9 +122,13 @@ def restore(session: Session, values: dict[str, Any]) -> None:
     display = session.display
     for key, value in values["display"].items():
         display = display.with_value(key, value)
+    draft, swim = restored_draft(values["draft"]), session.swim
+    for key, value in values["swim"].items():
+        swim = swim.with_value(key, value)
     session.resume(state)
     session.history.restore(past, future)
     session.saved, session.display = saved, display
+    session.draft, session.swim = draft, swim.without_own_path()
     session.pinned = None if pinned is None else layouts[pinned]
     session.compare_with(values["beside"])
 
@@ -128,6 +139,10 @@ def _state(values: dict[str, Any], layouts: list[Layout]) -> State:
         state = state.with_target(axis, value)
     for name in values["failed"]:
         state = state.with_failure_toggled(name)
+    for name, share in values["weak"]:
+        state = state.with_strength(str(name), share)
+    for name, angle in values["stuck"]:
+        state = state.with_stop(str(name), angle)
     for key in SETTINGS:
         state = state.with_setting(key, values["settings"][key])
     for a, b in values["links"]:

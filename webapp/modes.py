@@ -1,72 +1,58 @@
-"""The distinct ways in which an answer's candidates deliver the wrench, and names that tell them apart."""
+"""Names that tell an answer's modes apart; what counts as one is for `finlab.allocation.modes` to say."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.allocation import Candidates
+from finlab.allocation.allocation import Allocation, Candidates
+from finlab.allocation.modes import SAME_DIRECTION, Mode, Way, differences, find_modes, same_way, way_of
 from webapp.figures import listed
+from webapp.theme import MODE_COLORS
 
 Array = NDArray[np.float64]
 
-RESTING = 0.15
-"""Share of the strongest fin's thrust below which a fin counts as resting: how it does so does not matter."""
-SAME_DIRECTION = np.radians(25.0)
-"""Zero directions closer than this are the same [rad]."""
-SAME_SIZE = 0.25
-"""Thrusts, and ratios of amplitude to frequency, whose logarithms differ by less are the same."""
+MAX_SHOWN = len(MODE_COLORS)
+"""Modes that are shown, each in its own colour; a robot with many fins has dozens, the last ones dear."""
 
 
-@dataclass(frozen=True)
-class Mode:
-    """Candidates that do the same, as people see it."""
+class NamedMode(NamedTuple):
+    """One way to deliver the wrench, as people call it."""
 
-    index: int
-    """The best of them, as its place among the candidates."""
-    size: int
-    """How many candidates it stands for."""
+    mode: Mode
+    """The way itself."""
     name: str
-    """What makes it different from the other modes."""
+    """What makes it different from the others that are shown."""
 
 
-@dataclass(frozen=True)
-class _Way:
-    """What matters of one command: numbers per fin (n,), NaN where the fin rests or has failed."""
-
-    resting: tuple[int, ...]
-    thrust: Array
-    direction: Array
-    style: Array
-
-
-def distinct_modes(candidates: Candidates | None) -> tuple[Mode, ...]:
-    """The modes, best first; of candidates that do the same the best one stands for all."""
-    if candidates is None:
+def known_modes(answer: Allocation) -> tuple[Mode, ...]:
+    """The modes among the candidates that an answer has refined anyway: a few, but they cost no time."""
+    if answer.candidates is None:
         return ()
-    ways: list[_Way] = []
-    members: list[list[int]] = []
-    for k, command in enumerate(candidates.command):
-        way = _way(command)
-        home = next((i for i, known in enumerate(ways) if _same(known, way)), None)
-        if home is None:
-            ways.append(way)
-            members.append([k])
-        else:
-            members[home].append(k)
-    return tuple(
-        Mode(member[0], len(member), name) for member, name in zip(members, _names(ways), strict=True)
-    )
+    limits = [fin.limits for fin in answer.layout.fins]
+    lower, upper = (np.array([getattr(limit, end) for limit in limits]) for end in ("lower", "upper"))
+    return find_modes(answer.candidates, lower, upper)
 
 
-def nearest_modes(
-    samples: Candidates | None, candidates: Candidates | None, modes: tuple[Mode, ...]
-) -> NDArray[np.intp] | None:
+def named_modes(modes: tuple[Mode, ...]) -> tuple[NamedMode, ...]:
+    """The first `MAX_SHOWN` modes with their names, no two alike."""
+    shown = modes[:MAX_SHOWN]
+    names = _names([way_of(mode.command) for mode in shown])
+    return tuple(NamedMode(mode, name) for mode, name in zip(shown, names, strict=True))
+
+
+def same_mode(wanted: Mode, modes: tuple[NamedMode, ...]) -> int:
+    """The place of a mode that is known from another list; 0, the best one, where it is not there."""
+    way = way_of(wanted.command)
+    return next((k for k, (mode, _) in enumerate(modes) if same_way(way_of(mode.command), way)), 0)
+
+
+def nearest_modes(samples: Candidates | None, modes: tuple[NamedMode, ...]) -> NDArray[np.intp] | None:
     """For each raw sample (K,) the mode whose thrusts are nearest to its own; None where there are none."""
-    if samples is None or candidates is None or not modes:
+    if samples is None or not modes:
         return None
     raw = _push(samples.command)
-    refined = _push(candidates.command[[mode.index for mode in modes]])
+    refined = _push(np.array([mode.command for mode, _ in modes]))
     gap = np.abs(raw[:, None] - refined[None]) ** 2
     return np.asarray(np.argmin(gap.sum(axis=-1), axis=1))
 
@@ -77,31 +63,10 @@ def _push(command: Array) -> NDArray[np.complex128]:
     return np.asarray(np.nan_to_num(strength * np.exp(1j * command[..., 2])))
 
 
-def _way(command: Array) -> _Way:
-    with np.errstate(divide="ignore"):
-        thrust = 2 * np.log(np.sin(command[:, 0])) + 2 * np.log(command[:, 1])  # grows with sin^2(A) f^2
-        style = np.log(command[:, 0]) - np.log(command[:, 1])
-    resting = np.isfinite(thrust) & (thrust < np.nanmax(thrust) + np.log(RESTING))
-    pushes = np.isfinite(thrust) & ~resting
-    values = [np.where(pushes, v, np.nan) for v in (thrust, command[:, 2], style)]
-    return _Way(tuple(int(i) for i in np.flatnonzero(resting)), *values)
-
-
-def _differences(a: _Way, b: _Way) -> Array:
-    """How `b` differs from `a` (3, n) in direction, thrust and style; 1 is what counts as different."""
-    turn = np.angle(np.exp(1j * (b.direction - a.direction))) / SAME_DIRECTION
-    rest = np.array([b.thrust - a.thrust, b.style - a.style]) / SAME_SIZE
-    return np.nan_to_num(np.concatenate([turn[None], rest]))
-
-
-def _same(a: _Way, b: _Way) -> bool:
-    return a.resting == b.resting and bool((np.abs(_differences(a, b)) < 1.0).all())
-
-
-def _names(ways: list[_Way]) -> list[str]:
+def _names(ways: list[Way]) -> list[str]:
     """Who rests; where that is not enough, the largest differences from the first mode with the same name."""
     names: list[str] = []
-    firsts: dict[str, _Way] = {}
+    firsts: dict[str, Way] = {}
     for way in ways:
         base = _resting_words(way)
         name = base
@@ -117,7 +82,7 @@ def _names(ways: list[_Way]) -> list[str]:
     return names
 
 
-def _resting_words(way: _Way) -> str:
+def _resting_words(way: Way) -> str:
     if not way.resting:
         return "all fins push"
     several = len(way.resting) > 1
@@ -125,13 +90,13 @@ def _resting_words(way: _Way) -> str:
     return f"fins {fins} rest" if several else f"fin {fins} rests"
 
 
-def _difference_words(first: _Way, way: _Way) -> list[str]:
+def _difference_words(first: Way, way: Way) -> list[str]:
     """What differs, the largest difference first."""
-    differences = _differences(first, way)
+    told = differences(first, way)
     words = []
-    for flat in np.argsort(-np.abs(differences), axis=None):
-        kind, fin = divmod(int(flat), differences.shape[1])
-        value = float(differences[kind, fin])
+    for flat in np.argsort(-np.abs(told), axis=None):
+        kind, fin = divmod(int(flat), told.shape[1])
+        value = float(told[kind, fin])
         if abs(value) < 1.0:
             break
         if kind == 0:

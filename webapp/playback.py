@@ -52,16 +52,15 @@ class Playback:
             raise FinlabError("there is no answer yet; wait for one")
 
         def job() -> None:
-            try:
-                frames = self._solver.refinement(state, best)
-            except FinlabError as error:
-                self._post(partial(self._failed, str(error)))
-            else:
-                for frame in frames:
-                    _ = frame.wrench
-                self._post(partial(self._play, revision, frames))
+            frames = self._solver.refinement(state, best)
+            for frame in frames:
+                _ = frame.wrench
+            self._post(partial(self._play, revision, frames))
 
-        self._worker.submit((id(self), "refinement"), job)
+        def failed(text: str) -> None:
+            self._post(partial(self._failed, text))
+
+        self._worker.submit((id(self), "refinement"), job, failed)
 
     def _play(self, revision: int, frames: tuple[Allocation, ...]) -> None:
         self._answering.frames = frames if revision == self._session.revision else ()

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import Generic, TypeVar
 
-from finlab.errors import FinlabError
 from webapp.worker import Worker
 
 Question = TypeVar("Question")
@@ -66,12 +65,12 @@ class Resting(Generic[Question, Found]):
 
     def _start(self, question: Question) -> None:
         def job() -> None:
-            try:
-                self._post(partial(self._take, question, self._work(question), None))
-            except FinlabError as error:
-                self._post(partial(self._take, question, None, str(error)))
+            self._post(partial(self._take, question, self._work(question), None))
 
-        self._worker.submit(id(self), job)
+        def failed(text: str) -> None:
+            self._post(partial(self._take, question, None, text))
+
+        self._worker.submit(id(self), job, failed)
 
     def _take(self, question: Question, found: Found | None, error: str | None) -> None:
         self._answered, self.error = question, error

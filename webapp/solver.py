@@ -10,6 +10,7 @@ import numpy as np
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import load_allocator
+from finlab.allocation.modes import Mode
 from webapp.attention import Attention, attention
 from webapp.density import Densities, densities
 from webapp.refinement import refinement
@@ -21,7 +22,7 @@ SAMPLING_METHODS = ("learned", "paper")
 """Methods that K, T and gamma mean something to."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Reply:
     """An answer and what belongs to it."""
 
@@ -72,9 +73,13 @@ class Solver:
         _ = answer.wrench, answer.energy, answer.fin_forces, answer.candidates, answer.samples
         return Reply(
             answer,
-            densities(allocator, state.layout, state.failed, target, state.temperature),
-            attention(allocator, state.layout, state.failed, target),
+            densities(allocator, answer.layout, state.failed, target, state.temperature),
+            attention(allocator, answer.layout, state.failed, target),
         )
+
+    def modes(self, reply: Reply) -> tuple[Mode, ...]:
+        """All distinct ways to do what an answer does: a search of its own, tens of milliseconds."""
+        return reply.answer.modes
 
     def refinement(self, state: State, answer: Allocation) -> tuple[Allocation, ...]:
         """The steps of the refinement behind an answer to a state.
@@ -91,7 +96,7 @@ class Solver:
             FinlabError: the method cannot be loaded or cannot answer.
         """
         return self.allocator(state).allocate(
-            state.layout, state.target, failed=state.failed, policy=state.policy, seed=0
+            state.layout, state.target, failed=state.failed, policy=state.policy, health=state.health, seed=0
         )
 
 

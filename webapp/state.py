@@ -1,8 +1,10 @@
 """What a browser works on: one immutable, checked value that undo can put back."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
+from finlab.allocation.health import Health
 from finlab.allocation.methods import METHODS
 from finlab.allocation.policy import AXES, KINDS
 from finlab.errors import FinlabError
@@ -24,6 +26,8 @@ TEMPERATURE_RANGE = (0.0, 2.0)
 """Temperatures T of the mixture."""
 GAMMA_RANGE = (0.0, 1.0)
 """Weights gamma of the energy in the ranking."""
+STRENGTH_RANGE = (0.05, 1.0)
+"""Shares that may be left of a weak fin's largest amplitude and frequency."""
 SETTINGS = ("method", "policy", "n_candidates", "temperature", "gamma")
 """Fields of `State` that say how the question is answered."""
 
@@ -36,6 +40,10 @@ class State:
     """The robot."""
     failed: tuple[str, ...] = ()
     """Names of failed fins, in the order of the layout."""
+    weak: tuple[tuple[str, float], ...] = ()
+    """Weak fins: name, and the share that is left of the largest amplitude and frequency."""
+    stuck: tuple[tuple[str, float], ...] = ()
+    """Fins that no longer turn: name, and the zero direction [rad] at which they stay."""
     target: tuple[float, float, float, float, float, float] = (0.0,) * 6
     """Desired wrench [N, N m], body frame."""
     n_candidates: int = 64
@@ -56,6 +64,16 @@ class State:
         """Names of the fins that work."""
         return tuple(name for name in self.layout.names if name not in self.failed)
 
+    @property
+    def health(self) -> Health | None:
+        """What is known of damaged fins; None where all are whole."""
+        return Health(self.weak, self.stuck) if self.weak or self.stuck else None
+
+    @property
+    def able(self) -> Layout:
+        """The layout with the limits that are left to damaged fins."""
+        return self.layout if self.health is None else self.health.applied_to(self.layout)
+
     def with_target(self, axis: int, value: Any) -> "State":
         """One component of the target changed."""
         checked = number(value, f"{AXES[axis]} [{AXIS_UNITS[axis]}]", -MAX_TARGET, MAX_TARGET)
@@ -74,11 +92,33 @@ class State:
             )
         return replace(self, failed=tuple(n for n in self.layout.names if n in lost))
 
+    def with_strength(self, name: str, share: Any) -> "State":
+        """A fin that is weak, with a share left of its largest amplitude and frequency; 1 is a whole one."""
+        self.layout.index(name)
+        checked = number(share, f"strength left of {name}", *STRENGTH_RANGE)
+        others = tuple(pair for pair in self.weak if pair[0] != name)
+        return replace(self, weak=others if checked == 1.0 else (*others, (name, checked)))
+
+    def with_stop(self, name: str, angle: Any) -> "State":
+        """A fin that is stuck at a zero direction [rad]; None frees it."""
+        self.layout.index(name)
+        others = tuple(pair for pair in self.stuck if pair[0] != name)
+        if angle is None:
+            return replace(self, stuck=others)
+        checked = number(angle, f"direction of {name}, stuck, in radians", -math.pi - 1e-6, math.pi + 1e-6)
+        return replace(self, stuck=(*others, (name, checked)))
+
     def with_layout(self, layout: Layout) -> "State":
-        """Another layout; failures of fins that still exist stay, unless none would work."""
+        """Another layout; damage of fins that still exist stays, unless none would work."""
         failed = tuple(name for name in layout.names if name in self.failed)
-        failed = () if len(failed) == layout.n_fins else failed
-        return replace(self, layout=layout, failed=failed, links=kept(self.links, layout))
+        return replace(
+            self,
+            layout=layout,
+            failed=() if len(failed) == layout.n_fins else failed,
+            weak=tuple(pair for pair in self.weak if pair[0] in layout.names),
+            stuck=tuple(pair for pair in self.stuck if pair[0] in layout.names),
+            links=kept(self.links, layout),
+        )
 
     def with_link(self, a: str, b: str) -> "State":
         """Two fins become a mirror pair that moves together."""

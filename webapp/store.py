@@ -79,4 +79,5 @@ class SessionStore:
 
 def _mark(session: Session) -> object:
     """Differs whenever there is something new to keep."""
-    return session.revision, session.display, session.saved, session.pinned, session.beside
+    looks = session.display, session.saved, session.pinned, session.beside
+    return session.revision, *looks, session.draft, session.swim

@@ -4,54 +4,19 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 from finlab.errors import FinlabError
-from finlab.layout import Layout
-from finlab.sim import PLANTS, SHIPPED, Swim, Trajectory, make_trajectory
-from webapp.comparison import COMPARED
+from finlab.sim import Swim, make_trajectory
+from webapp.pace import Pace
 from webapp.solver import Solver
-from webapp.state import State, number
+from webapp.state import State
+from webapp.swim_plan import Plan
 from webapp.swimmer import Swimmer
 from webapp.worker import Worker
 
-SPEEDS = (0.1, 8.0)
-"""Simulated time per time on the wall that may be asked for."""
 BUDGET_S = 0.06
 """Longest time on the worker before the others have their turn [s]."""
-LAG_S = 0.25
-"""What the swim may be behind the clock [s]; what is more is dropped, so that nothing piles up."""
-WINDOW_S = 2.0
-"""Time over which the true speed is measured [s]."""
-MAX_METHODS = 2
-"""Robots that swim side by side."""
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What is to be swum."""
-
-    layout: Layout
-    """The robot."""
-    failed: tuple[str, ...]
-    """Fins that are lost from the start."""
-    path: str | Trajectory
-    """Name of a shipped trajectory, or one of the user's own."""
-    methods: tuple[str, ...]
-    """Allocation methods, one robot each."""
-    plant: str = "mean"
-    """How the fins' forces are simulated: one of `PLANTS`."""
-
-    def __post_init__(self) -> None:
-        if isinstance(self.path, str) and self.path not in SHIPPED:
-            raise FinlabError(f"path: expected one of {', '.join(SHIPPED)}, got {self.path!r:.40}")
-        if not 1 <= len(set(self.methods)) == len(self.methods) <= MAX_METHODS:
-            raise FinlabError("expected one method, or two different ones to compare")
-        if wrong := [method for method in self.methods if method not in COMPARED]:
-            raise FinlabError(f"method: expected one of {', '.join(COMPARED)}, got {wrong[0]!r:.40}")
-        if self.plant not in PLANTS:
-            raise FinlabError(f"fin forces: expected one of {', '.join(PLANTS)}, got {self.plant!r:.40}")
 
 
 class Swimming:
@@ -82,13 +47,11 @@ class Swimming:
         """The robots; none while they are being made."""
         self.running = False
         """Whether the clock runs."""
-        self.speed = 1.0
-        """Simulated time per time on the wall that is asked for."""
+        self.pace = Pace()
+        """At what speed it is to go, and goes."""
         self._busy = False
-        self._owed = 0.0
         self._stop = threading.Event()
         self._acts: deque[Callable[[Swim], None]] = deque()
-        self._pace: deque[tuple[float, float]] = deque()
 
     @property
     def active(self) -> bool:
@@ -105,14 +68,6 @@ class Swimming:
         """Simulated time [s]."""
         return self.swimmers[0].time if self.swimmers else 0.0
 
-    @property
-    def rate(self) -> float | None:
-        """Simulated time per time on the wall over the last moments; None before it is known."""
-        if len(self._pace) < 2 or not self.running:
-            return None
-        (wall, start), (now, end) = self._pace[0], self._pace[-1]
-        return (end - start) / (now - wall) if now - wall > 0.5 else None
-
     def start(self, plan: Plan) -> None:
         """Begin at the beginning; a swim that is under way is given up."""
         self.stop()
@@ -120,14 +75,10 @@ class Swimming:
         stop = self._stop
 
         def job() -> None:
-            try:
-                swimmers = tuple(self._swimmer(plan, method) for method in plan.methods)
-            except FinlabError as error:
-                self._post(partial(self._give_up, stop, str(error)))
-            else:
-                self._post(partial(self._begin, stop, swimmers))
+            swimmers = tuple(self._swimmer(plan, method) for method in plan.methods)
+            self._post(partial(self._begin, stop, swimmers))
 
-        self._worker.submit(id(self), job)
+        self._worker.submit(id(self), job, partial(self._fault, stop))
 
     def _swimmer(self, plan: Plan, method: str) -> Swimmer:
         path = make_trajectory(plan.path) if isinstance(plan.path, str) else plan.path
@@ -140,6 +91,10 @@ class Swimming:
             self.swimmers, self._busy = swimmers, False
             self._changed()
 
+    def _fault(self, stop: threading.Event, text: str) -> None:
+        """On the worker's thread: it cannot go on."""
+        self._post(partial(self._give_up, stop, f"the swim cannot go on: {text}"))
+
     def _give_up(self, stop: threading.Event, text: str) -> None:
         if stop is self._stop:
             self.stop()
@@ -151,20 +106,14 @@ class Swimming:
         self._stop = threading.Event()  # what is still under way belongs to the old one
         self._worker.forget(id(self))
         self.plan, self.swimmers, self.running = None, (), False
-        self._owed, self._busy = 0.0, False
+        self._busy = False
         self._acts.clear()
-        self._pace.clear()
+        self.pace.start_anew()
 
     def set_running(self, running: bool) -> None:
         """Let the clock run, or hold it."""
         self.running = running and self.active and not self.done
-        self._owed = 0.0
-        self._pace.clear()
-
-    def set_speed(self, speed: object) -> None:
-        """Another pace."""
-        self.speed = number(speed, "speed", *SPEEDS)
-        self._pace.clear()
+        self.pace.start_anew()
 
     def step(self) -> None:
         """Hold the clock, and swim for one control period."""
@@ -187,8 +136,7 @@ class Swimming:
         """Time has passed on the wall [s]; swim that far, if the last stretch is done."""
         if not self.running or not self.swimmers:
             return
-        self._owed = min(self._owed + elapsed * self.speed, LAG_S * max(self.speed, 1.0))
-        n_steps = int(self._owed / self.swimmers[0].period_s)
+        n_steps = self.pace.due(elapsed, self.swimmers[0].period_s)
         if n_steps:
             self._submit(n_steps)
 
@@ -196,25 +144,24 @@ class Swimming:
         if self._busy or not self.swimmers:
             return
         self._busy = True
-        self._worker.submit(id(self), partial(self._advance, n_steps, self._stop, self.swimmers))
+        stop = self._stop
+        self._worker.submit(
+            id(self), partial(self._advance, n_steps, stop, self.swimmers), partial(self._fault, stop)
+        )
 
     def _advance(self, n_steps: int, stop: threading.Event, swimmers: tuple[Swimmer, ...]) -> None:
         """On the worker's thread: some steps, but no longer than the others can wait."""
         end, done = time.monotonic() + BUDGET_S, 0
-        try:
-            while self._acts and not stop.is_set():
-                act = self._acts.popleft()
-                for swimmer in swimmers:
-                    act(swimmer.swim)
-            while done < n_steps and not swimmers[0].swim.done and not stop.is_set():
-                for swimmer in swimmers:
-                    swimmer.step()
-                done += 1
-                if time.monotonic() > end:
-                    break
-        except Exception as error:  # a fault of a method must not take the page with it
-            self._post(partial(self._give_up, stop, f"the swim cannot go on: {error}"))
-            return
+        while self._acts and not stop.is_set():
+            act = self._acts.popleft()
+            for swimmer in swimmers:
+                act(swimmer.swim)
+        while done < n_steps and not swimmers[0].swim.done and not stop.is_set():
+            for swimmer in swimmers:
+                swimmer.step()
+            done += 1
+            if time.monotonic() > end:
+                break
         moments = tuple(swimmer.moment() for swimmer in swimmers)
         self._post(partial(self._take, stop, done, moments))
 
@@ -224,11 +171,7 @@ class Swimming:
         self._busy = False
         for swimmer, moment in zip(self.swimmers, moments, strict=True):
             swimmer.take(moment)
-        self._owed = max(self._owed - done * self.swimmers[0].period_s, 0.0)
-        now = time.monotonic()
-        self._pace.append((now, self.time))
-        while now - self._pace[0][0] > WINDOW_S:
-            self._pace.popleft()
+        self.pace.paid(done * self.swimmers[0].period_s, self.time)
         if self.done:
             self.running = False
         self._changed()

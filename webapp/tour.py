@@ -1,4 +1,4 @@
-"""A tour in five steps: each one sets a state and says what to see in it."""
+"""A tour for a class: each stop sets a state and says what to see in it."""
 
 from dataclasses import dataclass
 
@@ -25,13 +25,15 @@ class Step:
     """Which mode is shown."""
     graph: bool = False
     """Whether the fin graph is shown."""
+    swims: bool = False
+    """Whether the robot swims."""
 
     def state(self, now: State) -> State:
         """The state of this stop, with the settings of the present one."""
         return State(
             shipped()[self.layout],
             self.failed,
-            self.target,
+            target=self.target,
             n_candidates=now.n_candidates,
             temperature=now.temperature,
             gamma=now.gamma,
@@ -48,8 +50,8 @@ STEPS = (
     ),
     Step(
         "One wrench has many answers",
-        "Four fins have twelve numbers, the wrench only six. Each numbered dot in the plot is one answer, "
-        "and this is the second. Choose more under Modes: fins change, the green sum stays.",
+        "Four fins have twelve numbers, the wrench only six. This is another answer than before. Open Modes: "
+        "each numbered dot is one. Click some: the fins change, the green sum stays.",
         "ucat",
         PRESETS["Turn"],
         mode=1,
@@ -69,6 +71,14 @@ STEPS = (
         "missing. Open Layout, turn a shaft, and watch yaw come alive.",
         "no_yaw",
         (1.0, 0.0, 0.0, 0.0, 0.0, 0.2),
+    ),
+    Step(
+        "It swims",
+        "Ten times a second the controller asks for a wrench and the network answers. The blue ball is where "
+        "the robot should be. Open Swim, break a fin by its number, and watch the others take over.",
+        "ucat",
+        PRESETS["Turn"],
+        swims=True,
     ),
     Step(
         "Another robot, the same network",

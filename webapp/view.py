@@ -7,9 +7,7 @@ import asyncio
 from collections.abc import Callable
 from functools import partial
 
-import numpy as np
 import viser
-from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
@@ -26,13 +24,14 @@ from webapp.panels.tabs import PANEL_WIDTH, build_panels
 from webapp.playback import Playback
 from webapp.ranging import REST_S, Beside, find_ranges
 from webapp.resting import Resting
-from webapp.scene.robot_scene import RobotScene
-from webapp.scene.swim_scene import SwimScene
+from webapp.scenery import Scenery
 from webapp.session import Session
 from webapp.solver import Solver
 from webapp.sweeping import Sweep
+from webapp.swim_plan import SwimSettings
 from webapp.swimming import Swimming
-from webapp.theme import BRAND, GREEN, VERMILLION
+from webapp.theme import GREEN, VERMILLION
+from webapp.tour import STEPS
 from webapp.workers import Workers
 
 CARD_REST_S = 0.35
@@ -63,12 +62,12 @@ class View:
         self.session = session
         self._loop = loop
         self._closed = False
-        self._dark: bool | None = None
+        self._stop: int | None = None
         self._panels: list[Panel] = []
         answers, post, changed = workers.answers, self._post, self._refresh
         refused = partial(self.notify, "Not possible")
         self.answering = Answering(
-            session, solver, answers, post, self._answered, partial(self.notify, "No answer")
+            session, solver, answers, loop, post, self._answered, partial(self.notify, "No answer")
         )
         self.playback = Playback(session, self.answering, solver, answers, loop, post, changed, refused)
         self.ranging = Resting(find_ranges, REST_S, workers.marks, loop, post, changed)
@@ -79,7 +78,8 @@ class View:
         self.sweep = Sweep(session, loop, self.do)
         self.exports = Exports(client, session, solver, answers, post, self.notify)
         self._build()
-        self._apply_theme()
+        self._follow_tour()
+        self.scenery.apply_theme()
         self._refresh()
         self._ask()
 
@@ -88,14 +88,7 @@ class View:
         gui.main_panel.dock_right()
         gui.main_panel.set_width(PANEL_WIDTH)
         gui.set_panel_label("finlab")
-        self.scene = RobotScene(
-            self.client,
-            self.session,
-            lambda name: self.do(partial(self.session.select, name)),
-            self._drag,
-            self._drag_wrench,
-        )
-        self.swim_scene = SwimScene(self.client, self.swimming)
+        self.scenery = Scenery(self.client, self.session, self.swimming, self.do)
         self._panels = build_panels(gui, self)
         add_commands(gui, self)
 
@@ -114,14 +107,7 @@ class View:
     @property
     def newtons(self) -> float:
         """Force [N] that an arrow of 0.1 m stands for."""
-        return self.scene.newtons
-
-    @property
-    def _overlaid(self) -> Allocation | None:
-        """The compared answer whose forces are shown, unless the question has changed since."""
-        answer = self.comparison.answers.get(self.session.overlay or "")
-        fits = self.comparison.state == self.session.state
-        return answer if fits and isinstance(answer, Allocation) else None
+        return self.scenery.robot.newtons
 
     def do(self, act: Callable[[], object]) -> None:
         """Carry out an intent; a refusal becomes a note, and the page goes back to what the session holds."""
@@ -129,7 +115,8 @@ class View:
             act()
         except FinlabError as error:
             self.notify("Not possible", str(error))
-        self._apply_theme()
+        self._follow_tour()
+        self.scenery.apply_theme()
         self._refresh()
         self._ask()
 
@@ -141,55 +128,38 @@ class View:
         """Go back from the robot that swims to the one that is designed."""
         if self.swimming.active:
             self.swimming.stop()
-            self.scene.look_from("3D")
+            self.look_from("3D")
 
     def animate(self, elapsed: float) -> None:
-        """Let time pass [s]: fins flap, and a robot that swims moves on."""
-        if self.swimming.active:
-            self.swimming.tick(elapsed)
-            self.swim_scene.animate(elapsed)
-        else:
-            self.scene.animate(elapsed)
+        """Let time pass [s]."""
+        self.scenery.animate(elapsed)
 
     def look_from(self, view: str) -> None:
         """Move the camera."""
-        self.scene.look_from(view)
+        self.scenery.robot.look_from(view)
+
+    def look_after_swim(self, follow: bool) -> None:
+        """Let the camera go along with the first robot that swims, or see all of its path."""
+        if self.swimming.active:
+            self.scenery.swim.follow() if follow else self.scenery.swim.overlook()
 
     # From the session to the page.
 
     def _refresh(self) -> None:
         with self.client.atomic():
-            found = self.improver.found
-            offered = found.layout if found is not None and found.improved else None
-            reply = self.answering.reply
-            attention = None if reply is None else reply.attention
             # First: it settles the scale that the legend tells.
-            self.scene.refresh(self.shown, self._overlaid, self.analyst.findings, offered, attention)
-            self.scene.show(not self.swimming.swimmers)
-            self.swim_scene.refresh(self.session.display.dark)
+            self.scenery.refresh(self.answering, self.comparison, self.improver, self.analyst.findings)
             for panel in self._panels:
                 panel.refresh()
 
-    def _apply_theme(self) -> None:
-        if self.session.display.dark != self._dark:
-            self._dark = self.session.display.dark
-            self.client.gui.configure_theme(
-                dark_mode=self._dark, show_logo=False, show_share_button=False, brand_color=BRAND
-            )
-
-    def _drag(self, name: str, phase: str, position: tuple[float, float, float], angle: float) -> None:
-        if phase == "start":
-            self.session.history.end_merge()
-        elif phase == "end":
-            self.do(partial(self.session.end_drag, name, position, angle))
-        else:
-            self.do(partial(self.session.drag_fin, name, position, angle))
-
-    def _drag_wrench(self, first: int, phase: str, vector: NDArray[np.float64]) -> None:
-        if phase == "start":
-            self.session.history.end_merge()
-        else:
-            self.do(partial(self.session.drag_target, first, vector.tolist(), phase == "end"))
+    def _follow_tour(self) -> None:
+        """At some stops of the tour the robot swims; to come to a stop, or to leave the tour, ends a swim."""
+        stop = self.session.stop
+        if stop != self._stop:
+            self._stop = stop
+            self.end_swim()
+            if stop is not None and STEPS[stop].swims:
+                self.swimming.start(SwimSettings().plan(self.session.state, None))
 
     # From the session to the workers and back.
 
@@ -197,19 +167,17 @@ class View:
         """Have the workers answer the present state, unless they were asked already."""
         session = self.session
         display, state = session.display, session.state
-        self.analyst.ask(
-            Question(state.layout, state.failed, session.reference, display.drawn, display.alone)
-        )
-        self.ranging.ask(Beside(state.layout, state.failed, state.target))
+        self.analyst.ask(Question(state.able, state.failed, session.reference, display.drawn, display.alone))
+        self.ranging.ask(Beside(state.able, state.failed, state.target))
         self.answering.ask()
 
     def _swam(self) -> None:
         """The swim has gone on: ten times a second, so only what shows it is written."""
-        if self.scene.shown == bool(self.swimming.swimmers):
+        if self.scenery.swims != bool(self.swimming.swimmers):
             self._refresh()
             return
         with self.client.atomic():
-            self.swim_scene.refresh(self.session.display.dark)
+            self.scenery.refresh_swim()
             for panel in self._panels:
                 if isinstance(panel, (Header, SwimPanel)):
                     panel.refresh()

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from finlab.analysis import Bounds
@@ -21,6 +21,11 @@ MAX_MISSION = 40
 """Most wrenches of a mission; each costs time in every round of the search."""
 WAY = (0.05, 0.05, 0.05, 180.0)
 """How far a fin may go along x, y and z [m] and turn either way [deg] unless it is said otherwise."""
+
+MAX_TEXT = 10_000
+"""Longest text of a mission that is taken."""
+ALL = "all"
+"""Stands for all fins that have no bounds of their own."""
 
 Way = tuple[float, float, float, float]
 Wrench = tuple[float, float, float, float, float, float]
@@ -63,6 +68,77 @@ class Wish:
         return self.mission or MISSION
 
 
+@dataclass(frozen=True)
+class Draft:
+    """What the user has wished for so far; it may name fins that are gone by now."""
+
+    goal: str = next(iter(GOAL_WORDS))
+    """Key of `GOAL_WORDS`."""
+    held: tuple[str, ...] = ()
+    """Fins that may not move."""
+    ways: tuple[tuple[str, Way], ...] = ()
+    """How far fins may go, by name or `ALL`; see `Wish.way`."""
+    mission: str = ""
+    """The mission as text, see `parsed_mission`."""
+
+    def with_goal(self, goal: Any) -> "Draft":
+        """Another goal.
+
+        Raises:
+            FinlabError: there is no such goal.
+        """
+        if goal not in GOAL_WORDS:
+            raise FinlabError(f"goal: expected one of {', '.join(GOAL_WORDS)}, got {goal!r:.40}")
+        return replace(self, goal=goal)
+
+    def with_held_toggled(self, name: str) -> "Draft":
+        """A fin held, or free to move again."""
+        held = tuple(other for other in self.held if other != name)
+        return replace(self, held=held if name in self.held else (*held, name))
+
+    def with_way(self, name: str, way: tuple[Any, ...]) -> "Draft":
+        """Other bounds of a fin, or of `ALL`.
+
+        Raises:
+            FinlabError: they are too far, or no numbers.
+        """
+        others = tuple(pair for pair in self.ways if pair[0] != name)
+        return replace(self, ways=(*others, (name, checked_way(way))))
+
+    def with_mission(self, text: Any) -> "Draft":
+        """Another mission; it is read when the search begins, so that half a line may be typed."""
+        return replace(self, mission=str(text)[:MAX_TEXT])
+
+    def way(self, name: str) -> Way:
+        """How far a fin may go."""
+        ways = dict(self.ways)
+        return ways.get(name, ways.get(ALL, WAY))
+
+    def wish(self, layout: Layout) -> Wish:
+        """What a search of this layout is told.
+
+        Raises:
+            FinlabError: no fin may move, or the mission makes no sense.
+        """
+        fins = tuple(name for name in layout.names if name not in self.held)
+        own = {name: way for name, way in self.ways if name in layout.names}
+        return Wish(self.goal, fins, self.way(ALL), own, parsed_mission(self.mission))
+
+
+def restored_draft(values: Mapping[str, Any]) -> Draft:
+    """A draft that was kept as plain values, checked like anything that a page sends.
+
+    Raises:
+        FinlabError: a value is not allowed. So may KeyError, TypeError and ValueError tell.
+    """
+    draft = Draft().with_goal(values["goal"]).with_mission(values["mission"])
+    for name in values["held"]:
+        draft = draft.with_held_toggled(str(name))
+    for name, way in values["ways"]:
+        draft = draft.with_way(str(name), tuple(way))
+    return draft
+
+
 def checked_way(way: tuple[Any, ...]) -> Way:
     """How far a fin may go, as the page sent it.
 
@@ -80,7 +156,7 @@ def parsed_mission(text: str) -> tuple[Wrench, ...]:
         FinlabError: a line is something else; the message names it.
     """
     wrenches: list[Wrench] = []
-    for place, line in enumerate(str(text)[:10_000].splitlines(), start=1):
+    for place, line in enumerate(text[:MAX_TEXT].splitlines(), start=1):
         words = line.replace(",", " ").split()
         if not words:
             continue

@@ -1,12 +1,14 @@
 """Sentences about an answer, for people."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.layout import Layout
 from webapp.figures import listed
-from webapp.state import AXIS_UNITS, AXIS_WORDS
+from webapp.state import AXIS_UNITS, AXIS_WORDS, State
 
 SMALL = 0.05
 """Normalized error of an axis that is too small to speak of."""
@@ -67,3 +69,10 @@ def saturated(allocation: Allocation) -> NDArray[np.bool_]:
     upper = np.array([fin.limits.upper[:2] for fin in allocation.layout.fins])
     with np.errstate(invalid="ignore"):
         return np.asarray(allocation.command[:, :2] >= AT_LIMIT * upper)
+
+
+def damage_words(state: State, name: str) -> str:
+    """What is wrong with a fin that still works: `weak 50 %, stuck at 30°`; nothing for a whole one."""
+    parts = [f"weak {100 * share:.0f} %" for fin, share in state.weak if fin == name]
+    parts += [f"stuck at {math.degrees(angle):.0f}°" for fin, angle in state.stuck if fin == name]
+    return ", ".join(parts).replace("-", "−")

@@ -4,7 +4,10 @@ import threading
 import traceback
 from collections.abc import Callable, Hashable
 
+from finlab.errors import FinlabError
+
 Job = Callable[[], None]
+Failed = Callable[[str], None]
 
 
 class Worker:
@@ -15,16 +18,22 @@ class Worker:
 
     def __init__(self) -> None:
         """Start the thread."""
-        self._jobs: dict[Hashable, Job] = {}
+        self._jobs: dict[Hashable, tuple[Job, Failed]] = {}
         self._wake = threading.Condition()
         self._stopped = False
         self._thread = threading.Thread(target=self._run, name="finlab-solver", daemon=True)
         self._thread.start()
 
-    def submit(self, key: Hashable, job: Job) -> None:
-        """Run `job` soon, instead of a job with the same key that has not begun yet."""
+    def submit(self, key: Hashable, job: Job, failed: Failed) -> None:
+        """Run `job` soon, instead of a job with the same key that has not begun yet.
+
+        Args:
+            key: who asks, and what for.
+            job: what to do, on the worker's thread.
+            failed: told there, in a sentence, why the job came to nothing.
+        """
         with self._wake:
-            self._jobs[key] = job
+            self._jobs[key] = (job, failed)
             self._wake.notify()
 
     def forget(self, key: Hashable) -> None:
@@ -46,8 +55,11 @@ class Worker:
                 self._wake.wait_for(lambda: self._jobs or self._stopped)
                 if self._stopped:
                     return
-                job = self._jobs.pop(next(iter(self._jobs)))
+                job, failed = self._jobs.pop(next(iter(self._jobs)))
             try:
                 job()
-            except Exception:  # one asker's fault must not silence all the others
+            except FinlabError as error:
+                failed(str(error))
+            except Exception as error:  # one asker's fault must not silence all the others
                 traceback.print_exc()
+                failed(f"it failed: {error or type(error).__name__}")

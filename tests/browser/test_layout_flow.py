@@ -44,7 +44,7 @@ def test_a_ghost_shows_where_a_held_fin_will_stick(page: Any) -> None:
     mouse.up()
     page.visible("/robot/landing", False)
     page.until(lambda: page.session.history.undo_name == "Move front_right")
-    stands = page.view.scene._fins[0].pose()[0]
+    stands = page.view.scenery.robot._fins[0].pose()[0]
     assert stands == pytest.approx(page.session.state.layout.fins[0].position, abs=1e-6)
 
 

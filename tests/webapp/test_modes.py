@@ -1,10 +1,12 @@
 """Candidates that do the same are one mode, and no two modes share a name."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from finlab.allocation.allocation import Candidates
+from finlab.allocation.modes import find_modes
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
 from tests.webapp.stand_in import StandIn, load_stand_in
@@ -12,10 +14,19 @@ from webapp.answering import Answering
 from webapp.figures import small, three_digits
 from webapp.markup.mode_plot import mode_plot
 from webapp.markup.modes import mode_table
-from webapp.modes import distinct_modes, nearest_modes
+from webapp.modes import MAX_SHOWN, NamedMode, known_modes, named_modes, nearest_modes, same_mode
 from webapp.session import Session
 from webapp.solver import Solver
 from webapp.targets import PRESETS
+
+
+class Timers:
+    """An event loop whose timers ring by hand."""
+
+    def call_later(self, _seconds: float, call: Any, *arguments: Any) -> Any:
+        self.ring = partial(call, *arguments)
+        return type("Timer", (), {"cancel": lambda _: None})()
+
 
 PUSH, REST = (0.3, 1.1, 0.0), (0.05, 0.1, 0.0)
 
@@ -26,28 +37,31 @@ def candidates(*commands: list[tuple[float, float, float]]) -> Candidates:
     return Candidates(command, np.zeros((k, 6)), np.full(k, 1e-6), np.arange(k) + 2.0, ("refined",) * k)
 
 
+def modes_of(*commands: list[tuple[float, float, float]]) -> tuple[NamedMode, ...]:
+    command = np.array(commands)
+    lower, upper = (np.tile(end, (command.shape[1], 1)) for end in ([0.05, 0.1, -np.pi], [0.6, 2.1, np.pi]))
+    return named_modes(find_modes(candidates(*commands), lower, upper))
+
+
 def test_how_a_fin_rests_is_no_news() -> None:
-    modes = distinct_modes(candidates([PUSH, REST], [PUSH, (0.2, 0.1, 3.0)], [REST, PUSH]))
-    assert [mode.name for mode in modes] == ["fin 2 rests", "fin 1 rests"]
-    assert [mode.size for mode in modes] == [2, 1] and modes[1].index == 2
+    modes = modes_of([PUSH, REST], [PUSH, (0.2, 0.1, 3.0)], [REST, PUSH])
+    assert [name for _, name in modes] == ["fin 2 rests", "fin 1 rests"]
+    assert [mode.members for mode, _ in modes] == [(0, 1), (2,)]
 
 
 def test_directions_wrap() -> None:
-    modes = distinct_modes(candidates([(0.3, 1.0, np.pi), PUSH], [(0.3, 1.0, -np.pi + 0.01), PUSH]))
-    assert len(modes) == 1
+    assert len(modes_of([(0.3, 1.0, np.pi), PUSH], [(0.3, 1.0, -np.pi + 0.01), PUSH])) == 1
 
 
 def test_names_tell_modes_apart() -> None:
-    modes = distinct_modes(
-        candidates(
-            [PUSH, PUSH],
-            [PUSH, (0.3, 1.1, 3.1)],
-            [(0.5, 0.7, 0.0), PUSH],
-            [PUSH, (0.3, 1.1, 1.0)],
-            [(0.3, 1.6, 0.0), PUSH],
-        )
+    modes = modes_of(
+        [PUSH, PUSH],
+        [PUSH, (0.3, 1.1, 3.1)],
+        [(0.5, 0.7, 0.0), PUSH],
+        [PUSH, (0.3, 1.1, 1.0)],
+        [(0.3, 1.6, 0.0), PUSH],
     )
-    names = [mode.name for mode in modes]
+    names = [name for _, name in modes]
     assert len(set(names)) == len(names) == 5
     assert names[0] == "all fins push" and names[1].endswith("fin 2 reversed")
     assert "fin 1 wider and slower" in names[2] and "fin 2 turned +57°" in names[3]
@@ -55,28 +69,36 @@ def test_names_tell_modes_apart() -> None:
 
 
 def test_failed_fins_are_left_out() -> None:
-    modes = distinct_modes(candidates([(np.nan,) * 3, PUSH, REST]))
-    assert modes[0].name == "fin 3 rests"
-    assert distinct_modes(None) == ()
+    assert modes_of([(np.nan,) * 3, PUSH, REST])[0].name == "fin 3 rests"
+
+
+def test_a_mode_is_found_again_in_another_list() -> None:
+    modes = modes_of([PUSH, REST], [REST, PUSH], [PUSH, PUSH])
+    fewer = modes_of([PUSH, PUSH], [REST, (0.301, 1.1, 0.01)])
+    assert same_mode(fewer[1].mode, modes) == 1 and same_mode(fewer[0].mode, modes) == 2
+    assert same_mode(modes[0].mode, fewer) == 0, "the best one where it is not there"
+    assert len(modes_of(*([PUSH, (0.3, 1.1, 0.5 * k)] for k in range(12)))) == MAX_SHOWN
 
 
 def test_real_candidates_are_drawn_and_listed() -> None:
     answer = StandIn().allocate(load_layout(shipped_layouts()["ucat"]), PRESETS["Turn"])
-    modes = distinct_modes(answer.candidates)
+    found = known_modes(answer)
+    modes = named_modes(found)
     assert answer.candidates is not None and answer.samples is not None
-    assert sum(mode.size for mode in modes) == len(answer.candidates.energy)
-    nearest = nearest_modes(answer.samples, answer.candidates, modes)
+    assert sum(len(mode.members) for mode in found) == len(answer.candidates.energy)
+    nearest = nearest_modes(answer.samples, modes)
     assert nearest is not None and len(nearest) == len(answer.samples.energy)
-    raw = answer.samples._replace(command=answer.candidates.command[[mode.index for mode in modes]])
-    again = nearest_modes(raw, answer.candidates, modes)
+    raw = answer.samples._replace(command=np.array([mode.command for mode, _ in modes]))
+    again = nearest_modes(raw, modes)
     assert again is not None and list(again) == list(range(len(modes))), "each mode is nearest to itself"
     plot = mode_plot(answer, modes, nearest, 0, None, 200, "here")
     assert plot.count("onclick") == len(modes) + 1, "one for all samples together"
     assert plot.count("data-k") == len(answer.samples.energy)
     assert mode_plot(answer, modes, nearest, None, 3, 200, "here").count("class='ring'") == 2
-    table = mode_table(answer.candidates, modes, 0, "here")
-    assert table.count("onclick") == len(modes) and "0.0000" not in table
-    assert "no candidates" in mode_table(None, (), 0, "here")
+    table = mode_table(modes, len(modes), 0, "here")
+    assert table.count("onclick") == len(modes) and "0.0000" not in table and "more are" not in table
+    assert "2 more are" in mode_table(modes, len(modes) + 2, 0, "here")
+    assert "no candidates" in mode_table((), 0, 0, "here")
 
 
 def test_figures_keep_their_width() -> None:
@@ -90,9 +112,10 @@ def test_another_sample_of_another_answer_is_shown() -> None:
     layout = load_layout(shipped_layouts()["ucat"])
     session = Session(layout)
     jobs: list[Any] = []
-    worker: Any = type("AtOnce", (), {"submit": lambda _, key, job: jobs.append(job)})()
+    worker: Any = type("AtOnce", (), {"submit": lambda _, key, job, failed: jobs.append(job)})()
+    loop = Timers()
     answering = Answering(
-        session, Solver(load=load_stand_in), worker, lambda act: act(), lambda: None, lambda _: None
+        session, Solver(load=load_stand_in), worker, loop, lambda act: act(), lambda: None, lambda _: None
     )
     shown = []
     for value in (0.5, 0.8):
@@ -105,3 +128,10 @@ def test_another_sample_of_another_answer_is_shown() -> None:
         session.show_sample(3)
         assert answering.shown is not shown[-1]
     assert shown[0].target[1] == 0.5 and shown[1].target[1] == 0.8
+    session.show_mode(1)
+    wanted = answering.modes[1].mode
+    loop.ring()
+    jobs.pop()()
+    assert answering.n_modes >= len(answering.modes) > 0
+    place = same_mode(wanted, answering.modes)
+    assert session.mode == place, "what is on the robot stays there when all modes are known"

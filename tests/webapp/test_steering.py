@@ -65,7 +65,7 @@ def test_a_sweep_is_one_step_and_ends_when_someone_else_steers(
         class AtOnce:
             """A worker that is never busy."""
 
-            def submit(self, key: object, job: Any) -> None:
+            def submit(self, key: object, job: Any, failed: Any) -> None:
                 job()
 
         def changed() -> None:
@@ -76,7 +76,7 @@ def test_a_sweep_is_one_step_and_ends_when_someone_else_steers(
             answering.ask()
 
         worker: Any = AtOnce()
-        answering = Answering(session, solver, worker, lambda act: act(), changed, lambda _: None)
+        answering = Answering(session, solver, worker, loop, lambda act: act(), changed, lambda _: None)
         sweep = Sweep(session, loop, do)
         with pytest.raises(FinlabError, match="smaller end first"):
             sweep.start(0, 2.0, -2.0)

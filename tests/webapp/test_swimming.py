@@ -13,9 +13,11 @@ from finlab.layout import load_layout
 from tests.webapp.stand_in import load_stand_in
 from webapp.markup.corner import swim_corner
 from webapp.markup.swim_card import swim_card
+from webapp.pace import LAG_S
 from webapp.solver import Solver
+from webapp.swim_plan import Plan
 from webapp.swimmer import ERROR, FORCES, POINTS, TIME
-from webapp.swimming import LAG_S, Plan, Swimming
+from webapp.swimming import Swimming
 from webapp.trajectory_file import read_path
 from webapp.worker import Worker
 
@@ -70,7 +72,7 @@ def test_a_slow_machine_drops_time_instead_of_piling_it_up(swimming: Swimming) -
     for _ in range(100):
         swimming.tick(1.0)  # a hundred seconds pass while the first stretch is swum
     until(lambda: not swimming._busy)
-    assert swimming._owed <= LAG_S and swimming.time <= 3 * LAG_S
+    assert swimming.pace._owed <= LAG_S and swimming.time <= 3 * LAG_S
 
 
 def test_pause_step_and_speed(swimming: Swimming) -> None:
@@ -80,10 +82,10 @@ def test_pause_step_and_speed(swimming: Swimming) -> None:
     assert swimming.time == 0.0
     swimming.step()
     until(lambda: swimming.time == pytest.approx(0.1))
-    swimming.set_speed(8.0)
+    swimming.pace.set_speed(8.0)
     for wrong in (float("nan"), 0.0, "2", 99.0):
         with pytest.raises(FinlabError):
-            swimming.set_speed(wrong)
+            swimming.pace.set_speed(wrong)
     assert "paused" in swim_card(swimming)
 
 

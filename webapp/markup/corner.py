@@ -5,7 +5,7 @@ from html import escape
 
 from finlab.allocation.allocation import Allocation
 from webapp.figures import small, three_digits
-from webapp.markup.swim_card import pace
+from webapp.markup.swim_card import pace_words
 from webapp.state import State
 from webapp.swimmer import ERROR
 from webapp.swimming import Swimming
@@ -55,7 +55,7 @@ def swim_corner(swimming: Swimming, newtons: float) -> str:
         f"<span>{alive} of {len(first.fins)} fins</span>",
         f"<span><b>{first.time:.1f}</b> s of {first.duration_s:.0f} s</span>",
         f"<span><span class='dim'>off the path</span> <b>{off}</b> cm</span>",
-        f"<span>{pace(swimming)}</span>",
+        f"<span>{pace_words(swimming)}</span>",
     )
     return (
         f"<div class='fl-corner'><div class='fl fl-card fl-legend-card'><div class='fl-legend'>{trails}</div>"

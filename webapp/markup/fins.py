@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
-from finlab.layout import Layout
+from webapp.state import State
 from webapp.theme import DEAD, css, fin_color
-from webapp.words import saturated
+from webapp.words import damage_words, saturated
 
 HEADER = (
     "<tr><th>fin</th><th title='half amplitude'>A [°]</th><th title='frequency'>f [Hz]</th>"
@@ -25,22 +25,24 @@ def swatch(index: int, failed: bool = False) -> str:
 
 
 def fin_table(
-    layout: Layout, allocation: Allocation | None, full: NDArray[np.float64], selected: str | None
+    state: State, allocation: Allocation | None, full: NDArray[np.float64], selected: str | None
 ) -> str:
     """All fins with their commands.
 
     Args:
-        layout: the robot.
+        state: the robot and its damage.
         allocation: the answer for it, None while there is none.
         full: full thrust (n,) of each fin [N].
         selected: name of the selected fin.
     """
     limits = None if allocation is None else saturated(allocation)
     rows = []
-    for i, fin in enumerate(layout.fins):
+    for i, fin in enumerate(state.layout.fins):
         failed = allocation is not None and not np.isfinite(allocation.command[i, 0])
         kind = " ".join(["dead"] * failed + ["chosen"] * (fin.name == selected))
         first = f"{swatch(i, failed)}<span class='name' title='{escape(fin.name)}'>{escape(fin.name)}</span>"
+        if not failed and (told := damage_words(state, fin.name)):
+            first += f"<div class='missing damage'>{told}</div>"
         if allocation is None or limits is None:
             cells = "<td>–</td>" * 5
         elif failed:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from finlab.allocation.allocation import Allocation
 from webapp.channel import send
 from webapp.markup.picking import pick
-from webapp.modes import Mode
+from webapp.modes import NamedMode
 from webapp.theme import css, mode_color
 
 WIDTH = 388
@@ -27,7 +27,7 @@ Scale = Callable[[float], float]
 
 def mode_plot(
     answer: Allocation,
-    modes: tuple[Mode, ...],
+    modes: tuple[NamedMode, ...],
     nearest: NDArray[np.intp] | None,
     shown: int | None,
     sample: int | None,
@@ -45,13 +45,13 @@ def mode_plot(
         height: of the plot [px].
         picker: class of the marker before the buttons that choose a mode, and of the channel for samples.
     """
-    samples, refined = answer.samples, answer.candidates
-    if refined is None or not modes:
+    samples = answer.samples
+    if not modes:
         return ""
-    index = [mode.index for mode in modes]
-    groups = [refined] if samples is None else [refined, samples]
-    energy = np.concatenate([group.energy for group in groups])
-    error = np.concatenate([group.err_norm for group in groups])
+    energy = np.array([mode.energy for mode, _ in modes])
+    error = np.array([mode.err_norm for mode, _ in modes])
+    if samples is not None:
+        energy, error = np.append(energy, samples.energy), np.append(error, samples.err_norm)
     if not np.isfinite(energy).all() or not np.isfinite(error).all():
         return ""
     low, high = float(energy.min()), float(energy.max())
@@ -80,7 +80,7 @@ def mode_plot(
         parts.append(f'<g class="pick samples" onclick="{click}">{"".join(dots)}</g>')
         if sample is not None and sample < len(dots):
             parts.append(_ring(x(float(samples.energy[sample])), y(float(samples.err_norm[sample])), 6.5))
-    places = _apart([(x(float(refined.energy[i])), y(float(refined.err_norm[i]))) for i in index])
+    places = _apart([(x(mode.energy), y(mode.err_norm)) for mode, _ in modes])
     for k, (cx, cy) in reversed(list(enumerate(places))):  # the best one on top
         parts.append(
             f"<g class='pick' {pick(picker, k)}>"

@@ -2,36 +2,38 @@
 
 from html import escape
 
-from finlab.allocation.allocation import Candidates
 from webapp.figures import small, three_digits
 from webapp.markup.picking import pick
-from webapp.modes import Mode
+from webapp.modes import NamedMode
 from webapp.theme import css, mode_color
 
 
-def mode_table(candidates: Candidates | None, modes: tuple[Mode, ...], shown: int | None, picker: str) -> str:
-    """Error, energy and a name for each mode.
+def mode_table(modes: tuple[NamedMode, ...], n_modes: int, shown: int | None, picker: str) -> str:
+    """Error, energy, use of the limits and a name for each mode.
 
     Args:
-        candidates: the answer's candidates.
-        modes: its modes.
+        modes: an answer's modes.
+        n_modes: how many it has; more than are shown.
         shown: which mode moves the fins, None while another command does.
         picker: class of the marker before the buttons that a click on a row presses.
     """
-    if candidates is None or not modes:
+    if not modes:
         return "<div class='fl dim'>This method gives one answer and no candidates.</div>"
     rows = []
-    for k, mode in enumerate(modes):
+    for k, (mode, name) in enumerate(modes):
         kind = "chosen" if k == shown else ""
-        several = f" <span class='dim'>×{mode.size}</span>" if mode.size > 1 else ""
         rows.append(
             f"<tr class='{kind} pick' {pick(picker, k)}><td>{_swatch(k)}</td>"
-            f"<td class='words'>{escape(mode.name)}{several}</td>"
-            f"<td>{small(float(candidates.err_norm[mode.index]))}</td>"
-            f"<td>{three_digits(float(candidates.energy[mode.index]))}</td></tr>"
+            f"<td class='words'>{escape(name)}</td><td>{small(mode.err_norm)}</td>"
+            f"<td>{three_digits(mode.energy)}</td><td>{100 * mode.saturation:.0f} %</td></tr>"
         )
-    header = "<tr><th>#</th><th class='words'>mode</th><th>error [σ]</th><th>energy</th></tr>"
-    return f"<div class='fl'><table class='modes'>{header}{''.join(rows)}</table></div>"
+    header = (
+        "<tr><th>#</th><th class='words'>mode</th><th>error [σ]</th><th>energy</th>"
+        "<th title='largest share of a range of amplitude or frequency that is used'>used</th></tr>"
+    )
+    left = n_modes - len(modes)
+    more = f"<div class='said dim'>{left} more are known; they come after these.</div>" if left > 0 else ""
+    return f"<div class='fl'><table class='modes'>{header}{''.join(rows)}</table>{more}</div>"
 
 
 def _swatch(k: int) -> str:

@@ -7,15 +7,15 @@ from webapp.swimming import Swimming
 from webapp.theme import DELIVERED, OTHER, css
 
 
-def pace(swimming: Swimming) -> str:
+def pace_words(swimming: Swimming) -> str:
     """At what pace it goes, in words: what is asked for, or what the machine can do."""
     if swimming.done:
         return "arrived"
     if not swimming.running:
         return "paused"
-    rate = swimming.rate
-    if rate is None or rate > 0.9 * swimming.speed:
-        return f"running at {swimming.speed:.2g}×"
+    rate, speed = swimming.pace.rate, swimming.pace.speed
+    if rate is None or rate > 0.9 * speed:
+        return f"running at {speed:.2g}×"
     return f"<span class='missing'>running at {rate:.1g}×, as fast as this machine can</span>"
 
 
@@ -26,7 +26,7 @@ def swim_card(swimming: Swimming) -> str:
     if not swimming.swimmers:
         return "<div class='fl dim'>making ready …</div>"
     first = swimming.swimmers[0]
-    head = f"<b>{first.time:.1f} s</b> of {first.duration_s:.0f} s, {pace(swimming)}"
+    head = f"<b>{first.time:.1f} s</b> of {first.duration_s:.0f} s, {pace_words(swimming)}"
     rows = []
     for swimmer, color in zip(swimming.swimmers, (DELIVERED, OTHER), strict=False):
         cells = "".join(

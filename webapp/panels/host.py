@@ -15,7 +15,6 @@ from webapp.improving import Improver
 from webapp.playback import Playback
 from webapp.ranging import Beside
 from webapp.resting import Resting
-from webapp.scene.swim_scene import SwimScene
 from webapp.session import Session
 from webapp.sweeping import Sweep
 from webapp.swimming import Swimming
@@ -66,14 +65,14 @@ class Host(Protocol):
     def notify(self, title: str, body: str, *, good: bool = False) -> None:
         """Show a note to the user."""
 
-    swim_scene: SwimScene
-    """What is seen of it."""
-
     def end_swim(self) -> None:
         """Go back from the robot that swims to the one that is designed."""
 
     def look_from(self, view: str) -> None:
         """Move the camera."""
+
+    def look_after_swim(self, follow: bool) -> None:
+        """Let the camera go along with the first robot that swims, or see all of its path."""
 
 
 class Panel(Protocol):

@@ -1,5 +1,6 @@
 """Improve this layout: choose a goal, watch the search, take or leave what it finds."""
 
+from collections.abc import Callable
 from functools import partial
 
 import viser
@@ -11,10 +12,7 @@ from webapp.markup.picking import button_colors
 from webapp.markup.score_card import score_table
 from webapp.panels.host import Host
 from webapp.theme import css, fin_color
-from webapp.wishes import GOAL_WORDS, WAY, Way, Wish, checked_way, parsed_mission
-
-ALL = "all"
-"""Entry of the list of fins with bounds for those that have none of their own."""
+from webapp.wishes import ALL, GOAL_WORDS, WAY, Draft
 
 
 class ImprovePanel:
@@ -23,12 +21,9 @@ class ImprovePanel:
     def __init__(self, gui: viser.GuiApi, host: Host) -> None:
         """Build the widgets."""
         self._host = host
-        self._held: set[str] = set()
-        self._ways: dict[str, Way] = {}
-        self._names: tuple[str, ...] = ()
         with gui.add_folder("Improve this layout"):
             self._goal = gui.add_dropdown("Goal", tuple(GOAL_WORDS), hint="What to raise.")
-            on_user_change(self._goal, lambda _: self.refresh())
+            on_user_change(self._goal, lambda goal: self._draft(lambda draft: draft.with_goal(goal)))
             self._paint = gui.add_html("")
             self._fins = gui.add_button_group(
                 "May move",
@@ -55,6 +50,7 @@ class ImprovePanel:
                 hint="Wrenches, one line each: Fx Fy Fz Tx Ty Tz [N, N m]. Empty: the common ones.",
                 visible=False,
             )
+            on_user_change(self._mission, lambda text: self._draft(lambda draft: draft.with_mission(text)))
             self._take = gui.add_button_group(
                 " ", ("Add the present wrench",), hint="To the mission.", visible=False
             )
@@ -75,24 +71,26 @@ class ImprovePanel:
             on_user_change(self._verdict, self._decide)
 
     def _hold(self, button: str) -> None:
+        names = self._host.session.state.layout.names
         index = int("".join(c for c in button if c.isdigit()) or 0) - 1
-        if 0 <= index < len(self._names):
-            self._held ^= {self._names[index]}
-        self.refresh()
+        if 0 <= index < len(names):
+            self._draft(lambda draft: draft.with_held_toggled(names[index]))
 
     def _bound(self, way: tuple[float, ...]) -> None:
-        self._host.do(lambda: self._ways.update({self._whose.value: checked_way(way)}))
+        self._draft(lambda draft: draft.with_way(self._whose.value, way))
+
+    def _draft(self, change: Callable[[Draft], Draft]) -> None:
+        session = self._host.session
+        self._host.do(lambda: session.set_draft(change(session.draft)))
 
     def _add_wrench(self) -> None:
         line = " ".join(f"{value:g}" for value in self._host.session.state.target)
-        put(self._mission, value=f"{self._mission.value.rstrip()}\n{line}".lstrip())
+        self._draft(lambda draft: draft.with_mission(f"{draft.mission.rstrip()}\n{line}".lstrip()))
 
     def _search(self) -> None:
-        fins = tuple(name for name in self._names if name not in self._held)
-        own = {name: way for name, way in self._ways.items() if name != ALL}
-        mission = parsed_mission(self._mission.value)
-        wish = Wish(self._goal.value, fins, self._ways.get(ALL, WAY), own, mission)
-        self._host.improver.start(self._host.session.state.layout, wish)
+        session = self._host.session
+        layout = session.state.layout
+        self._host.improver.start(layout, session.draft.wish(layout))
 
     def _decide(self, button: str) -> None:
         improver = self._host.improver
@@ -128,23 +126,20 @@ class ImprovePanel:
 
     def _refresh_wish(self) -> None:
         """Write which fins may move, and how far."""
-        names = self._host.session.state.layout.names
-        if names != self._names:
-            self._names = names
-            self._held &= set(names)
-            self._ways = {name: way for name, way in self._ways.items() if name in (ALL, *names)}
+        names, draft = self._host.session.state.layout.names, self._host.session.draft
+        put(self._goal, value=draft.goal)
         put(self._fins, options=tuple(str(i + 1) for i in range(len(names))))
         colors = [
-            ("transparent", "inherit") if n in self._held else (css(fin_color(i)), "#111")
+            ("transparent", "inherit") if n in draft.held else (css(fin_color(i)), "#111")
             for i, n in enumerate(names)
         ]
         put(self._paint, content=button_colors("fl-movers", colors))
         put(self._whose, options=(ALL, *names))
-        way = self._ways.get(self._whose.value, self._ways.get(ALL, WAY))
+        way = draft.way(self._whose.value)
         put(self._reach, value=way[:3])
         put(self._turn, value=way[3])
-        mission = self._goal.value == "energy of a mission"
-        put(self._mission, visible=mission)
+        mission = draft.goal == "energy of a mission"
+        put(self._mission, visible=mission, value=draft.mission)
         put(self._take, visible=mission)
 
 

@@ -137,7 +137,7 @@ class LayoutPanel:
         )
         put(self._about, content=f"<div class='fl'><div class='dim'>{escape(first)}</div>{pairs}</div>")
         state = session.state
-        if (layout, state.failed) != self._checked:
-            self._checked = (layout, state.failed)
-            quick = quick_check(layout, state.failed)
+        if (state.able, state.failed) != self._checked:
+            self._checked = (state.able, state.failed)
+            quick = quick_check(state.able, state.failed)
             put(self._card, content=check_card(quick, len(state.healthy) > 1, warnings(layout)))

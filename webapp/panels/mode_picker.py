@@ -48,7 +48,7 @@ class ModePicker:
         """Write the modes of the newest answer."""
         answering, sample = self._host.answering, self._host.session.sample
         best, modes = answering.best, answering.modes
-        if not self._changes(best, self.shown, sample):
+        if not self._changes(best, modes, self.shown, sample):
             return
         put(self._choice, options=tuple(str(k + 1) for k in range(len(modes))) or ("1",))
         plot = ""

@@ -10,16 +10,12 @@ from webapp.comparison import COMPARED
 from webapp.handles import on_user_change, put
 from webapp.markup.picking import button_colors
 from webapp.markup.swim_card import swim_card
+from webapp.pace import SPEEDS
 from webapp.panels.host import Host
 from webapp.panels.swim_plots import SwimPlots
-from webapp.swimming import SPEEDS, Plan
+from webapp.swim_plan import ALONE, OWN
 from webapp.theme import DEAD, css, fin_color
 from webapp.trajectory_file import read_path
-
-ALONE = "nobody"
-"""Entry of the list of rivals for a robot that swims alone."""
-OWN = "own path"
-"""Entry of the list of paths for one from a file."""
 
 
 class SwimPanel:
@@ -39,6 +35,13 @@ class SwimPanel:
         self._plant = gui.add_dropdown(
             "Fin forces", tuple(PLANTS), hint="Mean forces, forces with their ripple, or flexible fins."
         )
+        for key, widget in (
+            ("path", self._path),
+            ("method", self._method),
+            ("rival", self._rival),
+            ("plant", self._plant),
+        ):
+            on_user_change(widget, partial(self._set, key))
         self._run = gui.add_button_group(
             "Run",
             ("Start", "Pause", "Step", "End"),
@@ -48,9 +51,9 @@ class SwimPanel:
         self._speed = gui.add_slider(
             "Speed", *SPEEDS, 0.1, 1.0, hint="Simulated time per real time; a slow machine falls short of it."
         )
-        on_user_change(self._speed, lambda value: host.do(partial(host.swimming.set_speed, value)))
+        on_user_change(self._speed, partial(self._set, "speed"))
         self._follow = gui.add_checkbox("Follow", False, hint="The camera goes along with the first robot.")
-        on_user_change(self._follow, self._look)
+        on_user_change(self._follow, host.look_after_swim)
         self._paint = gui.add_html("")
         self._fins = gui.add_button_group(
             "Break a fin", ("1",), hint="Press a fin's number: break or mend it while it swims."
@@ -74,8 +77,10 @@ class SwimPanel:
 
     def _take_path(self, name: str, content: bytes) -> None:
         self._own = read_path(name, content)
-        put(self._path, options=(*SHIPPED, OWN))
-        put(self._path, value=OWN)
+        self._host.session.set_swim("path", OWN)
+
+    def _set(self, key: str, value: object) -> None:
+        self._host.do(partial(self._host.session.set_swim, key, value))
 
     def _press(self, button: str) -> None:
         swimming = self._host.swimming
@@ -89,15 +94,8 @@ class SwimPanel:
             self._host.do(self._host.end_swim)
 
     def _start(self) -> None:
-        state, method, rival = self._host.session.state, self._method.value, self._rival.value
-        methods = (method,) if rival in (ALONE, method) else (method, rival)
-        path = self._own if self._path.value == OWN and self._own is not None else self._path.value
-        self._host.swimming.start(Plan(state.layout, state.failed, path, methods, self._plant.value))
-
-    def _look(self, follow: bool) -> None:
-        scene = self._host.swim_scene
-        if self._host.swimming.active:
-            scene.follow() if follow else scene.overlook()
+        session = self._host.session
+        self._host.swimming.start(session.swim.plan(session.state, self._own))
 
     def _toggle(self, button: str) -> None:
         swimming = self._host.swimming
@@ -110,7 +108,15 @@ class SwimPanel:
 
     def refresh(self) -> None:
         """Write how the swim goes."""
-        swimming = self._host.swimming
+        swimming, settings = self._host.swimming, self._host.session.swim
+        put(self._path, options=tuple(SHIPPED) if self._own is None else (*SHIPPED, OWN))
+        put(self._path, value=settings.path)
+        put(self._method, value=settings.method)
+        put(self._rival, value=settings.rival)
+        put(self._plant, value=settings.plant)
+        put(self._speed, value=settings.speed)
+        if swimming.pace.speed != settings.speed:
+            swimming.pace.set_speed(settings.speed)
         swimmers = swimming.swimmers
         names = swimmers[0].fins if swimmers else self._host.session.state.layout.names
         failed = swimmers[0].failed if swimmers else self._host.session.state.failed

@@ -1,18 +1,15 @@
-"""Files: open and save a layout, export the graph for deployment, copy the command line."""
+"""Files: open and save a layout, take home what the robot needs, copy the question as a command."""
 
-import shlex
 from collections.abc import Callable
 from html import escape
 from typing import Any
 
 import viser
 
-from finlab.assets import shipped_layouts
 from webapp import files
 from webapp.handles import Changes, on_user_change, put
 from webapp.panels.host import Host
-from webapp.shipped import shipped_name
-from webapp.state import State
+from webapp.retelling import command_line, export_line, python_lines
 
 
 class TakeHomePanel:
@@ -77,37 +74,18 @@ class TakeHomePanel:
         state = self._host.session.state
         if not self._changes(state):
             return
-        known = shipped_name(state.layout)
-        words = ["finlab", "allocate", known or f"{files.file_stem(state.layout.name)}.yaml", "--wrench"]
-        words += [f"{value:g}" for value in state.target]
-        for name in state.failed:
-            words += ["--failed", name]
-        if state.method != "learned":
-            words += ["--method", state.method]
-        export = ["finlab", "export", words[2], "-o", files.file_stem(state.layout.name), "--zip"]
-        for name in state.failed:
-            export += ["--failed", name]
-        bundle = escape(shlex.join(export))
-        shell, python = escape(shlex.join(words)), escape(_python(state, words[2]))
-        put(
-            self._command,
-            content=f"<div class='fl'><span class='dim'>The same question on the command line:</span>"
-            f"<pre class='command'>{shell}</pre><span class='dim'>And in Python:</span>"
-            f"<pre class='command'>{python}</pre><span class='dim'>The bundle for the robot:</span>"
-            f"<pre class='command'>{bundle}</pre></div>",
-        )
+        texts = {
+            "The same question on the command line": command_line(state),
+            "The same in Python": python_lines(state),
+            "The bundle for the robot": export_line(state),
+        }
+        put(self._command, content=f"<div class='fl'>{''.join(map(_copied, texts, texts.values()))}</div>")
 
 
-def _python(state: State, name: str) -> str:
-    """The same question as lines of Python."""
-    shipped = name in shipped_layouts()
-    path = f"finlab.assets.shipped_layouts()[{name!r}]" if shipped else repr(name)
-    method = "" if state.method == "learned" else f"method={state.method!r}"
-    target = ", ".join(f"{value:g}" for value in state.target)
-    failed = f", failed={list(state.failed)!r}" if state.failed else ""
-    policy = "" if state.policy == "closest" else f", policy={state.policy!r}"
+def _copied(title: str, text: str) -> str:
+    """Lines that a click takes to the clipboard, where the browser lets it; else it selects them."""
+    copy = "navigator.clipboard?.writeText(this.innerText); this.previousSibling.dataset.done = 1"
     return (
-        f"import finlab{'.assets' if shipped else ''}\nlayout = finlab.load_layout({path})\n"
-        f"result = finlab.load_allocator({method}).allocate(layout, [{target}]{failed}{policy})\n"
-        "print(result.command, result.wrench)"
+        f"<div class='said copy'><span class='dim'>{title}</span></div>"
+        f'<pre class="command" title="click to copy" onclick="{copy}">{escape(text)}</pre>'
     )

@@ -59,9 +59,9 @@ class TargetPanel:
     def refresh(self) -> None:
         """Write the target, the sliders' ends and the marks on them."""
         state = self._host.session.state
-        if self._ends_for != (state.layout, state.failed):
-            self._ends_for = (state.layout, state.failed)
-            self.reach = axis_reach(state.layout, state.failed)
+        if self._ends_for != (state.able, state.failed):
+            self._ends_for = (state.able, state.failed)
+            self.reach = axis_reach(state.able, state.failed)
         for slider, value, reach in zip(self._sliders, state.target, self.reach, strict=True):
             end = slider_end(float(reach))
             put(slider, min=min(-end, value), max=max(end, value))

@@ -11,6 +11,7 @@ from webapp.handles import on_user_change, put
 from webapp.markup.bars import wrench_bars
 from webapp.markup.fins import fin_table
 from webapp.markup.picking import button_colors
+from webapp.panels.damage import DamagePanel
 from webapp.panels.host import Host
 from webapp.panels.mode_picker import ModePicker
 from webapp.panels.pilot import PilotPanel
@@ -38,6 +39,7 @@ class WrenchPanel:
         self._bars = gui.add_html("")
         self._table = gui.add_html("")
         self._picker = ModePicker(gui, host, 150, "fl-wrench-modes")
+        self._damage = DamagePanel(gui, host)
         self._pilot = PilotPanel(gui, host, self._target)
         self._sweep = SweepPanel(gui, host)
         self._full_for: Layout | None = None
@@ -55,15 +57,16 @@ class WrenchPanel:
         self._target.refresh()
         self._refresh_failures()
         self._picker.refresh()
+        self._damage.refresh()
         self._pilot.refresh()
         self._sweep.refresh()
         answer = host.shown
         given = None if answer is None else answer.wrench
         put(self._bars, content=wrench_bars(state.target, given, self._sentence()))
         fitting = answer if answer is not None and answer.layout.names == state.layout.names else None
-        if self._full_for != state.layout:
-            self._full_for, self._full = state.layout, full_thrust(state.layout)
-        put(self._table, content=fin_table(state.layout, fitting, self._full, host.session.selected))
+        if self._full_for != state.able:
+            self._full_for, self._full = state.able, full_thrust(state.able)
+        put(self._table, content=fin_table(state, fitting, self._full, host.session.selected))
 
     def _refresh_failures(self) -> None:
         state = self._host.session.state

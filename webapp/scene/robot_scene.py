@@ -1,8 +1,6 @@
 """The whole 3D view of one browser."""
 
-import math
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import viser
@@ -17,6 +15,7 @@ from webapp.handles import put
 from webapp.meshes.hull import hull_of
 from webapp.scene.attainable_nodes import AttainableNodes
 from webapp.scene.fin_node import FinNode
+from webapp.scene.flapping import Flapping
 from webapp.scene.ghost import Ghost, moved_fins
 from webapp.scene.grips import Grips
 from webapp.scene.lines import Lines
@@ -26,7 +25,7 @@ from webapp.scene.wrench_nodes import WrenchNodes
 from webapp.session import Session
 from webapp.state import State
 from webapp.theme import ASKED
-from webapp.words import missing_part
+from webapp.words import damage_words, missing_part
 
 CAMERAS = {
     "3D": (0.48, 0.46, 0.58),
@@ -75,8 +74,7 @@ class RobotScene:
         self._grips = Grips(scene, on_wrench)
         self._fins: list[FinNode] = []
         self._dragged: int | None = None
-        self._phase: NDArray[Any] = np.zeros(0)
-        self._command: NDArray[np.float64] = np.zeros((0, 3))
+        self._flapping = Flapping()
         self.newtons = 1.0
         """Force [N] that an arrow of 0.1 m stands for at the moment."""
         self.look_from("3D")
@@ -128,7 +126,7 @@ class RobotScene:
         fits = allocation is not None and allocation.layout.names == state.layout.names
         for i, fin in enumerate(state.layout.fins):
             selected = fin.name == self._session.selected
-            label = None if not display.labels else f"{i + 1} {fin.name}" if selected else str(i + 1)
+            label = _label(state, i, selected) if display.labels else None
             self._fins[i].place(fin, hull, selected, label, i == self._dragged)
             if fin.name in state.failed:
                 self._fins[i].command(None, np.zeros(3), 0.0, False)
@@ -138,7 +136,7 @@ class RobotScene:
                 angle = allocation.layout.fins[i].mounting_angle
                 self._fins[i].command(allocation.command[i], force * scale, angle, display.fans)
         if fits and allocation is not None:
-            self._take_command(allocation.command)
+            self._flapping.take(allocation.command)
         left = offered or (self._session.saved if display.ghost else None)
         self._ghost.show(moved_fins(left, state.layout))
         self._landing.show(self._landings())
@@ -161,27 +159,12 @@ class RobotScene:
         landing = self._session.landing(names[self._dragged], *self._fins[self._dragged].pose())
         return () if landing is None else (landing,)
 
-    def _take_command(self, command: NDArray[np.float64]) -> None:
-        if len(command) != len(self._command):
-            # Different phases look alive; the mean force does not depend on them.
-            self._phase = np.arange(len(command)) * 1.9
-        self._command = command
-
     def animate(self, elapsed: float) -> None:
         """Let the fins flap for some time [s] of the clock on the wall."""
         display = self._session.display
-        alive = np.isfinite(self._command[:, 0])
-        if not display.frozen:
-            frequency = np.where(alive, self._command[:, 1], 0.0)
-            turned = self._phase + 2 * np.pi * frequency * elapsed * display.speed
-            self._phase = turned % (2 * np.pi)
-        for i in range(min(len(self._command), self._session.state.layout.n_fins)):
-            if not alive[i]:
-                angle = math.pi / 2  # a limp fin hangs down
-            else:
-                swing = 0.0 if display.frozen else self._command[i, 0] * math.sin(self._phase[i])
-                angle = float(self._command[i, 2] + swing)
-            self._fins[i].pose_blade(angle)
+        angles = self._flapping.angles(elapsed * display.speed, display.frozen)
+        for node, angle in zip(self._fins, angles, strict=False):  # a fin may be newer than the answer
+            node.pose_blade(angle)
 
     def _clicked(self, index: int) -> None:
         self._on_select(self._session.state.layout.names[index])
@@ -191,6 +174,13 @@ class RobotScene:
             return
         self._dragged = None if phase == "end" else index
         self._on_drag(self._session.state.layout.names[index], phase, position, angle)
+
+
+def _label(state: State, index: int, selected: bool) -> str:
+    """A fin's number; its name while it is selected; what is wrong with it."""
+    name = state.layout.names[index]
+    told = damage_words(state, name) if name not in state.failed else ""
+    return " ".join([str(index + 1), *([name] if selected else []), *([told] if told else [])])
 
 
 def _largest(state: State, allocation: Allocation | None) -> float:

@@ -124,7 +124,7 @@ class SwimScene:
         if not swimming.swimmers or swimming.swimmers != self._shown:
             return
         names = swimming.swimmers[0].fins
-        rate = swimming.rate or swimming.speed
+        rate = swimming.pace.rate or swimming.pace.speed
         for robot, swimmer in zip(self._robots, swimming.swimmers, strict=False):
             lost = tuple(names.index(name) for name in swimmer.failed)
             robot.animate(elapsed * rate, lost)

@@ -5,7 +5,9 @@ from finlab.layout import Layout
 from webapp.history import History
 from webapp.session.display import Display
 from webapp.state import State
+from webapp.swim_plan import SwimSettings
 from webapp.targets import FIRST
+from webapp.wishes import Draft
 
 
 class Core:
@@ -24,6 +26,10 @@ class Core:
         """A layout that was put aside to compare others with."""
         self.beside: str | None = None
         """With what the score card compares: a shipped layout's name, `PINNED`, or None for the saved one."""
+        self.draft = Draft()
+        """What a search for a better layout is to do."""
+        self.swim = SwimSettings()
+        """How the robot is to swim."""
         self.mode = 0
         """Which of the answer's modes is shown; 0 is the best one."""
         self.sample: int | None = None

@@ -18,8 +18,9 @@ class Editing(Core):
     """Changes of the layout."""
 
     def open_layout(self, layout: Layout) -> None:
-        """Another layout; the target stays, failures and links are forgotten."""
-        self._commit(f"Open {layout.name}", replace(self.state, layout=layout, failed=(), links=()))
+        """Another layout; the target stays, damage and links are forgotten."""
+        whole = replace(self.state, layout=layout, failed=(), weak=(), stuck=(), links=())
+        self._commit(f"Open {layout.name}", whole)
         self.saved = layout
 
     def accept_layout(self, layout: Layout) -> None:

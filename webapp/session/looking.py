@@ -6,6 +6,7 @@ from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.session.core import Core
 from webapp.shipped import shipped
+from webapp.wishes import Draft
 
 PINNED = "pinned"
 """Name of the layout that was put aside, among those to compare with."""
@@ -29,6 +30,14 @@ class Looking(Core):
     def set_display(self, key: str, value: Any) -> None:
         """One field of `Display`."""
         self.display = self.display.with_value(key, value)
+
+    def set_swim(self, key: str, value: Any) -> None:
+        """One field of `SwimSettings`."""
+        self.swim = self.swim.with_value(key, value)
+
+    def set_draft(self, draft: Draft) -> None:
+        """What the next search for a better layout is to do."""
+        self.draft = draft
 
     def pin(self) -> None:
         """Put the layout aside as it is now, and compare with it."""

@@ -64,7 +64,7 @@ class Questions(Core):
         if not 0 <= axis < 6:
             raise FinlabError(f"axis: expected 0 to 5, got {axis!r:.40}")
         state = self.state
-        reach = float(axis_reach(state.layout, state.failed)[axis])
+        reach = float(axis_reach(state.able, state.failed)[axis])
         if reach < 1e-6:
             raise FinlabError(f"no working fin of this robot acts on {AXIS_WORDS[axis]}")
         value = float(f"{SHARE * reach:.2g}")
@@ -83,3 +83,21 @@ class Questions(Core):
         """A fin fails, or is repaired."""
         verb = "Repair" if name in self.state.failed else "Fail"
         self._commit(f"{verb} {name}", self.state.with_failure_toggled(name))
+
+    def weaken(self, name: str, share: Any) -> None:
+        """A fin keeps only a share of its largest amplitude and frequency; 1 makes it strong again."""
+        self._commit(f"Weaken {name}", self.state.with_strength(name, share), f"weaken {name}")
+
+    def jam(self, name: str, angle: Any) -> None:
+        """A fin no longer turns from a zero direction [rad]; None frees it."""
+        verb = "Free" if angle is None else "Jam"
+        self._commit(f"{verb} {name}", self.state.with_stop(name, angle), f"jam {name}")
+
+    def mend_all(self) -> None:
+        """All fins are whole again."""
+        self._commit("Mend all fins", replace(self.state, failed=(), weak=(), stuck=()))
+
+    def mend(self, name: str) -> None:
+        """A fin is whole again."""
+        state = self.state.with_strength(name, 1.0).with_stop(name, None)
+        self._commit(f"Mend {name}", state.with_failure_toggled(name) if name in state.failed else state)

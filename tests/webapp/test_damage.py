@@ -1,0 +1,125 @@
+"""Weak and stuck fins: what is asked for, what comes of it, and what is kept of it."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from finlab.assets import shipped_layouts
+from finlab.errors import FinlabError
+from finlab.layout import load_layout
+from finlab.sim import SHIPPED
+from tests.webapp.stand_in import load_stand_in
+from webapp.keeping import restore, to_dict
+from webapp.markup.fins import fin_table
+from webapp.retelling import command_line, python_lines
+from webapp.session import Session
+from webapp.solver import Solver
+from webapp.swim_plan import ALONE, OWN, SwimSettings
+from webapp.targets import axis_reach, full_thrust
+from webapp.wishes import ALL, Draft
+from webapp.words import damage_words
+
+UCAT = load_layout(shipped_layouts()["ucat"])
+
+
+@pytest.fixture
+def session() -> Session:
+    return Session(UCAT)
+
+
+def test_a_weak_and_a_stuck_fin_keep_to_what_is_left(session: Session) -> None:
+    session.weaken("front_left", 0.5)
+    session.jam("back_left", math.radians(30))
+    state = session.state
+    reply = Solver(load=load_stand_in).reply(state)
+    command = reply.answer.command
+    whole = UCAT.fins[1].limits.upper
+    assert command[1, 0] <= 0.5 * whole[0] + 1e-9 and command[1, 1] <= 0.5 * whole[1] + 1e-9
+    assert command[2, 2] == pytest.approx(math.radians(30))
+    assert (axis_reach(state.able) < axis_reach(state.layout)).any()
+    assert full_thrust(state.able)[1] < full_thrust(state.layout)[1]
+    table = fin_table(state, reply.answer, full_thrust(state.able), None)
+    assert "weak 50 %" in table and "stuck at 30°" in table
+    assert damage_words(state, "front_right") == ""
+    assert state.layout == UCAT, "the layout itself stays whole"
+    line = command_line(state)
+    assert "--health front_left=0.5" in line and "--stuck back_left=30" in line
+    assert "Health.of(weak={'front_left': 0.5}, stuck={'back_left': 0.5236})" in python_lines(state)
+
+
+def test_damage_is_mended_undone_and_goes_with_its_fin(session: Session) -> None:
+    session.weaken("front_left", 0.5)
+    session.weaken("front_left", 0.3)
+    session.jam("front_left", 1.0)
+    session.toggle_failure("front_left")
+    session.mend("front_left")
+    assert session.state.health is None and session.state.failed == ()
+    session.undo()
+    session.undo()
+    assert session.state.weak == (("front_left", 0.3),) and session.state.stuck == (("front_left", 1.0),)
+    session.jam("front_left", None)
+    assert session.state.stuck == ()
+    session.select("front_left")
+    session.delete_fin()
+    assert session.state.health is None
+    session.undo()
+    session.mend_all()
+    assert session.state.health is None
+
+
+def test_the_page_may_send_anything(session: Session) -> None:
+    before = session.state
+    for share in (math.nan, 0.0, 2.0, "much", True):
+        with pytest.raises(FinlabError):
+            session.weaken("front_left", share)
+    for angle in (math.nan, math.inf, 9.0, "up"):
+        with pytest.raises(FinlabError):
+            session.jam("front_left", angle)
+    with pytest.raises(FinlabError, match="nobody"):
+        session.weaken("nobody", 0.5)
+    for key, value in (("path", "nowhere"), ("speed", math.nan), ("method", OWN), ("color", "red")):
+        with pytest.raises(FinlabError):
+            session.set_swim(key, value)
+    draft = session.draft
+    for change in (
+        lambda: draft.with_goal("<b>"),
+        lambda: draft.with_way(ALL, (math.nan, 0.0, 0.0, 0.0)),
+        lambda: draft.with_way(ALL, (0.0, 0.0, 0.0, 900.0)),
+        lambda: draft.with_mission("1 2 3").wish(UCAT),
+    ):
+        with pytest.raises(FinlabError):
+            change()
+    assert session.state == before and session.draft == Draft() and session.swim == SwimSettings()
+    assert len(draft.with_mission("1" * 10**6).mission) == 10_000
+
+
+def test_damage_wishes_and_swim_outlive_the_server(session: Session) -> None:
+    session.weaken("front_left", 0.5)
+    session.jam("back_left", -2.0)
+    way = (0.01, 0.02, 0.03, 40.0)
+    draft = session.draft.with_goal("energy of a mission").with_held_toggled("back_right").with_way(ALL, way)
+    session.set_draft(draft.with_way("front_left", way).with_mission("1 0 0 0 0 0"))
+    for key, value in (("path", list(SHIPPED)[-1]), ("rival", "qp"), ("speed", 2.5)):
+        session.set_swim(key, value)
+    again = Session(UCAT)
+    restore(again, json.loads(json.dumps(to_dict(session))))
+    assert again.state == session.state and again.draft == session.draft and again.swim == session.swim
+    wish = again.draft.wish(UCAT)
+    assert "back_right" not in wish.fins and wish.own_ways == {"front_left": way}
+    assert wish.way == way and np.array(wish.wrenches).shape == (1, 6)
+    session.set_swim("path", OWN)
+    restore(again, json.loads(json.dumps(to_dict(session))))
+    assert again.swim.path in SHIPPED, "the file of the path is not there any more"
+
+
+def test_a_plan_is_made_of_the_settings(session: Session) -> None:
+    settings = SwimSettings()
+    assert settings.rival == ALONE and len(settings.plan(session.state, None).methods) == 1
+    assert settings.with_value("rival", "qp").plan(session.state, None).methods == ("learned", "qp")
+    assert settings.with_value("rival", "learned").plan(session.state, None).methods == ("learned",)
+    with pytest.raises(FinlabError, match="own"):
+        settings.with_value("path", OWN).plan(session.state, None)
+    session.jam("front_left", 0.5)
+    assert settings.plan(session.state, None).layout.fins[1].limits.zero_direction == (0.5, 0.5)

@@ -1,0 +1,83 @@
+"""What is wrong with each fin: whole, weak, stuck, or both; the numbers above fail it altogether."""
+
+import math
+from functools import partial
+
+import viser
+
+from webapp.handles import on_user_change, put
+from webapp.panels.host import Host
+from webapp.state import STRENGTH_RANGE
+
+
+class DamagePanel:
+    """Widgets of one folder."""
+
+    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+        """Build the widgets."""
+        self._host = host
+        with gui.add_folder("Damage a fin", expand_by_default=False):
+            self._fin = gui.add_dropdown(
+                "Which fin", ("1",), hint="Also the one that is selected in the view."
+            )
+            on_user_change(self._fin, lambda name: host.do(partial(host.session.select, name)))
+            self._strength = gui.add_slider(
+                "Strength [%]",
+                100 * STRENGTH_RANGE[0],
+                100.0,
+                5.0,
+                100.0,
+                hint="What is left of its largest amplitude and frequency: a worn motor, a torn fin.",
+            )
+            on_user_change(self._strength, self._weaken)
+            self._stuck = gui.add_checkbox(
+                "Stuck", False, hint="It no longer turns: it flaps about one direction only."
+            )
+            on_user_change(self._stuck, lambda stuck: self._jam(stuck, self._angle.value))
+            self._angle = gui.add_slider(
+                "Stuck at [°]",
+                -180.0,
+                180.0,
+                5.0,
+                0.0,
+                hint="Zero direction at which it stays.",
+                visible=False,
+            )
+            on_user_change(self._angle, partial(self._jam, True))
+            self._mend = gui.add_button_group(
+                "Repair", ("This fin", "All fins"), hint="Whole again; can be undone like all else."
+            )
+            on_user_change(self._mend, self._repair)
+
+    @property
+    def _name(self) -> str:
+        """The fin that the widgets are about: the selected one, or the first."""
+        session = self._host.session
+        return session.selected or session.state.layout.names[0]
+
+    def _weaken(self, percent: float) -> None:
+        name, session = self._name, self._host.session
+        self._host.do(lambda: session.weaken(name, percent / 100.0))
+
+    def _jam(self, stuck: bool, degrees: float) -> None:
+        name, session = self._name, self._host.session
+        self._host.do(lambda: session.jam(name, math.radians(degrees) if stuck else None))
+
+    def _repair(self, button: str) -> None:
+        session = self._host.session
+        if button == "This fin":
+            self._host.do(partial(session.mend, self._name))
+        elif button == "All fins":
+            self._host.do(session.mend_all)
+
+    def refresh(self) -> None:
+        """Write the damage of the fin."""
+        state, name = self._host.session.state, self._name
+        put(self._fin, options=state.layout.names)
+        put(self._fin, value=name)
+        put(self._strength, value=round(100.0 * dict(state.weak).get(name, 1.0), 1))
+        angle = dict(state.stuck).get(name)
+        put(self._stuck, value=angle is not None)
+        put(self._angle, visible=angle is not None)
+        if angle is not None:
+            put(self._angle, value=round(math.degrees(angle), 1))

@@ -1,0 +1,87 @@
+"""What is seen beside the panel: the robot that is designed, or those that swim."""
+
+from collections.abc import Callable
+from functools import partial
+
+import viser
+
+from finlab.allocation.allocation import Allocation
+from webapp.analyst import Findings
+from webapp.answering import Answering
+from webapp.comparison import Comparison
+from webapp.dragging import Dragging
+from webapp.improving import Improver
+from webapp.scene.robot_scene import RobotScene
+from webapp.scene.swim_scene import SwimScene
+from webapp.session import Session
+from webapp.swimming import Swimming
+from webapp.theme import BRAND
+
+
+class Scenery:
+    """Both scenes of one page, of which one is shown, and the theme."""
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        session: Session,
+        swimming: Swimming,
+        do: Callable[[Callable[[], object]], None],
+    ) -> None:
+        """Build the nodes.
+
+        Args:
+            client: the browser.
+            session: what it shows.
+            swimming: the robots that swim, if any do.
+            do: carries out an intent.
+        """
+        self._client, self._session, self._swimming = client, session, swimming
+        self._dark: bool | None = None
+        dragging = Dragging(session, do)
+        self.robot = RobotScene(
+            client, session, lambda name: do(partial(session.select, name)), dragging.fin, dragging.wrench
+        )
+        self.swim = SwimScene(client, swimming)
+
+    @property
+    def swims(self) -> bool:
+        """Whether the robots that swim are on the screen."""
+        return not self.robot.shown
+
+    def refresh(
+        self, answering: Answering, comparison: Comparison, improver: Improver, findings: Findings | None
+    ) -> None:
+        """Show what has been found for the session's state."""
+        found, reply = improver.found, answering.reply
+        offered = found.layout if found is not None and found.improved else None
+        attention = None if reply is None else reply.attention
+        self.robot.refresh(answering.shown, self._overlaid(comparison), findings, offered, attention)
+        self.robot.show(not self._swimming.swimmers)
+        self.refresh_swim()
+
+    def refresh_swim(self) -> None:
+        """Show where the robots that swim are."""
+        self.swim.refresh(self._session.display.dark)
+
+    def animate(self, elapsed: float) -> None:
+        """Let time pass [s]: fins flap, and a robot that swims moves on."""
+        if self._swimming.active:
+            self._swimming.tick(elapsed)
+            self.swim.animate(elapsed)
+        else:
+            self.robot.animate(elapsed)
+
+    def apply_theme(self) -> None:
+        """Light or dark."""
+        if self._session.display.dark != self._dark:
+            self._dark = self._session.display.dark
+            self._client.gui.configure_theme(
+                dark_mode=self._dark, show_logo=False, show_share_button=False, brand_color=BRAND
+            )
+
+    def _overlaid(self, comparison: Comparison) -> Allocation | None:
+        """The compared answer whose forces are shown, unless the question has changed since."""
+        answer = comparison.answers.get(self._session.overlay or "")
+        fits = comparison.state == self._session.state
+        return answer if fits and isinstance(answer, Allocation) else None
