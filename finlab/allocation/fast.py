@@ -18,6 +18,7 @@ from finlab.allocation.allocation import Solution
 from finlab.allocation.energy import DEFAULT_WEIGHTS
 from finlab.allocation.fast_network import NumpyFastNetwork
 from finlab.allocation.learned import LearnedAllocator
+from finlab.allocation.pipeline import Lead, nearest_forces
 from finlab.allocation.weights import LearnedWeights
 from finlab.data.features import fin_frame_features
 from finlab.errors import AllocationError
@@ -54,10 +55,18 @@ class FastAllocator(LearnedAllocator):
         std = self.normalization.std
         self._scaled_mean = self.normalization.mean / std
 
-    def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
+    def _solve(
+        self,
+        layout: Layout,
+        targets: Array,
+        *,
+        seed: int,
+        previous: Array | None,
+        lead: Lead = nearest_forces,
+    ) -> Solution:
         # Slow turns from tick to tick are a search of their own; the network learned the usual energy.
         if previous is not None or self.energy_weights != DEFAULT_WEIGHTS:
-            return super()._solve(layout, targets, seed=seed, previous=previous)
+            return super()._solve(layout, targets, seed=seed, previous=previous, lead=lead)
         prepared = self.pipeline.prepare(layout)
         target = targets / self.normalization.std
         x = fin_frame_features(prepared.geometry, target - self._scaled_mean).astype(np.float32)
@@ -68,14 +77,14 @@ class FastAllocator(LearnedAllocator):
         missed = np.einsum("ri,ri->r", planar.residual, planar.residual) > GOOD**2
         if len(targets) == 1:
             if missed[0]:
-                return super()._solve(layout, targets, seed=seed, previous=None)
+                return super()._solve(layout, targets, seed=seed, previous=None, lead=lead)
             command, _ = force_space.realize(prepared.planar, planar)
             wrench = targets - planar.residual * self.normalization.std
             return Solution(command, wrench, notes=self.notes(layout))
         command, _ = force_space.realize(prepared.planar, planar)
         wrench = targets - planar.residual * self.normalization.std
         if missed.any():
-            slow = super()._solve(layout, targets[missed], seed=seed, previous=None)
+            slow = super()._solve(layout, targets[missed], seed=seed, previous=None, lead=lead)
             assert slow.wrench_surrogate is not None
             command[missed], wrench[missed] = slow.command, slow.wrench_surrogate
         return Solution(command, wrench, notes=self.notes(layout))
