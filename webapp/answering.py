@@ -80,6 +80,11 @@ class Answering:
         return max(self._revision, self._error_revision) != self._session.revision
 
     @property
+    def searching(self) -> bool:
+        """True until all modes of the newest answer are known."""
+        return self._search.busy
+
+    @property
     def error(self) -> str | None:
         """Why the present state has no answer."""
         return self._error if self._error_revision == self._session.revision else None
@@ -138,7 +143,10 @@ class Answering:
 
     def _take_modes(self) -> None:
         """All modes of the newest answer are known; what is on the robot stays there if it can."""
-        if self._search.error is not None or self._search.busy:
+        if self._search.busy:
+            return
+        if self._search.error is not None:  # those that are known must do
+            self._changed()
             return
         before, mode = self.modes, self._session.mode
         self._name(self._search.findings or ())

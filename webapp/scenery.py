@@ -11,6 +11,7 @@ from webapp.answering import Answering
 from webapp.comparison import Comparison
 from webapp.dragging import Dragging
 from webapp.improving import Improver
+from webapp.markup.legend import graph_row, legend, overlay_row, set_rows
 from webapp.scene.robot_scene import RobotScene
 from webapp.scene.swim_scene import SwimScene
 from webapp.session import Session
@@ -43,6 +44,8 @@ class Scenery:
             client, session, lambda name: do(partial(session.select, name)), dragging.fin, dragging.wrench
         )
         self.swim = SwimScene(client, swimming)
+        self.legend = ""
+        """What is drawn of the robot that is designed, as markup."""
 
     @property
     def swims(self) -> bool:
@@ -56,8 +59,17 @@ class Scenery:
         found, reply = improver.found, answering.reply
         offered = found.layout if found is not None and found.improved else None
         attention = None if reply is None else reply.attention
-        self.robot.refresh(answering.shown, self._overlaid(comparison), findings, offered, attention)
+        other, display = self._overlaid(comparison), self._session.display
+        self.robot.refresh(answering.shown, other, findings, offered, attention)
         self.robot.show(not self._swimming.swimmers)
+        self.legend = legend(
+            self.robot.newtons,
+            (
+                overlay_row(other, display.dark),
+                graph_row(display.graph, attention is not None, display.dark),
+                set_rows(findings if display.drawn != "none" else None),
+            ),
+        )
         self.refresh_swim()
 
     def refresh_swim(self) -> None:

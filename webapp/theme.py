@@ -39,14 +39,14 @@ FIN_COLORS: tuple[Rgb, ...] = (
 """One colour per fin, in order; asked, delivered and missing keep their three colours to themselves."""
 
 MODE_COLORS: tuple[Rgb, ...] = (
-    (51, 34, 136),  # indigo, teal, wine, olive, ...: Paul Tol's "muted" set, told apart by every eye
-    (68, 170, 153),
-    (136, 34, 85),
-    (153, 153, 51),
-    (17, 119, 51),
+    (92, 92, 196),  # indigo, teal, wine, olive, ...: after Paul Tol's "muted" set, told apart by every eye,
+    (52, 152, 134),  # with the dark ones lightened, so that they can be seen on both themes
+    (184, 66, 122),
+    (148, 144, 44),
+    (38, 136, 72),
     (204, 102, 119),
-    (136, 204, 238),
-    (170, 68, 153),
+    (74, 152, 206),
+    (158, 92, 178),
 )
 """One colour per mode, in order."""
 
@@ -101,6 +101,11 @@ DARK = Look(
 def look(dark: bool) -> Look:
     """The look of the dark or the light theme."""
     return DARK if dark else LIGHT
+
+
+def overlay_color(dark: bool) -> Rgb:
+    """Forces of a second method, beside those of the robot."""
+    return (222, 228, 234) if dark else (40, 44, 52)
 
 
 def fin_color(index: int) -> Rgb:

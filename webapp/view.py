@@ -105,9 +105,9 @@ class View:
         return self.answering.busy
 
     @property
-    def newtons(self) -> float:
-        """Force [N] that an arrow of 0.1 m stands for."""
-        return self.scenery.robot.newtons
+    def legend(self) -> str:
+        """What is drawn in the view, as markup."""
+        return self.scenery.legend
 
     def do(self, act: Callable[[], object]) -> None:
         """Carry out an intent; a refusal becomes a note, and the page goes back to what the session holds."""

@@ -6,6 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from webapp.swim_plan import SwimSettings
+from webapp.wishes import Draft
+
 WAIT_MS = 45_000
 """Longest wait for the page: software rendering on a busy machine is slow."""
 PAUSE_S = 0.12
@@ -64,6 +67,7 @@ class Page:
         def restart() -> None:
             self.session.start_over()
             self.session.display = self._display
+            self.session.draft, self.session.swim = Draft(), SwimSettings()
             self.session.compare_with(None)
             self.session.set_overlay(None)
             self.view.improver.forget()

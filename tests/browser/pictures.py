@@ -52,6 +52,17 @@ def _tour(page: Page) -> None:
     page.until(lambda: page.session.stop == 1 and not page.view.busy)
 
 
+def _damage(page: Page) -> None:
+    page.tab("Damage a fin")
+    page.choose("Which fin", "back_left")
+    page.type("Strength [%]", "50")
+    page.row("Stuck").first.click()
+    page.until(lambda: page.session.state.stuck != () and not page.view.busy)
+    page.page.mouse.move(SIZE["width"] - 200, 500)
+    page.page.mouse.wheel(0, 120)
+    page.page.wait_for_timeout(500)
+
+
 def _palette(page: Page) -> None:
     page.key("Control+k")
     page.page.wait_for_timeout(1000)
@@ -64,7 +75,13 @@ def _steer(page: Page) -> None:
     page.press("Play the sweep")
     page.until(lambda: page.session.state.target[1] > 4.5)
     page.press("Stop the sweep")
+    page.press("Turn")
+    page.row("Spring back").first.click()
     _scroll(page)
+    box = page.page.locator("svg.pad:visible").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.drag((x, y), (x - 30, y - 45))
+    page.until(lambda: not page.view.busy)
 
 
 def _layout(page: Page) -> None:
@@ -155,14 +172,15 @@ SCENES: dict[str, Callable[[Page], object]] = {
     "app-view": _view,
     "app-files": lambda page: page.tab("Files"),
     "app-dark": _dark,
+    "app-damage": _damage,
     "app-steer": _steer,
     "app-palette": _palette,
 }
 """Picture and what to do before it, from first sight; those that open folders come after the others."""
 
 
-def main(folder: Path, wanted: list[str]) -> None:
-    """Take the pictures, all or those named."""
+def main(folder: Path, wanted: list[str], dark: bool = False) -> None:
+    """Take the pictures, all or those named, in the light or the dark theme."""
     from playwright.sync_api import sync_playwright
 
     from finlab.assets import shipped_layouts
@@ -177,7 +195,7 @@ def main(folder: Path, wanted: list[str]) -> None:
     server = start_server("127.0.0.1", 0)
     ucat, solver = load_layout(shipped_layouts()["ucat"]), Solver()
     solver.reply(State(ucat, target=FIRST))  # as `serve` does, so that the first page finds a warm solver
-    app = App(server, solver, ucat, Display(shadows=False))
+    app = App(server, solver, ucat, Display(shadows=False, dark=dark))
     with sync_playwright() as playwright:
         browser: Any = playwright.chromium.launch(
             executable_path=CHROMIUM, headless=True, chromium_sandbox=False, args=FLAGS

@@ -95,10 +95,11 @@ def test_real_candidates_are_drawn_and_listed() -> None:
     assert plot.count("onclick") == len(modes) + 1, "one for all samples together"
     assert plot.count("data-k") == len(answer.samples.energy)
     assert mode_plot(answer, modes, nearest, None, 3, 200, "here").count("class='ring'") == 2
-    table = mode_table(modes, len(modes), 0, "here")
+    table = mode_table(modes, len(modes), False, 0, "here")
     assert table.count("onclick") == len(modes) and "0.0000" not in table and "more are" not in table
-    assert "2 more are" in mode_table(modes, len(modes) + 2, 0, "here")
-    assert "no candidates" in mode_table((), 0, 0, "here")
+    assert "2 more are" in mode_table(modes, len(modes) + 2, False, 0, "here")
+    assert "no candidates" in mode_table((), 0, False, 0, "here")
+    assert "looking for more" in mode_table(modes, len(modes), True, 0, "here")
 
 
 def test_figures_keep_their_width() -> None:

@@ -6,7 +6,6 @@ from numpy.typing import ArrayLike
 from finlab.allocation.policy import AXES
 from webapp.state import AXIS_UNITS, AXIS_WORDS
 from webapp.targets import nice_limit
-from webapp.theme import ASKED, DELIVERED, MISSING, css
 
 
 def wrench_bars(asked: ArrayLike, given: ArrayLike | None, sentence: str) -> str:
@@ -45,16 +44,17 @@ def _header(scales: list[float]) -> str:
 
 def _value(value: float, axis: int) -> str:
     digits = 2 if axis < 3 else 3
-    return f"{round(value, digits) + 0.0:+.{digits}f}".replace("-", "−")  # + 0.0 makes -0.0 a plain zero
+    rounded = round(value, digits)
+    return f"{rounded:+.{digits}f}".replace("-", "−") if rounded else f"{0:.{digits}f}"
 
 
 def _track(asked: float, given: float | None) -> str:
     parts = ["<i style='left:50%;top:0;width:1px;height:14px;background:rgba(128,128,128,.55)'></i>"]
-    parts.append(_bar(0.0, asked, 1, 5, css(ASKED)))
+    parts.append(_bar(0.0, asked, 1, 5, "var(--fl-asked)"))
     if given is not None:
-        parts.append(_bar(0.0, given, 8, 5, css(DELIVERED)))
+        parts.append(_bar(0.0, given, 8, 5, "var(--fl-delivered)"))
         if abs(asked - given) > 0.02:
-            parts.append(_bar(given, asked, 8, 5, css(MISSING, 0.75)))
+            parts.append(_bar(given, asked, 8, 5, "var(--fl-missing)"))
     return f"<div class='track'>{''.join(parts)}</div>"
 
 

@@ -1,11 +1,17 @@
 """The table of compared methods."""
 
+import math
 from html import escape
 
-from finlab.allocation.allocation import Allocation
+from finlab.allocation.allocation import REACHED, Allocation
 from webapp.comparison import COMPARED, Comparison
 from webapp.figures import small, three_digits
 from webapp.markup.picking import pick
+
+ERRORS = (1e-12, 10.0)
+"""Errors [σ] at both ends of their bars."""
+TIMES = (0.01, 1000.0)
+"""Times [ms] at both ends of their bars."""
 
 
 def comparison_table(comparison: Comparison, shown: str | None, stale: bool, picker: str) -> str:
@@ -18,15 +24,28 @@ def comparison_table(comparison: Comparison, shown: str | None, stale: bool, pic
     for k, method in enumerate(COMPARED):
         answer = comparison.answers.get(method)
         if isinstance(answer, Allocation):
+            color = "var(--fl-delivered)" if answer.reachable else "var(--fl-missing)"
             cells = (
-                f"<td>{small(answer.err_norm)}</td><td>{three_digits(answer.energy)}</td>"
-                f"<td>{three_digits(answer.solve_ms)}</td>"
+                f"<td>{small(answer.err_norm)}{_bar(answer.err_norm, ERRORS, color)}</td>"
+                f"<td>{three_digits(answer.energy)}</td>"
+                f"<td>{three_digits(answer.solve_ms)}{_bar(answer.solve_ms, TIMES, 'currentColor')}</td>"
             )
         else:
             cells = f"<td colspan='3' class='words dim'>{'…' if answer is None else escape(answer)}</td>"
         kind = "chosen" if method == shown else ""
         rows.append(f"<tr class='{kind} pick' {pick(picker, k + 1)}><td>{method}</td>{cells}</tr>")
     header = "<tr><th>method</th><th>error [σ]</th><th>energy</th><th>time [ms]</th></tr>"
+    said = (
+        f"<div class='said'><span class='given'>Green</span>: delivered, up to {REACHED} σ. "
+        "<span class='missing'>Orange</span>: something is missing. Bars are logarithmic.</div>"
+    )
     note = "<div class='missing'>The question has changed since; compare again.</div>" if stale else ""
     body = "".join(rows)
-    return f"<div class='fl'><table class='methods'>{header}{body}</table>{note}</div>"
+    return f"<div class='fl'><table class='methods'>{header}{body}</table>{said}{note}</div>"
+
+
+def _bar(value: float, ends: tuple[float, float], color: str) -> str:
+    """A thin bar under a number, as long as its logarithm between two ends."""
+    low, high = (math.log10(end) for end in ends)
+    share = (math.log10(max(value, ends[0])) - low) / (high - low)
+    return f"<span class='log'><i style='width:{100 * min(share, 1.0):.0f}%;background:{color}'></i></span>"

@@ -1,6 +1,5 @@
 """What lies over the 3D view: the status line, and the legend of colours and scales."""
 
-import math
 from html import escape
 
 from finlab.allocation.allocation import Allocation
@@ -9,13 +8,13 @@ from webapp.markup.swim_card import pace_words
 from webapp.state import State
 from webapp.swimmer import ERROR
 from webapp.swimming import Swimming
-from webapp.theme import ASKED, DEAD, DELIVERED, MISSING, OTHER, TORQUE_SCALE, css
+from webapp.theme import ASKED, DEAD, DELIVERED, MISSING, OTHER, css
 from webapp.words import reach_sentence
 
 
 def corner(
     state: State,
-    newtons: float,
+    legend: str,
     allocation: Allocation | None,
     busy: bool,
     error: str | None,
@@ -25,14 +24,14 @@ def corner(
 
     Args:
         state: what is asked.
-        newtons: force [N] that an arrow of 0.1 m stands for.
+        legend: what the view shows, as markup.
         allocation: what is on the robot.
         busy: whether a newer answer is on its way.
         error: why there is no answer.
         raw: whether it is a raw command on show, of which nobody expects that it is exact.
     """
     return (
-        f"<div class='fl-corner'><div class='fl fl-card fl-legend-card'>{_legend(newtons)}</div>"
+        f"<div class='fl-corner'><div class='fl fl-card fl-legend-card'>{legend}</div>"
         f"<div class='fl fl-card fl-status'>{_status(state, allocation, busy, error, raw)}</div></div>"
     )
 
@@ -59,27 +58,8 @@ def swim_corner(swimming: Swimming, newtons: float) -> str:
     )
     return (
         f"<div class='fl-corner'><div class='fl fl-card fl-legend-card'><div class='fl-legend'>{trails}</div>"
-        f"<div class='dim' style='margin-top:4px'>arrow 0.1 m = {newtons:g} N</div></div>"
+        f"<div class='dim scales'>arrow 0.1 m = {newtons:g} N</div></div>"
         f"<div class='fl fl-card fl-status'>{''.join(parts)}</div></div>"
-    )
-
-
-def _legend(newtons: float) -> str:
-    # By name, so that the dark theme can lighten them.
-    arrows = [("asked", 0.65), ("delivered", 1.0), ("missing", 1.0)]
-    rows = [f"{_arrow(f'var(--fl-{word})', alpha)}<span>{word}</span>" for word, alpha in arrows]
-    turn = math.degrees(TORQUE_SCALE)
-    return (
-        f"<div class='fl-legend'>{''.join(rows)}</div><div class='dim' style='margin-top:4px'>"
-        f"arrow 0.1 m = {newtons:g} N<br>ring {turn:.0f}° = 1 N m</div>"
-    )
-
-
-def _arrow(color: str, opacity: float) -> str:
-    return (
-        f"<svg width='44' height='10' opacity='{opacity}'>"
-        f"<rect x='0' y='3' width='33' height='4' fill='{color}'/>"
-        f"<path d='M32 0 L44 5 L32 10 Z' fill='{color}'/></svg>"
     )
 
 

@@ -8,12 +8,15 @@ from webapp.modes import NamedMode
 from webapp.theme import css, mode_color
 
 
-def mode_table(modes: tuple[NamedMode, ...], n_modes: int, shown: int | None, picker: str) -> str:
+def mode_table(
+    modes: tuple[NamedMode, ...], n_modes: int, searching: bool, shown: int | None, picker: str
+) -> str:
     """Error, energy, use of the limits and a name for each mode.
 
     Args:
         modes: an answer's modes.
-        n_modes: how many it has; more than are shown.
+        n_modes: how many it has; perhaps more than are shown.
+        searching: whether more may be found.
         shown: which mode moves the fins, None while another command does.
         picker: class of the marker before the buttons that a click on a row presses.
     """
@@ -32,7 +35,8 @@ def mode_table(modes: tuple[NamedMode, ...], n_modes: int, shown: int | None, pi
         "<th title='largest share of a range of amplitude or frequency that is used'>used</th></tr>"
     )
     left = n_modes - len(modes)
-    more = f"<div class='said dim'>{left} more are known; they come after these.</div>" if left > 0 else ""
+    told = "looking for more …" if searching else f"{left} more are known; they come after these."
+    more = f"<div class='said dim'>{told}</div>" if searching or left > 0 else ""
     return f"<div class='fl'><table class='modes'>{header}{''.join(rows)}</table>{more}</div>"
 
 

@@ -12,6 +12,17 @@ def pick(name: str, index: int) -> str:
     return f'onclick="{find}?.click()"'
 
 
+def chosen_button(name: str, index: int | None) -> str:
+    """A style that fills the button at `index` behind the marker: the one whose choice is in force."""
+    if index is None:
+        return marker(name)
+    return (
+        f"<style>div:has(>.{name}) + div button:nth-of-type({index + 1}) "
+        "{ background: var(--mantine-primary-color-filled); color: #fff; }"
+        f"</style>{marker(name)}"
+    )
+
+
 def button_colors(name: str, colors: list[tuple[str, str]]) -> str:
     """A style that paints the buttons behind the marker: background and text colour of each."""
     rules = [

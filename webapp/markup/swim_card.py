@@ -2,7 +2,7 @@
 
 from html import escape
 
-from webapp.figures import listed, three_digits
+from webapp.figures import listed
 from webapp.swimming import Swimming
 from webapp.theme import DELIVERED, OTHER, css
 
@@ -30,8 +30,12 @@ def swim_card(swimming: Swimming) -> str:
     rows = []
     for swimmer, color in zip(swimming.swimmers, (DELIVERED, OTHER), strict=False):
         cells = "".join(
-            f"<td>{'–' if value is None else three_digits(value)}</td>"
-            for value in (swimmer.track_error, swimmer.depth_error, swimmer.power)
+            f"<td>{'–' if value is None else f'{scale * value:.{digits}f}'}</td>"
+            for value, scale, digits in (
+                (swimmer.track_error, 100, 1),
+                (swimmer.depth_error, 100, 1),
+                (swimmer.power, 1, 2),
+            )
         )
         dot = f"<span class='swatch' style='background:{css(color)};min-width:10px'>&nbsp;</span>"
         rows.append(f"<tr><td>{dot}{escape(swimmer.method)}</td>{cells}</tr>")
@@ -44,8 +48,8 @@ def swim_card(swimming: Swimming) -> str:
         )
     header = (
         "<tr><th>method</th>"
-        "<th title='root mean square distance from where it should be'>off the path [m]</th>"
-        "<th title='the same of the depth'>depth [m]</th><th title='inertial, mean'>power [W]</th></tr>"
+        "<th title='root mean square distance from where it should be'>off the path [cm]</th>"
+        "<th title='the same of the depth'>depth [cm]</th><th title='inertial, mean'>power [W]</th></tr>"
     )
     return (
         f"<div class='fl'><div class='said'>{head}</div><table>{header}{''.join(rows)}</table>{warning}</div>"

@@ -7,7 +7,7 @@ import viser
 from webapp.comparison import COMPARED
 from webapp.handles import on_user_change, on_user_click, put
 from webapp.markup.comparison import comparison_table
-from webapp.markup.picking import marker
+from webapp.markup.picking import chosen_button, marker
 from webapp.panels.host import Host
 
 PICKER = "fl-compare"
@@ -23,9 +23,11 @@ class ComparePanel:
             "Compare the methods", icon=viser.Icon.SCALE, hint="On the wrench and the failures of now."
         )
         on_user_click(self._run, lambda: host.do(lambda: host.comparison.start(host.session.state)))
-        gui.add_html(marker(PICKER))
+        self._chosen = gui.add_html(marker(PICKER))
         self._overlay = gui.add_button_group(
-            "Overlay", ("none", *COMPARED), hint="Dark arrows: the fins' forces by that method."
+            "Overlay",
+            ("none", *COMPARED),
+            hint="The fins' forces by that method, as plain arrows over those of the robot.",
         )
         on_user_change(self._overlay, self._choose)
         self._table = gui.add_html("")
@@ -39,4 +41,6 @@ class ComparePanel:
         session, comparison = self._host.session, self._host.comparison
         stale = comparison.state is not None and comparison.state != session.state
         put(self._run, disabled=comparison.running)
+        entries = (None, *COMPARED)
+        put(self._chosen, content=chosen_button(PICKER, entries.index(session.overlay)))
         put(self._table, content=comparison_table(comparison, session.overlay, stale, PICKER))

@@ -21,10 +21,18 @@ class DensityPanel:
         self._shows: Densities | None = None
         series = (
             uplot.Series(label="x"),
-            *(uplot.Series(label=str(i + 1), stroke=css(fin_color(i)), width=2) for i in range(MAX_FINS)),
+            # Fins that do the same have the same curve: each next line is thinner, so that all are seen.
+            *(
+                uplot.Series(label=str(i + 1), stroke=css(fin_color(i)), width=max(6.0 - 1.5 * i, 1.5))
+                for i in range(MAX_FINS)
+            ),
         )
         empty = tuple(np.full(2, float(k == 0)) * [0, 1] for k in range(MAX_FINS + 1))
         with gui.add_folder("What the network proposes", expand_by_default=False) as self._folder:
+            gui.add_html(
+                "<div class='fl dim'>How likely each command is, in the fin's colour; every curve has its "
+                "highest point at the top.</div>"
+            )
             self._plots = [
                 gui.add_uplot(
                     empty,

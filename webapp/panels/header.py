@@ -48,10 +48,10 @@ class Header:
             content = swim_corner(host.swimming, ARROWS_N)
         else:
             answering = host.answering
-            content = corner(host.session.state, host.newtons, host.shown, host.busy, answering.error, raw)
+            content = corner(host.session.state, host.legend, host.shown, host.busy, answering.error, raw)
         put(self._corner, content=content)
         undo, redo = history.undo_name or "nothing", history.redo_name or "nothing"
-        put(self._history, hint=f"Undo: {undo} (Ctrl+Z). Redo: {redo} (Ctrl+Shift+Z). A tour in five steps.")
+        put(self._history, hint=f"Undo: {undo} (Ctrl+Z). Redo: {redo} (Ctrl+Shift+Z). T starts a tour.")
         stop = host.session.stop
         put(self._card, visible=stop is not None, content="" if stop is None else tour_card(stop))
         put(self._stops, visible=stop is not None)

@@ -56,8 +56,8 @@ class Host(Protocol):
         """True while a newer answer is being computed."""
 
     @property
-    def newtons(self) -> float:
-        """Force [N] that an arrow of 0.1 m stands for."""
+    def legend(self) -> str:
+        """What is drawn in the view, as markup."""
 
     def do(self, act: Callable[[], object]) -> None:
         """Carry out an intent: show what changed, or tell the user why not."""

@@ -8,7 +8,7 @@ import viser
 from finlab.analysis import Improvement
 from webapp.figures import listed, three_digits
 from webapp.handles import on_user_change, on_user_click, put
-from webapp.markup.picking import button_colors
+from webapp.markup.picking import button_colors, chosen_button
 from webapp.markup.score_card import score_table
 from webapp.panels.host import Host
 from webapp.theme import css, fin_color
@@ -65,6 +65,7 @@ class ImprovePanel:
             )
             on_user_click(self._cancel, host.improver.cancel)
             self._card = gui.add_html("")
+            gui.add_html(chosen_button("fl-verdict", 0))
             self._verdict = gui.add_button_group(
                 "Result", ("Accept", "Leave"), visible=False, hint="Accepting can be undone."
             )
@@ -119,7 +120,7 @@ class ImprovePanel:
             text = _before_and_after(found)
         elif progress is not None:
             best, before = (three_digits(abs(v)) for v in (progress.best, progress.before))
-            text = f"Best so far {best}, {before} before."
+            text = f"Best so far <b>{best}</b>, {before} before, round {progress.round}."
         elif running:
             text = "Searching …"
         put(self._card, content=f"<div class='fl'>{text}</div>")
@@ -149,7 +150,8 @@ def _before_and_after(found: Improvement) -> str:
     before, after = (three_digits(abs(v)) for v in (found.value_before, found.value_after))
     goal = next(words for words, name in GOAL_WORDS.items() if name == found.goal)
     stopped = " The search was stopped early." if found.cancelled else ""
-    heading = f"<b>{goal.capitalize()}: {before} before, {after} after.</b>{stopped}"
+    unit = "" if found.goal == "mission_energy" else " N"
+    heading = f"<b>{goal.capitalize()}: {before}{unit} before, {after}{unit} after.</b>{stopped}"
     numbers = listed([str(found.layout.index(name) + 1) for name in found.moved])
     table = score_table(found.layout, found.card_after, found.card_before)
     return f"{heading} Fins {numbers} moved; the view shows them as ghosts.{table}"

@@ -73,8 +73,8 @@ class LayoutPanel:
         on_user_change(self._ring, self._copy_around)
         self._add = gui.add_button("Add a fin", icon=viser.Icon.PLUS, hint=f"Up to {MAX_FINS} fins.")
         on_user_click(self._add, lambda: host.do(host.session.add_fin))
-        self._hull = HullPanel(gui, host)
         self._card = gui.add_html("")
+        self._hull = HullPanel(gui, host)
         self._checked: tuple[Layout, tuple[str, ...]] | None = None
 
     def _open(self, name: str) -> None:

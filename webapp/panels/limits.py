@@ -1,20 +1,21 @@
 """What this layout can do: attainable sets in the view, and the score card."""
 
 from functools import partial
-from html import escape
 
 import viser
 
-from webapp.analyst import DRAWN, Findings
+from webapp.analyst import DRAWN
 from webapp.figures import three_digits
 from webapp.handles import Changes, on_user_change, put
+from webapp.markup.picking import chosen_button, marker
 from webapp.markup.score_card import score_table
 from webapp.panels.host import Host
 from webapp.panels.improve import ImprovePanel
-from webapp.scene.attainable_nodes import set_scale
 from webapp.session.looking import PINNED
 from webapp.shipped import shipped
 
+PICKER = "fl-drawn"
+"""Marks the buttons for the set that is drawn."""
 SAVED = "saved state"
 """Entry of the list of layouts for the one that was opened or saved last."""
 
@@ -25,6 +26,7 @@ class LimitsPanel:
     def __init__(self, gui: viser.GuiApi, host: Host) -> None:
         """Build the widgets."""
         self._host = host
+        self._chosen = gui.add_html(marker(PICKER))
         self._drawn = gui.add_button_group(
             "Draw the set of", tuple(DRAWN), hint="Everything that the fins can give, as a body in the view."
         )
@@ -59,6 +61,7 @@ class LimitsPanel:
         put(self._beside, value=session.beside or SAVED)
         self._improve.refresh()
         analyst, display = self._host.analyst, self._host.session.display
+        put(self._chosen, content=chosen_button(PICKER, list(DRAWN).index(display.drawn)))
         put(self._alone, value=display.alone, visible=display.drawn != "none")
         found = analyst.findings
         if not self._changes(found, analyst.busy, analyst.error, session.beside):
@@ -71,18 +74,8 @@ class LimitsPanel:
             note = "<span class='dim'>computing …</span> " if analyst.busy else ""
             if found.now is not None:
                 unit = "N" if found.now.kind == "force" else "N m"
-                note += (
-                    f"0.1 m of the body is {three_digits(0.1 / set_scale(found))} {unit}; green: working fins"
-                    f"{_grey(found)}, blue ball: asked; no point lies further "
-                    f"than {three_digits(found.now.gap)} {unit} outside."
-                )
+                gap = three_digits(found.now.gap)
+                note += f"<span class='dim'>The body lacks at most {gap} {unit} of the true set.</span>"
             name = "before" if session.beside is None else session.beside
             table = score_table(found.question.layout, found.card, found.before, name)
             put(self._card, content=f"<div class='fl'>{note}</div>{table}")
-
-
-def _grey(found: Findings) -> str:
-    """What the grey body stands for."""
-    if found.whole is None:
-        return ""
-    return ", grey: all fins" if found.question.failed else f", grey: {escape(found.question.beside.name)}"

@@ -7,7 +7,7 @@ import viser
 from webapp.channel import Channel
 from webapp.handles import Changes, on_user_change, put
 from webapp.markup.mode_plot import SAMPLES, mode_plot
-from webapp.markup.picking import marker
+from webapp.markup.picking import chosen_button, marker
 from webapp.panels.host import Host
 
 
@@ -22,7 +22,7 @@ class ModePicker:
         self._changes = Changes()
         self._plot = gui.add_html("")
         Channel(gui, f"{name}-{SAMPLES}", self._choose_sample)
-        gui.add_html(marker(name))
+        self._chosen = gui.add_html(marker(name))
         self._choice = gui.add_button_group(
             "Mode",
             ("1",),
@@ -51,6 +51,7 @@ class ModePicker:
         if not self._changes(best, modes, self.shown, sample):
             return
         put(self._choice, options=tuple(str(k + 1) for k in range(len(modes))) or ("1",))
+        put(self._chosen, content=chosen_button(self.name, self.shown))
         plot = ""
         if best is not None:
             nearest = answering.sample_modes

@@ -64,8 +64,10 @@ class ModesPanel:
         put(self._gamma, value=state.gamma)
         self._picker.refresh()
         answering, picker = host.answering, self._picker
-        if self._changes(answering.modes, picker.shown):
-            table = mode_table(answering.modes, answering.n_modes, picker.shown, picker.name)
+        if self._changes(answering.modes, answering.searching, picker.shown):
+            table = mode_table(
+                answering.modes, answering.n_modes, answering.searching, picker.shown, picker.name
+            )
             put(self._table, content=table)
         put(self._step, content=_step_words(host))
         self._density.refresh(host.answering.densities)

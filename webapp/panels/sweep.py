@@ -16,6 +16,8 @@ from webapp.targets import nice_limit
 from webapp.theme import css, fin_color
 
 FONT = "11px sans-serif"
+ROOM = 1.08
+"""Room above the last tick, so that its number is not cut off."""
 EXACT = 0.01
 """Error [σ] up to which a wrench counts as delivered."""
 EVERY_S = 0.25
@@ -91,7 +93,7 @@ class SweepPanel:
         lines[: len(sweep.force)] = sweep.force
         top = nice_limit(float(np.nanmax(sweep.force, initial=0.0)) / 1.2)
         # A scale of its own: the lines of fins that are not there would spoil an automatic one.
-        scales = {"x": uplot.Scale(time=False), "y": uplot.Scale(auto=False, range=(0.0, top))}
+        scales = {"x": uplot.Scale(time=False), "y": uplot.Scale(auto=False, range=(0.0, ROOM * top))}
         name = f"{AXIS_WORDS[sweep.axis]} asked [{AXIS_UNITS[sweep.axis]}]"
         put(self._plot, visible=True, scales=scales, axes=_axes(name))
         put(self._plot, data=(sweep.values, *np.ascontiguousarray(lines)))
@@ -115,6 +117,6 @@ def _sentence(sweep: Sweep) -> str:
 
 def _axes(below: str) -> tuple[uplot.Axis, uplot.Axis]:
     return (
-        uplot.Axis(label=below, labelSize=18, size=26, labelFont=FONT, font=FONT),
+        uplot.Axis(label=below, labelSize=18, size=32, labelFont=FONT, font=FONT),
         uplot.Axis(label="force of each fin [N]", labelSize=18, size=40, labelFont=FONT, font=FONT),
     )

@@ -32,7 +32,7 @@ class SwimPlots:
         """Build them, empty."""
         self._drawn = 0.0
         self._shows: object = None
-        self._error = _plot(gui, (css(DELIVERED), css(OTHER)), "error [m]")
+        self._error = _plot(gui, (css(DELIVERED), css(OTHER)), "off path [cm]")
         self._wrench = _plot(gui, (css(ASKED), css(DELIVERED)), "surge [N]")
         self._force = _plot(gui, tuple(css(fin_color(i)) for i in range(MAX_FINS)), "fins [N]", "time [s]")
         self._axis: viser.GuiDropdownHandle[str] | None = None
@@ -58,7 +58,9 @@ class SwimPlots:
         self._drawn, self._shows = time.monotonic(), key
         record = moments[0].record
         seconds = np.ascontiguousarray(record[:, TIME])
-        lines = [np.interp(seconds, m.record[:, TIME], m.record[:, ERROR]) for m in moments if len(m.record)]
+        lines = [
+            100 * np.interp(seconds, m.record[:, TIME], m.record[:, ERROR]) for m in moments if len(m.record)
+        ]
         lines += [np.full(len(seconds), np.nan)] * (2 - len(lines))
         _draw(self._error, seconds, lines, (0.0, _top(lines)))
         both = [record[:, column + axis] for column in (ASKED_COLUMN, DELIVERED_COLUMN)]
@@ -90,13 +92,15 @@ def _plot(gui: viser.GuiApi, colors: tuple[str, ...], title: str, below: str = "
         axes=_axes(title, below),
         legend=uplot.Legend(show=False),
         cursor=uplot.Cursor(show=False),
-        height=118 if below else 100,
+        height=124 if below else 100,
         visible=False,
     )
 
 
 def _axes(title: str, below: str) -> tuple[uplot.Axis, uplot.Axis]:
     return (
-        uplot.Axis(label=below, labelSize=16 if below else 0, size=24, labelFont=FONT, font=FONT),
+        uplot.Axis(
+            label=below, labelSize=16 if below else 0, size=30 if below else 24, labelFont=FONT, font=FONT
+        ),
         uplot.Axis(label=title, labelSize=16, size=42, labelFont=FONT, font=FONT),
     )

@@ -42,6 +42,7 @@ class TargetPanel:
             )
             for k in range(6)
         ]
+        gui.add_html(marker("fl-reach-end"))
         for k, slider in enumerate(self._sliders):
             on_user_change(slider, partial(self._set_target, k))
         self._ends_for: tuple[Layout, tuple[str, ...]] | None = None
@@ -85,7 +86,9 @@ def _marks(low: float, high: float) -> tuple[tuple[float, str], ...]:
 
 
 def _short(value: float) -> str:
-    return f"{value + 0.0:.2g}".replace("-", "−") if abs(value) < 10 else f"{value:.0f}".replace("-", "−")
+    digits = 0 if abs(value) >= 9.95 else 1
+    rounded = round(value, digits)
+    return f"{rounded:.{digits}f}".replace("-", "−") if rounded else "0"
 
 
 def _hint(axis: int, low: float, high: float, reach: float) -> str:

@@ -1,4 +1,4 @@
-"""Forces of the fins by another method, as dark arrows beside the robot's own."""
+"""Forces of the fins by another method, as plain arrows beside the robot's own."""
 
 import numpy as np
 import viser
@@ -8,8 +8,8 @@ from webapp.handles import put
 from webapp.meshes.arrows import NOTHING, force_arrow
 from webapp.meshes.mesh import Mesh, joined
 from webapp.scene.shape import Shape
+from webapp.theme import overlay_color
 
-COLOR = (40, 44, 52)
 LIFT = np.array([0.0, 0.0, 0.025])
 """The arrows stand a little above the fins' own ones, so that equal ones can be told apart [m]."""
 
@@ -24,15 +24,15 @@ class Overlay:
                 "/robot/overlay",
                 NOTHING.vertices,
                 NOTHING.faces,
-                color=COLOR,
+                color=overlay_color(False),
                 visible=False,
                 cast_shadow=False,
             )
         )
 
-    def refresh(self, answer: Allocation | None, scale: float) -> None:
+    def refresh(self, answer: Allocation | None, scale: float, dark: bool) -> None:
         """Show an answer's forces, arrows of `scale` [m/N]; nothing for None."""
-        put(self._shape.node, visible=answer is not None)
+        put(self._shape.node, visible=answer is not None, color=overlay_color(dark))
         if answer is not None:
             place = np.array([fin.position for fin in answer.layout.fins])
             self._shape.show(_arrows, place, np.nan_to_num(answer.fin_forces) * scale)

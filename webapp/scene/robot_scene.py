@@ -140,7 +140,7 @@ class RobotScene:
         left = offered or (self._session.saved if display.ghost else None)
         self._ghost.show(moved_fins(left, state.layout))
         self._landing.show(self._landings())
-        self._overlay.refresh(other, scale)
+        self._overlay.refresh(other, scale, display.dark)
         target = np.array(state.target)
         self._attainable.refresh(findings if display.drawn != "none" else None, target)
         given = allocation.wrench if allocation is not None else None
