@@ -29,10 +29,22 @@ def test_two_tabs_are_apart(page: Any, new_page: Callable[..., Any]) -> None:
 def test_reload_and_reconnect_restore(page: Any, served: Any) -> None:
     page.type("Fy [N]", "0.5")
     page.until(lambda: page.session.state.target[1] == 0.5)
+    page.tab("Limits")
+    page.choose("Goal", "worst single failure")
+    page.type("Reach ± [m]", "0.03", place=0)
+    page.tab("Swim")
+    page.choose("Path", "square")
+    page.until(lambda: page.session.swim.path == "square" and page.session.draft.ways != ())
     page.page.reload()
     page.ready()
     assert page.view.session is page.session
     page.until(lambda: page.row("Fy [N]").last.input_value() == "0.5")
+    page.tab("Limits")
+    page.until(lambda: page.row("Goal").first.input_value() == "worst single failure")
+    assert page.row("Reach ± [m]").first.input_value() == "0.03"
+    page.tab("Swim")
+    page.until(lambda: page.row("Path").first.input_value() == "square")
+    page.tab("Wrench")
     before = page.view
     disconnect_all(served.server)
     page.until(lambda: before not in served.app.views.values())

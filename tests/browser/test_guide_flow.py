@@ -1,0 +1,62 @@
+"""The tour, the list of commands, and damage that is less than a failure."""
+
+from typing import Any
+
+
+def test_the_tour_sets_each_stop_and_brings_the_work_back(page: Any) -> None:
+    page.type("Fy [N]", "0.5")
+    page.until(lambda: page.session.state.target[1] == 0.5)
+    mine = page.session.state
+    page.press("Tour")
+    page.until(lambda: "1 of 6" in page.text(".tour"))
+    assert page.session.state.target[1] == 0.0
+    for stop in range(2, 5):
+        page.press("Next")
+        page.until(lambda stop=stop: f"{stop} of 6" in page.text(".tour"))
+        page.until(lambda: not page.view.busy)
+    page.press("Next")
+    page.until(lambda: len(page.view.swimming.swimmers) == 1 and page.view.swimming.time > 0.3, seconds=60)
+    page.visible("/robot", False)
+    assert "off the path" in page.text(".fl-status")
+    page.press("Next")
+    page.until(lambda: not page.view.swimming.active)
+    page.visible("/robot")
+    page.until(lambda: "6 of 6 fins" in page.text(".fl-status"))
+    page.press("End")
+    page.until(lambda: page.session.state == mine and page.session.stop is None)
+    assert page.problems == []
+
+
+def test_a_command_is_found_by_its_words(page: Any) -> None:
+    page.key("Control+k")
+    box = page.page.get_by_placeholder("Search commands")
+    box.wait_for()
+    box.fill("heave alone")
+    page.page.get_by_text("Ask for heave alone").wait_for()
+    page.page.keyboard.press("Enter")
+    page.until(lambda: page.session.state.target[2] != 0.0 and page.session.state.target[0] == 0.0)
+    box.wait_for(state="hidden")
+    page.key("n")
+    page.key("f")
+    page.until(lambda: page.session.state.failed == ("front_right",))
+    page.key("Control+z")
+    page.until(lambda: page.session.state.failed == ())
+
+
+def test_a_weak_and_stuck_fin_is_told_and_mended(page: Any) -> None:
+    page.tab("Damage a fin")
+    page.choose("Which fin", "back_left")
+    page.until(lambda: page.session.selected == "back_left")
+    page.type("Strength [%]", "50")
+    page.until(lambda: page.session.state.weak == (("back_left", 0.5),))
+    page.row("Stuck").first.click()
+    page.until(lambda: page.session.state.stuck == (("back_left", 0.0),))
+    page.until(lambda: "weak 50 %, stuck at 0°" in page.text(".damage"))
+    page.until(lambda: not page.view.busy and page.view.shown.command[2, 2] == 0.0)
+    page.page.reload()
+    page.ready()
+    page.until(lambda: "weak 50 %, stuck at 0°" in page.text(".damage"))
+    page.tab("Damage a fin")
+    page.press("All fins")
+    page.until(lambda: page.session.state.health is None)
+    page.page.locator(".damage").wait_for(state="detached")
