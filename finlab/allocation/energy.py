@@ -65,3 +65,27 @@ def command_energy(
     """`J_en` of whole robots: commands (..., n, 3) to energies (...,). Failed fins (NaN) count nothing."""
     energy = fin_energy(command, upper, weights)
     return np.where(np.isnan(energy), 0.0, energy).sum(-1)
+
+
+class EnergyMeter:
+    """The energy proxy of one robot whose fins are all healthy, ready for many commands."""
+
+    def __init__(self, upper: NDArray[np.float64], weights: EnergyWeights = DEFAULT_WEIGHTS) -> None:
+        """Make it for upper limits (n, 3)."""
+        self.weights = weights
+        squares = np.tile([weights.amplitude, weights.frequency, weights.zero_direction], len(upper))
+        self._exact = energy_scale(upper), squares
+        self._rough = energy_scale(upper).astype(np.float32), squares.astype(np.float32)
+
+    def __call__(self, command: NDArray[np.floating]) -> NDArray[Any]:
+        """Energies (R,) of commands (R, n, 3)."""
+        scale, squares = self._rough if command.dtype == np.float32 else self._exact
+        scaled = command / scale
+        a, f = scaled[..., 0], scaled[..., 1]
+        beats = np.einsum("rn,rn->r", a, f)
+        beats *= self.weights.product
+        if self.weights.inertial:
+            beats += self.weights.inertial * ((a * f) ** 2 * f).sum(-1)
+        scaled *= scaled
+        beats += scaled.reshape(len(scaled), -1).dot(squares)
+        return beats

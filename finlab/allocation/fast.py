@@ -67,7 +67,7 @@ class FastAllocator(LearnedAllocator):
         # Slow turns from tick to tick are a search of their own; the network learned the usual energy.
         if previous is not None or self.energy_weights != DEFAULT_WEIGHTS:
             return super()._solve(layout, targets, seed=seed, previous=previous, lead=lead)
-        prepared = self.pipeline.prepare(layout)
+        prepared, notes = self._known(layout)
         target = targets / self.normalization.std
         x = fin_frame_features(prepared.geometry, target - self._scaled_mean).astype(np.float32)
         share = self.network(x).astype(np.float64)
@@ -80,11 +80,11 @@ class FastAllocator(LearnedAllocator):
                 return super()._solve(layout, targets, seed=seed, previous=None, lead=lead)
             command, _ = force_space.realize(prepared.planar, planar)
             wrench = targets - planar.residual * self.normalization.std
-            return Solution(command, wrench, notes=self.notes(layout))
+            return Solution(command, wrench, notes=notes)
         command, _ = force_space.realize(prepared.planar, planar)
         wrench = targets - planar.residual * self.normalization.std
         if missed.any():
             slow = super()._solve(layout, targets[missed], seed=seed, previous=None, lead=lead)
             assert slow.wrench_surrogate is not None
             command[missed], wrench[missed] = slow.command, slow.wrench_surrogate
-        return Solution(command, wrench, notes=self.notes(layout))
+        return Solution(command, wrench, notes=notes)

@@ -26,8 +26,26 @@ Array = NDArray[Any]
 
 RIDGE = 1e-9
 """Relative regularization of the 6 x 6 systems."""
+LEAST = 1e-12
+"""Absolute regularization of them."""
 REST = 1e-5
 """Share of the largest thrust below which a fin's mobility no longer shrinks; it can still come back."""
+
+
+class FreeTerms(NamedTuple):
+    """Parts of the 6 x 6 systems that do not change from step to step."""
+
+    gram: Array
+    """B_i B_i^T (n, 36) of each fin, regularized."""
+    columns: Array
+    """The columns (2n, 6), all horizontal ones first."""
+
+
+def free_terms(columns: Array) -> FreeTerms:
+    """The terms of normalized columns (n, 2, 6)."""
+    gram = np.einsum("nci,ncj->nij", columns, columns)
+    gram += RIDGE * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(6)
+    return FreeTerms(gram.reshape(-1, 36), columns.swapaxes(0, 1).reshape(-1, 6))
 
 
 class PlanarProblem(NamedTuple):
@@ -49,6 +67,8 @@ class PlanarProblem(NamedTuple):
     """Zero direction (n,) [rad] of a fin at rest: the cheapest one."""
     turns_fully: bool
     """Whether every fin may point anywhere."""
+    free: FreeTerms
+    """What is computed ahead for fins that may point anywhere."""
     growth: float = 0.5
     """Exponent with which a fin's energy grows with its thrust: below 1 some fins rest, above 1 all work."""
 
@@ -69,7 +89,9 @@ def mobility(problem: PlanarProblem, thrust: Array) -> Array:
     top = problem.curves.maximum
     kept = np.maximum(thrust, REST * top)
     if problem.growth == 0.5:  # the usual weights, and quicker than a power
-        return kept * np.sqrt(kept * top)
+        root = kept * top
+        kept *= np.sqrt(root, out=root)
+        return kept
     return kept * kept * (top / kept) ** problem.growth
 
 
@@ -115,24 +137,31 @@ def _descend_freely(problem: PlanarProblem, target: Array, thrust: Array, steps:
     A fin asked for more than it has gets its mobility cut in proportion, again and again until it
     holds: the fixed point is the multiplier of its limit.
     """
-    top = problem.curves.maximum
+    top, columns = problem.curves.maximum, problem.free.columns
+    n, rows = len(top), len(thrust)
     weight = mobility(problem, thrust)
     cut = np.ones_like(weight)
-    right = np.ascontiguousarray(target[..., None])
+    right = target[..., None]
     for step in range(steps + 1):
-        weighted = weight * cut
-        multiplier = np.linalg.solve(_gram(problem, weighted), right)[..., 0]
-        wanted = _answer(problem, weighted, multiplier)
-        size = np.sqrt(np.einsum("rnc,rnc->rn", wanted, wanted))
+        weight *= cut
+        gram = weight.dot(problem.free.gram)
+        gram[:, ::7] += LEAST
+        multiplier = np.linalg.solve(gram.reshape(rows, 6, 6), right).reshape(rows, 6)
+        wanted = multiplier.dot(columns.T).reshape(rows, 2, n)
+        wanted *= weight[:, None]
+        squared = wanted * wanted
+        size = squared[:, 0] + squared[:, 1]
+        np.sqrt(size, out=size)
         if step < steps:
-            ratio = top / (size + 1e-12)
-            cut = np.minimum(cut * ratio, 1.0) if (ratio < 1.0).any() or (cut < 1.0).any() else cut
+            cut *= top / (size + 1e-12)
+            np.minimum(cut, 1.0, out=cut)
             weight = mobility(problem, np.minimum(size, top))
     held = np.minimum(np.maximum(size, problem.curves.minimum), top)
-    n = wanted.shape[1]
-    force = wanted * (held / (size + 1e-12))[..., None]
-    reached = force.reshape(len(force), 2 * n) @ problem.columns.reshape(2 * n, 6)
-    return Planar(held, np.arctan2(wanted[..., 1], wanted[..., 0]), target - reached)
+    size += 1e-12
+    direction = np.arctan2(wanted[:, 1], wanted[:, 0])
+    wanted *= (held / size)[:, None]
+    reached = wanted.reshape(rows, 2 * n).dot(columns)
+    return Planar(held, direction, target - reached)
 
 
 def realize(problem: PlanarProblem, planar: Planar) -> tuple[Array, Array]:
@@ -141,7 +170,7 @@ def realize(problem: PlanarProblem, planar: Planar) -> tuple[Array, Array]:
     # A fin at rest points where that costs least.
     resting = planar.thrust <= problem.curves.minimum * (1.0 + 1e-6)
     direction = np.where(resting, problem.idle_direction, planar.direction)
-    energy = (looked_up[..., 2] + problem.direction_cost * direction * direction).sum(-1)
+    energy = np.add.reduce(looked_up[..., 2] + problem.direction_cost * direction * direction, axis=-1)
     looked_up[..., 2] = direction
     return looked_up, energy
 
@@ -163,7 +192,7 @@ def _gram(problem: PlanarProblem, weight: Array, slope: Array | None = None) -> 
         gram = weighted @ problem.products.reshape(n * 4, 36)
     # Every seventh entry of the flattened matrix is on the diagonal.
     diagonal = gram[:, ::7]
-    diagonal += RIDGE * diagonal.sum(1, keepdims=True) + 1e-12
+    diagonal += RIDGE * diagonal.sum(1, keepdims=True) + LEAST
     return gram.reshape(-1, 6, 6)
 
 

@@ -73,7 +73,7 @@ class LearnedAllocator(Allocator):
         # All products here are too small to be shared among threads; chunks of targets are not.
         self._one_thread = single_threaded_products()
         self._fin_model = FinModelSpec.from_values(self.weights.fin_model)
-        self.notes = lru_cache(maxsize=128)(self._notes)
+        self._known = lru_cache(maxsize=128)(self._meet)
 
     @classmethod
     def option_names(cls) -> list[str]:
@@ -89,8 +89,7 @@ class LearnedAllocator(Allocator):
         previous: Array | None,
         lead: Lead = nearest_forces,
     ) -> Solution:
-        prepared = self.pipeline.prepare(layout)
-        notes = self.notes(layout)
+        prepared, notes = self._known(layout)
         if len(targets) == 1:
             with self._one_thread():
                 pool, proposal = self.pipeline.solve(prepared, targets, seed, previous, lead=lead)
@@ -129,6 +128,10 @@ class LearnedAllocator(Allocator):
         return self._solve(
             layout, served.wrench * std, seed=seed, previous=previous, lead=lambda *_: served.force
         )
+
+    def _meet(self, layout: Layout) -> tuple[Prepared, tuple[str, ...]]:
+        """What is computed ahead for a layout, and what the user should know of it."""
+        return self.pipeline.prepare(layout), self._notes(layout)
 
     def _notes(self, layout: Layout) -> tuple[str, ...]:
         """What the user should know before trusting an answer for this layout."""

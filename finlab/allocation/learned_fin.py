@@ -28,73 +28,104 @@ class LearnedFin:
         """
         layers = sorted({int(key.split(".")[1]) for key in weights})
         self._layers = [
-            (
-                np.array(weights[f"net.{i}.weight"], np.float64).T.copy(),
-                np.array(weights[f"net.{i}.bias"], np.float64),
-            )
+            (np.array(weights[f"net.{i}.weight"], np.float64), np.array(weights[f"net.{i}.bias"], np.float64))
             for i in layers
         ]
-        self._rough = [(weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in self._layers]
+        self._columns = [(weight, bias[:, None]) for weight, bias in self._layers]
+        self._rough = [(weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in self._columns]
+        self._rows = [(weight.T.copy(), bias) for weight, bias in self._layers]
         self._a0, self._f0 = reference
         self._unit = unit
+        self._scale = np.array([[reference[0]], [reference[1]]])
+        self._rough_scale = self._scale.astype(np.float32)
 
     def force(self, command: NDArray[np.floating]) -> NDArray[np.floating]:
         """Forces (..., 3) [N] of commands (..., 3), in single precision where the commands are."""
-        flat = command.reshape(-1, 3)
-        layers = self._rough if command.dtype == np.float32 else self._layers
-        a, f, c, s = self._inputs(flat)
-        hidden = _columns(a - 0.5, f - 0.5, c, s)
+        layers = self._rough if command.dtype == np.float32 else self._columns
+        beat, hidden = self._inputs(command.reshape(-1, 3))
+        c, s = hidden[2], hidden[3]
         for weight, bias in layers[:-1]:
-            hidden = hidden @ weight
+            hidden = weight.dot(hidden)
             hidden += bias
             np.tanh(hidden, out=hidden)
         weight, bias = layers[-1]
-        k = (hidden @ weight + bias) * ((a * f) ** 2 * self._unit)[:, None]
-        force = np.empty_like(k)
-        force[:, 0] = k[:, 0]
-        force[:, 1] = c * k[:, 1] - s * k[:, 2]
-        force[:, 2] = s * k[:, 1] + c * k[:, 2]
+        k = weight.dot(hidden)
+        k += bias
+        scale = beat[0] * beat[1]
+        scale *= scale
+        scale *= self._unit
+        k *= scale
+        force = np.empty((k.shape[1], 3), dtype=k.dtype)
+        force[:, 0] = k[0]
+        np.subtract(c * k[1], s * k[2], out=force[:, 1])
+        np.add(s * k[1], c * k[2], out=force[:, 2])
         return force.reshape(command.shape)
 
     def force_and_jacobian(self, command: Array) -> tuple[Array, Array]:
         """Forces (..., 3) and their derivatives (..., 3, 3) by amplitude, frequency and zero direction."""
+        force, by_command = self.force_and_slopes(command)
+        return force, by_command.swapaxes(-1, -2)
+
+    def force_and_slopes(self, command: Array) -> tuple[Array, Array]:
+        """Forces (..., 3) and, for each of the three commands in turn, their derivative by it (..., 3, 3).
+
+        Value and derivatives go through the perceptron together, as four blocks of rows (4, R, width).
+        """
         flat = command.reshape(-1, 3)
         rows = len(flat)
-        a, f, c, s = self._inputs(flat)
-        hidden = _columns(a - 0.5, f - 0.5, c, s)
-        tangent = np.zeros((rows, 3, 4))  # d inputs / d command
-        tangent[:, 0, 0] = 1.0 / self._a0
-        tangent[:, 1, 1] = 1.0 / self._f0
-        tangent[:, 2, 2], tangent[:, 2, 3] = -s, c
-        for weight, bias in self._layers[:-1]:
-            hidden = np.tanh(hidden @ weight + bias)
-            slope = 1.0 - hidden * hidden
-            tangent = (tangent.reshape(rows * 3, -1) @ weight).reshape(rows, 3, -1) * slope[:, None]
-        weight, bias = self._layers[-1]
-        k = hidden @ weight + bias
-        dk = (tangent.reshape(rows * 3, -1) @ weight).reshape(rows, 3, 3)  # (rows, command, coefficient)
-        scale = (a * f) ** 2 * self._unit
-        dk *= scale[:, None, None]
-        dk[:, 0] += (2.0 * self._unit / self._a0 * a * f * f)[:, None] * k
-        dk[:, 1] += (2.0 * self._unit / self._f0 * a * a * f)[:, None] * k
-        k *= scale[:, None]
-        force = _columns(k[:, 0], c * k[:, 1] - s * k[:, 2], s * k[:, 1] + c * k[:, 2])
-        jacobian = np.empty((rows, 3, 3))
-        c3, s3 = c[:, None], s[:, None]
-        jacobian[:, 0] = dk[:, :, 0]
-        jacobian[:, 1] = c3 * dk[:, :, 1] - s3 * dk[:, :, 2]
-        jacobian[:, 2] = s3 * dk[:, :, 1] + c3 * dk[:, :, 2]
-        jacobian[:, 1, 2] -= force[:, 2]
-        jacobian[:, 2, 2] += force[:, 1]
-        return force.reshape(command.shape), jacobian.reshape(*command.shape, 3)
+        beat, inputs = self._inputs(flat)
+        (a, f), c, s = beat, inputs[2], inputs[3]
+        weight, bias = self._rows[0]
+        hidden, slope = _activated(inputs.T.dot(weight), bias)
+        both = np.empty((4, *hidden.shape))
+        both[0] = hidden
+        np.multiply(slope, weight[0] / self._a0, out=both[1])
+        np.multiply(slope, weight[1] / self._f0, out=both[2])
+        by_direction = np.multiply(c[:, None], weight[3], out=both[3])
+        by_direction -= s[:, None] * weight[2]
+        by_direction *= slope
+        for weight, bias in self._rows[1:-1]:
+            both = both.reshape(4 * rows, -1).dot(weight).reshape(4, rows, -1)
+            hidden, slope = _activated(both[0], bias)
+            both[1:] *= slope
+            both[0] = hidden
+        weight, bias = self._columns[-1]
+        k = weight.dot(both.reshape(4 * rows, -1).T).reshape(3, 4, rows)
+        value = k[:, 0]
+        value += bias
+        # The coefficients are scaled by (a f)^2, which has derivatives of its own.
+        af = a * f
+        af *= self._unit
+        by_a = value * (af * f * (2.0 / self._a0))
+        by_f = value * (af * a * (2.0 / self._f0))
+        af *= a
+        af *= f
+        k *= af
+        k[:, 1] += by_a
+        k[:, 2] += by_f
+        # So has the turn about the shaft, by which the force follows the zero direction.
+        k[1, 3] -= k[2, 0]
+        k[2, 3] += k[1, 0]
+        turned = np.empty((rows, 4, 3))
+        turned[:, :, 0] = k[0].T
+        np.subtract(c * k[1], s * k[2], out=turned[:, :, 1].T)
+        np.add(s * k[1], c * k[2], out=turned[:, :, 2].T)
+        return turned[:, 0].reshape(command.shape), turned[:, 1:].reshape(*command.shape, 3)
 
-    def _inputs(self, flat: Array) -> tuple[Array, Array, Array, Array]:
-        return flat[:, 0] / self._a0, flat[:, 1] / self._f0, np.cos(flat[:, 2]), np.sin(flat[:, 2])
+    def _inputs(self, flat: Array) -> tuple[Array, Array]:
+        """Normalized amplitude and frequency (2, R) of commands (R, 3); what the perceptron sees (4, R)."""
+        values = flat.T
+        beat = values[:2] / (self._rough_scale if flat.dtype == np.float32 else self._scale)
+        inputs = np.empty((4, len(flat)), dtype=flat.dtype)
+        np.subtract(beat, 0.5, out=inputs[:2])
+        np.cos(values[2], out=inputs[2])
+        np.sin(values[2], out=inputs[3])
+        return beat, inputs
 
 
-def _columns(*columns: Array) -> Array:
-    """Vectors (R,) side by side; `np.stack` takes four times as long for so few."""
-    result = np.empty((len(columns[0]), len(columns)), dtype=columns[0].dtype)
-    for i, column in enumerate(columns):
-        result[:, i] = column
-    return result
+def _activated(hidden: Array, bias: Array) -> tuple[Array, Array]:
+    """Hyperbolic tangent of a layer (R, width) and its derivative."""
+    hidden = hidden + bias
+    np.tanh(hidden, out=hidden)
+    slope = hidden * hidden
+    return hidden, np.subtract(1.0, slope, out=slope)

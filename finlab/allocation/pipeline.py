@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation import force_space
-from finlab.allocation.energy import DEFAULT_WEIGHTS, EnergyWeights, command_energy
+from finlab.allocation.energy import DEFAULT_WEIGHTS, EnergyWeights
 from finlab.allocation.force_space import PlanarProblem
 from finlab.allocation.foresight import foresee
 from finlab.allocation.learned_fin import LearnedFin
@@ -24,7 +24,7 @@ from finlab.allocation.levenberg_marquardt import refine
 from finlab.allocation.nearest import nearest, wrench_of
 from finlab.allocation.numpy_network import NumpyNetwork
 from finlab.allocation.prepared import Prepared, prepare
-from finlab.allocation.proposal import Proposal, propose
+from finlab.allocation.proposal import Proposal, Proposer, propose
 from finlab.allocation.steady import TURNS, planar_thrust, turn_little, turn_short
 from finlab.allocation.weights import LearnedWeights
 from finlab.errors import AllocationError
@@ -105,6 +105,7 @@ class Pipeline:
         """Take over trained weights; energies are compared by `energy_weights`."""
         self.settings, self.normalization = settings, weights.normalization
         self.network = NumpyNetwork(weights.network, weights.heads, weights.n_components)
+        self.propose: Proposer = partial(propose, self.network)
         fin = LearnedFin(weights.surrogate, weights.reference, weights.force_unit)
         std = self.normalization.std
         self.prepare = lru_cache(maxsize=128)(lambda layout: prepare(layout, fin, std, energy_weights))
@@ -130,9 +131,7 @@ class Pipeline:
         std, settings = self.normalization.std, self.settings
         target = targets / std
         centred = target - self.normalization.mean / std
-        proposal = propose(
-            self.network, prepared, centred, target, settings.n_candidates, settings.temperature, seed
-        )
+        proposal = self.propose(prepared, centred, target, settings.n_candidates, settings.temperature, seed)
         if previous is None:
             seeds = self._seeds(prepared, proposal)
             return self._descend(prepared, target, proposal, seeds, lead), proposal
@@ -246,11 +245,14 @@ class Pipeline:
         """Thrust seeds (N, S, n): the best candidate of each component, and sub-layouts."""
         score = proposal.error * proposal.error + self.settings.gamma * proposal.energy
         chosen = _best_of_each_component(proposal.component, score, self.settings.n_seeds)
-        seeds = proposal.thrust[np.arange(len(score))[:, None], chosen].astype(np.float64)
-        if not self.settings.subsets:
-            return seeds
-        shared = np.broadcast_to(prepared.subsets, (len(score), *prepared.subsets.shape))
-        return np.concatenate([seeds, shared], axis=1)
+        rows, k = score.shape
+        count = chosen.shape[1]
+        seeds = np.empty((rows, count + len(prepared.subsets) * self.settings.subsets, len(prepared.lower)))
+        chosen += np.arange(0, rows * k, k)[:, None]
+        seeds[:, :count] = proposal.thrust.reshape(rows * k, -1).take(chosen, axis=0)
+        if self.settings.subsets:
+            seeds[:, count:] = prepared.subsets
+        return seeds
 
     def _search(
         self,
@@ -266,7 +268,7 @@ class Pipeline:
         With `steady`, the first seed is where the robot is; what it leads to stays first.
         """
         rows, n_seeds, n = thrust.shape
-        flat = np.repeat(target, n_seeds, axis=0)
+        flat = target if rows == 1 else np.repeat(target, n_seeds, axis=0)
         steps = steps or self.settings.search_steps or (4 if n < 6 else 12)
         planar = force_space.descend(prepared.planar, flat, thrust.reshape(-1, n), steps)
         command, energy = force_space.realize(prepared.planar, planar)
@@ -278,7 +280,7 @@ class Pipeline:
             np.argsort(score, axis=1)[:, : keep or self.settings.n_refined]
             + np.arange(rows)[:, None] * n_seeds
         )
-        return command[kept]
+        return command.take(kept, axis=0)
 
     def _refine(
         self, prepared: Prepared, target: Array, command: Array, steps: int, steady: bool = False
@@ -289,18 +291,19 @@ class Pipeline:
         `SWITCH_GAIN` of its energy to take its place.
         """
         rows, p, n, _ = command.shape
-        repeated = np.repeat(target, p, axis=0)
+        repeated = target if rows == 1 else np.repeat(target, p, axis=0)
         refined = refine(prepared.commands, repeated, command.reshape(-1, n, 3), steps)
-        energy = command_energy(refined.command, prepared.upper, prepared.weights)
-        cost = energy.reshape(rows, p).copy()
+        energy = prepared.energy(refined.command)
+        cost = energy.reshape(rows, p)
         if steady:
+            cost = cost.copy()
             cost[:, 0] *= 1.0 - SWITCH_GAIN
         error = refined.error.reshape(rows, p)
         order = (
             np.argsort(np.where(error > TOLERANCE, INEXACT * (1.0 + error), cost), axis=1)
             + np.arange(rows)[:, None] * p
         )
-        return Pool(refined.command[order], refined.wrench[order], refined.error[order], energy[order])
+        return Pool(*(values.take(order, axis=0) for values in (*refined, energy)))
 
 
 def _fresh_starts(prepared: Prepared, proposed: Array, count: int) -> Array:

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.energy import DEFAULT_WEIGHTS, EnergyWeights, energy_scale
-from finlab.allocation.force_space import PlanarProblem
+from finlab.allocation.energy import DEFAULT_WEIGHTS, EnergyMeter, EnergyWeights, energy_scale
+from finlab.allocation.force_space import PlanarProblem, free_terms
 from finlab.allocation.learned_fin import LearnedFin
 from finlab.allocation.levenberg_marquardt import CommandProblem
 from finlab.allocation.thrust_curve import thrust_curves
@@ -39,8 +39,10 @@ class Prepared(NamedTuple):
     """The layout for the refinement of commands."""
     subsets: Array
     """Thrust seeds (S, n) [N] of sub-layouts: the fins outside are nearly at rest."""
-    weights: EnergyWeights = DEFAULT_WEIGHTS
-    """By which energies are compared."""
+    energy: EnergyMeter
+    """By which answers are compared."""
+    usual_energy: EnergyMeter
+    """By which the network's candidates are ranked: the one that it has learned to keep low."""
 
 
 def prepare(
@@ -71,6 +73,7 @@ def prepare(
         direction_cost=cost,
         idle_direction=np.clip(0.0, lower[:, 2], upper[:, 2]),
         turns_fully=bool((arc >= FULL_TURN).all()),
+        free=free_terms(in_plane),
         growth=1.5 if weights.inertial else 0.5,
     )
     return Prepared(
@@ -80,7 +83,8 @@ def prepare(
         planar,
         CommandProblem(fin, columns, lower, upper, arc >= FULL_TURN),
         _subset_seeds(curves.maximum),
-        weights,
+        EnergyMeter(upper, weights),
+        EnergyMeter(upper),
     )
 
 

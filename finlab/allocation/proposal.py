@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.energy import command_energy
-from finlab.allocation.numpy_network import MixtureArrays, NumpyNetwork
+from finlab.allocation.numpy_network import MixtureArrays
 from finlab.allocation.prepared import Prepared
 from finlab.data.features import fin_frame_features
 
@@ -33,7 +32,34 @@ class Proposal(NamedTuple):
     """Energy proxy (N, K)."""
 
 
-def predict(network: NumpyNetwork, prepared: Prepared, centred: Array) -> MixtureArrays:
+class Network(Protocol):
+    """The allocator network, whatever runs it."""
+
+    def __call__(
+        self, x: Array, target: Array, lower: NDArray[np.floating], upper: NDArray[np.floating]
+    ) -> MixtureArrays:
+        """The mixture; arguments as in `NumpyNetwork`."""
+        ...
+
+
+class Proposer(Protocol):
+    """`propose` with its network, or an engine that does the whole of it by itself."""
+
+    def __call__(
+        self,
+        prepared: Prepared,
+        centred: Array,
+        target: Array,
+        n_candidates: int,
+        temperature: float,
+        seed: int,
+        /,
+    ) -> Proposal:
+        """K candidates for each target; arguments as in `propose`."""
+        ...
+
+
+def predict(network: Network, prepared: Prepared, centred: Array) -> MixtureArrays:
     """The network's mixture for normalized, centred targets (N, 6)."""
     x = fin_frame_features(prepared.geometry, centred).astype(np.float32)
     return network(x, centred.astype(np.float32), prepared.lower, prepared.upper)
@@ -50,7 +76,7 @@ def sample(
     """
     rows, n, m, _ = mixture.mean.shape
     kept = min(m, n_samples)
-    means = np.swapaxes(mixture.mean, 1, 2)  # (N, M, n, 3)
+    means = mixture.mean.swapaxes(1, 2)  # (N, M, n, 3)
     component = np.broadcast_to(np.arange(kept), (rows, kept))
     extra = n_samples - kept
     if extra <= 0:
@@ -60,7 +86,8 @@ def sample(
     draw = raw * cumulative[:, None, -1:]
     drawn = np.minimum((draw > cumulative[:, None, :]).sum(-1), m - 1)
     row = np.arange(rows)[:, None]
-    noise = normal * np.swapaxes(mixture.std, 1, 2)[row, drawn]
+    noise = mixture.std.swapaxes(1, 2)[row, drawn]
+    noise *= normal
     noise *= np.float32(np.sqrt(temperature))
     noise += means[row, drawn]
     return np.concatenate([means, noise], axis=1), np.concatenate([component, drawn], axis=1)
@@ -83,7 +110,7 @@ def draws_of_one(seed: int, extra: int, n: int) -> tuple[Array, Array]:
 
 
 def propose(
-    network: NumpyNetwork,
+    network: Network,
     prepared: Prepared,
     centred: Array,
     target: Array,
@@ -94,8 +121,7 @@ def propose(
     """Predict, sample, clamp and score.
 
     Args:
-        network: the allocator network; one that has a method `propose` of its own does it all by itself, as
-            engines on board do.
+        network: what predicts the mixture.
         prepared: the layout.
         centred: normalized targets minus the mean (N, 6), which the network sees.
         target: normalized targets (N, 6).
@@ -103,35 +129,19 @@ def propose(
         temperature: T.
         seed: seed of the draw.
     """
-    engine = getattr(network, "propose", None)
-    if engine is not None:
-        answer: Proposal = engine(prepared, centred, target, n_candidates, temperature, seed)
-        return answer
-    return propose_by_steps(network, prepared, centred, target, n_candidates, temperature, seed)
-
-
-def propose_by_steps(
-    network: NumpyNetwork,
-    prepared: Prepared,
-    centred: Array,
-    target: Array,
-    n_candidates: int,
-    temperature: float,
-    seed: int,
-) -> Proposal:
-    """`propose` in numpy, with whatever runs the network."""
     x, component = sample(predict(network, prepared, centred), n_candidates, temperature, seed)
-    lower, upper = prepared.lower.astype(np.float32), prepared.upper.astype(np.float32)
     problem = prepared.commands
+    limits = problem.rough
     x = x + np.float32(1.0)
-    x *= np.float32(0.5) * (upper - lower)
-    x += lower
-    command = problem.clamp(x)
+    x *= limits.half
+    x += limits.lower
+    command = problem.clamp_in_place(x)
     rows, k, n, _ = command.shape
     force = problem.fin.force(command)
-    columns = problem.columns.reshape(3 * n, 6).astype(np.float32)
-    wrench = (force.reshape(rows * k, 3 * n) @ columns).reshape(rows, k, 6)
+    wrench = force.reshape(rows * k, 3 * n).dot(problem.rough_columns).reshape(rows, k, 6)
     missing = wrench - target[:, None]
     error = np.sqrt(np.einsum("rki,rki->rk", missing, missing))
-    thrust = np.sqrt(force[..., 1] ** 2 + force[..., 2] ** 2)
-    return Proposal(command, component, wrench, error, thrust, command_energy(command, upper))
+    across = force[..., 1:] * force[..., 1:]
+    thrust = np.sqrt(across[..., 0] + across[..., 1])
+    energy = prepared.usual_energy(command.reshape(rows * k, n, 3)).reshape(rows, k)
+    return Proposal(command, component, wrench, error, thrust, energy)

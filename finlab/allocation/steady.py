@@ -7,6 +7,7 @@ of reach so is the arc widened. `foresight` sees to it that this is rare.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -53,7 +54,7 @@ def turn_little(prepared: Prepared, previous: Array, aim: Array, width: float) -
         idle_direction=np.clip(ahead, lower[:, 2], upper[:, 2]),
         turns_fully=False,
     )
-    commands = prepared.commands._replace(lower=lower, upper=upper, wraps=wraps)
+    commands = replace(prepared.commands, lower=lower, upper=upper, wraps=wraps)
     return prepared._replace(planar=planar, commands=commands)
 
 

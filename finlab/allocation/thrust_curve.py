@@ -8,7 +8,7 @@ one planar force per fin, in which the wrench is linear.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -37,14 +37,30 @@ class ThrustCurves:
     table: Array
     """Amplitude [rad], frequency [Hz] and energy (without zero direction) (n, KNOTS, 3)."""
 
+    @cached_property
+    def _rows(self) -> tuple[Array, Array, Array]:
+        """Range of thrust (n,) [N], all knots (n * KNOTS, 3), and where each fin's begin (n,)."""
+        span = np.maximum(self.maximum - self.minimum, 1e-12)
+        return span, self.table.reshape(-1, 3), np.arange(len(span)) * KNOTS
+
     def lookup(self, thrust: Array) -> Array:
         """Amplitude, frequency, energy (..., n, 3) of thrusts (..., n), clamped to what each fin can."""
-        span = np.maximum(self.maximum - self.minimum, 1e-12)
-        q = np.sqrt(np.sqrt(np.clip((thrust - self.minimum) / span, 0.0, 1.0))) * (KNOTS - 1)
-        index = np.minimum(q.astype(np.int64), KNOTS - 2)
+        span, table, first = self._rows
+        q = (thrust - self.minimum) / span
+        np.minimum(np.maximum(q, 0.0, out=q), 1.0, out=q)
+        np.sqrt(np.sqrt(q, out=q), out=q)
+        q *= KNOTS - 1
+        index = q.astype(np.int64)
+        np.minimum(index, KNOTS - 2, out=index)
         part = (q - index)[..., None]
-        fin = np.arange(len(self.minimum))
-        return self.table[fin, index] * (1.0 - part) + self.table[fin, index + 1] * part
+        index += first
+        found: Array = table.take(index, axis=0)
+        found *= 1.0 - part
+        index += 1
+        above = table.take(index, axis=0)
+        above *= part
+        found += above
+        return found
 
 
 def thrust_curves(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from finlab.allocation.numpy_network import MixtureArrays
 from finlab.allocation.pipeline import Pipeline, Settings
 from finlab.allocation.prepared import Prepared
-from finlab.allocation.proposal import Proposal, propose_by_steps
+from finlab.allocation.proposal import Proposal, propose
 from finlab.allocation.weights import LearnedWeights
 from finlab.deploy.bundle import NETWORK
 from finlab.deploy.bundle_file import RobotBundle
@@ -41,10 +41,8 @@ def use_engine(pipeline: Pipeline, bundle: RobotBundle, engine: str) -> None:
     if engine not in ENGINES:
         raise DataError(f"engine: expected one of {', '.join(ENGINES)}, got {engine!r:.40}")
     if engine == "onnx":
-        # The pipeline asks the network one thing only, and both engines answer it alike.
         network = OnnxNetwork(bundle.files[NETWORK])
-        proposer = OnnxProposer(network, bundle.weights, pipeline.settings)
-        pipeline.network = proposer  # type: ignore[assignment]
+        pipeline.propose = OnnxProposer(network, bundle.weights, pipeline.settings)
 
 
 class OnnxSession:
@@ -104,12 +102,6 @@ class OnnxProposer:
         self._sessions: OrderedDict[int, tuple[Prepared, OnnxSession]] = OrderedDict()
 
     def __call__(
-        self, x: Array, target: Array, lower: NDArray[np.floating], upper: NDArray[np.floating]
-    ) -> MixtureArrays:
-        """The mixture; arguments as in `NumpyNetwork`."""
-        return self._network(x, target, lower, upper)
-
-    def propose(
         self,
         prepared: Prepared,
         centred: Array,
@@ -117,18 +109,11 @@ class OnnxProposer:
         n_candidates: int,
         temperature: float,
         seed: int,
+        /,
     ) -> Proposal:
         """As `finlab.allocation.proposal.propose`; many targets, or another seed than 0, go by steps."""
         if len(target) != 1 or seed != SEED or n_candidates <= self._weights.n_components:
-            return propose_by_steps(
-                self._network,  # type: ignore[arg-type]
-                prepared,
-                centred,
-                target,
-                n_candidates,
-                temperature,
-                seed,
-            )
+            return propose(self._network, prepared, centred, target, n_candidates, temperature, seed)
         parts = self._session(prepared).run(
             target=centred.astype(np.float32), wanted=target.astype(np.float32)
         )

@@ -111,7 +111,7 @@ def _onnx_findings(runtime: Runtime, alive: list[int]) -> list[Finding]:
     cases = runtime.bundle.graph.self_test
     scaled = (np.array([case.wrench for case in cases]) - normalization.mean) / normalization.std
     by_numpy = predict(runtime.allocator.pipeline.network, prepared, scaled)
-    by_onnx = predict(network, prepared, scaled)  # type: ignore[arg-type]
+    by_onnx = predict(network, prepared, scaled)
     parts = [np.abs(a - b) for a, b in zip(by_numpy, by_onnx, strict=True)]
     parts[1][..., 2] = np.minimum(parts[1][..., 2], np.abs(2.0 - parts[1][..., 2]))  # an angle: -1 is 1
     command = np.array([[case.command[i] for i in alive] for case in cases], dtype=np.float32)
