@@ -47,7 +47,7 @@ class Ipopt(SingleTarget):
 
     def __init__(self, normalization: Normalization, *, n_starts: int = 8) -> None:
         super().__init__(normalization, n_starts=n_starts)
-        self._casadi = _import_casadi()
+        self._casadi = import_casadi()
         self._solver = lru_cache(CACHE_SIZE)(self._build)
 
     def _minimize(self, problem: Problem, start: Array) -> Array:
@@ -107,7 +107,7 @@ def _bessel_j1(x: Any) -> Any:
     return total
 
 
-def _import_casadi() -> Any:
+def import_casadi() -> Any:
     try:
         import casadi
     except ImportError as error:

@@ -1,4 +1,5 @@
-"""`finlab eval steadiness|modes`: what an allocator does from tick to tick, and how many ways it knows."""
+"""`finlab eval steadiness|modes|unreachable`: what an allocator does from tick to tick,
+how many ways it knows, and what it delivers of wrenches out of reach."""
 
 from __future__ import annotations
 
@@ -83,3 +84,28 @@ def modes(
     rows = mode_rows(load_allocator(checkpoint), cases, n_starts=starts, seed=seed)
     write_json(json, {"rows": rows})
     print(mode_report(rows, starts))
+
+
+@verbs.command
+def unreachable(
+    layouts: Count = 50,
+    seed: Count = 0,
+    checkpoint: Checkpoint = None,
+    json: JsonFile = None,
+) -> None:
+    """Ask for wrenches out of reach; what each policy delivers against the best possible.
+
+    Args:
+        layouts: random layouts of 2 to 8 fins per kind of limits, with one target each.
+        seed: draws layouts and targets.
+        checkpoint: trained checkpoint; the shipped one by default.
+        json: file for the rows.
+    """
+    from finlab.allocation import load_allocator
+    from finlab.evaluation.unreachable import unreachable_report, unreachable_rows
+
+    check_positive("layouts", layouts)
+    check_writable(json)
+    rows = unreachable_rows(load_allocator(checkpoint), n_layouts=layouts, seed=seed)
+    write_json(json, {"rows": rows})
+    print(unreachable_report(rows))

@@ -99,3 +99,20 @@ def test_a_general_solver_finds_nothing_nearer(learned: LearnedAllocator) -> Non
     )
     mine = 0.5 * ((nearest(planar, target[None]).wrench[0] - target) ** 2).sum()
     assert mine == pytest.approx(found.fun, rel=1e-5)
+
+
+def test_where_forces_are_unique_the_weakest_fin_sets_the_share(learned: LearnedAllocator) -> None:
+    """Three fins span all six axes: the share of a target is what the most loaded of them can give."""
+    checked = 0
+    for seed in range(5100, 5140):
+        rng = np.random.default_rng(seed)
+        planar = learned.pipeline.prepare(random_layout(rng, n_fins=3)).planar
+        target = rng.standard_normal(6) * 6.0
+        flat = planar.columns.reshape(6, 6)
+        if np.linalg.cond(flat) > 50.0:
+            continue
+        load = np.linalg.norm(np.linalg.solve(flat.T, target).reshape(3, 2), axis=1) / planar.curves.maximum
+        found = nearest_along(planar, target).wrench[0]
+        np.testing.assert_allclose(found, target * min(1.0, 1.0 / load.max()), atol=1e-4)
+        checked += 1
+    assert checked > 20
