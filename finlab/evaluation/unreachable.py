@@ -128,8 +128,8 @@ def unreachable_report(rows: Sequence[Row]) -> str:
     """The rows as a table, with what its columns mean."""
     note = (
         "Scored by the plant against the best that IPOPT finds in the fins' planar forces. excess: closest, "
-        "and priority for its first group: normalized error beyond the least possible; direction: share of the "
-        "target lacking to the largest possible. beside: normalized wrench beside that share."
+        "and priority for its first group: normalized error beyond the least possible; direction: share of "
+        "the target lacking to the largest possible. beside: normalized wrench beside that share."
     )
     return f"{text_table(rows)}\n\n{note}"
 
