@@ -44,15 +44,52 @@ class Changes:
 
 
 def on_user_change(handle: Any, act: Callable[[Any], None]) -> None:
-    """Call `act(value)` on the event loop when the user changes an input; our own writes are not heard."""
+    """Call `act(value)` on the event loop when the user changes an input; our own writes are not heard.
+
+    Values of another kind than the input's own are not from our page: the input goes back to what it held.
+    Whether a number makes sense is for the session to say.
+    """
+    honest = handle.value
+    buttons = isinstance(handle, viser.GuiButtonGroupHandle)
 
     async def changed(event: Any) -> None:
-        if event.client is not None:
-            act(event.target.value)
+        nonlocal honest
+        if event.client is None:
+            return
+        value = event.target.value
+        if _alike(honest, value):
+            act(value)
+            honest = event.target.value  # what the session has refused is mended by now
+        elif not buttons:
+            handle.value = honest
 
     # A group of buttons is an input whose value is the button that was pressed last.
-    listen = handle.on_click if isinstance(handle, viser.GuiButtonGroupHandle) else handle.on_update
+    listen = handle.on_click if buttons else handle.on_update
     listen(changed)
+
+
+def hold_kind(handle: Any) -> None:
+    """Keep an input that is only read later to values of its own kind."""
+    on_user_change(handle, lambda _: None)
+
+
+def _alike(known: Any, value: Any) -> bool:
+    """Whether two values are of the same kind: texts, switches, numbers, or as many numbers."""
+    if isinstance(known, (tuple, list)):
+        listed = isinstance(value, (tuple, list)) and len(value) == len(known)
+        return listed and all(_alike(a, b) for a, b in zip(known, value, strict=True))
+    if isinstance(known, bool) or isinstance(value, bool):
+        return isinstance(known, bool) and isinstance(value, bool)
+    kind = (int, float) if isinstance(known, (int, float)) else str
+    return isinstance(value, kind)
+
+
+def numbered(button: str, count: int) -> int | None:
+    """Place that a numbered button stands for (`3`, `3 ✕`: 2), of `count`; None for any other text."""
+    number = button.split(" ")[0]
+    if not (number.isdecimal() and len(number) < 6 and 0 < int(number) <= count):
+        return None
+    return int(number) - 1
 
 
 def on_user_click(handle: Any, act: Callable[[], None]) -> None:

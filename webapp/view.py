@@ -4,6 +4,7 @@ Everything here runs on viser's event loop; what takes time is handed to the wor
 """
 
 import asyncio
+import traceback
 from collections.abc import Callable
 from functools import partial
 
@@ -115,6 +116,9 @@ class View:
             act()
         except FinlabError as error:
             self.notify("Not possible", str(error))
+        except Exception as error:  # the page must go on, whatever we have got wrong
+            traceback.print_exc()
+            self.notify("A fault of the app", f"{type(error).__name__}: {error}")
         self._follow_tour()
         self.scenery.apply_theme()
         self._refresh()

@@ -41,7 +41,7 @@ class DisplayPanel:
         """Build the widgets."""
         self._host = host
         self._camera = gui.add_button_group("Camera", tuple(CAMERAS), hint="Keys 1, 2, 3, 4.")
-        on_user_change(self._camera, host.look_from)
+        on_user_change(self._camera, self._look)
         self._speed = gui.add_slider("Motion speed", 0.05, 1.0, 0.05, 0.5, hint="1 is real time.")
         on_user_change(self._speed, partial(self._set, "speed"))
         self._scale = gui.add_dropdown(
@@ -53,6 +53,10 @@ class DisplayPanel:
         }
         for key, switch in self._switches.items():
             on_user_change(switch, partial(self._set, key))
+
+    def _look(self, view: str) -> None:
+        if view in CAMERAS:
+            self._host.look_from(view)
 
     def _set(self, key: str, value: object) -> None:
         self._host.do(partial(self._host.session.set_display, key, value))

@@ -6,7 +6,7 @@ from typing import Any
 import viser
 
 from finlab.layout.body import HULL_SHAPES
-from webapp.handles import on_user_change, put
+from webapp.handles import hold_kind, on_user_change, put
 from webapp.hull_editing import center_of_gravity
 from webapp.meshes.hull import hull_of
 from webapp.meshes.mesh_hull import UNITS
@@ -45,6 +45,7 @@ class HullPanel:
                 self._center, lambda value: host.do(partial(host.session.set_center_of_gravity, value))
             )
             self._unit = gui.add_dropdown("Unit of file", tuple(UNITS), hint="What 1 means in the mesh file.")
+            hold_kind(self._unit)
             self._upload = gui.add_upload_button(
                 "Import a hull (STL, OBJ, GLB)",
                 icon=viser.Icon.UPLOAD,

@@ -7,7 +7,7 @@ import viser
 
 from finlab.analysis import Improvement
 from webapp.figures import listed, three_digits
-from webapp.handles import on_user_change, on_user_click, put
+from webapp.handles import numbered, on_user_change, on_user_click, put
 from webapp.markup.picking import button_colors, chosen_button
 from webapp.markup.score_card import score_table
 from webapp.panels.host import Host
@@ -73,12 +73,13 @@ class ImprovePanel:
 
     def _hold(self, button: str) -> None:
         names = self._host.session.state.layout.names
-        index = int("".join(c for c in button if c.isdigit()) or 0) - 1
-        if 0 <= index < len(names):
+        index = numbered(button, len(names))
+        if index is not None:
             self._draft(lambda draft: draft.with_held_toggled(names[index]))
 
     def _bound(self, way: tuple[float, ...]) -> None:
-        self._draft(lambda draft: draft.with_way(self._whose.value, way))
+        whose = self._whose.value if self._whose.value in self._host.session.state.layout.names else ALL
+        self._draft(lambda draft: draft.with_way(whose, way))
 
     def _draft(self, change: Callable[[Draft], Draft]) -> None:
         session = self._host.session

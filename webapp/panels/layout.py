@@ -10,7 +10,7 @@ import viser
 from finlab.analysis.quick import quick_check
 from finlab.layout import Layout
 from webapp.checks import warnings
-from webapp.handles import on_user_change, on_user_click, put
+from webapp.handles import hold_kind, on_user_change, on_user_click, put
 from webapp.markup.check_card import check_card
 from webapp.panels.host import Host
 from webapp.panels.hull import HullPanel
@@ -22,6 +22,8 @@ NONE = "none"
 """Entry of the list of fins that selects nothing."""
 RINGS = {"z, up": "z", "x, forward": "x", "y, to the left": "y"}
 """Axes that copies can stand around, by what they are called."""
+RING_SIZES = ("2", "3", "4", "5", "6", "8")
+"""How many fins can stand around an axis."""
 OWN = "(edited)"
 """Entry of the list of layouts while the robot is none of them."""
 
@@ -65,9 +67,10 @@ class LayoutPanel:
         self._axis = gui.add_dropdown(
             "Copies around", tuple(RINGS), hint="Axis through the centre of gravity that copies stand around."
         )
+        hold_kind(self._axis)
         self._ring = gui.add_button_group(
             "How many",
-            ("2", "3", "4", "5", "6", "8"),
+            RING_SIZES,
             hint="Copies of the selected fin, so that so many stand evenly around the axis.",
         )
         on_user_change(self._ring, self._copy_around)
@@ -110,7 +113,7 @@ class LayoutPanel:
             self._host.do(acts[button])
 
     def _copy_around(self, button: str) -> None:
-        if button.isdigit():
+        if button in RING_SIZES:
             axis = RINGS.get(self._axis.value, "z")
             self._host.do(partial(self._host.session.ring_of_fins, int(button), axis))
 

@@ -5,7 +5,7 @@ from functools import partial
 import viser
 
 from webapp.channel import Channel
-from webapp.handles import Changes, on_user_change, put
+from webapp.handles import Changes, numbered, on_user_change, put
 from webapp.markup.mode_plot import SAMPLES, mode_plot
 from webapp.markup.picking import chosen_button, marker
 from webapp.panels.host import Host
@@ -31,11 +31,14 @@ class ModePicker:
         on_user_change(self._choice, self._choose)
 
     def _choose(self, entry: str) -> None:
-        if entry.isdigit():
-            self._host.do(partial(self._host.session.show_mode, int(entry) - 1))
+        index = numbered(entry, len(self._host.answering.modes))
+        if index is not None:
+            self._host.do(partial(self._host.session.show_mode, index))
 
     def _choose_sample(self, word: list[str]) -> None:
-        if word[0].isdigit():
+        best = self._host.answering.best
+        count = 0 if best is None or best.samples is None else len(best.samples.energy)
+        if word[0].isdecimal() and int(word[0]) < count:
             self._host.do(partial(self._host.session.show_sample, int(word[0])))
 
     @property

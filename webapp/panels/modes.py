@@ -83,7 +83,8 @@ def _step_words(host: Host) -> str:
         text = words.get(frame, f"Step {frame} of {STEPS}")
     else:
         text = f"Raw sample {sample}"
-        if host.answering.sample_modes is not None and sample is not None:
-            text += f", nearest to mode {host.answering.sample_modes[sample] + 1}"
+        nearest = host.answering.sample_modes
+        if nearest is not None and sample is not None and sample < len(nearest):
+            text += f", nearest to mode {nearest[sample] + 1}"
     error, energy = small(shown.err_norm), three_digits(shown.energy)
     return f"<div class='fl step'><b>{text}</b>: error {error} σ, energy {energy}</div>"

@@ -8,7 +8,7 @@ from viser import uplot
 
 from finlab.layout.layout import MAX_FINS
 from webapp.figures import small
-from webapp.handles import on_user_change, on_user_click, put
+from webapp.handles import hold_kind, on_user_change, on_user_click, put
 from webapp.panels.host import Host
 from webapp.state import AXIS_UNITS, AXIS_WORDS
 from webapp.sweeping import POINTS, Sweep
@@ -39,6 +39,7 @@ class SweepPanel:
             self._range = gui.add_vector2(
                 "From, to", (-5.0, 5.0), step=0.05, hint="Ends of the range [N or N m]."
             )
+            hold_kind(self._range)
             self._play = gui.add_button(
                 "Play the sweep", icon=viser.Icon.PLAYER_PLAY, hint="To and fro until you stop it."
             )

@@ -7,7 +7,7 @@ import viser
 
 from finlab.sim import PLANTS, SHIPPED, Trajectory
 from webapp.comparison import COMPARED
-from webapp.handles import on_user_change, put
+from webapp.handles import numbered, on_user_change, put
 from webapp.markup.picking import button_colors
 from webapp.markup.swim_card import swim_card
 from webapp.pace import SPEEDS
@@ -99,12 +99,10 @@ class SwimPanel:
 
     def _toggle(self, button: str) -> None:
         swimming = self._host.swimming
-        index = int("".join(c for c in button if c.isdigit()) or 0) - 1
-        names = swimming.swimmers[0].fins if swimming.swimmers else ()
-        if 0 <= index < len(names):
+        names = swimming.swimmers[0].fins if swimming.swimmers else self._host.session.state.layout.names
+        index = numbered(button, len(names))
+        if index is not None:
             self._host.do(partial(swimming.toggle, names[index]))
-        else:
-            self._host.notify("Not possible", "Nothing swims yet; press Start.")
 
     def refresh(self) -> None:
         """Write how the swim goes."""

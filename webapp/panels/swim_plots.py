@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from viser import uplot
 
 from finlab.layout.layout import MAX_FINS
-from webapp.handles import put
+from webapp.handles import hold_kind, put
 from webapp.state import AXIS_UNITS, AXIS_WORDS
 from webapp.swimmer import ASKED as ASKED_COLUMN
 from webapp.swimmer import DELIVERED as DELIVERED_COLUMN
@@ -42,6 +42,7 @@ class SwimPlots:
         self._axis = gui.add_dropdown(
             "Plot the wrench of", AXIS_WORDS, hint="Asked in blue, delivered in green, of the first robot."
         )
+        hold_kind(self._axis)
         return self._axis
 
     def refresh(self, swimming: Swimming) -> None:
@@ -50,7 +51,9 @@ class SwimPlots:
         moments = tuple(swimmer.shown for swimmer in swimmers)
         for plot in (self._error, self._wrench, self._force):
             put(plot, visible=bool(swimmers))
-        axis = 0 if self._axis is None else AXIS_WORDS.index(self._axis.value)
+        axis = 0
+        if self._axis is not None and self._axis.value in AXIS_WORDS:
+            axis = AXIS_WORDS.index(self._axis.value)
         key = (axis, *(id(moment) for moment in moments))
         soon = time.monotonic() - self._drawn < EVERY_S and swimming.running
         if not moments or soon or key == self._shows or not len(moments[0].record):

@@ -7,7 +7,7 @@ import numpy as np
 import viser
 
 from finlab.layout import Layout
-from webapp.handles import on_user_change, put
+from webapp.handles import numbered, on_user_change, put
 from webapp.markup.bars import wrench_bars
 from webapp.markup.fins import fin_table
 from webapp.markup.picking import button_colors
@@ -47,8 +47,8 @@ class WrenchPanel:
 
     def _toggle_failure(self, button: str) -> None:
         names = self._host.session.state.layout.names
-        index = int("".join(c for c in button if c.isdigit()) or 0) - 1
-        if 0 <= index < len(names):
+        index = numbered(button, len(names))
+        if index is not None:
             self._host.do(partial(self._host.session.toggle_failure, names[index]))
 
     def refresh(self) -> None:
