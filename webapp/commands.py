@@ -48,7 +48,7 @@ def add_commands(gui: viser.GuiApi, host: Host) -> None:
     add("Play the refinement", host.playback.start)
     add("Stop the sweep", host.sweep.stop)
     add("Swim: pause or go on", lambda: host.swimming.set_running(not host.swimming.running), "B")
-    add("Swim: back to the design", host.end_swim)
+    add("Swim: back to the design", host.scenery.end_swim)
     add("Export the bundle for the robot", host.exports.bundle)
     add("Tour: start, or next stop", session.next_stop, "T")
     add("Start over", session.start_over)
@@ -58,4 +58,4 @@ def add_commands(gui: viser.GuiApi, host: Host) -> None:
     add("Show or hide the centre of gravity", lambda: toggle("center"))
     add("Dark or light theme", lambda: toggle("dark"))
     for view, key in (("3D", "1"), ("Top", "2"), ("Side", "3"), ("Front", "4")):
-        add(f"Camera: {view}", partial(host.look_from, view), key)
+        add(f"Camera: {view}", partial(host.scenery.look_from, view), key)

@@ -15,8 +15,10 @@ from webapp.markup.legend import graph_row, legend, overlay_row, set_rows
 from webapp.scene.robot_scene import RobotScene
 from webapp.scene.swim_scene import SwimScene
 from webapp.session import Session
+from webapp.swim_plan import SwimSettings
 from webapp.swimming import Swimming
 from webapp.theme import BRAND
+from webapp.tour import STEPS
 
 
 class Scenery:
@@ -39,6 +41,7 @@ class Scenery:
         """
         self._client, self._session, self._swimming = client, session, swimming
         self._dark: bool | None = None
+        self._stop: int | None = None
         dragging = Dragging(session, do)
         self.robot = RobotScene(
             client, session, lambda name: do(partial(session.select, name)), dragging.fin, dragging.wrench
@@ -83,6 +86,30 @@ class Scenery:
             self.swim.animate(elapsed)
         else:
             self.robot.animate(elapsed)
+
+    def look_from(self, view: str) -> None:
+        """Move the camera to a view of the robot that is designed."""
+        self.robot.look_from(view)
+
+    def look_after_swim(self, follow: bool) -> None:
+        """Let the camera go along with the first robot that swims, or see all of its path."""
+        if self._swimming.active:
+            self.swim.follow() if follow else self.swim.overlook()
+
+    def end_swim(self) -> None:
+        """Go back from the robot that swims to the one that is designed."""
+        if self._swimming.active:
+            self._swimming.stop()
+            self.look_from("3D")
+
+    def follow_tour(self) -> None:
+        """At some stops of the tour the robot swims; to come to a stop, or to leave the tour, ends a swim."""
+        stop = self._session.stop
+        if stop != self._stop:
+            self._stop = stop
+            self.end_swim()
+            if stop is not None and STEPS[stop].swims:
+                self._swimming.start(SwimSettings().plan(self._session.state, None))
 
     def apply_theme(self) -> None:
         """Light or dark."""

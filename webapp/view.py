@@ -29,10 +29,8 @@ from webapp.scenery import Scenery
 from webapp.session import Session
 from webapp.solver import Solver
 from webapp.sweeping import Sweep
-from webapp.swim_plan import SwimSettings
 from webapp.swimming import Swimming
 from webapp.theme import GREEN, VERMILLION
-from webapp.tour import STEPS
 from webapp.workers import Workers
 
 CARD_REST_S = 0.35
@@ -63,7 +61,6 @@ class View:
         self.session = session
         self._loop = loop
         self._closed = False
-        self._stop: int | None = None
         self._panels: list[Panel] = []
         answers, post, changed = workers.answers, self._post, self._refresh
         refused = partial(self.notify, "Not possible")
@@ -79,7 +76,7 @@ class View:
         self.sweep = Sweep(session, loop, self.do)
         self.exports = Exports(client, session, solver, answers, post, self.notify)
         self._build()
-        self._follow_tour()
+        self.scenery.follow_tour()
         self.scenery.apply_theme()
         self._refresh()
         self._ask()
@@ -105,11 +102,6 @@ class View:
         """True while the newest answer is older than the state."""
         return self.answering.busy
 
-    @property
-    def legend(self) -> str:
-        """What is drawn in the view, as markup."""
-        return self.scenery.legend
-
     def do(self, act: Callable[[], object]) -> None:
         """Carry out an intent; a refusal becomes a note, and the page goes back to what the session holds."""
         try:
@@ -119,7 +111,7 @@ class View:
         except Exception as error:  # the page must go on, whatever we have got wrong
             traceback.print_exc()
             self.notify("A fault of the app", f"{type(error).__name__}: {error}")
-        self._follow_tour()
+        self.scenery.follow_tour()
         self.scenery.apply_theme()
         self._refresh()
         self._ask()
@@ -128,24 +120,9 @@ class View:
         """Show a note to the user."""
         self.client.add_notification(title, body, auto_close_seconds=8.0, color=GREEN if good else VERMILLION)
 
-    def end_swim(self) -> None:
-        """Go back from the robot that swims to the one that is designed."""
-        if self.swimming.active:
-            self.swimming.stop()
-            self.look_from("3D")
-
     def animate(self, elapsed: float) -> None:
         """Let time pass [s]."""
         self.scenery.animate(elapsed)
-
-    def look_from(self, view: str) -> None:
-        """Move the camera."""
-        self.scenery.robot.look_from(view)
-
-    def look_after_swim(self, follow: bool) -> None:
-        """Let the camera go along with the first robot that swims, or see all of its path."""
-        if self.swimming.active:
-            self.scenery.swim.follow() if follow else self.scenery.swim.overlook()
 
     # From the session to the page.
 
@@ -155,15 +132,6 @@ class View:
             self.scenery.refresh(self.answering, self.comparison, self.improver, self.analyst.findings)
             for panel in self._panels:
                 panel.refresh()
-
-    def _follow_tour(self) -> None:
-        """At some stops of the tour the robot swims; to come to a stop, or to leave the tour, ends a swim."""
-        stop = self.session.stop
-        if stop != self._stop:
-            self._stop = stop
-            self.end_swim()
-            if stop is not None and STEPS[stop].swims:
-                self.swimming.start(SwimSettings().plan(self.session.state, None))
 
     # From the session to the workers and back.
 

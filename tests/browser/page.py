@@ -72,8 +72,8 @@ class Page:
             self.session.set_overlay(None)
             self.view.improver.forget()
             self.view.sweep.stop()
-            self.view.end_swim()
-            self.view.look_from("3D")
+            self.view.scenery.end_swim()
+            self.view.scenery.look_from("3D")
 
         self._served.server.get_event_loop().call_soon_threadsafe(self.view.do, restart)
         self.close_notes()

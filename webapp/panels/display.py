@@ -56,7 +56,7 @@ class DisplayPanel:
 
     def _look(self, view: str) -> None:
         if view in CAMERAS:
-            self._host.look_from(view)
+            self._host.scenery.look_from(view)
 
     def _set(self, key: str, value: object) -> None:
         self._host.do(partial(self._host.session.set_display, key, value))

@@ -48,7 +48,9 @@ class Header:
             content = swim_corner(host.swimming, ARROWS_N)
         else:
             answering = host.answering
-            content = corner(host.session.state, host.legend, host.shown, host.busy, answering.error, raw)
+            content = corner(
+                host.session.state, host.scenery.legend, host.shown, host.busy, answering.error, raw
+            )
         put(self._corner, content=content)
         undo, redo = history.undo_name or "nothing", history.redo_name or "nothing"
         put(self._history, hint=f"Undo: {undo} (Ctrl+Z). Redo: {redo} (Ctrl+Shift+Z). T starts a tour.")

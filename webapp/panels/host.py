@@ -15,6 +15,7 @@ from webapp.improving import Improver
 from webapp.playback import Playback
 from webapp.ranging import Beside
 from webapp.resting import Resting
+from webapp.scenery import Scenery
 from webapp.session import Session
 from webapp.sweeping import Sweep
 from webapp.swimming import Swimming
@@ -42,6 +43,8 @@ class Host(Protocol):
     """Other methods on the same question."""
     swimming: Swimming
     """A robot that swims."""
+    scenery: Scenery
+    """What is seen beside the panel."""
     exports: Exports
     """Files to take home."""
     sweep: Sweep
@@ -55,24 +58,11 @@ class Host(Protocol):
     def busy(self) -> bool:
         """True while a newer answer is being computed."""
 
-    @property
-    def legend(self) -> str:
-        """What is drawn in the view, as markup."""
-
     def do(self, act: Callable[[], object]) -> None:
         """Carry out an intent: show what changed, or tell the user why not."""
 
     def notify(self, title: str, body: str, *, good: bool = False) -> None:
         """Show a note to the user."""
-
-    def end_swim(self) -> None:
-        """Go back from the robot that swims to the one that is designed."""
-
-    def look_from(self, view: str) -> None:
-        """Move the camera."""
-
-    def look_after_swim(self, follow: bool) -> None:
-        """Let the camera go along with the first robot that swims, or see all of its path."""
 
 
 class Panel(Protocol):

@@ -53,7 +53,7 @@ class SwimPanel:
         )
         on_user_change(self._speed, partial(self._set, "speed"))
         self._follow = gui.add_checkbox("Follow", False, hint="The camera goes along with the first robot.")
-        on_user_change(self._follow, host.look_after_swim)
+        on_user_change(self._follow, host.scenery.look_after_swim)
         self._paint = gui.add_html("")
         self._fins = gui.add_button_group(
             "Break a fin", ("1",), hint="Press a fin's number: break or mend it while it swims."
@@ -91,7 +91,7 @@ class SwimPanel:
         elif button == "Step":
             self._host.do(swimming.step)
         elif button == "End":
-            self._host.do(self._host.end_swim)
+            self._host.do(self._host.scenery.end_swim)
 
     def _start(self) -> None:
         session = self._host.session
