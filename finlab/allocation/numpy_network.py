@@ -83,10 +83,12 @@ class NumpyNetwork:
         raw = _apply(self.head, hidden).reshape(rows, n, self.n_components, 7)
         everyone = np.add.reduce(hidden.reshape(rows, n, width), axis=1)
         everyone /= np.float32(n)
-        mean = np.empty((rows, n, self.n_components, 3), dtype=np.float32)
+        # In memory each component's commands lie together, since that is how they are drawn.
+        mean = np.empty((rows, self.n_components, n, 3), dtype=np.float32).swapaxes(1, 2)
         np.tanh(raw[..., :2], out=mean[..., :2])
-        mean[..., 2] = _direction(raw[..., 2], raw[..., 3], lower, upper)
-        std = np.exp(-raw[..., 4:])
+        _direction(raw[..., 2], raw[..., 3], lower, upper, mean[..., 2])
+        std = np.empty((rows, self.n_components, n, 3), dtype=np.float32).swapaxes(1, 2)
+        np.exp(np.negative(raw[..., 4:], out=std), out=std)
         std += np.float32(1.0)
         np.divide(_LOG_STD_RANGE, std, out=std)
         std += _LOG_STD_LOW
@@ -233,8 +235,10 @@ def _silu(x: Array) -> Array:
     return np.divide(x, slow, out=slow)
 
 
-def _direction(x: Array, y: Array, lower: NDArray[np.floating], upper: NDArray[np.floating]) -> Array:
-    """Zero directions (N, n, M) in normalized coordinates, as in `AllocatorNetwork`."""
+def _direction(
+    x: Array, y: Array, lower: NDArray[np.floating], upper: NDArray[np.floating], out: Array
+) -> None:
+    """Write zero directions (N, n, M) in normalized coordinates, as in `AllocatorNetwork`, to `out`."""
     low, high = lower[:, 2:], upper[:, 2:]
     half = np.maximum(0.5 * (high - low), 1e-6).astype(np.float32)
     middle = (0.5 * (high + low)).astype(np.float32)
@@ -244,5 +248,4 @@ def _direction(x: Array, y: Array, lower: NDArray[np.floating], upper: NDArray[n
     np.mod(offset, _TURN, out=offset)
     offset -= _TURN / 2
     np.minimum(np.maximum(offset, -half, out=offset), half, out=offset)
-    offset /= half
-    return offset
+    np.divide(offset, half, out=out)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import Any, NamedTuple, Protocol
 
@@ -77,20 +78,24 @@ def sample(
     rows, n, m, _ = mixture.mean.shape
     kept = min(m, n_samples)
     means = mixture.mean.swapaxes(1, 2)  # (N, M, n, 3)
-    component = np.broadcast_to(np.arange(kept), (rows, kept))
+    components = np.empty((rows, n_samples), dtype=np.int64)
+    commands = np.empty((rows, n_samples, n, 3), dtype=np.float32)
+    kept = min(m, n_samples)
+    components[:, :kept] = np.arange(kept)
+    commands[:, :kept] = means[:, :kept]
     extra = n_samples - kept
     if extra <= 0:
-        return means[:, :kept], component
+        return commands, components
     raw, normal = draws_of_one(seed, extra, n) if rows == 1 else _draws(seed, rows, extra, n)
     cumulative = mixture.weight.cumsum(1)
     draw = raw * cumulative[:, None, -1:]
-    drawn = np.minimum((draw > cumulative[:, None, :]).sum(-1), m - 1)
-    row = np.arange(rows)[:, None]
-    noise = mixture.std.swapaxes(1, 2)[row, drawn]
-    noise *= normal
-    noise *= np.float32(np.sqrt(temperature))
-    noise += means[row, drawn]
-    return np.concatenate([means, noise], axis=1), np.concatenate([component, drawn], axis=1)
+    drawn = np.add.reduce(draw > cumulative[:, None, :-1], axis=-1, out=components[:, kept:])
+    place = drawn + np.arange(0, rows * m, m)[:, None]
+    noise = commands[:, kept:]
+    np.multiply(normal, mixture.std.swapaxes(1, 2).reshape(rows * m, n, 3).take(place, axis=0), out=noise)
+    noise *= np.float32(math.sqrt(temperature))
+    noise += means.reshape(rows * m, n, 3).take(place, axis=0)
+    return commands, components
 
 
 def _draws(seed: int, rows: int, extra: int, n: int) -> tuple[Array, Array]:
@@ -132,7 +137,7 @@ def propose(
     x, component = sample(predict(network, prepared, centred), n_candidates, temperature, seed)
     problem = prepared.commands
     limits = problem.rough
-    x = x + np.float32(1.0)
+    x += np.float32(1.0)
     x *= limits.half
     x += limits.lower
     command = problem.clamp_in_place(x)

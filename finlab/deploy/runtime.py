@@ -11,6 +11,7 @@ wrenches and errors are those that the learned surrogate predicts.
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -18,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finlab.allocation.energy import command_energy
+from finlab.allocation.energy import EnergyMeter
 from finlab.allocation.fast import FastAllocator
 from finlab.allocation.learned import LearnedAllocator
 from finlab.allocation.policy import CLOSEST, Policy
@@ -68,6 +69,7 @@ class Runtime:
         self.bundle = bundle
         self.layout: Layout = bundle.graph.layout
         self.failed = bundle.graph.failed
+        self._energy = EnergyMeter(np.array([fin.limits.upper for fin in self.layout.fins]))
         self.engine = engine
         try:
             kind = FastAllocator if fast else LearnedAllocator
@@ -98,20 +100,21 @@ class Runtime:
         )
         assert result.wrench_surrogate is not None
         missing = result.target - result.wrench_surrogate
+        scaled = missing / result.sigma
         return Answer(
             fins=result.fins,
             command=result.command,
             wrench=result.wrench_surrogate,
             unallocated=missing,
-            err_norm=float(np.linalg.norm(missing / result.sigma)),
-            energy=result.energy,
+            err_norm=math.sqrt(scaled.dot(scaled)),
+            energy=self.energy(result.command),
             solve_ms=result.solve_ms,
             notes=result.notes,
         )
 
     def energy(self, command: Array) -> float:
         """Energy proxy of a command (n, 3), NaN for failed fins."""
-        return float(command_energy(command, np.array([fin.limits.upper for fin in self.layout.fins])))
+        return float(self._energy(np.where(np.isnan(command), 0.0, command)[None])[0])
 
     def neutral(self, failed: Sequence[str] = ()) -> Array:
         """Commands (n, 3) that push least: least amplitude and frequency, zero direction nearest to 0."""

@@ -50,13 +50,13 @@ def add_network(g: Builder, weights: Weights, heads: int, n_components: int) -> 
     """From the tensors `features`, `target`, `lower` and `upper` to `weight`, `mean` and `std`."""
     width = len(weights["skip.bias"])
     hidden = "features"
-    for i in range(_count(weights, "graph.", 1)):
+    for i in range(layer_count(weights, "graph.", 1)):
         hidden = g.add("Elu", _graph_layer(g, hidden, weights, f"graph.{i}", heads, width))
     hidden = g.add("Add", hidden, g.linear("features", weights, "skip."))
     wrench = g.linear("target", weights, "wrench.0.")
     wrench = g.linear(g.add("Mul", wrench, g.add("Sigmoid", wrench)), weights, "wrench.2.")
     hidden = _join(g, hidden, wrench, weights, width)
-    for i in range(_count(weights, "transformer.layers.", 2)):
+    for i in range(layer_count(weights, "transformer.layers.", 2)):
         hidden = _transformer_layer(g, hidden, weights, f"transformer.layers.{i}", heads, width)
     hidden = g.layer_norm(hidden, weights, "norm")
     _mixture(g, hidden, weights, n_components)
@@ -76,7 +76,16 @@ def network_weights(model: Model) -> dict[str, NDArray[np.float32]]:
     return state
 
 
-def _count(weights: Weights, prefix: str, place: int) -> int:
+def score_block(attention: NDArray[Any]) -> NDArray[np.float32]:
+    """A GATv2 layer's attention vectors (heads, part) as (width, heads), so that one product scores all."""
+    heads, part = attention.shape
+    block = np.zeros((heads * part, heads), dtype=np.float32)
+    for head in range(heads):
+        block[head * part : (head + 1) * part, head] = attention[head]
+    return block
+
+
+def layer_count(weights: Weights, prefix: str, place: int) -> int:
     """How many layers there are whose names start with `prefix`."""
     return len({key.split(".")[place] for key in weights if key.startswith(prefix)})
 
@@ -90,14 +99,10 @@ def _graph_layer(g: Builder, x: str, weights: Weights, name: str, heads: int, wi
         g.add("Unsqueeze", source, g.integers([1])),
         g.add("Unsqueeze", target, g.integers([2])),
     )
-    attention = weights[f"{name}.attention"]
-    part = width // heads
-    block = np.zeros((width, heads), dtype=np.float32)  # block form: one product scores all heads
-    for head in range(heads):
-        block[head * part : (head + 1) * part, head] = attention[head]
+    block = score_block(weights[f"{name}.attention"])
     score = g.add("MatMul", g.add("LeakyRelu", pair, alpha=0.2), g.weight(f"{name}.attention", block))
     share = g.add("Softmax", g.add("Transpose", score, perm=(0, 3, 1, 2)), axis=-1)  # (N, heads, i, j)
-    out = g.add("MatMul", share, g.split_heads(source, heads, part))
+    out = g.add("MatMul", share, g.split_heads(source, heads, width // heads))
     return g.add("Add", g.join_heads(out, width), g.weight(f"{name}.bias", weights[f"{name}.bias"]))
 
 

@@ -2,6 +2,7 @@
 
 Made in memory on the robot, from weights that were checked, with the layout and the draws of a seed as
 constants. What `finlab.allocation.proposal.propose` does in a hundred small steps of numpy takes one call.
+Commands and forces stand as (3, K, n): one matrix for each of their three numbers.
 """
 
 from __future__ import annotations
@@ -15,8 +16,7 @@ from finlab.allocation.proposal import draws_of_one
 from finlab.allocation.weights import LearnedWeights
 from finlab.deploy.onnx.builder import Builder
 from finlab.deploy.onnx.model import Model
-from finlab.deploy.onnx.network import add_network
-from finlab.deploy.onnx.surrogate import add_fin
+from finlab.deploy.onnx.single_network import TURN, add_hidden, add_mixture
 
 OUTPUTS = ("command", "component", "wrench", "error", "thrust", "energy")
 """In the order of `Proposal`."""
@@ -26,22 +26,21 @@ def proposal_model(weights: LearnedWeights, prepared: Prepared, settings: Settin
     """One target in, K candidates with their scores out."""
     g = Builder()
     n, k, m = len(prepared.lower), settings.n_candidates, weights.n_components
-    lower, upper = (g.weight(name, getattr(prepared, name)) for name in ("lower", "upper"))
-    _features(g, prepared, n)
-    add_network(g, weights.network, weights.heads, m)
-    x = _candidates(g, settings, n, m, seed)
-    x = g.add("Reshape", x, g.integers([k, n, 3]))
-    scale = g.weight("half range", 0.5 * (prepared.upper - prepared.lower))
-    x = g.add("Add", g.add("Mul", g.add("Add", x, g.number(1.0)), scale), lower)
-    _clamp(g, x, prepared, lower, upper)
-    _, horizontal, vertical = add_fin(g, weights.surrogate, weights.reference, weights.force_unit)
-    flat = g.add("Reshape", "fin_force", g.integers([k, 3 * n]))
-    columns = g.weight("columns", prepared.commands.columns.reshape(3 * n, 6))
-    missing = g.add("Sub", g.add("MatMul", flat, columns, name="wrench"), "wanted")
-    g.add("Sqrt", _square_sum(g, missing), name="error")
-    planar = g.add("Add", g.add("Mul", horizontal, horizontal), g.add("Mul", vertical, vertical))
-    g.add("Squeeze", g.add("Sqrt", planar), g.integers([2]), name="thrust")
-    _energy(g, prepared)
+    static = prepared.geometry.static[0]
+    hidden = add_hidden(g, _features(g, prepared, n), static, weights.network, weights.heads)
+    mixture = add_mixture(g, hidden, weights.network, m, prepared.lower, prepared.upper)
+    x = _candidates(g, mixture, settings, n, m, seed)
+    half = 0.5 * (prepared.upper - prepared.lower)
+    x = g.add("Mul", x, g.weight("half range", _rows(half)))
+    x = _clamp(g, g.add("Add", x, g.weight("middle", _rows(half + prepared.lower))), prepared)
+    g.add("Transpose", x, perm=(1, 2, 0), name="command")
+    beat, direction = g.add_many("Split", x, g.integers([2, 1]), names=("beat", "direction"), axis=0)
+    product = g.add("ReduceProd", beat, axes=(0,), keepdims=1)
+    force = _force(g, beat, direction, product, weights, k, n)
+    columns = g.weight("columns", prepared.commands.columns.swapaxes(0, 1))
+    g.add("ReduceSum", g.add("MatMul", force, columns), g.integers([0]), keepdims=0, name="wrench")
+    g.add("ReduceL2", g.add("Sub", "wrench", "wanted"), axes=(1,), keepdims=0, name="error")
+    _energy(g, x, product, prepared)
     shapes: dict[str, tuple[int | str, ...]] = {
         "command": (k, n, 3),
         "component": (k,),
@@ -53,67 +52,96 @@ def proposal_model(weights: LearnedWeights, prepared: Prepared, settings: Settin
     return g.model("finlab proposal", {"target": (1, 6), "wanted": (1, 6)}, shapes, {}, "")
 
 
-def _features(g: Builder, prepared: Prepared, n: int) -> None:
-    """The tensor `features`, as in `finlab.data.features.fin_frame_features`."""
+def _rows(values: np.ndarray) -> np.ndarray:
+    """What belongs to each command (n, 3), to be set beside (3, K, n)."""
+    return values.T[:, None]
+
+
+def _features(g: Builder, prepared: Prepared, n: int) -> str:
+    """Node features (n, 7) that depend on the target, as in `finlab.data.features.fin_frame_features`."""
     geometry = prepared.geometry
-    share = g.add("MatMul", "target", g.weight("solver", geometry.solver[0].T))
-    share = g.add("Reshape", share, g.integers([1, n, 2]))
-    size = g.add("ReduceSum", g.add("Mul", share, share), g.integers([2]), keepdims=1)
+    shares = geometry.solver[0].T.reshape(6, n, 2)
+    projections = 0.1 * geometry.columns[0].reshape(6, n, 2)
+    both = np.concatenate([shares, projections], axis=-1).reshape(6, 4 * n)
+    pair = g.add("Reshape", g.add("MatMul", "target", g.weight("solver", both)), g.integers([n, 4]))
+    share, _ = g.add_many("Split", pair, g.integers([2, 2]), names=("share", "projection"), axis=1)
+    size = g.add("ReduceSumSquare", share, axes=(1,), keepdims=1)
     size = g.add("Sqrt", g.add("Add", size, g.number(1e-8)))
-    projection = g.add("MatMul", "target", g.weight("full wrenches", geometry.columns[0]))
-    projection = g.add("Mul", g.add("Reshape", projection, g.integers([1, n, 2])), g.number(0.1))
-    unit, root = g.add("Div", share, size), g.add("Sqrt", g.add("Sqrt", size))
-    static = g.weight("static", geometry.static)
-    g.add("Concat", static, share, unit, root, projection, axis=-1, name="features")
+    root = g.add("Sqrt", g.add("Sqrt", size))
+    return g.add("Concat", pair, g.add("Div", share, size), root, axis=1)
 
 
-def _candidates(g: Builder, settings: Settings, n: int, m: int, seed: int) -> str:
-    """Normalized commands (K, 3 n): the components' means, then draws; also the output `component`."""
+def _candidates(
+    g: Builder, mixture: tuple[str, str, str], settings: Settings, n: int, m: int, seed: int
+) -> str:
+    """Normalized commands (3, K, n): the components' means, then draws; also the output `component`."""
+    weight, mean, std = mixture
     k = settings.n_candidates
-    means, spread = (
-        g.add("Reshape", g.add("Transpose", name, perm=(0, 2, 1, 3)), g.integers([m, 3 * n]))
-        for name in ("mean", "std")
-    )
     uniform, normal = draws_of_one(seed, k - m, n)
     ladder = g.weight("ladder", np.triu(np.ones((m, m))))  # sums of the weights so far, as a product
-    so_far = g.add("MatMul", "weight", ladder)
-    total = g.add("Slice", so_far, g.integers([m - 1]), g.integers([m]), g.integers([1]))
+    so_far = g.add("MatMul", weight, ladder)
+    so_far, total = g.add_many("Split", so_far, g.integers([m - 1, 1]), names=("so far", "total"), axis=1)
     draw = g.add("Mul", g.weight("uniform", uniform[0]), total)
-    passed = g.add("Slice", so_far, g.integers([0]), g.integers([m - 1]), g.integers([1]))
-    passed = g.add("Cast", g.add("Greater", draw, passed), to=1)  # (E, M - 1)
+    passed = g.add("Cast", g.add("Greater", draw, so_far), to=1)  # (E, M - 1)
     ones, zeros = (g.weight(name, np.full((k - m, 1), v)) for name, v in (("ones", 1.0), ("zeros", 0.0)))
     # 1 at the component that was drawn, 0 at the others.
     chosen = g.add("Sub", g.add("Concat", ones, passed, axis=1), g.add("Concat", passed, zeros, axis=1))
-    noise = g.weight("normal", normal[0].reshape(k - m, 3 * n) * np.float32(np.sqrt(settings.temperature)))
-    drawn = g.add("Add", g.add("Mul", noise, g.add("MatMul", chosen, spread)), g.add("MatMul", chosen, means))
+    noise = np.moveaxis(normal[0], -1, 0) * np.float32(np.sqrt(settings.temperature))
+    spread = g.add("Mul", g.weight("normal", noise), g.add("MatMul", chosen, std))
+    drawn = g.add("Add", spread, g.add("MatMul", chosen, mean))
     numbers = g.weight("numbers", np.arange(m, dtype=np.float32))
     g.add("Concat", numbers, g.add("MatMul", chosen, numbers), axis=0, name="component")
-    return g.add("Concat", means, drawn, axis=0)
+    return g.add("Concat", mean, drawn, axis=1)
 
 
-def _clamp(g: Builder, x: str, prepared: Prepared, lower: str, upper: str) -> None:
-    """The tensor `command` (K, n, 3) inside the limits, zero directions wrapped first."""
-    middle = 0.5 * (prepared.lower[:, 2:] + prepared.upper[:, 2:])
-    beat, direction = g.add_many("Split", x, g.integers([2, 1]), names=("beat", "turned"), axis=-1)
+def _clamp(g: Builder, x: str, prepared: Prepared) -> str:
+    """Commands (3, K, n) inside the limits, zero directions wrapped first."""
+    middle = 0.5 * (prepared.lower[:, 2] + prepared.upper[:, 2])
+    beat, direction = g.add_many("Split", x, g.integers([2, 1]), names=("size", "turned"), axis=0)
     ahead = g.add("Sub", direction, g.weight("behind", middle - np.pi))
-    turns = g.add("Floor", g.add("Div", ahead, g.number(2 * np.pi)))
-    ahead = g.add("Sub", ahead, g.add("Mul", turns, g.number(2 * np.pi)))
-    direction = g.add("Add", ahead, "behind")
-    whole = g.add("Concat", beat, direction, axis=-1)
-    g.add("Min", g.add("Max", whole, lower), upper, name="command")
+    turns = g.add("Floor", g.add("Mul", ahead, g.number(1.0 / TURN)))
+    direction = g.add("Sub", direction, g.add("Mul", turns, g.number(TURN)))
+    whole = g.add("Concat", beat, direction, axis=0)
+    lower, upper = (g.weight(name, _rows(getattr(prepared, name))) for name in ("lower", "upper"))
+    return g.add("Min", g.add("Max", whole, lower), upper)
 
 
-def _energy(g: Builder, prepared: Prepared) -> None:
-    """The output `energy` (K,), as in `finlab.allocation.energy`."""
-    w = DEFAULT_WEIGHTS
-    scaled = g.add("Mul", "command", g.weight("scale", 1.0 / energy_scale(prepared.upper)))
+def _force(
+    g: Builder, beat: str, direction: str, product: str, weights: LearnedWeights, k: int, n: int
+) -> str:
+    """Forces (3, K, n) in the fins' own frames, as in `LearnedFin`; also the output `thrust`."""
+    c, s = g.add("Cos", direction), g.add("Sin", direction)
+    hidden = g.add("Concat", beat, c, s, axis=0)
+    hidden = g.add("Reshape", hidden, g.integers([4, k * n]))
+    state = {name: array.astype(np.float64) for name, array in weights.surrogate.items()}
+    layers = sorted({int(name.split(".")[1]) for name in state})
+    first, last = f"net.{layers[0]}", f"net.{layers[-1]}"
+    # How commands are scaled and shifted goes into the first layer, how forces are into the last.
+    a0, f0 = weights.reference
+    state[f"{first}.bias"] = state[f"{first}.bias"] - 0.5 * state[f"{first}.weight"][:, :2].sum(1)
+    state[f"{first}.weight"] = state[f"{first}.weight"] / np.array([a0, f0, 1.0, 1.0])
+    for part in ("weight", "bias"):
+        state[f"{last}.{part}"] = state[f"{last}.{part}"] * (weights.force_unit / (a0 * f0) ** 2)
+    for i in layers:
+        matrix = g.weight(f"net.{i}.weight", state[f"net.{i}.weight"])
+        hidden = g.add("Gemm", matrix, hidden, g.weight(f"net.{i}.bias", state[f"net.{i}.bias"][:, None]))
+        hidden = hidden if i == layers[-1] else g.add("Tanh", hidden)
+    coefficient = g.add("Reshape", hidden, g.integers([3, k, n]))
+    scaled = g.add("Mul", coefficient, g.add("Mul", product, product))
+    parts = ("shaft", "along", "across")
+    shaft, along, across = g.add_many("Split", scaled, g.integers([1, 1, 1]), names=parts, axis=0)
+    horizontal = g.add("Sub", g.add("Mul", c, along), g.add("Mul", s, across))
+    vertical = g.add("Add", g.add("Mul", s, along), g.add("Mul", c, across))
+    planar = g.add("Concat", horizontal, vertical, axis=0)
+    g.add("ReduceL2", planar, axes=(0,), keepdims=0, name="thrust")
+    return g.add("Concat", shaft, planar, axis=0)
+
+
+def _energy(g: Builder, x: str, product: str, prepared: Prepared) -> None:
+    """The output `energy` (K,) of commands (3, K, n), as in `finlab.allocation.energy`."""
+    w, scale = DEFAULT_WEIGHTS, energy_scale(prepared.upper)
     root = np.sqrt([w.amplitude, w.frequency, w.zero_direction])
-    squares = g.add("Mul", scaled, g.weight("root weights", root))
-    squares = g.add("ReduceSum", g.add("Mul", squares, squares), g.integers([1, 2]), keepdims=0)
-    a, f, _ = g.add_many("Split", scaled, g.integers([1, 1, 1]), names=("sa", "sf", "sd"), axis=-1)
-    product = g.add("ReduceSum", g.add("Mul", a, f), g.integers([1, 2]), keepdims=0)
-    g.add("Add", squares, g.add("Mul", product, g.number(w.product)), name="energy")
-
-
-def _square_sum(g: Builder, x: str) -> str:
-    return g.add("ReduceSum", g.add("Mul", x, x), g.integers([1]), keepdims=0)
+    squares = g.add("Mul", x, g.weight("root weights", _rows(root / scale)))
+    squares = g.add("ReduceSumSquare", squares, axes=(0, 2), keepdims=0)
+    beats = g.add("Mul", product, g.weight("product weights", w.product / (scale[:, 0] * scale[:, 1])))
+    g.add("Add", squares, g.add("ReduceSum", beats, g.integers([0, 2]), keepdims=0), name="energy")
