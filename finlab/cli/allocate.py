@@ -61,12 +61,11 @@ def allocate(
     damage = health_from(health, stuck, running)
     lost = robot.with_failed(failed)
     result = allocator.allocate(robot.layout, wrench, failed=lost, policy=answer, health=damage, seed=seed)
+    lost_axes = axes_lost(robot.layout, result.layout, lost) if lost or damage is not None else None
     if json:
-        print(json_format.dumps(allocation_record(result), allow_nan=False))
+        print(json_format.dumps(allocation_record(result, lost_axes), allow_nan=False))
     else:
-        print(allocation_text(result))
-        if lost or damage is not None:
-            print(loss_text(robot.layout, result.layout, lost))
+        print("\n".join([allocation_text(result), *([loss_text(lost_axes)] if lost_axes else [])]))
 
 
 def health_from(weak: Sequence[str], stuck: Sequence[str], running: Sequence[str]) -> Health | None:
@@ -98,22 +97,28 @@ def _named(option: str, text: str, count: int) -> tuple[str, tuple[float, ...]]:
     return name, values
 
 
-def loss_text(whole: Layout, damaged: Layout, failed: Sequence[str]) -> str:
-    """Which axes can be had alone, before and after what happened to the fins."""
+def axes_lost(whole: Layout, damaged: Layout, failed: Sequence[str]) -> dict[str, list[str]]:
+    """Which axes can be had alone, `before` and `after` what happened to the fins, and which were `lost`."""
     from finlab.analysis import authority
 
-    before, after = authority(whole), authority(damaged, failed)
-    lost = [axis for axis in before.reachable if axis not in after.reachable]
-    return (
-        f"reachable alone before: {', '.join(before.reachable) or 'none'}; "
-        f"after: {', '.join(after.reachable) or 'none'}; lost: {', '.join(lost) or 'none'}"
-    )
+    before, after = authority(whole).reachable, authority(damaged, failed).reachable
+    lost = [axis for axis in before if axis not in after]
+    return {"before": list(before), "after": list(after), "lost": lost}
 
 
-def allocation_record(result: Allocation) -> dict[str, object]:
-    """The JSON object of `finlab allocate --json`; its keys are a contract."""
+def loss_text(axes: dict[str, list[str]]) -> str:
+    """`axes_lost` in words."""
+    before, after, lost = (", ".join(axes[key]) or "none" for key in ("before", "after", "lost"))
+    return f"reachable alone before: {before}; after: {after}; lost: {lost}"
+
+
+def allocation_record(result: Allocation, lost_axes: dict[str, list[str]] | None = None) -> dict[str, object]:
+    """The JSON object of `finlab allocate --json`; its keys are a contract.
+
+    `axes`, there where a fin is lost or damaged, are those that can be had alone.
+    """
     surrogate = result.wrench_surrogate
-    return {
+    record: dict[str, object] = {
         "fins": list(result.fins),
         "failed": list(result.failed),
         "command": [
@@ -130,7 +135,12 @@ def allocation_record(result: Allocation) -> dict[str, object]:
         "solve_ms": result.solve_ms,
         "method": result.method,
         "checkpoint": result.checkpoint,
+        "reachable": result.reachable,
+        "scale": result.scale,
+        "binding": list(result.binding),
+        "notes": list(result.notes),
     }
+    return record if lost_axes is None else {**record, "axes": lost_axes}
 
 
 def allocation_text(result: Allocation) -> str:

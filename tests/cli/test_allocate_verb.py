@@ -30,6 +30,10 @@ KEYS = [
     "solve_ms",
     "method",
     "checkpoint",
+    "reachable",
+    "scale",
+    "binding",
+    "notes",
 ]
 
 
@@ -241,3 +245,11 @@ def test_whole_program(untrained_checkpoint: Path, tmp_path: Path) -> None:
     bad = run("--wrench", "nan", "0", "0", "0", "0", "0")
     assert (bad.returncode, bad.stdout) == (2, "")
     assert bad.stderr.startswith("finlab: error: ") and "Traceback" not in bad.stderr
+
+
+def test_json_tells_what_a_damage_costs(allocate: Callable[..., tuple[int, str, str]]) -> None:
+    lost = answer(allocate("no_yaw", *WRENCH, "--json", "--failed", "front"))["axes"]
+    assert set(lost["lost"]) == set(lost["before"]) - set(lost["after"])
+    stuck = answer(allocate("A", *WRENCH, "--json", "--stuck", "front_left=30"))
+    assert stuck["axes"]["before"] == ["surge", "sway", "heave", "roll", "pitch", "yaw"]
+    assert stuck["command"][1][2] == pytest.approx(0.5235987755982988)
