@@ -229,7 +229,7 @@ def remove_failed(layout: Layout, failed: Sequence[str]) -> tuple[Layout, NDArra
 
 def _with_failed(command: Array, alive: NDArray[np.bool_]) -> Array:
     """Put the healthy fins' commands (..., m, 3) back among all n fins; the failed ones are NaN."""
-    if alive.all():
+    if len(alive) == command.shape[-2]:
         return command
     full = np.full((*command.shape[:-2], len(alive), 3), np.nan)
     full[..., alive, :] = command

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.allocation.small_systems import solve
 from finlab.allocation.thrust_curve import ThrustCurves
 
 Array = NDArray[Any]
@@ -27,25 +28,26 @@ Array = NDArray[Any]
 RIDGE = 1e-9
 """Relative regularization of the 6 x 6 systems."""
 LEAST = 1e-12
-"""Absolute regularization of them."""
+"""Absolute regularization of them, and of sizes that are divided by."""
 REST = 1e-5
 """Share of the largest thrust below which a fin's mobility no longer shrinks; it can still come back."""
 
 
 class FreeTerms(NamedTuple):
-    """Parts of the 6 x 6 systems that do not change from step to step."""
+    """What stays from step to step where fins may point anywhere; forces are shares of the largest."""
 
     gram: Array
-    """B_i B_i^T (n, 36) of each fin, regularized."""
+    """B_i B_i^T T_max^2 (n, 36) of each fin, regularized."""
     columns: Array
-    """The columns (2n, 6), all horizontal ones first."""
+    """Normalized wrench (2n, 6) of each fin's largest force, all horizontal ones first."""
 
 
-def free_terms(columns: Array) -> FreeTerms:
-    """The terms of normalized columns (n, 2, 6)."""
-    gram = np.einsum("nci,ncj->nij", columns, columns)
+def free_terms(columns: Array, maximum: Array) -> FreeTerms:
+    """The terms of normalized columns (n, 2, 6) and largest thrusts (n,)."""
+    full = columns * maximum[:, None, None]
+    gram = np.einsum("nci,ncj->nij", full, full)
     gram += RIDGE * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(6)
-    return FreeTerms(gram.reshape(-1, 36), columns.swapaxes(0, 1).reshape(-1, 6))
+    return FreeTerms(gram.reshape(-1, 36), full.swapaxes(0, 1).reshape(-1, 6))
 
 
 class PlanarProblem(NamedTuple):
@@ -119,12 +121,12 @@ def polar(problem: PlanarProblem, force: Array) -> Planar:
 
 def _newton(problem: PlanarProblem, target: Array, weight: Array, reweighted: int, plain: int) -> Planar:
     """Semismooth Newton steps on the multiplier, the first of them followed by a new weight."""
-    multiplier = np.linalg.solve(_gram(problem, weight), target[..., None])[..., 0]
+    multiplier = solve(_gram(problem, weight), target[..., None])[..., 0]
     for step in range(reweighted + plain):
         wanted = _answer(problem, weight, multiplier)
         planar, slope = _project(problem, wanted, target)
         gram = _gram(problem, weight, slope)
-        multiplier = multiplier + np.linalg.solve(gram, planar.residual[..., None])[..., 0]
+        multiplier = multiplier + solve(gram, planar.residual[..., None])[..., 0]
         if step < reweighted:
             size = np.linalg.norm(_answer(problem, weight, multiplier), axis=-1)
             weight = mobility(problem, np.minimum(size, problem.curves.maximum))
@@ -139,29 +141,39 @@ def _descend_freely(problem: PlanarProblem, target: Array, thrust: Array, steps:
     """
     top, columns = problem.curves.maximum, problem.free.columns
     n, rows = len(top), len(thrust)
-    weight = mobility(problem, thrust)
+    weight = _share_mobility(thrust / top, problem.growth)
     cut = np.ones_like(weight)
     right = target[..., None]
     for step in range(steps + 1):
         weight *= cut
         gram = weight.dot(problem.free.gram)
         gram[:, ::7] += LEAST
-        multiplier = np.linalg.solve(gram.reshape(rows, 6, 6), right).reshape(rows, 6)
+        multiplier = solve(gram.reshape(rows, 6, 6), right).reshape(rows, 6)
         wanted = multiplier.dot(columns.T).reshape(rows, 2, n)
         wanted *= weight[:, None]
         squared = wanted * wanted
         size = squared[:, 0] + squared[:, 1]
         np.sqrt(size, out=size)
         if step < steps:
-            cut *= top / (size + 1e-12)
+            cut /= size + LEAST
             np.minimum(cut, 1.0, out=cut)
-            weight = mobility(problem, np.minimum(size, top))
-    held = np.minimum(np.maximum(size, problem.curves.minimum), top)
-    size += 1e-12
+            weight = _share_mobility(np.minimum(size, 1.0), problem.growth)
     direction = np.arctan2(wanted[:, 1], wanted[:, 0])
+    held = np.minimum(np.maximum(size * top, problem.curves.minimum), top)
+    size += LEAST
+    size *= top
     wanted *= (held / size)[:, None]
     reached = wanted.reshape(rows, 2 * n).dot(columns)
     return Planar(held, direction, target - reached)
+
+
+def _share_mobility(share: Array, growth: float) -> Array:
+    """`mobility` over the squared largest thrust, for thrusts (R, n) as shares of the largest; in place."""
+    kept = np.maximum(share, REST, out=share)
+    if growth == 0.5:  # the usual weights, and quicker than a power
+        kept *= np.sqrt(kept)
+        return kept
+    return kept ** (2.0 - growth)
 
 
 def realize(problem: PlanarProblem, planar: Planar) -> tuple[Array, Array]:

@@ -34,6 +34,9 @@ class LearnedFin:
         self._columns = [(weight, bias[:, None]) for weight, bias in self._layers]
         self._rough = [(weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in self._columns]
         self._rows = [(weight.T.copy(), bias) for weight, bias in self._layers]
+        weight = self._rows[0][0]
+        # Cosine and sine change with the zero direction as minus the sine and the cosine.
+        self._first_slopes = weight[:2] / np.array([reference]).T, np.stack([weight[3], -weight[2]])
         self._a0, self._f0 = reference
         self._unit = unit
         self._scale = np.array([[reference[0]], [reference[1]]])
@@ -55,11 +58,7 @@ class LearnedFin:
         scale *= scale
         scale *= self._unit
         k *= scale
-        force = np.empty((k.shape[1], 3), dtype=k.dtype)
-        force[:, 0] = k[0]
-        np.subtract(c * k[1], s * k[2], out=force[:, 1])
-        np.add(s * k[1], c * k[2], out=force[:, 2])
-        return force.reshape(command.shape)
+        return _turned(k, c, s).reshape(command.shape)
 
     def force_and_jacobian(self, command: Array) -> tuple[Array, Array]:
         """Forces (..., 3) and their derivatives (..., 3, 3) by amplitude, frequency and zero direction."""
@@ -75,15 +74,14 @@ class LearnedFin:
         rows = len(flat)
         beat, inputs = self._inputs(flat)
         (a, f), c, s = beat, inputs[2], inputs[3]
+        (by_a, by_f), by_turn = self._first_slopes
         weight, bias = self._rows[0]
         hidden, slope = _activated(inputs.T.dot(weight), bias)
         both = np.empty((4, *hidden.shape))
         both[0] = hidden
-        np.multiply(slope, weight[0] / self._a0, out=both[1])
-        np.multiply(slope, weight[1] / self._f0, out=both[2])
-        by_direction = np.multiply(c[:, None], weight[3], out=both[3])
-        by_direction -= s[:, None] * weight[2]
-        by_direction *= slope
+        np.multiply(slope, by_a, out=both[1])
+        np.multiply(slope, by_f, out=both[2])
+        np.multiply(slope, inputs[2:].T.dot(by_turn), out=both[3])
         for weight, bias in self._rows[1:-1]:
             both = both.reshape(4 * rows, -1).dot(weight).reshape(4, rows, -1)
             hidden, slope = _activated(both[0], bias)
@@ -96,20 +94,17 @@ class LearnedFin:
         # The coefficients are scaled by (a f)^2, which has derivatives of its own.
         af = a * f
         af *= self._unit
-        by_a = value * (af * f * (2.0 / self._a0))
-        by_f = value * (af * a * (2.0 / self._f0))
+        grown_a = value * (af * f * (2.0 / self._a0))
+        grown_f = value * (af * a * (2.0 / self._f0))
         af *= a
         af *= f
         k *= af
-        k[:, 1] += by_a
-        k[:, 2] += by_f
+        k[:, 1] += grown_a
+        k[:, 2] += grown_f
         # So has the turn about the shaft, by which the force follows the zero direction.
         k[1, 3] -= k[2, 0]
         k[2, 3] += k[1, 0]
-        turned = np.empty((rows, 4, 3))
-        turned[:, :, 0] = k[0].T
-        np.subtract(c * k[1], s * k[2], out=turned[:, :, 1].T)
-        np.add(s * k[1], c * k[2], out=turned[:, :, 2].T)
+        turned = _turned(k, c, s)
         return turned[:, 0].reshape(command.shape), turned[:, 1:].reshape(*command.shape, 3)
 
     def _inputs(self, flat: Array) -> tuple[Array, Array]:
@@ -129,3 +124,14 @@ def _activated(hidden: Array, bias: Array) -> tuple[Array, Array]:
     np.tanh(hidden, out=hidden)
     slope = hidden * hidden
     return hidden, np.subtract(1.0, slope, out=slope)
+
+
+def _turned(k: Array, c: Array, s: Array) -> Array:
+    """Forces (R, ..., 3) from (3, ..., R), turned about the shaft by angles of cosine c, sine s (R,)."""
+    along, across = k[1] * c, k[2] * s
+    along -= across
+    k[1] *= s
+    k[2] *= c
+    k[2] += k[1]
+    k[1] = along
+    return np.ascontiguousarray(k.T)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.learned_fin import LearnedFin
+from finlab.allocation.small_systems import solve
 
 Array = NDArray[Any]
 
@@ -203,5 +204,5 @@ def _smallest_change(free: Array, right: Array, damping: Array) -> Array:
     """The change (R, 3n, 1) that gives the wrenches (R, 6, 1) by a Jacobian (R, 3n, 6)."""
     gram = free.swapaxes(1, 2) @ free
     gram.reshape(-1, 36)[:, ::7] += (damping + 1e-9)[:, None]
-    change: Array = free @ np.linalg.solve(gram, right)
+    change: Array = free @ solve(gram, right)
     return change

@@ -273,12 +273,12 @@ class Pipeline:
         planar = force_space.descend(prepared.planar, flat, thrust.reshape(-1, n), steps)
         command, energy = force_space.realize(prepared.planar, planar)
         error = np.einsum("ri,ri->r", planar.residual, planar.residual)
-        score = np.where(error > PROMISING**2, INEXACT * (1.0 + error), energy).reshape(rows, n_seeds)
+        score = _rank(energy, error, PROMISING**2).reshape(rows, n_seeds)
         if steady:
             score[:, 0] = -1.0
         kept = (
-            np.argsort(score, axis=1)[:, : keep or self.settings.n_refined]
-            + np.arange(rows)[:, None] * n_seeds
+            score.argsort(axis=1)[:, : keep or self.settings.n_refined]
+            + np.arange(0, rows * n_seeds, n_seeds)[:, None]
         )
         return command.take(kept, axis=0)
 
@@ -299,11 +299,14 @@ class Pipeline:
             cost = cost.copy()
             cost[:, 0] *= 1.0 - SWITCH_GAIN
         error = refined.error.reshape(rows, p)
-        order = (
-            np.argsort(np.where(error > TOLERANCE, INEXACT * (1.0 + error), cost), axis=1)
-            + np.arange(rows)[:, None] * p
-        )
+        order = _rank(cost, error, TOLERANCE).argsort(axis=1) + np.arange(0, rows * p, p)[:, None]
         return Pool(*(values.take(order, axis=0) for values in (*refined, energy)))
+
+
+def _rank(energy: Array, error: Array, tolerance: float) -> Array:
+    """What to sort answers by: the energy of exact ones, and behind them the error of the others."""
+    missed = error > tolerance
+    return np.where(missed, INEXACT * (1.0 + error), energy) if missed.any() else energy
 
 
 def _fresh_starts(prepared: Prepared, proposed: Array, count: int) -> Array:

@@ -73,7 +73,7 @@ def prepare(
         direction_cost=cost,
         idle_direction=np.clip(0.0, lower[:, 2], upper[:, 2]),
         turns_fully=bool((arc >= FULL_TURN).all()),
-        free=free_terms(in_plane),
+        free=free_terms(in_plane, curves.maximum),
         growth=1.5 if weights.inertial else 0.5,
     )
     return Prepared(

@@ -107,7 +107,7 @@ class Runtime:
             wrench=result.wrench_surrogate,
             unallocated=missing,
             err_norm=math.sqrt(scaled.dot(scaled)),
-            energy=self.energy(result.command),
+            energy=self.energy(result.command) if lost else float(self._energy(result.command[None])[0]),
             solve_ms=result.solve_ms,
             notes=result.notes,
         )

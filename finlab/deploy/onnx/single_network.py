@@ -69,12 +69,14 @@ def add_mixture(
     )
     half = np.maximum(0.5 * (upper - lower)[:, 2], 1e-6)
     middle = 0.5 * (upper + lower)[:, 2]
-    ahead = g.angle(y, g.add("Add", x, g.number(1e-6)))
-    ahead = g.add("Add", ahead, g.weight("from seam", np.pi - middle))
-    turns = g.add("Floor", g.add("Mul", ahead, g.number(1.0 / TURN)))
-    offset = g.add("Sub", ahead, g.add("Mul", turns, g.number(TURN)))
-    offset = g.add("Mul", g.add("Sub", offset, g.number(np.pi)), g.weight("per half arc", 1.0 / half))
-    inside = g.add("Min", g.add("Max", offset, g.number(-1.0)), g.number(1.0))
+    offset = g.angle(y, g.add("Add", x, g.number(1e-6)))
+    if middle.any():  # else the angle is already within half a turn of the middle
+        ahead = g.add("Add", offset, g.weight("from seam", np.pi - middle))
+        turns = g.add("Floor", g.add("Mul", ahead, g.number(1.0 / TURN)))
+        ahead = g.add("Sub", ahead, g.add("Mul", turns, g.number(TURN)))
+        offset = g.add("Sub", ahead, g.number(np.pi))
+    offset = g.add("Mul", offset, g.weight("per half arc", 1.0 / half))
+    inside = g.add("Clip", offset, g.number(-1.0), g.number(1.0))
     shape = g.integers([3, m, n])
     mean = g.add("Reshape", g.add("Concat", g.add("Tanh", beat), inside, axis=0), shape)
     low, high = LOG_STD_RANGE
