@@ -22,6 +22,7 @@ def save(page: Page, path: Path) -> None:
     page.close_notes()
     page.page.mouse.move(200, 60)  # off the buttons, so that no hint covers anything
     page.page.wait_for_timeout(1500)
+    page.until(lambda: page.page.locator("[role=tooltip]:visible").count() == 0)
     picture = Image.open(io.BytesIO(page.page.screenshot(timeout=0))).convert("RGB")
     ImageOps.posterize(picture, 7).save(path, optimize=True)
     print(path, path.stat().st_size // 1000, "kB", flush=True)
@@ -54,10 +55,12 @@ def _tour(page: Page) -> None:
 
 def _damage(page: Page) -> None:
     page.tab("Damage a fin")
-    page.choose("Which fin", "back_left")
-    page.type("Strength [%]", "50")
+    page.choose("Which fin", "front_right")
+    page.type("Strength [%]", "60")
     page.row("Stuck").first.click()
-    page.until(lambda: page.session.state.stuck != () and not page.view.busy)
+    page.until(lambda: page.session.state.stuck != ())
+    page.type("Stuck at [°]", "60")
+    page.until(lambda: page.session.state.stuck[0][1] > 1.0 and not page.view.busy)
     page.page.mouse.move(SIZE["width"] - 200, 500)
     page.page.mouse.wheel(0, 120)
     page.page.wait_for_timeout(500)
@@ -71,9 +74,9 @@ def _palette(page: Page) -> None:
 def _steer(page: Page) -> None:
     page.tab("Steer by hand")
     page.tab("Sweep an axis")
-    page.choose("Sweep", "sway")
+    page.choose("Sweep", "heave")
     page.press("Play the sweep")
-    page.until(lambda: page.session.state.target[1] > 4.5)
+    page.until(lambda: page.session.state.target[2] > 8.0)
     page.press("Stop the sweep")
     page.press("Turn")
     page.row("Spring back").first.click()

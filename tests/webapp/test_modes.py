@@ -12,7 +12,7 @@ from finlab.layout import load_layout
 from tests.webapp.stand_in import StandIn, load_stand_in
 from webapp.answering import Answering
 from webapp.figures import small, three_digits
-from webapp.markup.mode_plot import mode_plot
+from webapp.markup.mode_plot import DOT, LEFT, WIDTH, _apart, mode_plot
 from webapp.markup.modes import mode_table
 from webapp.modes import MAX_SHOWN, NamedMode, known_modes, named_modes, nearest_modes, same_mode
 from webapp.session import Session
@@ -136,3 +136,10 @@ def test_another_sample_of_another_answer_is_shown() -> None:
     assert answering.n_modes >= len(answering.modes) > 0
     place = same_mode(wanted, answering.modes)
     assert session.mode == place, "what is on the robot stays there when all modes are known"
+
+
+def test_dots_do_not_cover_each_other_nor_leave_the_plot() -> None:
+    places = _apart([(375.0, 50.0)] * 8 + [(60.0, 52.0)] * 3)
+    assert all(LEFT + DOT <= x <= WIDTH - DOT for x, _ in places)
+    for k, (x, y) in enumerate(places):
+        assert all(abs(x - u) >= 2 * DOT or abs(y - v) >= 2 * DOT for u, v in places[:k])

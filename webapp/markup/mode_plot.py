@@ -19,6 +19,8 @@ STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 1e9)
 """Distances that ticks of the energy may have."""
 LEGEND = (("sampled", 2.6, 6), ("refined", 5.0, 78), ("on the robot", 0.0, 144))
 """Word, radius and place of what is drawn; radius 0 is the ring."""
+DOT = 9
+"""Radius of the dot of a mode with its rim [px]."""
 SAMPLES = "fl-sample"
 """Channel that hears which sample is clicked."""
 
@@ -97,12 +99,17 @@ def _ring(x: float, y: float, radius: float) -> str:
 
 
 def _apart(places: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Dots moved sideways until none covers another, so that each can be clicked."""
+    """Dots moved sideways, no further than need be and within the plot, so that each can be clicked."""
     apart: list[tuple[float, float]] = []
     for x, y in places:
-        while any(abs(x - u) < 18 and abs(y - v) < 18 for u, v in apart):
-            x += 2.0
-        apart.append((x, y))
+        rooms = [x + side * step for step in range(0, WIDTH, 2) for side in (1, -1)]
+        free = (
+            room
+            for room in rooms
+            if LEFT + DOT <= room <= WIDTH - RIGHT - DOT
+            and not any(abs(room - u) < 2 * DOT and abs(y - v) < 2 * DOT for u, v in apart)
+        )
+        apart.append((next(free, x), y))
     return apart
 
 
