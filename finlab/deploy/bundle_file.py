@@ -7,32 +7,27 @@ byte, what finlab writes for the weights in it: whatever runs the file can only 
 from __future__ import annotations
 
 import os
-import stat
-import zipfile
-import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from finlab.allocation.weights import LearnedWeights
 from finlab.deploy import metadata
-from finlab.deploy.bundle import CHECKSUMS, FAST, FILES, GRAPH, NETWORK, README, SURROGATE, checksums
+from finlab.deploy.bundle import CHECKSUMS, FAST, GRAPH, NETWORK, SURROGATE, checksums
+from finlab.deploy.bundle_source import files_at
 from finlab.deploy.graph import LayoutGraph
 from finlab.deploy.graph_file import parse_graph
 from finlab.deploy.onnx.fast import fast_model, fast_weights
 from finlab.deploy.onnx.model import Model, model_bytes
 from finlab.deploy.onnx.network import network_model, network_weights
-from finlab.deploy.onnx.reading import MAX_BYTES, read_model
+from finlab.deploy.onnx.reading import read_model
 from finlab.deploy.onnx.surrogate import surrogate_model, surrogate_weights
 from finlab.errors import DataError
 from finlab.layout import FinModelSpec
 from finlab.model.fast_weights import FastWeights
 
-LARGEST = {GRAPH: 1_000_000, README: 100_000, CHECKSUMS: 10_000}
-"""Largest size of the files that are no ONNX [bytes]."""
 REQUIRED = (GRAPH, NETWORK, SURROGATE, CHECKSUMS)
 
 
@@ -56,9 +51,7 @@ def read_bundle(path: str | os.PathLike[str]) -> RobotBundle:
     Raises:
         FinlabError: it cannot be read, was changed after it was written, or is not what finlab writes.
     """
-    source = str(path)
-    files = _folder(Path(path), source) if os.path.isdir(source) else _archive(source)
-    return parse_bundle(files, source)
+    return parse_bundle(files_at(path), str(path))
 
 
 def parse_bundle(files: Mapping[str, bytes], source: str = "bundle") -> RobotBundle:
@@ -154,48 +147,3 @@ def _check_sums(files: Mapping[str, bytes], source: str) -> None:
     actual = {line[66:]: line[:64] for line in checksums(rest).decode().splitlines()}
     wrong = next((name for name in actual if listed.get(name) != actual[name]), CHECKSUMS)
     raise DataError(f"{source}: {wrong} does not fit {CHECKSUMS}; it was changed; copy the bundle again")
-
-
-def _folder(path: Path, source: str) -> dict[str, bytes]:
-    files = {}
-    try:
-        for name in FILES:
-            file = path / name
-            try:
-                about = file.lstat()
-            except FileNotFoundError:
-                continue
-            if not stat.S_ISREG(about.st_mode):
-                raise DataError(f"{source}: {name} is no regular file")
-            with file.open("rb") as stream:
-                files[name] = _bounded(stream.read, name, source)
-    except OSError as error:
-        raise DataError(f"{source}: cannot be read: {error.strerror}") from None
-    return files
-
-
-def _archive(source: str) -> dict[str, bytes]:
-    files: dict[str, bytes] = {}
-    try:
-        with zipfile.ZipFile(source) as archive:
-            entries = archive.infolist()
-            for entry in entries[: len(FILES) + 1]:
-                # Nothing is unpacked, so a name can do no harm; still, a bundle holds these files only.
-                if entry.filename not in FILES or entry.filename in files:
-                    raise DataError(f"{source}: holds {entry.filename!r:.60}, which is no part of a bundle")
-                with archive.open(entry) as stream:
-                    files[entry.filename] = _bounded(stream.read, entry.filename, source)
-    except OSError as error:
-        raise DataError(f"{source}: cannot be read: {error.strerror or error}") from None
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, ValueError, zlib.error) as error:
-        reason = str(error).splitlines()[0][:80] if str(error) else type(error).__name__
-        raise DataError(f"{source}: is neither a bundle's folder nor its zip archive ({reason})") from None
-    return files
-
-
-def _bounded(read: Callable[[int], bytes], name: str, source: str) -> bytes:
-    largest = LARGEST.get(name, MAX_BYTES)
-    content = read(largest + 1)
-    if len(content) > largest:
-        raise DataError(f"{source}: {name} is larger than {largest:,} bytes")
-    return content

@@ -6,46 +6,18 @@ The file is one JSON object; `graph.schema.json` beside this module describes it
 
 from __future__ import annotations
 
-import hashlib
 import json
-import math
 import os
-from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from finlab.data.normalization import Normalization
-from finlab.deploy.graph import SELF_TEST_TOLERANCE, LayoutGraph, Row, SelfTest
+from finlab.deploy.graph import LayoutGraph
+from finlab.deploy.graph_document import checksum_of, document_of
+from finlab.deploy.graph_reading import graph_of
 from finlab.errors import LayoutError
-from finlab.layout import Layout, layout_to_dict, parse_layout
-from finlab.layout.file import FORMAT as LAYOUT_FORMAT
-from finlab.layout.file import FRAME
-from finlab.layout.file import VERSION as LAYOUT_VERSION
 from finlab.layout.reading import parse_json, read_text
-from finlab.layout.rules import mapping, number, numbers, shown, text
 
-FORMAT = "finlab-graph"
-VERSION = 1
 SUFFIX = ".graph.json"
 """How the name of a graph file ends."""
-UNITS = {"length": "m", "angle": "rad", "frequency": "Hz", "force": "N", "torque": "N m"}
-
-_KEYS = (
-    "format",
-    "version",
-    "checksum",
-    "frame",
-    "units",
-    "layout",
-    "graph",
-    "features",
-    "normalization",
-    "checkpoint",
-    "self_test",
-)
 
 
 def write_graph(graph: LayoutGraph, path: str | os.PathLike[str]) -> None:
@@ -82,8 +54,8 @@ def check_graph_name(path: Path) -> None:
 
 def graph_bytes(graph: LayoutGraph) -> bytes:
     """The contents of a graph file."""
-    document = _document(graph)
-    document["checksum"] = _checksum(document)
+    document = document_of(graph)
+    document["checksum"] = checksum_of(document)
     return (json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()
 
 
@@ -91,166 +63,6 @@ def parse_graph(content: str, source: str = "graph") -> LayoutGraph:
     """The graph in the text of a graph file; errors as in `read_graph`."""
     data = parse_json(content, source)
     try:
-        return _graph(data, source)
+        return graph_of(data, source)
     except LayoutError as error:
         raise error if error.source else error.under("", source) from None
-
-
-def _checksum(document: Mapping[str, Any]) -> str:
-    """SHA-256 of everything but the checksum, independent of white space and the order of keys."""
-    rest = {key: value for key, value in document.items() if key != "checksum"}
-    canonical = json.dumps(rest, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
-    return "sha256:" + hashlib.sha256(canonical.encode("utf-8", "surrogatepass")).hexdigest()
-
-
-def _document(graph: LayoutGraph) -> dict[str, Any]:
-    """Everything but the checksum, which comes third once it is known."""
-    layout = layout_to_dict(graph.layout)
-    nodes = []
-    for fin, entry, features in zip(graph.layout.fins, layout["fins"], graph.features, strict=True):
-        node = {
-            "id": entry["name"],
-            "position_m": entry["position_m"],
-            "mounting_angle_rad": fin.mounting_angle,
-        }
-        node |= {"limits": entry["limits"], "model": entry["model"]}
-        nodes.append(node | {"healthy": fin.name not in graph.failed, "features": _plain(features)})
-    return {
-        "format": FORMAT,
-        "version": VERSION,
-        "checksum": "",
-        "frame": FRAME,
-        "units": UNITS,
-        "layout": {key: layout[key] for key in ("name", "description", "body") if key in layout},
-        "graph": {
-            "directed": False,
-            "multigraph": False,
-            "graph": {"name": graph.layout.name},
-            "nodes": nodes,
-            "edges": _edges(graph),
-        },
-        "features": {"set": graph.feature_set},
-        "normalization": {"mean": graph.normalization.mean.tolist(), "std": graph.normalization.std.tolist()},
-        "checkpoint": {"name": graph.checkpoint, "sha256": graph.checkpoint_sha256},
-        "self_test": {
-            "tolerance_err_norm": SELF_TEST_TOLERANCE,
-            "cases": [
-                {
-                    "wrench": list(case.wrench),
-                    "command": [_plain(row) for row in case.command],
-                    "predicted_wrench": list(case.predicted_wrench),
-                    "features": [_plain(row) for row in case.features],
-                }
-                for case in graph.self_test
-            ],
-        },
-    }
-
-
-def _graph(data: Any, source: str) -> LayoutGraph:
-    """Check and convert the values of a file."""
-    # Format and version first: in a file of another kind or version, unknown keys are not the news.
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        got = shown(data.get("format")) if isinstance(data, dict) else shown(data)
-        raise LayoutError(f"expected {FORMAT}, got {got}", "format")
-    if data.get("version") != VERSION or data["version"] is True:
-        raise LayoutError(f"this finlab reads version {VERSION}, got {shown(data.get('version'))}", "version")
-    data = mapping(data, "", _KEYS, required=_KEYS)
-    if data["checksum"] != _checksum(data):
-        raise LayoutError("does not fit the contents; the file was changed, export it again", "checksum")
-    if data["units"] != UNITS:
-        raise LayoutError(f"expected {UNITS}, got {shown(data['units'])}", "units")
-    parts = ("directed", "multigraph", "graph", "nodes", "edges")
-    shape = mapping(data["graph"], "graph", parts, required=parts)
-    nodes = shape["nodes"]
-    if not isinstance(nodes, list):
-        raise LayoutError(f"expected a list of fins, got {shown(nodes)}", "graph.nodes")
-    layout = _layout(data, nodes, source)
-    normalization = _section(data, "normalization", "mean", "std")
-    checkpoint = _section(data, "checkpoint", "name", "sha256")
-    cases = _section(data, "self_test", "tolerance_err_norm", "cases")["cases"]
-    if not isinstance(cases, list):
-        raise LayoutError(f"expected a list, got {shown(cases)}", "self_test.cases")
-    graph = LayoutGraph(
-        layout=layout,
-        failed=tuple(name for name, node in zip(layout.names, nodes, strict=True) if not node["healthy"]),
-        feature_set=text(_section(data, "features", "set")["set"], "features.set", 40),
-        features=tuple(_row(node["features"], f"graph.nodes[{i}].features") for i, node in enumerate(nodes)),
-        normalization=Normalization(
-            np.array(numbers(normalization["mean"], "normalization.mean", 6)),
-            np.array(numbers(normalization["std"], "normalization.std", 6, low=0.0)),
-        ),
-        checkpoint=text(checkpoint["name"], "checkpoint.name", 200),
-        checkpoint_sha256=text(checkpoint["sha256"], "checkpoint.sha256", 64),
-        self_test=tuple(_case(case, i, layout.n_fins) for i, case in enumerate(cases)),
-    )
-    if shape["edges"] != _edges(graph):
-        raise LayoutError("expected every pair of healthy fins, and each with itself", "graph.edges")
-    return graph
-
-
-def _section(data: Mapping[str, Any], name: str, *keys: str) -> Mapping[str, Any]:
-    """One part of the file, with exactly these keys."""
-    return mapping(data[name], name, keys, required=keys)
-
-
-def _edges(graph: LayoutGraph) -> list[dict[str, str]]:
-    return [{"source": a, "target": b} for a, b in graph.edges]
-
-
-def _layout(data: Mapping[str, Any], nodes: list[Any], source: str) -> Layout:
-    """The layout, checked by the reader of layout files, with the shafts' angles exactly as they were."""
-    keys = ("id", "position_m", "mounting_angle_rad", "limits", "model", "healthy", "features")
-    about = mapping(data["layout"], "layout", ("name", "description", "body"), ("name",))
-    fins, angles = [], []
-    for i, node in enumerate(nodes):
-        node = mapping(node, f"graph.nodes[{i}]", keys, required=keys)
-        angle = number(
-            node["mounting_angle_rad"], f"graph.nodes[{i}].mounting_angle_rad", -math.tau, math.tau
-        )
-        angles.append(angle)
-        if not isinstance(node["healthy"], bool):
-            got = shown(node["healthy"])
-            raise LayoutError(f"expected true or false, got {got}", f"graph.nodes[{i}].healthy")
-        fins.append(
-            {
-                "name": node["id"],
-                "position_m": node["position_m"],
-                "mounting_angle_deg": math.degrees(angle),
-                "limits": node["limits"],
-                "model": node["model"],
-            }
-        )
-    layout = parse_layout(
-        {"format": LAYOUT_FORMAT, "version": LAYOUT_VERSION, "frame": data["frame"], **about, "fins": fins},
-        source,
-    )
-    pairs = zip(layout.fins, angles, strict=True)
-    return replace(layout, fins=tuple(replace(fin, mounting_angle=angle) for fin, angle in pairs))
-
-
-def _case(data: Any, i: int, n_fins: int) -> SelfTest:
-    keys = ("wrench", "command", "predicted_wrench", "features")
-    key = f"self_test.cases[{i}]"
-    data = mapping(data, key, keys, required=keys)
-    for name in ("command", "features"):
-        if not isinstance(data[name], list) or len(data[name]) != n_fins:
-            raise LayoutError(f"expected a list of {n_fins} rows, one for each fin", f"{key}.{name}")
-    return SelfTest(
-        wrench=numbers(data["wrench"], f"{key}.wrench", 6),
-        command=tuple(_row(row, f"{key}.command[{j}]", 3) for j, row in enumerate(data["command"])),
-        predicted_wrench=numbers(data["predicted_wrench"], f"{key}.predicted_wrench", 6),
-        features=tuple(_row(row, f"{key}.features[{j}]") for j, row in enumerate(data["features"])),
-    )
-
-
-def _row(value: Any, key: str, count: int | None = None) -> Row | None:
-    """Numbers of one fin; None for a failed one."""
-    if value is None:
-        return None
-    length = len(value) if isinstance(value, list) else 0
-    return numbers(value, key, length if count is None else count)
-
-
-def _plain(row: Row | None) -> list[float] | None:
-    return None if row is None else list(row)

@@ -76,7 +76,8 @@ class Runtime:
             self.allocator = kind(bundle.weights, **bundle.settings)
             use_engine(self.allocator.pipeline, bundle, engine)
             # The first answer prepares the layout, and shows whether the weights fit together at all.
-            self.allocate(np.zeros(6))
+            if not np.isfinite(self.allocate(np.zeros(6)).wrench).all():
+                raise ValueError("answers are not finite")
         except (KeyError, IndexError, ValueError, TypeError, FloatingPointError, MemoryError) as error:
             reason = str(error).splitlines()[0][:100] if str(error) else type(error).__name__
             raise DataError(f"the bundle's weights do not fit together ({reason}); export it again") from None

@@ -12,7 +12,8 @@ import finlab
 from finlab.assets import shipped_layouts
 from finlab.deploy.bundle import CHECKSUMS, GRAPH, NETWORK, SURROGATE, Bundle, checksums, make_bundle
 from finlab.deploy.bundle_file import parse_bundle, read_bundle
-from finlab.deploy.graph_file import _checksum, parse_graph
+from finlab.deploy.graph_document import checksum_of
+from finlab.deploy.graph_file import parse_graph
 from finlab.deploy.runtime import Runtime
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
@@ -75,7 +76,7 @@ def test_graph_files(small: Bundle) -> None:
         if i % 2:  # a forger mends the checksum
             try:
                 document = json.loads(text)
-                document["checksum"] = _checksum(document)
+                document["checksum"] = checksum_of(document)
                 text = json.dumps(document)
             except (ValueError, TypeError, RecursionError):
                 pass

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from finlab.assets import shipped_layouts
 from finlab.data.normalization import Normalization
 from finlab.deploy import LayoutGraph, SelfTest, graph_bytes, parse_graph, read_graph, write_graph
-from finlab.deploy.graph_file import _checksum
+from finlab.deploy.graph_document import checksum_of
 from finlab.errors import FinlabError, LayoutError
 from finlab.layout import Fin, Layout, load_layout
 
@@ -49,7 +49,7 @@ def edited(change: Callable[[dict[str, Any]], None], fix_checksum: bool = True) 
     document = json.loads(graph_bytes(make_graph(load_layout(shipped_layouts()["A"]))))
     change(document)
     if fix_checksum:
-        document["checksum"] = _checksum(document)
+        document["checksum"] = checksum_of(document)
     return json.dumps(document)
 
 

@@ -41,7 +41,7 @@ def folder(bundle: Bundle, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize(("engine", "most"), [("numpy", 0), ("onnx", 1)])
 def test_answers_are_the_librarys(engine: str, most: int, bundle: Bundle) -> None:
-    """All cases by numpy. onnxruntime rounds otherwise, which may tip an answer now and then (DEPLOYMENT)."""
+    """All cases by numpy. onnxruntime rounds otherwise, which may tip an answer now and then."""
     runtime = Runtime(parse_bundle(bundle.files), engine)
     apart = [difference(answer_again(runtime, case), case.command) for case in random_cases(150)]
     assert sum(value > 1e-4 for value in apart) <= most
