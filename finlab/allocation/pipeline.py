@@ -26,6 +26,7 @@ from finlab.allocation.numpy_network import NumpyNetwork
 from finlab.allocation.prepared import Prepared, prepare
 from finlab.allocation.proposal import Proposal, Proposer, propose
 from finlab.allocation.steady import TURNS, planar_thrust, turn_little, turn_short
+from finlab.allocation.weighted_sum import lessen
 from finlab.allocation.weights import LearnedWeights
 from finlab.errors import AllocationError
 
@@ -77,8 +78,12 @@ class Settings:
     """Levenberg-Marquardt steps."""
     subsets: bool = True
     """Whether sub-layouts are searched as well."""
+    energy_weight: float = 0.0
+    """w of the weighted sum `err_norm^2 + w J_en` to minimize; 0: the least energy among exact answers."""
 
     def __post_init__(self) -> None:
+        if not 0.0 <= self.energy_weight < np.inf:
+            raise AllocationError(f"energy_weight: expected a number from 0, got {self.energy_weight}")
         if self.n_candidates < 1 or self.n_seeds < 1 or self.n_refined < 1 or not self.temperature >= 0.0:
             raise AllocationError(
                 "method 'learned' needs at least one candidate, seed and refined answer and a temperature "
@@ -103,6 +108,11 @@ class Pipeline:
         self, weights: LearnedWeights, settings: Settings, energy_weights: EnergyWeights = DEFAULT_WEIGHTS
     ) -> None:
         """Take over trained weights; energies are compared by `energy_weights`."""
+        if settings.energy_weight > 0.0 and energy_weights.inertial > 0.0:
+            raise AllocationError(
+                "energy_weight: the weighted sum needs an energy of squares, got energy_weights with "
+                "inertial power; leave energy_weight at 0 or take other energy_weights"
+            )
         self.settings, self.normalization = settings, weights.normalization
         self.network = NumpyNetwork(weights.network, weights.heads, weights.n_components)
         self.propose: Proposer = partial(propose, self.network)
@@ -134,8 +144,11 @@ class Pipeline:
         proposal = self.propose(prepared, centred, target, settings.n_candidates, settings.temperature, seed)
         if previous is None:
             seeds = self._seeds(prepared, proposal)
-            return self._descend(prepared, target, proposal, seeds, lead), proposal
+            pool = self._descend(prepared, target, proposal, seeds, lead)
+            return self._weigh(prepared, target, pool), proposal
         pool = self._descend_steadily(prepared, target, proposal, previous, lead)
+        near = turn_little(prepared, previous, pool.command[0, 0, :, 2], TURNS[0])
+        pool = self._weigh(near, target, pool)
         # Arcs that pass the seam are brought back inside the fin's own limits.
         return pool._replace(command=prepared.commands.clamp(pool.command)), proposal
 
@@ -179,6 +192,20 @@ class Pipeline:
             near = turn_little(prepared, previous, aim, width)
             pool = self._descend(near, target, proposal, seeds, lead, steady=True)
         return pool
+
+    def _weigh(self, prepared: Prepared, target: Array, pool: Pool) -> Pool:
+        """Trade error for energy, where the settings ask for the weighted sum."""
+        weight = self.settings.energy_weight
+        if weight == 0.0:
+            return pool
+        rows, p, n, _ = pool.command.shape
+        start = prepared.commands.clamp(pool.command.reshape(-1, n, 3))
+        found, energy = lessen(
+            prepared.commands, np.repeat(target, p, axis=0), start, prepared.energy, weight
+        )
+        total = (found.error**2 + weight * energy).reshape(rows, p)
+        order = total.argsort(axis=1) + np.arange(0, rows * p, p)[:, None]
+        return Pool(*(values.take(order, axis=0) for values in (*found, energy)))
 
     def _descend(
         self,
