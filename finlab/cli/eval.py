@@ -62,14 +62,20 @@ def wrench(
     from finlab.evaluation.entrants import is_slow
     from finlab.evaluation.records import columns_of_records, save_columns
     from finlab.evaluation.splits import SPLITS, make_split
-    from finlab.evaluation.wrench import interval_rows, run_method, wrench_report, wrench_rows
+    from finlab.evaluation.wrench import (
+        energy_comparison,
+        interval_rows,
+        run_method,
+        wrench_report,
+        wrench_rows,
+    )
 
     for name, value in (("single", single), ("subsample", subsample)):
         check_positive(name, value)
     check_writable(json)
     check_folder("records", records)
     allocators = load_methods(methods, checkpoint)
-    rows, intervals = [], []
+    rows, intervals, energies = [], [], []
     for k, part in enumerate(SPLITS if split == "all" else (split,)):
         cases = make_split(part, layouts, targets, seed)
         found = {
@@ -83,8 +89,9 @@ def wrench(
                 save_columns(records / f"wrench-{part}-{name}.npz", columns_of_records(each), made)
         rows += wrench_rows(found, part)
         intervals += interval_rows(found, part)
+        energies += [{"split": part, **row} for row in energy_comparison(found)]
         print(("\n" if k else "") + wrench_report(found, part, single=single))
-    write_json(json, {"rows": rows, "intervals": intervals})
+    write_json(json, {"rows": rows, "intervals": intervals, "energies": energies})
 
 
 @verbs.command

@@ -13,7 +13,7 @@ from tqdm import tqdm
 from finlab.allocation.allocation import BatchAllocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.energy import command_energy
-from finlab.evaluation.metrics import rows_by_fin_count, wrench_intervals, wrench_row
+from finlab.evaluation.metrics import energy_rows, rows_by_fin_count, wrench_intervals, wrench_row
 from finlab.evaluation.paper_figures import paper_wrench_rows
 from finlab.evaluation.records import Records, join_records
 from finlab.evaluation.splits import Case
@@ -115,6 +115,20 @@ def interval_rows(records: dict[str, Records], split: str) -> list[dict[str, Any
     ]
 
 
+def energy_comparison(records: dict[str, Records]) -> list[dict[str, Any]]:
+    """Energies of all methods over those of IPOPT, from the most starts that took part; none without it."""
+    starts = {name: int(name.partition("-")[2] or 8) for name in records if name.partition("-")[0] == "ipopt"}
+    if not starts or len(records) == 1:
+        return []
+    reference = max(starts, key=lambda name: starts[name])
+    return [
+        {"reference": reference, **row}
+        for method, part in records.items()
+        if method != reference
+        for row in energy_rows(part, records[reference], method=method)
+    ]
+
+
 def wrench_report(records: dict[str, Records], split: str, *, single: int | None = None) -> str:
     """The table beside the paper's printed figures, its intervals, and the error by fin count, as text."""
     by_fins = [row for method, part in records.items() for row in rows_by_fin_count(part, method=method)]
@@ -123,6 +137,7 @@ def wrench_report(records: dict[str, Records], split: str, *, single: int | None
         if single is None
         else "solve_ms: one call at a time."
     )
+    energies = energy_comparison(records)
     shown = ("method", "err_norm_mean", "err_norm_median", "err_norm_p95", "success_0.01", "energy_mean")
     return "\n".join(
         [
@@ -133,6 +148,11 @@ def wrench_report(records: dict[str, Records], split: str, *, single: int | None
             "",
             text_table(by_fins),
             "",
+            *(
+                [f"energy over that of {energies[0]['reference']}", text_table(energies), ""]
+                if energies
+                else []
+            ),
             f"scored by the plant, the analytic fin model. {timing}",
         ]
     )

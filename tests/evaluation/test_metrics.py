@@ -7,6 +7,7 @@ from finlab.evaluation.metrics import energy_rows, rows_by_fin_count, wrench_int
 from finlab.evaluation.paper_figures import paper_figures, paper_wrench_rows
 from finlab.evaluation.records import Records, join_records
 from finlab.evaluation.tables import format_cell, markdown_table, text_table
+from finlab.evaluation.wrench import energy_comparison
 
 KEYS = [
     *("split", "method", "n", "scored_by"),
@@ -102,3 +103,16 @@ def test_markdown_table() -> None:
 )
 def test_cells(value: object, text: str) -> None:
     assert format_cell(value) == text
+
+
+def test_energies_are_compared_with_the_most_starts_of_ipopt() -> None:
+    records = {
+        "learned": _records([0.0, 0.0], energy=[2.0, 4.0]),
+        "ipopt": _records([0.0, 0.0], energy=[1.0, 1.0]),
+        "ipopt-32": _records([0.0], energy=[2.5]),
+    }
+    rows = energy_comparison(records)
+    assert {row["reference"] for row in rows} == {"ipopt-32"}
+    ours = next(row for row in rows if (row["method"], row["fins"]) == ("learned", "all"))
+    assert ours["n"] == 1 and ours["energy_ratio"] == pytest.approx(0.8)
+    assert energy_comparison({"learned": records["learned"]}) == []
