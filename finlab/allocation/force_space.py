@@ -128,7 +128,8 @@ def _newton(problem: PlanarProblem, target: Array, weight: Array, reweighted: in
         gram = _gram(problem, weight, slope)
         multiplier = multiplier + solve(gram, planar.residual[..., None])[..., 0]
         if step < reweighted:
-            size = np.linalg.norm(_answer(problem, weight, multiplier), axis=-1)
+            free = _answer(problem, weight, multiplier)
+            size = np.sqrt(np.einsum("rnc,rnc->rn", free, free))
             weight = mobility(problem, np.minimum(size, problem.curves.maximum))
     return _project(problem, _answer(problem, weight, multiplier), target)[0]
 
@@ -211,28 +212,34 @@ def _gram(problem: PlanarProblem, weight: Array, slope: Array | None = None) -> 
 def _project(problem: PlanarProblem, wanted: Array, target: Array) -> tuple[Planar, Array]:
     """What the fins can do nearest to `wanted` (R, n, 2), and the slope (R, n, 2, 2) of that projection."""
     low, high = problem.curves.minimum, problem.curves.maximum
-    size = np.sqrt((wanted * wanted).sum(-1)) + 1e-12
+    x, y = wanted[..., 0], wanted[..., 1]
+    size = np.sqrt(x * x + y * y)
+    size += LEAST
     unit = wanted / size[..., None]
-    direction = np.arctan2(wanted[..., 1], wanted[..., 0])
+    direction = np.arctan2(y, x)
     along = size
     outside = np.zeros(size.shape, dtype=bool)
     if not problem.turns_fully:
-        offset = np.mod(direction - problem.middle + np.pi, 2 * np.pi) - np.pi
-        inside = np.clip(offset, -problem.half, problem.half)
-        excess = np.abs(offset - inside)
-        outside = excess > 0
-        along = size * np.where(excess < np.pi / 2, np.cos(excess), 0.0)
+        offset = np.mod(direction - problem.middle + np.pi, 2 * np.pi)
+        offset -= np.pi
+        inside = np.minimum(np.maximum(offset, -problem.half), problem.half)
+        outside = inside != offset
         direction = np.where(outside | (problem.half < np.pi - 1e-6), problem.middle + inside, direction)
-        unit = np.where(outside[..., None], np.stack([np.cos(direction), np.sin(direction)], axis=-1), unit)
+        if outside.any():
+            excess = np.abs(offset - inside)
+            along = size * np.where(excess < np.pi / 2, np.cos(excess), 0.0)
+            np.cos(direction, out=unit[..., 0], where=outside)
+            np.sin(direction, out=unit[..., 1], where=outside)
     thrust = np.minimum(np.maximum(along, low), high)
-    free = along == thrust
     force = unit * thrust[..., None]
     n = wanted.shape[1]
-    reached = force.reshape(len(force), 2 * n) @ problem.columns.reshape(2 * n, 6)
+    reached = force.reshape(len(force), 2 * n).dot(problem.columns.reshape(2 * n, 6))
     # Inside its limits a fin follows freely; at a thrust limit it only turns; at an end of its arc it
     # only pushes harder; at both it is stuck.
-    radial = unit[..., :, None] * unit[..., None, :]
-    turn = np.where(outside, 0.0, thrust / np.maximum(size, 1e-12))
-    push = free.astype(np.float64)
-    slope = radial * (push - turn)[..., None, None] + np.eye(2) * turn[..., None, None]
+    turn = np.where(outside, 0.0, thrust / size)
+    push = (along == thrust) - turn
+    slope = unit[..., :, None] * unit[..., None, :]
+    slope *= push[..., None, None]
+    slope[..., 0, 0] += turn
+    slope[..., 1, 1] += turn
     return Planar(thrust, direction, target - reached), slope
