@@ -178,7 +178,7 @@ class Pipeline:
         kept = planar_thrust(prepared.commands, previous)
         seeds = np.concatenate([kept[None, None], seeds], axis=1)
         near = turn_little(prepared, previous, aim, TURNS[0])
-        pool = self._descend(near, target, proposal, seeds, lead, steady=True)
+        pool = self._descend(near, target, proposal, seeds, lead, beside=free.command[0])
         plan = foresee(prepared, previous, target[0], pool.command[0, 0], free.command[0])
         if plan is not None:
             near = turn_little(prepared, previous, plan.ready, TURNS[1])
@@ -190,7 +190,7 @@ class Pipeline:
             if pool.error[0, 0] <= TOLERANCE:
                 break
             near = turn_little(prepared, previous, aim, width)
-            pool = self._descend(near, target, proposal, seeds, lead, steady=True)
+            pool = self._descend(near, target, proposal, seeds, lead, beside=free.command[0])
         return pool
 
     def _weigh(self, prepared: Prepared, target: Array, pool: Pool) -> Pool:
@@ -214,11 +214,19 @@ class Pipeline:
         proposal: Proposal,
         seeds: Array,
         lead: Lead,
-        steady: bool = False,
+        beside: Array | None = None,
     ) -> Pool:
-        """Search from thrust seeds (N, S, n), refine, and insist where that did not reach the target."""
+        """Search from thrust seeds (N, S, n), refine, and insist where that did not reach the target.
+
+        From tick to tick, `beside` are commands (P, n, 3) that answer the single target whatever the turns:
+        the search in narrow arcs may miss them where they are within these.
+        """
+        steady, steps = beside is not None, self.settings.refine_steps
         command = self._search(prepared, target, seeds, steady)
-        pool = self._refine(prepared, target, command, self.settings.refine_steps, steady)
+        if beside is not None:
+            within = prepared.commands.clamp(turn_short(prepared, beside))
+            command, steps = np.concatenate([command, within[None]], axis=1), steps + 1
+        pool = self._refine(prepared, target, command, steps, steady)
         missed = pool.error[:, 0] > TOLERANCE
         if missed.any():
             self._insist(prepared, target, proposal, pool, missed, lead)

@@ -59,10 +59,10 @@ def turn_little(prepared: Prepared, previous: Array, aim: Array, width: float) -
 
 
 def turn_short(near: Prepared, command: Array) -> Array:
-    """The command (n, 3), each zero direction a turn more or less so that it is nearest to its arc."""
+    """Commands (..., n, 3), each zero direction a turn more or less so that it is nearest to its arc."""
     turned = command.copy()
     middle = near.planar.middle
-    turned[:, 2] = middle + np.mod(command[:, 2] - middle + np.pi, 2 * np.pi) - np.pi
+    turned[..., 2] = middle + np.mod(command[..., 2] - middle + np.pi, 2 * np.pi) - np.pi
     return turned
 
 

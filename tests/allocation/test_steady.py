@@ -84,7 +84,8 @@ def steady(learned: LearnedAllocator, penta: Layout) -> Drive:
 
 def test_fins_turn_at_most_a_fifth_as_far(free: Drive, steady: Drive) -> None:
     assert steady.turns.max() <= 0.2 * free.turns.max()
-    assert steady.turns.sum() < free.turns.sum()
+    # Fins at rest turn ahead of need, so the turns need not add up to less; they are spread over the ticks.
+    assert np.square(steady.turns).sum() < 0.5 * np.square(free.turns).sum()
     assert steady.turns.max() <= TURNS[1] + 1e-6
     assert (steady.turns.max(1) <= TURNS[0] + 1e-6).mean() > 0.95
 

@@ -60,9 +60,16 @@ def swim_claims(rows: Mapping[str, Sequence[Row]]) -> Claims:
         trails += [
             f"`{name}` follows the trajectories closer: ATE {100 * row['ate']:.1f} cm."
             for name, row in whole.items()
-            if row["ate"] < 0.97 * ours["ate"]
+            if row["ate"] < ours["ate"]
         ]
     swum = [r for r in rows.get("faults", ()) if r.get("method") == "learned"]
+    healthy = {r["method"]: r["ate"] for r in rows.get("faults", ()) if r["kind"] == "healthy"}
+    trails += [
+        f"Healthy, on the layout of the faults: ATE {100 * healthy['learned']:.1f} cm against "
+        f"{100 * ate:.1f} cm of `{name}`."
+        for name, ate in healthy.items()
+        if "learned" in healthy and ate < healthy["learned"]
+    ]
     single = [r["ate_over_healthy"] for r in swum if r["kind"] == "one fin" and "ate_over_healthy" in r]
     if single:
         words = f"With one fin lost the ATE is at most {max(single):.2f} times that of the healthy robot."
