@@ -133,6 +133,8 @@ def refine(
         damping: first damping of each row.
     """
     damping_of = np.full(len(command), damping)
+    # Where nothing better is found this is the answer: it must not lie outside by a rounding error.
+    command = np.minimum(np.maximum(command, problem.lower), problem.upper)
     best = _judged(problem, target, command, None if steps else _NO_SLOPES)
     for step in range(steps):
         # (R, n, 3 commands, 6): change of the normalized wrench per unit of each limit range.

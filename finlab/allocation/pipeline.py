@@ -39,6 +39,10 @@ PROMISING = 0.02
 INEXACT = 1e9
 """Rank of inexact answers, behind every exact one. Energies reach thousands where an arc of zero directions
 ends near zero, since the energy divides by that end."""
+GRAIN = 5e-5
+"""Normalized error by which one inexact answer may be worse than another that is cheaper."""
+SPARING_STEPS = 3
+"""Levenberg-Marquardt steps after an inexact answer was made cheaper."""
 FIRST_PATIENCE, NEAREST_PATIENCE, LAST_PATIENCE = 5, 8, 25
 """Levenberg-Marquardt steps for the few targets that the quick way did not reach: at once, from the
 nearest wrench that the fins can deliver, and from fresh starts."""
@@ -260,6 +264,15 @@ class Pipeline:
         if missed.any():
             fresh = _fresh_starts(prepared, proposal.command[missed], RESTARTS)
             self._try(prepared, target, pool, missed, fresh, LAST_PATIENCE)
+        self._spare(prepared, target, pool)
+
+    def _spare(self, prepared: Prepared, target: Array, pool: Pool) -> None:
+        """Give inexact answers, in place, the amplitudes and frequencies by which their forces cost least."""
+        missed = pool.error[:, 0] > TOLERANCE
+        if missed.any():
+            force = prepared.commands.fin.force(pool.command[missed, 0])[..., 1:]
+            cheap, _ = force_space.realize(prepared.planar, force_space.polar(prepared.planar, force))
+            self._try(prepared, target, pool, missed, cheap[:, None], SPARING_STEPS)
 
     def _try(
         self,
@@ -336,14 +349,20 @@ class Pipeline:
             cost = cost.copy()
             cost[:, 0] *= 1.0 - SWITCH_GAIN
         error = refined.error.reshape(rows, p)
-        order = _rank(cost, error, TOLERANCE).argsort(axis=1) + np.arange(0, rows * p, p)[:, None]
+        order = _rank(cost, error, TOLERANCE, GRAIN).argsort(axis=1) + np.arange(0, rows * p, p)[:, None]
         return Pool(*(values.take(order, axis=0) for values in (*refined, energy)))
 
 
-def _rank(energy: Array, error: Array, tolerance: float) -> Array:
-    """What to sort answers by: the energy of exact ones, and behind them the error of the others."""
+def _rank(energy: Array, error: Array, tolerance: float, grain: float = 0.0) -> Array:
+    """What to sort answers by: the energy of exact ones, and behind them the error of the others.
+
+    Errors in the same grain count as one, and the energy decides.
+    """
     missed = error > tolerance
-    return np.where(missed, INEXACT * (1.0 + error), energy) if missed.any() else energy
+    if not missed.any():
+        return energy
+    coarse = grain * np.floor(error / grain) if grain else error
+    return np.where(missed, INEXACT * (1.0 + coarse) + np.minimum(energy, grain * INEXACT), energy)
 
 
 def _fresh_starts(prepared: Prepared, proposed: Array, count: int) -> Array:
