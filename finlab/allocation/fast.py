@@ -17,8 +17,8 @@ from finlab.allocation import force_space
 from finlab.allocation.allocation import Solution
 from finlab.allocation.energy import DEFAULT_WEIGHTS
 from finlab.allocation.fast_network import NumpyFastNetwork
+from finlab.allocation.insist import Lead, nearest_forces
 from finlab.allocation.learned import LearnedAllocator
-from finlab.allocation.pipeline import Lead, nearest_forces
 from finlab.allocation.weights import LearnedWeights
 from finlab.data.features import fin_frame_features
 from finlab.errors import AllocationError

@@ -18,10 +18,13 @@ from numpy.typing import NDArray
 from finlab.allocation.allocation import Candidates, Solution
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.energy import DEFAULT_WEIGHTS, EnergyWeights
-from finlab.allocation.pipeline import Lead, Pipeline, Pool, Settings, nearest_forces
+from finlab.allocation.insist import Lead, nearest_forces
+from finlab.allocation.pipeline import Pipeline
 from finlab.allocation.policy import Policy
+from finlab.allocation.pool import Pool
 from finlab.allocation.prepared import Prepared
 from finlab.allocation.proposal import Proposal
+from finlab.allocation.settings import Settings
 from finlab.allocation.threads import single_threaded_products
 from finlab.allocation.unreachable import serve
 from finlab.allocation.weights import LearnedWeights, weights_of

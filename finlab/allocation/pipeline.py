@@ -7,24 +7,22 @@ Levenberg-Marquardt on the commands. Nothing here knows the analytic fin model.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation import force_space
 from finlab.allocation.energy import DEFAULT_WEIGHTS, EnergyWeights
-from finlab.allocation.force_space import PlanarProblem
 from finlab.allocation.foresight import foresee
+from finlab.allocation.insist import FIRST_PATIENCE, Lead, insist, nearest_forces
 from finlab.allocation.learned_fin import LearnedFin
-from finlab.allocation.levenberg_marquardt import refine
-from finlab.allocation.nearest import nearest, wrench_of
 from finlab.allocation.numpy_network import NumpyNetwork
+from finlab.allocation.pool import TOLERANCE, Pool, rank, refine_pool
 from finlab.allocation.prepared import Prepared, prepare
 from finlab.allocation.proposal import Proposal, Proposer, propose
+from finlab.allocation.settings import Settings
 from finlab.allocation.steady import TURNS, planar_thrust, turn_little, turn_short
 from finlab.allocation.weighted_sum import lessen
 from finlab.allocation.weights import LearnedWeights
@@ -32,79 +30,16 @@ from finlab.errors import AllocationError
 
 Array = NDArray[Any]
 
-TOLERANCE = 2e-4
-"""Normalized error (by the surrogate) below which an answer counts as exact and energy decides."""
 PROMISING = 0.02
 """Normalized error below which a search counts as successful: refinement removes the rest."""
-INEXACT = 1e9
-"""Rank of inexact answers, behind every exact one. Energies reach thousands where an arc of zero directions
-ends near zero, since the energy divides by that end."""
-GRAIN = 5e-5
-"""Normalized error by which one inexact answer may be worse than another that is cheaper."""
-SPARING_STEPS = 3
-"""Levenberg-Marquardt steps after an inexact answer was made cheaper."""
-FIRST_PATIENCE, NEAREST_PATIENCE, LAST_PATIENCE = 5, 8, 25
-"""Levenberg-Marquardt steps for the few targets that the quick way did not reach: at once, from the
-nearest wrench that the fins can deliver, and from fresh starts."""
-RESTARTS = 32
-"""Fresh starts for the very few that even so stay further away than they need to."""
 EXPLORERS = 64
 """Random seeds of the wide search for other ways."""
 EXPLORING_STEPS = 40
 """Reweighting steps of that search: what it tells should be the bottoms of their valleys."""
-NEEDLESS = (5e-4, 2e-3)
-"""Normalized error beyond what is proven to be needed that is not worth further starts: a constant and a
-share."""
 PLAN_STEPS = 4
 """Levenberg-Marquardt steps on a command that was planned ahead."""
 SLIGHT = 5e-3
 """Normalized error for a tick that is better than a fast turn: half of what counts as delivered."""
-SWITCH_GAIN = 0.01
-"""Share of its energy that a robot in motion must save before it changes the way it moves."""
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How widely and how long the pipeline searches."""
-
-    n_candidates: int = 64
-    """Number K of candidates drawn from the mixture."""
-    temperature: float = 0.02
-    """T of the sampling; 0.02 in the paper."""
-    gamma: float = 1e-2
-    """Weight of the energy in the ranking J = J_norm + gamma J_en."""
-    n_seeds: int = 6
-    """Candidates that enter the search."""
-    n_refined: int = 4
-    """Allocations that are refined and offered as candidates."""
-    search_steps: int | None = None
-    """Reweighting steps of the search in force space; None: 4, and 12 from six fins on, where there is
-    more to choose from."""
-    refine_steps: int = 1
-    """Levenberg-Marquardt steps."""
-    subsets: bool = True
-    """Whether sub-layouts are searched as well."""
-    energy_weight: float = 0.0
-    """w of the weighted sum `err_norm^2 + w J_en` to minimize; 0: the least energy among exact answers."""
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.energy_weight < np.inf:
-            raise AllocationError(f"energy_weight: expected a number from 0, got {self.energy_weight}")
-        if self.n_candidates < 1 or self.n_seeds < 1 or self.n_refined < 1 or not self.temperature >= 0.0:
-            raise AllocationError(
-                "method 'learned' needs at least one candidate, seed and refined answer and a temperature "
-                f"from 0, got n_candidates={self.n_candidates}, n_seeds={self.n_seeds}, "
-                f"n_refined={self.n_refined}, temperature={self.temperature}"
-            )
-
-
-Lead = Callable[[PlanarProblem, Array], Array | None]
-"""From targets (R, 6) that were missed to planar forces (R, n, 2) [N] that come near them, or None."""
-
-
-def nearest_forces(problem: PlanarProblem, target: Array) -> Array:
-    """The forces (R, n, 2) whose wrench is nearest."""
-    return nearest(problem, target).force
 
 
 class Pipeline:
@@ -168,7 +103,7 @@ class Pipeline:
         drawn = np.random.default_rng(0).random((EXPLORERS, len(top))) ** 2 * top
         spread = np.concatenate([proposal.thrust[0].astype(np.float64), prepared.subsets, drawn])
         command = self._search(prepared, target, spread[None], False, keep=len(spread), steps=EXPLORING_STEPS)
-        found = self._refine(prepared, target, command, FIRST_PATIENCE)
+        found = refine_pool(prepared, target, command, FIRST_PATIENCE)
         return Pool(*(np.concatenate(both, axis=1) for both in zip(answer, found, strict=True)))
 
     def _descend_steadily(
@@ -189,7 +124,7 @@ class Pipeline:
         if plan is not None:
             near = turn_little(prepared, previous, plan.ready, TURNS[1])
             start = near.commands.clamp(turn_short(near, plan.command))
-            planned = self._refine(near, target, start[None, None], PLAN_STEPS)
+            planned = refine_pool(near, target, start[None, None], PLAN_STEPS)
             if planned.error[0, 0] <= max(TOLERANCE, pool.error[0, 0]):
                 pool = Pool(*(np.concatenate(parts, axis=1) for parts in zip(planned, pool, strict=True)))
         for width in TURNS[1:]:
@@ -232,64 +167,11 @@ class Pipeline:
         if beside is not None:
             within = prepared.commands.clamp(turn_short(prepared, beside))
             command, steps = np.concatenate([command, within[None]], axis=1), steps + 1
-        pool = self._refine(prepared, target, command, steps, steady)
+        pool = refine_pool(prepared, target, command, steps, steady)
         missed = pool.error[:, 0] > TOLERANCE
         if missed.any():
-            self._insist(prepared, target, proposal, pool, missed, lead)
+            insist(prepared, target, proposal, pool, missed, lead)
         return pool
-
-    def _insist(
-        self,
-        prepared: Prepared,
-        target: Array,
-        proposal: Proposal,
-        pool: Pool,
-        missed: NDArray[np.bool_],
-        lead: Lead,
-    ) -> None:
-        """Improve, in place, the answers to targets that were missed: they are hard, or out of reach."""
-        self._try(prepared, target, pool, missed, None, FIRST_PATIENCE)
-        missed = pool.error[:, 0] > TOLERANCE
-        if not missed.any():
-            return
-        force = lead(prepared.planar, target[missed])
-        if force is None:
-            return
-        needed = np.zeros(len(target))
-        left = target[missed] - wrench_of(prepared.planar.columns, force)
-        needed[missed] = np.linalg.norm(left, axis=-1)
-        start, _ = force_space.realize(prepared.planar, force_space.polar(prepared.planar, force))
-        self._try(prepared, target, pool, missed, start[:, None], NEAREST_PATIENCE)
-        missed &= pool.error[:, 0] > np.maximum(TOLERANCE, NEEDLESS[0] + (1.0 + NEEDLESS[1]) * needed)
-        if missed.any():
-            fresh = _fresh_starts(prepared, proposal.command[missed], RESTARTS)
-            self._try(prepared, target, pool, missed, fresh, LAST_PATIENCE)
-        self._spare(prepared, target, pool)
-
-    def _spare(self, prepared: Prepared, target: Array, pool: Pool) -> None:
-        """Give inexact answers, in place, the amplitudes and frequencies by which their forces cost least."""
-        missed = pool.error[:, 0] > TOLERANCE
-        if missed.any():
-            force = prepared.commands.fin.force(pool.command[missed, 0])[..., 1:]
-            cheap, _ = force_space.realize(prepared.planar, force_space.polar(prepared.planar, force))
-            self._try(prepared, target, pool, missed, cheap[:, None], SPARING_STEPS)
-
-    def _try(
-        self,
-        prepared: Prepared,
-        target: Array,
-        pool: Pool,
-        rows: NDArray[np.bool_],
-        starts: Array | None,
-        steps: int,
-    ) -> None:
-        """Refine some rows of a pool further, in place, together with new starts (rows, S, n, 3)."""
-        command = pool.command[rows]
-        if starts is not None:
-            command = np.concatenate([command, prepared.commands.clamp(starts)], axis=1)
-        longer = self._refine(prepared, target[rows], command, steps)
-        for kept, new in zip(pool, longer, strict=True):
-            kept[rows] = new[:, : kept.shape[1]]
 
     def _seeds(self, prepared: Prepared, proposal: Proposal) -> Array:
         """Thrust seeds (N, S, n): the best candidate of each component, and sub-layouts."""
@@ -323,7 +205,7 @@ class Pipeline:
         planar = force_space.descend(prepared.planar, flat, thrust.reshape(-1, n), steps)
         command, energy = force_space.realize(prepared.planar, planar)
         error = np.einsum("ri,ri->r", planar.residual, planar.residual)
-        score = _rank(energy, error, PROMISING**2).reshape(rows, n_seeds)
+        score = rank(energy, error, PROMISING**2).reshape(rows, n_seeds)
         if steady:
             score[:, 0] = -1.0
         kept = (
@@ -331,60 +213,6 @@ class Pipeline:
             + np.arange(0, rows * n_seeds, n_seeds)[:, None]
         )
         return command.take(kept, axis=0)
-
-    def _refine(
-        self, prepared: Prepared, target: Array, command: Array, steps: int, steady: bool = False
-    ) -> Pool:
-        """Refined commands (N, P, n, 3), best first: the cheapest exact one, or the most exact one.
-
-        With `steady`, the first command is how the robot moves now; another must save the share
-        `SWITCH_GAIN` of its energy to take its place.
-        """
-        rows, p, n, _ = command.shape
-        repeated = target if rows == 1 else np.repeat(target, p, axis=0)
-        refined = refine(prepared.commands, repeated, command.reshape(-1, n, 3), steps)
-        energy = prepared.energy(refined.command)
-        cost = energy.reshape(rows, p)
-        if steady:
-            cost = cost.copy()
-            cost[:, 0] *= 1.0 - SWITCH_GAIN
-        error = refined.error.reshape(rows, p)
-        order = _rank(cost, error, TOLERANCE, GRAIN).argsort(axis=1) + np.arange(0, rows * p, p)[:, None]
-        return Pool(*(values.take(order, axis=0) for values in (*refined, energy)))
-
-
-def _rank(energy: Array, error: Array, tolerance: float, grain: float = 0.0) -> Array:
-    """What to sort answers by: the energy of exact ones, and behind them the error of the others.
-
-    Errors in the same grain count as one, and the energy decides.
-    """
-    missed = error > tolerance
-    if not missed.any():
-        return energy
-    coarse = grain * np.floor(error / grain) if grain else error
-    return np.where(missed, INEXACT * (1.0 + coarse) + np.minimum(energy, grain * INEXACT), energy)
-
-
-def _fresh_starts(prepared: Prepared, proposed: Array, count: int) -> Array:
-    """Commands (N, count, n, 3): raw candidates of the network and random ones, half and half."""
-    raw = proposed[:, : count // 2].astype(np.float64)
-    lower, upper = prepared.commands.lower, prepared.commands.upper
-    unit = np.random.default_rng(0).random((count - raw.shape[1], len(lower), 3))
-    spread = np.broadcast_to(lower + unit * (upper - lower), (len(proposed), *unit.shape))
-    return np.concatenate([raw, spread], axis=1)
-
-
-class Pool(NamedTuple):
-    """P refined answers to each of N targets, best first."""
-
-    command: Array
-    """(N, P, n, 3)."""
-    wrench: Array
-    """Normalized wrench (N, P, 6) by the surrogate."""
-    error: Array
-    """Normalized error (N, P) by the surrogate."""
-    energy: Array
-    """(N, P)."""
 
 
 def _best_of_each_component(component: NDArray[np.int64], score: Array, n_seeds: int) -> NDArray[np.int64]:

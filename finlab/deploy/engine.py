@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.numpy_network import MixtureArrays
-from finlab.allocation.pipeline import Pipeline, Settings
+from finlab.allocation.pipeline import Pipeline
 from finlab.allocation.prepared import Prepared
 from finlab.allocation.proposal import Proposal, propose
+from finlab.allocation.settings import Settings
 from finlab.allocation.weights import LearnedWeights
 from finlab.deploy.bundle import NETWORK
 from finlab.deploy.bundle_file import RobotBundle

@@ -14,7 +14,7 @@ import numpy as np
 
 import finlab
 from finlab.allocation.energy import EnergyWeights
-from finlab.allocation.pipeline import Settings
+from finlab.allocation.settings import Settings
 from finlab.allocation.weights import LearnedWeights
 from finlab.data.normalization import Normalization
 from finlab.deploy.graph import LayoutGraph

@@ -19,7 +19,7 @@ from tqdm import tqdm
 from finlab.allocation.energy import command_energy
 from finlab.allocation.learned import LearnedAllocator
 from finlab.allocation.levenberg_marquardt import refine
-from finlab.allocation.pipeline import TOLERANCE
+from finlab.allocation.pool import TOLERANCE
 from finlab.allocation.prepared import Prepared
 from finlab.allocation.proposal import propose
 from finlab.evaluation.splits import Case

@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from finlab.allocation.energy import DEFAULT_WEIGHTS, energy_scale
-from finlab.allocation.pipeline import Settings
 from finlab.allocation.prepared import Prepared
 from finlab.allocation.proposal import draws_of_one
+from finlab.allocation.settings import Settings
 from finlab.allocation.weights import LearnedWeights
 from finlab.deploy.onnx.builder import Builder
 from finlab.deploy.onnx.model import Model
