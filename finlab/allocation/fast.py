@@ -64,8 +64,10 @@ class FastAllocator(LearnedAllocator):
         previous: Array | None,
         lead: Lead = nearest_forces,
     ) -> Solution:
-        # Slow turns from tick to tick are a search of their own; the network learned the usual energy.
-        if previous is not None or self.energy_weights != DEFAULT_WEIGHTS:
+        # Slow turns from tick to tick are a search of their own; the network learned exact answers, cheap by
+        # the usual energy.
+        usual = self.energy_weights == DEFAULT_WEIGHTS and self.settings.energy_weight == 0.0
+        if previous is not None or not usual:
             return super()._solve(layout, targets, seed=seed, previous=previous, lead=lead)
         prepared, notes = self._known(layout)
         target = targets / self.normalization.std
@@ -75,12 +77,8 @@ class FastAllocator(LearnedAllocator):
         thrust = share * share * prepared.planar.curves.maximum
         planar = force_space.descend(prepared.planar, target, thrust, STEPS)
         missed = np.einsum("ri,ri->r", planar.residual, planar.residual) > GOOD**2
-        if len(targets) == 1:
-            if missed[0]:
-                return super()._solve(layout, targets, seed=seed, previous=None, lead=lead)
-            command, _ = force_space.realize(prepared.planar, planar)
-            wrench = targets - planar.residual * self.normalization.std
-            return Solution(command, wrench, notes=notes)
+        if missed.all():
+            return super()._solve(layout, targets, seed=seed, previous=None, lead=lead)
         command, _ = force_space.realize(prepared.planar, planar)
         wrench = targets - planar.residual * self.normalization.std
         if missed.any():

@@ -69,3 +69,9 @@ def test_what_cannot_be_weighed_is_refused() -> None:
         load_allocator(energy_weight=-1)
     with pytest.raises(AllocationError, match="energy of squares"):
         load_allocator(energy_weight=0.1, energy_weights=POWER_WEIGHTS)
+
+
+def test_the_fast_way_weighs_too() -> None:
+    layout, target = next(iter(cases("nominal")))
+    fast, full = (load_allocator(method=name, energy_weight=0.1) for name in ("fast", "learned"))
+    assert np.array_equal(fast.allocate(layout, target).command, full.allocate(layout, target).command)
