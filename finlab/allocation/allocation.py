@@ -99,9 +99,7 @@ class Allocation:
         alternatives = self.make_alternatives() or self.candidates
         if alternatives is None:
             return ()
-        limits = [fin.limits for fin in self.layout.fins]
-        lower, upper = (np.array([getattr(limit, end) for limit in limits]) for end in ("lower", "upper"))
-        return find_modes(alternatives, lower, upper, self.previous)
+        return find_modes(alternatives, *self._limits, self.previous)
 
     @cached_property
     def candidates(self) -> Candidates | None:
@@ -159,17 +157,20 @@ class Allocation:
         """Sentences about the limits that keep the robot from delivering the target; none where it does."""
         if self.reachable:
             return ()
-        limits = [fin.limits for fin in self.layout.fins]
-        lower, upper = (np.array([getattr(limit, end) for limit in limits]) for end in ("lower", "upper"))
         missing = self.unallocated / self.sigma**2
         pull = (missing @ layout_effectiveness(self.layout)).reshape(-1, 2)
-        return tuple(describe_binding(self.fins, self.command, lower, upper, pull))
+        return tuple(describe_binding(self.fins, self.command, *self._limits, pull))
+
+    @property
+    def _limits(self) -> tuple[Array, Array]:
+        """Lower and upper limits (n, 3) of all fins."""
+        limits = [fin.limits for fin in self.layout.fins]
+        return np.array([limit.lower for limit in limits]), np.array([limit.upper for limit in limits])
 
     @cached_property
     def energy(self) -> float:
         """Energy proxy of the command."""
-        upper = np.array([fin.limits.upper for fin in self.layout.fins])
-        return float(command_energy(self.command, upper))
+        return float(command_energy(self.command, self._limits[1]))
 
 
 class BatchAllocation(NamedTuple):

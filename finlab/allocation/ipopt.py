@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from finlab.allocation.actuation import Actuation
 from finlab.allocation.energy import DEFAULT_WEIGHTS, energy_scale
 from finlab.allocation.model_based import CACHE_SIZE, ENERGY_WEIGHT
-from finlab.allocation.single_target import Problem, SingleTarget
+from finlab.allocation.single_target import DEFAULT_STARTS, Problem, SingleTarget
 from finlab.data.normalization import Normalization
 from finlab.errors import AllocationError
 
@@ -45,7 +45,7 @@ class Ipopt(SingleTarget):
 
     name = "ipopt"
 
-    def __init__(self, normalization: Normalization, *, n_starts: int = 8) -> None:
+    def __init__(self, normalization: Normalization, *, n_starts: int = DEFAULT_STARTS) -> None:
         super().__init__(normalization, n_starts=n_starts)
         self._casadi = import_casadi()
         self._solver = lru_cache(CACHE_SIZE)(self._build)

@@ -86,10 +86,9 @@ class Pipeline:
         if previous is None:
             seeds = self._seeds(prepared, proposal)
             pool = self._descend(prepared, target, proposal, seeds, lead)
-            return self._weigh(prepared, target, pool), proposal
+            return self._weigh(prepared, target, pool, None), proposal
         pool = self._descend_steadily(prepared, target, proposal, previous, lead)
-        near = turn_little(prepared, previous, pool.command[0, 0, :, 2], TURNS[0])
-        pool = self._weigh(near, target, pool)
+        pool = self._weigh(prepared, target, pool, previous)
         # Arcs that pass the seam are brought back inside the fin's own limits.
         return pool._replace(command=prepared.commands.clamp(pool.command)), proposal
 
@@ -134,11 +133,13 @@ class Pipeline:
             pool = self._descend(near, target, proposal, seeds, lead, beside=free.command[0])
         return pool
 
-    def _weigh(self, prepared: Prepared, target: Array, pool: Pool) -> Pool:
+    def _weigh(self, prepared: Prepared, target: Array, pool: Pool, previous: Array | None) -> Pool:
         """Trade error for energy, where the settings ask for the weighted sum."""
         weight = self.settings.energy_weight
         if weight == 0.0:
             return pool
+        if previous is not None:
+            prepared = turn_little(prepared, previous, pool.command[0, 0, :, 2], TURNS[0])
         rows, p, n, _ = pool.command.shape
         start = prepared.commands.clamp(pool.command.reshape(-1, n, 3))
         found, energy = lessen(

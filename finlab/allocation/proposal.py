@@ -80,7 +80,6 @@ def sample(
     means = mixture.mean.swapaxes(1, 2)  # (N, M, n, 3)
     components = np.empty((rows, n_samples), dtype=np.int64)
     commands = np.empty((rows, n_samples, n, 3), dtype=np.float32)
-    kept = min(m, n_samples)
     components[:, :kept] = np.arange(kept)
     commands[:, :kept] = means[:, :kept]
     extra = n_samples - kept

@@ -14,6 +14,9 @@ from finlab.data.normalization import Normalization
 
 Array = NDArray[np.float64]
 
+DEFAULT_STARTS = 8
+"""Random starts per target unless told otherwise."""
+
 
 class Problem:
     """One target on one layout, over the commands that have a range at all, as positions in 0..1.
@@ -72,7 +75,7 @@ class SingleTarget(ModelBased):
         n_starts: uniform random starts per target.
     """
 
-    def __init__(self, normalization: Normalization, *, n_starts: int = 8) -> None:
+    def __init__(self, normalization: Normalization, *, n_starts: int = DEFAULT_STARTS) -> None:
         super().__init__(normalization)
         self.n_starts = n_starts
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from finlab.allocation.single_target import Problem, SingleTarget
+from finlab.allocation.single_target import DEFAULT_STARTS, Problem, SingleTarget
 from finlab.data.normalization import Normalization
 
 Array = NDArray[np.float64]
@@ -25,7 +25,9 @@ class Slsqp(SingleTarget):
 
     name = "slsqp"
 
-    def __init__(self, normalization: Normalization, *, n_starts: int = 8, max_iterations: int = 200) -> None:
+    def __init__(
+        self, normalization: Normalization, *, n_starts: int = DEFAULT_STARTS, max_iterations: int = 200
+    ) -> None:
         super().__init__(normalization, n_starts=n_starts)
         self.max_iterations = max_iterations
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from finlab.allocation.single_target import Problem, SingleTarget
+from finlab.allocation.single_target import DEFAULT_STARTS, Problem, SingleTarget
 from finlab.data.normalization import Normalization
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ class Trf(SingleTarget):
     name = "trf"
 
     def __init__(
-        self, normalization: Normalization, *, n_starts: int = 8, max_evaluations: int = 100
+        self, normalization: Normalization, *, n_starts: int = DEFAULT_STARTS, max_evaluations: int = 100
     ) -> None:
         super().__init__(normalization, n_starts=n_starts)
         self.max_evaluations = max_evaluations

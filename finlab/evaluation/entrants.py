@@ -29,7 +29,7 @@ def method_names(text: str) -> list[str]:
 
 def is_slow(name: str) -> bool:
     """Whether an entrant runs on a subsample only."""
-    return _parse(name)[0] in SLOW
+    return method_and_starts(name)[0] in SLOW
 
 
 def load_entrant(name: str, checkpoint: str | Path | None = None) -> Allocator:
@@ -42,7 +42,7 @@ def load_entrant(name: str, checkpoint: str | Path | None = None) -> Allocator:
     Raises:
         AllocationError: unknown method, or starts for a method that has none.
     """
-    method, starts = _parse(name)
+    method, starts = method_and_starts(name)
     if starts is None:
         return load_allocator(checkpoint, method)
     if method not in SLOW or starts < 1:
@@ -57,7 +57,7 @@ def fingerprint(name: str, checkpoint: str | Path | None = None) -> str:
     a digest of the normalization for the others."""
     from finlab.model.checkpoint import load_checkpoint, load_normalization, resolve_checkpoint
 
-    method = _parse(name)[0]
+    method = method_and_starts(name)[0]
     path = resolve_checkpoint(checkpoint or ("paper" if method == "paper" else "default"))
     if method == "fast":
         weights = b"".join(file.read_bytes() for file in sorted((path / DISTILLED).iterdir()))
@@ -82,7 +82,7 @@ def surrogate_fingerprint(checkpoint: str | Path) -> str:
     return hashlib.sha256(b"".join(state[key].numpy().tobytes() for key in sorted(state))).hexdigest()
 
 
-def _parse(name: str) -> tuple[str, int | None]:
+def method_and_starts(name: str) -> tuple[str, int | None]:
     """Method and number of starts."""
     found = _WITH_STARTS.fullmatch(name)
     return (name, None) if found is None else (found[1], int(found[2]))

@@ -13,6 +13,8 @@ from tqdm import tqdm
 from finlab.allocation.allocation import BatchAllocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.energy import command_energy
+from finlab.allocation.single_target import DEFAULT_STARTS
+from finlab.evaluation.entrants import method_and_starts
 from finlab.evaluation.metrics import energy_rows, rows_by_fin_count, wrench_intervals, wrench_row
 from finlab.evaluation.paper_figures import paper_wrench_rows
 from finlab.evaluation.records import Records, join_records
@@ -117,7 +119,8 @@ def interval_rows(records: dict[str, Records], split: str) -> list[dict[str, Any
 
 def energy_comparison(records: dict[str, Records]) -> list[dict[str, Any]]:
     """Energies of all methods over those of IPOPT, from the most starts that took part; none without it."""
-    starts = {name: int(name.partition("-")[2] or 8) for name in records if name.partition("-")[0] == "ipopt"}
+    parsed = {name: method_and_starts(name) for name in records}
+    starts = {name: count or DEFAULT_STARTS for name, (method, count) in parsed.items() if method == "ipopt"}
     if not starts or len(records) == 1:
         return []
     reference = max(starts, key=lambda name: starts[name])
