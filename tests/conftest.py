@@ -18,11 +18,11 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
     import numpy as np
     import torch
 
-    from finlab.data.features import SIZES
-    from finlab.data.normalization import Normalization
-    from finlab.model.allocator_network import AllocatorNetwork
-    from finlab.model.checkpoint import Checkpoint, save_checkpoint
-    from finlab.model.surrogate import make_surrogate
+    from finlab.inference.features import SIZES
+    from finlab.inference.normalization import Normalization
+    from finlab.training.networks.allocator_network import AllocatorNetwork
+    from finlab.training.networks.checkpoint import Checkpoint, save_checkpoint
+    from finlab.training.networks.surrogate import make_surrogate
     from finlab.training.presets import get_preset
 
     preset = get_preset("smoke")

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from finlab.analysis import AttainableSet, ScoreCard, attainable_set, score_card
-from finlab.analysis.attainable import Kind
+from finlab.forces.attainable import Kind
 from finlab.layout import Layout
 
 DRAWN: dict[str, Kind | None] = {"none": None, "forces": "force", "torques": "torque"}

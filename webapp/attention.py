@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
-from finlab.data.features import fin_frame_features
+from finlab.inference.features import fin_frame_features
 from finlab.layout import Layout
 
 
@@ -23,7 +23,7 @@ def attention(
     allocator: Allocator, layout: Layout, failed: tuple[str, ...], target: NDArray[np.float64]
 ) -> Attention | None:
     """What the fins of a layout look at for a target (6,) [N, N m]; None for methods without a graph."""
-    from finlab.allocation.learned import LearnedAllocator
+    from finlab.allocation.learned.learned_allocator import LearnedAllocator
 
     if not isinstance(allocator, LearnedAllocator):
         return None

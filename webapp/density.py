@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.proposal import predict
+from finlab.allocation.learned.proposal import predict
 from finlab.layout import Layout
 
 Array = NDArray[np.float64]
@@ -41,7 +41,7 @@ def densities(
     Returns:
         None for methods that draw no candidates.
     """
-    from finlab.allocation.learned import LearnedAllocator
+    from finlab.allocation.learned.learned_allocator import LearnedAllocator
 
     if not isinstance(allocator, LearnedAllocator):
         return None

@@ -54,7 +54,7 @@ def layout_bytes(layout: Layout) -> bytes:
 
 def graph_bytes(layout: Layout, failed: tuple[str, ...], allocator: Allocator) -> bytes:
     """The layout graph file for deployment with the allocator's checkpoint."""
-    from finlab.allocation.learned import LearnedAllocator
+    from finlab.allocation.learned.learned_allocator import LearnedAllocator
     from finlab.deploy.graph import build_graph
     from finlab.deploy.graph_file import write_graph
 
@@ -74,7 +74,7 @@ def bundle_bytes(layout: Layout, failed: tuple[str, ...], allocator: Allocator) 
     Raises:
         FinlabError: the allocator has no trained network.
     """
-    from finlab.allocation.learned import LearnedAllocator
+    from finlab.allocation.learned.learned_allocator import LearnedAllocator
     from finlab.deploy.bundle import make_bundle
 
     if isinstance(allocator, LearnedAllocator):

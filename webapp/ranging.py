@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from finlab.analysis.beside import Ranges, ranges_beside
+from finlab.forces.beside import Ranges, ranges_beside
 from finlab.layout import Layout
 
 REST_S = 0.12

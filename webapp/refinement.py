@@ -6,7 +6,7 @@ import numpy as np
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.levenberg_marquardt import refine
+from finlab.allocation.learned.levenberg_marquardt import refine
 from finlab.errors import AllocationError
 
 STEPS = 6
@@ -19,7 +19,7 @@ def refinement(allocator: Allocator, answer: Allocation) -> tuple[Allocation, ..
     Raises:
         AllocationError: the method draws no candidates and refines none.
     """
-    from finlab.allocation.learned import LearnedAllocator
+    from finlab.allocation.learned.learned_allocator import LearnedAllocator
 
     if not isinstance(allocator, LearnedAllocator) or answer.samples is None:
         raise AllocationError("only the method learned refines candidates; choose it to see how")

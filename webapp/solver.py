@@ -102,7 +102,7 @@ class Solver:
 
 def _take_settings(allocator: Allocator, state: State) -> None:
     """Let K, T and gamma take effect on the next answer; no network is loaded again for a slider's step."""
-    from finlab.allocation.learned import LearnedAllocator
+    from finlab.allocation.learned.learned_allocator import LearnedAllocator
 
     values = {key: getattr(state, key) for key in ("n_candidates", "temperature", "gamma")}
     if isinstance(allocator, LearnedAllocator):

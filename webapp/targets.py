@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.analysis.fin_sets import SCALE, fin_sets
+from finlab.forces.fin_sets import SCALE, fin_sets
 from finlab.layout import Layout
 
 PRESETS: dict[str, tuple[float, float, float, float, float, float]] = {

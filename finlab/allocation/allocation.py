@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.energy import command_energy
 from finlab.allocation.modes import Mode, find_modes
 from finlab.allocation.policy import describe_binding
 from finlab.layout import Layout
 from finlab.layout.arrays import layout_effectiveness
+from finlab.physics.energy import command_energy
 
 Array = NDArray[np.float64]
 

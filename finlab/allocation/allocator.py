@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from finlab.allocation.allocation import REACHED, Allocation, BatchAllocation, Candidates, Solution
 from finlab.allocation.health import Health
 from finlab.allocation.policy import AXES, CLOSEST, Policy, as_policy, largest_share
-from finlab.data.normalization import Normalization
 from finlab.errors import AllocationError, CommandError
+from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
 
 Array = NDArray[np.float64]

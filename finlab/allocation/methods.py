@@ -10,16 +10,16 @@ from finlab.allocation.allocator import Allocator
 from finlab.errors import AllocationError
 
 METHODS: dict[str, tuple[str, str]] = {
-    "learned": ("finlab.allocation.learned", "LearnedAllocator"),
-    "fast": ("finlab.allocation.fast", "FastAllocator"),
-    "paper": ("finlab.allocation.paper", "PaperAllocator"),
-    "qp": ("finlab.allocation.qp", "Qp"),
-    "sqp": ("finlab.allocation.sqp", "Sqp"),
-    "analytic": ("finlab.allocation.analytic", "Analytic"),
-    "multistart": ("finlab.allocation.multistart", "Multistart"),
-    "trf": ("finlab.allocation.trf", "Trf"),
-    "slsqp": ("finlab.allocation.slsqp", "Slsqp"),
-    "ipopt": ("finlab.allocation.ipopt", "Ipopt"),
+    "learned": ("finlab.allocation.learned.learned_allocator", "LearnedAllocator"),
+    "fast": ("finlab.allocation.learned.fast", "FastAllocator"),
+    "paper": ("finlab.allocation.learned.paper", "PaperAllocator"),
+    "qp": ("finlab.allocation.baselines.qp", "Qp"),
+    "sqp": ("finlab.allocation.baselines.sqp", "Sqp"),
+    "analytic": ("finlab.allocation.baselines.analytic", "Analytic"),
+    "multistart": ("finlab.allocation.baselines.multistart", "Multistart"),
+    "trf": ("finlab.allocation.baselines.trf", "Trf"),
+    "slsqp": ("finlab.allocation.baselines.slsqp", "Slsqp"),
+    "ipopt": ("finlab.allocation.baselines.ipopt", "Ipopt"),
 }
 """Name -> module and class; modules are loaded only when their method is asked for."""
 
@@ -44,7 +44,11 @@ def load_allocator(
     """
     if method not in METHODS:
         raise AllocationError(f"method: expected one of {', '.join(METHODS)}, got {method!r}")
-    from finlab.model.checkpoint import load_allocator_checkpoint, load_normalization, resolve_checkpoint
+    from finlab.training.networks.checkpoint import (
+        load_allocator_checkpoint,
+        load_normalization,
+        resolve_checkpoint,
+    )
 
     path = resolve_checkpoint(checkpoint or ("paper" if method == "paper" else "default"))
     module, name = METHODS[method]

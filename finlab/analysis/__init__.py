@@ -3,15 +3,12 @@
 It works from the fins' own laws with numpy and scipy. Torch is loaded only for fins that follow a table.
 """
 
-from finlab.analysis.attainable import AttainableSet as AttainableSet
-from finlab.analysis.attainable import attainable_set as attainable_set
 from finlab.analysis.authority import AXES as AXES
 from finlab.analysis.authority import Authority as Authority
 from finlab.analysis.authority import Loss as Loss
 from finlab.analysis.authority import authority as authority
 from finlab.analysis.authority import losses as losses
 from finlab.analysis.goals import GOALS as GOALS
-from finlab.analysis.least_energy import least_energy as least_energy
 from finlab.analysis.moves import Bounds as Bounds
 from finlab.analysis.moves import mirror_pairs as mirror_pairs
 from finlab.analysis.optimize import Improvement as Improvement
@@ -19,3 +16,6 @@ from finlab.analysis.optimize import Progress as Progress
 from finlab.analysis.optimize import optimize_layout as optimize_layout
 from finlab.analysis.score_card import ScoreCard as ScoreCard
 from finlab.analysis.score_card import score_card as score_card
+from finlab.forces.attainable import AttainableSet as AttainableSet
+from finlab.forces.attainable import attainable_set as attainable_set
+from finlab.forces.least_energy import least_energy as least_energy

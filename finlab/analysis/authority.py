@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.analysis.extent import RANK_TOLERANCE, Extent, singular_values, strongest, weakest
-from finlab.analysis.fin_sets import SCALE, fin_sets
-from finlab.analysis.reach import along_exactly
-from finlab.analysis.thrust_law import thrust_laws
+from finlab.forces.extent import RANK_TOLERANCE, Extent, singular_values, strongest, weakest
+from finlab.forces.fin_sets import SCALE, fin_sets
+from finlab.forces.reach import along_exactly
+from finlab.forces.thrust_law import thrust_laws
 from finlab.layout import Layout
 
 Array = NDArray[np.float64]

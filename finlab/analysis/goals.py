@@ -12,11 +12,11 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finlab.analysis.extent import weakest
-from finlab.analysis.fin_sets import SCALE, FinSets
-from finlab.analysis.least_energy import descend, planar_energy, starts
-from finlab.analysis.reach import COARSE, FINE, along
 from finlab.errors import LayoutError
+from finlab.forces.extent import weakest
+from finlab.forces.fin_sets import SCALE, FinSets
+from finlab.forces.least_energy import descend, planar_energy, starts
+from finlab.forces.reach import COARSE, FINE, along
 from finlab.layout import Layout
 
 Array = NDArray[np.float64]

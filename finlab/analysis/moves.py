@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.analysis.fin_sets import SCALE, FinSets, fin_sets
 from finlab.errors import LayoutError
+from finlab.forces.fin_sets import SCALE, FinSets, fin_sets
 from finlab.layout import Fin, Layout, planar_effectiveness
 
 Array = NDArray[np.float64]

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import differential_evolution
 
-from finlab.analysis.fin_sets import fin_sets
 from finlab.analysis.goals import MISSION, Goal, make_goal
 from finlab.analysis.moves import Bounds, Moves, mirror_pairs
 from finlab.analysis.score_card import ScoreCard, score_card
+from finlab.forces.fin_sets import fin_sets
 from finlab.layout import Layout
 
 Array = NDArray[np.float64]

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.analysis.authority import AXES
-from finlab.analysis.extent import RANK_TOLERANCE, singular_values
-from finlab.analysis.fin_sets import fin_sets
+from finlab.forces.extent import RANK_TOLERANCE, singular_values
+from finlab.forces.fin_sets import fin_sets
 from finlab.layout import Layout
 
 

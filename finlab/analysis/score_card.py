@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from finlab.analysis.authority import AXES, Authority, Loss, authority, losses, model_error
-from finlab.analysis.fin_sets import MAX_PIECES, fin_sets, wide_fins
-from finlab.analysis.least_energy import least_energy
+from finlab.forces.fin_sets import MAX_PIECES, fin_sets, wide_fins
+from finlab.forces.least_energy import least_energy
 from finlab.layout import Layout
 
 UNIT = (1.0, 1.0, 1.0, 0.1, 0.1, 0.1)

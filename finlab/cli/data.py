@@ -24,7 +24,7 @@ def generate(
         commands_per_layout: how many random commands on each.
         seed: same numbers and seed, same bytes.
     """
-    from finlab.data.shards import generate as generate_shards
+    from finlab.training.data.shards import generate as generate_shards
 
     report = generate_shards(output, n_layouts=layouts, commands_per_layout=commands_per_layout, seed=seed)
     rate = f", {report.samples_per_second:,.0f} samples/s" if report.samples else ""
@@ -38,6 +38,6 @@ def verify(folder: Annotated[Positional[Path], arg(metavar="FOLDER")]) -> None:
     Args:
         folder: folder that `data generate` wrote.
     """
-    from finlab.data.shards import verify as verify_shards
+    from finlab.training.data.shards import verify as verify_shards
 
     print(f"{folder}: {verify_shards(folder):,} samples, all checksums fit")

@@ -115,7 +115,7 @@ def seeds(
         checkpoint: trained checkpoint; the shipped one by default.
         json: file for the rows.
     """
-    from finlab.allocation.learned import LearnedAllocator
+    from finlab.allocation.learned.learned_allocator import LearnedAllocator
     from finlab.evaluation.seeds import seed_report, seed_rows
     from finlab.evaluation.splits import make_split
 

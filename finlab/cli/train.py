@@ -12,7 +12,7 @@ from tyro.extras import SubcommandApp
 
 if TYPE_CHECKING:
     from finlab.layout import FinModelSpec
-    from finlab.model.checkpoint import Checkpoint
+    from finlab.training.networks.checkpoint import Checkpoint
 
 verbs = SubcommandApp()
 
@@ -111,10 +111,10 @@ def fast(
         stop_after: stop after so many steps; call again to go on.
     """
     from finlab.allocation import load_allocator
-    from finlab.allocation.learned import LearnedAllocator
-    from finlab.distill.answers import AnswerSettings
-    from finlab.distill.train import FastSettings, train_fast
-    from finlab.model.fast_network import FastConfig
+    from finlab.allocation.learned.learned_allocator import LearnedAllocator
+    from finlab.training.distill.answers import AnswerSettings
+    from finlab.training.distill.train import FastSettings, train_fast
+    from finlab.training.networks.fast_network import FastConfig
 
     _check_counts(shards=shards, steps=steps, stop_after=stop_after)
     allocator = load_allocator(checkpoint)

@@ -101,7 +101,7 @@ def make_bundle(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = 
         LayoutError: an unknown failed fin, or none left.
         AllocationError: the allocator's method cannot run on a robot.
     """
-    from finlab.allocation.learned import LearnedAllocator
+    from finlab.allocation.learned.learned_allocator import LearnedAllocator
 
     if not isinstance(allocator, LearnedAllocator):
         raise AllocationError(

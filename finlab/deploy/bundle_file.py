@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from finlab.allocation.weights import LearnedWeights
 from finlab.deploy import metadata
 from finlab.deploy.bundle import CHECKSUMS, FAST, GRAPH, NETWORK, SURROGATE, checksums
 from finlab.deploy.bundle_source import files_at
@@ -25,8 +24,9 @@ from finlab.deploy.onnx.network import network_model, network_weights
 from finlab.deploy.onnx.reading import read_model
 from finlab.deploy.onnx.surrogate import surrogate_model, surrogate_weights
 from finlab.errors import DataError
+from finlab.inference.fast_weights import FastWeights
+from finlab.inference.weights import LearnedWeights
 from finlab.layout import FinModelSpec
-from finlab.model.fast_weights import FastWeights
 
 REQUIRED = (GRAPH, NETWORK, SURROGATE, CHECKSUMS)
 

@@ -11,17 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.numpy_network import MixtureArrays
-from finlab.allocation.pipeline import Pipeline
-from finlab.allocation.prepared import Prepared
-from finlab.allocation.proposal import Proposal, propose
-from finlab.allocation.settings import Settings
-from finlab.allocation.weights import LearnedWeights
+from finlab.allocation.learned.pipeline import Pipeline
+from finlab.allocation.learned.prepared import Prepared
+from finlab.allocation.learned.proposal import Proposal, propose
+from finlab.allocation.learned.settings import Settings
 from finlab.deploy.bundle import NETWORK
 from finlab.deploy.bundle_file import RobotBundle
 from finlab.deploy.onnx.model import model_bytes
 from finlab.deploy.onnx.proposal import proposal_model
 from finlab.errors import DataError
+from finlab.inference.network import MixtureArrays
+from finlab.inference.weights import LearnedWeights
 
 Array = NDArray[Any]
 
@@ -112,7 +112,7 @@ class OnnxProposer:
         seed: int,
         /,
     ) -> Proposal:
-        """As `finlab.allocation.proposal.propose`; many targets, or another seed than 0, go by steps."""
+        """As `propose`; many targets, or another seed than 0, go by steps."""
         if len(target) != 1 or seed != SEED or n_candidates <= self._weights.n_components:
             return propose(self._network, prepared, centred, target, n_candidates, temperature, seed)
         parts = self._session(prepared).run(

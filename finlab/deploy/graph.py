@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.data.normalization import Normalization
 from finlab.errors import AllocationError
+from finlab.inference.normalization import Normalization
 from finlab.layout import Layout, stack_layouts
 
 if TYPE_CHECKING:
@@ -117,8 +117,8 @@ class NodeFeatures:
     """The node features of one layout, from the same functions that training uses."""
 
     def __init__(self, name: str, layout: Layout, normalization: Normalization) -> None:
-        """`name` is a feature set of `finlab.data.features`; all fins of `layout` are healthy."""
-        from finlab.data.features import geometry, raw_features
+        """`name` is a feature set of `finlab.inference.features`; all fins of `layout` are healthy."""
+        from finlab.inference.features import geometry, raw_features
 
         arrays = stack_layouts([layout])
         numbers = (arrays.position, arrays.mounting_angle, arrays.lower, arrays.upper)
@@ -130,7 +130,7 @@ class NodeFeatures:
 
     def of(self, target: Array) -> Array:
         """All node features (n, F) for a target wrench (6,)."""
-        from finlab.data.features import fin_frame_features
+        from finlab.inference.features import fin_frame_features
 
         if self._geometry is None:
             return self.fixed

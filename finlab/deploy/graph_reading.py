@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from finlab.data.normalization import Normalization
 from finlab.deploy.graph import LayoutGraph, Row, SelfTest
 from finlab.deploy.graph_document import FORMAT, UNITS, VERSION, checksum_of, edges_of
 from finlab.errors import LayoutError
+from finlab.inference.normalization import Normalization
 from finlab.layout import Layout, parse_layout
 from finlab.layout.file import FORMAT as LAYOUT_FORMAT
 from finlab.layout.file import VERSION as LAYOUT_VERSION

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 import finlab
-from finlab.allocation.energy import EnergyWeights
-from finlab.allocation.settings import Settings
-from finlab.allocation.weights import LearnedWeights
-from finlab.data.normalization import Normalization
+from finlab.allocation.learned.settings import Settings
 from finlab.deploy.graph import LayoutGraph
 from finlab.deploy.onnx.model import Model
 from finlab.errors import DataError
+from finlab.inference.normalization import Normalization
+from finlab.inference.weights import LearnedWeights
+from finlab.physics.energy import EnergyWeights
 
 VERSION = "1"
 """Version of the bundle; a reader knows exactly one."""

@@ -19,14 +19,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finlab.allocation.energy import EnergyMeter
-from finlab.allocation.fast import FastAllocator
-from finlab.allocation.learned import LearnedAllocator
+from finlab.allocation.learned.fast import FastAllocator
+from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.deploy.bundle_file import RobotBundle, read_bundle
 from finlab.deploy.engine import use_engine
 from finlab.errors import DataError
 from finlab.layout import Layout
+from finlab.physics.energy import EnergyMeter
 
 Array = NDArray[np.float64]
 

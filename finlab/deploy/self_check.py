@@ -13,14 +13,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.fast_network import NumpyFastNetwork
-from finlab.allocation.proposal import predict
-from finlab.data.features import fin_frame_features
+from finlab.allocation.learned.proposal import predict
 from finlab.deploy.bundle import FAST, NETWORK, SURROGATE
 from finlab.deploy.engine import OnnxNetwork, OnnxSession
 from finlab.deploy.graph import SELF_TEST_TOLERANCE, SelfTest
 from finlab.deploy.runtime import Runtime
 from finlab.errors import DataError
+from finlab.inference.fast_network import NumpyFastNetwork
+from finlab.inference.features import fin_frame_features
 
 Array = NDArray[Any]
 

@@ -16,7 +16,7 @@ import numpy as np
 from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.paper import PaperAllocator
+from finlab.allocation.learned.paper import PaperAllocator
 from finlab.errors import AllocationError
 from finlab.evaluation.ablation_refinement import PaperWithLevenbergMarquardt
 from finlab.evaluation.bootstrap import mean_interval
@@ -25,7 +25,7 @@ from finlab.evaluation.records import Records, join_records
 from finlab.evaluation.splits import Case
 from finlab.evaluation.tables import text_table
 from finlab.evaluation.wrench import score
-from finlab.model.checkpoint import load_allocator_checkpoint, resolve_checkpoint
+from finlab.training.networks.checkpoint import load_allocator_checkpoint, resolve_checkpoint
 
 VARIANTS: dict[str, dict[str, Any]] = {
     "mean_only": {"mean_only": True, "refine": False},

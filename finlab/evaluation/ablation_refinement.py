@@ -7,9 +7,9 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from finlab.allocation.paper import PaperAllocator
-from finlab.model.checkpoint import Checkpoint
-from finlab.model.mixture import to_command, to_normalized
+from finlab.allocation.learned.paper import PaperAllocator
+from finlab.training.networks.checkpoint import Checkpoint
+from finlab.training.networks.mixture import to_command, to_normalized
 
 STEPS = 20
 """A step differentiates six wrench components where Adam's differentiates one score: 20 steps take about as

@@ -55,7 +55,7 @@ def load_entrant(name: str, checkpoint: str | Path | None = None) -> Allocator:
 def fingerprint(name: str, checkpoint: str | Path | None = None) -> str:
     """What an entrant's answers depend on besides its settings: the weights' SHA-256 for a learned method,
     a digest of the normalization for the others."""
-    from finlab.model.checkpoint import load_checkpoint, load_normalization, resolve_checkpoint
+    from finlab.training.networks.checkpoint import load_checkpoint, load_normalization, resolve_checkpoint
 
     method = method_and_starts(name)[0]
     path = resolve_checkpoint(checkpoint or ("paper" if method == "paper" else "default"))
@@ -69,14 +69,14 @@ def fingerprint(name: str, checkpoint: str | Path | None = None) -> str:
 
 def has_distilled(checkpoint: str | Path | None = None) -> bool:
     """Whether a checkpoint holds the distilled network of method `fast`."""
-    from finlab.model.checkpoint import resolve_checkpoint
+    from finlab.training.networks.checkpoint import resolve_checkpoint
 
     return (resolve_checkpoint(checkpoint or "default") / DISTILLED).is_dir()
 
 
 def surrogate_fingerprint(checkpoint: str | Path) -> str:
     """Digest of a checkpoint's surrogate alone, which stays the same while the network learns on."""
-    from finlab.model.checkpoint import load_checkpoint, resolve_checkpoint
+    from finlab.training.networks.checkpoint import load_checkpoint, resolve_checkpoint
 
     state = load_checkpoint(resolve_checkpoint(checkpoint)).surrogate.state_dict()
     return hashlib.sha256(b"".join(state[key].numpy().tobytes() for key in sorted(state))).hexdigest()

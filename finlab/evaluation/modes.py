@@ -16,16 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from finlab.allocation.actuation import Actuation
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.energy import command_energy
-from finlab.allocation.ipopt import SOLVER_OPTIONS, Ipopt
+from finlab.allocation.baselines.actuation import Actuation
+from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, Ipopt
+from finlab.allocation.baselines.single_target import Problem
 from finlab.allocation.modes import cluster, same_way, way_of
-from finlab.allocation.single_target import Problem
 from finlab.evaluation.splits import Case
 from finlab.evaluation.tables import text_table
 from finlab.layout import Layout
 from finlab.physics import Plant
+from finlab.physics.energy import command_energy
 
 Array = NDArray[np.float64]
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.actuation import Actuation
-from finlab.allocation.model_based import ModelBased
-from finlab.data.normalization import Normalization
+from finlab.allocation.baselines.actuation import Actuation
+from finlab.allocation.baselines.model_based import ModelBased
+from finlab.inference.normalization import Normalization
 
 Array = NDArray[np.float64]
 

@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 from tqdm import tqdm
 
-from finlab.allocation.energy import command_energy
-from finlab.allocation.learned import LearnedAllocator
-from finlab.allocation.levenberg_marquardt import refine
-from finlab.allocation.pool import TOLERANCE
-from finlab.allocation.prepared import Prepared
-from finlab.allocation.proposal import propose
+from finlab.allocation.learned.learned_allocator import LearnedAllocator
+from finlab.allocation.learned.levenberg_marquardt import refine
+from finlab.allocation.learned.pool import TOLERANCE
+from finlab.allocation.learned.prepared import Prepared
+from finlab.allocation.learned.proposal import propose
 from finlab.evaluation.splits import Case
 from finlab.evaluation.tables import text_table
 from finlab.physics import Plant
+from finlab.physics.energy import command_energy
 
 Array = NDArray[Any]
 

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.energy import command_energy
 from finlab.evaluation.tables import text_table
 from finlab.layout import Layout
 from finlab.layout.arrays import layout_effectiveness
 from finlab.physics import Plant
+from finlab.physics.energy import command_energy
 
 Array = NDArray[np.float64]
 

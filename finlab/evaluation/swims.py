@@ -11,10 +11,10 @@ from tqdm import tqdm
 
 from finlab.allocation import load_allocator
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.energy import POWER_WEIGHTS
 from finlab.evaluation.entrants import method_names
 from finlab.evaluation.on_board import OnBoard
 from finlab.evaluation.trajectory_errors import RTE_DELTA_S, absolute_error, depth_error, relative_error
+from finlab.physics.energy import POWER_WEIGHTS
 from finlab.sim import Swim, SwimLog
 
 Row = dict[str, Any]

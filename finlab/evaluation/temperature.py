@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from finlab.allocation.paper import PaperAllocator
+from finlab.allocation.learned.paper import PaperAllocator
 from finlab.evaluation.bootstrap import mean_interval
 from finlab.evaluation.splits import Case
 from finlab.evaluation.tables import text_table
 from finlab.layout import Layout
-from finlab.model.checkpoint import load_allocator_checkpoint, resolve_checkpoint
+from finlab.training.networks.checkpoint import load_allocator_checkpoint, resolve_checkpoint
 
 Array = NDArray[Any]
 Columns = dict[str, Array]

@@ -17,7 +17,7 @@ from finlab.evaluation.records import columns_of_records
 from finlab.evaluation.splits import Case
 from finlab.evaluation.tables import text_table
 from finlab.evaluation.wrench import run_method
-from finlab.model.checkpoint import resolve_checkpoint
+from finlab.training.networks.checkpoint import resolve_checkpoint
 
 LM_STEPS = 4
 """Levenberg-Marquardt steps after which the refined error is taken."""
@@ -96,8 +96,8 @@ def train_and_run(
         batch_size: samples per step.
         seed: of data and weights.
     """
-    from finlab.model.checkpoint import load_checkpoint
     from finlab.training.allocator import train_allocator
+    from finlab.training.networks.checkpoint import load_checkpoint
 
     change = CHANGES[name]
     start = time.perf_counter()

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from finlab.allocation.actuation import FULL_TURN, Actuation
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.ipopt import SOLVER_OPTIONS, import_casadi
+from finlab.allocation.baselines.actuation import FULL_TURN, Actuation
+from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, import_casadi
 from finlab.allocation.policy import KINDS, Policy
 from finlab.evaluation.tables import text_table
 from finlab.layout import Layout, random_layout

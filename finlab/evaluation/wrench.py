@@ -12,8 +12,7 @@ from tqdm import tqdm
 
 from finlab.allocation.allocation import BatchAllocation
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.energy import command_energy
-from finlab.allocation.single_target import DEFAULT_STARTS
+from finlab.allocation.baselines.single_target import DEFAULT_STARTS
 from finlab.evaluation.entrants import method_and_starts
 from finlab.evaluation.metrics import energy_rows, rows_by_fin_count, wrench_intervals, wrench_row
 from finlab.evaluation.paper_figures import paper_wrench_rows
@@ -21,6 +20,7 @@ from finlab.evaluation.records import Records, join_records
 from finlab.evaluation.splits import Case
 from finlab.evaluation.tables import text_table
 from finlab.physics import Plant
+from finlab.physics.energy import command_energy
 
 Array = NDArray[np.float64]
 

@@ -1,13 +1,24 @@
-"""Command to force to wrench: fin models and the plant, in torch, batched and differentiable."""
+"""Command to force to wrench: fin models, the plant, energy."""
 
-from finlab.physics.drag import Drag as Drag
-from finlab.physics.fin_model import FinModel as FinModel
-from finlab.physics.fin_model import make_fin_model as make_fin_model
-from finlab.physics.lighthill import Lighthill as Lighthill
-from finlab.physics.plant import Plant as Plant
-from finlab.physics.table import TableFinModel as TableFinModel
-from finlab.physics.table import write_table as write_table
-from finlab.physics.wrench import assemble_wrench as assemble_wrench
-from finlab.physics.wrench import body_force as body_force
-from finlab.physics.wrench import effectiveness_matrix as effectiveness_matrix
-from finlab.physics.wrench import wrench_of_forces as wrench_of_forces
+from importlib import import_module
+from typing import Any
+
+_HOME = {
+    "Drag": "drag",
+    "FinModel": "fin_model",
+    "make_fin_model": "fin_model",
+    "Lighthill": "lighthill",
+    "Plant": "plant",
+    "TableFinModel": "table",
+    "write_table": "table",
+    "assemble_wrench": "wrench",
+    "body_force": "wrench",
+    "effectiveness_matrix": "wrench",
+    "wrench_of_forces": "wrench",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(name)
+    return getattr(import_module(f"finlab.physics.{_HOME[name]}"), name)

@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.fin_laws import group_laws
+from finlab.allocation.baselines.fin_laws import group_laws
 from finlab.layout import Layout
 from finlab.sim.fin_motion import FinMotion
 

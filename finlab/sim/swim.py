@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.actuation import Actuation
 from finlab.allocation.allocator import Allocator
+from finlab.allocation.baselines.actuation import Actuation
 from finlab.control import Completion, Controller, Measurement, VelocityController, WaypointController
 from finlab.errors import FinlabError
 from finlab.layout import Layout

@@ -10,14 +10,12 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from finlab.data.features import SIZES, fin_frame_features, geometry, raw_features
-from finlab.data.sampling import Batch, ForwardSampler, seeded_generator
+from finlab.inference.features import SIZES, fin_frame_features, geometry, raw_features
 from finlab.layout import FinModelSpec
-from finlab.model.allocator_network import AllocatorNetwork, NetworkConfig
-from finlab.model.checkpoint import Checkpoint, load_checkpoint, resolve_checkpoint, save_checkpoint
 from finlab.physics import make_fin_model
 from finlab.training import losses
 from finlab.training.curves import plot_log
+from finlab.training.data.sampling import Batch, ForwardSampler, seeded_generator
 from finlab.training.device import (
     autocast_dtype,
     join_processes,
@@ -26,6 +24,13 @@ from finlab.training.device import (
     training_device,
 )
 from finlab.training.loop import LoopSettings, train
+from finlab.training.networks.allocator_network import AllocatorNetwork, NetworkConfig
+from finlab.training.networks.checkpoint import (
+    Checkpoint,
+    load_checkpoint,
+    resolve_checkpoint,
+    save_checkpoint,
+)
 from finlab.training.presets import AllocatorTraining, get_preset
 from finlab.training.surrogate import TRAIN_SEED
 

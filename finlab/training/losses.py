@@ -6,9 +6,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from finlab.data.sampling import Batch
-from finlab.model.mixture import Mixture, clamp_to_limits, to_command, to_normalized
-from finlab.model.surrogate import Surrogate
+from finlab.training.data.sampling import Batch
+from finlab.training.networks.mixture import Mixture, clamp_to_limits, to_command, to_normalized
+from finlab.training.networks.surrogate import Surrogate
 
 HUBER = 0.02
 """Normalized wrench error below which the guidance is quadratic and above which it is linear: linear

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from finlab.errors import DataError
-from finlab.model.allocator_network import NetworkConfig
-from finlab.model.surrogate import SurrogateConfig
+from finlab.training.networks.allocator_network import NetworkConfig
+from finlab.training.networks.surrogate import SurrogateConfig
 
 
 @dataclass(frozen=True)

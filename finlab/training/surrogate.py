@@ -11,15 +11,15 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from finlab.data.normalization import Normalization
-from finlab.data.sampling import Batch, ForwardSampler
+from finlab.inference.normalization import Normalization
 from finlab.layout import FinModelSpec
-from finlab.model.checkpoint import Checkpoint, save_checkpoint
-from finlab.model.surrogate import CoefficientSurrogate, Surrogate, make_surrogate
 from finlab.physics import FinModel, make_fin_model
 from finlab.training.curves import plot_log
+from finlab.training.data.sampling import Batch, ForwardSampler
 from finlab.training.device import join_processes, leave_processes, share_of_batch, training_device
 from finlab.training.loop import LoopSettings, train
+from finlab.training.networks.checkpoint import Checkpoint, save_checkpoint
+from finlab.training.networks.surrogate import CoefficientSurrogate, Surrogate, make_surrogate
 from finlab.training.presets import get_preset
 
 Terms = Callable[[nn.Module, int], dict[str, Tensor]]

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.allocation.learned import LearnedAllocator
-from finlab.allocation.learned_fin import LearnedFin
-from finlab.model.checkpoint import Checkpoint, load_allocator_checkpoint, resolve_checkpoint
-from finlab.model.surrogate import FORCE_UNIT, CoefficientSurrogate, Surrogate
+from finlab.allocation.learned.learned_allocator import LearnedAllocator
+from finlab.inference.learned_fin import LearnedFin
+from finlab.training.networks.checkpoint import Checkpoint, load_allocator_checkpoint, resolve_checkpoint
+from finlab.training.networks.surrogate import FORCE_UNIT, CoefficientSurrogate, Surrogate
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from finlab.allocation import METHODS, Allocation, Allocator, Candidates, Solution, load_allocator
-from finlab.data.normalization import Normalization
 from finlab.errors import AllocationError, CommandError, LayoutError
+from finlab.inference.normalization import Normalization
 from finlab.layout import Fin, Layout
 from finlab.physics import Plant
 

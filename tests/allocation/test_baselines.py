@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Allocator
-from finlab.allocation.analytic import Analytic
-from finlab.allocation.ipopt import Ipopt
-from finlab.allocation.multistart import Multistart
-from finlab.allocation.qp import Qp
-from finlab.allocation.slsqp import Slsqp
-from finlab.allocation.sqp import Sqp
-from finlab.allocation.trf import Trf
-from finlab.data.normalization import Normalization
+from finlab.allocation.baselines.analytic import Analytic
+from finlab.allocation.baselines.ipopt import Ipopt
+from finlab.allocation.baselines.multistart import Multistart
+from finlab.allocation.baselines.qp import Qp
+from finlab.allocation.baselines.slsqp import Slsqp
+from finlab.allocation.baselines.sqp import Sqp
+from finlab.allocation.baselines.trf import Trf
 from finlab.errors import AllocationError, LayoutError
+from finlab.inference.normalization import Normalization
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
 from finlab.physics import Plant
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from finlab.allocation.actuation import Actuation
-from finlab.allocation.actuation_descent import DescentOptions, descend
-from finlab.allocation.box_least_squares import solve_box_quadratics
-from finlab.allocation.energy import command_energy
-from finlab.allocation.single_target import Problem
+from finlab.allocation.baselines.actuation import Actuation
+from finlab.allocation.baselines.actuation_descent import DescentOptions, descend
+from finlab.allocation.baselines.box_least_squares import solve_box_quadratics
+from finlab.allocation.baselines.single_target import Problem
 from finlab.layout import Fin, FinModelSpec, Layout, random_layout
 from finlab.physics import Plant
+from finlab.physics.energy import command_energy
 
 SIGMA = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35])
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from finlab.allocation.energy import EnergyWeights, command_energy, fin_energy
+from finlab.physics.energy import EnergyWeights, command_energy, fin_energy
 
 UPPER = np.array([0.5, 2.0, np.pi])
 

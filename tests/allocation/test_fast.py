@@ -9,16 +9,16 @@ import torch
 
 import finlab
 from finlab.allocation import load_allocator
-from finlab.allocation.energy import command_energy
-from finlab.allocation.fast import FastAllocator
-from finlab.allocation.fast_network import NumpyFastNetwork
-from finlab.allocation.learned import LearnedAllocator
+from finlab.allocation.learned.fast import FastAllocator
+from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.assets import checkpoint_path, shipped_layouts
 from finlab.errors import AllocationError, CheckpointError
+from finlab.inference.fast_network import NumpyFastNetwork
+from finlab.inference.fast_weights import FastWeights, load_fast, save_fast
 from finlab.layout import random_layout
-from finlab.model.fast_network import FastConfig, FastNetwork
-from finlab.model.fast_weights import FastWeights, load_fast, save_fast
 from finlab.physics import Plant
+from finlab.physics.energy import command_energy
+from finlab.training.networks.fast_network import FastConfig, FastNetwork
 
 
 @pytest.fixture(scope="module")

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from finlab.allocation.force_space import Planar, descend, realize
-from finlab.allocation.learned import LearnedAllocator
-from finlab.allocation.prepared import Prepared
+from finlab.allocation.learned.learned_allocator import LearnedAllocator
+from finlab.allocation.learned.prepared import Prepared
+from finlab.forces.force_space import Planar, descend, realize
 from finlab.layout import Layout, random_layout
 
 

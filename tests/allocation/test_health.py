@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Health, load_allocator
-from finlab.allocation.learned import LearnedAllocator
+from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.assets import shipped_layouts
 from finlab.cli import main
 from finlab.errors import AllocationError, FinlabError

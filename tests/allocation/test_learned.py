@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from finlab.allocation import Allocator, load_allocator
-from finlab.allocation.learned import CHUNK, LearnedAllocator
+from finlab.allocation.learned.learned_allocator import CHUNK, LearnedAllocator
 from finlab.assets import shipped_layouts
-from finlab.data.features import SIZES
 from finlab.errors import CheckpointError
+from finlab.inference.features import SIZES
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout, random_layout
-from finlab.model.allocator_network import AllocatorNetwork, NetworkConfig
-from finlab.model.checkpoint import Checkpoint, load_checkpoint
-from finlab.model.surrogate import SurrogateConfig, make_surrogate
 from finlab.physics import Plant
+from finlab.training.networks.allocator_network import AllocatorNetwork, NetworkConfig
+from finlab.training.networks.checkpoint import Checkpoint, load_checkpoint
+from finlab.training.networks.surrogate import SurrogateConfig, make_surrogate
 
 GOOD = 5e-3
 """Normalized error below which an answer counts as exact here."""

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 import torch
 
-from finlab.allocation.learned_fin import LearnedFin
-from finlab.allocation.numpy_network import NumpyNetwork
-from finlab.data.features import SIZES
+from finlab.inference.features import SIZES
+from finlab.inference.learned_fin import LearnedFin
+from finlab.inference.network import NumpyNetwork
 from finlab.layout import random_layouts
-from finlab.model.allocator_network import AllocatorNetwork, NetworkConfig
-from finlab.model.checkpoint import Checkpoint
-from finlab.model.surrogate import CoefficientSurrogate, SurrogateConfig
 from finlab.physics import Drag
+from finlab.training.networks.allocator_network import AllocatorNetwork, NetworkConfig
+from finlab.training.networks.checkpoint import Checkpoint
+from finlab.training.networks.surrogate import CoefficientSurrogate, SurrogateConfig
 
 MakeFin = Callable[[CoefficientSurrogate], LearnedFin]
 

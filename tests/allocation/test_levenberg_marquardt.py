@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from finlab.allocation.learned import LearnedAllocator
-from finlab.allocation.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.learned.learned_allocator import LearnedAllocator
+from finlab.allocation.learned.levenberg_marquardt import CommandProblem, refine
 from finlab.layout import Fin, Layout, Limits, random_layout
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from finlab.allocation import load_allocator
 from finlab.allocation.allocation import Candidates
-from finlab.allocation.learned import LearnedAllocator
+from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.allocation.modes import find_modes, same_way, way_of
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from finlab.allocation.force_space import PlanarProblem
-from finlab.allocation.learned import LearnedAllocator
-from finlab.allocation.nearest import nearest, nearest_along, nearest_in_turn
+from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.assets import shipped_layouts
+from finlab.forces.force_space import PlanarProblem
+from finlab.forces.nearest import nearest, nearest_along, nearest_in_turn
 from finlab.layout import load_layout, random_layout
 
 GROUPS = [

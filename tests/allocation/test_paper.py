@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 import torch
 
-from finlab.allocation.paper import CHUNK, PaperAllocator
+from finlab.allocation.learned.paper import CHUNK, PaperAllocator
 from finlab.assets import shipped_layouts
-from finlab.data.features import SIZES
-from finlab.data.normalization import Normalization
 from finlab.errors import AllocationError, CheckpointError
+from finlab.inference.features import SIZES
+from finlab.inference.normalization import Normalization
 from finlab.layout import Fin, Layout, Limits, load_layout
-from finlab.model.allocator_network import AllocatorNetwork, NetworkConfig
-from finlab.model.checkpoint import Checkpoint
-from finlab.model.surrogate import SurrogateConfig, make_surrogate
 from finlab.physics import Plant
+from finlab.training.networks.allocator_network import AllocatorNetwork, NetworkConfig
+from finlab.training.networks.checkpoint import Checkpoint
+from finlab.training.networks.surrogate import SurrogateConfig, make_surrogate
 
 TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from finlab.allocation import METHODS, Allocation, load_allocator
-from finlab.allocation.learned import LearnedAllocator
+from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.allocation.policy import (
     AXES,
     CLOSEST,

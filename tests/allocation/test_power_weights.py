@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from finlab.allocation import load_allocator
-from finlab.allocation.energy import DEFAULT_WEIGHTS, POWER_WEIGHTS, command_energy
 from finlab.assets import shipped_layouts
 from finlab.layout import Layout, load_layout
+from finlab.physics.energy import DEFAULT_WEIGHTS, POWER_WEIGHTS, command_energy
 
 TARGETS = ([4.0, 0, 0, 0, 0, 0], [3.0, 0, 1.0, 0, 0, 0.3], [1.0, 0.5, -0.5, 0.1, 0.1, 0.2])
 

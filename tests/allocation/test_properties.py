@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from finlab.allocation import Allocation
-from finlab.allocation.learned import LearnedAllocator
+from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.allocation.modes import same_way, way_of
 from finlab.layout import Fin, Layout, Limits, random_layout
 from finlab.physics import Plant

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from finlab.allocation.learned import LearnedAllocator
-from finlab.allocation.steady import TURNS, planar_thrust, turn_little
+from finlab.allocation.learned.learned_allocator import LearnedAllocator
+from finlab.allocation.learned.steady import TURNS, planar_thrust, turn_little
 from finlab.assets import shipped_layouts
 from finlab.errors import CommandError
 from finlab.layout import Layout, load_layout

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from finlab.allocation.energy import fin_energy
-from finlab.allocation.learned_fin import LearnedFin
-from finlab.allocation.thrust_curve import ThrustCurves, thrust_curves
+from finlab.forces.thrust_curve import ThrustCurves, thrust_curves
+from finlab.inference.learned_fin import LearnedFin
+from finlab.physics.energy import fin_energy
 
 LIMITS = {
     "nominal": ((0.05, 0.1, -math.pi), (0.6, 2.1, math.pi)),

@@ -5,11 +5,11 @@ import pytest
 from scipy.optimize import minimize
 
 from finlab import load_allocator
-from finlab.allocation.energy import POWER_WEIGHTS, command_energy
-from finlab.allocation.learned import LearnedAllocator
+from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.errors import AllocationError
 from finlab.layout import random_layout
 from finlab.physics import Plant
+from finlab.physics.energy import POWER_WEIGHTS, command_energy
 
 
 def cases(limits: str, count: int = 8):  # type: ignore[no-untyped-def]

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from finlab.analysis.fin_sets import FinSets
 from finlab.assets import shipped_layouts
+from finlab.forces.fin_sets import FinSets
 from finlab.layout import Fin, Layout, Limits, load_layout
 
 Array = NDArray[np.float64]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from finlab.analysis.answers import Answer, cheap, strong
-from finlab.analysis.fin_sets import FinSets
+from finlab.forces.answers import Answer, cheap, strong
+from finlab.forces.fin_sets import FinSets
 
 Array = NDArray[np.float64]
 HALVES = [0.0, 0.4, np.pi / 2, 1.9, 2.9, np.pi]

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from finlab.analysis import AttainableSet, attainable_set
 from finlab.analysis.authority import model_error
-from finlab.analysis.fin_sets import SCALE, fin_sets
 from finlab.errors import LayoutError
+from finlab.forces.fin_sets import SCALE, fin_sets
 from finlab.layout import Layout
 from finlab.physics import Plant
 from tests.analysis.conftest import THRUST

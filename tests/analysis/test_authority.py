@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from finlab.analysis import authority, losses
-from finlab.analysis.extent import strongest, weakest
-from finlab.analysis.fin_sets import fin_sets
+from finlab.forces.extent import strongest, weakest
+from finlab.forces.fin_sets import fin_sets
 from finlab.layout import Layout
 from tests.analysis.conftest import THRUST
 

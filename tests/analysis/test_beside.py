@@ -7,9 +7,9 @@ import pytest
 from scipy.optimize import linprog
 
 from finlab.analysis import authority, losses
-from finlab.analysis.beside import ranges_beside
-from finlab.analysis.fin_sets import SCALE, fin_sets
 from finlab.analysis.quick import quick_check
+from finlab.forces.beside import ranges_beside
+from finlab.forces.fin_sets import SCALE, fin_sets
 from finlab.layout import Layout
 
 Layouts = Callable[[str], Layout]

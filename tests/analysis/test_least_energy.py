@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from finlab.allocation.multistart import Multistart
-from finlab.analysis import least_energy
-from finlab.analysis.thrust_law import thrust_laws
-from finlab.data.normalization import Normalization
+from finlab.allocation.baselines.multistart import Multistart
+from finlab.forces import least_energy
+from finlab.forces.thrust_law import thrust_laws
+from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
 
 Layouts = Callable[[str], Layout]

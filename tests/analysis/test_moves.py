@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from finlab.analysis import Bounds, mirror_pairs
-from finlab.analysis.fin_sets import fin_sets
 from finlab.analysis.moves import Moves, is_mirrored
 from finlab.errors import LayoutError
+from finlab.forces.fin_sets import fin_sets
 from finlab.layout import Layout
 
 Layouts = Callable[[str], Layout]

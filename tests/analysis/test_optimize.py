@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from finlab.analysis import GOALS, Bounds, Progress, authority, mirror_pairs, optimize_layout
-from finlab.analysis.fin_sets import fin_sets
 from finlab.analysis.goals import UNREACHED, make_goal
 from finlab.errors import LayoutError
+from finlab.forces.fin_sets import fin_sets
 from finlab.layout import Layout
 
 Layouts = Callable[[str], Layout]

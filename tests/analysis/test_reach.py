@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from finlab.analysis import authority
-from finlab.analysis.answers import strong
-from finlab.analysis.fin_sets import SCALE, fin_sets, pieces
-from finlab.analysis.reach import across, along, along_exactly
+from finlab.forces.answers import strong
+from finlab.forces.fin_sets import SCALE, fin_sets, pieces
+from finlab.forces.reach import across, along, along_exactly
 from finlab.layout import Layout
 from finlab.physics import Plant
 from tests.analysis.conftest import THRUST, largest_by_polygons

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from finlab.allocation.energy import fin_energy
-from finlab.analysis.thrust_law import thrust_laws
+from finlab.forces.thrust_law import thrust_laws
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.physics import Drag, Plant, write_table
+from finlab.physics.energy import fin_energy
 
 SPECS = [
     FinModelSpec(),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from finlab.data.features import (
+from finlab.inference.features import (
     FIN_FRAME_SIZE,
     FULL_FORCE,
     RAW_SIZE,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from finlab.data.normalization import STD_FLOOR, Normalization
+from finlab.inference.normalization import STD_FLOOR, Normalization
 
 
 def test_statistics_are_per_axis() -> None:

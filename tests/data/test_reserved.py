@@ -7,10 +7,10 @@ import pytest
 import torch
 
 from finlab.assets import shipped_layouts
-from finlab.data import sampling
-from finlab.data.reserved import ReservedLayouts, is_reserved, shipped_reserved
-from finlab.data.sampling import ForwardSampler, sample_layouts, seeded_generator
 from finlab.layout import LayoutArrays, layout_from_arrays, load_layout, random_layouts, stack_layouts
+from finlab.training.data import sampling
+from finlab.training.data.reserved import ReservedLayouts, is_reserved, shipped_reserved
+from finlab.training.data.sampling import ForwardSampler, sample_layouts, seeded_generator
 
 SHIPPED = [load_layout(path) for path in shipped_layouts().values()]
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import torch
 
-from finlab.data.sampling import ForwardSampler, sample_layouts, seeded_generator
 from finlab.layout import LayoutArrays, Limits, layout_from_arrays, random_layouts
 from finlab.layout.random import TRAINING_BOX
 from finlab.physics import Lighthill, Plant
+from finlab.training.data.sampling import ForwardSampler, sample_layouts, seeded_generator
 
 BATCH = ForwardSampler(seed=1, batch_size=20_000).batch(0)
 

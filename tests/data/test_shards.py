@@ -10,13 +10,13 @@ import time
 import numpy as np
 import pytest
 
-from finlab.data.dataset import open_dataset
-from finlab.data.manifest import FILE_NAME
-from finlab.data.reserved import shipped_reserved
-from finlab.data.shards import LAYOUTS_PER_SHARD, generate, verify
 from finlab.errors import DataError
 from finlab.layout import layout_from_arrays
 from finlab.physics import Plant
+from finlab.training.data.dataset import open_dataset
+from finlab.training.data.manifest import FILE_NAME
+from finlab.training.data.reserved import shipped_reserved
+from finlab.training.data.shards import LAYOUTS_PER_SHARD, generate, verify
 
 LAYOUTS, COMMANDS = 2 * LAYOUTS_PER_SHARD + 5, 30
 
@@ -62,7 +62,7 @@ def test_a_second_call_has_nothing_to_do_and_a_lost_shard_is_made_again(made, tm
 def test_a_generation_that_was_killed_ends_in_the_same_bytes(tmp_path):
     size = (40 * LAYOUTS_PER_SHARD, 1000)
     killed, whole = tmp_path / "killed", tmp_path / "whole"
-    code = f"from finlab.data.shards import generate; generate({str(killed)!r}, *{size}, seed=1)"
+    code = f"from finlab.training.data.shards import generate; generate({str(killed)!r}, *{size}, seed=1)"
     process = subprocess.Popen([sys.executable, "-c", code], env={**os.environ, "OMP_NUM_THREADS": "1"})
     deadline = time.monotonic() + 60
     while not list(killed.glob("wrench-*.npy")) and process.poll() is None and time.monotonic() < deadline:

@@ -12,11 +12,11 @@ import finlab
 from finlab.allocation import Allocator
 from finlab.assets import shipped_layouts
 from finlab.cli import main
-from finlab.data.features import fin_frame_features, geometry
 from finlab.deploy import build_graph, graph_bytes
 from finlab.errors import FinlabError
+from finlab.inference.features import fin_frame_features, geometry
 from finlab.layout import stack_layouts
-from finlab.model.checkpoint import load_checkpoint
+from finlab.training.networks.checkpoint import load_checkpoint
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "finlab/deploy/graph.schema.json").read_text())
 WRENCH = ["--wrench", "0.5", "0", "0.5", "0", "0", "0"]

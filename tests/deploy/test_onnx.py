@@ -11,15 +11,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from onnx import TensorProto, helper
 
-from finlab.allocation.numpy_network import NumpyNetwork
 from finlab.deploy.onnx.model import Model, model_bytes
 from finlab.deploy.onnx.network import network_model, network_weights
 from finlab.deploy.onnx.reading import OPERATORS, read_model
 from finlab.deploy.onnx.surrogate import surrogate_model, surrogate_weights
 from finlab.errors import DataError, FinlabError
+from finlab.inference.network import NumpyNetwork
 from finlab.layout import random_layouts
-from finlab.model.checkpoint import Checkpoint, load_checkpoint
-from finlab.model.surrogate import FORCE_UNIT, CoefficientSurrogate
+from finlab.training.networks.checkpoint import Checkpoint, load_checkpoint
+from finlab.training.networks.surrogate import FORCE_UNIT, CoefficientSurrogate
 
 REFERENCE = CoefficientSurrogate.REFERENCE
 

@@ -11,7 +11,6 @@ import pytest
 
 import finlab
 from finlab.allocation import Allocator
-from finlab.allocation.energy import POWER_WEIGHTS
 from finlab.assets import shipped_layouts
 from finlab.deploy.bundle import NETWORK, Bundle, make_bundle
 from finlab.deploy.bundle_file import parse_bundle
@@ -22,6 +21,7 @@ from finlab.deploy.parity import answer_again, difference, random_cases
 from finlab.deploy.runtime import Runtime
 from finlab.deploy.self_check import self_check
 from finlab.errors import DataError, FinlabError
+from finlab.physics.energy import POWER_WEIGHTS
 
 HEAVY = ("torch", "scipy", "viser", "matplotlib", "yaml", "safetensors", "tyro", "tqdm", "threadpoolctl")
 WRENCH = ["--wrench", "1", "0", "0.5", "0", "0", "0.1"]

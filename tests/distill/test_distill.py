@@ -7,16 +7,16 @@ import pytest
 import torch
 
 from finlab.allocation import load_allocator
-from finlab.allocation.force_space import descend
-from finlab.allocation.learned import LearnedAllocator
+from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.cli import main
-from finlab.distill.answers import AnswerSettings, make_answers, read_answers, write_answers
-from finlab.distill.cost import decode, energy
-from finlab.distill.train import FastSettings, train_fast
 from finlab.errors import DataError
+from finlab.forces.force_space import descend
 from finlab.layout import layout_from_arrays
 from finlab.layout.arrays import LayoutArrays
-from finlab.model.fast_network import FastConfig
+from finlab.training.distill.answers import AnswerSettings, make_answers, read_answers, write_answers
+from finlab.training.distill.cost import decode, energy
+from finlab.training.distill.train import FastSettings, train_fast
+from finlab.training.networks.fast_network import FastConfig
 
 SMALL = AnswerSettings(n_shards=2, layouts_per_shard=4, targets_per_layout=5)
 

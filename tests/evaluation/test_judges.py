@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from finlab.allocation.actuation import Actuation
-from finlab.allocation.qp import LinearMap, Qp
-from finlab.data.normalization import Normalization
+from finlab.allocation.baselines.actuation import Actuation
+from finlab.allocation.baselines.qp import LinearMap, Qp
 from finlab.evaluation.splits import make_split
+from finlab.inference.normalization import Normalization
 
 NORMALIZATION = Normalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35]))
 

@@ -8,15 +8,15 @@ import pytest
 
 from finlab.allocation.allocation import Solution
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.analytic import Analytic
+from finlab.allocation.baselines.analytic import Analytic
 from finlab.cli import main
-from finlab.data.normalization import Normalization
 from finlab.evaluation.ablation import REFINEMENTS, VARIANTS, ablation_report, paper_ablation_rows
 from finlab.evaluation.latency import latency_report, latency_rows, machine
 from finlab.evaluation.metrics import wrench_row
 from finlab.evaluation.records import load_columns, records_of_columns
 from finlab.evaluation.splits import SPLITS, make_split
 from finlab.evaluation.wrench import run_method, wrench_report, wrench_rows
+from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
 from finlab.physics import Plant
 

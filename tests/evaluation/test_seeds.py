@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from finlab.allocation import load_allocator
-from finlab.allocation.learned import LearnedAllocator
+from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.evaluation.seeds import KINDS, STEPS, Row, seed_report, seed_rows
 from finlab.evaluation.splits import Case, make_split
 

@@ -7,9 +7,9 @@ import pytest
 import torch
 from torch import Tensor
 
-from finlab.data.features import SIZES, fin_frame_features, geometry, raw_features
-from finlab.data.sampling import sample_layouts, seeded_generator
-from finlab.model.allocator_network import AllocatorNetwork, NetworkConfig
+from finlab.inference.features import SIZES, fin_frame_features, geometry, raw_features
+from finlab.training.data.sampling import sample_layouts, seeded_generator
+from finlab.training.networks.allocator_network import AllocatorNetwork, NetworkConfig
 
 STD = torch.tensor([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 

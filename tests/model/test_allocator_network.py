@@ -6,8 +6,8 @@ import pytest
 import torch
 from torch import Tensor
 
-from finlab.model.allocator_network import AllocatorNetwork
-from finlab.model.mixture import LOG_STD_RANGE, Mixture
+from finlab.training.networks.allocator_network import AllocatorNetwork
+from finlab.training.networks.mixture import LOG_STD_RANGE, Mixture
 
 
 def predict(network: AllocatorNetwork, robots, mask: Tensor | None) -> Mixture:

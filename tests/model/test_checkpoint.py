@@ -14,7 +14,7 @@ from safetensors.torch import load_file, save_file
 
 from finlab.allocation import load_allocator
 from finlab.errors import CheckpointError
-from finlab.model.checkpoint import (
+from finlab.training.networks.checkpoint import (
     Checkpoint,
     file_sha256,
     load_allocator_checkpoint,

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 from torch.distributions import Categorical, Independent, MixtureSameFamily, Normal
 
-from finlab.model.mixture import Mixture, clamp_to_limits, to_command, to_normalized, turns_fully
+from finlab.training.networks.mixture import Mixture, clamp_to_limits, to_command, to_normalized, turns_fully
 
 B, N, M = 4, 3, 5
 

@@ -6,7 +6,8 @@ import pytest
 import torch
 from torch import Tensor
 
-from finlab.model.surrogate import (
+from finlab.physics import Drag, assemble_wrench
+from finlab.training.networks.surrogate import (
     CoefficientSurrogate,
     MlpSurrogate,
     SurrogateConfig,
@@ -14,7 +15,6 @@ from finlab.model.surrogate import (
     sum_wrench,
     to_body,
 )
-from finlab.physics import Drag, assemble_wrench
 
 F64 = torch.float64
 

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from finlab.model.checkpoint import Checkpoint
 from finlab.training import train_allocator, train_surrogate
 from finlab.training.loop import LOG_FILE, LoopSettings
+from finlab.training.networks.checkpoint import Checkpoint
 
 
 class Run(NamedTuple):

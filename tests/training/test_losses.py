@@ -7,11 +7,11 @@ import pytest
 import torch
 from torch import Tensor
 
-from finlab.allocation.energy import command_energy
-from finlab.data.sampling import Batch, ForwardSampler
-from finlab.model.mixture import Mixture, to_normalized, turns_fully
 from finlab.physics import Drag, assemble_wrench
+from finlab.physics.energy import command_energy
 from finlab.training import losses
+from finlab.training.data.sampling import Batch, ForwardSampler
+from finlab.training.networks.mixture import Mixture, to_normalized, turns_fully
 
 B, N, M = 6, 4, 3
 STD = torch.tensor([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])

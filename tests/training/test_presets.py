@@ -2,12 +2,12 @@
 
 import pytest
 
-from finlab.data.features import SIZES
 from finlab.errors import DataError
-from finlab.model.allocator_network import AllocatorNetwork
-from finlab.model.mixture import LOG_STD_RANGE
-from finlab.model.surrogate import make_surrogate
+from finlab.inference.features import SIZES
 from finlab.training.loop import LoopSettings, learning_rate
+from finlab.training.networks.allocator_network import AllocatorNetwork
+from finlab.training.networks.mixture import LOG_STD_RANGE
+from finlab.training.networks.surrogate import make_surrogate
 from finlab.training.presets import PRESETS, get_preset
 
 

@@ -8,14 +8,19 @@ import pytest
 import torch
 from safetensors.torch import load_file
 
-from finlab.data.features import SIZES
 from finlab.errors import CheckpointError, DataError
-from finlab.model.allocator_network import AllocatorNetwork
-from finlab.model.checkpoint import Checkpoint, load_allocator_checkpoint, load_checkpoint, resolve_checkpoint
-from finlab.model.surrogate import make_surrogate
+from finlab.inference.features import SIZES
 from finlab.physics import Drag
 from finlab.training import train_allocator, train_surrogate
 from finlab.training.allocator import make_terms
+from finlab.training.networks.allocator_network import AllocatorNetwork
+from finlab.training.networks.checkpoint import (
+    Checkpoint,
+    load_allocator_checkpoint,
+    load_checkpoint,
+    resolve_checkpoint,
+)
+from finlab.training.networks.surrogate import make_surrogate
 from finlab.training.presets import get_preset
 from finlab.training.surrogate import surrogate_metrics
 

@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Candidates, Solution
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.energy import command_energy
+from finlab.allocation.baselines.multistart import Multistart
 from finlab.allocation.methods import METHODS
-from finlab.allocation.multistart import Multistart
-from finlab.data.normalization import Normalization
 from finlab.errors import AllocationError
+from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
 from finlab.physics import Plant
+from finlab.physics.energy import command_energy
 
 NORMALIZATION = Normalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.3, 0.3, 0.35]))
 N_REFINED = 4

@@ -1,6 +1,6 @@
 """The distilled network as an ONNX model, and its weights out of one.
 
-The operators are those of `finlab.allocation.fast_network`, in the same order.
+The operators are those of `finlab.inference.fast_network`, in the same order.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from finlab.deploy.onnx.builder import Builder
 from finlab.deploy.onnx.model import Model
-from finlab.model.fast_weights import FastWeights
+from finlab.inference.fast_weights import FastWeights
 
 
 def fast_model(weights: FastWeights, metadata: Mapping[str, str]) -> Model:

@@ -1,6 +1,6 @@
 """The allocator network as an ONNX model, and its weights out of one.
 
-The operators are those of `finlab.allocation.numpy_network`, in the same order; tests hold both against the
+The operators are those of `finlab.inference.network`, in the same order; tests hold both against the
 network that was trained.
 """
 
@@ -18,7 +18,7 @@ from finlab.deploy.onnx.model import Model
 Weights = Mapping[str, NDArray[Any]]
 
 LOG_STD_RANGE = (-3.0, 3.0)
-"""As in `finlab.model.mixture`, which needs torch."""
+"""As in `finlab.training.networks.mixture`, which needs torch."""
 
 
 def network_model(weights: Weights, heads: int, n_components: int, metadata: Mapping[str, str]) -> Model:

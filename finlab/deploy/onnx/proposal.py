@@ -1,7 +1,7 @@
 """The whole proposal for one layout as an ONNX model: features, network, draws, fin physics and scores.
 
 Made in memory on the robot, from weights that were checked, with the layout and the draws of a seed as
-constants. What `finlab.allocation.proposal.propose` does in a hundred small steps of numpy takes one call.
+constants. What `proposal.propose` does in a hundred small steps of numpy takes one call.
 Commands and forces stand as (3, K, n): one matrix for each of their three numbers.
 """
 
@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from finlab.allocation.energy import DEFAULT_WEIGHTS, energy_scale
-from finlab.allocation.prepared import Prepared
-from finlab.allocation.proposal import draws_of_one
-from finlab.allocation.settings import Settings
-from finlab.allocation.weights import LearnedWeights
+from finlab.allocation.learned.prepared import Prepared
+from finlab.allocation.learned.proposal import draws_of_one
+from finlab.allocation.learned.settings import Settings
 from finlab.deploy.onnx.builder import Builder
 from finlab.deploy.onnx.model import Model
 from finlab.deploy.onnx.single_network import TURN, add_hidden, add_mixture
+from finlab.inference.weights import LearnedWeights
+from finlab.physics.energy import DEFAULT_WEIGHTS, energy_scale
 
 OUTPUTS = ("command", "component", "wrench", "error", "thrust", "energy")
 """In the order of `Proposal`."""
@@ -58,7 +58,7 @@ def _rows(values: np.ndarray) -> np.ndarray:
 
 
 def _features(g: Builder, prepared: Prepared, n: int) -> str:
-    """Node features (n, 7) that depend on the target, as in `finlab.data.features.fin_frame_features`."""
+    """Node features (n, 7) that depend on the target, as in `fin_frame_features`."""
     geometry = prepared.geometry
     shares = geometry.solver[0].T.reshape(6, n, 2)
     projections = 0.1 * geometry.columns[0].reshape(6, n, 2)
@@ -138,7 +138,7 @@ def _force(
 
 
 def _energy(g: Builder, x: str, product: str, prepared: Prepared) -> None:
-    """The output `energy` (K,) of commands (3, K, n), as in `finlab.allocation.energy`."""
+    """The output `energy` (K,) of commands (3, K, n), as in `finlab.physics.energy`."""
     w, scale = DEFAULT_WEIGHTS, energy_scale(prepared.upper)
     root = np.sqrt([w.amplitude, w.frequency, w.zero_direction])
     squares = g.add("Mul", x, g.weight("root weights", _rows(root / scale)))

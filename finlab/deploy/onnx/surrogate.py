@@ -1,6 +1,6 @@
 """The learned fin physics as an ONNX model, and its weights out of one.
 
-What `finlab.allocation.learned_fin` computes for one fin, and the sum over the fins of a robot.
+What `finlab.inference.learned_fin` computes for one fin, and the sum over the fins of a robot.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ from finlab.evaluation.report.sections.swims import swim_blocks
 from finlab.evaluation.report.sections.wrench import wrench_blocks
 from finlab.evaluation.report.sizes import SIZES, Sizes
 from finlab.evaluation.store import Store
-from finlab.model.checkpoint import load_checkpoint, load_normalization, resolve_checkpoint
+from finlab.training.networks.checkpoint import load_checkpoint, load_normalization, resolve_checkpoint
 
 PAGE, TWIN, TABLES, PICTURES = "index.html", "report.md", "tables.json", "pictures"
 """What a report's folder holds."""

@@ -93,7 +93,7 @@ def scatter(*, fins: int, targets: int, seed: int, checkpoint: str | None) -> Co
 
 def seeds(*, layouts: int, targets: int, candidates: int, seed: int, checkpoint: str | None) -> Columns:
     """Rows of the comparison of the network's seeds with random ones."""
-    from finlab.allocation.learned import LearnedAllocator
+    from finlab.allocation.learned.learned_allocator import LearnedAllocator
     from finlab.evaluation.entrants import load_entrant
     from finlab.evaluation.seeds import seed_rows
 

@@ -1,0 +1,1 @@
+"""The methods that know the fins' own laws and need no training."""

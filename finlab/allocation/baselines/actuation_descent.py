@@ -1,0 +1,196 @@
+"""Levenberg-Marquardt within limits for many commands at once, on the analytic actuation map.
+
+Each row minimizes `J = ||(w - target) / sigma||^2 + energy_weight * J_en`. The energy is a quadratic form
+that couples only the amplitude and frequency of one fin, so a damped step costs one 6 x 6 solve however many
+fins there are (the matrix inversion lemma on the 2 x 2 blocks). A limit that a step would cross fixes its
+variable there and the rest of the step is solved anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.baselines.actuation import Actuation
+from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyWeights, command_energy, energy_scale
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+HELD = 1e30
+"""Damping that keeps a variable where it is."""
+MIN_DAMPING, MAX_DAMPING = 1e-12, 1e9
+PASSES = 2
+"""Times a step is solved: once freely, then with the limits it crossed."""
+
+
+@dataclass(frozen=True)
+class DescentOptions:
+    """How long and how carefully to descend."""
+
+    n_steps: int = 30
+    """Most steps of one row."""
+    energy_weight: float = 0.0
+    """Weight of the energy proxy beside the squared normalized error."""
+    damping: float = 1e-2
+    """Damping of the first step for a full range of each command, times one plus the objective."""
+    tolerance: float = 1e-9
+    """A row whose objective is below, or whose step lowers it by less than this share of itself, is done."""
+    energy_weights: EnergyWeights = DEFAULT_WEIGHTS
+    """Weights within the energy proxy."""
+
+
+class Descent(NamedTuple):
+    """Where B rows ended."""
+
+    command: Array
+    """Commands (B, n, 3), within the limits."""
+    wrench: Array
+    """Their wrenches (B, 6) [N, N m]."""
+    objective: Array
+    """J (B,)."""
+
+
+def descend(
+    actuation: Actuation, start: Array, target: Array, sigma: Array, options: DescentOptions
+) -> Descent:
+    """Minimize J from B start commands.
+
+    Args:
+        actuation: the robot.
+        start: commands (B, n, 3), within the limits.
+        target: desired wrench of each row (B, 6).
+        sigma: per-axis standard deviation (6,).
+        options: see `DescentOptions`.
+    """
+    energy = _EnergyForm(actuation, options)
+    command = actuation.feasible(start)
+    wrench, slope = actuation.linearize(command)
+    objective = _objective(actuation, command, wrench, target, sigma, options)
+    damping = options.damping * (1.0 + objective)
+    busy = np.arange(len(command))
+    slope = slope * energy.width / sigma[:, None]
+    for _ in range(options.n_steps):
+        residual = (wrench[busy] - target[busy]) / sigma
+        position = (command[busy] - actuation.lower) / energy.safe_width
+        step = _clamped_step(position, residual, slope[busy], damping[busy], energy, actuation)
+        trial = actuation.feasible(command[busy] + (step * energy.width).reshape(-1, actuation.n_fins, 3))
+        trial_wrench, trial_slope = actuation.linearize(trial)
+        trial_objective = _objective(actuation, trial, trial_wrench, target[busy], sigma, options)
+        better = trial_objective < objective[busy]
+        gain = objective[busy] - trial_objective
+        rows = busy[better]
+        command[rows], wrench[rows] = trial[better], trial_wrench[better]
+        slope[rows] = trial_slope[better] * energy.width / sigma[:, None]
+        objective[rows] = trial_objective[better]
+        damping[busy] = np.clip(damping[busy] * np.where(better, 0.2, 6.0), MIN_DAMPING, MAX_DAMPING)
+        settled = better & (gain <= options.tolerance * np.maximum(objective[busy], options.tolerance))
+        busy = busy[~settled & (objective[busy] > options.tolerance**2) & (damping[busy] < MAX_DAMPING)]
+        if not len(busy):
+            break
+    return Descent(command, wrench, objective)
+
+
+class _EnergyForm:
+    """The energy as a quadratic form in positions between the limits (0 at the lower, 1 at the upper one)."""
+
+    def __init__(self, actuation: Actuation, options: DescentOptions) -> None:
+        self.width = actuation.width.ravel()
+        self.safe_width = np.where(actuation.width > 0, actuation.width, 1.0)
+        scale = energy_scale(actuation.upper)
+        self.slope = actuation.width / scale
+        self.offset = actuation.lower / scale
+        weights, gamma = options.energy_weights, options.energy_weight
+        self.diagonal = gamma * np.array([weights.amplitude, weights.frequency, weights.zero_direction])
+        self.product = gamma * weights.product / 2
+
+    def gradient(self, position: Array) -> Array:
+        """Half the derivative of the weighted energy by positions (B, n, 3)."""
+        value = self.offset + self.slope * position
+        result = self.diagonal * value
+        result[..., 0] += self.product * value[..., 1]
+        result[..., 1] += self.product * value[..., 0]
+        return result * self.slope
+
+    def inverse(self, damping: Array, held: Mask) -> tuple[Array, Array]:
+        """Inverse of damping plus energy: diagonal (B, n, 3) and amplitude-frequency entry (B, n).
+
+        Half the energy's Hessian is meant, as the Gauss-Newton matrix is half the error's.
+        """
+        diagonal = self.diagonal * self.slope**2 + damping[:, None, None] + held * HELD
+        off = self.product * self.slope[:, 0] * self.slope[:, 1]
+        determinant = diagonal[..., 0] * diagonal[..., 1] - off**2
+        inverse = 1.0 / diagonal
+        inverse[..., 0] = diagonal[..., 1] / determinant
+        inverse[..., 1] = diagonal[..., 0] / determinant
+        return inverse, -off / determinant
+
+    @staticmethod
+    def apply(vector: Array, inverse: Array, off: Array) -> Array:
+        """What `inverse` returned times vectors (..., n, 3)."""
+        result = vector * inverse
+        # Entry by entry: arithmetic on slices of two is several times slower in numpy.
+        result[..., 0] += vector[..., 1] * off
+        result[..., 1] += vector[..., 0] * off
+        return result
+
+
+def _clamped_step(
+    position: Array, residual: Array, slope: Array, damping: Array, energy: _EnergyForm, actuation: Actuation
+) -> Array:
+    """The damped step (B, 3 n) in positions, with variables fixed at the limits that it would cross."""
+    shape = position.shape
+    pull = energy.gradient(position)
+    gradient = np.einsum("bij,bi->bj", slope, residual).reshape(shape) + pull
+    free_turn = np.zeros(shape[1:], dtype=bool)
+    free_turn[:, 2] = actuation.full_turn
+    at_low, at_high = position <= 0, position >= 1
+    held = ((at_low & (gradient > 0)) | (at_high & (gradient < 0))) & ~free_turn
+    moved = np.zeros(shape)
+    low, high = np.where(free_turn, -0.5, -position), np.where(free_turn, 0.5, 1 - position)
+    for _ in range(PASSES):
+        step = np.where(held, moved, _damped_step(residual, slope, pull, damping, held, energy))
+        bounded = np.clip(step, low, high)
+        crossing = (bounded != step) & ~free_turn & ~held
+        if not crossing.any():
+            break
+        held |= crossing
+        moved = np.where(crossing, bounded, moved)
+        jump = np.where(crossing, bounded, 0.0)
+        residual = residual + np.einsum("bij,bj->bi", slope, jump.reshape(len(position), -1))
+        pull = energy.gradient(position + jump)
+    return bounded.reshape(len(position), -1)
+
+
+def _damped_step(
+    residual: Array, slope: Array, pull: Array, damping: Array, held: Mask, energy: _EnergyForm
+) -> Array:
+    """Minimizer of `||r + J d||^2 + energy + damping ||d||^2` over the free variables, shape (B, n, 3)."""
+    n_rows, n_fins = pull.shape[:2]
+    inverse, off = energy.inverse(damping, held)
+
+    rest = -energy.apply(pull, inverse, off)
+    weighted = energy.apply(slope.reshape(n_rows, 6, n_fins, 3), inverse[:, None], off[:, None])
+    weighted = weighted.reshape(n_rows, 6, -1)
+    matrix = weighted @ slope.transpose(0, 2, 1)
+    matrix[:, np.arange(6), np.arange(6)] += 1.0
+    missing = residual + np.einsum("bij,bj->bi", slope, rest.reshape(n_rows, -1))
+    multiplier = np.linalg.solve(matrix, missing[..., None])[..., 0]
+    return rest - np.einsum("bij,bi->bj", weighted, multiplier).reshape(pull.shape)
+
+
+def _objective(
+    actuation: Actuation,
+    command: Array,
+    wrench: Array,
+    target: Array,
+    sigma: Array,
+    options: DescentOptions,
+) -> Array:
+    error = (((wrench - target) / sigma) ** 2).sum(axis=-1)
+    if options.energy_weight == 0:
+        return error
+    return error + options.energy_weight * command_energy(command, actuation.upper, options.energy_weights)

@@ -1,0 +1,53 @@
+"""What the methods that know the fin model share: limits, starts, the objective by which starts compete."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.allocation import Solution
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.baselines.actuation import Actuation
+from finlab.inference.normalization import Normalization
+from finlab.layout import Layout
+from finlab.physics.energy import command_energy
+
+Array = NDArray[np.float64]
+
+ENERGY_WEIGHT = 1e-4
+"""Weight of the energy proxy beside the squared normalized error where a method weighs the two."""
+CACHE_SIZE = 64
+"""Layouts whose prepared quantities a method keeps; a control loop asks for the same one again and again."""
+
+
+class ModelBased(Allocator):
+    """A method that optimizes over the layout's own analytic fin models, the ones that score every method.
+
+    Args:
+        normalization: the yardstick of the error; nothing else is taken from a checkpoint.
+    """
+
+    def __init__(self, normalization: Normalization) -> None:
+        self.normalization = normalization
+        self._actuation = lru_cache(CACHE_SIZE)(Actuation)
+
+    @abstractmethod
+    def _commands(self, actuation: Actuation, targets: Array, seed: int) -> Array:
+        """Commands (N, n, 3) for targets (N, 6).
+
+        Random starts are drawn once and shared by all targets, so that a target gets the same answer alone
+        and among others.
+        """
+
+    def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
+        actuation = self._actuation(layout)
+        command = self._commands(actuation, targets, seed)
+        return Solution(actuation.feasible(command))
+
+    def _objective(self, actuation: Actuation, command: Array, target: Array) -> Array:
+        """`J = err_norm^2 + ENERGY_WEIGHT * J_en` of commands (..., n, 3)."""
+        error = self.normalization.error(actuation.wrench(command), target)
+        return error**2 + ENERGY_WEIGHT * command_energy(command, actuation.upper)

@@ -1,0 +1,63 @@
+"""Method `multistart`: random seeds, batched Levenberg-Marquardt within the limits, the lowest J wins."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.baselines.actuation import Actuation
+from finlab.allocation.baselines.actuation_descent import DescentOptions, descend
+from finlab.allocation.baselines.model_based import ENERGY_WEIGHT, ModelBased
+from finlab.inference.normalization import Normalization
+
+Array = NDArray[np.float64]
+
+CHUNK_ROWS = 2048
+"""Commands refined together; more would not fit the caches."""
+POLISH = DescentOptions(n_steps=20, damping=1e-6)
+"""Last steps of the winner, on the error alone."""
+
+
+class Multistart(ModelBased):
+    """Uniform random commands refined on error and energy, the best one polished on the error alone.
+
+    Knows the analytic fin model.
+
+    Args:
+        normalization: sigma scales the error.
+        n_candidates: random commands per target.
+        n_steps: most refinement steps of each.
+        energy_weight: weight of the energy proxy beside the squared normalized error.
+    """
+
+    name = "multistart"
+
+    def __init__(
+        self,
+        normalization: Normalization,
+        *,
+        n_candidates: int = 16,
+        n_steps: int = 20,
+        energy_weight: float = ENERGY_WEIGHT,
+    ) -> None:
+        super().__init__(normalization)
+        self.n_candidates = n_candidates
+        self.options = DescentOptions(n_steps=n_steps, energy_weight=energy_weight)
+
+    def _commands(self, actuation: Actuation, targets: Array, seed: int) -> Array:
+        start = actuation.sample(np.random.default_rng(seed), (self.n_candidates,))
+        size = max(1, CHUNK_ROWS // self.n_candidates)
+        parts = [
+            self._best(actuation, start, targets[first : first + size])
+            for first in range(0, len(targets), size)
+        ]
+        return np.concatenate(parts) if parts else np.empty((0, actuation.n_fins, 3))
+
+    def _best(self, actuation: Actuation, start: Array, targets: Array) -> Array:
+        sigma, n_targets = self.normalization.std, len(targets)
+        starts = np.tile(start, (n_targets, 1, 1))
+        repeated = np.repeat(targets, len(start), axis=0)
+        refined = descend(actuation, starts, repeated, sigma, self.options)
+        winner = refined.objective.reshape(n_targets, -1).argmin(axis=1)
+        command = refined.command.reshape(n_targets, len(start), -1, 3)[np.arange(n_targets), winner]
+        return descend(actuation, command, targets, sigma, POLISH).command

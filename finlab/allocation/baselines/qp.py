@@ -1,0 +1,70 @@
+"""Method `qp`: one linear map per layout, one box-constrained least squares per target, as in the paper."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from finlab.allocation.baselines.actuation import Actuation
+from finlab.allocation.baselines.model_based import CACHE_SIZE, ModelBased
+from finlab.inference.normalization import Normalization
+
+Array = NDArray[np.float64]
+
+DIFFERENCE_STEP = 1e-4
+"""Half width of the central differences, as a share of each command's range."""
+
+
+class LinearMap:
+    """The actuation map of a layout, linearized by central differences at the middle of the limits.
+
+    Commands are positions between the limits, 0 at the lower and 1 at the upper one.
+    """
+
+    def __init__(self, actuation: Actuation, sigma: Array) -> None:
+        self.reference = (actuation.lower + actuation.upper) / 2
+        n = self.reference.size
+        offset = DIFFERENCE_STEP * np.eye(n).reshape(n, -1, 3) * actuation.width
+        rise = actuation.wrench(self.reference + offset) - actuation.wrench(self.reference - offset)
+        self.free = actuation.width.ravel() > 0
+        """Commands (3 n,) that have a range at all; SciPy takes no others."""
+        self.matrix = (rise / (2 * DIFFERENCE_STEP) / sigma).T[:, self.free]
+        self.wrench = actuation.wrench(self.reference)
+
+
+class Qp(ModelBased):
+    """Linearized once per layout, solved per target by SciPy's active-set `lsq_linear(method="bvls")`.
+
+    Minimizes `||(w_ref + J du - target) / sigma||^2 + regularization ||du||^2` over commands as positions
+    between their limits, where `w_ref` and `J` belong to the middle of the limits. Knows the analytic fin
+    model.
+
+    Args:
+        normalization: sigma scales the error.
+        regularization: weight of the distance from the middle of the limits.
+    """
+
+    name = "qp"
+
+    def __init__(self, normalization: Normalization, *, regularization: float = 1.0) -> None:
+        super().__init__(normalization)
+        self.regularization = regularization
+        self._map = lru_cache(CACHE_SIZE)(self._prepare)
+
+    def _commands(self, actuation: Actuation, targets: Array, seed: int) -> Array:
+        linear = self._map(actuation)
+        n_free = int(linear.free.sum())
+        step = np.zeros((len(targets), linear.free.size))
+        if n_free:
+            matrix = np.vstack([linear.matrix, np.sqrt(self.regularization) * np.eye(n_free)])
+            wanted = np.zeros((len(targets), 6 + n_free))
+            wanted[:, :6] = (targets - linear.wrench) / self.normalization.std
+            for i, right in enumerate(wanted):
+                step[i, linear.free] = lsq_linear(matrix, right, (-0.5, 0.5), method="bvls").x
+        return linear.reference + step.reshape(-1, actuation.n_fins, 3) * actuation.width
+
+    def _prepare(self, actuation: Actuation) -> LinearMap:
+        return LinearMap(actuation, self.normalization.std)

@@ -1,0 +1,101 @@
+"""What the one-target-at-a-time solvers share: free variables, random starts, the winner by J."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.baselines.actuation import Actuation
+from finlab.allocation.baselines.model_based import ENERGY_WEIGHT, ModelBased
+from finlab.inference.normalization import Normalization
+from finlab.physics.energy import DEFAULT_WEIGHTS, energy_scale
+
+Array = NDArray[np.float64]
+
+DEFAULT_STARTS = 8
+"""Random starts per target unless told otherwise."""
+
+
+class Problem:
+    """One target on one layout, over the commands that have a range at all, as positions in 0..1.
+
+    Args:
+        actuation: the robot.
+        target: desired wrench (6,).
+        sigma: per-axis standard deviation (6,).
+    """
+
+    def __init__(self, actuation: Actuation, target: Array, sigma: Array) -> None:
+        self.actuation, self.target, self.sigma = actuation, target, sigma
+        self.free = actuation.width.ravel() > 0
+        self.n_free = int(self.free.sum())
+        self._scale = energy_scale(actuation.upper)
+
+    def command(self, x: Array) -> Array:
+        """Command (n, 3) at positions (n_free,)."""
+        position = np.zeros(self.free.size)
+        position[self.free] = x
+        return self.actuation.lower + position.reshape(-1, 3) * self.actuation.width
+
+    def position(self, command: Array) -> Array:
+        """Positions (n_free,) of a command (n, 3)."""
+        return ((command - self.actuation.lower).ravel()[self.free]) / self.actuation.width.ravel()[self.free]
+
+    def residual(self, x: Array) -> Array:
+        """Normalized error (6,)."""
+        return (self.actuation.wrench(self.command(x)) - self.target) / self.sigma
+
+    def residual_slope(self, x: Array) -> Array:
+        """Derivative (6, n_free) of `residual`."""
+        _, jacobian = self.actuation.linearize(self.command(x))
+        return (jacobian * self.actuation.width.ravel() / self.sigma[:, None])[:, self.free]
+
+    def objective(self, x: Array) -> tuple[float, Array]:
+        """`err_norm^2 + ENERGY_WEIGHT * J_en` and its gradient (n_free,)."""
+        command = self.command(x)
+        wrench, jacobian = self.actuation.linearize(command)
+        residual = (wrench - self.target) / self.sigma
+        weights = DEFAULT_WEIGHTS
+        share = command / self._scale
+        diagonal = np.array([weights.amplitude, weights.frequency, weights.zero_direction])
+        half = diagonal * share
+        half[:, :2] += weights.product / 2 * share[:, 1::-1]
+        value = float(residual @ residual + ENERGY_WEIGHT * (half * share).sum())
+        by_command = 2 * (residual / self.sigma) @ jacobian + 2 * ENERGY_WEIGHT * (half / self._scale).ravel()
+        return value, (by_command * self.actuation.width.ravel())[self.free]
+
+
+class SingleTarget(ModelBased):
+    """A ready-made solver run from several random starts; the end with the lowest J wins.
+
+    Args:
+        normalization: sigma scales the error.
+        n_starts: uniform random starts per target.
+    """
+
+    def __init__(self, normalization: Normalization, *, n_starts: int = DEFAULT_STARTS) -> None:
+        super().__init__(normalization)
+        self.n_starts = n_starts
+
+    @abstractmethod
+    def _minimize(self, problem: Problem, start: Array) -> Array:
+        """Positions (n_free,) where the solver ends from a start (n_free,)."""
+
+    def _commands(self, actuation: Actuation, targets: Array, seed: int) -> Array:
+        starts = actuation.sample(np.random.default_rng(seed), (self.n_starts,))
+        result = np.empty((len(targets), actuation.n_fins, 3))
+        for i, target in enumerate(targets):
+            problem = Problem(actuation, target, self.normalization.std)
+            if problem.n_free == 0:
+                result[i] = actuation.lower
+                continue
+            ends = np.array([self._end(problem, start) for start in starts])
+            result[i] = ends[self._objective(actuation, ends, target).argmin()]
+        return result
+
+    def _end(self, problem: Problem, start: Array) -> Array:
+        """The command (n, 3) a solver ends at, or the start itself where it breaks down."""
+        end = problem.command(self._minimize(problem, problem.position(start)))
+        return problem.actuation.feasible(end) if np.isfinite(end).all() else start

@@ -1,0 +1,88 @@
+"""The fast path: a distilled network says how hard each fin works, one closed-form step does the rest.
+
+No sampling and no search: the network's shares of thrust weigh the fins, the weighted pseudo-inverse gives
+the planar forces that add up to the target, one reweighting sharpens which fins rest, and the thrust curves
+turn forces into commands. Where that misses the target, because limits bind or arcs stand in the way, the
+full pipeline answers instead.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.allocation import Solution
+from finlab.allocation.learned.insist import Lead, nearest_forces
+from finlab.allocation.learned.learned_allocator import LearnedAllocator
+from finlab.errors import AllocationError
+from finlab.forces import force_space
+from finlab.inference.fast_network import NumpyFastNetwork
+from finlab.inference.features import fin_frame_features
+from finlab.inference.weights import LearnedWeights
+from finlab.layout import Layout
+from finlab.physics.energy import DEFAULT_WEIGHTS
+
+if TYPE_CHECKING:
+    from finlab.training.networks.checkpoint import Checkpoint
+
+Array = NDArray[Any]
+
+STEPS = 1
+"""Reweighting steps after the network."""
+GOOD = 2e-3
+"""Normalized error, by the learned thrust curves, up to which the fast answer stands."""
+
+
+class FastAllocator(LearnedAllocator):
+    """Method `fast`: the distilled network first, the full pipeline where it must."""
+
+    name = "fast"
+
+    def __init__(self, weights: LearnedWeights | Checkpoint, **settings: Any) -> None:
+        """Make it from weights that hold a distilled network; settings are those of the full pipeline.
+
+        Raises:
+            AllocationError: there is no distilled network.
+        """
+        super().__init__(weights, **settings)
+        if self.weights.fast is None:
+            raise AllocationError(
+                f"checkpoint {self.checkpoint!r} has no distilled network; train one with `finlab train fast`"
+            )
+        self.network = NumpyFastNetwork(self.weights.fast)
+        std = self.normalization.std
+        self._scaled_mean = self.normalization.mean / std
+
+    def _solve(
+        self,
+        layout: Layout,
+        targets: Array,
+        *,
+        seed: int,
+        previous: Array | None,
+        lead: Lead = nearest_forces,
+    ) -> Solution:
+        # Slow turns from tick to tick are a search of their own; the network learned exact answers, cheap by
+        # the usual energy.
+        usual = self.energy_weights == DEFAULT_WEIGHTS and self.settings.energy_weight == 0.0
+        if previous is not None or not usual:
+            return super()._solve(layout, targets, seed=seed, previous=previous, lead=lead)
+        prepared, notes = self._known(layout)
+        target = targets / self.normalization.std
+        x = fin_frame_features(prepared.geometry, target - self._scaled_mean).astype(np.float32)
+        share = self.network(x).astype(np.float64)
+        share *= share
+        thrust = share * share * prepared.planar.curves.maximum
+        planar = force_space.descend(prepared.planar, target, thrust, STEPS)
+        missed = np.einsum("ri,ri->r", planar.residual, planar.residual) > GOOD**2
+        if missed.all():
+            return super()._solve(layout, targets, seed=seed, previous=None, lead=lead)
+        command, _ = force_space.realize(prepared.planar, planar)
+        wrench = targets - planar.residual * self.normalization.std
+        if missed.any():
+            slow = super()._solve(layout, targets[missed], seed=seed, previous=None, lead=lead)
+            assert slow.wrench_surrogate is not None
+            command[missed], wrench[missed] = slow.command, slow.wrench_surrogate
+        return Solution(command, wrench, notes=notes)

@@ -1,0 +1,178 @@
+"""The learned allocator: a network proposes, the surrogate ranks, a search finds the cheapest answer.
+
+Only the learned surrogate is seen on the way; the analytic fin model scores the answer afterwards. The way
+itself is in `pipeline`; here are the policies, the batches and what the user is told.
+"""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import fields
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.allocation import Candidates, Solution
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.learned.insist import Lead, nearest_forces
+from finlab.allocation.learned.pipeline import Pipeline
+from finlab.allocation.learned.pool import Pool
+from finlab.allocation.learned.prepared import Prepared
+from finlab.allocation.learned.proposal import Proposal
+from finlab.allocation.learned.settings import Settings
+from finlab.allocation.learned.unreachable import serve
+from finlab.allocation.policy import Policy
+from finlab.inference.threads import single_threaded_products
+from finlab.inference.weights import LearnedWeights, weights_of
+from finlab.layout import FinModelSpec, Layout
+from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyWeights
+
+if TYPE_CHECKING:
+    from finlab.training.networks.checkpoint import Checkpoint
+
+Array = NDArray[Any]
+
+CHUNK = 256
+"""Targets that are solved together; keeps memory flat for any number of targets."""
+
+
+ALTERNATIVE = 1e-3
+"""Normalized error, by the surrogate, up to which another answer is an alternative."""
+
+
+class LearnedAllocator(Allocator):
+    """The product's default method."""
+
+    name = "learned"
+
+    def __init__(
+        self,
+        weights: LearnedWeights | Checkpoint,
+        *,
+        energy_weights: EnergyWeights = DEFAULT_WEIGHTS,
+        **settings: Any,
+    ) -> None:
+        """Make it from a checkpoint, or from the weights of one.
+
+        Args:
+            weights: trained weights.
+            energy_weights: by which answers are compared; `POWER_WEIGHTS` for the least inertial power.
+            settings: fields of `Settings`.
+
+        Raises:
+            AllocationError: settings that leave nothing to answer with.
+            CheckpointError: the checkpoint's networks are of another kind.
+        """
+        self.settings = Settings(**settings)
+        self.trained = None if isinstance(weights, LearnedWeights) else weights
+        self.weights = weights if isinstance(weights, LearnedWeights) else weights_of(weights)
+        self.checkpoint = self.weights.checkpoint
+        self.normalization = self.weights.normalization
+        self.energy_weights = energy_weights
+        self.pipeline = Pipeline(self.weights, self.settings, energy_weights)
+        # All products here are too small to be shared among threads; chunks of targets are not.
+        self._one_thread = single_threaded_products()
+        self._fin_model = FinModelSpec.from_values(self.weights.fin_model)
+        self._known = lru_cache(maxsize=128)(self._meet)
+
+    @classmethod
+    def option_names(cls) -> list[str]:
+        """Names of the settings."""
+        return ["energy_weights", *(field.name for field in fields(Settings))]
+
+    def _solve(
+        self,
+        layout: Layout,
+        targets: Array,
+        *,
+        seed: int,
+        previous: Array | None,
+        lead: Lead = nearest_forces,
+    ) -> Solution:
+        prepared, notes = self._known(layout)
+        if len(targets) == 1:
+            with self._one_thread():
+                pool, proposal = self.pipeline.solve(prepared, targets, seed, previous, lead=lead)
+            std = self.normalization.std
+            return Solution(
+                pool.command[:, 0],
+                pool.wrench[:, 0] * std,
+                notes=notes,
+                candidates=lambda: _candidates(pool, std),
+                samples=lambda: _samples(proposal, prepared, std),
+                alternatives=lambda: _alternatives(
+                    self.pipeline.explore(prepared, targets, pool, proposal), std
+                ),
+            )
+
+        def solve(start: int) -> Pool:
+            return self.pipeline.solve(prepared, targets[start : start + CHUNK], seed + start, None)[0]
+
+        with self._one_thread(), ThreadPoolExecutor(os.cpu_count()) as executor:
+            parts = list(executor.map(solve, range(0, len(targets), CHUNK)))
+        command = np.concatenate([part.command[:, 0] for part in parts])
+        wrench = np.concatenate([part.wrench[:, 0] for part in parts]) * self.normalization.std
+        return Solution(command, wrench, notes=notes)
+
+    def _solve_by(
+        self, policy: Policy, layout: Layout, target: Array, *, seed: int, previous: Array | None
+    ) -> Solution:
+        if policy.kind == "closest" and len(set(policy.axis_weights)) == 1:
+            return self._solve(layout, target, seed=seed, previous=previous)
+        plain = self._solve(layout, target, seed=seed, previous=previous, lead=lambda *_: None)
+        if self._reaches(layout, plain, target)[0]:
+            return plain
+        # What the policy asks for within reach is one wrench; that one is then delivered as any other.
+        std = self.normalization.std
+        served = serve(self.pipeline.prepare(layout).planar, policy, target[0] / std)
+        return self._solve(
+            layout, served.wrench * std, seed=seed, previous=previous, lead=lambda *_: served.force
+        )
+
+    def _meet(self, layout: Layout) -> tuple[Prepared, tuple[str, ...]]:
+        """What is computed ahead for a layout, and what the user should know of it."""
+        return self.pipeline.prepare(layout), self._notes(layout)
+
+    def _notes(self, layout: Layout) -> tuple[str, ...]:
+        """What the user should know before trusting an answer for this layout."""
+        known = self._fin_model
+        strangers = [
+            fin.name
+            for fin in layout.fins
+            if fin.model.type != known.type or fin.model.values() != known.values()
+        ]
+        if not strangers:
+            return ()
+        return (
+            f"checkpoint {self.checkpoint!r} knows fins of model {known.type!r} and takes these for "
+            f"such: {', '.join(strangers)}; trust the plant's error or train a surrogate for them",
+        )
+
+
+def _candidates(pool: Pool, std: Array) -> Candidates:
+    """The refined answers to a single target."""
+    command, wrench, error, energy = (values[0] for values in pool)
+    return Candidates(command, wrench * std, error, energy, ("refined",) * len(command))
+
+
+def _alternatives(pool: Pool, std: Array) -> Candidates:
+    """The exact answers to a single target, the chosen one first; all where none is exact."""
+    exact = pool.error[0] <= max(ALTERNATIVE, 1.01 * pool.error[0, 0])
+    return _candidates(Pool(*(values[:, exact] for values in pool)), std)
+
+
+def _samples(proposal: Proposal, prepared: Prepared, std: Array) -> Candidates:
+    """The raw candidates for a single target."""
+    order = np.argsort(proposal.error[0])
+    names = tuple(f"mode {k + 1}" for k in proposal.component[0][order])
+    command = proposal.command[0][order].astype(np.float64)
+    return Candidates(
+        np.clip(command, prepared.lower, prepared.upper),
+        proposal.wrench[0][order] * std,
+        proposal.error[0][order].astype(np.float64),
+        proposal.energy[0][order].astype(np.float64),
+        names,
+    )

@@ -1,0 +1,210 @@
+"""Levenberg-Marquardt on the commands, through the surrogate's closed-form Jacobian, inside the limits.
+
+The last word of every learned allocation: it works in commands, not forces, and with the whole
+surrogate, so it removes what the planar search's simplifications leave.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.forces.small_systems import solve
+from finlab.inference.learned_fin import LearnedFin
+
+Array = NDArray[Any]
+
+
+AT_LIMIT = 1e-9
+"""How near [rad, Hz, rad] to a limit a command counts as being at it."""
+
+
+class Limits(NamedTuple):
+    """The limits of n fins in one floating-point type."""
+
+    lower: Array
+    """(n, 3)."""
+    upper: Array
+    """(n, 3)."""
+    seam: Array
+    """Zero direction (n,) [rad], half a turn before the middle of the arc, from where angles are counted."""
+    turn: np.floating[Any]
+    """A whole turn [rad]."""
+    half: Array
+    """Half of each range (n, 3)."""
+
+
+@dataclass(frozen=True, eq=False)
+class CommandProblem:
+    """One layout as the refinement sees it."""
+
+    fin: LearnedFin
+    """The learned fin."""
+    columns: Array
+    """Normalized wrench per newton (n, 3, 6) of each fin's force along shaft, e_h and e_z."""
+    lower: Array
+    """Lower limits (n, 3)."""
+    upper: Array
+    """Upper limits (n, 3)."""
+    wraps: NDArray[np.bool_]
+    """True (n,) where the zero direction may turn a full circle."""
+
+    @cached_property
+    def span(self) -> Array:
+        """Ranges of the limits (n, 3)."""
+        return self.upper - self.lower
+
+    @cached_property
+    def edges(self) -> tuple[Array, Array]:
+        """Below the first and above the second (n, 3), a command is at its limit; full circles have none."""
+        low, high = self.lower + AT_LIMIT, self.upper - AT_LIMIT
+        low[self.wraps, 2], high[self.wraps, 2] = -np.inf, np.inf
+        return low, high
+
+    @cached_property
+    def exact(self) -> Limits:
+        """The limits in double precision."""
+        return self._limits(np.float64)
+
+    @cached_property
+    def rough(self) -> Limits:
+        """The limits in single precision."""
+        return self._limits(np.float32)
+
+    def _limits(self, kind: type[np.floating[Any]]) -> Limits:
+        middle = (0.5 * (self.lower[:, 2] + self.upper[:, 2])).astype(kind)
+        lower, upper = self.lower.astype(kind), self.upper.astype(kind)
+        return Limits(lower, upper, middle - kind(np.pi), kind(2 * np.pi), kind(0.5) * (upper - lower))
+
+    @cached_property
+    def rough_columns(self) -> Array:
+        """The columns (3n, 6) in single precision."""
+        return self.columns.reshape(-1, 6).astype(np.float32)
+
+    def wrench(self, command: Array) -> Array:
+        """Normalized wrenches (R, 6) of commands (R, n, 3)."""
+        rows, n, _ = command.shape
+        return self.fin.force(command).reshape(rows, 3 * n) @ self.columns.reshape(3 * n, 6)
+
+    def clamp(self, command: NDArray[np.floating]) -> NDArray[np.floating]:
+        """Commands (..., n, 3) inside the limits, zero directions wrapped first; the type is kept."""
+        return self.clamp_in_place(command.copy())
+
+    def clamp_in_place(self, command: NDArray[np.floating]) -> NDArray[np.floating]:
+        """`clamp` for commands that nobody else needs."""
+        limits = self.rough if command.dtype == np.float32 else self.exact
+        direction = command[..., 2]
+        direction -= limits.seam
+        np.mod(direction, limits.turn, out=direction)
+        direction += limits.seam
+        np.maximum(command, limits.lower, out=command)
+        return np.minimum(command, limits.upper, out=command)
+
+
+class Refined(NamedTuple):
+    """R refined commands."""
+
+    command: Array
+    """(R, n, 3), inside the limits."""
+    wrench: Array
+    """Normalized wrench (R, 6) by the surrogate."""
+    error: Array
+    """Normalized error (R,) of that wrench."""
+
+
+def refine(
+    problem: CommandProblem, target: Array, command: Array, steps: int, *, damping: float = 1e-6
+) -> Refined:
+    """Reduce the tracking error of commands (R, n, 3) towards normalized targets (R, 6).
+
+    Each step is the smallest change, in units of the limit ranges, that cancels the error to first
+    order; commands at a limit that would leave it are held. A step that makes a row worse is undone
+    and that row's damping raised.
+
+    Args:
+        problem: the layout.
+        target: normalized wrenches (R, 6), or one for all rows (1, 6).
+        command: where to start (R, n, 3).
+        steps: number of steps.
+        damping: first damping of each row.
+    """
+    damping_of = np.full(len(command), damping)
+    # Where nothing better is found this is the answer: it must not lie outside by a rounding error.
+    command = np.minimum(np.maximum(command, problem.lower), problem.upper)
+    best = _judged(problem, target, command, None if steps else _NO_SLOPES)
+    for step in range(steps):
+        # (R, n, 3 commands, 6): change of the normalized wrench per unit of each limit range.
+        jacobian = np.matmul(best.slopes, problem.columns)
+        jacobian *= problem.span[..., None]
+        moved = _step(problem, best, jacobian, damping_of)
+        moved *= problem.span
+        moved += best.command
+        # The last commands are only judged: from there nothing leads on.
+        last = step == steps - 1
+        new = _judged(problem, target, problem.clamp_in_place(moved), best.slopes if last else None)
+        worse = new.error > best.error
+        if worse.any():
+            rows = [worse.reshape(-1, *(1,) * (part.ndim - 1)) for part in new]
+            new = _Judged(*map(np.where, rows, best, new))
+        if not last:
+            damping_of = np.where(worse, damping_of * 30.0 + 1e-4, damping_of * 0.3)
+        best = new
+    return Refined(best.command, best.wrench, np.sqrt(best.error))
+
+
+class _Judged(NamedTuple):
+    """R commands and how they do."""
+
+    command: Array
+    """(R, n, 3)."""
+    wrench: Array
+    """(R, 6)."""
+    residual: Array
+    """Target minus wrench (R, 6)."""
+    error: Array
+    """Its squared size (R,)."""
+    slopes: Array
+    """Derivatives of each fin's force by each of its commands (R, n, 3 commands, 3)."""
+
+
+_NO_SLOPES = np.empty((1, 1, 1, 1))
+
+
+def _judged(problem: CommandProblem, target: Array, command: Array, slopes: Array | None) -> _Judged:
+    """Judge commands; slopes that are given are not computed anew."""
+    rows, n, _ = command.shape
+    if slopes is None:
+        force, slopes = problem.fin.force_and_slopes(command)
+    else:
+        force = problem.fin.force(command)
+    wrench = force.reshape(rows, 3 * n).dot(problem.columns.reshape(3 * n, 6))
+    residual = target - wrench
+    return _Judged(command, wrench, residual, np.einsum("ri,ri->r", residual, residual), slopes)
+
+
+def _step(problem: CommandProblem, at: _Judged, jacobian: Array, damping: Array) -> Array:
+    """Damped smallest change (R, n, 3), in units of the limit ranges, that leaves no limit."""
+    rows, n, _ = at.command.shape
+    free = jacobian.reshape(rows, 3 * n, 6)
+    right = at.residual[..., None]
+    change = _smallest_change(free, right, damping)
+    # Hold what is at a limit and wants out, then solve again with the rest.
+    low, high = problem.edges
+    moved = change.reshape(rows, n, 3)
+    out = (at.command <= low) & (moved < 0)
+    out |= (at.command >= high) & (moved > 0)
+    if out.any():
+        change = _smallest_change(free * ~out.reshape(rows, 3 * n, 1), right, damping)
+    return change.reshape(rows, n, 3)
+
+
+def _smallest_change(free: Array, right: Array, damping: Array) -> Array:
+    """The change (R, 3n, 1) that gives the wrenches (R, 6, 1) by a Jacobian (R, 3n, 6)."""
+    gram = free.swapaxes(1, 2) @ free
+    gram.reshape(-1, 36)[:, ::7] += (damping + 1e-9)[:, None]
+    change: Array = free @ solve(gram, right)
+    return change

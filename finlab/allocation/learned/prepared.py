@@ -1,0 +1,102 @@
+"""What the learned allocator needs to know of a layout, computed once and kept."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.learned.levenberg_marquardt import CommandProblem
+from finlab.forces.force_space import PlanarProblem, free_terms
+from finlab.forces.thrust_curve import thrust_curves
+from finlab.inference.features import Geometry, geometry
+from finlab.inference.learned_fin import LearnedFin
+from finlab.layout import Layout
+from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyMeter, EnergyWeights, energy_scale
+
+Array = NDArray[Any]
+
+MAX_SUBSETS = 40
+"""Most sub-layouts that are searched beside the network's proposals."""
+FULL_TURN = 2 * np.pi - 1e-6
+"""Arc of zero directions [rad] from which a fin counts as able to point anywhere."""
+
+
+class Prepared(NamedTuple):
+    """One layout of n healthy fins, ready for prediction, search and refinement."""
+
+    lower: Array
+    """Lower limits (n, 3)."""
+    upper: Array
+    """Upper limits (n, 3)."""
+    geometry: Geometry
+    """The part of the network's features that does not depend on the target."""
+    planar: PlanarProblem
+    """The layout for the search in force space."""
+    commands: CommandProblem
+    """The layout for the refinement of commands."""
+    subsets: Array
+    """Thrust seeds (S, n) [N] of sub-layouts: the fins outside are nearly at rest."""
+    energy: EnergyMeter
+    """By which answers are compared."""
+    usual_energy: EnergyMeter
+    """By which the network's candidates are ranked: the one that it has learned to keep low."""
+
+
+def prepare(
+    layout: Layout, fin: LearnedFin, std: Array, weights: EnergyWeights = DEFAULT_WEIGHTS
+) -> Prepared:
+    """Prepare a layout whose fins are all healthy; `std` (6,) normalizes wrenches."""
+    position = np.array([f.position for f in layout.fins], dtype=np.float64)
+    angle = np.array([f.mounting_angle for f in layout.fins], dtype=np.float64)
+    lower = np.array([f.limits.lower for f in layout.fins], dtype=np.float64)
+    upper = np.array([f.limits.upper for f in layout.fins], dtype=np.float64)
+    c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
+    axes = np.stack(
+        [np.stack([c, s, zero], -1), np.stack([-s, c, zero], -1), np.stack([zero, zero, one], -1)], axis=1
+    )
+    torque = np.cross(position[:, None], axes)
+    columns = np.concatenate([axes, torque], axis=-1) / std  # (n, 3, 6)
+    curves = thrust_curves(fin, lower, upper, weights)
+    arc = upper[:, 2] - lower[:, 2]
+    half = np.where(arc >= FULL_TURN, np.pi, 0.5 * arc)
+    cost = weights.zero_direction / energy_scale(upper)[:, 2] ** 2
+    in_plane = np.ascontiguousarray(columns[:, 1:])
+    planar = PlanarProblem(
+        columns=in_plane,
+        products=np.einsum("nci,ndj->ncdij", in_plane, in_plane),
+        curves=curves,
+        middle=0.5 * (lower[:, 2] + upper[:, 2]),
+        half=half,
+        direction_cost=cost,
+        idle_direction=np.clip(0.0, lower[:, 2], upper[:, 2]),
+        turns_fully=bool((arc >= FULL_TURN).all()),
+        free=free_terms(in_plane, curves.maximum),
+        growth=1.5 if weights.inertial else 0.5,
+    )
+    return Prepared(
+        lower,
+        upper,
+        geometry(position[None], angle[None], lower[None], upper[None], std),
+        planar,
+        CommandProblem(fin, columns, lower, upper, arc >= FULL_TURN),
+        _subset_seeds(curves.maximum),
+        EnergyMeter(upper, weights),
+        EnergyMeter(upper),
+    )
+
+
+def _subset_seeds(maximum: Array) -> Array:
+    """Seeds that let no, one or two fins rest while at least three work.
+
+    The energy is concave in a fin's force, so the cheapest allocation often rests some fins, which a
+    local search from the whole layout may miss. Two fins alone rarely span a wrench.
+    """
+    n = len(maximum)
+    resting = [c for k in range(min(2, max(n - 3, 0)) + 1) for c in combinations(range(n), k)][:MAX_SUBSETS]
+    seeds = np.tile(maximum, (len(resting), 1))
+    for row, fins in enumerate(resting):
+        seeds[row, list(fins)] *= 1e-3
+    return seeds

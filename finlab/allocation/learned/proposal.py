@@ -1,0 +1,151 @@
+"""What the network proposes: K candidate commands, drawn from its mixture and scored by the surrogate."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.learned.prepared import Prepared
+from finlab.inference.features import fin_frame_features
+from finlab.inference.network import MixtureArrays
+
+Array = NDArray[Any]
+
+
+class Proposal(NamedTuple):
+    """K candidates for each of N targets, inside the limits, in single precision."""
+
+    command: Array
+    """(N, K, n, 3)."""
+    component: NDArray[np.int64]
+    """Mixture component of each candidate (N, K)."""
+    wrench: Array
+    """Normalized wrench (N, K, 6) by the surrogate."""
+    error: Array
+    """Normalized error (N, K) by the surrogate."""
+    thrust: Array
+    """Planar force of each fin (N, K, n) [N] by the surrogate."""
+    energy: Array
+    """Energy proxy (N, K)."""
+
+
+class Network(Protocol):
+    """The allocator network, whatever runs it."""
+
+    def __call__(
+        self, x: Array, target: Array, lower: NDArray[np.floating], upper: NDArray[np.floating]
+    ) -> MixtureArrays:
+        """The mixture; arguments as in `NumpyNetwork`."""
+        ...
+
+
+class Proposer(Protocol):
+    """`propose` with its network, or an engine that does the whole of it by itself."""
+
+    def __call__(
+        self,
+        prepared: Prepared,
+        centred: Array,
+        target: Array,
+        n_candidates: int,
+        temperature: float,
+        seed: int,
+        /,
+    ) -> Proposal:
+        """K candidates for each target; arguments as in `propose`."""
+        ...
+
+
+def predict(network: Network, prepared: Prepared, centred: Array) -> MixtureArrays:
+    """The network's mixture for normalized, centred targets (N, 6)."""
+    x = fin_frame_features(prepared.geometry, centred).astype(np.float32)
+    return network(x, centred.astype(np.float32), prepared.lower, prepared.upper)
+
+
+def sample(
+    mixture: MixtureArrays, n_samples: int, temperature: float, seed: int
+) -> tuple[Array, NDArray[np.int64]]:
+    """Normalized commands (N, K, n, 3) and their components (N, K).
+
+    The first M candidates are the components' means. The rest are drawn by the mixture's weights, with
+    the variance of each Gaussian times T. Weights are not sharpened by T: the best component is there
+    anyway, and other modes are what a user wants to compare.
+    """
+    rows, n, m, _ = mixture.mean.shape
+    kept = min(m, n_samples)
+    means = mixture.mean.swapaxes(1, 2)  # (N, M, n, 3)
+    components = np.empty((rows, n_samples), dtype=np.int64)
+    commands = np.empty((rows, n_samples, n, 3), dtype=np.float32)
+    components[:, :kept] = np.arange(kept)
+    commands[:, :kept] = means[:, :kept]
+    extra = n_samples - kept
+    if extra <= 0:
+        return commands, components
+    raw, normal = draws_of_one(seed, extra, n) if rows == 1 else _draws(seed, rows, extra, n)
+    cumulative = mixture.weight.cumsum(1)
+    draw = raw * cumulative[:, None, -1:]
+    drawn = np.add.reduce(draw > cumulative[:, None, :-1], axis=-1, out=components[:, kept:])
+    place = drawn + np.arange(0, rows * m, m)[:, None]
+    noise = commands[:, kept:]
+    np.multiply(normal, mixture.std.swapaxes(1, 2).reshape(rows * m, n, 3).take(place, axis=0), out=noise)
+    noise *= np.float32(math.sqrt(temperature))
+    noise += means.reshape(rows * m, n, 3).take(place, axis=0)
+    return commands, components
+
+
+def _draws(seed: int, rows: int, extra: int, n: int) -> tuple[Array, Array]:
+    """Uniform (rows, extra, 1) and normal (rows, extra, n, 3) random numbers of a seed."""
+    rng = np.random.default_rng(seed)
+    uniform = rng.random((rows, extra, 1), dtype=np.float32)
+    return uniform, rng.standard_normal((rows, extra, n, 3), dtype=np.float32)
+
+
+@lru_cache(maxsize=64)
+def draws_of_one(seed: int, extra: int, n: int) -> tuple[Array, Array]:
+    """The same for a single target, kept: a robot asks with one seed, tick after tick."""
+    uniform, normal = _draws(seed, 1, extra, n)
+    uniform.setflags(write=False)
+    normal.setflags(write=False)
+    return uniform, normal
+
+
+def propose(
+    network: Network,
+    prepared: Prepared,
+    centred: Array,
+    target: Array,
+    n_candidates: int,
+    temperature: float,
+    seed: int,
+) -> Proposal:
+    """Predict, sample, clamp and score.
+
+    Args:
+        network: what predicts the mixture.
+        prepared: the layout.
+        centred: normalized targets minus the mean (N, 6), which the network sees.
+        target: normalized targets (N, 6).
+        n_candidates: K.
+        temperature: T.
+        seed: seed of the draw.
+    """
+    x, component = sample(predict(network, prepared, centred), n_candidates, temperature, seed)
+    problem = prepared.commands
+    limits = problem.rough
+    x += np.float32(1.0)
+    x *= limits.half
+    x += limits.lower
+    command = problem.clamp_in_place(x)
+    rows, k, n, _ = command.shape
+    force = problem.fin.force(command)
+    wrench = force.reshape(rows * k, 3 * n).dot(problem.rough_columns).reshape(rows, k, 6)
+    missing = wrench - target[:, None]
+    error = np.sqrt(np.einsum("rki,rki->rk", missing, missing))
+    across = force[..., 1:] * force[..., 1:]
+    thrust = np.sqrt(across[..., 0] + across[..., 1])
+    energy = prepared.usual_energy(command.reshape(rows * k, n, 3)).reshape(rows, k)
+    return Proposal(command, component, wrench, error, thrust, energy)

@@ -1,1 +1,0 @@
-"""Training data: seeded sampling, shards on disk, features and normalization."""

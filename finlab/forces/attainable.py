@@ -1,0 +1,176 @@
+"""The forces, or torques, that a layout can give, as a body to be drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.forces.fin_sets import SCALE, FinSets, fin_sets, joined, pieces, wide_fins
+from finlab.forces.hull import hull_of
+from finlab.forces.reach import largest
+from finlab.layout import Layout
+
+Array = NDArray[np.float64]
+Kind = Literal["force", "torque"]
+
+N_DIRECTIONS = 120
+"""Directions that are looked at first; faces that are too far off add theirs."""
+MAX_DRAWN_PIECES = 4
+"""Most combinations of convex pieces that a picture is made of; with more, arcs count with their hulls."""
+MAX_ROUNDS = 4
+"""Most times that directions are added."""
+SPECK = 1e-5
+"""Share of the sum of all thrusts below which a point counts as the origin; the solver is no more exact."""
+TOLERANCE = 0.01
+"""Gap at which no more directions are added, as a share of the farthest vertex."""
+
+
+@dataclass(frozen=True)
+class AttainableSet:
+    """A convex polytope of attainable forces or torques. Every vertex is attained, by the fins or, where
+    `hull` says so, by the convex hulls of what they can push."""
+
+    kind: Kind
+    """What it is a set of: `force` or `torque`."""
+    alone: bool
+    """Whether all else is zero (torque for forces, force for torques) or free."""
+    failed: tuple[str, ...]
+    """Names of the fins that push nothing."""
+    vertices: Array
+    """Corners (V, 3), body frame [N] or [N m]."""
+    faces: NDArray[np.intp]
+    """Triangles (F, 3) of vertices, counter-clockwise from outside; none when the set is flat or smaller."""
+    outline: NDArray[np.intp]
+    """Vertices around a flat set, or the two ends of a line; empty otherwise."""
+    dimension: int
+    """3 for a body, 2 flat, 1 a line, 0 nothing but the origin."""
+    gap: float
+    """Nothing attainable lies further than this outside any face [N] or [N m]."""
+    hull: bool
+    """Whether it is the convex hull of a set that is not convex, because a fin's arc is wider than half a
+    turn but no full circle."""
+    sampled: bool
+    """Whether a fin follows a table, so that its largest thrust was sampled."""
+
+
+def attainable_set(
+    layout: Layout,
+    kind: Kind,
+    *,
+    failed: Collection[str] = (),
+    alone: bool = True,
+    tolerance: float = TOLERANCE,
+) -> AttainableSet:
+    """Returns what forces or torques the fins can give.
+
+    Directions are sent out from the origin. In each, the farthest attainable point is a vertex; where a face
+    still lies further than `tolerance` inside the plane that touches the set, its normal is sent out too.
+
+    Args:
+        layout: the robot.
+        kind: `force` or `torque`.
+        failed: names of fins that push nothing.
+        alone: keep all else at zero; otherwise it may be anything.
+        tolerance: when to stop, as a share of the farthest vertex.
+
+    Raises:
+        LayoutError: there is no fin of a name in `failed`.
+    """
+    layout.indices(tuple(failed))
+    sets = fin_sets([layout], failed)
+    support = _without_specks(
+        _alone_support(sets, kind) if alone else _free_support(sets, kind), SPECK * float(sets.radius.sum())
+    )
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    extent = np.maximum(support(axes)[1].reshape(2, 3).max(axis=0), 0.0)
+    # Flat robots have flat sets: directions are spread over the sphere that the set would be if scaled.
+    scale = 1.0 / np.maximum(extent, 1e-2 * extent.max()) if extent.max() > 0.0 else np.ones(3)
+    spread = _sphere(N_DIRECTIONS) * scale
+    points = support(np.concatenate([axes, spread / np.linalg.norm(spread, axis=-1, keepdims=True)]))[0]
+    points = np.concatenate([points, np.zeros((1, 3))])  # every fin may rest
+    found = hull_of(points)
+    for round_ in range(MAX_ROUNDS + 1):
+        new, reach = support(found.normals)
+        beyond = reach - found.offsets
+        size = float(np.linalg.norm(points, axis=-1).max())
+        far = beyond > tolerance * size
+        if round_ == MAX_ROUNDS or not far.any():
+            break
+        points = np.concatenate([found.vertices, new[far]])
+        found = hull_of(points)
+    return AttainableSet(
+        kind=kind,
+        alone=alone,
+        failed=tuple(name for name in layout.names if name in failed),
+        vertices=found.vertices,
+        faces=found.faces,
+        outline=found.outline,
+        dimension=found.dimension,
+        gap=max(float(beyond.max()), 0.0),
+        hull=len(wide_fins(sets)) > 0,
+        sampled=any(fin.model.type == "table" for fin in layout.fins),
+    )
+
+
+Support = Callable[[Array], tuple[Array, Array]]
+"""Unit directions (D, 3) to the farthest points (D, 3) and how far they lie along them (D,)."""
+
+
+def _without_specks(support: Support, speck: float) -> Support:
+    """The same, but points nearer to the origin than `speck` are the origin."""
+
+    def clean(directions: Array) -> tuple[Array, Array]:
+        points, reach = support(directions)
+        near = np.linalg.norm(points, axis=-1) <= speck
+        return np.where(near[:, None], 0.0, points), np.where(near, 0.0, reach)
+
+    return clean
+
+
+def _free_support(sets: FinSets, kind: Kind) -> Support:
+    """Farthest points with all else free: in closed form."""
+    own = slice(0, 3) if kind == "force" else slice(3, 6)
+
+    def support(directions: Array) -> tuple[Array, Array]:
+        normal = np.zeros((len(directions), 6))
+        # A scaled wrench times its scale is the wrench; so a normal is multiplied, too.
+        normal[:, own] = directions * SCALE[own]
+        rows = sets.take(np.zeros(len(directions), dtype=np.intp))
+        reach, force = rows.farthest(normal)
+        return rows.wrench(force)[:, own] * SCALE[own], reach
+
+    return support
+
+
+def _alone_support(sets: FinSets, kind: Kind) -> Support:
+    """Farthest points with all else zero: by the dual, in each convex piece."""
+    own, other = (slice(0, 3), slice(3, 6)) if kind == "force" else (slice(3, 6), slice(0, 3))
+    parts = joined(pieces(sets, MAX_DRAWN_PIECES))
+    n_parts = len(parts.radius)
+
+    def support(directions: Array) -> tuple[Array, Array]:
+        rows = len(directions)
+        normal = np.zeros((n_parts * rows, 6))
+        normal[:, own] = np.tile(directions, (n_parts, 1))
+        basis = np.broadcast_to(np.eye(6)[:, other], (len(normal), 6, 3))
+        answer = largest(parts.take(np.repeat(np.arange(n_parts), rows)), normal, basis)
+        reach = answer.size.reshape(n_parts, rows)
+        best = reach.argmax(axis=0) * rows + np.arange(rows)
+        # The origin stands in for a point that is not proven to be attained.
+        proven = answer.gap < 1e-3 * (1.0 + answer.size)
+        points = np.where(proven[:, None], answer.wrench[:, own], 0.0)
+        return points[best] * SCALE[own], answer.size[best] * SCALE[own][0]
+
+    return support
+
+
+def _sphere(n: int) -> Array:
+    """n unit vectors (n, 3), evenly spread along a spiral from pole to pole."""
+    z = 1.0 - (2.0 * np.arange(n) + 1.0) / n
+    turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(n)
+    across = np.sqrt(1.0 - z * z)
+    return np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=-1)

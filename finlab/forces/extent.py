@@ -1,0 +1,101 @@
+"""How near and how far the set of all wrenches reaches: its weakest and its strongest direction."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.forces.fin_sets import FinSets
+from finlab.forces.reach import COARSE, FINE, along
+
+Array = NDArray[np.float64]
+
+RANK_TOLERANCE = 1e-6
+"""Share of the largest singular value below which another counts as zero."""
+N_RANDOM = 24
+"""Random directions from which the weakest one is sought, beside axes and singular vectors."""
+N_WALKS = 6
+"""Steps from face to face of the set of wrenches."""
+
+
+class Extent(NamedTuple):
+    """One extreme of the sets of wrenches of P robots, in scaled wrenches."""
+
+    size: Array
+    """(P,) [N]."""
+    direction: Array
+    """Unit scaled wrench (P, 6)."""
+
+
+def singular_values(sets: FinSets) -> tuple[Array, Array]:
+    """Returns singular values (P, 6) [N], falling, and their directions (P, 6, 6), in columns.
+
+    Each column of the matrix is what one fin does at its largest thrust along one axis of its plane; a fin
+    whose stops coincide has but one.
+    """
+    strong = sets.columns * sets.radius[..., None, None]
+    fixed = sets.half == 0.0
+    if fixed.any():
+        only = np.stack([np.cos(sets.middle), np.sin(sets.middle)], axis=-1)
+        along_it = np.einsum("pnc,pnck->pnk", only, strong)[..., None, :] * np.array([1.0, 0.0])[:, None]
+        strong = np.where(fixed[..., None, None], along_it, strong)
+    robots, n = sets.radius.shape
+    matrix = np.swapaxes(strong.reshape(robots, 2 * n, 6), -1, -2)
+    directions, values, _ = np.linalg.svd(matrix, full_matrices=True)
+    return np.pad(values, ((0, 0), (0, 6 - values.shape[-1]))), directions
+
+
+def weakest(sets: FinSets, n_random: int = N_RANDOM, n_walks: int = N_WALKS, fine: bool = True) -> Extent:
+    """Returns the direction in which the sets of wrenches end soonest, and where.
+
+    Every wrench of that size, in any direction, is within reach. The walk starts from axes, singular vectors
+    and random directions, goes to the face of the set that lies that way, turns to the face's normal and goes
+    again; each step ends nearer. The least end of all walks is returned: an end that truly is there.
+    """
+    values, vectors = singular_values(sets)
+    size = np.zeros(len(values))
+    direction = vectors[:, :, 5].copy()
+    full = np.flatnonzero(values[:, 5] > RANK_TOLERANCE * np.maximum(values[:, 0], 1e-9))
+    if not len(full):
+        return Extent(size, direction)
+    rng = np.random.default_rng(0)
+    drawn = rng.standard_normal((n_random, 6))
+    drawn /= np.linalg.norm(drawn, axis=-1, keepdims=True)
+    common = np.concatenate([np.eye(6), drawn])
+    of_robot = np.swapaxes(vectors[full], -1, -2)
+    starts = np.concatenate([np.broadcast_to(common, (len(full), *common.shape)), of_robot], axis=1)
+    if (sets.half[full] < np.pi).any():  # with full circles only, opposite directions are alike
+        starts = np.concatenate([starts, -starts], axis=1)
+    n_starts = starts.shape[1]
+    rows = sets.take(np.repeat(full, n_starts))
+    ends = starts.reshape(-1, 6)
+    for walk in range(n_walks):
+        last = fine and walk == n_walks - 1
+        normal = along(rows, ends, FINE if last else COARSE).normal
+        ends = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    reach = rows.farthest(ends)[0].reshape(len(full), n_starts)
+    best = reach.argmin(axis=1)
+    size[full] = np.maximum(reach[np.arange(len(full)), best], 0.0)
+    direction[full] = ends.reshape(len(full), n_starts, 6)[np.arange(len(full)), best]
+    return Extent(size, direction)
+
+
+def strongest(sets: FinSets) -> Extent:
+    """Returns the largest scaled wrench of each robot, other axes free: walks from axes and singular
+    vectors."""
+    _, vectors = singular_values(sets)
+    robots = len(vectors)
+    starts = np.concatenate(
+        [np.broadcast_to(np.eye(6), (robots, 6, 6)), np.swapaxes(vectors, -1, -2)], axis=1
+    )
+    ends = np.concatenate([starts, -starts], axis=1).reshape(-1, 6)
+    rows = sets.take(np.repeat(np.arange(robots), 24))
+    for _ in range(50):
+        wrench = rows.wrench(rows.farthest(ends)[1])
+        size = np.linalg.norm(wrench, axis=-1)
+        ends = np.where(size[:, None] > 1e-12, wrench / np.maximum(size, 1e-12)[:, None], ends)
+    size = size.reshape(robots, -1)
+    best = size.argmax(axis=1)
+    return Extent(size.max(axis=1), ends.reshape(robots, -1, 6)[np.arange(robots), best])

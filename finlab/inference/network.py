@@ -1,0 +1,251 @@
+"""The trained allocator network in numpy, for a few targets at a time.
+
+A network this small spends most of its time on the overhead of each tensor operation; numpy's is a
+few times smaller than a tensor library's, and a robot's computer need not have one. A test holds it
+against `finlab.training.networks.allocator_network.AllocatorNetwork`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+_LAYER_NORM_EPS = np.float32(1e-5)
+_LOG_STD_LOW, _LOG_STD_RANGE = np.float32(-3.0), np.float32(6.0)
+_TURN = np.float32(2 * np.pi)
+
+
+class MixtureArrays(NamedTuple):
+    """A joint mixture over the commands of n fins for N targets, in normalized coordinates."""
+
+    weight: Array
+    """Weights of the components (N, M)."""
+    mean: Array
+    """Means (N, n, M, 3)."""
+    std: Array
+    """Standard deviations (N, n, M, 3)."""
+
+
+class NumpyNetwork:
+    """A joint-mixture allocator network: features and target in, mixture out."""
+
+    def __init__(self, weights: Mapping[str, NDArray[np.floating]], heads: int, n_components: int) -> None:
+        """Take over a trained network.
+
+        Args:
+            weights: its state by PyTorch's names.
+            heads: attention heads.
+            n_components: number M of mixture components.
+        """
+        w = {key: np.ascontiguousarray(value, dtype=np.float32) for key, value in weights.items()}
+        self.heads, self.n_components = heads, n_components
+        n_graph = len({key.split(".")[1] for key in w if key.startswith("graph.")})
+        n_transformer = len({key.split(".")[2] for key in w if key.startswith("transformer.layers.")})
+        self.graph = [_Graph(w, f"graph.{i}", heads) for i in range(n_graph)]
+        self.skip = _linear(w, "skip")
+        self.wrench = (_linear(w, "wrench.0"), _linear(w, "wrench.2"))
+        self.join = _centred(_linear(w, "join"))
+        self.transformer = [_Transformer(w, f"transformer.layers.{i}", heads) for i in range(n_transformer)]
+        self.head, self.weight = (_normed(_linear(w, name), w, "norm") for name in ("head", "weight"))
+
+    def __call__(
+        self, x: Array, target: Array, lower: NDArray[np.floating], upper: NDArray[np.floating]
+    ) -> MixtureArrays:
+        """The mixture.
+
+        Args:
+            x: node features (N, n, F).
+            target: normalized, centred targets (N, 6).
+            lower: lower limits (n, 3).
+            upper: upper limits (n, 3).
+        """
+        rows, n, _ = x.shape
+        flat = x.reshape(rows * n, -1)
+        hidden = flat
+        for graph in self.graph:
+            hidden = _elu(graph(hidden, rows))
+        hidden += _apply(self.skip, flat)
+        wrench = _apply(self.wrench[1], _silu(_apply(self.wrench[0], target)))
+        weight, bias = self.join
+        width = hidden.shape[-1]
+        wrench = wrench.dot(weight[width:])
+        wrench += bias
+        hidden = hidden.dot(weight[:width])
+        hidden.reshape(rows, n, width)[...] += wrench[:, None]
+        for layer in self.transformer:
+            hidden = layer(hidden, rows)
+        hidden = _norm(hidden)
+        raw = _apply(self.head, hidden).reshape(rows, n, self.n_components, 7)
+        everyone = np.add.reduce(hidden.reshape(rows, n, width), axis=1)
+        everyone /= np.float32(n)
+        # In memory each component's commands lie together, since that is how they are drawn.
+        mean = np.empty((rows, self.n_components, n, 3), dtype=np.float32).swapaxes(1, 2)
+        np.tanh(raw[..., :2], out=mean[..., :2])
+        _direction(raw[..., 2], raw[..., 3], lower, upper, mean[..., 2])
+        std = np.empty((rows, self.n_components, n, 3), dtype=np.float32).swapaxes(1, 2)
+        np.exp(np.negative(raw[..., 4:], out=std), out=std)
+        std += np.float32(1.0)
+        np.divide(_LOG_STD_RANGE, std, out=std)
+        std += _LOG_STD_LOW
+        return MixtureArrays(_softmax(_apply(self.weight, everyone)), mean, np.exp(std, out=std))
+
+    def attention(self, x: Array) -> Array:
+        """How much each fin looks at each (N, n, n) in the first layer, mean of its heads; rows sum to 1.
+
+        Args:
+            x: node features (N, n, F).
+        """
+        flat = np.ascontiguousarray(x).reshape(-1, x.shape[-1])
+        return np.asarray(self.graph[0].attention(flat, len(x))[0].mean(-1))
+
+
+class _Graph:
+    """One dense GATv2 layer."""
+
+    def __init__(self, w: dict[str, Array], name: str, heads: int) -> None:
+        self.both = (
+            np.concatenate([w[f"{name}.source.weight"], w[f"{name}.target.weight"]]).T.copy(),
+            np.concatenate([w[f"{name}.source.bias"], w[f"{name}.target.bias"]]),
+        )
+        attention = w[f"{name}.attention"]
+        self.heads, self.width = heads, attention.size
+        # Block form, so that one product scores all heads.
+        self.score = np.zeros((attention.size, heads), dtype=np.float32)
+        for head in range(heads):
+            self.score[head * attention.shape[1] : (head + 1) * attention.shape[1], head] = attention[head]
+        self.bias = w[f"{name}.bias"]
+
+    def attention(self, x: Array, rows: int) -> tuple[Array, Array]:
+        """For features (N n, F) of N robots: weights (N, n, n, heads) with which each fin looks at each, and
+        what it sees (N, n, width)."""
+        both = _apply(self.both, x).reshape(rows, -1, 2 * self.width)
+        n = both.shape[1]
+        source, target = both[..., : self.width], both[..., self.width :]
+        pair = source[:, None] + target[:, :, None]
+        leak = pair * np.float32(0.2)
+        np.maximum(pair, leak, out=leak)
+        score = leak.reshape(-1, self.width).dot(self.score).reshape(rows, n, n, self.heads)
+        return _softmax(score, axis=2), source
+
+    def __call__(self, x: Array, rows: int) -> Array:
+        """Hidden features (N n, width) of features (N n, F) of N robots."""
+        weight, source = self.attention(x, rows)
+        n = source.shape[1]
+        split = source.reshape(rows, n, self.heads, -1).transpose(0, 2, 1, 3)
+        out = np.empty((rows, n, self.heads, split.shape[-1]), dtype=np.float32)
+        np.matmul(weight.transpose(0, 3, 1, 2), split, out=out.transpose(0, 2, 1, 3))
+        flat = out.reshape(-1, self.width)
+        flat += self.bias
+        return flat
+
+
+class _Transformer:
+    """One Transformer encoder layer, normalization first, ReLU."""
+
+    def __init__(self, w: dict[str, Array], name: str, heads: int) -> None:
+        self.heads = heads
+        self.depth = len(w[f"{name}.self_attn.out_proj.bias"]) // heads
+        qkv = w[f"{name}.self_attn.in_proj_weight"].T.copy(), w[f"{name}.self_attn.in_proj_bias"].copy()
+        for part in qkv:
+            part[..., : heads * self.depth] *= np.float32(self.depth**-0.5)
+        self.qkv = _normed(qkv, w, f"{name}.norm1")
+        self.out = _centred(_linear(w, f"{name}.self_attn.out_proj"))
+        self.up = _normed(_linear(w, f"{name}.linear1"), w, f"{name}.norm2")
+        self.down = _centred(_linear(w, f"{name}.linear2"))
+
+    def __call__(self, x: Array, rows: int) -> Array:
+        """Hidden features (N n, width) of hidden features (N n, width) of N robots, which are overwritten."""
+        qkv = _apply(self.qkv, _norm(x)).reshape(rows, -1, 3, self.heads, self.depth)
+        q, k, v = qkv.transpose(2, 0, 3, 1, 4)
+        score = q @ k.swapaxes(-1, -2)
+        heard = np.empty((rows, qkv.shape[1], self.heads, self.depth), dtype=np.float32)
+        np.matmul(_softmax(score), v, out=heard.transpose(0, 2, 1, 3))
+        x += _apply(self.out, heard.reshape(x.shape))
+        up = _apply(self.up, _norm(x))
+        x += _apply(self.down, np.maximum(up, 0, out=up))
+        return x
+
+
+def _linear(w: dict[str, Array], name: str) -> tuple[Array, Array]:
+    return w[f"{name}.weight"].T.copy(), w[f"{name}.bias"]
+
+
+def _apply(layer: tuple[Array, Array], x: Array) -> Array:
+    # One product of two matrices is much faster than numpy's loop over stacked small ones.
+    y: Array = x.dot(layer[0])
+    y += layer[1]
+    return y
+
+
+def _centred(layer: tuple[Array, Array]) -> tuple[Array, Array]:
+    """A layer whose outputs have mean 0.
+
+    What adds to the hidden features is only ever seen through a normalization, which takes the mean away; so
+    it may as well not be there, and the normalization saves its first steps.
+    """
+    weight, bias = (part.astype(np.float64) for part in layer)
+    weight -= weight.mean(-1, keepdims=True)
+    bias -= bias.mean()
+    return weight.astype(np.float32), bias.astype(np.float32)
+
+
+def _normed(layer: tuple[Array, Array], w: dict[str, Array], name: str) -> tuple[Array, Array]:
+    """A layer that also scales and shifts, as the layer normalization `name` before it does."""
+    weight, bias = (part.astype(np.float64) for part in layer)
+    scale, shift = w[f"{name}.weight"].astype(np.float64), w[f"{name}.bias"].astype(np.float64)
+    bias = bias + shift @ weight
+    weight = weight * (scale * np.sqrt(len(scale)))[:, None]
+    return weight.astype(np.float32), bias.astype(np.float32)
+
+
+def _norm(x: Array) -> Array:
+    """Layer normalization of features (R, width) of mean 0; divided by the root of the width."""
+    square = np.einsum("ri,ri->r", x, x)
+    square += np.float32(x.shape[-1]) * _LAYER_NORM_EPS
+    return x / np.sqrt(square, out=square)[:, None]
+
+
+def _softmax(x: Array, axis: int = -1) -> Array:
+    """Softmax, in place."""
+    x -= np.maximum.reduce(x, axis=axis, keepdims=True)
+    np.exp(x, out=x)
+    x /= np.add.reduce(x, axis=axis, keepdims=True)
+    return x
+
+
+def _elu(x: Array) -> Array:
+    """Exponential linear unit, in place."""
+    below = np.minimum(x, 0)
+    np.expm1(below, out=below)
+    np.maximum(x, 0, out=x)
+    x += below
+    return x
+
+
+def _silu(x: Array) -> Array:
+    """Sigmoid linear unit; far out the exponential would overflow."""
+    slow = np.maximum(x, np.float32(-80.0))
+    np.exp(np.negative(slow, out=slow), out=slow)
+    slow += np.float32(1.0)
+    return np.divide(x, slow, out=slow)
+
+
+def _direction(
+    x: Array, y: Array, lower: NDArray[np.floating], upper: NDArray[np.floating], out: Array
+) -> None:
+    """Write zero directions (N, n, M) in normalized coordinates, as in `AllocatorNetwork`, to `out`."""
+    low, high = lower[:, 2:], upper[:, 2:]
+    half = np.maximum(0.5 * (high - low), 1e-6).astype(np.float32)
+    middle = (0.5 * (high + low)).astype(np.float32)
+    offset = np.arctan2(y, x + np.float32(1e-6))
+    offset -= middle
+    offset += _TURN / 2
+    np.mod(offset, _TURN, out=offset)
+    offset -= _TURN / 2
+    np.minimum(np.maximum(offset, -half, out=offset), half, out=offset)
+    np.divide(offset, half, out=out)

@@ -1,0 +1,1 @@
+"""Training data: seeded sampling and what is kept out of it."""

@@ -1,0 +1,62 @@
+"""What the fast path's shares of thrust cost, in torch, so that training can lower it.
+
+The same decoding as on the robot: shares give each fin a weight, the weighted pseudo-inverse gives the planar
+forces that add up to the target exactly. The energy of a force grows like the square root of its size.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from finlab.forces.force_space import REST, RIDGE
+
+FULL_ENERGY = 3.0
+"""Energy proxy of a fin at full thrust: three terms of one each, see `finlab.physics.energy`."""
+DIRECTION = 0.1 / torch.pi**2
+"""Energy per squared zero direction [1/rad^2] of a fin that turns fully."""
+OVERLOAD = 3.0
+"""Cost of asking a fin for twice what it has, in units of energy."""
+
+
+class Forces(NamedTuple):
+    """Planar forces of B targets on n fins."""
+
+    size: Tensor
+    """Thrust over the fin's largest (B, n)."""
+    direction: Tensor
+    """Zero direction (B, n) [rad]."""
+
+
+def decode(share: Tensor, columns: Tensor, maximum: Tensor, mask: Tensor, target: Tensor) -> Forces:
+    """The forces that shares lead to.
+
+    Args:
+        share: fourth root of thrust over largest thrust (B, n).
+        columns: normalized wrench per newton (B, n, 2, 6).
+        maximum: largest thrust (B, n) [N].
+        mask: True (B, n) where there is a fin.
+        target: normalized targets (B, 6).
+    """
+    # m = T / e'(T), as in `force_space.mobility`; in double precision, since weights span six decades.
+    weight = (share.double() ** 4).clamp_min(REST) ** 1.5 * maximum.double() ** 2 * mask
+    rows = columns.double()
+    gram = torch.einsum("bn,bnci,bncj->bij", weight, rows, rows)
+    trace = gram.diagonal(dim1=1, dim2=2).sum(-1)
+    ridge = (RIDGE * trace + 1e-12)[:, None, None] * torch.eye(6, dtype=gram.dtype)
+    multiplier = torch.linalg.solve(gram + ridge, target.double()[..., None])[..., 0]
+    force = torch.einsum("bnci,bi->bnc", rows, multiplier) * weight[..., None]
+    size = (force.square().sum(-1) + 1e-18).sqrt() / maximum
+    direction = torch.atan2(force[..., 1], force[..., 0] + 1e-12)
+    return Forces(size.float(), direction.float())
+
+
+def energy(forces: Forces, mask: Tensor) -> Tensor:
+    """Energy proxy (B,), with what is asked beyond a fin's largest thrust punished."""
+    size = forces.size
+    beat = FULL_ENERGY * (size + 1e-6).sqrt().clamp_max(1.0)
+    # A fin at rest points where it costs nothing.
+    turned = DIRECTION * forces.direction.square() * (size / 0.01).clamp_max(1.0)
+    return ((beat + turned + OVERLOAD * (size - 1.0).clamp_min(0.0)) * mask).sum(-1)

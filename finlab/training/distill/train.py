@@ -1,0 +1,163 @@
+"""`finlab train fast`: fit the distilled network to the allocator's best answers.
+
+Two terms: the shares of thrust of the best answer, and what the decoded shares cost beyond that answer. The
+first points to the right mode, the second settles what the mean of two modes would leave undecided.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from finlab.allocation.learned.learned_allocator import LearnedAllocator
+from finlab.inference.fast_weights import FastWeights, save_fast
+from finlab.inference.features import FIN_FRAME_SIZE, fin_frame_features, geometry
+from finlab.inference.normalization import Normalization
+from finlab.training.distill.answers import Answers, AnswerSettings, read_answers, write_answers
+from finlab.training.distill.cost import decode, energy
+from finlab.training.distill.measure import fast_metrics
+from finlab.training.loop import LoopSettings, train
+from finlab.training.networks.fast_network import FastConfig, FastNetwork
+
+SEED = 80_000
+"""Added to the user's seed."""
+ENERGY_WEIGHT = 0.3
+"""Weight of the cost beyond the best answer's, in units of that answer's energy."""
+
+
+@dataclass(frozen=True)
+class FastSettings:
+    """How to train the distilled network."""
+
+    steps: int = 20_000
+    """Optimizer steps."""
+    batch_size: int = 1024
+    """Targets per step."""
+    learning_rate: float = 2e-3
+    """Peak learning rate."""
+    seed: int = 0
+    """Seed of first weights and batches."""
+
+
+def train_fast(
+    allocator: LearnedAllocator,
+    out: Path,
+    *,
+    config: FastConfig,
+    settings: FastSettings,
+    data: AnswerSettings,
+    stop_after: int | None = None,
+) -> dict[str, float]:
+    """Write missing answers to `out/answers`, train, and write the weights to `out`; resumable throughout.
+
+    Returns:
+        Losses on layouts that were held out, and `fast_metrics`.
+    """
+    write_answers(allocator, out / "answers", data)
+    answers = read_answers(out / "answers")
+    n = len(answers.position)
+    cut = min(round(n * 0.98), n - 1)
+    learned, judged = (Answers(*(a[rows] for a in answers)) for rows in (slice(cut), slice(cut, None)))
+    torch.manual_seed(SEED + settings.seed)
+    network = FastNetwork(config, FIN_FRAME_SIZE)
+    batches = Batches(learned, allocator.normalization)
+
+    def terms(net: nn.Module, step: int) -> dict[str, Tensor]:
+        rng = np.random.default_rng([SEED + settings.seed, step])
+        return losses(net, batches.draw(rng, settings.batch_size))
+
+    identity: dict[str, Any] = {"fast": asdict(settings) | asdict(config), "answers": asdict(data)}
+    loop = LoopSettings(
+        settings.steps, settings.batch_size, settings.learning_rate, warmup=200, ema=0.999, log_every=100
+    )
+
+    def save(weights: dict[str, Tensor], step: int) -> None:
+        fast = FastWeights({k: v.detach().numpy() for k, v in weights.items()}, config.rounds)
+        save_fast(out, fast, identity | {"checkpoint": allocator.checkpoint, "step": step})
+
+    weights = train(network, terms, loop, out, identity, stop_after=stop_after, on_save=save)
+    network.load_state_dict(weights, strict=True)
+    with torch.inference_mode():
+        held_out = losses(network, Batches(judged, allocator.normalization).all())
+    fast = FastWeights({k: v.detach().numpy() for k, v in weights.items()}, config.rounds)
+    metrics = {f"held_out_{name}": float(value) for name, value in held_out.items()}
+    metrics |= fast_metrics(allocator, fast)
+    save_fast(out, fast, identity | {"checkpoint": allocator.checkpoint, "metrics": metrics})
+    return metrics
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Targets with their best answers, B of them on layouts of n fins."""
+
+    features: Tensor
+    """(B, n, F)."""
+    mask: Tensor
+    """(B, n)."""
+    columns: Tensor
+    """(B, n, 2, 6)."""
+    maximum: Tensor
+    """(B, n)."""
+    free: Tensor
+    """(B,)."""
+    target: Tensor
+    """(B, 6)."""
+    share: Tensor
+    """(B, n)."""
+    energy: Tensor
+    """(B,)."""
+
+
+def losses(net: Callable[..., Tensor], batch: Batch) -> dict[str, Tensor]:
+    """The loss and its parts, means over a batch."""
+    share = net(batch.features, batch.mask)
+    apart = nn.functional.smooth_l1_loss(share, batch.share, reduction="none", beta=0.1)
+    imitation = (apart * batch.mask).sum() / batch.mask.sum()
+    forces = decode(share, batch.columns, batch.maximum, batch.mask, batch.target)
+    beyond = energy(forces, batch.mask) / batch.energy
+    # Arcs are not part of this decoding; there the answers alone are the teacher.
+    regret = ((beyond - 1.0).clamp(-0.5, 3.0) * batch.free).sum() / batch.free.sum().clamp_min(1)
+    return {"loss": imitation + ENERGY_WEIGHT * regret, "imitation": imitation, "regret": regret}
+
+
+class Batches:
+    """Draws batches from answers; node features are made as they are needed."""
+
+    def __init__(self, answers: Answers, normalization: Normalization) -> None:
+        """Take over answers in memory."""
+        self._answers, self._normalization = answers, normalization
+        position, angle, lower, upper = (np.asarray(a, dtype=np.float64) for a in answers[:4])
+        self._geometry = geometry(position, angle, lower, upper, normalization.std, answers.mask)
+
+    def draw(self, rng: np.random.Generator, size: int) -> Batch:
+        """A random batch."""
+        n_layouts, n_targets, _ = self._answers.target.shape
+        return self._of(rng.integers(n_layouts, size=size), rng.integers(n_targets, size=size))
+
+    def all(self) -> Batch:
+        """Everything at once."""
+        rows, columns = np.indices(self._answers.energy.shape)
+        return self._of(rows.ravel(), columns.ravel())
+
+    def _of(self, row: np.ndarray, place: np.ndarray) -> Batch:
+        a = self._answers
+        target = a.target[row, place]
+        centred = target - self._normalization.mean / self._normalization.std
+        seen = type(self._geometry)(*(part[row] for part in self._geometry))
+        arrays = (
+            fin_frame_features(seen, centred),
+            a.mask[row],
+            a.columns[row],
+            a.maximum[row],
+            a.free[row],
+            target,
+            a.share[row, place],
+            a.energy[row, place],
+        )
+        return Batch(*(torch.from_numpy(np.asarray(array, dtype=np.float32)) for array in arrays))

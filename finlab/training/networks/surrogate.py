@@ -1,0 +1,159 @@
+"""Learned, differentiable models of the fin physics: commands in, wrench out.
+
+The allocator never sees the fin model that judges it, only one of these, trained on forward samples.
+Torque is computed from force and position in both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+from finlab.inference.features import raw_features
+from finlab.training.networks.mixture import to_normalized
+
+FORCE_UNIT = 4.0
+"""Force [N] of order one for the networks' outputs."""
+
+
+@dataclass(frozen=True)
+class SurrogateConfig:
+    """Kind and size of a surrogate."""
+
+    kind: str = "coefficient"
+    """`coefficient` (force coefficient in the fin's own frame) or `mlp` (the paper's)."""
+    hidden: tuple[int, ...] = (32, 32)
+    """Widths of the hidden layers."""
+
+
+def mlp(n_in: int, hidden: Sequence[int], n_out: int, activation: type[nn.Module]) -> nn.Sequential:
+    """Plain perceptron with activations between linear layers."""
+    sizes = [n_in, *hidden]
+    blocks: list[nn.Module] = []
+    for a, b in zip(sizes, sizes[1:], strict=False):
+        blocks += [nn.Linear(a, b), activation()]
+    return nn.Sequential(*blocks, nn.Linear(sizes[-1], n_out))
+
+
+def first_layer(net: nn.Sequential) -> nn.Linear:
+    """The layer that sees the inputs."""
+    layer = net[0]
+    assert isinstance(layer, nn.Linear)
+    return layer
+
+
+def to_body(force: Tensor, mounting_angle: Tensor) -> Tensor:
+    """Forces (..., 3) from fin frames (shaft, e_h, e_z) to the body frame; angles (...,) [rad]."""
+    c, s = torch.cos(mounting_angle), torch.sin(mounting_angle)
+    shaft, horizontal, vertical = force.unbind(-1)
+    return torch.stack([c * shaft - s * horizontal, s * shaft + c * horizontal, vertical], dim=-1)
+
+
+def sum_wrench(force: Tensor, position: Tensor, mask: Tensor | None = None) -> Tensor:
+    """Wrench (..., 6) of body-frame forces (..., n, 3) at positions (..., n, 3)."""
+    if mask is not None:
+        force = force * mask[..., None]
+    torque = torch.linalg.cross(position.expand_as(force), force)
+    return torch.cat([force.sum(-2), torque.sum(-2)], dim=-1)
+
+
+class CoefficientSurrogate(nn.Module):
+    """Dimensionless force coefficients of one fin, learned in the frame turned by its zero direction.
+
+    Thrust of an oscillating fin scales with (A f)^2, so the network only learns the slowly varying
+    rest: F = (A f / (A0 f0))^2 R(zero direction) c(A, f, zero direction) * unit. Position and
+    mounting angle are geometry and need not be learned.
+    """
+
+    REFERENCE = (0.6, 2.1)
+    """Amplitude [rad] and frequency [Hz] at which the scale is one."""
+
+    def __init__(self, config: SurrogateConfig) -> None:
+        """Make it; see `SurrogateConfig`."""
+        super().__init__()
+        self.config = config
+        self.net = mlp(4, config.hidden, 3, nn.Tanh)
+
+    def fin_force(self, command: Tensor) -> Tensor:
+        """Force (..., 3) in the fin frame (shaft, e_h, e_z) [N] of commands (..., 3)."""
+        amplitude, frequency, direction = command.unbind(-1)
+        a0, f0 = self.REFERENCE
+        c, s = torch.cos(direction), torch.sin(direction)
+        inputs = torch.stack([amplitude / a0 - 0.5, frequency / f0 - 0.5, c, s], dim=-1)
+        shaft, along, across = (self.net(inputs) * FORCE_UNIT).unbind(-1)
+        scale = (amplitude * frequency / (a0 * f0)).square()
+        return scale[..., None] * torch.stack([shaft, c * along - s * across, s * along + c * across], dim=-1)
+
+    def forward(
+        self,
+        command: Tensor,
+        position: Tensor,
+        mounting_angle: Tensor,
+        lower: Tensor,
+        upper: Tensor,
+        mask: Tensor | None = None,
+    ) -> Tensor:
+        """Wrench (..., 6) of commands (..., n, 3) on layouts broadcastable to them."""
+        force = to_body(self.fin_force(command), mounting_angle)
+        return sum_wrench(force, position, mask)
+
+
+class MlpSurrogate(nn.Module):
+    """The paper's surrogate: an MLP of the ten node features and the command, and an affine correction.
+
+    F_i = f([x_i, u_i]) in the body frame, wrench = sum of (F_i, r_i x F_i), then scale and bias
+    from a descriptor of the layout pooled over its fins.
+    """
+
+    def __init__(self, config: SurrogateConfig) -> None:
+        """Make it; see `SurrogateConfig`."""
+        super().__init__()
+        self.config = config
+        self.net = mlp(13, config.hidden, 3, nn.SiLU)
+        # Angles enter as plain numbers and their sines must be learned; wider first weights start
+        # nearer to that (measured: a sixth of the loss after the same minute).
+        nn.init.uniform_(first_layer(self.net).weight, -0.8, 0.8)
+        self.descriptor = nn.Sequential(nn.Linear(10, 64), nn.Tanh())
+        self.affine = nn.Linear(64, 12)
+        nn.init.zeros_(self.affine.weight)
+        nn.init.zeros_(self.affine.bias)
+
+    def forward(
+        self,
+        command: Tensor,
+        position: Tensor,
+        mounting_angle: Tensor,
+        lower: Tensor,
+        upper: Tensor,
+        mask: Tensor | None = None,
+    ) -> Tensor:
+        """Wrench (..., 6) of commands (..., n, 3) on layouts broadcastable to them."""
+        x = raw_features(position, mounting_angle, lower, upper)
+        x = x.expand(*command.shape[:-1], x.shape[-1])
+        force = self.net(torch.cat([x, to_normalized(command, lower, upper)], dim=-1)) * FORCE_UNIT
+        wrench = sum_wrench(force, position, mask)
+        described = self.descriptor(x)
+        if mask is not None:
+            described = described * mask[..., None]
+            count = mask.sum(-1, keepdim=True).to(described.dtype)
+        else:
+            count = torch.tensor(float(command.shape[-2]), dtype=described.dtype, device=described.device)
+        scale, bias = self.affine(described.sum(-2) / count).chunk(2, dim=-1)
+        return wrench * (1.0 + scale) + bias
+
+
+Surrogate = CoefficientSurrogate | MlpSurrogate
+
+KINDS: dict[str, type[CoefficientSurrogate] | type[MlpSurrogate]] = {
+    "coefficient": CoefficientSurrogate,
+    "mlp": MlpSurrogate,
+}
+"""Kind of surrogate -> class."""
+
+
+def make_surrogate(config: SurrogateConfig) -> Surrogate:
+    """The surrogate of a configuration."""
+    return KINDS[config.kind](config)
