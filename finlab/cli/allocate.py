@@ -31,7 +31,7 @@ def allocate(
     health: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE")] = (),
     stuck: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=DEG")] = (),
     running: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=A,F,DEG")] = (),
-    energy_weight: Annotated[float, arg(metavar="W")] = 0.0,
+    energy_tradeoff: Annotated[float, arg(metavar="W")] = 0.0,
     seed: Annotated[int, arg(metavar="N")] = 0,
     json: bool = False,
 ) -> None:
@@ -49,7 +49,7 @@ def allocate(
         health: a weak fin: share that is left of its largest amplitude and frequency, such as bow=0.5.
         stuck: a fin that no longer turns: the zero direction at which it stays [deg].
         running: a fin that no longer listens: the command that it keeps [rad, Hz, deg].
-        energy_weight: for `learned` and `fast`: give up some of the wrench for energy, the least
+        energy_tradeoff: for `learned` and `fast`: give up some of the wrench for energy, the least
             err_norm^2 + W J_en; 0 delivers the wrench whole.
         seed: same target, layout and seed, same answer.
         json: print one JSON object instead of a table.
@@ -59,7 +59,7 @@ def allocate(
     from finlab.cli.inputs import open_robot
 
     robot = open_robot(layout)
-    options = {"energy_weight": energy_weight} if energy_weight else {}
+    options = {"energy_tradeoff": energy_tradeoff} if energy_tradeoff else {}
     allocator = load_allocator(checkpoint, method, **options)
     answer = policy_from(policy, axis_weights, priority)
     damage = health_from(health, stuck, running)

@@ -89,8 +89,8 @@ def test_a_fixed_variable_stays() -> None:
     np.testing.assert_allclose(x, [[0.0, 1.0]])
 
 
-@pytest.mark.parametrize("energy_weight", [0.0, 1e-3])
-def test_descent_lowers_its_objective_and_reports_it(energy_weight: float) -> None:
+@pytest.mark.parametrize("energy_tradeoff", [0.0, 1e-3])
+def test_descent_lowers_its_objective_and_reports_it(energy_tradeoff: float) -> None:
     rng = np.random.default_rng(3)
     actuation = Actuation(random_layout(rng, n_fins=4, limits="varied"))
     start = actuation.sample(rng, (50,))
@@ -98,9 +98,9 @@ def test_descent_lowers_its_objective_and_reports_it(energy_weight: float) -> No
 
     def objective(command: np.ndarray) -> np.ndarray:
         error = (((actuation.wrench(command) - target) / SIGMA) ** 2).sum(-1)
-        return error + energy_weight * command_energy(command, actuation.upper)
+        return error + energy_tradeoff * command_energy(command, actuation.upper)
 
-    end = descend(actuation, start, target, SIGMA, DescentOptions(energy_weight=energy_weight))
+    end = descend(actuation, start, target, SIGMA, DescentOptions(energy_tradeoff=energy_tradeoff))
     np.testing.assert_allclose(end.objective, objective(end.command), rtol=1e-9)
     assert (end.objective <= objective(start)).all()
     assert np.median(objective(end.command)) < 0.05 * np.median(objective(start))
@@ -111,7 +111,7 @@ def test_energy_in_the_descent_finds_cheaper_commands() -> None:
     actuation = Actuation(random_layout(rng, n_fins=5))
     start, target = actuation.sample(rng, (50,)), actuation.wrench(actuation.sample(rng, (50,)))
     plain, cheap = (
-        descend(actuation, start, target, SIGMA, DescentOptions(energy_weight=weight, n_steps=60)).command
+        descend(actuation, start, target, SIGMA, DescentOptions(energy_tradeoff=weight, n_steps=60)).command
         for weight in (0.0, 1e-4)
     )
     assert (

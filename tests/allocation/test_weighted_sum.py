@@ -24,7 +24,7 @@ def cases(limits: str, count: int = 8):  # type: ignore[no-untyped-def]
 @pytest.mark.parametrize("weight", [1e-3, 3e-2])
 def test_no_small_change_lessens_the_sum(learned: LearnedAllocator, limits: str, weight: float) -> None:
     """SciPy, started from the answer on the analytic fin model, finds nothing much better next to it."""
-    allocator = load_allocator(energy_weight=weight)
+    allocator = load_allocator(energy_tradeoff=weight)
     sigma = allocator.normalization.std
     for layout, target in cases(limits):
         answer = allocator.allocate(layout, target)
@@ -49,14 +49,16 @@ def test_no_small_change_lessens_the_sum(learned: LearnedAllocator, limits: str,
 
 def test_more_weight_gives_up_more_of_the_wrench() -> None:
     layout, target = next(iter(cases("nominal")))
-    answers = [load_allocator(energy_weight=w).allocate(layout, target) for w in (0.0, 1e-3, 1e-2, 1e-1, 1.0)]
+    answers = [
+        load_allocator(energy_tradeoff=w).allocate(layout, target) for w in (0.0, 1e-3, 1e-2, 1e-1, 1.0)
+    ]
     errors, energies = [a.err_norm for a in answers], [a.energy for a in answers]
     assert errors == sorted(errors) and energies == sorted(energies, reverse=True)
     assert errors[0] < 1e-3 < 0.05 < errors[-1]
 
 
 def test_with_the_previous_command_fins_still_turn_slowly() -> None:
-    allocator = load_allocator(energy_weight=1e-2)
+    allocator = load_allocator(energy_tradeoff=1e-2)
     layout, target = next(iter(cases("nominal")))
     first = allocator.allocate(layout, target)
     second = allocator.allocate(layout, target * 1.02, previous=first.command)
@@ -66,12 +68,12 @@ def test_with_the_previous_command_fins_still_turn_slowly() -> None:
 
 def test_what_cannot_be_weighed_is_refused() -> None:
     with pytest.raises(AllocationError, match="from 0, got -1"):
-        load_allocator(energy_weight=-1)
+        load_allocator(energy_tradeoff=-1)
     with pytest.raises(AllocationError, match="energy of squares"):
-        load_allocator(energy_weight=0.1, energy_weights=POWER_WEIGHTS)
+        load_allocator(energy_tradeoff=0.1, energy_weights=POWER_WEIGHTS)
 
 
 def test_the_fast_way_weighs_too() -> None:
     layout, target = next(iter(cases("nominal")))
-    fast, full = (load_allocator(method=name, energy_weight=0.1) for name in ("fast", "learned"))
+    fast, full = (load_allocator(method=name, energy_tradeoff=0.1) for name in ("fast", "learned"))
     assert np.array_equal(fast.allocate(layout, target).command, full.allocate(layout, target).command)

@@ -29,7 +29,7 @@ def test_no_multistart_finds_much_less(shipped: Layouts, name: str) -> None:
     layout = shipped(name)
     energy = least_energy(layout, WRENCHES)
     sigma = np.array([1.0, 1.0, 1.0, 0.1, 0.1, 0.1])
-    method = Multistart(Normalization(np.zeros(6), sigma), n_candidates=24, n_steps=30, energy_weight=1e-3)
+    method = Multistart(Normalization(np.zeros(6), sigma), n_candidates=24, n_steps=30, energy_tradeoff=1e-3)
     for wrench, least in zip(WRENCHES, energy, strict=True):
         found = method.allocate(layout, wrench)
         if found.err_norm < 1e-2:

@@ -1,6 +1,6 @@
 """Levenberg-Marquardt within limits for many commands at once, on the analytic actuation map.
 
-Each row minimizes `J = ||(w - target) / sigma||^2 + energy_weight * J_en`. The energy is a quadratic form
+Each row minimizes `J = ||(w - target) / sigma||^2 + energy_tradeoff * J_en`. The energy is a quadratic form
 that couples only the amplitude and frequency of one fin, so a damped step costs one 6 x 6 solve however many
 fins there are (the matrix inversion lemma on the 2 x 2 blocks). A limit that a step would cross fixes its
 variable there and the rest of the step is solved anew.
@@ -33,7 +33,7 @@ class DescentOptions:
 
     n_steps: int = 30
     """Most steps of one row."""
-    energy_weight: float = 0.0
+    energy_tradeoff: float = 0.0
     """Weight of the energy proxy beside the squared normalized error."""
     damping: float = 1e-2
     """Damping of the first step for a full range of each command, times one plus the objective."""
@@ -103,7 +103,7 @@ class _EnergyForm:
         scale = energy_scale(actuation.upper)
         self.slope = actuation.width / scale
         self.offset = actuation.lower / scale
-        weights, gamma = options.energy_weights, options.energy_weight
+        weights, gamma = options.energy_weights, options.energy_tradeoff
         self.diagonal = gamma * np.array([weights.amplitude, weights.frequency, weights.zero_direction])
         self.product = gamma * weights.product / 2
 
@@ -191,6 +191,6 @@ def _objective(
     options: DescentOptions,
 ) -> Array:
     error = (((wrench - target) / sigma) ** 2).sum(axis=-1)
-    if options.energy_weight == 0:
+    if options.energy_tradeoff == 0:
         return error
-    return error + options.energy_weight * command_energy(command, actuation.upper, options.energy_weights)
+    return error + options.energy_tradeoff * command_energy(command, actuation.upper, options.energy_weights)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.baselines.actuation import Actuation
-from finlab.allocation.baselines.model_based import CACHE_SIZE, ENERGY_WEIGHT
+from finlab.allocation.baselines.model_based import CACHE_SIZE, ENERGY_TRADEOFF
 from finlab.allocation.baselines.single_target import DEFAULT_STARTS, Problem, SingleTarget
 from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
@@ -62,7 +62,7 @@ class Ipopt(SingleTarget):
     def _build(self, actuation: Actuation) -> Any:
         """The solver of one layout; its variables are the commands as they are, its parameter the target."""
         command, target, residual, energy = self._formulas(actuation)
-        objective = self._casadi.sumsqr(residual) + ENERGY_WEIGHT * energy
+        objective = self._casadi.sumsqr(residual) + ENERGY_TRADEOFF * energy
         program = {"x": command, "p": target, "f": objective}
         return self._casadi.nlpsol("allocation", "ipopt", program, SOLVER_OPTIONS)
 

@@ -17,7 +17,7 @@ from finlab.physics.energy import command_energy
 
 Array = NDArray[np.float64]
 
-ENERGY_WEIGHT = 1e-4
+ENERGY_TRADEOFF = 1e-4
 """Weight of the energy proxy beside the squared normalized error where a method weighs the two."""
 CACHE_SIZE = 64
 """Layouts whose prepared quantities a method keeps; a control loop asks for the same one again and again."""
@@ -48,6 +48,6 @@ class ModelBased(Allocator):
         return Solution(actuation.feasible(command))
 
     def _objective(self, actuation: Actuation, command: Array, target: Array) -> Array:
-        """`J = err_norm^2 + ENERGY_WEIGHT * J_en` of commands (..., n, 3)."""
+        """`J = err_norm^2 + ENERGY_TRADEOFF * J_en` of commands (..., n, 3)."""
         error = self.normalization.error(actuation.wrench(command), target)
-        return error**2 + ENERGY_WEIGHT * command_energy(command, actuation.upper)
+        return error**2 + ENERGY_TRADEOFF * command_energy(command, actuation.upper)

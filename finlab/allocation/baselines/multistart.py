@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation.baselines.actuation import Actuation
 from finlab.allocation.baselines.actuation_descent import DescentOptions, descend
-from finlab.allocation.baselines.model_based import ENERGY_WEIGHT, ModelBased
+from finlab.allocation.baselines.model_based import ENERGY_TRADEOFF, ModelBased
 from finlab.inference.normalization import Normalization
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ class Multistart(ModelBased):
         normalization: sigma scales the error.
         n_candidates: random commands per target.
         n_steps: most refinement steps of each.
-        energy_weight: weight of the energy proxy beside the squared normalized error.
+        energy_tradeoff: w of the energy proxy beside the squared normalized error.
     """
 
     name = "multistart"
@@ -38,11 +38,11 @@ class Multistart(ModelBased):
         *,
         n_candidates: int = 16,
         n_steps: int = 20,
-        energy_weight: float = ENERGY_WEIGHT,
+        energy_tradeoff: float = ENERGY_TRADEOFF,
     ) -> None:
         super().__init__(normalization)
         self.n_candidates = n_candidates
-        self.options = DescentOptions(n_steps=n_steps, energy_weight=energy_weight)
+        self.options = DescentOptions(n_steps=n_steps, energy_tradeoff=energy_tradeoff)
 
     def _commands(self, actuation: Actuation, targets: Array, seed: int) -> Array:
         start = actuation.sample(np.random.default_rng(seed), (self.n_candidates,))

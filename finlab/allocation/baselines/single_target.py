@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.baselines.actuation import Actuation
-from finlab.allocation.baselines.model_based import ENERGY_WEIGHT, ModelBased
+from finlab.allocation.baselines.model_based import ENERGY_TRADEOFF, ModelBased
 from finlab.inference.normalization import Normalization
 from finlab.physics.energy import DEFAULT_WEIGHTS, energy_scale
 
@@ -53,7 +53,7 @@ class Problem:
         return (jacobian * self.actuation.width.ravel() / self.sigma[:, None])[:, self.free]
 
     def objective(self, x: Array) -> tuple[float, Array]:
-        """`err_norm^2 + ENERGY_WEIGHT * J_en` and its gradient (n_free,)."""
+        """`err_norm^2 + ENERGY_TRADEOFF * J_en` and its gradient (n_free,)."""
         command = self.command(x)
         wrench, jacobian = self.actuation.linearize(command)
         residual = (wrench - self.target) / self.sigma
@@ -62,8 +62,10 @@ class Problem:
         diagonal = np.array([weights.amplitude, weights.frequency, weights.zero_direction])
         half = diagonal * share
         half[:, :2] += weights.product / 2 * share[:, 1::-1]
-        value = float(residual @ residual + ENERGY_WEIGHT * (half * share).sum())
-        by_command = 2 * (residual / self.sigma) @ jacobian + 2 * ENERGY_WEIGHT * (half / self._scale).ravel()
+        value = float(residual @ residual + ENERGY_TRADEOFF * (half * share).sum())
+        by_command = (
+            2 * (residual / self.sigma) @ jacobian + 2 * ENERGY_TRADEOFF * (half / self._scale).ravel()
+        )
         return value, (by_command * self.actuation.width.ravel())[self.free]
 
 

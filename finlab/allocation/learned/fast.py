@@ -66,7 +66,7 @@ class FastAllocator(LearnedAllocator):
     ) -> Solution:
         # Slow turns from tick to tick are a search of their own; the network learned exact answers, cheap by
         # the usual energy.
-        usual = self.energy_weights == DEFAULT_WEIGHTS and self.settings.energy_weight == 0.0
+        usual = self.energy_weights == DEFAULT_WEIGHTS and self.settings.energy_tradeoff == 0.0
         if previous is not None or not usual:
             return super()._solve(layout, targets, seed=seed, previous=previous, lead=lead)
         prepared, notes = self._known(layout)

@@ -49,10 +49,10 @@ class Pipeline:
         self, weights: LearnedWeights, settings: Settings, energy_weights: EnergyWeights = DEFAULT_WEIGHTS
     ) -> None:
         """Take over trained weights; energies are compared by `energy_weights`."""
-        if settings.energy_weight > 0.0 and energy_weights.inertial > 0.0:
+        if settings.energy_tradeoff > 0.0 and energy_weights.inertial > 0.0:
             raise AllocationError(
-                "energy_weight: the weighted sum needs an energy of squares, got energy_weights with "
-                "inertial power; leave energy_weight at 0 or take other energy_weights"
+                "energy_tradeoff: the weighted sum needs an energy of squares, got energy_weights with "
+                "inertial power; leave energy_tradeoff at 0 or take other energy_weights"
             )
         self.settings, self.normalization = settings, weights.normalization
         self.network = NumpyNetwork(weights.network, weights.heads, weights.n_components)
@@ -135,7 +135,7 @@ class Pipeline:
 
     def _weigh(self, prepared: Prepared, target: Array, pool: Pool, previous: Array | None) -> Pool:
         """Trade error for energy, where the settings ask for the weighted sum."""
-        weight = self.settings.energy_weight
+        weight = self.settings.energy_tradeoff
         if weight == 0.0:
             return pool
         if previous is not None:

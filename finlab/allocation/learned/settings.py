@@ -30,12 +30,12 @@ class Settings:
     """Levenberg-Marquardt steps."""
     subsets: bool = True
     """Whether sub-layouts are searched as well."""
-    energy_weight: float = 0.0
+    energy_tradeoff: float = 0.0
     """w of the weighted sum `err_norm^2 + w J_en` to minimize; 0: the least energy among exact answers."""
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.energy_weight < np.inf:
-            raise AllocationError(f"energy_weight: expected a number from 0, got {self.energy_weight}")
+        if not 0.0 <= self.energy_tradeoff < np.inf:
+            raise AllocationError(f"energy_tradeoff: expected a number from 0, got {self.energy_tradeoff}")
         if self.n_candidates < 1 or self.n_seeds < 1 or self.n_refined < 1 or not self.temperature >= 0.0:
             raise AllocationError(
                 "method 'learned' needs at least one candidate, seed and refined answer and a temperature "

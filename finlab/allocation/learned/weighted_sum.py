@@ -25,7 +25,7 @@ SETTLED = 1e-7
 
 
 def lessen(
-    problem: CommandProblem, target: Array, command: Array, energy: EnergyMeter, energy_weight: float
+    problem: CommandProblem, target: Array, command: Array, energy: EnergyMeter, energy_tradeoff: float
 ) -> tuple[Refined, Array]:
     """Commands near a local minimum of the weighted sum, and their energies (R,).
 
@@ -34,17 +34,17 @@ def lessen(
         target: normalized wrenches (R, 6).
         command: where to start (R, n, 3), inside the limits.
         energy: of this robot, without inertial power: a sum of squares is needed.
-        energy_weight: w.
+        energy_tradeoff: w.
     """
     rows, n, _ = command.shape
-    slope = _energy_slope(problem, energy.weights) * np.sqrt(energy_weight)
+    slope = _energy_slope(problem, energy.weights) * np.sqrt(energy_tradeoff)
     bend = np.zeros((3 * n, 3 * n))
     for i in range(n):
         bend[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = slope[i].T @ slope[i]
 
     def judge(command: Array) -> Array:
         error = ((problem.wrench(command) - target) ** 2).sum(-1)
-        total: Array = error + energy_weight * energy(command)
+        total: Array = error + energy_tradeoff * energy(command)
         return total
 
     total, damping = judge(command), np.full(rows, DAMPING[0])
