@@ -51,8 +51,8 @@ def densities(
     mixture = predict(allocator.pipeline.network, allocator.pipeline.prepare(healthy), centred)
     weight, mean, std = (np.asarray(v[0], dtype=float) for v in (mixture.weight, mixture.mean, mixture.std))
     std = np.maximum(std * np.sqrt(temperature), NARROWEST)
-    lower = np.array([fin.limits.lower for fin in healthy.fins])
-    upper = np.array([fin.limits.upper for fin in healthy.fins])
+    lower = healthy.lower
+    upper = healthy.upper
     places = np.linspace(lower.min(axis=0), upper.max(axis=0), POINTS, axis=1)  # (3, P)
     width = np.maximum(upper - lower, 1e-9)
     at = 2 * (places[None] - lower[:, :, None]) / width[:, :, None] - 1  # (n, 3, P), normalized

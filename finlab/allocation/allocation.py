@@ -127,7 +127,7 @@ class Allocation:
     def wrench(self) -> Array:
         """Delivered wrench (6,) by the analytic fin model [N, N m]."""
         force = self.fin_forces
-        position = np.array([fin.position for fin in self.layout.fins])
+        position = self.layout.position
         return np.concatenate([force.sum(0), np.cross(position, force).sum(0)])
 
     @property

@@ -110,9 +110,9 @@ class Moves:
         self.names = tuple(name for name in layout.names if name in leaders or twins.get(name) in leaders)
         """All fins that move, twins included, in the layout's order."""
         self._sets = fin_sets([layout])
-        self.start_position = np.array([fin.position for fin in layout.fins])
+        self.start_position = layout.position
         """Where all fins are now (n, 3) [m]."""
-        self._angle = np.array([fin.mounting_angle for fin in layout.fins])
+        self._angle = layout.mounting_angle
         box = np.concatenate([bounds[name].pairs for name in leaders])  # (4 leaders, 2)
         held = np.concatenate([[*layout.fins[i].position, layout.fins[i].mounting_angle] for i in self._lead])
         self._whole = np.clip(held, box[:, 0], box[:, 1])

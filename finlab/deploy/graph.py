@@ -85,8 +85,8 @@ def build_graph(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = 
             f"method {allocator.name!r} has no trained network to make a graph for; use learned"
         )
     features = NodeFeatures(checkpoint.network.config.features, healthy, checkpoint.normalization)
-    lower = np.array([fin.limits.lower for fin in healthy.fins])
-    upper = np.array([fin.limits.upper for fin in healthy.fins])
+    lower = healthy.lower
+    upper = healthy.upper
     draws = np.random.default_rng(0).uniform(size=(N_SELF_TEST, *lower.shape))
     cases = []
     for target in Plant(healthy).wrench(lower + draws * (upper - lower)):

@@ -73,11 +73,11 @@ def answer_again(runtime: Runtime, case: Case) -> Array:
 
 def _options(rng: np.random.Generator, layout: Layout, kind: int, previous: Array | None) -> dict[str, Any]:
     """Arguments of one case: plain, a fin lost, after another, out of reach under a policy, two fins lost."""
-    lower = np.array([fin.limits.lower for fin in layout.fins])
-    upper = np.array([fin.limits.upper for fin in layout.fins])
+    lower = layout.lower
+    upper = layout.upper
     command = lower + rng.random((layout.n_fins, 3)) * (upper - lower)
     thrust = 4.7 * (np.sin(command[:, 0]) * command[:, 1]) ** 2
-    angle = np.array([fin.mounting_angle for fin in layout.fins])
+    angle = layout.mounting_angle
     c, s = thrust * np.cos(command[:, 2]), thrust * np.sin(command[:, 2])
     force = np.stack([-np.sin(angle) * c, np.cos(angle) * c, s], axis=-1)
     torque = np.cross([fin.position for fin in layout.fins], force)

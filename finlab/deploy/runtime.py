@@ -69,7 +69,7 @@ class Runtime:
         self.bundle = bundle
         self.layout: Layout = bundle.graph.layout
         self.failed = bundle.graph.failed
-        self._energy = EnergyMeter(np.array([fin.limits.upper for fin in self.layout.fins]))
+        self._energy = EnergyMeter(self.layout.upper)
         self.engine = engine
         try:
             kind = FastAllocator if fast else LearnedAllocator
@@ -119,8 +119,8 @@ class Runtime:
 
     def neutral(self, failed: Sequence[str] = ()) -> Array:
         """Commands (n, 3) that push least: least amplitude and frequency, zero direction nearest to 0."""
-        command = np.array([fin.limits.lower for fin in self.layout.fins])
-        upper = np.array([fin.limits.upper for fin in self.layout.fins])
+        command = self.layout.lower
+        upper = self.layout.upper
         command[:, 2] = np.clip(0.0, command[:, 2], upper[:, 2])
         lost = {*self.failed, *failed}
         command[[name in lost for name in self.layout.names]] = np.nan

@@ -47,14 +47,14 @@ def reachable_targets(layout: Any, count: int) -> Any:
     """Wrenches (count, 6) of random commands by the default fin law."""
     import numpy as np
 
-    lower = np.array([fin.limits.lower for fin in layout.fins])
-    upper = np.array([fin.limits.upper for fin in layout.fins])
+    lower = layout.lower
+    upper = layout.upper
     command = lower + np.random.default_rng(0).random((count, layout.n_fins, 3)) * (upper - lower)
     thrust = 4.7 * (np.sin(command[..., 0]) * command[..., 1]) ** 2
-    angle = np.array([fin.mounting_angle for fin in layout.fins])
+    angle = layout.mounting_angle
     c, s = thrust * np.cos(command[..., 2]), thrust * np.sin(command[..., 2])
     force = np.stack([-np.sin(angle) * c, np.cos(angle) * c, s], axis=-1)
-    torque = np.cross(np.array([fin.position for fin in layout.fins]), force)
+    torque = np.cross(layout.position, force)
     return np.concatenate([force.sum(1), torque.sum(1)], axis=-1)
 
 

@@ -110,7 +110,7 @@ def _compare(
     """Counts and coverage for one target; None where no start delivers it."""
     truth = _truth(ways, layout, target, n_starts, seed)
     mine = np.array([mode.command for mode in allocator.allocate(layout, target).modes])
-    upper = np.array([fin.limits.upper for fin in layout.fins])
+    upper = layout.upper
     if not len(truth) or not len(mine):
         return None
     truth_energy, energy = command_energy(truth, upper), command_energy(mine, upper)

@@ -66,8 +66,8 @@ def _make_case(split: str, n_targets: int, seed: int, k: int) -> Case:
     layout_seed, target_seed = np.random.SeedSequence(entropy).spawn(2)
     layout, failed = SPLITS[split](np.random.default_rng(layout_seed), f"{split}-{seed}-{k}")
     healthy = layout.without(failed) if failed else layout
-    lower = np.array([fin.limits.lower for fin in healthy.fins])
-    upper = np.array([fin.limits.upper for fin in healthy.fins])
+    lower = healthy.lower
+    upper = healthy.upper
     rng = np.random.default_rng(target_seed)
     command = lower + rng.uniform(size=(n_targets, healthy.n_fins, 3)) * (upper - lower)
     return Case(layout, Plant(healthy).wrench(command), failed)

@@ -87,7 +87,7 @@ def ride(allocator: Allocator, layout: Layout, path: Array, *, steady: bool, see
         times.append(answer.solve_ms)
         previous = answer.command if steady else None
     command = np.array(commands)
-    upper = np.array([fin.limits.upper for fin in layout.fins])
+    upper = layout.upper
     return Ride(
         turn=_turns(command[..., 2]),
         energy=command_energy(command, upper),

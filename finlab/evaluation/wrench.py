@@ -72,7 +72,7 @@ def score(case: Case, targets: Array, answer: BatchAllocation, sigma: Array, *, 
         number: of the layout in its split.
     """
     plant = Plant(case.layout)
-    upper = np.array([fin.limits.upper for fin in case.layout.fins])
+    upper = case.layout.upper
     difference = plant.wrench(answer.command) - targets
     return Records(
         layout=np.full(len(targets), number, np.int64),
@@ -88,7 +88,7 @@ def score(case: Case, targets: Array, answer: BatchAllocation, sigma: Array, *, 
 
 def count_resting(plant: Plant, command: Array) -> NDArray[np.int64]:
     """Healthy fins that rest (N,) in commands (N, n, 3): nearly no force beside their largest one."""
-    upper = np.array([fin.limits.upper for fin in plant.layout.fins])
+    upper = plant.layout.upper
     largest = np.linalg.norm(plant.fin_forces(upper), axis=-1)
     force = np.linalg.norm(plant.fin_forces(command), axis=-1)
     rests = (force < RESTING * largest) & ~np.isnan(command).any(axis=-1)

@@ -2,7 +2,11 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from finlab.errors import LayoutError
 from finlab.layout.body import Body
@@ -42,6 +46,38 @@ class Layout:
                     f"{fin.name!r} is already the name of fins[{first_use[fin.name]}]", f"fins[{i}].name"
                 )
             first_use[fin.name] = i
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash((self.name, self.fins, self.description, self.body))
+
+    def __hash__(self) -> int:
+        # Kept: every call of an allocator looks its layout up, and hashing all fins takes longer than that.
+        return self._hash
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Hashes of text differ between processes, and arrays are quickly made again.
+        return {key: self.__dict__[key] for key in ("name", "fins", "description", "body")}
+
+    @cached_property
+    def position(self) -> NDArray[np.float64]:
+        """Where each fin's force acts (n, 3), body frame [m]; read-only."""
+        return _read_only([fin.position for fin in self.fins])
+
+    @cached_property
+    def mounting_angle(self) -> NDArray[np.float64]:
+        """Azimuth of each shaft (n,) [rad]; read-only."""
+        return _read_only([fin.mounting_angle for fin in self.fins])
+
+    @cached_property
+    def lower(self) -> NDArray[np.float64]:
+        """Least amplitude [rad], frequency [Hz] and zero direction [rad] of each fin (n, 3); read-only."""
+        return _read_only([fin.limits.lower for fin in self.fins])
+
+    @cached_property
+    def upper(self) -> NDArray[np.float64]:
+        """Greatest amplitude [rad], frequency [Hz] and zero direction [rad] of each fin (n, 3); read-only."""
+        return _read_only([fin.limits.upper for fin in self.fins])
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -87,3 +123,9 @@ class Layout:
         fins = list(self.fins)
         fins[i] = replace(fins[i], **changes)
         return replace(self, fins=tuple(fins))
+
+
+def _read_only(values: ArrayLike) -> NDArray[np.float64]:
+    array = np.array(values, dtype=np.float64)
+    array.setflags(write=False)
+    return array

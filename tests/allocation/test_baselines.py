@@ -41,8 +41,8 @@ def one_fin(**changes: object) -> Layout:
 
 
 def within(command: np.ndarray, layout: Layout) -> bool:
-    lower = np.array([fin.limits.lower for fin in layout.fins])
-    upper = np.array([fin.limits.upper for fin in layout.fins])
+    lower = layout.lower
+    upper = layout.upper
     return bool(np.isfinite(command).all() and (command >= lower).all() and (command <= upper).all())
 
 

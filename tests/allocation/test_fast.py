@@ -30,8 +30,8 @@ def fast() -> FastAllocator:
 
 def targets(layout: finlab.Layout, count: int, seed: int = 0) -> np.ndarray:
     """Wrenches of random commands."""
-    lower = np.array([fin.limits.lower for fin in layout.fins])
-    upper = np.array([fin.limits.upper for fin in layout.fins])
+    lower = layout.lower
+    upper = layout.upper
     draws = np.random.default_rng(seed).random((count, layout.n_fins, 3))
     return Plant(layout).wrench(lower + draws * (upper - lower))
 
@@ -60,7 +60,7 @@ def test_exact_and_hardly_dearer_on_new_layouts(fast: FastAllocator) -> None:
         wanted = targets(layout, 40)
         quick, whole = (a.allocate_batch(layout, wanted).command for a in (fast, full))
         errors.append(fast.normalization.error(Plant(layout).wrench(quick), wanted))
-        upper = np.array([fin.limits.upper for fin in layout.fins])
+        upper = layout.upper
         ratios.append(command_energy(quick, upper) / command_energy(whole, upper))
     assert np.mean(errors) < 5e-3
     assert np.mean(ratios) < 1.08

@@ -31,8 +31,8 @@ def reachable(layout: Layout, n: int, seed: int = 0) -> np.ndarray:
 
 def bounds(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
     return (
-        np.array([fin.limits.lower for fin in layout.fins]),
-        np.array([fin.limits.upper for fin in layout.fins]),
+        layout.lower,
+        layout.upper,
     )
 
 

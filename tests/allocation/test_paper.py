@@ -51,8 +51,8 @@ def robot() -> Layout:
 
 
 def keeps_limits(layout: Layout, command: np.ndarray) -> bool:
-    lower = np.array([fin.limits.lower for fin in layout.fins])
-    upper = np.array([fin.limits.upper for fin in layout.fins])
+    lower = layout.lower
+    upper = layout.upper
     return bool(np.isfinite(command).all() and (command >= lower).all() and (command <= upper).all())
 
 
@@ -144,8 +144,8 @@ def test_targets_beyond_one_chunk_get_their_answers(checkpoint: Checkpoint) -> N
 def test_on_our_networks_it_reaches_the_target(default_checkpoint: Checkpoint) -> None:
     method = PaperAllocator(default_checkpoint)
     layout = load_layout(shipped_layouts()["A"])
-    lower = np.array([fin.limits.lower for fin in layout.fins])
-    upper = np.array([fin.limits.upper for fin in layout.fins])
+    lower = layout.lower
+    upper = layout.upper
     share = np.random.default_rng(0).uniform(size=(10, layout.n_fins, 3))
     targets = Plant(layout).wrench(lower + share * (upper - lower))
     command = method.allocate_batch(layout, targets).command

@@ -38,8 +38,8 @@ def shipped(name: str) -> Layout:
 
 def least_error(layout: Layout, target: np.ndarray, weights: np.ndarray, n_starts: int = 3) -> float:
     """Weighted error that scipy finds on the plant from several starts."""
-    lower = np.array([fin.limits.lower for fin in layout.fins])
-    upper = np.array([fin.limits.upper for fin in layout.fins])
+    lower = layout.lower
+    upper = layout.upper
     plant, rng = Plant(layout), np.random.default_rng(0)
 
     def residual(command: np.ndarray) -> np.ndarray:

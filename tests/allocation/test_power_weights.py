@@ -28,7 +28,7 @@ def test_less_power_at_the_same_error(layout: Layout, target: list[float]) -> No
             load_allocator(method="analytic"),
         )
     )
-    upper = np.array([fin.limits.upper for fin in layout.fins])
+    upper = layout.upper
     power = [float(command_energy(each.command, upper, POWER_WEIGHTS)) for each in (usual, sparing, analytic)]
     assert sparing.reachable
     assert power[1] < 0.85 * min(power[0], power[2])

@@ -29,8 +29,8 @@ def few(examples: int) -> settings:
 
 def bounds(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
     return (
-        np.array([fin.limits.lower for fin in layout.fins]),
-        np.array([fin.limits.upper for fin in layout.fins]),
+        layout.lower,
+        layout.upper,
     )
 
 

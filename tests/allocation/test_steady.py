@@ -62,8 +62,8 @@ def smooth_path(seed: int) -> np.ndarray:
 
 def limits(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
     return (
-        np.array([fin.limits.lower for fin in layout.fins]),
-        np.array([fin.limits.upper for fin in layout.fins]),
+        layout.lower,
+        layout.upper,
     )
 
 

@@ -32,7 +32,7 @@ def test_no_small_change_lessens_the_sum(learned: LearnedAllocator, limits: str,
         bounds = [
             (lo, hi) for f in layout.fins for lo, hi in zip(f.limits.lower, f.limits.upper, strict=True)
         ]
-        upper = np.array([fin.limits.upper for fin in layout.fins])
+        upper = layout.upper
 
         def total(flat: np.ndarray, plant=plant, target=target, upper=upper) -> float:  # type: ignore[no-untyped-def]
             command = flat.reshape(-1, 3)

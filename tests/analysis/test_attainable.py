@@ -31,8 +31,8 @@ def outside(body: AttainableSet, points: Array) -> float:
 def sampled(layout: Layout, size: int = 6_000) -> Array:
     """Wrenches (size, 6) of random commands by the plant, every other one with all fins at full thrust."""
     rng = np.random.default_rng(0)
-    lower = np.array([fin.limits.lower for fin in layout.fins])
-    upper = np.array([fin.limits.upper for fin in layout.fins])
+    lower = layout.lower
+    upper = layout.upper
     command = rng.uniform(lower, upper, (size, layout.n_fins, 3))
     command[::2, :, :2] = upper[:, :2]
     return Plant(layout).wrench(command)

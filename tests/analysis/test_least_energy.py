@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from finlab.allocation.baselines.multistart import Multistart
-from finlab.forces import least_energy
+from finlab.forces.least_energy import least_energy
 from finlab.forces.thrust_law import thrust_laws
 from finlab.inference.normalization import Normalization
 from finlab.layout import Layout

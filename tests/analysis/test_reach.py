@@ -71,7 +71,7 @@ def test_the_plant_gives_the_largest_wrench(shipped: Layouts) -> None:
 
 def _commands(layout: Layout, thrust: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """Commands at full amplitude whose frequency gives the thrusts; both laws grow with its square."""
-    upper = np.array([fin.limits.upper for fin in layout.fins])
+    upper = layout.upper
     full = np.linalg.norm(Plant(layout).fin_forces(np.where([True, True, False], upper, 0.0)), axis=-1)
     return np.stack([upper[:, 0], upper[:, 1] * np.sqrt(thrust / full), angle], axis=-1)
 
@@ -80,8 +80,8 @@ def _commands(layout: Layout, thrust: np.ndarray, angle: np.ndarray) -> np.ndarr
 def test_no_sampled_command_goes_beyond(shipped: Layouts, name: str) -> None:
     layout = shipped(name)
     rng = np.random.default_rng(2)
-    lower = np.array([fin.limits.lower for fin in layout.fins])
-    upper = np.array([fin.limits.upper for fin in layout.fins])
+    lower = layout.lower
+    upper = layout.upper
     wrench = Plant(layout).wrench(rng.uniform(lower, upper, (4_000, layout.n_fins, 3))) / SCALE
     size, _ = fin_sets([layout]).take(np.zeros(12, dtype=np.intp)).farthest(BOTH_WAYS)
     assert ((wrench @ BOTH_WAYS.T).max(axis=0) <= size + 1e-3).all()

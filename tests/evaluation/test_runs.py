@@ -32,7 +32,7 @@ class Idle(Allocator):
     def _solve(
         self, layout: Layout, targets: np.ndarray, *, seed: int, previous: np.ndarray | None
     ) -> Solution:
-        least = np.array([fin.limits.lower for fin in layout.fins])
+        least = layout.lower
         return Solution(np.tile(least, (len(targets), 1, 1)))
 
 
@@ -53,7 +53,7 @@ def test_the_plant_scores(single: int | None) -> None:
     records = run_method(Idle(), cases, single=single)
     expected = []
     for case in cases:
-        command = np.array([fin.limits.lower for fin in case.layout.fins])
+        command = case.layout.lower.copy()
         command[[name in case.failed for name in case.layout.names]] = np.nan
         expected.append(NORMALIZATION.error(Plant(case.layout).wrench(command), case.targets[:single]))
     np.testing.assert_allclose(records.err_norm, np.concatenate(expected))

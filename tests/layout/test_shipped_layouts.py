@@ -88,8 +88,8 @@ def test_restricted_zero_directions_confine_the_force_as_described():
 
     layout = load_layout(SHIPPED["restricted"])
     rng = np.random.default_rng(0)
-    lower = np.array([fin.limits.lower for fin in layout.fins])
-    upper = np.array([fin.limits.upper for fin in layout.fins])
+    lower = layout.lower
+    upper = layout.upper
     force = Plant(layout).fin_forces(rng.uniform(lower, upper, (500, 4, 3)))
     i = layout.index
     assert force[:, [i("front_left"), i("front_right")], 0].min() >= -1e-9

@@ -31,8 +31,8 @@ def wrench_by_hand(layout, command):
 
 
 def random_commands(layout, n, seed=0):
-    lower = np.array([fin.limits.lower for fin in layout.fins])
-    upper = np.array([fin.limits.upper for fin in layout.fins])
+    lower = layout.lower
+    upper = layout.upper
     return np.random.default_rng(seed).uniform(lower, upper, (n, *lower.shape))
 
 

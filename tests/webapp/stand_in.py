@@ -34,8 +34,8 @@ class StandIn(Allocator):
     def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         starts = [self._inner._solve(layout, targets, seed=seed + k, previous=None) for k in range(N_REFINED)]
         refined = np.concatenate([start.command for start in starts])
-        lower = np.array([fin.limits.lower for fin in layout.fins])
-        upper = np.array([fin.limits.upper for fin in layout.fins])
+        lower = layout.lower
+        upper = layout.upper
         rng = np.random.default_rng(seed)
         picks = refined[rng.integers(0, N_REFINED, self.n_candidates)]
         noise = rng.normal(size=picks.shape) * (0.05 + self.temperature) * [0.5, 1.5, 2.0]

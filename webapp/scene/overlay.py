@@ -34,7 +34,7 @@ class Overlay:
         """Show an answer's forces, arrows of `scale` [m/N]; nothing for None."""
         put(self._shape.node, visible=answer is not None, color=overlay_color(dark))
         if answer is not None:
-            place = np.array([fin.position for fin in answer.layout.fins])
+            place = answer.layout.position
             self._shape.show(_arrows, place, np.nan_to_num(answer.fin_forces) * scale)
 
 

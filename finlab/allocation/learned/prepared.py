@@ -49,10 +49,10 @@ def prepare(
     layout: Layout, fin: LearnedFin, std: Array, weights: EnergyWeights = DEFAULT_WEIGHTS
 ) -> Prepared:
     """Prepare a layout whose fins are all healthy; `std` (6,) normalizes wrenches."""
-    position = np.array([f.position for f in layout.fins], dtype=np.float64)
-    angle = np.array([f.mounting_angle for f in layout.fins], dtype=np.float64)
-    lower = np.array([f.limits.lower for f in layout.fins], dtype=np.float64)
-    upper = np.array([f.limits.upper for f in layout.fins], dtype=np.float64)
+    position = layout.position
+    angle = layout.mounting_angle
+    lower = layout.lower
+    upper = layout.upper
     c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
     axes = np.stack(
         [np.stack([c, s, zero], -1), np.stack([-s, c, zero], -1), np.stack([zero, zero, one], -1)], axis=1

@@ -28,8 +28,8 @@ def fast_metrics(
     for _ in range(n_layouts):
         layout = random_layout(rng)
         plant = Plant(layout)
-        lower = np.array([fin.limits.lower for fin in layout.fins])
-        upper = np.array([fin.limits.upper for fin in layout.fins])
+        lower = layout.lower
+        upper = layout.upper
         targets = plant.wrench(lower + rng.random((n_targets, layout.n_fins, 3)) * (upper - lower))
         quick = fast.allocate_batch(layout, targets).command
         whole = allocator.allocate_batch(layout, targets).command

@@ -1,0 +1,23 @@
+"""Angles: the one way to wrap them, and the one arc that counts as a full turn."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+TURN = 2.0 * math.pi
+"""A full turn [rad]."""
+FULL_TURN_TOLERANCE = 1e-6
+"""By how much [rad] an arc may fall short of a full turn and still be one."""
+
+
+def is_full_turn(arc: ArrayLike) -> Any:
+    """Says whether arcs [rad] cover the circle, as a bool or an array of bools."""
+    full = np.asarray(arc) >= TURN - FULL_TURN_TOLERANCE
+    return full if full.ndim else bool(full)
+
+
+def wrapped(angle: ArrayLike) -> NDArray[np.float64]:
+    """Returns the same angles within [-pi, pi) [rad]."""
+    return np.asarray(np.mod(np.asarray(angle) + math.pi, TURN) - math.pi)
