@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import networkx as nx
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -70,6 +71,77 @@ def test_imports_go_one_way() -> None:
             if there not in (None, here) and LEVEL[str(there)] >= LEVEL[here]:
                 wrong.append(f"finlab/{relative}:{line} imports {module}")
     assert not wrong, "\n".join(wrong)
+
+
+def _modules(root: Path) -> dict[str, Path]:
+    """Every module of finlab and webapp by its full name."""
+    named = {}
+    for package in ("finlab", "webapp"):
+        for path in sorted((root / package).rglob("*.py")):
+            parts = path.relative_to(root).with_suffix("").parts
+            named[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return named
+
+
+def _loaded_at_once(body: list[ast.stmt]) -> Iterator[ast.Import | ast.ImportFrom]:
+    """The imports that run while a module loads, not those in functions or for type checkers alone."""
+    for node in body:
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            yield node
+        elif isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            yield from _loaded_at_once(node.orelse)
+        elif not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            for block in ("body", "orelse", "finalbody"):
+                yield from _loaded_at_once(getattr(node, block, []))
+            for handler in getattr(node, "handlers", []):
+                yield from _loaded_at_once(handler.body)
+
+
+def _import_graph(root: Path) -> "nx.DiGraph[str]":
+    """Which module loads which; a package's own file only where something is asked of it by name."""
+    modules = _modules(root)
+    graph: nx.DiGraph[str] = nx.DiGraph()
+    for name, path in modules.items():
+        for node in _loaded_at_once(ast.parse(path.read_text(encoding="utf-8")).body):
+            if isinstance(node, ast.Import):
+                wanted = [alias.name for alias in node.names]
+            else:
+                inside = [f"{node.module}.{alias.name}" for alias in node.names]
+                wanted = [full if full in modules else str(node.module) for full in inside]
+            graph.add_edges_from((name, module) for module in wanted if module in modules)
+    return graph
+
+
+def _shortest_cycle(graph: "nx.DiGraph[str]") -> list[str]:
+    """The modules around a smallest cycle, the first one again at the end; empty where there is none."""
+    cycles = [
+        [start, *nx.shortest_path(graph, then, start)]
+        for group in nx.strongly_connected_components(graph)
+        for start in group
+        for then in graph.successors(start)
+        if then in group
+    ]
+    return min(cycles, key=lambda cycle: (len(cycle), cycle), default=[])
+
+
+def test_modules_import_each_other_in_no_circle() -> None:
+    cycle = _shortest_cycle(_import_graph(ROOT))
+    assert not cycle, " -> ".join(cycle)
+
+
+def test_a_circle_of_imports_is_found(tmp_path: Path) -> None:
+    for name, text in {
+        "finlab/__init__.py": "",
+        "finlab/first.py": "from finlab import second\n",
+        "finlab/second.py": "try:\n    import finlab.third\nexcept ImportError:\n    pass\n",
+        "finlab/third.py": "from finlab.first import name\nfrom webapp import fourth\n",
+        "webapp/fourth.py": "def later():\n    import finlab.third\n",
+    }.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    cycle = _shortest_cycle(_import_graph(tmp_path))
+    assert cycle[0] == cycle[-1]
+    assert set(cycle) == {"finlab.first", "finlab.second", "finlab.third"} and len(cycle) == 4
 
 
 @pytest.mark.parametrize(

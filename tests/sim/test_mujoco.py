@@ -5,14 +5,12 @@ out half of the added mass, so it cannot judge those. What is checked is the rig
 gyroscopic terms, the attitude, and the integration.
 """
 
+import mujoco
 import numpy as np
-import pytest
 
 from finlab.sim.attitude import rotation
 from finlab.sim.parameters import VehicleParameters
 from finlab.sim.vehicle import STATE_SIZE, Vehicle
-
-mujoco = pytest.importorskip("mujoco")
 
 MASS, INERTIA = 19.0, (0.1574, 0.4646, 0.51151)
 DT, SECONDS, HOLD = 0.01, 60.0, 50
