@@ -77,6 +77,6 @@ def test_full_disk_under_stdout_is_one_sentence() -> None:
 def test_unwritable_output_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "file"
     file.write_text("in the way")
-    assert main(["data", "generate", "--output", str(file / "below"), "--layouts", "1"]) == 2
+    assert main(["train", "surrogate", "--preset", "smoke", "--output", str(file / "below")]) == 2
     err = capsys.readouterr().err
     assert err.startswith("finlab: error: ") and len(err.splitlines()) == 1

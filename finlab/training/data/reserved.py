@@ -96,8 +96,3 @@ class ReservedLayouts:
 def shipped_reserved() -> ReservedLayouts:
     """Returns the layouts shipped with finlab as a reserved set, read once."""
     return ReservedLayouts([load_layout(path) for path in shipped_layouts().values()])
-
-
-def is_reserved(position: ArrayLike, mounting_angle: ArrayLike) -> bool:
-    """Returns whether fins at (n, 3) [m] with angles (n,) [rad] make up a shipped layout, in any order."""
-    return bool(shipped_reserved().matches(np.asarray(position)[None], np.asarray(mounting_angle)[None])[0])

@@ -5,7 +5,6 @@ in torch on one device, fast enough to draw fresh samples for each step instead 
 """
 
 import math
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -82,8 +81,6 @@ def sample_layouts(
     n: int,
     n_fins: tuple[int, int] = TRAINING_FINS,
     varied_limits: float = 0.5,
-    box: tuple[float, float, float] = TRAINING_BOX,
-    reserved: ReservedLayouts | None = None,
 ) -> LayoutBatch:
     """Returns n random layouts on the generator's device, distributed as `finlab.layout.random_layouts`.
 
@@ -92,18 +89,16 @@ def sample_layouts(
         n: how many layouts.
         n_fins: least and most fins, uniform; arrays are padded to the most.
         varied_limits: share of layouts whose fins get limits of their own, the rest keep the nominal ones.
-        box: largest |x|, |y|, |z| [m].
-        reserved: layouts that must not come up; the shipped ones when None.
     """
     device, width = generator.device, n_fins[1]
     count = torch.randint(n_fins[0], width + 1, (n, 1), generator=generator, device=device)
     mask = torch.arange(width, device=device) < count
     # One plane (n, width) per quantity: whole planes are several times faster to work on than their columns.
     draw = torch.rand(9, n, width, generator=generator, device=device)
-    place = [(2.0 * draw[axis] - 1.0) * (box[axis] * mask) for axis in range(3)]
+    place = [(2.0 * draw[axis] - 1.0) * (TRAINING_BOX[axis] * mask) for axis in range(3)]
     mounting_angle = (2.0 * draw[3] - 1.0) * (math.pi * mask)
     position = torch.stack(place, dim=-1)
-    _avoid(position, mounting_angle, mask, shipped_reserved() if reserved is None else reserved)
+    _avoid(position, mounting_angle, mask, shipped_reserved())
 
     varied = (torch.rand(n, 1, generator=generator, device=device) < varied_limits) & mask
     arc = varied & (draw[4] < ARC_SHARE)
@@ -131,8 +126,7 @@ def sample_commands(generator: torch.Generator, lower: Tensor, upper: Tensor) ->
 class ForwardSampler:
     """An endless stream of fresh training batches.
 
-    Batch k depends on (seed, k) alone, so a run that resumes at step k sees what it would have seen, and
-    processes that share the work take every n-th batch. Streams differ between kinds of device.
+    Batch k depends on (seed, k) alone, so a run that resumes at step k sees what it would have seen.
     """
 
     def __init__(
@@ -142,8 +136,6 @@ class ForwardSampler:
         n_fins: tuple[int, int] = TRAINING_FINS,
         fin_model: FinModel | None = None,
         varied_limits: float = 0.5,
-        device: torch.device | str = "cpu",
-        box: tuple[float, float, float] = TRAINING_BOX,
     ) -> None:
         """Describes the stream; see `sample_layouts`. `fin_model` is `Drag()` when None."""
         self.seed = seed
@@ -151,29 +143,17 @@ class ForwardSampler:
         self.n_fins = n_fins
         self.fin_model = Drag() if fin_model is None else fin_model
         self.varied_limits = varied_limits
-        self.device = torch.device(device)
-        self.box = box
 
     @torch.no_grad()
     def batch(self, step: int) -> Batch:
         """Returns batch number `step`."""
-        generator = seeded_generator(self.seed, step, self.device)
-        layouts = sample_layouts(generator, self.batch_size, self.n_fins, self.varied_limits, self.box)
+        generator = seeded_generator(self.seed, step)
+        layouts = sample_layouts(generator, self.batch_size, self.n_fins, self.varied_limits)
         command = sample_commands(generator, layouts.lower, layouts.upper) * layouts.mask.unsqueeze(-1)
         wrench = assemble_wrench(
             self.fin_model, command, layouts.position, layouts.mounting_angle, layouts.mask
         )
         return Batch(*layouts, command=command, wrench=wrench)
-
-    def batches(self, start: int = 0, stride: int = 1) -> Iterator[Batch]:
-        """Yields batches start, start + stride, ... without end."""
-        step = start
-        while True:
-            yield self.batch(step)
-            step += stride
-
-    def __iter__(self) -> Iterator[Batch]:
-        return self.batches()
 
 
 def _between(ends: tuple[float, float], draw: Tensor) -> Tensor:

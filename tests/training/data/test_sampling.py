@@ -1,6 +1,5 @@
 """Streamed training data: reproducible, distributed as promised, with wrenches that the plant confirms."""
 
-import itertools
 import math
 
 import numpy as np
@@ -30,14 +29,6 @@ def test_a_batch_depends_on_seed_and_step_alone():
     # Neither sum nor difference of seed and step may make two streams meet.
     assert not torch.equal(wanted.command, ForwardSampler(17, 64).batch(5).command)
     assert not torch.equal(wanted.command, ForwardSampler(6, 64).batch(16).command)
-
-
-def test_processes_share_a_stream_by_striding():
-    sampler = ForwardSampler(0, 8)
-    whole = [batch.wrench for batch in itertools.islice(sampler, 6)]
-    parts = [[b.wrench for b in itertools.islice(sampler.batches(start, 2), 3)] for start in range(2)]
-    for k, wrench in enumerate(whole):
-        assert torch.equal(wrench, parts[k % 2][k // 2])
 
 
 def test_shapes_and_types():

@@ -9,8 +9,14 @@ import torch
 from finlab.assets import shipped_layouts
 from finlab.layout import LayoutArrays, layout_from_arrays, load_layout, random_layouts, stack_layouts
 from finlab.training.data import sampling
-from finlab.training.data.reserved import ReservedLayouts, is_reserved, shipped_reserved
+from finlab.training.data.reserved import ReservedLayouts, shipped_reserved
 from finlab.training.data.sampling import ForwardSampler, sample_layouts, seeded_generator
+
+
+def is_reserved(position, angle):
+    """Whether one layout, fins at (n, 3) with angles (n,), is a shipped one."""
+    return bool(shipped_reserved().matches(position[None], angle[None])[0])
+
 
 SHIPPED = [load_layout(path) for path in shipped_layouts().values()]
 
