@@ -6,11 +6,10 @@ You will see amplitude, frequency and zero direction of layout A's four fins, an
 import numpy as np
 
 import finlab
-from finlab.assets import shipped_layouts
 
 
 def main() -> None:
-    layout = finlab.load_layout(shipped_layouts()["A"])
+    layout = finlab.load_layout("A")
     allocator = finlab.load_allocator()
     result = allocator.allocate(layout, [1, 0, 0.5, 0, 0, 0.1], seed=0)
 

@@ -4,13 +4,12 @@ You will see the same target allocated to all four fins, to three, and to two, w
 """
 
 import finlab
-from finlab.assets import shipped_layouts
 
 TARGET = [0.5, 0, 0.5, 0, 0, 0.05]
 
 
 def main() -> None:
-    layout = finlab.load_layout(shipped_layouts()["A"])
+    layout = finlab.load_layout("A")
     allocator = finlab.load_allocator()
     for failed in ([], ["front_right"], ["front_right", "back_left"]):
         result = allocator.allocate(layout, TARGET, failed=failed, seed=0)

@@ -4,16 +4,15 @@ You will see error, energy and time of five methods on one target.
 """
 
 import finlab
-from finlab.assets import shipped_layouts
 
 METHODS = ("learned", "paper", "analytic", "qp", "sqp")
 
 
 def main() -> None:
-    layout = finlab.load_layout(shipped_layouts()["A"])
+    layout = finlab.load_layout("A")
     print(f"{'method':<10}  err_norm   energy        ms")
     for method in METHODS:
-        allocator = finlab.load_allocator(method=method)
+        allocator = finlab.load_allocator(method)
         allocator.allocate(layout, [1, 0, 0, 0, 0, 0])  # the first call is slower
         result = allocator.allocate(layout, [1, 0, 0.5, 0, 0, 0.1], seed=0)
         print(f"{method:<10}  {result.err_norm:8.1e}  {result.energy:7.3f}  {result.solve_ms:8.1f}")

@@ -8,14 +8,13 @@ import time
 import numpy as np
 
 import finlab
-from finlab.assets import shipped_layouts
 from finlab.physics import Plant
 
 N_TARGETS = 512
 
 
 def main() -> None:
-    layout = finlab.load_layout(shipped_layouts()["ucat"])
+    layout = finlab.load_layout("ucat")
     phase = np.linspace(0, 2 * np.pi, N_TARGETS)
     targets = np.zeros((N_TARGETS, 6))
     targets[:, 0] = 1.0

@@ -10,12 +10,11 @@ from tempfile import TemporaryDirectory
 import networkx
 
 import finlab
-from finlab.assets import shipped_layouts
 from finlab.deploy import build_graph, read_graph, write_graph
 
 
 def main() -> None:
-    layout = finlab.load_layout(shipped_layouts()["A"])
+    layout = finlab.load_layout("A")
     with TemporaryDirectory() as folder:
         path = Path(folder) / "A.graph.json"
         write_graph(build_graph(layout, finlab.load_allocator(), failed=("back_left",)), path)

@@ -9,7 +9,6 @@ from tempfile import TemporaryDirectory
 from types import SimpleNamespace as Message
 
 import finlab
-from finlab.assets import shipped_layouts
 from finlab.deploy import make_bundle
 from finlab.deploy.runtime import load
 from finlab.exchange import flippers
@@ -43,7 +42,7 @@ def show(message: Message) -> None:
 
 
 def main() -> None:
-    layout = finlab.load_layout(shipped_layouts()["ucat"])
+    layout = finlab.load_layout("ucat")
     with TemporaryDirectory() as folder:
         bundle = Path(folder) / "ucat"
         make_bundle(layout, finlab.load_allocator()).write(bundle)

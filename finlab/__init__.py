@@ -3,7 +3,7 @@
 A layout says where the fins of a robot sit. A wrench says what the body should feel. An allocator turns
 both into one command per fin:
 
-    layout = finlab.load_layout("layouts/A.yaml")
+    layout = finlab.load_layout("A")
     result = finlab.load_allocator().allocate(layout, [1, 0, 0.5, 0, 0, 0.1])
 
 Names are imported on first use, so that `import finlab` needs neither torch nor the time to load it.
@@ -15,10 +15,15 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from finlab.allocation.allocation import Allocation as Allocation
     from finlab.allocation.allocator import Allocator as Allocator
+    from finlab.allocation.health import Health as Health
     from finlab.allocation.methods import load_allocator as load_allocator
+    from finlab.allocation.policy import Policy as Policy
     from finlab.errors import FinlabError as FinlabError
+    from finlab.layout.body import Body as Body
     from finlab.layout.file import load_layout as load_layout
     from finlab.layout.file import save_layout as save_layout
+    from finlab.layout.fin import Fin as Fin
+    from finlab.layout.fin import Limits as Limits
     from finlab.layout.layout import Layout as Layout
 
 __version__ = "0.1.0"
@@ -26,11 +31,16 @@ __version__ = "0.1.0"
 _HOME = {
     "Allocation": "finlab.allocation.allocation",
     "Allocator": "finlab.allocation.allocator",
+    "Health": "finlab.allocation.health",
+    "Policy": "finlab.allocation.policy",
     "load_allocator": "finlab.allocation.methods",
     "FinlabError": "finlab.errors",
     "load_layout": "finlab.layout.file",
     "save_layout": "finlab.layout.file",
+    "Body": "finlab.layout.body",
+    "Fin": "finlab.layout.fin",
     "Layout": "finlab.layout.layout",
+    "Limits": "finlab.layout.fin",
 }
 
 

@@ -3,7 +3,6 @@
 import math
 import shlex
 
-from finlab.assets import shipped_layouts
 from webapp.files import file_stem
 from webapp.shipped import shipped_name
 from webapp.state import State
@@ -36,14 +35,7 @@ def export_line(state: State) -> str:
 def python_lines(state: State) -> str:
     """The same question in Python."""
     name = _layout_name(state)
-    shipped = name in shipped_layouts()
-    imports = ["import finlab"]
-    if state.health is not None:
-        imports.append("from finlab.allocation.health import Health")
-    if shipped:
-        imports.append("from finlab.assets import shipped_layouts")
-    path = f"shipped_layouts()[{name!r}]" if shipped else repr(name)
-    method = "" if state.method == "learned" else f"method={state.method!r}"
+    method = "" if state.method == "learned" else repr(state.method)
     target = ", ".join(f"{value:g}" for value in state.target)
     options = [f"failed={list(state.failed)!r}"] if state.failed else []
     if state.policy != "closest":
@@ -55,11 +47,11 @@ def python_lines(state: State) -> str:
             for kind, pairs in kinds.items()
             if pairs
         ]
-        options.append(f"health=Health.of({', '.join(damage)})")
+        options.append(f"health=finlab.Health.of({', '.join(damage)})")
     lines = [
-        *imports,
+        "import finlab",
         "",
-        f"layout = finlab.load_layout({path})",
+        f"layout = finlab.load_layout({name!r})",
         f"allocator = finlab.load_allocator({method})",
         f"wrench = [{target}]",
         f"result = allocator.allocate({', '.join(['layout', 'wrench', *options])})",

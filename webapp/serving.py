@@ -5,7 +5,6 @@ import socket
 import threading
 from pathlib import Path
 
-from finlab.assets import shipped_layouts
 from finlab.deploy.graph_file import read_graph
 from finlab.errors import FinlabError
 from finlab.layout import Layout, load_layout
@@ -57,9 +56,6 @@ def serve(
 
 
 def _first_layout(text: str) -> Layout:
-    shipped = shipped_layouts()
-    if text in shipped and not Path(text).exists():
-        return load_layout(shipped[text])
     return read_graph(text).layout if text.endswith(GRAPH_SUFFIX) else load_layout(text)
 
 

@@ -56,7 +56,7 @@ class Solver:
         """
         if state.method not in self._allocators:
             checkpoint = None if state.method == "paper" else self._checkpoint
-            self._allocators[state.method] = self._load(checkpoint, method=state.method)
+            self._allocators[state.method] = self._load(state.method, checkpoint=checkpoint)
         allocator = self._allocators[state.method]
         if state.method in SAMPLING_METHODS:
             _take_settings(allocator, state)

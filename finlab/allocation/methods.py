@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from finlab.allocation.allocator import Allocator
 from finlab.errors import AllocationError
@@ -27,15 +27,22 @@ LEARNED = ("learned", "fast", "paper")
 """Methods that need a trained network; the others take only the normalization from a checkpoint."""
 
 
+Method = Literal["learned", "fast", "paper", "qp", "sqp", "analytic", "multistart", "trf", "slsqp", "ipopt"]
+"""The names again, for type checkers and editors."""
+
+
 def load_allocator(
-    checkpoint: str | Path | None = None, method: str = "learned", **options: Any
+    method: Method | str = "learned",
+    *,
+    checkpoint: str | Path | None = None,
+    **options: Any,
 ) -> Allocator:
     """The allocator of a method, ready to answer.
 
     Args:
+        method: one of `METHODS`.
         checkpoint: a checkpoint folder or the name of a shipped one; by default `paper` for the
             method `paper` and `default` for all others.
-        method: one of `METHODS`.
         options: passed to the method's class.
 
     Raises:

@@ -60,7 +60,7 @@ def allocate(
 
     robot = open_robot(layout)
     options = {"energy_tradeoff": energy_tradeoff} if energy_tradeoff else {}
-    allocator = load_allocator(checkpoint, method, **options)
+    allocator = load_allocator(method, checkpoint=checkpoint, **options)
     answer = policy_from(policy, axis_weights, priority)
     damage = health_from(health, stuck, running)
     lost = robot.with_failed(failed)

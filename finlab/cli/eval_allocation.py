@@ -48,7 +48,9 @@ def steadiness(
     check_positive("ticks", ticks - 1)
     check_writable(json)
     robots = open_layouts(layouts)
-    rows = steadiness_rows(load_allocator(checkpoint), robots, n_paths=paths, ticks=ticks, seed=seed)
+    rows = steadiness_rows(
+        load_allocator(checkpoint=checkpoint), robots, n_paths=paths, ticks=ticks, seed=seed
+    )
     write_json(json, {"rows": rows})
     print(steadiness_report(rows))
 
@@ -81,7 +83,7 @@ def modes(
     check_positive("starts", starts)
     check_writable(json)
     cases = make_split(split, layouts, targets, seed)
-    rows = mode_rows(load_allocator(checkpoint), cases, n_starts=starts, seed=seed)
+    rows = mode_rows(load_allocator(checkpoint=checkpoint), cases, n_starts=starts, seed=seed)
     write_json(json, {"rows": rows})
     print(mode_report(rows, starts))
 
@@ -106,6 +108,6 @@ def unreachable(
 
     check_positive("layouts", layouts)
     check_writable(json)
-    rows = unreachable_rows(load_allocator(checkpoint), n_layouts=layouts, seed=seed)
+    rows = unreachable_rows(load_allocator(checkpoint=checkpoint), n_layouts=layouts, seed=seed)
     write_json(json, {"rows": rows})
     print(unreachable_report(rows))

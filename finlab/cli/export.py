@@ -34,7 +34,7 @@ def export(
     failed = robot.with_failed(failed)
     from finlab.allocation import load_allocator
 
-    allocator = load_allocator(checkpoint)
+    allocator = load_allocator(checkpoint=checkpoint)
     if graph_alone:
         from finlab.deploy import build_graph, write_graph
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
@@ -34,36 +33,12 @@ def open_robot(text: str) -> Robot:
     Raises:
         LayoutError: neither a readable file nor a shipped layout.
     """
+    from finlab.layout.file import layout_path, load_layout
+
     path = layout_path(text)
     if path.name.endswith(GRAPH_SUFFIX):
         from finlab.deploy.graph_file import read_graph
 
         graph = read_graph(path)
         return Robot(graph.layout, graph.failed, graph)
-    from finlab.layout import load_layout
-
     return Robot(load_layout(path))
-
-
-def layout_path(text: str) -> Path:
-    """The path that a user means: the file if there is one, else the shipped layout of that name.
-
-    Raises:
-        LayoutError: there is no such file and no such shipped layout.
-    """
-    from finlab.assets import shipped_layouts
-    from finlab.errors import LayoutError
-
-    path = Path(text)
-    try:
-        if path.exists():
-            return path
-    except (OSError, ValueError) as error:  # a name that is too long, or holds a NUL byte
-        reason = getattr(error, "strerror", None) or error
-        raise LayoutError(f"layout {text[:80]!r} cannot be a path: {reason}") from error
-    shipped = shipped_layouts()
-    if text in shipped:
-        return shipped[text]
-    raise LayoutError(
-        f"layout {text!r} is neither a file nor a shipped layout; shipped are {', '.join(shipped) or 'none'}"
-    )

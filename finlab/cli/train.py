@@ -117,7 +117,7 @@ def fast(
     from finlab.training.networks.fast_network import FastConfig
 
     _check_counts(shards=shards, steps=steps, stop_after=stop_after)
-    allocator = load_allocator(checkpoint)
+    allocator = load_allocator(checkpoint=checkpoint)
     assert isinstance(allocator, LearnedAllocator)
     metrics = train_fast(
         allocator,

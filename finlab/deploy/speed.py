@@ -78,7 +78,7 @@ def main() -> int:
         import finlab
 
         layout = finlab.load_layout(arguments.path)
-        allocator = finlab.load_allocator(method="fast" if arguments.fast else "learned")
+        allocator = finlab.load_allocator("fast" if arguments.fast else "learned")
         allocate = partial(allocator.allocate, layout)
         allocate([0.0] * 6)
     ready = time.perf_counter() - _START

@@ -44,12 +44,12 @@ def load_entrant(name: str, checkpoint: str | Path | None = None) -> Allocator:
     """
     method, starts = method_and_starts(name)
     if starts is None:
-        return load_allocator(checkpoint, method)
+        return load_allocator(method, checkpoint=checkpoint)
     if method not in SLOW or starts < 1:
         raise AllocationError(
             f"methods: a number of starts, from 1, goes with {', '.join(SLOW)} only, got {name!r}"
         )
-    return load_allocator(checkpoint, method, n_starts=starts)
+    return load_allocator(method, checkpoint=checkpoint, n_starts=starts)
 
 
 def fingerprint(name: str, checkpoint: str | Path | None = None) -> str:

@@ -37,10 +37,10 @@ def load_methods(names: str, checkpoint: str | None = None) -> dict[str, Allocat
 
 def _load(name: str, checkpoint: str | None) -> Allocator:
     if name == "learned-power":
-        return load_allocator(checkpoint, "learned", energy_weights=POWER_WEIGHTS)
+        return load_allocator("learned", checkpoint=checkpoint, energy_weights=POWER_WEIGHTS)
     if name != OnBoard.name:
-        return load_allocator(checkpoint, name)
-    return OnBoard(load_allocator(checkpoint, "analytic").normalization)
+        return load_allocator(name, checkpoint=checkpoint)
+    return OnBoard(load_allocator("analytic", checkpoint=checkpoint).normalization)
 
 
 def follow_row(log: SwimLog) -> Row:

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from finlab.assets import shipped_layouts
 from finlab.errors import LayoutError
 from finlab.layout.body import BODY_KEYS, HULL_KEYS, Body, Hull
 from finlab.layout.fin import Fin, Limits
@@ -33,16 +34,18 @@ _LIMIT_FIELDS = {
 }
 
 
-def load_layout(path: str | os.PathLike[str]) -> Layout:
-    """Returns the layout in a YAML or JSON file.
+def load_layout(layout: str | os.PathLike[str]) -> Layout:
+    """Returns a shipped layout by its bare name, such as "A", or the layout in a YAML or JSON file.
 
-    Relative paths inside it (a force table, a hull mesh) are taken from the file's own folder.
+    A bare name is never looked up in the current folder while a layout of that name is shipped; write `./A`
+    for a file called `A` there. Relative paths inside a file (a force table, a hull mesh) are taken from the
+    file's own folder.
 
     Raises:
         LayoutError: the file cannot be read or is not a valid layout; the message names file and key.
     """
-    file = Path(path)
-    source = str(path)
+    file = layout_path(layout)
+    source = str(layout)
     content = read_text(file, source)
     if file.suffix.lower() == ".json":
         data = parse_json(content, source)
@@ -51,6 +54,30 @@ def load_layout(path: str | os.PathLike[str]) -> Layout:
 
         data = parse_yaml(content, source)
     return parse_layout(data, source=source, folder=file.resolve().parent)
+
+
+def layout_path(layout: str | os.PathLike[str]) -> Path:
+    """The path that a user means: text may be the name of a shipped layout, a `Path` is always a path.
+
+    Raises:
+        LayoutError: there is neither a shipped layout nor anything else of this name.
+    """
+    if not isinstance(layout, str):
+        return Path(layout)
+    shipped = shipped_layouts()
+    if layout in shipped:
+        return shipped[layout]
+    path = Path(layout)
+    try:
+        if path.exists():
+            return path
+    except (OSError, ValueError) as error:  # a name that is too long, or holds a NUL byte
+        reason = getattr(error, "strerror", None) or error
+        raise LayoutError(f"layout {layout[:80]!r} cannot be a path: {reason}") from error
+    raise LayoutError(
+        f"layout {layout!r} is neither a file nor a shipped layout; "
+        f"shipped are {', '.join(shipped) or 'none'}"
+    )
 
 
 def parse_layout(data: Any, source: str = "layout", folder: Path | None = None) -> Layout:

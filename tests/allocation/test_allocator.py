@@ -1,11 +1,13 @@
 """What every method has in common: problems are checked, failed fins left out, answers judge themselves."""
 
 import math
+from typing import get_args
 
 import numpy as np
 import pytest
 
 from finlab.allocation import METHODS, Allocation, Allocator, Candidates, Solution, load_allocator
+from finlab.allocation.methods import Method
 from finlab.errors import AllocationError, CommandError, LayoutError
 from finlab.inference.normalization import Normalization
 from finlab.layout import Fin, Layout
@@ -182,5 +184,13 @@ def test_a_method_without_candidates_says_so(method: Drawn) -> None:
 
 def test_unknown_methods_are_refused_with_the_names_that_exist() -> None:
     with pytest.raises(AllocationError) as caught:
-        load_allocator(method="magic")
+        load_allocator("magic")
     assert str(caught.value) == f"method: expected one of {', '.join(METHODS)}, got 'magic'"
+
+
+def test_the_method_comes_first_and_the_checkpoint_by_keyword() -> None:
+    assert get_args(Method) == tuple(METHODS)
+    for name in ("analytic", "qp"):
+        assert load_allocator(name).name == name
+    with pytest.raises(TypeError):
+        load_allocator("learned", "default")  # type: ignore[misc]

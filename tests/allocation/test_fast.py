@@ -23,7 +23,7 @@ from finlab.training.networks.fast_network import FastConfig, FastNetwork
 
 @pytest.fixture(scope="module")
 def fast() -> FastAllocator:
-    allocator = load_allocator(method="fast")
+    allocator = load_allocator("fast")
     assert isinstance(allocator, FastAllocator)
     return allocator
 
@@ -97,7 +97,7 @@ def test_one_target_as_in_a_batch(fast: FastAllocator) -> None:
 
 def test_checkpoint_without_a_distilled_network_says_so(untrained_checkpoint: Path) -> None:
     with pytest.raises(AllocationError, match="has no distilled network; train one with `finlab train fast`"):
-        load_allocator(untrained_checkpoint, method="fast")
+        load_allocator("fast", checkpoint=untrained_checkpoint)
 
 
 def test_changed_weights_are_refused(tmp_path: Path) -> None:

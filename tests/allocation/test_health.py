@@ -42,7 +42,7 @@ def test_a_stuck_fin_points_where_it_stays(learned: LearnedAllocator, penta: Lay
 @pytest.mark.parametrize("method", ["learned", "sqp"])
 def test_the_force_of_a_running_fin_is_made_up_for(method: str, penta: Layout) -> None:
     kept = (0.4, 1.2, 1.0)
-    result = load_allocator(method=method).allocate(penta, TARGET, health=Health.of(running={"bow": kept}))
+    result = load_allocator(method).allocate(penta, TARGET, health=Health.of(running={"bow": kept}))
     np.testing.assert_allclose(result.command[penta.index("bow")], kept)
     assert result.err_norm < 0.02
     np.testing.assert_allclose(result.wrench, Plant(penta).wrench(result.command))

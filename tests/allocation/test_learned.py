@@ -212,7 +212,7 @@ def test_every_option_still_answers_exactly(
 
 
 def test_a_network_that_learned_nothing_still_keeps_the_limits(untrained_checkpoint: Path) -> None:
-    method = load_allocator(untrained_checkpoint)
+    method = load_allocator(checkpoint=untrained_checkpoint)
     for layout in (HOSTILE["no width"], load_layout(shipped_layouts()["restricted"])):
         assert keeps_limits(layout, method.allocate_batch(layout, reachable(layout, 5)).command)
 

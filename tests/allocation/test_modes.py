@@ -66,4 +66,4 @@ def test_modes_of_an_answer_deliver_the_wrench_in_different_ways(learned: Learne
 
 def test_a_method_with_one_answer_tells_no_modes() -> None:
     layout = load_layout(shipped_layouts()["A"])
-    assert load_allocator(method="analytic").allocate(layout, [1, 0, 0, 0, 0, 0]).modes == ()
+    assert load_allocator("analytic").allocate(layout, [1, 0, 0, 0, 0, 0]).modes == ()

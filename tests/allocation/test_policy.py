@@ -221,7 +221,7 @@ def test_methods_without_weights_say_so() -> None:
     for name in METHODS:
         if name in ("learned", "fast") or name in PATIENT:
             continue
-        method = load_allocator(method=name)
+        method = load_allocator(name)
         for policy in (Policy("priority"), Policy(axis_weights=(2.0, 1.0, 1.0, 1.0, 1.0, 1.0))):
             with pytest.raises(AllocationError, match=f"method '{name}' minimizes the plain error") as caught:
                 method.allocate(layout, FAR, policy=policy)
@@ -231,7 +231,7 @@ def test_methods_without_weights_say_so() -> None:
 
 def test_direction_is_known_to_every_method() -> None:
     layout = shipped("A")
-    result = load_allocator(method="analytic").allocate(layout, HEAVY, policy="direction")
+    result = load_allocator("analytic").allocate(layout, HEAVY, policy="direction")
     assert cosine(result) > 0.999 and 0.5 < result.scale < 0.8
 
 

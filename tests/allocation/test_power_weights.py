@@ -25,7 +25,7 @@ def test_less_power_at_the_same_error(layout: Layout, target: list[float]) -> No
         for allocator in (
             load_allocator(),
             load_allocator(energy_weights=POWER_WEIGHTS),
-            load_allocator(method="analytic"),
+            load_allocator("analytic"),
         )
     )
     upper = layout.upper

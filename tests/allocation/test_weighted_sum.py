@@ -75,5 +75,5 @@ def test_what_cannot_be_weighed_is_refused() -> None:
 
 def test_the_fast_way_weighs_too() -> None:
     layout, target = next(iter(cases("nominal")))
-    fast, full = (load_allocator(method=name, energy_tradeoff=0.1) for name in ("fast", "learned"))
+    fast, full = (load_allocator(name, energy_tradeoff=0.1) for name in ("fast", "learned"))
     assert np.array_equal(fast.allocate(layout, target).command, full.allocate(layout, target).command)

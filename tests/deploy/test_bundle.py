@@ -103,7 +103,7 @@ def test_forged_network_is_refused_although_its_checksum_fits(bundle: Bundle) ->
 
 def test_parts_of_two_exports_are_refused(bundle: Bundle, untrained_checkpoint: Path) -> None:
     other = make_bundle(
-        finlab.load_layout(shipped_layouts()["A"]), finlab.load_allocator(untrained_checkpoint)
+        finlab.load_layout(shipped_layouts()["A"]), finlab.load_allocator(checkpoint=untrained_checkpoint)
     )
     mixed = {**bundle.files, GRAPH: other.files[GRAPH]}
     with pytest.raises(DataError, match="are of different checkpoints"):
@@ -149,7 +149,7 @@ def test_a_folder_with_other_things_is_not_written_to(bundle: Bundle, tmp_path: 
 
 def test_methods_that_do_not_travel_are_refused() -> None:
     with pytest.raises(AllocationError, match="method 'sqp' cannot be exported"):
-        make_bundle(finlab.load_layout(shipped_layouts()["A"]), finlab.load_allocator(method="sqp"))
+        make_bundle(finlab.load_layout(shipped_layouts()["A"]), finlab.load_allocator("sqp"))
 
 
 def test_export_refuses_names_that_are_neither(capsys: pytest.CaptureFixture[str]) -> None:

@@ -25,7 +25,7 @@ ODD = (b"\xff", b"\0", b"9" * 30, b"1e999", b"NaN", b"[", b"{", b'"', b"\n- ", b
 @pytest.fixture(scope="module")
 def small(untrained_checkpoint: Path) -> Bundle:
     """A bundle of a small network, so that many fit into a test."""
-    allocator = finlab.load_allocator(untrained_checkpoint)
+    allocator = finlab.load_allocator(checkpoint=untrained_checkpoint)
     return make_bundle(load_layout(shipped_layouts()["A"]), allocator)
 
 

@@ -24,7 +24,7 @@ WRENCH = ["--wrench", "0.5", "0", "0.5", "0", "0", "0"]
 
 @pytest.fixture(scope="module")
 def allocator(untrained_checkpoint: Path) -> Allocator:
-    return finlab.load_allocator(untrained_checkpoint)
+    return finlab.load_allocator(checkpoint=untrained_checkpoint)
 
 
 @pytest.mark.parametrize("failed", [(), ("front_left",)], ids=["whole", "one lost"])
@@ -64,12 +64,12 @@ def test_features_are_those_of_training(allocator: Allocator) -> None:
 
 def test_same_input_same_bytes(allocator: Allocator, untrained_checkpoint: Path) -> None:
     layout = finlab.load_layout(shipped_layouts()["ucat"])
-    again = finlab.load_allocator(untrained_checkpoint)
+    again = finlab.load_allocator(checkpoint=untrained_checkpoint)
     assert graph_bytes(build_graph(layout, allocator)) == graph_bytes(build_graph(layout, again))
 
 
 def test_method_without_a_network_is_refused(untrained_checkpoint: Path) -> None:
-    analytic = finlab.load_allocator(untrained_checkpoint, method="analytic")
+    analytic = finlab.load_allocator("analytic", checkpoint=untrained_checkpoint)
     with pytest.raises(FinlabError, match="method 'analytic' has no trained network"):
         build_graph(finlab.load_layout(shipped_layouts()["A"]), analytic)
 

@@ -24,7 +24,7 @@ def test_paths_are_smooth_and_within_reach(name: str) -> None:
     assert step.max() < 0.1
     np.testing.assert_array_equal(path, smooth_path(shipped(name), SIGMA, 5000))
     assert np.abs(path - smooth_path(shipped(name), SIGMA, 5001)).max() > 0.1
-    error = load_allocator(method="analytic").allocate(shipped(name), path[17]).err_norm
+    error = load_allocator("analytic").allocate(shipped(name), path[17]).err_norm
     assert error < 1e-3
 
 
@@ -34,16 +34,14 @@ def test_turns_are_forced_where_forces_are_unique() -> None:
     forced = forced_turn(pair, path)
     assert forced is not None
     # The pseudo-inverse answers with the only forces there are.
-    assert ride(load_allocator(method="analytic"), pair, path, steady=True).turn.max() == pytest.approx(
+    assert ride(load_allocator("analytic"), pair, path, steady=True).turn.max() == pytest.approx(
         forced, abs=1e-3
     )
     assert forced_turn(shipped("A"), path) is None
 
 
 def test_a_method_without_memory_turns_as_far_either_way() -> None:
-    (row,) = steadiness_rows(
-        load_allocator(method="analytic"), [shipped("A")], n_paths=2, ticks=30, seed=5000
-    )
+    (row,) = steadiness_rows(load_allocator("analytic"), [shipped("A")], n_paths=2, ticks=30, seed=5000)
     assert row["turn_ratio"] == row["energy_ratio"] == 1.0
     assert row["paths"] == 2 and row["steady"] == 0 and row["err_norm_max"] < 1e-3
 

@@ -95,3 +95,11 @@ def test_restricted_zero_directions_confine_the_force_as_described():
     assert force[:, [i("front_left"), i("front_right")], 0].min() >= -1e-9
     assert force[:, i("back_left"), 2].min() > 0.0
     assert force[:, i("back_right"), 2].max() < 0.0
+
+
+def test_loads_by_bare_name_from_any_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    save_layout(load_layout("pair"), "A.yaml")
+    (tmp_path / "A").mkdir()
+    assert load_layout("A") == load_layout(SHIPPED["A"])  # a folder here does not take its place
+    assert load_layout("A.yaml") == load_layout("pair")

@@ -203,7 +203,7 @@ def test_a_surrogate_alone_loads_but_cannot_allocate(folder: Path) -> None:
     message = refusal(folder, load_allocator_checkpoint)
     assert "holds a surrogate only; train the allocator with `finlab train allocator`" in message
     with pytest.raises(CheckpointError, match="holds a surrogate only"):
-        load_allocator(folder)
+        load_allocator(checkpoint=folder)
 
 
 def test_normalization_alone_is_read_without_the_weights(folder: Path) -> None:

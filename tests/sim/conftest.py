@@ -17,4 +17,4 @@ def analytic() -> Allocator:
     """The quickest method; it takes only the normalization from a checkpoint."""
     from finlab.allocation import load_allocator
 
-    return load_allocator(method="analytic")
+    return load_allocator("analytic")

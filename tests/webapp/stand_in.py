@@ -52,7 +52,7 @@ def _ranked(layout: Layout, command: Array, target: Array, upper: Array, source:
     return Candidates(command[order], wrench[order], error[order], energy[order], (source,) * len(command))
 
 
-def load_stand_in(checkpoint: Any = None, method: str = "learned") -> Allocator:
+def load_stand_in(method: str = "learned", *, checkpoint: Any = None) -> Allocator:
     """In place of `load_allocator`: `learned` is the stand-in, `slsqp` fails, all others are `multistart`."""
     if method == "slsqp":
         raise AllocationError("slsqp is out of order in this test")

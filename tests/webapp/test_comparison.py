@@ -39,8 +39,8 @@ def test_all_methods_answer_one_after_the_other() -> None:
 
 
 def test_a_method_that_fails_keeps_nobody_else_waiting() -> None:
-    def load(checkpoint: object = None, method: str = "learned") -> object:
-        return load_stand_in(checkpoint, "slsqp" if method == "paper" else method)
+    def load(method: str = "learned", checkpoint: object = None) -> object:
+        return load_stand_in("slsqp" if method == "paper" else method)
 
     worker, done = Worker(), threading.Event()
     comparison = Comparison(
@@ -55,7 +55,7 @@ def test_a_method_that_fails_keeps_nobody_else_waiting() -> None:
 
 @pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
 def test_densities_of_the_shipped_network() -> None:
-    allocator = load_allocator(None, method="learned")
+    allocator = load_allocator()
     found = densities(allocator, UCAT, ("front_left",), np.array(PRESETS["Turn"]), 0.02)
     assert found is not None
     assert found.places[0, -1] == pytest.approx(np.degrees(0.6)) and found.places[2, 0] == pytest.approx(-180)

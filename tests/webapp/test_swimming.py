@@ -119,7 +119,7 @@ def test_bad_plans_and_methods_out_of_order(swimming: Swimming) -> None:
     ):
         with pytest.raises(FinlabError):
             Plan(UCAT, (), **{"path": "circle", "methods": ("qp",), **wrong})  # type: ignore[arg-type]
-    swimming._solver = Solver(load=lambda *_, **__: load_stand_in(method="slsqp"))
+    swimming._solver = Solver(load=lambda *_, **__: load_stand_in("slsqp"))
     swimming.start(Plan(UCAT, (), "circle", ("qp",)))
     until(lambda: bool(swimming.notes))  # type: ignore[attr-defined]
     assert not swimming.active
