@@ -1,9 +1,13 @@
-"""What all tests share: settings, and a small untrained checkpoint that is made in a moment."""
+"""What tests share: settings, an untrained checkpoint, and a robot and a method that are quick to make."""
 
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+from finlab.allocation.allocator import Allocator
+from finlab.assets import shipped_layouts
+from finlab.layout import Layout, load_layout
 
 # Machines that run tests also run browsers and trainings: an example that takes long is no failure.
 settings.register_profile("finlab", deadline=None)
@@ -39,3 +43,16 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
         )
     save_checkpoint(folder, checkpoint)
     return folder
+
+
+@pytest.fixture(scope="session")
+def layout_a() -> Layout:
+    return load_layout(shipped_layouts()["A"])
+
+
+@pytest.fixture(scope="session")
+def analytic() -> Allocator:
+    """The quickest method; it takes only the normalization from a checkpoint."""
+    from finlab.allocation import load_allocator
+
+    return load_allocator("analytic")

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.sim import Swim
+from finlab.sim import ClosedLoop
 from finlab.sim.log import Tick
 
 Array = NDArray[np.float64]
@@ -51,9 +51,9 @@ the force of each fin (n) [N]."""
 
 
 class Swimmer:
-    """A `Swim` on the worker's thread, and the last moment taken from it for the page."""
+    """A `ClosedLoop` on the worker's thread, and the last moment taken from it for the page."""
 
-    def __init__(self, method: str, swim: Swim) -> None:
+    def __init__(self, method: str, swim: ClosedLoop) -> None:
         """Take over a swim that is at its start."""
         self.method, self.swim = method, swim
         self.fins, self.period_s = swim.layout.names, swim.period_s

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 
 from finlab.errors import FinlabError
-from finlab.sim import Swim, make_trajectory
+from finlab.sim import ClosedLoop, make_trajectory
 from webapp.pace import Pace
 from webapp.solver import Solver
 from webapp.state import State
@@ -51,7 +51,7 @@ class Swimming:
         """At what speed it is to go, and goes."""
         self._busy = False
         self._stop = threading.Event()
-        self._acts: deque[Callable[[Swim], None]] = deque()
+        self._acts: deque[Callable[[ClosedLoop], None]] = deque()
 
     @property
     def active(self) -> bool:
@@ -84,7 +84,7 @@ class Swimming:
         path = make_trajectory(plan.path) if isinstance(plan.path, str) else plan.path
         allocator = self._solver.allocator(State(plan.layout, method=method))
         failures = [(name, 0.0) for name in plan.failed]
-        return Swimmer(method, Swim(plan.layout, allocator, path, plant=plan.plant, failures=failures))
+        return Swimmer(method, ClosedLoop(plan.layout, allocator, path, plant=plan.plant, failures=failures))
 
     def _begin(self, stop: threading.Event, swimmers: tuple[Swimmer, ...]) -> None:
         if stop is self._stop:

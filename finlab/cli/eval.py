@@ -7,7 +7,7 @@ from typing import Annotated
 from tyro.conf import arg
 from tyro.extras import SubcommandApp
 
-from finlab.cli.eval_files import (
+from finlab.cli.eval_arguments import (
     Checkpoint,
     Count,
     Folder,
@@ -59,16 +59,16 @@ def wrench(
         json: file for the rows.
         records: folder for the records, one NPZ file for each split and method.
     """
-    from finlab.evaluation.entrants import is_slow
-    from finlab.evaluation.records import columns_of_records, save_columns
-    from finlab.evaluation.splits import SPLITS, make_split
-    from finlab.evaluation.wrench import (
+    from finlab.evaluation.experiments.wrench_tracking import (
         energy_comparison,
         interval_rows,
         run_method,
         wrench_report,
         wrench_rows,
     )
+    from finlab.evaluation.method_specs import is_slow
+    from finlab.evaluation.splits import SPLITS, make_split
+    from finlab.evaluation.statistics.records import columns_of_records, save_columns
 
     for name, value in (("single", single), ("subsample", subsample)):
         check_positive(name, value)
@@ -116,7 +116,7 @@ def seeds(
         json: file for the rows.
     """
     from finlab.allocation.learned.learned_allocator import LearnedAllocator
-    from finlab.evaluation.seeds import seed_report, seed_rows
+    from finlab.evaluation.experiments.seeds import seed_report, seed_rows
     from finlab.evaluation.splits import make_split
 
     check_positive("candidates", candidates)
@@ -151,7 +151,7 @@ def ablation(
         checkpoint: trained checkpoint of method paper; the shipped one by default.
         json: file for the rows.
     """
-    from finlab.evaluation.ablation import ablation_report, ablation_rows
+    from finlab.evaluation.experiments.ablation import ablation_report, ablation_rows
     from finlab.evaluation.splits import make_split
 
     check_writable(json)
@@ -185,7 +185,7 @@ def latency(
         json: file for the rows and the machine.
     """
     from finlab.errors import DataError
-    from finlab.evaluation.latency import latency_report, latency_rows, machine
+    from finlab.evaluation.experiments.latency import latency_report, latency_rows, machine
     from finlab.evaluation.splits import make_split
 
     check_positive("calls", calls)

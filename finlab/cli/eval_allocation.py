@@ -7,7 +7,7 @@ from typing import Annotated
 
 from tyro.conf import arg
 
-from finlab.cli.eval_files import (
+from finlab.cli.eval_arguments import (
     Checkpoint,
     Count,
     JsonFile,
@@ -17,7 +17,7 @@ from finlab.cli.eval_files import (
     open_layouts,
     write_json,
 )
-from finlab.cli.eval_swim import verbs
+from finlab.cli.eval_closed_loop import verbs
 
 Layouts = Annotated[str, arg(metavar="A,B,...")]
 
@@ -42,7 +42,7 @@ def steadiness(
         json: file for the rows.
     """
     from finlab.allocation import load_allocator
-    from finlab.evaluation.steadiness import steadiness_report, steadiness_rows
+    from finlab.evaluation.experiments.steadiness import steadiness_report, steadiness_rows
 
     check_positive("paths", paths)
     check_positive("ticks", ticks - 1)
@@ -77,7 +77,7 @@ def modes(
         json: file for the rows.
     """
     from finlab.allocation import load_allocator
-    from finlab.evaluation.modes import mode_report, mode_rows
+    from finlab.evaluation.experiments.mode_coverage import mode_report, mode_rows
     from finlab.evaluation.splits import make_split
 
     check_positive("starts", starts)
@@ -104,7 +104,7 @@ def unreachable(
         json: file for the rows.
     """
     from finlab.allocation import load_allocator
-    from finlab.evaluation.unreachable import unreachable_report, unreachable_rows
+    from finlab.evaluation.experiments.unreachable import unreachable_report, unreachable_rows
 
     check_positive("layouts", layouts)
     check_writable(json)

@@ -10,7 +10,7 @@ from typing import Annotated
 from tyro.conf import arg
 
 from finlab.cli.eval import verbs
-from finlab.cli.eval_files import (
+from finlab.cli.eval_arguments import (
     Checkpoint,
     Count,
     Folder,
@@ -46,13 +46,13 @@ def temperature(
     """
     from tqdm import tqdm
 
-    from finlab.evaluation.splits import make_split
-    from finlab.evaluation.temperature import (
+    from finlab.evaluation.experiments.temperature import (
         TEMPERATURES,
         temperature_columns,
         temperature_report,
         temperature_row,
     )
+    from finlab.evaluation.splits import make_split
 
     check_positive("candidates", candidates)
     check_writable(json)
@@ -90,12 +90,12 @@ def training(
         seed: draws data, weights, layouts and targets.
         json: file for the rows.
     """
+    from finlab.evaluation.experiments.training_study import training_report, training_row
     from finlab.evaluation.report.jobs import run_jobs
     from finlab.evaluation.report.plan import training_jobs
     from finlab.evaluation.report.provenance import source_commit
     from finlab.evaluation.splits import make_split
-    from finlab.evaluation.store import Store
-    from finlab.evaluation.training import training_report, training_row
+    from finlab.evaluation.statistics.store import Store
     from finlab.training.presets import get_preset
 
     for name, value in (("steps", steps), ("batch-size", batch_size)):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, UseAppendAction, arg
 
 if TYPE_CHECKING:
-    from finlab.sim import SwimLog
+    from finlab.sim import RunLog
 
 
 def simulate(
@@ -50,13 +50,13 @@ def simulate(
 
     from finlab.cli.inputs import open_robot
     from finlab.control import WaypointController, WaypointGains, load_gains
-    from finlab.evaluation.swims import load_methods
-    from finlab.sim import NO_NOISE, Swim, make_trajectory
+    from finlab.evaluation.experiments.closed_loop_runs import load_methods
+    from finlab.sim import NO_NOISE, ClosedLoop, make_trajectory
 
     robot = open_robot(layout)
     failures = [(name, 0.0) for name in robot.failed] + [_failure(text) for text in fail]
     _check_folder(output)
-    swim = Swim(
+    swim = ClosedLoop(
         robot.layout,
         next(iter(load_methods(method, checkpoint).values())),
         make_trajectory(trajectory, duration),
@@ -75,7 +75,7 @@ def simulate(
         log = swim.run(bar.update)
     print(summary(log))
     if output is not None:
-        from finlab.evaluation.swim_pictures import save_pictures
+        from finlab.evaluation.plots.closed_loop_run import save_pictures
 
         output.mkdir(parents=True, exist_ok=True)
         log.save(output / "log.npz")
@@ -83,10 +83,10 @@ def simulate(
         print(f"\n{output}: written log.npz, {names}.")
 
 
-def summary(log: SwimLog) -> str:
+def summary(log: RunLog) -> str:
     """The run in a few lines."""
-    from finlab.evaluation.swims import LOST_M, follow_row
-    from finlab.evaluation.trajectory_errors import RTE_DELTA_S
+    from finlab.evaluation.experiments.closed_loop_runs import LOST_M, follow_row
+    from finlab.evaluation.statistics.trajectory_errors import RTE_DELTA_S
 
     row = follow_row(log)
     lost = [name for name, works in zip(log.fins, log.alive[-1], strict=True) if not works]
@@ -128,9 +128,9 @@ def _check_folder(output: Path | None) -> None:
 def _warnings(swim: object, failures: list[tuple[str, float]]) -> list[str]:
     """What will not be controllable, said before the run."""
     from finlab.control import Completion
-    from finlab.sim import Swim
+    from finlab.sim import ClosedLoop
 
-    assert isinstance(swim, Swim)
+    assert isinstance(swim, ClosedLoop)
     sentences, lost = [], []
     for name, time in [("", 0.0), *sorted(failures, key=lambda failure: failure[1])]:
         lost += [name] if name else []

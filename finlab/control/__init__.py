@@ -1,6 +1,6 @@
 """Body-frame controllers: measurements and a setpoint in, a wrench out. numpy only.
 
-Any object with the shape of `Controller` plugs into `finlab.sim.Swim`.
+Any object with the shape of `Controller` plugs into `finlab.sim.ClosedLoop`.
 """
 
 from finlab.control.completion import Completion

@@ -1,17 +1,17 @@
 """Simulation of a robot that swims: body, fins, sensors, and the closed loop around an allocator.
 
-    swim = Swim(layout, finlab.load_allocator(), make_trajectory("circle"), failures=[("front_left", 30.0)])
-    log = swim.run()
+    loop = ClosedLoop(layout, finlab.load_allocator(), make_trajectory("circle"), failures=[("bow", 30.0)])
+    log = loop.run()
 
 World: z up. Body: x forward, y left, z up. SI and radians.
 """
 
+from finlab.sim.closed_loop import ClosedLoop
 from finlab.sim.fin_motion import Servo
-from finlab.sim.log import SwimLog, Tick, load_log
+from finlab.sim.log import RunLog, Tick, load_log
 from finlab.sim.parameters import VehicleParameters, vehicle_parameters
 from finlab.sim.plants import PLANTS
 from finlab.sim.sensors import NO_NOISE, SensorSettings
-from finlab.sim.swim import Swim
 from finlab.sim.task import Cruise, Task
 from finlab.sim.trajectory import SHIPPED, Trajectory, make_trajectory
 from finlab.sim.vehicle import Vehicle
@@ -23,8 +23,8 @@ __all__ = [
     "Cruise",
     "SensorSettings",
     "Servo",
-    "Swim",
-    "SwimLog",
+    "ClosedLoop",
+    "RunLog",
     "Task",
     "Tick",
     "Trajectory",

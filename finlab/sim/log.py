@@ -19,7 +19,7 @@ VERSION = 1
 
 
 class Tick(NamedTuple):
-    """What happened in one control period; N ticks of n fins make the columns of a `SwimLog`."""
+    """What happened in one control period; N ticks of n fins make the columns of a `RunLog`."""
 
     time: float
     """At the beginning of the period [s]."""
@@ -58,7 +58,7 @@ class Tick(NamedTuple):
 
 
 @dataclass(frozen=True)
-class SwimLog:
+class RunLog:
     """A whole swim: each column of `Tick` as an array with N rows, and what was swum."""
 
     layout: str
@@ -98,14 +98,14 @@ class SwimLog:
             np.savez_compressed(file, allow_pickle=False, meta=np.array(json.dumps(meta)), **self.columns)
 
 
-def log_of_ticks(ticks: list[Tick], **about: Any) -> SwimLog:
-    """The log of ticks in order; `about` holds the other fields of `SwimLog`."""
+def log_of_ticks(ticks: list[Tick], **about: Any) -> RunLog:
+    """The log of ticks in order; `about` holds the other fields of `RunLog`."""
     columns = {name: np.array([getattr(tick, name) for tick in ticks]) for name in Tick._fields}
-    return SwimLog(columns=columns, **about)
+    return RunLog(columns=columns, **about)
 
 
-def load_log(path: str | Path) -> SwimLog:
-    """Reads what `SwimLog.save` wrote.
+def load_log(path: str | Path) -> RunLog:
+    """Reads what `RunLog.save` wrote.
 
     Raises:
         DataError: the file is missing, or no log of this version.
@@ -118,4 +118,4 @@ def load_log(path: str | Path) -> SwimLog:
         raise DataError(f"{path}: expected a swim log written by finlab simulate: {error}") from None
     if (meta.pop("format", None), meta.pop("version", None)) != (FORMAT, VERSION):
         raise DataError(f"{path}: expected a swim log of version {VERSION}")
-    return SwimLog(columns=columns, **{**meta, "fins": tuple(meta["fins"])})
+    return RunLog(columns=columns, **{**meta, "fins": tuple(meta["fins"])})

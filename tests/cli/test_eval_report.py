@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from finlab.cli import main
-from finlab.evaluation.training import CHANGES
+from finlab.evaluation.experiments.training_study import CHANGES
 
 
 def test_temperature(untrained_checkpoint: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

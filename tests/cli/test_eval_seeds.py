@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from finlab.cli import main
-from finlab.evaluation.seeds import KINDS, STEPS
+from finlab.evaluation.experiments.seeds import KINDS, STEPS
 
 TINY = ["eval", "seeds", "--layouts", "1", "--targets", "2", "--candidates", "4"]
 

@@ -15,7 +15,7 @@ from typing import Any
 from tqdm import tqdm
 
 from finlab.evaluation.report.work import WORK
-from finlab.evaluation.store import Result, Store
+from finlab.evaluation.statistics.store import Result, Store
 
 
 @dataclass(frozen=True)

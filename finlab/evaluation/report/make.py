@@ -13,9 +13,11 @@ from finlab.evaluation.report.page_markdown import to_markdown
 from finlab.evaluation.report.plan import Checkpoints, make_plan
 from finlab.evaluation.report.provenance import Provenance, make_provenance, source_commit
 from finlab.evaluation.report.results import Results
+from finlab.evaluation.report.sections.accuracy import accuracy_blocks
+from finlab.evaluation.report.sections.closed_loop import closed_loop_blocks
 from finlab.evaluation.report.sections.energy import energy_blocks
-from finlab.evaluation.report.sections.making import making_blocks
-from finlab.evaluation.report.sections.parts import (
+from finlab.evaluation.report.sections.how_made import how_made_blocks
+from finlab.evaluation.report.sections.studies import (
     ablation_blocks,
     latency_blocks,
     seed_blocks,
@@ -23,10 +25,8 @@ from finlab.evaluation.report.sections.parts import (
     training_blocks,
 )
 from finlab.evaluation.report.sections.summary import summary_blocks
-from finlab.evaluation.report.sections.swims import swim_blocks
-from finlab.evaluation.report.sections.wrench import wrench_blocks
 from finlab.evaluation.report.sizes import SIZES, Sizes
-from finlab.evaluation.store import Store
+from finlab.evaluation.statistics.store import Store
 from finlab.training.networks.checkpoint import load_checkpoint, load_normalization, resolve_checkpoint
 
 PAGE, TWIN, TABLES, PICTURES = "index.html", "report.md", "tables.json", "pictures"
@@ -83,15 +83,15 @@ def make_document(results: Results, provenance: Provenance, sizes: Sizes, left_o
     """The page's blocks, from results; `left_out` parts have none yet."""
     blocks: list[Block] = [
         *summary_blocks(results),
-        *wrench_blocks(results),
+        *accuracy_blocks(results),
         *energy_blocks(results),
         *latency_blocks(results),
-        *swim_blocks(results),
+        *closed_loop_blocks(results),
         *seed_blocks(results),
         *ablation_blocks(results),
         *temperature_blocks(results),
         *training_blocks(results),
-        *making_blocks(results, provenance, sizes),
+        *how_made_blocks(results, provenance, sizes),
     ]
     note = "" if sizes.name == "full" else f" A {sizes.name} look on few cases; intervals are wide."
     note += f" {left_out} parts had not been run when this page was made." if left_out else ""

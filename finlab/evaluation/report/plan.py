@@ -8,8 +8,10 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from finlab.evaluation.ablation import REFINEMENTS, VARIANTS
-from finlab.evaluation.entrants import (
+from finlab.evaluation.experiments.ablation import REFINEMENTS, VARIANTS
+from finlab.evaluation.experiments.temperature import PAPER_TEMPERATURE, TEMPERATURES
+from finlab.evaluation.experiments.training_study import CHANGES
+from finlab.evaluation.method_specs import (
     QUICK,
     SLOW,
     fingerprint,
@@ -21,9 +23,7 @@ from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.report.jobs import Job
 from finlab.evaluation.report.sizes import Sizes
 from finlab.evaluation.splits import SPLITS
-from finlab.evaluation.store import Store
-from finlab.evaluation.temperature import PAPER_TEMPERATURE, TEMPERATURES
-from finlab.evaluation.training import CHANGES
+from finlab.evaluation.statistics.store import Store
 
 REFERENCE = "ipopt-32"
 """Whose energies the others are measured by."""
@@ -119,9 +119,9 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
     prints = {name: fingerprint(name, checkpoints.of(name)) for name in names}
     plan = Plan()
 
-    def job(name: str, work: str, entrant: str, **settings: Any) -> Job:
-        context = {"checkpoint": checkpoints.of(entrant)}
-        return Job(name, work, {"seed": seed, **settings}, prints[entrant], context)
+    def job(name: str, work: str, spec: str, **settings: Any) -> Job:
+        context = {"checkpoint": checkpoints.of(spec)}
+        return Job(name, work, {"seed": seed, **settings}, prints[spec], context)
 
     layouts, targets = sizes.energy
     for method in (REFERENCE, *ENERGY_METHODS):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import finlab
-from finlab.evaluation.latency import machine
+from finlab.evaluation.experiments.latency import machine
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from finlab.evaluation.records import columns_of_records
-from finlab.evaluation.report.work_swims import faults, trajectory, velocity
+from finlab.evaluation.report.work_closed_loop import faults, trajectory, velocity
 from finlab.evaluation.splits import make_split
-from finlab.evaluation.store import Columns, columns_of_rows
+from finlab.evaluation.statistics.records import columns_of_records
+from finlab.evaluation.statistics.store import Columns, columns_of_rows
 
 MOST_FINS = 8
 """Commands are padded to so many fins, those that are not there hold NaN."""
@@ -24,20 +24,20 @@ def wrench(
     *, split: str, layouts: int, targets: int, method: str, seed: int, checkpoint: str | None
 ) -> Columns:
     """Records of a method on a split."""
-    from finlab.evaluation.entrants import load_entrant
-    from finlab.evaluation.wrench import run_method
+    from finlab.evaluation.experiments.wrench_tracking import run_method
+    from finlab.evaluation.method_specs import load_method_spec
 
     cases = make_split(split, layouts, targets, seed)
-    return columns_of_records(run_method(load_entrant(method, checkpoint), cases))
+    return columns_of_records(run_method(load_method_spec(method, checkpoint), cases))
 
 
 def energy(*, layouts: int, targets: int, method: str, seed: int, checkpoint: str | None) -> Columns:
     """Records of a method on split `id`, with its commands (N, 8, 3), so that each can be checked again."""
-    from finlab.evaluation.entrants import load_entrant
-    from finlab.evaluation.records import join_records
-    from finlab.evaluation.wrench import score
+    from finlab.evaluation.experiments.wrench_tracking import score
+    from finlab.evaluation.method_specs import load_method_spec
+    from finlab.evaluation.statistics.records import join_records
 
-    allocator, parts, commands = load_entrant(method, checkpoint), [], []
+    allocator, parts, commands = load_method_spec(method, checkpoint), [], []
     for k, case in enumerate(make_split("id", layouts, targets, seed)):
         answer = allocator.allocate_batch(case.layout, case.targets)
         parts.append(score(case, case.targets, answer, allocator.normalization.std, number=k))
@@ -59,7 +59,7 @@ def ablation(
     checkpoint: str | None,
 ) -> Columns:
     """Records of one variant, scored by plant and surrogate, and the time of single calls."""
-    from finlab.evaluation.ablation import ablation_method, run_variant
+    from finlab.evaluation.experiments.ablation import ablation_method, run_variant
 
     method = ablation_method(
         variant, refinement, checkpoint=checkpoint, n_candidates=candidates, temperature=temperature
@@ -76,7 +76,7 @@ def temperature(
     *, temperature: float, layouts: int, targets: int, seed: int, checkpoint: str | None
 ) -> Columns:
     """Diversity and best J at one temperature."""
-    from finlab.evaluation.temperature import temperature_columns
+    from finlab.evaluation.experiments.temperature import temperature_columns
 
     cases = make_split("id", layouts, targets, seed)
     return temperature_columns(cases, temperature, checkpoint=checkpoint, seed=seed)
@@ -84,7 +84,7 @@ def temperature(
 
 def scatter(*, fins: int, targets: int, seed: int, checkpoint: str | None) -> Columns:
     """Candidates before and after refinement, on the first layout of so many fins."""
-    from finlab.evaluation.temperature import refinement_columns
+    from finlab.evaluation.experiments.temperature import refinement_columns
 
     cases = make_split("id", 40, targets, seed)
     case = next(case for case in cases if case.layout.n_fins == fins)
@@ -94,10 +94,10 @@ def scatter(*, fins: int, targets: int, seed: int, checkpoint: str | None) -> Co
 def seeds(*, layouts: int, targets: int, candidates: int, seed: int, checkpoint: str | None) -> Columns:
     """Rows of the comparison of the network's seeds with random ones."""
     from finlab.allocation.learned.learned_allocator import LearnedAllocator
-    from finlab.evaluation.entrants import load_entrant
-    from finlab.evaluation.seeds import seed_rows
+    from finlab.evaluation.experiments.seeds import seed_rows
+    from finlab.evaluation.method_specs import load_method_spec
 
-    allocator = load_entrant("learned", checkpoint)
+    allocator = load_method_spec("learned", checkpoint)
     assert isinstance(allocator, LearnedAllocator)
     cases = make_split("id", layouts, targets, seed)
     return columns_of_rows(seed_rows(allocator, cases, n_seeds=candidates, seed=seed))
@@ -113,12 +113,12 @@ def latency(
     paper_checkpoint: str | None,
 ) -> Columns:
     """Rows of the comparison of times; to be run with nothing beside it."""
-    from finlab.evaluation.entrants import load_entrant
-    from finlab.evaluation.latency import latency_rows
+    from finlab.evaluation.experiments.latency import latency_rows
+    from finlab.evaluation.method_specs import load_method_spec
 
     cases = [c for c in make_split("id", 100, 50, seed) if c.layout.n_fins == LATENCY_FINS]
     allocators = {
-        name: load_entrant(name, paper_checkpoint if name == "paper" else checkpoint) for name in methods
+        name: load_method_spec(name, paper_checkpoint if name == "paper" else checkpoint) for name in methods
     }
     return columns_of_rows(
         latency_rows(allocators, cases[:LATENCY_LAYOUTS], n_calls=calls, budget_s=budget_s)
@@ -139,7 +139,7 @@ def training(
     """Train with one thing changed and try the network."""
     from pathlib import Path
 
-    from finlab.evaluation.training import train_and_run
+    from finlab.evaluation.experiments.training_study import train_and_run
 
     return train_and_run(
         change,

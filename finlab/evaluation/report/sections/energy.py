@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from finlab.evaluation.plots.energy_by_fins import energy_by_fins
 from finlab.evaluation.report.document import Block, Column, Figure, Fold, Heading, Row, Table, Text
-from finlab.evaluation.report.pictures.energy import energy_by_fins
 from finlab.evaluation.report.plan import REFERENCE
 from finlab.evaluation.report.results import Results
 

@@ -8,7 +8,7 @@ from finlab.evaluation.report.document import Block, Card, Cards, Row, TwoSides
 from finlab.evaluation.report.numbers import error, factor, share, three
 from finlab.evaluation.report.plan import REFERENCE
 from finlab.evaluation.report.results import Results
-from finlab.evaluation.report.sections.swims import swim_claims
+from finlab.evaluation.report.sections.closed_loop import closed_loop_claims
 
 NOTHING = ("Nowhere in the tables below.",)
 
@@ -35,7 +35,7 @@ def _claims(results: Results, tables: dict[str, list[Row]]) -> claims.Claims:
         + claims.accuracy_claims(tables)
         + claims.energy_claims(results.energy_rows, REFERENCE)
         + claims.latency_claims(results.latency_rows, printed["inference"]["cycle_s"] * 1e3)
-        + swim_claims(results.swim_rows)
+        + closed_loop_claims(results.swim_rows)
         + claims.seed_claims(results.seed_rows)
         + claims.rebuild_claims(whole, printed["ablation"]["ours"]["err_norm_mean"])
     )

@@ -1,0 +1,169 @@
+"""The paper's fault experiment: a trajectory with fins lost from the start, or on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import combinations
+from typing import Any
+
+from finlab.allocation.allocator import Allocator
+from finlab.control import Completion, WaypointController
+from finlab.evaluation.experiments.closed_loop_runs import (
+    LOST_M,
+    Row,
+    follow_row,
+    over_seeds,
+    run_all,
+    spread,
+)
+from finlab.evaluation.experiments.trajectory import LABELS
+from finlab.evaluation.paper_figures import paper_figures
+from finlab.evaluation.statistics.tables import text_table
+from finlab.layout import Layout
+from finlab.sim import ClosedLoop, RunLog, Trajectory
+
+HEALTHY = "healthy"
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Fins that are lost, and when."""
+
+    fins: tuple[str, ...]
+    """Their names."""
+    time_s: float
+    """When they stop [s]."""
+    controllable: bool
+    """Whether the others can still give surge, heave and yaw independently."""
+
+    @property
+    def label(self) -> str:
+        """In words."""
+        if not self.fins:
+            return HEALTHY
+        when = f" at {self.time_s:.0f} s" if self.time_s > 0 else ""
+        return f"{' + '.join(self.fins)} lost{when}"
+
+    @property
+    def kind(self) -> str:
+        """Cases of one kind are summed up together."""
+        if not self.fins:
+            return HEALTHY
+        count = "one fin" if len(self.fins) == 1 else "two fins"
+        return f"{count} on the way" if self.time_s > 0 else count
+
+
+def all_faults(layout: Layout, half_way_s: float) -> list[Fault]:
+    """Healthy, each fin, each pair, and each fin half-way."""
+    names = layout.names
+    lost = [((), 0.0), *(((name,), 0.0) for name in names)]
+    if len(names) > 2:
+        lost += [(pair, 0.0) for pair in combinations(names, 2)]
+    lost += [((name,), half_way_s) for name in names]
+    axes = WaypointController.axes
+    return [
+        Fault(tuple(fins), time, Completion(layout, fins, axes).controllable)
+        for fins, time in lost
+        if len(fins) < len(names)
+    ]
+
+
+def run_faults(
+    layout: Layout,
+    allocators: Mapping[str, Allocator],
+    trajectory: Trajectory,
+    faults: Sequence[Fault],
+    seeds: Sequence[int],
+    plant: str = "mean",
+    **options: Any,
+) -> list[tuple[tuple[str, str], RunLog]]:
+    """Every controllable fault with every method and seed; each run under (fault's label, method's name)."""
+    swum = [fault for fault in faults if fault.controllable]
+
+    def swims() -> Iterator[tuple[tuple[str, str], Any]]:
+        for fault in swum:
+            failures = [(name, fault.time_s) for name in fault.fins]
+            for name, allocator in allocators.items():
+                for seed in seeds:
+                    yield (
+                        (fault.label, name),
+                        partial(
+                            ClosedLoop,
+                            layout,
+                            allocator,
+                            trajectory,
+                            failures=failures,
+                            plant=plant,
+                            seed=seed,
+                            **options,
+                        ),
+                    )
+
+    return run_all(swims(), len(swum) * len(allocators) * len(seeds))
+
+
+def fault_rows(faults: Sequence[Fault], runs: Sequence[tuple[tuple[str, str], RunLog]]) -> list[Row]:
+    """One row per fault and method; `ate_over_healthy` is the ratio of means, `tracked` whether every run
+    stayed with its reference. Faults that leave the robot uncontrollable have a row without figures."""
+    groups: dict[tuple[str, str], list[Row]] = {}
+    for key, log in runs:
+        groups.setdefault(key, []).append(follow_row(log))
+    methods = dict.fromkeys(method for _, method in groups)
+    rows: list[Row] = []
+    for fault in faults:
+        about = {"fault": fault.label, "kind": fault.kind, "controllable": fault.controllable}
+        if not fault.controllable:
+            rows.append(about)
+            continue
+        for method in methods:
+            found = groups[fault.label, method]
+            row = {**about, "method": method, "runs": len(found), **over_seeds(found)}
+            row["tracked"] = max(single["max"] for single in found) < LOST_M
+            if (HEALTHY, method) in groups:
+                row["ate_over_healthy"] = row["ate"] / over_seeds(groups[HEALTHY, method])["ate"]
+            rows.append(row)
+    return rows
+
+
+def fault_report(rows: Sequence[Row], layout: Layout, trajectory: Trajectory, plant: str) -> str:
+    """What was not swum and why, the table, and the paper's."""
+    hopeless = [row["fault"] for row in rows if not row["controllable"]]
+    before = [
+        f"Not swum, since the fins that are left cannot give surge, heave and yaw independently: {fault}."
+        for fault in hopeless
+    ]
+    table = text_table([_shown(row) for row in rows if row["controllable"]])
+    return "\n".join(
+        [
+            *before,
+            *([""] if before else []),
+            table,
+            "",
+            f"Layout {layout.name}, {trajectory.name} of {trajectory.duration_s:.0f} s, plant {plant}.",
+            "In the paper, in a pool [m]:",
+            text_table(_paper_rows()),
+        ]
+    )
+
+
+def _shown(row: Row) -> Row:
+    """A row for people."""
+    ratio = row.get("ate_over_healthy")
+    return {
+        "fault": row["fault"],
+        "method": row["method"],
+        **{label: spread(row, key) for key, label in LABELS.items()},
+        "ATE / healthy": "" if ratio is None else f"{ratio:.2f}",
+        "tracked": "yes" if row["tracked"] else "no",
+    }
+
+
+def _paper_rows() -> list[Row]:
+    return [
+        {"fault": fault.replace("_", " "), "method": method}
+        | {label: f"{values[key]:.3f}" for key, label in LABELS.items()}
+        for fault, methods in paper_figures()["fault_tolerance"].items()
+        for method, values in methods.items()
+    ]

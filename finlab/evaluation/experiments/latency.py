@@ -1,0 +1,118 @@
+"""How long one call takes: methods side by side in one run on one machine, single calls only."""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from finlab.allocation.allocator import Allocator
+from finlab.evaluation.splits import Case
+from finlab.evaluation.statistics.tables import text_table
+
+REFERENCE = "learned"
+"""The method that the others are compared with, where it takes part."""
+WARM_UP = 2
+"""First calls on each layout that are not counted; a robot keeps its layout for long."""
+
+Row = dict[str, Any]
+
+
+def latency_rows(
+    allocators: Mapping[str, Allocator],
+    cases: Sequence[Case],
+    *,
+    n_calls: int = 200,
+    budget_s: float = 20.0,
+    seed: int = 0,
+) -> list[Row]:
+    """Median and 99th percentile of whole `allocate` calls [ms], and the ratio to `learned`.
+
+    Args:
+        allocators: method name -> method.
+        cases: layouts with targets, visited one after the other; every method sees the same.
+        n_calls: calls of each method.
+        budget_s: a slow method stops after this long [s]; its row says how many calls it made.
+        seed: passed to the methods.
+    """
+    rows = []
+    for name, allocator in tqdm(
+        allocators.items(), unit="method", disable=None, leave=False, file=sys.stderr
+    ):
+        times = _time_calls(allocator, cases, n_calls, budget_s, seed)
+        rows.append(
+            {
+                "method": name,
+                "calls": len(times),
+                "p50_ms": float(np.quantile(times, 0.5)),
+                "p99_ms": float(np.quantile(times, 0.99)),
+            }
+        )
+    reference = next((row["p50_ms"] for row in rows if row["method"] == REFERENCE), None)
+    if reference is not None:
+        for row in rows:
+            row[f"p50_over_{REFERENCE}"] = row["p50_ms"] / reference
+    return rows
+
+
+def _time_calls(
+    allocator: Allocator, cases: Sequence[Case], n_calls: int, budget_s: float, seed: int
+) -> list[float]:
+    """Wall time of each counted call [ms]."""
+    times: list[float] = []
+    per_case = -(-n_calls // len(cases))
+    for case in cases:
+        if len(times) >= n_calls:
+            break
+        begin = time.perf_counter()
+        for k in range(WARM_UP + min(per_case, n_calls - len(times))):
+            target = case.targets[k % len(case.targets)]
+            start = time.perf_counter()
+            allocator.allocate(case.layout, target, failed=case.failed, seed=seed)
+            end = time.perf_counter()
+            if k >= WARM_UP:
+                times.append((end - start) * 1e3)
+                if end - begin > budget_s / len(cases):
+                    break
+    return times
+
+
+def machine() -> dict[str, str]:
+    """What this ran on: processor, cores, threads and versions."""
+    import scipy
+    import torch
+
+    return {
+        "processor": _processor(),
+        "cores": str(os.cpu_count()),
+        "torch_threads": str(torch.get_num_threads()),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "torch": torch.__version__,
+    }
+
+
+def _processor() -> str:
+    """The processor's name as Linux tells it, or what Python knows."""
+    try:
+        for line in Path("/proc/cpuinfo").read_text("utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
+
+
+def latency_report(rows: Sequence[Row], described: Mapping[str, str]) -> str:
+    """The table and the machine, as text."""
+    on = ", ".join(f"{key} {value}" for key, value in described.items())
+    how = f"Whole calls of allocate, one target each, after {WARM_UP} uncounted ones on each layout."
+    return f"{text_table(rows)}\n\n{how}\nMachine: {on}."

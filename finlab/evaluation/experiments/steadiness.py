@@ -1,0 +1,191 @@
+"""From tick to tick along smooth paths of wrenches: how far fins turn with and without the previous command.
+
+A path is a sum of slow sines in every axis, brought into what the layout can push at all and scaled so that
+an even spread over the fins never asks for more than half of any fin's thrust. Each tick is one call of
+`allocate`; with `previous` it is told the last command. Every answer is scored by the plant.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from finlab.allocation.allocator import Allocator
+from finlab.evaluation.statistics.tables import text_table
+from finlab.layout import Layout
+from finlab.layout.arrays import layout_effectiveness
+from finlab.physics import Plant
+from finlab.physics.energy import command_energy
+
+Array = NDArray[np.float64]
+
+TICKS, RATE = 600, 10.0
+"""Length of a path, and ticks per second [Hz]: one minute."""
+PERIODS = (10.0, 40.0)
+"""Shortest and longest period of a path's sines [s]."""
+N_SINES = 3
+"""Sines in each axis."""
+LOAD = 0.5
+"""Largest share of a fin's thrust that an even spread of the path asks for."""
+DOMAIN = 0x57EAD
+"""Leads the seed of every path."""
+GOAL = 0.2
+"""Largest turn with `previous` over that without it that counts as steady."""
+WORKS = 1e-3
+"""Share of its largest thrust from which a fin has to point somewhere."""
+
+Row = dict[str, Any]
+
+
+class Rollout(NamedTuple):
+    """What one method did along one path of T ticks."""
+
+    turn: Array
+    """What each fin turned from tick to tick (T - 1, n), the shorter way round [rad]."""
+    energy: Array
+    """Energy proxy (T,)."""
+    err_norm: Array
+    """Normalized error (T,), by the plant."""
+    solve_ms: Array
+    """Time of each call (T,) [ms]."""
+
+
+def smooth_path(layout: Layout, sigma: Array, seed: int, ticks: int = TICKS) -> Array:
+    """A path of wrenches (T, 6) [N, N m] that the layout can follow.
+
+    Args:
+        layout: the robot.
+        sigma: per-axis standard deviation (6,), which sets how the axes compare.
+        seed: same seed, same sines.
+        ticks: how many; a shorter path is the beginning of a longer one up to its scale.
+    """
+    rng = np.random.default_rng((DOMAIN, seed))
+    time = np.arange(ticks)[:, None] / RATE
+    path = np.zeros((ticks, 6))
+    for _ in range(N_SINES):
+        frequency = rng.uniform(1.0 / PERIODS[1], 1.0 / PERIODS[0], 6)
+        phase, size = rng.uniform(0.0, 2.0 * np.pi, 6), rng.uniform(0.3, 1.0, 6)
+        path += size * np.sin(2.0 * np.pi * frequency * time + phase)
+    spread = _even_spread(layout, path, sigma)
+    share = np.linalg.norm(spread.reshape(ticks, -1, 2), axis=-1) / _largest_thrust(layout)
+    pushed: Array = spread @ layout_effectiveness(layout).T
+    return pushed * (LOAD / share.max())
+
+
+def rollout(allocator: Allocator, layout: Layout, path: Array, *, steady: bool, seed: int = 0) -> Rollout:
+    """Follow a path (T, 6), one call per tick; with `steady`, each is told the last command."""
+    commands, times = [], []
+    previous = None
+    for wrench in path:
+        answer = allocator.allocate(layout, wrench, previous=previous, seed=seed)
+        commands.append(answer.command)
+        times.append(answer.solve_ms)
+        previous = answer.command if steady else None
+    command = np.array(commands)
+    return Rollout(
+        turn=_turns(command[..., 2]),
+        energy=command_energy(command, layout.upper),
+        err_norm=allocator.normalization.error(Plant(layout).wrench(command), path),
+        solve_ms=np.array(times),
+    )
+
+
+def forced_turn(layout: Layout, path: Array) -> float | None:
+    """The largest turn per tick [rad] that a path forces; None where the fins have a choice.
+
+    Without a null space there is only one set of forces for each wrench.
+    """
+    effectiveness = layout_effectiveness(layout)
+    if np.linalg.matrix_rank(effectiveness, 1e-6) < effectiveness.shape[1]:
+        return None
+    force = (path @ np.linalg.pinv(effectiveness).T).reshape(len(path), -1, 2)
+    works = np.linalg.norm(force, axis=-1) > WORKS * _largest_thrust(layout)
+    turn = _turns(np.arctan2(force[..., 1], force[..., 0]))
+    return float(np.where(works[1:] & works[:-1], turn, 0.0).max())
+
+
+def steadiness_rows(
+    allocator: Allocator, layouts: Sequence[Layout], *, n_paths: int = 3, ticks: int = TICKS, seed: int = 0
+) -> list[Row]:
+    """One row per layout: the worst of its paths where turns are told, their mean where energy is.
+
+    Args:
+        allocator: a method that knows `previous`.
+        layouts: the robots.
+        n_paths: paths of each.
+        ticks: length of each path.
+        seed: of the first path; the others follow.
+    """
+    rows = []
+    for layout in tqdm(layouts, unit="layout", disable=None, leave=False, file=sys.stderr):
+        free, steady, forced = [], [], []
+        for k in range(n_paths):
+            path = smooth_path(layout, allocator.normalization.std, seed + k, ticks)
+            free.append(rollout(allocator, layout, path, steady=False))
+            steady.append(rollout(allocator, layout, path, steady=True))
+            forced.append(forced_turn(layout, path))
+        rows.append(_row(layout, free, steady, forced))
+    return rows
+
+
+def steadiness_report(rows: Sequence[Row]) -> str:
+    """The rows as a table, with what its columns mean."""
+    return "\n".join(
+        [
+            text_table(rows),
+            "",
+            f"{TICKS / RATE:g} s at {RATE:g} Hz unless told otherwise; scored by the plant. turn_free and "
+            "turn_steady: the largest turn of any fin in one tick [rad] without and with `previous`; "
+            f"turn_ratio: the worst path's; steady: paths whose ratio is at most {GOAL}; forced: the largest "
+            "turn that any answer must make, where forces are unique.",
+        ]
+    )
+
+
+def _row(layout: Layout, free: list[Rollout], steady: list[Rollout], forced: list[float | None]) -> Row:
+    ratios = [b.turn.max() / max(a.turn.max(), 1e-9) for a, b in zip(free, steady, strict=True)]
+    energies = [b.energy.mean() / a.energy.mean() for a, b in zip(free, steady, strict=True)]
+    known = [turn for turn in forced if turn is not None]
+    return {
+        "layout": layout.name,
+        "fins": layout.n_fins,
+        "paths": len(free),
+        "turn_free": float(max(a.turn.max() for a in free)),
+        "turn_steady": float(max(b.turn.max() for b in steady)),
+        "turn_ratio": float(max(ratios)),
+        "steady": int(sum(ratio <= GOAL for ratio in ratios)),
+        "forced": max(known) if known else None,
+        "energy_ratio": float(np.mean(energies)),
+        "energy_ratio_worst": float(max(energies)),
+        "err_norm_max": float(max(b.err_norm.max() for b in steady)),
+        "ms_free": float(np.median([a.solve_ms for a in free])),
+        "ms_steady": float(np.median([b.solve_ms for b in steady])),
+    }
+
+
+def _even_spread(layout: Layout, path: Array, sigma: Array) -> Array:
+    """The least planar forces (T, 2n) whose wrench comes closest to sigma times the path."""
+    effectiveness = layout_effectiveness(layout)
+    spread: Array = path @ np.linalg.pinv(effectiveness / sigma[:, None], rcond=1e-6).T
+    return spread
+
+
+def _largest_thrust(layout: Layout) -> Array:
+    """Largest thrust of each fin (n,) [N]."""
+    strongest = np.array(
+        [[*fin.limits.upper[:2], 0.5 * sum(fin.limits.zero_direction)] for fin in layout.fins]
+    )
+    thrust: Array = np.linalg.norm(Plant(layout).fin_forces(strongest), axis=-1)
+    return thrust
+
+
+def _turns(direction: Array) -> Array:
+    """Turns (T - 1, n) between directions (T, n), the shorter way round."""
+    turn = np.diff(direction, axis=0)
+    shorter: Array = np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi)
+    return shorter

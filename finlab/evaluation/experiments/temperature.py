@@ -1,0 +1,142 @@
+"""The paper's figure A: what the temperature of the draw does, and what refinement does to a candidate."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from finlab.allocation.learned.paper import PaperAllocator
+from finlab.evaluation.splits import Case
+from finlab.evaluation.statistics.bootstrap import mean_interval
+from finlab.evaluation.statistics.tables import text_table
+from finlab.layout import Layout
+from finlab.training.networks.checkpoint import load_allocator_checkpoint, resolve_checkpoint
+
+Array = NDArray[Any]
+Columns = dict[str, Array]
+Row = dict[str, Any]
+
+TEMPERATURES = tuple(float(t) for t in np.logspace(-3, 1, 13))
+"""From 0.001 to 10, three to a decade."""
+PAPER_TEMPERATURE = 0.02
+"""The paper's choice."""
+FULL_TURN = 2 * np.pi - 1e-6
+"""Arc of zero directions [rad] from which they are compared as angles."""
+
+
+def temperature_columns(
+    cases: Sequence[Case],
+    temperature: float,
+    *,
+    checkpoint: str | Path | None = None,
+    n_candidates: int = 64,
+    seed: int = 0,
+) -> Columns:
+    """What the draw at one temperature gives, before any refinement, one entry per target.
+
+    Columns: `layout` and `target` (numbers), `n_fins`, `diversity` (see `diversity`), `best_j` and `mean_j`
+    (smallest and mean selection cost J = J_norm + gamma J_en among the candidates, by the surrogate).
+
+    Args:
+        cases: layouts with targets.
+        temperature: of the draw.
+        checkpoint: of method `paper`; the shipped one by default.
+        n_candidates: candidates drawn per target.
+        seed: of the draw.
+    """
+    allocator = _method(checkpoint, n_candidates=n_candidates, temperature=temperature, refine=False)
+    rows: list[tuple[float, ...]] = []
+    for k, case in enumerate(tqdm(cases, unit="layout", disable=None, leave=False, file=sys.stderr)):
+        layout = case.layout.without(case.failed) if case.failed else case.layout
+        for number, target in enumerate(case.targets):
+            samples = allocator.allocate(layout, target, seed=seed).samples
+            assert samples is not None
+            j = samples.err_norm**2 + allocator.gamma * samples.energy
+            spread = diversity(samples.command, layout)
+            rows.append((k, number, layout.n_fins, spread, float(j.min()), float(j.mean())))
+    names = ("layout", "target", "n_fins", "diversity", "best_j", "mean_j")
+    values = np.array(rows, dtype=np.float64)
+    whole = ("layout", "target", "n_fins")
+    return {
+        name: column.astype(np.int64) if name in whole else column
+        for name, column in zip(names, values.T, strict=True)
+    }
+
+
+def refinement_columns(
+    case: Case,
+    *,
+    checkpoint: str | Path | None = None,
+    n_candidates: int = 64,
+    temperature: float = PAPER_TEMPERATURE,
+    seed: int = 0,
+) -> Columns:
+    """Every candidate of every target of a case before and after refinement.
+
+    Columns, one entry per candidate, by the surrogate: `target`, `refined` (0 before, 1 after), `energy`,
+    `err_norm`.
+    """
+    allocator = _method(
+        checkpoint, n_candidates=n_candidates, n_refined=n_candidates, temperature=temperature
+    )
+    parts = []
+    for number, target in enumerate(case.targets):
+        result = allocator.allocate(case.layout, target, failed=case.failed, seed=seed)
+        for refined, found in ((0, result.samples), (1, result.candidates)):
+            assert found is not None
+            ones = np.ones(len(found.energy))
+            parts.append(np.stack([number * ones, refined * ones, found.energy, found.err_norm]))
+    target_number, after, energy, error = np.concatenate(parts, axis=1)
+    return {
+        "target": target_number.astype(np.int64),
+        "refined": after.astype(np.int64),
+        "energy": energy,
+        "err_norm": error,
+    }
+
+
+def diversity(command: Array, layout: Layout) -> float:
+    """Mean distance between two of the commands (K, n, 3): root mean square over all their entries, each in
+    units of its range; zero directions of a full circle are compared the short way round."""
+    lower, upper = (np.array([getattr(f.limits, end) for f in layout.fins]) for end in ("lower", "upper"))
+    width = np.maximum(upper - lower, 1e-9)
+    first, second = np.triu_indices(len(command), k=1)
+    if len(first) == 0:
+        return 0.0
+    gap = np.abs(command[first] - command[second])
+    turns = width[:, 2] >= FULL_TURN
+    gap[..., 2] = np.where(turns, np.minimum(gap[..., 2], 2 * np.pi - gap[..., 2]), gap[..., 2])
+    return float(np.sqrt(((gap / width) ** 2).mean(axis=(1, 2))).mean())
+
+
+def temperature_row(temperature: float, columns: Columns) -> Row:
+    """One row of the table, from the records of one temperature."""
+    j, group = columns["best_j"], columns["layout"]
+    return {
+        "temperature": temperature,
+        "n": len(j),
+        "diversity": float(columns["diversity"].mean()),
+        "best_j_median": float(np.median(j)),
+        "best_j_mean": float(j.mean()),
+        "best_j_mean_interval": list(mean_interval(j, group)),
+    }
+
+
+def temperature_report(rows: Sequence[Row]) -> str:
+    """The table, and which temperature is best, as text."""
+    best = min(rows, key=lambda row: row["best_j_mean"])
+    note = (
+        f"best J at T = {best['temperature']:.3g}; the paper uses {PAPER_TEMPERATURE}. J and diversity are "
+        "those of the raw candidates, by the surrogate."
+    )
+    return f"{text_table(rows)}\n\n{note}"
+
+
+def _method(checkpoint: str | Path | None, **options: Any) -> PaperAllocator:
+    return PaperAllocator(load_allocator_checkpoint(resolve_checkpoint(checkpoint or "paper")), **options)

@@ -1,0 +1,146 @@
+"""What each part of the training brings: small trainings on equal budgets, one thing changed at a time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.evaluation.experiments.ablation_refinement import PaperWithLevenbergMarquardt
+from finlab.evaluation.experiments.wrench_tracking import run_method
+from finlab.evaluation.splits import Case
+from finlab.evaluation.statistics.bootstrap import mean_interval
+from finlab.evaluation.statistics.records import columns_of_records
+from finlab.evaluation.statistics.tables import text_table
+from finlab.training.networks.checkpoint import resolve_checkpoint
+
+LM_STEPS = 4
+"""Levenberg-Marquardt steps after which the refined error is taken."""
+
+Columns = dict[str, NDArray[Any]]
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Change:
+    """What differs from the recipe at hand."""
+
+    title: str
+    """In words."""
+    training: dict[str, Any] = field(default_factory=dict)
+    """Fields of `AllocatorTraining`."""
+    network: dict[str, Any] = field(default_factory=dict)
+    """Fields of `NetworkConfig`."""
+    surrogate: str = "default"
+    """Shipped checkpoint whose surrogate guides the training."""
+
+
+PAPER_LOSS: dict[str, Any] = {
+    "imitation": 1.0,
+    "imitate": "all",
+    "guide": "samples",
+    "guidance_start": 0.01,
+    "ramp": 0.5,
+    "entropy": 0.01,
+}
+"""The terms as the paper prints them; the recipe's guidance of modes needs a joint mixture."""
+CHANGES = {
+    "recipe": Change("the recipe of the shipped network, at this budget"),
+    "no_guidance": Change(
+        "imitation alone, no physics guidance",
+        {"guidance": 0.0, "guidance_start": 0.0, "imitation": 1.0, "imitate": "all"},
+    ),
+    "paper_loss": Change("the paper's loss: imitation, ramped guidance of one sample, entropy", PAPER_LOSS),
+    "paper_loss_per_fin": Change(
+        "the paper's loss, and one mixture per fin as in the paper instead of a joint one",
+        PAPER_LOSS,
+        {"joint": False},
+    ),
+    "ramped": Change("guidance ramped up over half the steps", {"guidance_start": 0.01, "ramp": 0.5}),
+    "no_entropy": Change("no entropy term", {"entropy": 0.0}),
+    "no_imitation": Change("no imitation term", {"imitation": 0.0}),
+    "no_energy": Change("no energy in the guidance", {"energy": 0.0}),
+    "raw_features": Change("the paper's ten node features", network={"features": "raw"}),
+    "mlp_surrogate": Change("guided through the paper's surrogate (perceptron)", surrogate="paper"),
+}
+"""Name -> change; the first one changes nothing."""
+
+
+def train_and_run(
+    name: str,
+    cases: Sequence[Case],
+    folder: Path,
+    *,
+    preset: str,
+    steps: int,
+    batch_size: int,
+    seed: int = 0,
+) -> Columns:
+    """Train with one change and try the network on cases; a training that was cut off goes on.
+
+    Columns: those of `Records` for the best of 64 raw candidates by the surrogate, `refined_err_norm` and
+    `refined_energy` after a few Levenberg-Marquardt steps, and `train_s`, the seconds of training. All are
+    scored by the plant; in all of them the surrogate of the shipped checkpoint ranks and refines.
+
+    Args:
+        name: one of `CHANGES`.
+        cases: layouts with targets.
+        folder: of the training run.
+        preset: recipe that is changed.
+        steps: optimizer steps.
+        batch_size: samples per step.
+        seed: of data and weights.
+    """
+    from finlab.training.allocator import train_allocator
+    from finlab.training.networks.checkpoint import load_checkpoint
+
+    change = CHANGES[name]
+    start = time.perf_counter()
+    trained = train_allocator(
+        preset,
+        folder,
+        surrogate=resolve_checkpoint(change.surrogate),
+        seed=seed,
+        steps=steps,
+        batch_size=batch_size,
+        overrides=change.training,
+        network_overrides=change.network,
+    )
+    train_s = time.perf_counter() - start
+    trained.surrogate = load_checkpoint(resolve_checkpoint("default")).surrogate
+    raw = run_method(PaperWithLevenbergMarquardt(trained, refine=False), cases, seed=seed)
+    refined = run_method(PaperWithLevenbergMarquardt(trained, n_lm_steps=LM_STEPS), cases, seed=seed)
+    after = {"refined_err_norm": refined.err_norm, "refined_energy": refined.energy}
+    return columns_of_records(raw) | after | {"train_s": np.array(train_s)}
+
+
+def training_row(name: str, columns: Columns) -> Row:
+    """One row of the table."""
+    raw, refined, group = columns["err_norm"], columns["refined_err_norm"], columns["layout"]
+    return {
+        "change": name,
+        "n": len(raw),
+        "err_norm_mean": float(raw.mean()),
+        "err_norm_mean_interval": list(mean_interval(raw, group)),
+        "energy_mean": float(columns["energy"].mean()),
+        "refined_err_norm_mean": float(refined.mean()),
+        "refined_err_norm_mean_interval": list(mean_interval(refined, group)),
+        "refined_success_0.01": float((refined <= 0.01).mean()),
+        "refined_energy_mean": float(columns["refined_energy"].mean()),
+        "train_s": float(columns["train_s"]),
+    }
+
+
+def training_report(rows: Sequence[Row], preset: str, steps: int, batch_size: int) -> str:
+    """The table and its budget, as text."""
+    note = (
+        f"{steps} steps of {batch_size} samples, preset {preset}; scored by the plant. err_norm: the best of "
+        f"64 raw candidates; refined: after {LM_STEPS} Levenberg-Marquardt steps on two of them."
+    )
+    meaning = "\n".join(f"{name}: {CHANGES[name].title}" for name in (row["change"] for row in rows))
+    return f"{text_table(rows)}\n\n{meaning}\n\n{note}"

@@ -1,0 +1,161 @@
+"""Wrench tracking: methods over a split, every answer scored by the plant."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from finlab.allocation.allocation import BatchAllocation
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.baselines.single_target import DEFAULT_STARTS
+from finlab.evaluation.method_specs import method_and_starts
+from finlab.evaluation.paper_figures import paper_wrench_rows
+from finlab.evaluation.splits import Case
+from finlab.evaluation.statistics.metrics import energy_rows, rows_by_fin_count, wrench_intervals, wrench_row
+from finlab.evaluation.statistics.records import Records, join_records
+from finlab.evaluation.statistics.tables import text_table
+from finlab.physics import Plant
+from finlab.physics.energy import command_energy
+
+Array = NDArray[np.float64]
+
+
+RESTING = 0.01
+"""A fin rests when it gives less than this share of the force that its limits allow."""
+
+
+def run_method(
+    allocator: Allocator,
+    cases: Sequence[Case],
+    *,
+    seed: int = 0,
+    single: int | None = None,
+    first: int | None = None,
+) -> Records:
+    """What a method does on the cases of a split.
+
+    Args:
+        allocator: the method.
+        cases: layouts with targets.
+        seed: passed to the method.
+        single: None solves all targets of a layout together and `solve_ms` is their time over their number;
+            otherwise only the first so many targets of each layout are solved, one call each, each timed.
+        first: only the first so many targets of each layout, solved together.
+    """
+    parts = []
+    # disable=None: a bar on a terminal, nothing elsewhere
+    bar = tqdm(cases, desc=allocator.name, unit="layout", disable=None, leave=False, file=sys.stderr)
+    for k, case in enumerate(bar):
+        if single is None:
+            targets = case.targets[:first]
+            answer = allocator.allocate_batch(case.layout, targets, failed=case.failed, seed=seed)
+        else:
+            targets = case.targets[:single]
+            answer = _one_by_one(allocator, case, targets, seed)
+        parts.append(score(case, targets, answer, allocator.normalization.std, number=k))
+    return join_records(parts)
+
+
+def score(case: Case, targets: Array, answer: BatchAllocation, sigma: Array, *, number: int = 0) -> Records:
+    """Records of a method's answers to targets (N, 6) of a case, the wrench computed by the plant.
+
+    Args:
+        case: the layout.
+        targets: desired wrenches (N, 6).
+        answer: the method's commands.
+        sigma: per-axis standard deviation (6,).
+        number: of the layout in its split.
+    """
+    plant = Plant(case.layout)
+    upper = case.layout.upper
+    difference = plant.wrench(answer.command) - targets
+    return Records(
+        layout=np.full(len(targets), number, np.int64),
+        target=np.arange(len(targets)),
+        n_fins=np.full(len(targets), case.layout.n_fins - len(case.failed), np.int64),
+        err_norm=np.linalg.norm(difference / sigma, axis=-1),
+        err_phys=np.linalg.norm(difference, axis=-1),
+        energy=command_energy(answer.command, upper),
+        resting=count_resting(plant, answer.command),
+        solve_ms=np.asarray(answer.solve_ms, np.float64),
+    )
+
+
+def count_resting(plant: Plant, command: Array) -> NDArray[np.int64]:
+    """Healthy fins that rest (N,) in commands (N, n, 3): nearly no force beside their largest one."""
+    upper = plant.layout.upper
+    largest = np.linalg.norm(plant.fin_forces(upper), axis=-1)
+    force = np.linalg.norm(plant.fin_forces(command), axis=-1)
+    rests = (force < RESTING * largest) & ~np.isnan(command).any(axis=-1)
+    return rests.sum(axis=-1)
+
+
+def _one_by_one(allocator: Allocator, case: Case, targets: Array, seed: int) -> BatchAllocation:
+    results = [allocator.allocate(case.layout, target, failed=case.failed, seed=seed) for target in targets]
+    return BatchAllocation(
+        np.array([result.command for result in results]),
+        None,
+        np.array([result.solve_ms for result in results]),
+    )
+
+
+def wrench_rows(records: dict[str, Records], split: str) -> list[dict[str, Any]]:
+    """The table's rows, one per method."""
+    return [wrench_row(of_method, split=split, method=method) for method, of_method in records.items()]
+
+
+def interval_rows(records: dict[str, Records], split: str) -> list[dict[str, Any]]:
+    """Intervals of the table's columns, one row per method: [low, high] by column."""
+    return [
+        {"split": split, "method": method, **{k: list(v) for k, v in wrench_intervals(part).items()}}
+        for method, part in records.items()
+    ]
+
+
+def energy_comparison(records: dict[str, Records]) -> list[dict[str, Any]]:
+    """Energies of all methods over those of IPOPT, from the most starts that took part; none without it."""
+    parsed = {name: method_and_starts(name) for name in records}
+    starts = {name: count or DEFAULT_STARTS for name, (method, count) in parsed.items() if method == "ipopt"}
+    if not starts or len(records) == 1:
+        return []
+    reference = max(starts, key=lambda name: starts[name])
+    return [
+        {"reference": reference, **row}
+        for method, part in records.items()
+        if method != reference
+        for row in energy_rows(part, records[reference], method=method)
+    ]
+
+
+def wrench_report(records: dict[str, Records], split: str, *, single: int | None = None) -> str:
+    """The table beside the paper's printed figures, its intervals, and the error by fin count, as text."""
+    by_fins = [row for method, part in records.items() for row in rows_by_fin_count(part, method=method)]
+    timing = (
+        "solve_ms: the time of all targets of a layout over their number."
+        if single is None
+        else "solve_ms: one call at a time."
+    )
+    energies = energy_comparison(records)
+    shown = ("method", "err_norm_mean", "err_norm_median", "err_norm_p95", "success_0.01", "energy_mean")
+    return "\n".join(
+        [
+            text_table([*wrench_rows(records, split), *paper_wrench_rows(split)]),
+            "",
+            "where a rerun with another seed lands, 95 times of 100 (bootstrap over layouts)",
+            text_table(interval_rows(records, split), shown),
+            "",
+            text_table(by_fins),
+            "",
+            *(
+                [f"energy over that of {energies[0]['reference']}", text_table(energies), ""]
+                if energies
+                else []
+            ),
+            f"scored by the plant, the analytic fin model. {timing}",
+        ]
+    )

@@ -1,0 +1,88 @@
+"""Methods as users specify them: a name, with a number of starts where a method has them: `ipopt-32`."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.methods import LEARNED, load_allocator
+from finlab.errors import AllocationError
+
+SLOW = ("trf", "slsqp", "ipopt")
+"""Methods that take a tenth of a second per target, each from several starts; they run on a subsample."""
+QUICK = ("learned", "fast", "paper", "qp", "sqp", "analytic", "multistart")
+"""Methods that run on every target."""
+DISTILLED = "fast"
+"""Folder of the distilled network in a checkpoint."""
+_WITH_STARTS = re.compile(r"(\w+)-(\d+)")
+
+
+def method_names(text: str) -> list[str]:
+    """Names with commas between, each once, in their order; `AllocationError` where there is none."""
+    names = list(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    if not names:
+        raise AllocationError(f"methods: expected names with commas between (learned,paper), got {text!r}")
+    return names
+
+
+def is_slow(name: str) -> bool:
+    """Whether a method runs on a subsample only."""
+    return method_and_starts(name)[0] in SLOW
+
+
+def load_method_spec(name: str, checkpoint: str | Path | None = None) -> Allocator:
+    """The allocator of a specification, as `finlab.load_allocator` makes it.
+
+    Args:
+        name: `sqp`, say, or `ipopt-32` for 32 starts.
+        checkpoint: as in `load_allocator`.
+
+    Raises:
+        AllocationError: unknown method, or starts for a method that has none.
+    """
+    method, starts = method_and_starts(name)
+    if starts is None:
+        return load_allocator(method, checkpoint=checkpoint)
+    if method not in SLOW or starts < 1:
+        raise AllocationError(
+            f"methods: a number of starts, from 1, goes with {', '.join(SLOW)} only, got {name!r}"
+        )
+    return load_allocator(method, checkpoint=checkpoint, n_starts=starts)
+
+
+def fingerprint(name: str, checkpoint: str | Path | None = None) -> str:
+    """What a method's answers depend on besides its settings: the weights' SHA-256 for a learned method,
+    a digest of the normalization for the others."""
+    from finlab.training.networks.checkpoint import load_checkpoint, load_normalization, resolve_checkpoint
+
+    method = method_and_starts(name)[0]
+    path = resolve_checkpoint(checkpoint or ("paper" if method == "paper" else "default"))
+    if method == "fast":
+        weights = b"".join(file.read_bytes() for file in sorted((path / DISTILLED).iterdir()))
+        return load_checkpoint(path).sha256 + hashlib.sha256(weights).hexdigest()
+    if method in LEARNED:
+        return load_checkpoint(path).sha256
+    return hashlib.sha256(b"".join(values.tobytes() for values in load_normalization(path))).hexdigest()
+
+
+def has_distilled(checkpoint: str | Path | None = None) -> bool:
+    """Whether a checkpoint holds the distilled network of method `fast`."""
+    from finlab.training.networks.checkpoint import resolve_checkpoint
+
+    return (resolve_checkpoint(checkpoint or "default") / DISTILLED).is_dir()
+
+
+def surrogate_fingerprint(checkpoint: str | Path) -> str:
+    """Digest of a checkpoint's surrogate alone, which stays the same while the network learns on."""
+    from finlab.training.networks.checkpoint import load_checkpoint, resolve_checkpoint
+
+    state = load_checkpoint(resolve_checkpoint(checkpoint)).surrogate.state_dict()
+    return hashlib.sha256(b"".join(state[key].numpy().tobytes() for key in sorted(state))).hexdigest()
+
+
+def method_and_starts(name: str) -> tuple[str, int | None]:
+    """Method and number of starts."""
+    found = _WITH_STARTS.fullmatch(name)
+    return (name, None) if found is None else (found[1], int(found[2]))

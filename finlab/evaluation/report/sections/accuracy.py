@@ -1,0 +1,125 @@
+"""Wrench tracking on every split, beside the paper's table, with both pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from finlab.evaluation.method_specs import is_slow
+from finlab.evaluation.paper_figures import paper_figures
+from finlab.evaluation.plots.error_distribution import error_by_fins, error_distribution
+from finlab.evaluation.report.document import Block, Column, Figure, Fold, Heading, Row, Table, Text
+from finlab.evaluation.report.results import Results
+from finlab.evaluation.statistics.records import Records, join_records
+
+ORDER = (
+    "learned",
+    "fast",
+    "paper",
+    "analytic",
+    "sqp",
+    "qp",
+    "multistart",
+    "trf",
+    "slsqp",
+    "ipopt",
+    "ipopt-32",
+)
+"""Methods from top to bottom."""
+SPLIT_WORDS = {
+    "id": "2 to 5 fins within 0.30 m, nominal limits, as in training",
+    "ood": "fins out to 0.45 m, beyond what training saw",
+    "ood-fins": "6 to 8 fins; training saw 2 to 5",
+    "limits": "each fin with limits of its own, a third of them with an arc of directions",
+    "failure": "one or two fins lost",
+    "near-singular": "nearly parallel or coincident fins",
+}
+PRINTED = {"ours": "paper's method, printed", "qp": "QP, printed", "sqp": "SQP, printed"}
+
+COLUMNS = (
+    Column("method", "method"),
+    Column("n", "targets", "count"),
+    Column("err_norm_mean", "mean error", "error", "err_norm_mean_interval"),
+    Column("err_norm_median", "median", "error"),
+    Column("err_norm_p95", "95th percentile", "error", "err_norm_p95_interval"),
+    Column("err_norm_max", "largest", "error"),
+    Column("err_phys_mean", "mean, N and N m", "error"),
+    Column("success_0.01", "within 0.01", "share", "success_0.01_interval"),
+    Column("success_0.5", "within 0.5", "share"),
+    Column("success_1.0", "within 1.0", "share"),
+    Column("energy_mean", "mean energy", "three", "energy_mean_interval"),
+    Column("solve_ms_p50", "ms per target", "error"),
+)
+
+
+def accuracy_blocks(results: Results) -> list[Block]:
+    """The whole section."""
+    printed = paper_figures()["wrench_tracking"]
+    blocks: list[Block] = [
+        Heading("Wrench tracking"),
+        Text(
+            "Every method answers wrenches that the robot can deliver, on layouts that no training has seen. "
+            "The error is the distance between asked and delivered wrench in standard deviations of the "
+            "training wrenches; the analytic fin model scores every method, whatever the method believed. "
+            "`learned`, `fast` (its distilled form) and `paper` know only networks trained on forward "
+            "samples; all others know the analytic fin model that scores them."
+        ),
+    ]
+    if not results.wrench:
+        return []
+    shown = {split: _quick(results.wrench[split]) for split in printed if split in results.wrench}
+    blocks.append(
+        Figure(
+            "error-distribution",
+            error_distribution(shown, {split: printed[split]["ours"]["err_norm_mean"] for split in shown}),
+            "How large errors are: the further left and the steeper a curve falls, the better. Errors of "
+            "1e-8 are rounding. Dashes: the mean error that the paper prints for its method.",
+        )
+    )
+    blocks.append(
+        Figure(
+            "error-by-fins",
+            error_by_fins(_by_fins(results), ORDER),
+            "Figure B of the paper: the error by number of working fins, splits `id` (2 to 5) and `ood-fins` "
+            "(6 to 8). Dots are means, bars reach from median to 95th percentile.",
+        )
+    )
+    for split, rows in results.wrench_rows.items():
+        table = Table(COLUMNS, wrench_table(rows, split))
+        title = f"Split {split}: {SPLIT_WORDS[split]}"
+        blocks += [Heading(title, 3), table] if split in printed else [Fold(title, (table,))]
+    blocks.append(
+        Text(
+            "Small print below a number: where a rerun with another seed lands, 95 times of 100 (bootstrap "
+            "over layouts). ms per target: all targets of a layout are solved together; "
+            "methods with a few hundred targets or fewer solve them one by one, from 8 starts (`ipopt-32`: "
+            "32), on the first targets of each layout.",
+            small=True,
+        )
+    )
+    return blocks
+
+
+def wrench_table(rows: Sequence[Row], split: str) -> list[Row]:
+    """Rows in fixed order, the paper's after the method that each belongs to."""
+    printed = paper_figures()["wrench_tracking"].get(split, {})
+    places = {"paper": "ours", "qp": "qp", "sqp": "sqp"}
+    shown: list[Row] = []
+    for row in sorted(rows, key=lambda row: ORDER.index(row["method"])):
+        name = row["method"]
+        kind = {"_kind": "ours"} if name == "learned" else {}
+        shown.append({**row, "method": f"`{name}`", **kind})
+        if (theirs := places.get(name, "")) in printed:
+            shown.append({"method": PRINTED[theirs], "_kind": "printed", **printed[theirs]})
+    return shown
+
+
+def _quick(methods: dict[str, Records]) -> dict[str, Records]:
+    """Methods with enough targets for a curve, in order."""
+    return {name: methods[name] for name in ORDER if name in methods and not is_slow(name)}
+
+
+def _by_fins(results: Results) -> dict[str, Records]:
+    """Records of both splits, for methods that ran on either."""
+    parts = [results.wrench[split] for split in ("id", "ood-fins") if split in results.wrench]
+    names = dict.fromkeys(name for part in parts for name in _quick(part))
+    return {name: join_records([part[name] for part in parts if name in part]) for name in names}

@@ -1,0 +1,175 @@
+"""Closed loop: trajectories on the paper's layouts, lost fins, and speed against power."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from finlab.evaluation.paper_figures import paper_figures
+from finlab.evaluation.plots.closed_loop_report import fault_dots, paths
+from finlab.evaluation.report.claims import Claims
+from finlab.evaluation.report.document import Block, Bullets, Column, Figure, Heading, Row, Table, Text
+from finlab.evaluation.report.results import Results
+
+ERRORS = (
+    Column("ate", "ATE [m]", "metres"),
+    Column("ate_std", "spread", "error"),
+    Column("rte", "RTE [m]", "metres"),
+    Column("depth_rmse", "depth RMSE [m]", "metres"),
+)
+FAULT_WORDS = {"healthy": "healthy", "one_fin": "one fin lost", "two_fins": "two fins lost"}
+
+
+def closed_loop_blocks(results: Results) -> list[Block]:
+    """Every experiment that has run."""
+    rows = results.swim_rows
+    blocks: list[Block] = []
+    if "trajectory" in rows:
+        blocks += _trajectory(rows["trajectory"], results)
+    if "faults" in rows:
+        blocks += _faults(rows["faults"])
+    if "velocity" in rows:
+        blocks += _velocity(rows["velocity"])
+    if not blocks:
+        return []
+    return [
+        Heading("Closed loop"),
+        Text(
+            "A robot with six degrees of freedom swims in simulation, sensor noise and servo lag included; "
+            "the controllers are the paper's. The paper's runs took place in another simulator "
+            "(trajectories) and in a pool (faults, speeds), on paths that it does not describe: its "
+            "figures stand beside ours, not against them. `on-board` is the robot's own fixed-frequency "
+            "law."
+        ),
+        *blocks,
+    ]
+
+
+def closed_loop_claims(rows: Mapping[str, Sequence[Row]]) -> Claims:
+    """The closed loop in words; rows of the three experiments, as far as they have run."""
+    leads: list[str] = []
+    trails: list[str] = []
+    whole = {r["method"]: r for r in rows.get("trajectory", ()) if r["layout"] == "all"}
+    if "learned" in whole:
+        ours, printed = whole["learned"], paper_figures()["trajectory"]["all"]
+        words = (
+            f"Closed loop on layouts A to D: ATE {100 * ours['ate']:.1f} cm and depth RMSE "
+            f"{100 * ours['depth_rmse']:.1f} cm in our simulation (printed, in another: "
+            f"{100 * printed['ate']:.1f} and {100 * printed['depth_rmse']:.1f} cm)."
+        )
+        (leads if ours["ate"] < printed["ate"] else trails).append(words)
+        trails += [
+            f"`{name}` follows the trajectories closer: ATE {100 * row['ate']:.1f} cm."
+            for name, row in whole.items()
+            if row["ate"] < ours["ate"]
+        ]
+    swum = [r for r in rows.get("faults", ()) if r.get("method") == "learned"]
+    healthy = {r["method"]: r["ate"] for r in rows.get("faults", ()) if r["kind"] == "healthy"}
+    trails += [
+        f"Healthy, on the layout of the faults: ATE {100 * healthy['learned']:.1f} cm against "
+        f"{100 * ate:.1f} cm of `{name}`."
+        for name, ate in healthy.items()
+        if "learned" in healthy and ate < healthy["learned"]
+    ]
+    single = [r["ate_over_healthy"] for r in swum if r["kind"] == "one fin" and "ate_over_healthy" in r]
+    if single:
+        words = f"With one fin lost the ATE is at most {max(single):.2f} times that of the healthy robot."
+        (leads if max(single) <= 1.15 else trails).append(words)
+        trails += [f"Loses its way with {r['fault']}." for r in swum if not r["tracked"]]
+    speeds = {r["method"]: r for r in rows.get("velocity", ()) if r["speed"] is None}
+    for mine in (name for name in ("learned-power", "learned") if name in speeds):
+        goal = "inertial power" if mine == "learned-power" else "the energy proxy"
+        sides: dict[bool, list[str]] = {True: [], False: []}
+        for name in (name for name in ("analytic", "on-board") if name in speeds):
+            power = speeds[mine]["inertial_w"] / speeds[name]["inertial_w"] - 1
+            missed = speeds[mine]["mae"] / speeds[name]["mae"] - 1
+            sides[power < 0 and missed <= 0.01].append(
+                f"{abs(100 * power):.0f} % {'less' if power < 0 else 'more'} inertial power than `{name}` "
+                f"with {abs(100 * missed):.0f} % {'smaller' if missed < 0 else 'larger'} speed error"
+            )
+        for ahead, found in sides.items():
+            if found:
+                sentence = f"At constant speed, minimizing {goal} (`{mine}`): {', '.join(found)}."
+                (leads if ahead else trails).append(sentence)
+    return Claims(tuple(leads), tuple(trails))
+
+
+def _trajectory(rows: Sequence[Row], results: Results) -> list[Block]:
+    printed = paper_figures()["trajectory"]
+    shown: list[Row] = []
+    for layout in dict.fromkeys(row["layout"] for row in rows):
+        shown += [_ours(row) for row in rows if row["layout"] == layout]
+        theirs = {"layout": layout, "method": "paper's method, printed", **printed[layout]}
+        shown.append({**theirs, "_kind": "printed"})
+    columns = (
+        Column("layout", "layout"),
+        Column("method", "method"),
+        Column("runs", "runs", "count"),
+        *ERRORS,
+    )
+    return [
+        Heading("Trajectories", 3),
+        Figure(
+            "paths",
+            paths(results.columns(results.plan.swims["trajectory"]), rows),
+            "One run on each of the paper's layouts, seen from above.",
+        ),
+        Table(columns, shown),
+    ]
+
+
+def _faults(rows: Sequence[Row]) -> list[Block]:
+    printed = paper_figures()["fault_tolerance"]
+    swum = [_ours(row) for row in rows if row["controllable"]]
+    names = {"ours": "paper's method, printed", "baseline": "paper's baseline, printed"}
+    theirs = [
+        {"fault": FAULT_WORDS[fault], "method": names[method], "_kind": "printed", **values}
+        for fault, methods in printed.items()
+        for method, values in methods.items()
+    ]
+    columns = (
+        Column("fault", "lost fins"),
+        Column("method", "method"),
+        Column("runs", "runs", "count"),
+        *ERRORS,
+        Column("ate_over_healthy", "over healthy", "ratio"),
+    )
+    hopeless = tuple(row["fault"] for row in rows if not row["controllable"])
+    beside = {f"{FAULT_WORDS[k]} (printed)": v["ours"]["ate"] for k, v in printed.items()}
+    blocks: list[Block] = [
+        Heading("Lost fins", 3),
+        Figure("faults", fault_dots(rows, beside), "Layout A. Diamonds: the paper's pool."),
+        Table(columns, [*swum, *theirs]),
+    ]
+    if hopeless:
+        blocks += [
+            Text("Not swum, since the fins that are left cannot give surge, heave and yaw independently:"),
+            Bullets(hopeless),
+        ]
+    return blocks
+
+
+def _velocity(rows: Sequence[Row]) -> list[Block]:
+    printed = paper_figures()["velocity"]
+    shown = [{**_ours(row), "speed": row["speed"] or "all"} for row in rows]
+    names = {"ours": "paper's method, printed", "baseline": "paper's baseline, printed"}
+    shown += [
+        {"speed": "all", "method": names[method], "_kind": "printed", **values}
+        for method, values in printed.items()
+    ]
+    columns = (
+        Column("speed", "speed [m/s]"),
+        Column("method", "method"),
+        Column("runs", "runs", "count"),
+        Column("inertial_w", "inertial power [W]", "three"),
+        Column("inertial_w_std", "spread", "error"),
+        Column("torque_w", "torque power [W]", "three"),
+        Column("mae", "speed error [m/s]", "metres"),
+        Column("mae_std", "spread", "error"),
+        Column("depth_rmse", "depth RMSE [m]", "metres"),
+    )
+    return [Heading("Speed and power", 3), Table(columns, shown)]
+
+
+def _ours(row: Row) -> Row:
+    kind = {"_kind": "ours"} if row["method"].startswith("learned") else {}
+    return {**row, "method": f"`{row['method']}`", **kind}

@@ -1,0 +1,266 @@
+"""A robot that swims: sensors, controller, allocator, fins and body, one control period at a time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.baselines.actuation import Actuation
+from finlab.control import Completion, Controller, Measurement, VelocityController, WaypointController
+from finlab.errors import FinlabError
+from finlab.layout import Layout
+from finlab.layout.arrays import stack_layouts
+from finlab.sim.attitude import euler, quaternion_of_yaw
+from finlab.sim.fin_motion import FinMotion, Servo
+from finlab.sim.fin_power import fin_power
+from finlab.sim.log import RunLog, Tick, log_of_ticks
+from finlab.sim.parameters import vehicle_parameters
+from finlab.sim.plants import make_plant
+from finlab.sim.sensors import Sensors, SensorSettings
+from finlab.sim.task import Cruise, Task
+from finlab.sim.vehicle import STATE_SIZE, Vehicle
+
+Array = NDArray[np.float64]
+
+
+class ClosedLoop:
+    """One robot under way. Make it, then call `step` until `done`; `fail` and `mend` fins as you like.
+
+        swim = ClosedLoop(layout, finlab.load_allocator(), make_trajectory("lissajous"))
+        while not swim.done:
+            tick = swim.step()
+
+    A step takes one control period, 0.1 s by the shipped gains. Nothing in here waits: whoever shows a swim
+    steps it at the pace of the clock.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        allocator: Allocator,
+        task: Task,
+        controller: Controller | None = None,
+        *,
+        plant: str = "mean",
+        steady: bool = False,
+        sensors: SensorSettings | None = None,
+        servo: Servo | None = None,
+        current: Sequence[float] = (0.0, 0.0, 0.0),
+        failures: Sequence[tuple[str, float]] = (),
+        seed: int = 0,
+    ) -> None:
+        """Puts the robot at rest at the start of its task.
+
+        Args:
+            layout: the robot; what its body does not say is U-CAT's.
+            allocator: any method.
+            task: a `Trajectory` or a `Cruise`.
+            controller: by default the waypoint controller for trajectories, the velocity controller for
+                cruises.
+            plant: `mean`, `ripple` or `flexible`; see `PLANTS`.
+            steady: whether the allocator is told its previous command, so that fins turn little per tick.
+            sensors: rates and noise; the defaults of `SensorSettings`.
+            servo: what drives the fins.
+            current: velocity of the water (3,) in the world [m/s].
+            failures: names of fins, each with the time [s] at which it is lost.
+            seed: of the sensors' noise and of the allocator.
+
+        Raises:
+            FinlabError: an unknown fin or plant, or a time that is none.
+        """
+        layout.indices([name for name, _ in failures])
+        for name, time in failures:
+            if not (math.isfinite(time) and time >= 0.0):
+                raise FinlabError(f"failure of {name}: expected a time of 0 s or more, got {time}")
+        self.layout = layout
+        self.allocator = allocator
+        self.task = task
+        self.controller = _usual_controller(task) if controller is None else controller
+        self.plant = plant
+        self.steady = steady
+        self.seed = seed
+        self.vehicle = Vehicle(vehicle_parameters(layout), current)
+        self.fins = FinMotion(layout, servo)
+        """The fins' motion: amplitude, frequency, zero direction and phase of each."""
+        self._fin_force = make_plant(plant, layout)
+        self._actuation = Actuation(layout)
+        self._axes, self._position = _geometry(layout)
+        self._sensors = Sensors(SensorSettings() if sensors is None else sensors, np.random.default_rng(seed))
+        self._pending = sorted(failures, key=lambda failure: failure[1])
+        self.failed: tuple[str, ...] = ()
+        """Names of the fins that are lost now."""
+        self._completion: dict[tuple[str, ...], Completion] = {}
+        self._ticks: list[Tick] = []
+        self._command: Array | None = None
+        self.period_s = self.controller.period_s
+        """Length of a step [s]."""
+        start, heading = task.start()
+        self.state = np.zeros(STATE_SIZE)
+        """State (13,): position (world), quaternion (w, x, y, z), velocity and rates (body); SI."""
+        self.state[:3], self.state[3:7] = start, quaternion_of_yaw(heading)
+        self.controller.reset()
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return len(self._ticks) * self.period_s
+
+    @property
+    def done(self) -> bool:
+        """Whether the task is over."""
+        return self.time >= self.task.duration_s - 1e-9
+
+    @property
+    def position(self) -> Array:
+        """Position (3,) in the world [m]."""
+        return self.state[:3]
+
+    @property
+    def attitude(self) -> Array:
+        """Roll, pitch, yaw (3,) [rad]."""
+        return euler(self.state[3:7])
+
+    @property
+    def controllable(self) -> bool:
+        """Whether the working fins can give what the controller commands, in small."""
+        return self._complete().controllable
+
+    @property
+    def log(self) -> RunLog:
+        """The record so far."""
+        return log_of_ticks(
+            self._ticks,
+            layout=self.layout.name,
+            fins=self.layout.names,
+            method=self.allocator.name,
+            controller=self.controller.name,
+            task=self.task.name,
+            plant=self.plant,
+            seed=self.seed,
+        )
+
+    def fail(self, name: str) -> None:
+        """A fin stops and hangs still; the allocator knows at once.
+
+        Raises:
+            LayoutError: there is no fin of that name, or it is the last that works.
+        """
+        self.layout.index(name)
+        if name not in self.failed:
+            self.layout.without([*self.failed, name])
+            self.failed = (*self.failed, name)
+
+    def mend(self, name: str) -> None:
+        """A lost fin works again.
+
+        Raises:
+            LayoutError: there is no fin of that name.
+        """
+        self.layout.index(name)
+        self.failed = tuple(other for other in self.failed if other != name)
+
+    def step(self) -> Tick:
+        """Swims for one control period and returns what happened."""
+        time = self.time
+        while self._pending and self._pending[0][1] <= time + 1e-9:
+            self.fail(self._pending.pop(0)[0])
+        now = self._sensors.measure(time, self.state)
+        asked = self._complete()(
+            self.controller.wrench(now, self.task.setpoint(time + self.controller.lead_s))
+        )
+        previous = self._command if self.steady else None
+        answer = self.allocator.allocate(
+            self.layout, asked, failed=self.failed, previous=previous, seed=self.seed
+        )
+        tick = self._move(time, now, asked, answer.command, answer.solve_ms)
+        self._command = answer.command
+        self._ticks.append(tick)
+        return tick
+
+    def run(self, progress: Callable[[float], None] | None = None) -> RunLog:
+        """Swims to the end of the task.
+
+        Args:
+            progress: called after each step with the time that it took in the simulation [s].
+        """
+        while not self.done:
+            self.step()
+            if progress is not None:
+                progress(self.period_s)
+        return self.log
+
+    def _complete(self) -> Completion:
+        """What completes the controller's wrench for the fins that work now."""
+        if self.failed not in self._completion:
+            self._completion[self.failed] = Completion(self.layout, self.failed, self.controller.axes)
+        return self._completion[self.failed]
+
+    def _move(self, time: float, now: Measurement, asked: Array, command: Array, solve_ms: float) -> Tick:
+        """Fins and body over one period with a constant command."""
+        before, setpoint = self.state, self.task.setpoint(time)
+        n_steps = max(1, math.ceil(self.period_s / self._fin_force.step_s - 1e-9))
+        dt = self.period_s / n_steps
+        alive = np.isfinite(command[:, 0])
+        total, wrench_sum = np.zeros((self.layout.n_fins, 3)), np.zeros(6)
+        inertial, torque = np.zeros(self.layout.n_fins), np.zeros(self.layout.n_fins)
+        for k in range(n_steps):
+            self.fins.step(command, dt)
+            force = np.einsum("nij,nj->ni", self._axes, self._fin_force.step(self.fins, dt))
+            force[~alive] = 0.0
+            wrench = _wrench(force, self._position)
+            self.state = self.vehicle.step(self.state, wrench.tolist(), dt)
+            if k + 1 < n_steps:  # the sample at the end belongs to the next period
+                self._sensors.measure(time + (k + 1) * dt, self.state)
+            power = fin_power(self.fins)
+            total += force / n_steps
+            wrench_sum += wrench / n_steps
+            inertial += power.inertial / n_steps
+            torque += power.torque / n_steps
+        idle = np.where(alive[:, None], command, 0.0)
+        planned = self._actuation.wrench(idle)
+        return Tick(
+            time=time,
+            position=before[:3].copy(),
+            quaternion=before[3:7].copy(),
+            motion=before[7:].copy(),
+            reference=setpoint.position,
+            reference_surge=setpoint.surge,
+            asked=asked,
+            allocated=planned,
+            delivered=wrench_sum,
+            command=command,
+            fin_motion=self.fins.command,
+            fin_angle=self.fins.angle,
+            fin_force=total,
+            inertial_power=inertial,
+            torque_power=torque,
+            alive=alive,
+            solve_ms=solve_ms,
+        )
+
+
+def _usual_controller(task: Task) -> Controller:
+    """Velocity and depth for a cruise, waypoints for all else."""
+    return VelocityController() if isinstance(task, Cruise) else WaypointController()
+
+
+def _wrench(force: Array, position: Array) -> Array:
+    """The wrench (6,) of forces (n, 3) [N] at positions (n, 3) [m]."""
+    x, y, z = position.T
+    fx, fy, fz = force.T
+    return np.array([*force.sum(axis=0), y @ fz - z @ fy, z @ fx - x @ fz, x @ fy - y @ fx])
+
+
+def _geometry(layout: Layout) -> tuple[Array, Array]:
+    """Axes of the fins' frames as columns (n, 3, 3) in the body frame, and their positions (n, 3) [m]."""
+    arrays = stack_layouts([layout])
+    angle = arrays.mounting_angle[0]
+    axes = np.zeros((layout.n_fins, 3, 3))
+    axes[:, 0, 0], axes[:, 1, 0] = np.cos(angle), np.sin(angle)
+    axes[:, 0, 1], axes[:, 1, 1] = -np.sin(angle), np.cos(angle)
+    axes[:, 2, 2] = 1.0
+    return axes, arrays.position[0]

@@ -1,0 +1,146 @@
+"""The three experiments and their pictures on small runs, and what the verbs refuse."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finlab.allocation.allocator import Allocator
+from finlab.cli import main
+from finlab.evaluation.experiments.faults import all_faults, fault_report, fault_rows, run_faults
+from finlab.evaluation.experiments.trajectory import run_trajectory, trajectory_report, trajectory_rows
+from finlab.evaluation.experiments.velocity import run_velocity, velocity_report, velocity_rows
+from finlab.evaluation.on_board import OnBoard
+from finlab.evaluation.plots.closed_loop_experiments import (
+    save_faults_figure,
+    save_layouts_figure,
+    save_velocity_figure,
+)
+from finlab.layout import Layout
+from finlab.sim import Trajectory, load_log
+
+MOST_BYTES = 150_000
+
+
+@pytest.fixture(scope="module")
+def line() -> Trajectory:
+    """A metre ahead in eight seconds."""
+    return Trajectory("line", np.array([0.0, 8.0]), np.array([[0.0, 0.0, -1.0], [1.0, 0.0, -1.0]]))
+
+
+def is_small_png(path: Path) -> bool:
+    content = path.read_bytes()
+    return content.startswith(b"\x89PNG") and 5_000 < len(content) < MOST_BYTES
+
+
+def test_trajectory(layout_a: Layout, analytic: Allocator, line: Trajectory, tmp_path: Path) -> None:
+    runs = run_trajectory([layout_a], {"analytic": analytic}, line, range(2))
+    one, every = trajectory_rows(runs)
+    assert (one["layout"], one["runs"], every["layout"]) == ("A", 2, "all")
+    assert 0.0 < one["ate"] < 0.3 and one["ate_std"] > 0.0
+    report = trajectory_report([one, every], line, "mean")
+    assert "printed in the paper" in report and "0.134" in report and "no alignment" in report
+    save_layouts_figure(runs, tmp_path / "layouts.png")
+    assert is_small_png(tmp_path / "layouts.png")
+
+
+def test_faults(layout_a: Layout, analytic: Allocator, line: Trajectory, tmp_path: Path) -> None:
+    faults = all_faults(layout_a, 4.0)
+    assert len(faults) == 1 + 4 + 6 + 4
+    assert sum(not fault.controllable for fault in faults) == 2
+    chosen = [fault for fault in faults if "back_right" in fault.fins or not fault.fins]
+    rows = fault_rows(chosen, run_faults(layout_a, {"analytic": analytic}, line, chosen, [0]))
+    assert rows[0]["ate_over_healthy"] == 1.0
+    hopeless = next(row for row in rows if not row["controllable"])
+    report = fault_report(rows, layout_a, line, "mean")
+    assert report.startswith("Not swum") and hopeless["fault"] in report and "ate" not in hopeless
+    save_faults_figure(rows, tmp_path / "faults.png")
+    assert is_small_png(tmp_path / "faults.png")
+
+
+def test_velocity(layout_a: Layout, analytic: Allocator, tmp_path: Path) -> None:
+    methods = {"analytic": analytic, "on-board": OnBoard(analytic.normalization)}
+    runs = run_velocity(layout_a, methods, [0], (0.1,), duration_s=12.0)
+    rows = velocity_rows(runs)
+    assert [row["speed"] for row in rows] == [0.1, 0.1, None, None]
+    assert rows[0]["inertial_w"] < rows[1]["inertial_w"], "a fixed fast beat costs more"
+    assert "%" in velocity_report(rows, "analytic", layout_a, "mean")
+    save_velocity_figure(runs, tmp_path / "velocity.png")
+    assert is_small_png(tmp_path / "velocity.png")
+
+
+def test_on_board_is_exact_within_its_limits_and_scales_beyond(layout_a: Layout, analytic: Allocator) -> None:
+    method = OnBoard(analytic.normalization)
+    modest = method.allocate(layout_a, [4.0, 0.3, 1.0, 0.1, 0.1, 0.2])
+    assert modest.err_norm < 0.05
+    assert (modest.command[:, 1] == 2.0).all()
+    huge = method.allocate(layout_a, [60.0, 0, 0, 0, 0, 0])
+    assert huge.command[:, 0].max() == pytest.approx(0.6)
+    assert huge.wrench[0] > 15.0 and np.abs(huge.wrench[1:]).max() < 1e-6
+    one_lost = method.allocate(layout_a, [2.0, 0, 0.3, 0, 0, 0.1], failed=["front_left"])
+    assert np.isnan(one_lost.command[layout_a.index("front_left")]).all()
+    assert one_lost.err_norm < 0.05
+
+
+def test_simulate_writes_a_log_and_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "line.csv"
+    path.write_text("t,x,y,z\n0,0,0,-1\n8,1,0,-1\n")
+    out = tmp_path / "out"
+    argv = ["simulate", "A", "--trajectory", str(path), "--method", "analytic", "--fail", "front_left@4"]
+    assert main([*argv, "--output", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert "ATE" in printed and "lost: front_left" in printed
+    log = load_log(out / "log.npz")
+    assert log.task == "line" and not log.alive[-1, log.fins.index("front_left")]
+    assert all(is_small_png(out / f"{name}.png") for name in ("path", "errors", "commands", "wrench"))
+    assert main([*argv, "--output", str(out)]) == 2
+    assert "expected a new or empty folder" in capsys.readouterr().err
+
+
+def test_uncontrollable_is_said_before_the_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "line.csv"
+    path.write_text("t,x,y,z\n0,0,0,-1\n1,0.1,0,-1\n")
+    fins = ["--fail", "front_left@0", "--fail", "back_left@0.5"]
+    assert main(["simulate", "A", "--trajectory", str(path), "--method", "analytic", *fins]) == 0
+    err = capsys.readouterr().err
+    assert "from 0.5 s on, A without front_left, back_left cannot give surge, heave and yaw" in err
+
+
+@pytest.mark.parametrize(
+    ("argv", "message"),
+    [
+        (["simulate", "A", "--fail", "front_left"], "expected NAME@SECONDS"),
+        (["simulate", "A", "--fail", "tail@3", "--method", "analytic"], "no fin 'tail'"),
+        (["simulate", "A", "--trajectory", "spiral", "--method", "analytic"], "circle, lissajous, square"),
+        (["eval", "trajectory", "--runs", "0"], "runs: expected a number of at least 1"),
+        (["eval", "faults", "--methods", ","], "methods: expected names"),
+        (["eval", "velocity", "--duration", "5"], "more than 10 s"),
+    ],
+)
+def test_bad_input_is_one_sentence(argv: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(argv) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("finlab: error: ") and message in err and len(err.splitlines()) == 1
+
+
+def test_verbs_have_help_and_write_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for verb in (["simulate"], ["eval", "trajectory"], ["eval", "faults"], ["eval", "velocity"]):
+        assert main([*verb, "--help"]) == 0
+    capsys.readouterr()
+    file = tmp_path / "rows.json"
+    argv = [
+        "eval",
+        "velocity",
+        "--methods",
+        "analytic",
+        "--runs",
+        "1",
+        "--duration",
+        "11",
+        "--json",
+        str(file),
+    ]
+    assert main(argv) == 0
+    rows = json.loads(file.read_text())["rows"]
+    assert {row["speed"] for row in rows} == {0.1, 0.15, 0.2, None}

@@ -1,0 +1,172 @@
+"""Whole runs: a method over a split, latency, and the command line."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finlab.allocation.allocation import Solution
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.baselines.analytic import Analytic
+from finlab.cli import main
+from finlab.evaluation.experiments.ablation import REFINEMENTS, VARIANTS, ablation_report, paper_ablation_rows
+from finlab.evaluation.experiments.latency import latency_report, latency_rows, machine
+from finlab.evaluation.experiments.wrench_tracking import run_method, wrench_report, wrench_rows
+from finlab.evaluation.splits import SPLITS, make_split
+from finlab.evaluation.statistics.metrics import wrench_row
+from finlab.evaluation.statistics.records import load_columns, records_of_columns
+from finlab.inference.normalization import Normalization
+from finlab.layout import Layout
+from finlab.physics import Plant
+
+NORMALIZATION = Normalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35]))
+
+
+class Idle(Allocator):
+    """Answers every target with the least command."""
+
+    name = "idle"
+    normalization = NORMALIZATION
+
+    def _solve(
+        self, layout: Layout, targets: np.ndarray, *, seed: int, previous: np.ndarray | None
+    ) -> Solution:
+        least = layout.lower
+        return Solution(np.tile(least, (len(targets), 1, 1)))
+
+
+@pytest.fixture
+def statistics(tmp_path: Path) -> str:
+    """A checkpoint folder of which only the wrench statistics are there, enough for the baselines."""
+    config = {"format": "finlab-checkpoint", "version": 1}
+    statistics = {"mean": NORMALIZATION.mean.tolist(), "std": NORMALIZATION.std.tolist()}
+    folder = tmp_path / "statistics"
+    folder.mkdir()
+    (folder / "config.json").write_text(json.dumps({**config, "normalization": statistics}))
+    return str(folder)
+
+
+@pytest.mark.parametrize("single", [None, 2])
+def test_the_plant_scores(single: int | None) -> None:
+    cases = make_split("failure", 3, 4, 11)
+    records = run_method(Idle(), cases, single=single)
+    expected = []
+    for case in cases:
+        command = case.layout.lower.copy()
+        command[[name in case.failed for name in case.layout.names]] = np.nan
+        expected.append(NORMALIZATION.error(Plant(case.layout).wrench(command), case.targets[:single]))
+    np.testing.assert_allclose(records.err_norm, np.concatenate(expected))
+    assert (records.solve_ms > 0).all()
+
+
+def test_report_shows_the_papers_figures_beside() -> None:
+    records = {"idle": run_method(Idle(), make_split("id", 3, 4, 11))}
+    report = wrench_report(records, "id")
+    assert "ours (printed in the paper)" in report and "0.0857" in report and "time of all targets" in report
+    assert wrench_rows(records, "id")[0]["n"] == 12
+    assert "one call at a time" in wrench_report(records, "limits", single=3)
+
+
+def test_latency_compares_with_learned() -> None:
+    cases = make_split("id", 3, 4, 11)
+    slow, fast = Analytic(NORMALIZATION), Idle()
+    rows = latency_rows({"learned": fast, "analytic": slow}, cases, n_calls=7)
+    assert [row["calls"] for row in rows] == [7, 7]
+    assert rows[0]["p50_over_learned"] == 1.0
+    assert all(0 < row["p50_ms"] <= row["p99_ms"] for row in rows)
+    assert "p50_over_learned" not in latency_rows({"analytic": slow}, cases, n_calls=1)[0]
+    assert latency_rows({"analytic": slow}, cases, n_calls=1000, budget_s=0.0)[0]["calls"] == len(cases)
+    assert machine()["processor"] in latency_report(rows, machine())
+
+
+def test_ablation_has_the_papers_rows() -> None:
+    assert [row["variant"] for row in paper_ablation_rows()] == list(VARIANTS)
+    ours = [{"variant": name, "scored_by": "plant", "err_norm_mean": 0.5} for name in VARIANTS]
+    lines = ablation_report(ours).splitlines()[2:12]
+    assert [line.split()[0] for line in lines] == [name for name in VARIANTS for _ in range(2)]
+
+
+def test_eval_wrench(statistics: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "rows.json"
+    cases = ["--split", "limits", "--layouts", "2", "--targets", "3", "--seed", "1000"]
+    arguments = ["eval", "wrench", *cases, "--methods", "analytic,qp", "--checkpoint", statistics]
+    assert main([*arguments, "--json", str(file)]) == 0
+    rows = json.loads(file.read_text())["rows"]
+    assert [(row["split"], row["method"], row["n"]) for row in rows] == [
+        ("limits", "analytic", 6),
+        ("limits", "qp", 6),
+    ]
+    out = capsys.readouterr().out
+    assert "scored by the plant" in out and "where a rerun with another seed lands" in out
+    for row, ends in zip(rows, json.loads(file.read_text())["intervals"], strict=True):
+        low, high = ends["err_norm_mean"]
+        assert ends["method"] == row["method"] and low <= row["err_norm_mean"] <= high
+
+
+def test_eval_wrench_on_all_splits_keeps_records(
+    statistics: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sizes = ["--split", "all", "--layouts", "1", "--targets", "3", "--subsample", "2"]
+    arguments = ["eval", "wrench", *sizes, "--methods", "qp,trf-1", "--checkpoint", statistics]
+    file, folder = tmp_path / "rows.json", tmp_path / "records"
+    assert main([*arguments, "--json", str(file), "--records", str(folder)]) == 0
+    rows = json.loads(file.read_text())["rows"]
+    pairs = [(split, method) for split in SPLITS for method in ("qp", "trf-1")]
+    assert [(row["split"], row["method"]) for row in rows] == pairs
+    assert {row["method"]: row["n"] for row in rows} == {"qp": 3, "trf-1": 2}
+    assert len(list(folder.iterdir())) == len(pairs)
+    columns, meta = load_columns(folder / "wrench-limits-qp.npz")
+    again = wrench_row(records_of_columns(columns), split="limits", method="qp")
+    assert again == rows[pairs.index(("limits", "qp"))] and meta["method"] == "qp"
+
+
+def test_eval_latency(statistics: str, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["eval", "latency", "--methods", "analytic", "--calls", "3", "--checkpoint", statistics]
+    assert main(arguments) == 0
+    assert "p99_ms" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("wrench --methods nobody", "method: expected one of"),
+        ("wrench --methods ,", "methods: expected names with commas between"),
+        ("wrench --split nowhere --methods qp", "split: expected one of id, ood"),
+        ("wrench --layouts 0 --methods qp", "layouts: expected a number of at least 1, got 0"),
+        ("wrench --methods qp-3", "a number of starts, from 1, goes with trf, slsqp, ipopt only, got 'qp-3'"),
+        ("wrench --subsample 0 --methods qp", "subsample: expected a number of at least 1, got 0"),
+        ("wrench --single 0 --methods qp", "single: expected a number of at least 1, got 0"),
+        (
+            "wrench --methods qp --json missing/folder/rows.json",
+            "json: expected a file in an existing",
+        ),
+        ("latency --fins 9 --methods qp", "fins: expected 2 to 5"),
+    ],
+)
+def test_bad_input_is_one_sentence(
+    arguments: str, message: str, statistics: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["eval", *arguments.split(), "--checkpoint", statistics]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("finlab: error: ") and message in error and error.count("\n") == 1
+
+
+def test_eval_ablation(
+    untrained_checkpoint: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("finlab.evaluation.experiments.ablation.TIMED_CALLS", 1)
+    file = tmp_path / "rows.json"
+    arguments = ["eval", "ablation", "--layouts", "2", "--targets", "2", "--candidates", "8"]
+    assert main([*arguments, "--checkpoint", str(untrained_checkpoint), "--json", str(file)]) == 0
+    rows = json.loads(file.read_text())["rows"]
+    shown = [(row["variant"], row["refinement"], row["scored_by"]) for row in rows]
+    models = ("surrogate", "plant")
+    assert shown == [(name, by, model) for name in VARIANTS for by in REFINEMENTS for model in models]
+    alike = [row["err_norm_mean"] for row in rows if row["variant"] == "mean_only"]
+    assert alike[:2] == alike[2:]  # where nothing is refined, how it would be makes no difference
+    assert all(row["n"] == 4 and row["time_s"] > 0 for row in rows)
+    assert "(printed in the paper)" in capsys.readouterr().out

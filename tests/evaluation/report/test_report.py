@@ -1,0 +1,83 @@
+"""A whole report at a tiny size, with an untrained network; then again from what was kept."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from finlab.evaluation.experiments.training_study import CHANGES
+from finlab.evaluation.report import plan as planning
+from finlab.evaluation.report.make import PAGE, PICTURES, TABLES, TWIN, make_report
+from finlab.evaluation.report.plan import Checkpoints
+from finlab.evaluation.report.work import WORK
+
+pytest.importorskip("matplotlib")
+pytest.importorskip("casadi")
+
+
+@pytest.fixture(scope="module")
+def few() -> pytest.MonkeyPatch:
+    """Fewer methods, temperatures and trainings than a real report has."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(planning, "QUICK", ("learned", "paper", "analytic"))
+        patch.setattr(planning, "SLOW", ("ipopt",))
+        patch.setattr(planning, "ENERGY_METHODS", ("learned", "analytic", "ipopt"))
+        patch.setattr(planning, "LATENCY_METHODS", ("learned", "paper", "analytic", "ipopt"))
+        patch.setattr(planning, "TEMPERATURES", (0.01, 1.0))
+        patch.setattr(planning, "CHANGES", {name: CHANGES[name] for name in ("recipe", "paper_loss_per_fin")})
+        patch.setattr("finlab.evaluation.experiments.ablation.TIMED_CALLS", 1)
+        yield patch
+
+
+@pytest.fixture(scope="module")
+def folder(
+    few: pytest.MonkeyPatch, untrained_checkpoint: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    out = tmp_path_factory.mktemp("report")
+    _make(out, untrained_checkpoint)
+    return out
+
+
+def _make(out: Path, checkpoint: Path) -> None:
+    make_report(
+        out,
+        size="tiny",
+        seed=0,
+        checkpoints=Checkpoints(str(checkpoint), str(checkpoint)),
+        records=out / "records",
+        command="finlab eval report -o DIR",
+        processes=0,
+    )
+
+
+def test_page_twin_pictures_and_rows_say_the_same(folder: Path, untrained_checkpoint: Path) -> None:
+    page, twin = (folder / PAGE).read_text("utf-8"), (folder / TWIN).read_text("utf-8")
+    tables = json.loads((folder / TABLES).read_text("utf-8"))
+    for words in ("Where the learned allocator leads", "Where it does not", "0.0857", "SHA-256", "ipopt-32"):
+        assert words in page and words in twin
+    digest = json.loads((untrained_checkpoint / "config.json").read_text())["sha256"]
+    assert digest in page and digest in twin
+    names = {path.name for path in (folder / PICTURES).iterdir()}
+    assert len(names) == page.count("<svg") == twin.count("](pictures/")
+    assert all(f"](pictures/{name})" in twin for name in names)
+    assert len(tables["wrench"]) == 6 * 5 and len(tables["ablation"]) == 20
+    assert [row["temperature"] for row in tables["temperature"]] == [0.01, 1.0]
+
+
+def test_the_page_stands_alone(folder: Path) -> None:
+    page = (folder / PAGE).read_text("utf-8")
+    assert "<script" not in page and "<img" not in page and "@import" not in page
+    assert page.index("Where it does not") < page.index('<h2 id="wrench-tracking">')
+
+
+def test_the_second_time_nothing_is_done_again(
+    folder: Path, untrained_checkpoint: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(**_: object) -> None:
+        raise AssertionError("work was done twice")
+
+    for name in list(WORK):
+        monkeypatch.setitem(WORK, name, refuse)
+    rows = (folder / TABLES).read_text("utf-8")
+    _make(folder, untrained_checkpoint)
+    assert (folder / TABLES).read_text("utf-8") == rows

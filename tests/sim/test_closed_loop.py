@@ -1,0 +1,102 @@
+"""The closed loop as a whole, with the quickest method."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finlab.allocation.allocator import Allocator
+from finlab.errors import DataError, FinlabError, LayoutError
+from finlab.layout import Layout
+from finlab.sim import NO_NOISE, ClosedLoop, Cruise, RunLog, Tick, load_log, make_trajectory
+from finlab.sim.log import log_of_ticks
+
+
+def swum(swim: ClosedLoop, seconds: float) -> RunLog:
+    """The log of the first seconds."""
+    while swim.time < seconds:
+        swim.step()
+    return swim.log
+
+
+@pytest.mark.parametrize("plant", ["mean", "ripple", "flexible"])
+def test_it_follows_a_circle_on_every_plant(layout_a: Layout, analytic: Allocator, plant: str) -> None:
+    log = swum(ClosedLoop(layout_a, analytic, make_trajectory("circle"), plant=plant, seed=7), 20.0)
+    error = np.linalg.norm(log.position - log.reference, axis=1)
+    assert error.max() < 0.25
+    assert np.sqrt((error**2).mean()) < 0.1
+
+
+def test_same_seed_same_swim(layout_a: Layout, analytic: Allocator) -> None:
+    swims = [ClosedLoop(layout_a, analytic, make_trajectory("circle", 20.0), seed=seed) for seed in (1, 1, 2)]
+    first, again, other = ([swim.step() for _ in range(30)][-1].position for swim in swims)
+    np.testing.assert_array_equal(first, again)
+    assert (first != other).any()
+
+
+def test_cruise_holds_speed_and_depth(layout_a: Layout, analytic: Allocator) -> None:
+    log = swum(ClosedLoop(layout_a, analytic, Cruise(0.15), sensors=NO_NOISE), 20.0)
+    late = log.time > 15.0
+    assert np.abs(log.motion[late, 0] - 0.15).max() < 0.01
+    assert np.abs(log.position[late, 2] + 1.0).max() < 0.02
+
+
+def test_fins_fail_and_mend(layout_a: Layout, analytic: Allocator) -> None:
+    swim = ClosedLoop(layout_a, analytic, make_trajectory("circle", 20.0), failures=[("front_left", 0.5)])
+    ticks = [swim.step() for _ in range(8)]
+    lost = layout_a.index("front_left")
+    assert [bool(tick.alive[lost]) for tick in ticks] == [True] * 5 + [False] * 3
+    assert np.isnan(ticks[-1].command[lost]).all() and (ticks[-1].fin_force[lost] == 0.0).all()
+    swim.mend("front_left")
+    assert swim.step().alive.all() and swim.failed == ()
+    swim.fail("front_left")
+    swim.fail("back_left")
+    assert not swim.controllable, "both left fins lost leave surge and yaw tied to each other"
+    swim.fail("back_right")
+    with pytest.raises(LayoutError, match="no fin left"):
+        swim.fail("front_right")
+    with pytest.raises(LayoutError, match="no fin 'tail'"):
+        swim.mend("tail")
+
+
+def test_a_robot_is_carried_by_a_current_but_tracks(layout_a: Layout, analytic: Allocator) -> None:
+    log = swum(ClosedLoop(layout_a, analytic, make_trajectory("circle"), current=(0.04, 0.0, 0.0)), 20.0)
+    assert np.linalg.norm(log.position - log.reference, axis=1).max() < 0.4
+
+
+def test_what_is_delivered_follows_what_is_allocated(layout_a: Layout, analytic: Allocator) -> None:
+    log = swum(ClosedLoop(layout_a, analytic, Cruise(0.1), sensors=NO_NOISE), 15.0)
+    late = log.time > 10.0
+    np.testing.assert_allclose(log.delivered[late], log.allocated[late], atol=0.15)
+    np.testing.assert_allclose(log.allocated[late], log.asked[late], atol=0.01)
+
+
+def test_bad_swims_are_refused(layout_a: Layout, analytic: Allocator) -> None:
+    task = make_trajectory("circle", 20.0)
+    with pytest.raises(LayoutError, match="no fin 'tail'"):
+        ClosedLoop(layout_a, analytic, task, failures=[("tail", 1.0)])
+    with pytest.raises(FinlabError, match="0 s or more"):
+        ClosedLoop(layout_a, analytic, task, failures=[("front_left", -1.0)])
+    with pytest.raises(FinlabError, match="expected one of mean, ripple, flexible"):
+        ClosedLoop(layout_a, analytic, task, plant="water")
+
+
+def test_logs_survive_the_disk(layout_a: Layout, analytic: Allocator, tmp_path: Path) -> None:
+    swim = ClosedLoop(layout_a, analytic, make_trajectory("circle", 20.0), seed=3)
+    ticks = [swim.step() for _ in range(5)]
+    log = swim.log
+    log.save(tmp_path / "log.npz")
+    read = load_log(tmp_path / "log.npz")
+    assert (read.fins, read.method, read.seed, read.n_ticks) == (layout_a.names, "analytic", 3, 5)
+    for name in Tick._fields:
+        np.testing.assert_array_equal(getattr(read, name), getattr(log_of_ticks_like(log, ticks), name))
+    (tmp_path / "bad.npz").write_bytes(b"no archive")
+    for path in ("bad.npz", "missing.npz"):
+        with pytest.raises(DataError, match="expected a swim log"):
+            load_log(tmp_path / path)
+
+
+def log_of_ticks_like(log: object, ticks: list[Tick]) -> object:
+    """The same log made anew from its ticks."""
+    about = {name: getattr(log, name) for name in ("layout", "fins", "method", "controller", "task", "plant")}
+    return log_of_ticks(ticks, seed=log.seed, **about)  # type: ignore[attr-defined]
