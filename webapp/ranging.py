@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from finlab.forces.beside import Ranges, ranges_beside
+from finlab.forces.axis_ranges import Ranges, axis_ranges
 from finlab.layout import Layout
 
 REST_S = 0.12
@@ -23,4 +23,4 @@ class Beside:
 
 def find_ranges(question: Beside) -> Ranges:
     """The range of each component."""
-    return ranges_beside(question.layout, question.target, question.failed)
+    return axis_ranges(question.layout, question.target, question.failed)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from finlab.forces.extent import RANK_TOLERANCE, Extent, singular_values, strongest, weakest
 from finlab.forces.fin_sets import SCALE, fin_sets
-from finlab.forces.reach import along_exactly
+from finlab.forces.reach import max_wrench_along_exactly
 from finlab.forces.thrust_law import thrust_laws
 from finlab.layout import Layout
 
@@ -114,7 +114,7 @@ def _authorities(layout: Layout, failures: Sequence[Collection[str]]) -> list[Au
         sets.radius[row, list(layout.indices(tuple(failed)))] = 0.0
     values, vectors = singular_values(sets)
     axes = np.concatenate([np.eye(6), -np.eye(6)])
-    size, gap = along_exactly(sets, axes)
+    size, gap = max_wrench_along_exactly(sets, axes)
     rows = sets.take(np.repeat(np.arange(len(failures)), 12))
     free = rows.farthest(np.tile(axes, (len(failures), 1)))[0].reshape(-1, 2, 6).max(axis=1)
     size, free = (np.where(value > NOTHING, value, 0.0) for value in (size, free))

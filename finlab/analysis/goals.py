@@ -16,7 +16,7 @@ from finlab.errors import LayoutError
 from finlab.forces.extent import weakest
 from finlab.forces.fin_sets import SCALE, FinSets
 from finlab.forces.least_energy import descend, planar_energy, starts
-from finlab.forces.reach import COARSE, FINE, along
+from finlab.forces.reach import COARSE, FINE, max_wrench_along
 from finlab.layout import Layout
 
 Array = NDArray[np.float64]
@@ -118,7 +118,7 @@ def _missing(sets: FinSets, target: Array, softness: tuple[float, ...]) -> Array
     size = np.linalg.norm(target, axis=-1)
     asked = size > 0.0
     unit = np.where(asked[:, None], target / np.where(asked, size, 1.0)[:, None], np.eye(6)[0])
-    given = (along(sets, unit, softness).wrench * unit).sum(-1)
+    given = (max_wrench_along(sets, unit, softness).wrench * unit).sum(-1)
     return np.where(asked, 1.0 - np.clip(given / np.where(asked, size, 1.0), 0.0, 1.0), 0.0)
 
 

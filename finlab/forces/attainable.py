@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.forces.fin_sets import SCALE, FinSets, fin_sets, joined, pieces, wide_fins
+from finlab.forces.fin_sets import SCALE, FinSets, convex_parts, fin_sets, joined, wide_fins
 from finlab.forces.hull import hull_of
 from finlab.forces.reach import largest
 from finlab.layout import Layout
@@ -149,7 +149,7 @@ def _free_support(sets: FinSets, kind: Kind) -> Support:
 def _alone_support(sets: FinSets, kind: Kind) -> Support:
     """Farthest points with all else zero: by the dual, in each convex piece."""
     own, other = (slice(0, 3), slice(3, 6)) if kind == "force" else (slice(3, 6), slice(0, 3))
-    parts = joined(pieces(sets, MAX_DRAWN_PIECES))
+    parts = joined(convex_parts(sets, MAX_DRAWN_PIECES))
     n_parts = len(parts.radius)
 
     def support(directions: Array) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.forces.fin_sets import FinSets
-from finlab.forces.reach import COARSE, FINE, along
+from finlab.forces.reach import COARSE, FINE, max_wrench_along
 
 Array = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ def weakest(sets: FinSets, n_random: int = N_RANDOM, n_walks: int = N_WALKS, fin
     ends = starts.reshape(-1, 6)
     for walk in range(n_walks):
         last = fine and walk == n_walks - 1
-        normal = along(rows, ends, FINE if last else COARSE).normal
+        normal = max_wrench_along(rows, ends, FINE if last else COARSE).normal
         ends = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
     reach = rows.farthest(ends)[0].reshape(len(full), n_starts)
     best = reach.argmin(axis=1)

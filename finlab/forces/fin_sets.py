@@ -2,8 +2,8 @@
 
 A fin that may turn a full circle pushes anywhere within a disc whose radius is its largest thrust. A fin with
 stops pushes within a sector of that disc. A sector wider than half a turn is not convex: here it stands for
-its convex hull, the disc cut off along the chord between the stops, unless `pieces` has cut it in two sectors
-that are convex. Every fin may rest: the tiny thrust that it cannot go below is left out.
+its convex hull, the disc cut off along the chord between the stops, unless `convex_parts` has cut it
+in two sectors that are convex. Every fin may rest: the tiny thrust that it cannot go below is left out.
 
 Wrenches are scaled: torques are divided by `LEVER`, so that all six entries are in newton.
 """
@@ -93,7 +93,7 @@ def fin_sets(layouts: Sequence[Layout], failed: Collection[str] = ()) -> FinSets
     )
 
 
-def pieces(sets: FinSets, most: int = MAX_PIECES) -> list[FinSets]:
+def convex_parts(sets: FinSets, most: int = MAX_PIECES) -> list[FinSets]:
     """Returns sets of the same robots, all convex, whose union is exactly what each robot can push.
 
     Each fin whose sector is wider than half a turn but no full circle is cut in two along its middle; each

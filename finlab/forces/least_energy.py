@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.forces.answers import cheap
 from finlab.forces.dual import Dual, minimize_dual
-from finlab.forces.fin_sets import SCALE, FinSets, fin_sets, joined, pieces
-from finlab.forces.reach import along
+from finlab.forces.fin_sets import SCALE, FinSets, convex_parts, fin_sets, joined
+from finlab.forces.reach import max_wrench_along
 from finlab.forces.thrust_law import thrust_laws
 from finlab.layout import Layout, stack_layouts
 from finlab.physics.energy import DEFAULT_WEIGHTS, energy_scale
@@ -49,7 +49,7 @@ def least_energy(
     layout.indices(tuple(failed))
     wanted = np.asarray(wrenches, dtype=np.float64).reshape(-1, 6) / SCALE
     sets = fin_sets([layout], failed)
-    parts = pieces(sets)
+    parts = convex_parts(sets)
     robots = joined(parts).take(np.repeat(np.arange(len(parts)), len(wanted)))
     target = np.tile(wanted, (len(parts), 1))
     seeds = starts(sets.radius[0], n_random)
@@ -68,7 +68,7 @@ def within_reach(sets: FinSets, target: Array) -> NDArray[np.bool_]:
     """Returns which scaled wrenches (R, 6) the robots can give, all six entries as asked."""
     size = np.linalg.norm(target, axis=-1)
     unit = np.where(size[:, None] > 0.0, target / np.maximum(size, 1e-300)[:, None], np.eye(6)[0])
-    return np.asarray(size <= along(sets, unit).size * (1.0 - 1e-6) + 1e-12)
+    return np.asarray(size <= max_wrench_along(sets, unit).size * (1.0 - 1e-6) + 1e-12)
 
 
 def starts(radius: Array, n_random: int, most_resting: int = 2) -> Array:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from finlab.forces.answers import strong
 from finlab.forces.dual import Dual, minimize_dual
-from finlab.forces.fin_sets import FinSets, joined, pieces
+from finlab.forces.fin_sets import FinSets, convex_parts, joined
 
 Array = NDArray[np.float64]
 
@@ -59,28 +59,28 @@ def largest(sets: FinSets, origin: Array, basis: Array, softness: tuple[float, .
     return Largest(size, np.maximum(size - proven, 0.0), wrench, normal)
 
 
-def along(sets: FinSets, direction: Array, softness: tuple[float, ...] = FINE) -> Largest:
+def max_wrench_along(sets: FinSets, direction: Array, softness: tuple[float, ...] = FINE) -> Largest:
     """Returns the largest wrenches that point exactly along unit `direction` (R, 6), all else zero."""
-    return largest(sets, direction, across(direction), softness)
+    return largest(sets, direction, orthogonal_complement(direction), softness)
 
 
-def along_exactly(sets: FinSets, directions: Array) -> tuple[Array, float]:
+def max_wrench_along_exactly(sets: FinSets, directions: Array) -> tuple[Array, float]:
     """Returns the largest wrenches (P, D) of robots (P) along unit `directions` (D, 6), and the largest gap.
 
     Sectors wider than half a turn are taken in pieces, so that the result is theirs and not their hull's;
     with too many of them the hull's, larger, result is returned.
     """
     robots, n = len(sets.radius), len(directions)
-    parts = pieces(sets)
+    parts = convex_parts(sets)
     rows = np.repeat(np.arange(len(parts) * robots), n)
-    found = along(joined(parts).take(rows), np.tile(directions, (len(parts) * robots, 1)))
+    found = max_wrench_along(joined(parts).take(rows), np.tile(directions, (len(parts) * robots, 1)))
     size, proven = (
         v.reshape(len(parts), robots, n).max(axis=0) for v in (found.size, found.size - found.gap)
     )
     return size, float((size - proven).max())
 
 
-def across(direction: Array) -> Array:
+def orthogonal_complement(direction: Array) -> Array:
     """Returns an orthonormal basis (R, 6, 5) of all that is at right angles to unit `direction` (R, 6)."""
     # Householder's reflection takes an axis to the direction, and the other five axes along.
     rows, k = direction.shape

@@ -9,7 +9,7 @@ from finlab.analysis import authority, losses
 from finlab.forces.extent import strongest, weakest
 from finlab.forces.fin_sets import fin_sets
 from finlab.layout import Layout
-from tests.analysis.conftest import THRUST
+from tests.forces.conftest import THRUST
 
 Layouts = Callable[[str], Layout]
 

@@ -6,7 +6,7 @@ from typing import Protocol
 import viser
 
 from finlab.allocation.allocation import Allocation
-from finlab.forces.beside import Ranges
+from finlab.forces.axis_ranges import Ranges
 from webapp.analyst import Findings, Question
 from webapp.answering import Answering
 from webapp.comparison import Comparison

@@ -23,7 +23,7 @@ from finlab.allocation.learned.pool import Pool
 from finlab.allocation.learned.prepared import Prepared
 from finlab.allocation.learned.proposal import Proposal
 from finlab.allocation.learned.settings import Settings
-from finlab.allocation.learned.unreachable import serve
+from finlab.allocation.learned.unreachable import project_target
 from finlab.allocation.policy import Policy
 from finlab.inference.threads import single_threaded_products
 from finlab.inference.weights import LearnedWeights, weights_of
@@ -127,7 +127,7 @@ class LearnedAllocator(Allocator):
             return plain
         # What the policy asks for within reach is one wrench; that one is then delivered as any other.
         std = self.normalization.std
-        served = serve(self.pipeline.prepare(layout).planar, policy, target[0] / std)
+        served = project_target(self.pipeline.prepare(layout).planar, policy, target[0] / std)
         return self._solve(
             layout, served.wrench * std, seed=seed, previous=previous, lead=lambda *_: served.force
         )

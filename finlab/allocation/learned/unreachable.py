@@ -14,7 +14,7 @@ from finlab.forces.nearest import Nearest, nearest, nearest_along, nearest_in_tu
 Array = NDArray[Any]
 
 
-def serve(problem: PlanarProblem, policy: Policy, target: Array) -> Nearest:
+def project_target(problem: PlanarProblem, policy: Policy, target: Array) -> Nearest:
     """The one wrench to deliver, normalized, and forces that do so.
 
     Args:

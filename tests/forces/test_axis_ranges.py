@@ -1,4 +1,4 @@
-"""What can be told while one moves a slider or a fin, against linear programmes and the whole analysis."""
+"""How far each axis can go with the others held, against linear programmes."""
 
 from collections.abc import Callable
 
@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from finlab.analysis import authority, losses
-from finlab.analysis.quick import quick_check
-from finlab.forces.beside import ranges_beside
+from finlab.forces.axis_ranges import axis_ranges
 from finlab.forces.fin_sets import SCALE, fin_sets
 from finlab.layout import Layout
 
@@ -54,20 +52,7 @@ def test_ranges_are_those_of_linear_programmes(
     shipped: Layouts, name: str, wrench: list[float], failed: tuple[str, ...]
 ) -> None:
     layout = shipped(name)
-    low, high = ranges_beside(layout, wrench, failed)
+    low, high = axis_ranges(layout, wrench, failed)
     expected = ranges_by_polygons(layout, wrench, failed)
     assert low == pytest.approx(expected[:, 0], rel=2e-3, abs=2e-3, nan_ok=True)
     assert high == pytest.approx(expected[:, 1], rel=2e-3, abs=2e-3, nan_ok=True)
-
-
-@pytest.mark.parametrize("name", ["A", "B", "ucat", "pair", "no_yaw", "hexa", "asymmetric"])
-def test_quick_check_agrees_with_the_whole_analysis(shipped: Layouts, name: str) -> None:
-    layout = shipped(name)
-    quick, whole = quick_check(layout), authority(layout)
-    assert (quick.rank, quick.without_authority, quick.coupled) == (
-        whole.rank,
-        whole.without_authority,
-        whole.coupled,
-    )
-    assert quick.condition == pytest.approx(whole.condition)
-    assert dict(quick.lost) == {loss.fin: loss.lost for loss in losses(layout) if loss.lost}

@@ -7,11 +7,11 @@ import pytest
 
 from finlab.analysis import authority
 from finlab.forces.answers import strong
-from finlab.forces.fin_sets import SCALE, fin_sets, pieces
-from finlab.forces.reach import across, along, along_exactly
+from finlab.forces.fin_sets import SCALE, convex_parts, fin_sets
+from finlab.forces.reach import max_wrench_along, max_wrench_along_exactly, orthogonal_complement
 from finlab.layout import Layout
 from finlab.physics import Plant
-from tests.analysis.conftest import THRUST, largest_by_polygons
+from tests.forces.conftest import THRUST, largest_by_polygons
 
 Layouts = Callable[[str], Layout]
 BOTH_WAYS = np.concatenate([np.eye(6), -np.eye(6)])
@@ -32,7 +32,7 @@ def test_bracketed_by_linear_programmes(shipped: Layouts, name: str) -> None:
     sets = fin_sets([shipped(name)])
     mixture = np.random.default_rng(0).standard_normal((3, 6))
     directions = np.concatenate([BOTH_WAYS[::3], mixture / np.linalg.norm(mixture, axis=1, keepdims=True)])
-    found, gap = along_exactly(sets, directions)
+    found, gap = max_wrench_along_exactly(sets, directions)
     assert gap < 2e-5
     for direction, value in zip(directions, found[0], strict=True):
         inside = largest_by_polygons(sets, direction, 180, outer=False)
@@ -42,8 +42,8 @@ def test_bracketed_by_linear_programmes(shipped: Layouts, name: str) -> None:
 
 def test_wide_arcs_count_piece_by_piece(wide: Layout) -> None:
     sets = fin_sets([wide])
-    size = along_exactly(sets, BOTH_WAYS)[0][0]
-    parts = pieces(sets)
+    size = max_wrench_along_exactly(sets, BOTH_WAYS)[0][0]
+    parts = convex_parts(sets)
     assert len(parts) == 4
     by_piece = np.array(
         [
@@ -52,7 +52,7 @@ def test_wide_arcs_count_piece_by_piece(wide: Layout) -> None:
         ]
     )
     assert size == pytest.approx(by_piece.max(axis=0), rel=1e-3, abs=1e-4)
-    hull = along(sets.take(np.zeros(12, dtype=np.intp)), BOTH_WAYS).size
+    hull = max_wrench_along(sets.take(np.zeros(12, dtype=np.intp)), BOTH_WAYS).size
     assert (hull >= size - 1e-4).all()
     assert (hull > size + 1e-3).any()
 
@@ -61,7 +61,7 @@ def test_the_plant_gives_the_largest_wrench(shipped: Layouts) -> None:
     layout = shipped("mixed")
     sets = fin_sets([layout])
     for direction in BOTH_WAYS:
-        found = along(sets, direction[None])
+        found = max_wrench_along(sets, direction[None])
         unit = np.maximum(np.sqrt((sets.pull(direction[None]) ** 2).sum(-1)).max(-1), 1e-6)
         force = strong(sets, sets.pull(found.normal), 1e-6 * unit[:, None] * np.ones((1, 4)))[1][0]
         thrust, angle = np.hypot(*force.T), np.arctan2(force[:, 1], force[:, 0])
@@ -107,5 +107,5 @@ def test_the_plant_reaches_as_far_as_it_is_said_to(shipped: Layouts, name: str) 
 def test_across_is_a_basis() -> None:
     drawn = np.random.default_rng(0).standard_normal((20, 6))
     directions = np.concatenate([BOTH_WAYS, drawn / np.linalg.norm(drawn, axis=1, keepdims=True)])
-    whole = np.concatenate([directions[:, :, None], across(directions)], axis=-1)
+    whole = np.concatenate([directions[:, :, None], orthogonal_complement(directions)], axis=-1)
     assert np.allclose(np.swapaxes(whole, -1, -2) @ whole, np.eye(6))

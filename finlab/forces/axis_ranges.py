@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from finlab.forces.answers import strong
 from finlab.forces.dual import Dual, minimize_dual
 from finlab.forces.fin_sets import SCALE, fin_sets
-from finlab.forces.reach import across
+from finlab.forces.reach import orthogonal_complement
 from finlab.layout import Layout
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ class Ranges(NamedTuple):
     """Largest values (6,) [N, N m]."""
 
 
-def ranges_beside(layout: Layout, wrench: ArrayLike, failed: Collection[str] = ()) -> Ranges:
+def axis_ranges(layout: Layout, wrench: ArrayLike, failed: Collection[str] = ()) -> Ranges:
     """Returns the range of each axis with the others as in a wrench, too wide by about a thousandth at most.
 
     Fins whose arc is wider than half a turn count with the convex hull of what they can push.
@@ -48,7 +48,7 @@ def ranges_beside(layout: Layout, wrench: ArrayLike, failed: Collection[str] = (
     held = np.tile(scaled, (12, 1)) * (1.0 - np.abs(axes))
     pull = np.sqrt((sets.pull(axes) ** 2).sum(-1)).max(-1)
     unit = np.maximum(pull, 1e-6)[:, None] * np.ones(sets.radius.shape[1])
-    basis = across(axes)
+    basis = orthogonal_complement(axes)
     x = np.zeros((12, 5))
     for factor in SOFTNESS:
         dual = Dual(strong, sets, factor * unit, axes, basis, held)

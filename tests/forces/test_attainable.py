@@ -12,7 +12,7 @@ from finlab.errors import LayoutError
 from finlab.forces.fin_sets import SCALE, fin_sets
 from finlab.layout import Layout
 from finlab.physics import Plant
-from tests.analysis.conftest import THRUST
+from tests.forces.conftest import THRUST
 
 Array = NDArray[np.float64]
 Layouts = Callable[[str], Layout]
