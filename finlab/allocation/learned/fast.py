@@ -1,4 +1,4 @@
-"""The fast path: a distilled network says how hard each fin works, one closed-form step does the rest.
+"""The fast path: a distilled network gives each fin's share of thrust, one closed-form step the rest.
 
 No sampling and no search: the network's shares of thrust weigh the fins, the weighted pseudo-inverse gives
 the planar forces that add up to the target, one reweighting sharpens which fins rest, and the thrust curves
@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Solution
-from finlab.allocation.learned.insist import Lead, nearest_forces
 from finlab.allocation.learned.learned_allocator import LearnedAllocator
+from finlab.allocation.learned.refine_missed import FallbackForces, nearest_forces
 from finlab.errors import AllocationError
 from finlab.forces import force_space
 from finlab.inference.fast_network import NumpyFastNetwork
@@ -29,10 +29,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[Any]
 
-STEPS = 1
-"""Reweighting steps after the network."""
-GOOD = 2e-3
-"""Normalized error, by the learned thrust curves, up to which the fast answer stands."""
+REWEIGHTING_STEPS = 1
+"""Steps of the search in force space after the network."""
+ACCEPTED_ERROR = 2e-3
+"""Normalized error, by the learned thrust curves, up to which the fast answer is taken: a fifth
+of what counts as delivered."""
 
 
 class FastAllocator(LearnedAllocator):
@@ -62,27 +63,27 @@ class FastAllocator(LearnedAllocator):
         *,
         seed: int,
         previous: Array | None,
-        lead: Lead = nearest_forces,
+        fallback: FallbackForces = nearest_forces,
     ) -> Solution:
         # Slow turns from tick to tick are a search of their own; the network learned exact answers, cheap by
         # the usual energy.
         usual = self.energy_weights == DEFAULT_WEIGHTS and self.settings.energy_tradeoff == 0.0
         if previous is not None or not usual:
-            return super()._solve(layout, targets, seed=seed, previous=previous, lead=lead)
-        prepared, notes = self._known(layout)
+            return super()._solve(layout, targets, seed=seed, previous=previous, fallback=fallback)
+        prepared, notes = self._prepared(layout)
         target = targets / self.normalization.std
         x = fin_frame_features(prepared.geometry, target - self._scaled_mean).astype(np.float32)
         share = self.network(x).astype(np.float64)
         share *= share
         thrust = share * share * prepared.planar.curves.maximum
-        planar = force_space.descend(prepared.planar, target, thrust, STEPS)
-        missed = np.einsum("ri,ri->r", planar.residual, planar.residual) > GOOD**2
+        planar = force_space.descend(prepared.planar, target, thrust, REWEIGHTING_STEPS)
+        missed = np.einsum("ri,ri->r", planar.residual, planar.residual) > ACCEPTED_ERROR**2
         if missed.all():
-            return super()._solve(layout, targets, seed=seed, previous=None, lead=lead)
+            return super()._solve(layout, targets, seed=seed, previous=None, fallback=fallback)
         command, _ = force_space.realize(prepared.planar, planar)
         wrench = targets - planar.residual * self.normalization.std
         if missed.any():
-            slow = super()._solve(layout, targets[missed], seed=seed, previous=None, lead=lead)
+            slow = super()._solve(layout, targets[missed], seed=seed, previous=None, fallback=fallback)
             assert slow.wrench_surrogate is not None
             command[missed], wrench[missed] = slow.command, slow.wrench_surrogate
         return Solution(command, wrench, notes=notes)

@@ -1,7 +1,7 @@
 """The learned allocator: a network proposes, the surrogate ranks, a search finds the cheapest answer.
 
-Only the learned surrogate is seen on the way; the analytic fin model scores the answer afterwards. The way
-itself is in `pipeline`; here are the policies, the batches and what the user is told.
+Only the learned surrogate is used here; the analytic fin model scores the answer afterwards. The stages
+are in `pipeline`; here are the policies, the batches and the notes to the user.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Candidates, Solution
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.learned.insist import Lead, nearest_forces
 from finlab.allocation.learned.pipeline import Pipeline
-from finlab.allocation.learned.pool import Pool
 from finlab.allocation.learned.prepared import Prepared
 from finlab.allocation.learned.proposal import Proposal
+from finlab.allocation.learned.refine_missed import FallbackForces, nearest_forces
+from finlab.allocation.learned.refined_candidates import RefinedCandidates
 from finlab.allocation.learned.settings import Settings
 from finlab.allocation.learned.unreachable import project_target
 from finlab.allocation.policy import Policy
@@ -76,7 +76,7 @@ class LearnedAllocator(Allocator):
         # All products here are too small to be shared among threads; chunks of targets are not.
         self._one_thread = single_threaded_products()
         self._fin_model = FinModelSpec.from_values(self.weights.fin_model)
-        self._known = lru_cache(maxsize=128)(self._meet)
+        self._prepared = lru_cache(maxsize=128)(self._prepare)
 
     @classmethod
     def option_names(cls) -> list[str]:
@@ -90,25 +90,25 @@ class LearnedAllocator(Allocator):
         *,
         seed: int,
         previous: Array | None,
-        lead: Lead = nearest_forces,
+        fallback: FallbackForces = nearest_forces,
     ) -> Solution:
-        prepared, notes = self._known(layout)
+        prepared, notes = self._prepared(layout)
         if len(targets) == 1:
             with self._one_thread():
-                pool, proposal = self.pipeline.solve(prepared, targets, seed, previous, lead=lead)
+                refined, proposal = self.pipeline.solve(prepared, targets, seed, previous, fallback=fallback)
             std = self.normalization.std
             return Solution(
-                pool.command[:, 0],
-                pool.wrench[:, 0] * std,
+                refined.command[:, 0],
+                refined.wrench[:, 0] * std,
                 notes=notes,
-                candidates=lambda: _candidates(pool, std),
+                candidates=lambda: _candidates(refined, std),
                 samples=lambda: _samples(proposal, prepared, std),
                 alternatives=lambda: _alternatives(
-                    self.pipeline.explore(prepared, targets, pool, proposal), std
+                    self.pipeline.explore(prepared, targets, refined, proposal), std
                 ),
             )
 
-        def solve(start: int) -> Pool:
+        def solve(start: int) -> RefinedCandidates:
             return self.pipeline.solve(prepared, targets[start : start + CHUNK], seed + start, None)[0]
 
         with self._one_thread(), ThreadPoolExecutor(os.cpu_count()) as executor:
@@ -122,46 +122,46 @@ class LearnedAllocator(Allocator):
     ) -> Solution:
         if policy.kind == "closest" and len(set(policy.axis_weights)) == 1:
             return self._solve(layout, target, seed=seed, previous=previous)
-        plain = self._solve(layout, target, seed=seed, previous=previous, lead=lambda *_: None)
+        plain = self._solve(layout, target, seed=seed, previous=previous, fallback=lambda *_: None)
         if self._reaches(layout, plain, target)[0]:
             return plain
         # What the policy asks for within reach is one wrench; that one is then delivered as any other.
         std = self.normalization.std
         served = project_target(self.pipeline.prepare(layout).planar, policy, target[0] / std)
         return self._solve(
-            layout, served.wrench * std, seed=seed, previous=previous, lead=lambda *_: served.force
+            layout, served.wrench * std, seed=seed, previous=previous, fallback=lambda *_: served.force
         )
 
-    def _meet(self, layout: Layout) -> tuple[Prepared, tuple[str, ...]]:
-        """What is computed ahead for a layout, and what the user should know of it."""
+    def _prepare(self, layout: Layout) -> tuple[Prepared, tuple[str, ...]]:
+        """What is computed once for a layout, and the notes to the user about it."""
         return self.pipeline.prepare(layout), self._notes(layout)
 
     def _notes(self, layout: Layout) -> tuple[str, ...]:
-        """What the user should know before trusting an answer for this layout."""
+        """Sentences that the user should read before trusting an answer for this layout."""
         known = self._fin_model
-        strangers = [
+        unknown = [
             fin.name
             for fin in layout.fins
             if fin.model.type != known.type or fin.model.values() != known.values()
         ]
-        if not strangers:
+        if not unknown:
             return ()
         return (
             f"checkpoint {self.checkpoint!r} knows fins of model {known.type!r} and takes these for "
-            f"such: {', '.join(strangers)}; trust the plant's error or train a surrogate for them",
+            f"such: {', '.join(unknown)}; trust the plant's error or train a surrogate for them",
         )
 
 
-def _candidates(pool: Pool, std: Array) -> Candidates:
+def _candidates(refined: RefinedCandidates, std: Array) -> Candidates:
     """The refined answers to a single target."""
-    command, wrench, error, energy = (values[0] for values in pool)
+    command, wrench, error, energy = (values[0] for values in refined)
     return Candidates(command, wrench * std, error, energy, ("refined",) * len(command))
 
 
-def _alternatives(pool: Pool, std: Array) -> Candidates:
+def _alternatives(refined: RefinedCandidates, std: Array) -> Candidates:
     """The exact answers to a single target, the chosen one first; all where none is exact."""
-    exact = pool.error[0] <= max(ALTERNATIVE, 1.01 * pool.error[0, 0])
-    return _candidates(Pool(*(values[:, exact] for values in pool)), std)
+    exact = refined.error[0] <= max(ALTERNATIVE, 1.01 * refined.error[0, 0])
+    return _candidates(RefinedCandidates(*(values[:, exact] for values in refined)), std)
 
 
 def _samples(proposal: Proposal, prepared: Prepared, std: Array) -> Candidates:

@@ -1,7 +1,7 @@
 """Levenberg-Marquardt on the commands, through the surrogate's closed-form Jacobian, inside the limits.
 
-The last word of every learned allocation: it works in commands, not forces, and with the whole
-surrogate, so it removes what the planar search's simplifications leave.
+The last stage of every learned allocation: it works in commands, not forces, and with the whole
+surrogate, so it removes the error that the planar search's simplifications leave.
 """
 
 from __future__ import annotations
@@ -66,12 +66,12 @@ class CommandProblem:
         return low, high
 
     @cached_property
-    def exact(self) -> Limits:
+    def float64(self) -> Limits:
         """The limits in double precision."""
         return self._limits(np.float64)
 
     @cached_property
-    def rough(self) -> Limits:
+    def float32(self) -> Limits:
         """The limits in single precision."""
         return self._limits(np.float32)
 
@@ -81,7 +81,7 @@ class CommandProblem:
         return Limits(lower, upper, middle - kind(np.pi), kind(2 * np.pi), kind(0.5) * (upper - lower))
 
     @cached_property
-    def rough_columns(self) -> Array:
+    def columns_float32(self) -> Array:
         """The columns (3n, 6) in single precision."""
         return self.columns.reshape(-1, 6).astype(np.float32)
 
@@ -95,8 +95,8 @@ class CommandProblem:
         return self.clamp_in_place(command.copy())
 
     def clamp_in_place(self, command: NDArray[np.floating]) -> NDArray[np.floating]:
-        """`clamp` for commands that nobody else needs."""
-        limits = self.rough if command.dtype == np.float32 else self.exact
+        """`clamp` that overwrites its argument."""
+        limits = self.float32 if command.dtype == np.float32 else self.float64
         direction = command[..., 2]
         direction -= limits.seam
         np.mod(direction, limits.turn, out=direction)
@@ -135,7 +135,7 @@ def refine(
     damping_of = np.full(len(command), damping)
     # Where nothing better is found this is the answer: it must not lie outside by a rounding error.
     command = np.minimum(np.maximum(command, problem.lower), problem.upper)
-    best = _judged(problem, target, command, None if steps else _NO_SLOPES)
+    best = _evaluated(problem, target, command, None if steps else _NO_SLOPES)
     for step in range(steps):
         # (R, n, 3 commands, 6): change of the normalized wrench per unit of each limit range.
         jacobian = np.matmul(best.slopes, problem.columns)
@@ -143,21 +143,21 @@ def refine(
         moved = _step(problem, best, jacobian, damping_of)
         moved *= problem.span
         moved += best.command
-        # The last commands are only judged: from there nothing leads on.
+        # The last commands are only evaluated: no step follows.
         last = step == steps - 1
-        new = _judged(problem, target, problem.clamp_in_place(moved), best.slopes if last else None)
+        new = _evaluated(problem, target, problem.clamp_in_place(moved), best.slopes if last else None)
         worse = new.error > best.error
         if worse.any():
             rows = [worse.reshape(-1, *(1,) * (part.ndim - 1)) for part in new]
-            new = _Judged(*map(np.where, rows, best, new))
+            new = _Evaluated(*map(np.where, rows, best, new))
         if not last:
             damping_of = np.where(worse, damping_of * 30.0 + 1e-4, damping_of * 0.3)
         best = new
     return Refined(best.command, best.wrench, np.sqrt(best.error))
 
 
-class _Judged(NamedTuple):
-    """R commands and how they do."""
+class _Evaluated(NamedTuple):
+    """R commands and their errors."""
 
     command: Array
     """(R, n, 3)."""
@@ -174,8 +174,8 @@ class _Judged(NamedTuple):
 _NO_SLOPES = np.empty((1, 1, 1, 1))
 
 
-def _judged(problem: CommandProblem, target: Array, command: Array, slopes: Array | None) -> _Judged:
-    """Judge commands; slopes that are given are not computed anew."""
+def _evaluated(problem: CommandProblem, target: Array, command: Array, slopes: Array | None) -> _Evaluated:
+    """Errors of commands; slopes that are given are not computed anew."""
     rows, n, _ = command.shape
     if slopes is None:
         force, slopes = problem.fin.force_and_slopes(command)
@@ -183,10 +183,10 @@ def _judged(problem: CommandProblem, target: Array, command: Array, slopes: Arra
         force = problem.fin.force(command)
     wrench = force.reshape(rows, 3 * n).dot(problem.columns.reshape(3 * n, 6))
     residual = target - wrench
-    return _Judged(command, wrench, residual, np.einsum("ri,ri->r", residual, residual), slopes)
+    return _Evaluated(command, wrench, residual, np.einsum("ri,ri->r", residual, residual), slopes)
 
 
-def _step(problem: CommandProblem, at: _Judged, jacobian: Array, damping: Array) -> Array:
+def _step(problem: CommandProblem, at: _Evaluated, jacobian: Array, damping: Array) -> Array:
     """Damped smallest change (R, n, 3), in units of the limit ranges, that leaves no limit."""
     rows, n, _ = at.command.shape
     free = jacobian.reshape(rows, 3 * n, 6)

@@ -7,20 +7,21 @@ Levenberg-Marquardt on the commands. Nothing here knows the analytic fin model.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.learned.foresight import foresee
-from finlab.allocation.learned.insist import FIRST_PATIENCE, Lead, insist, nearest_forces
-from finlab.allocation.learned.pool import TOLERANCE, Pool, rank, refine_pool
 from finlab.allocation.learned.prepared import Prepared, prepare
 from finlab.allocation.learned.proposal import Proposal, Proposer, propose
+from finlab.allocation.learned.receding_horizon import plan_ahead
+from finlab.allocation.learned.refine_missed import MISSED, FallbackForces, nearest_forces, refine_missed
+from finlab.allocation.learned.refined_candidates import RANKING, RefinedCandidates, rank, refine_candidates
 from finlab.allocation.learned.settings import Settings
-from finlab.allocation.learned.steady import TURNS, planar_thrust, turn_little, turn_short
-from finlab.allocation.learned.weighted_sum import lessen
+from finlab.allocation.learned.turn_limits import TURNS, limit_turn, planar_thrust, unwrap_to_arc
+from finlab.allocation.learned.weighted_sum import minimize_weighted_sum
 from finlab.errors import AllocationError
 from finlab.forces import force_space
 from finlab.inference.learned_fin import LearnedFin
@@ -30,16 +31,31 @@ from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyWeights
 
 Array = NDArray[Any]
 
-PROMISING = 0.02
-"""Normalized error below which a search counts as successful: refinement removes the rest."""
-EXPLORERS = 64
-"""Random seeds of the wide search for other ways."""
-EXPLORING_STEPS = 40
-"""Reweighting steps of that search: what it tells should be the bottoms of their valleys."""
-PLAN_STEPS = 4
-"""Levenberg-Marquardt steps on a command that was planned ahead."""
-SLIGHT = 5e-3
-"""Normalized error for a tick that is better than a fast turn: half of what counts as delivered."""
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """What the search does that users need not set."""
+
+    promising_error: float = 0.02
+    """Normalized error below which a search in force space counts as successful: refinement removes the
+    rest."""
+    few_fins_steps: int = 4
+    """Reweighting steps of the search with up to five fins."""
+    many_fins_steps: int = 12
+    """The same from six fins on, where there are more local minima to leave."""
+    wide_seeds: int = 64
+    """Random seeds of the wide search for alternatives."""
+    wide_steps: int = 40
+    """Reweighting steps of that search, enough to converge: alternatives are counted by their local
+    minima."""
+    plan_lm_steps: int = 4
+    """Levenberg-Marquardt steps on a command of the receding horizon."""
+    passing_error: float = 5e-3
+    """Normalized error for a tick that is better than a fast turn: half of what counts as delivered."""
+
+
+SEARCH = SearchSettings()
+"""What every pipeline uses."""
 
 
 class Pipeline:
@@ -68,8 +84,8 @@ class Pipeline:
         seed: int,
         previous: Array | None,
         *,
-        lead: Lead = nearest_forces,
-    ) -> tuple[Pool, Proposal]:
+        fallback: FallbackForces = nearest_forces,
+    ) -> tuple[RefinedCandidates, Proposal]:
         """Refined answers, best first, to a few targets (N, 6), and the network's raw proposal.
 
         Args:
@@ -77,7 +93,7 @@ class Pipeline:
             targets: desired wrenches (N, 6).
             seed: of the samples.
             previous: command (n, 3) of the previous tick, for a single target.
-            lead: where to start from when targets were missed; None from it gives them up.
+            fallback: where to start from when targets were missed; None from it ends their search.
         """
         std, settings = self.normalization.std, self.settings
         target = targets / std
@@ -85,69 +101,75 @@ class Pipeline:
         proposal = self.propose(prepared, centred, target, settings.n_candidates, settings.temperature, seed)
         if previous is None:
             seeds = self._seeds(prepared, proposal)
-            pool = self._descend(prepared, target, proposal, seeds, lead)
-            return self._weigh(prepared, target, pool, None), proposal
-        pool = self._descend_steadily(prepared, target, proposal, previous, lead)
-        pool = self._weigh(prepared, target, pool, previous)
+            candidates = self._descend(prepared, target, proposal, seeds, fallback)
+            return self._trade_error_for_energy(prepared, target, candidates, None), proposal
+        candidates = self._descend_from_previous(prepared, target, proposal, previous, fallback)
+        candidates = self._trade_error_for_energy(prepared, target, candidates, previous)
         # Arcs that pass the seam are brought back inside the fin's own limits.
-        return pool._replace(command=prepared.commands.clamp(pool.command)), proposal
+        return candidates._replace(command=prepared.commands.clamp(candidates.command)), proposal
 
-    def explore(self, prepared: Prepared, targets: Array, answer: Pool, proposal: Proposal) -> Pool:
-        """Many refined answers to one target (1, 6): the answer itself, then all that wide seeds lead to.
+    def explore(
+        self, prepared: Prepared, targets: Array, answer: RefinedCandidates, proposal: Proposal
+    ) -> RefinedCandidates:
+        """Many refined answers to one target (1, 6): the answer itself, then all that many seeds lead to.
 
         Every candidate of the network seeds a search of its own, as do random shares of thrust.
         """
         target = targets / self.normalization.std
         top = prepared.planar.curves.maximum
-        drawn = np.random.default_rng(0).random((EXPLORERS, len(top))) ** 2 * top
+        drawn = np.random.default_rng(0).random((SEARCH.wide_seeds, len(top))) ** 2 * top
         spread = np.concatenate([proposal.thrust[0].astype(np.float64), prepared.subsets, drawn])
-        command = self._search(prepared, target, spread[None], False, keep=len(spread), steps=EXPLORING_STEPS)
-        found = refine_pool(prepared, target, command, FIRST_PATIENCE)
-        return Pool(*(np.concatenate(both, axis=1) for both in zip(answer, found, strict=True)))
+        command = self._search(
+            prepared, target, spread[None], False, keep=len(spread), steps=SEARCH.wide_steps
+        )
+        found = refine_candidates(prepared, target, command, MISSED.first_lm_steps)
+        return found.with_first(answer)
 
-    def _descend_steadily(
-        self, prepared: Prepared, target: Array, proposal: Proposal, previous: Array, lead: Lead
-    ) -> Pool:
-        """Answers that turn the fins as little as the target allows, with an eye on the next ticks.
+    def _descend_from_previous(
+        self, prepared: Prepared, target: Array, proposal: Proposal, previous: Array, fallback: FallbackForces
+    ) -> RefinedCandidates:
+        """Answers that turn the fins as little as the target allows, with regard to the next ticks.
 
         Fins at rest turn towards where they will be needed, or else where they would be cheapest.
         """
         seeds = self._seeds(prepared, proposal)
-        free = self._descend(prepared, target, proposal, seeds, lead)
+        free = self._descend(prepared, target, proposal, seeds, fallback)
         aim = free.command[0, 0, :, 2]
         kept = planar_thrust(prepared.commands, previous)
         seeds = np.concatenate([kept[None, None], seeds], axis=1)
-        near = turn_little(prepared, previous, aim, TURNS[0])
-        pool = self._descend(near, target, proposal, seeds, lead, beside=free.command[0])
-        plan = foresee(prepared, previous, target[0], pool.command[0, 0], free.command[0])
+        near = limit_turn(prepared, previous, aim, TURNS[0])
+        candidates = self._descend(near, target, proposal, seeds, fallback, known=free.command[0])
+        plan = plan_ahead(prepared, previous, target[0], candidates.command[0, 0], free.command[0])
         if plan is not None:
-            near = turn_little(prepared, previous, plan.ready, TURNS[1])
-            start = near.commands.clamp(turn_short(near, plan.command))
-            planned = refine_pool(near, target, start[None, None], PLAN_STEPS)
-            if planned.error[0, 0] <= max(TOLERANCE, pool.error[0, 0]):
-                pool = Pool(*(np.concatenate(parts, axis=1) for parts in zip(planned, pool, strict=True)))
+            near = limit_turn(prepared, previous, plan.ready, TURNS[1])
+            start = near.commands.clamp(unwrap_to_arc(near, plan.command))
+            planned = refine_candidates(near, target, start[None, None], SEARCH.plan_lm_steps)
+            if planned.error[0, 0] <= max(RANKING.exact_error, candidates.error[0, 0]):
+                candidates = candidates.with_first(planned)
         for width in TURNS[1:]:
-            if pool.error[0, 0] <= (TOLERANCE if width == TURNS[1] else SLIGHT):
+            if candidates.error[0, 0] <= (RANKING.exact_error if width == TURNS[1] else SEARCH.passing_error):
                 break
-            near = turn_little(prepared, previous, aim, width)
-            pool = self._descend(near, target, proposal, seeds, lead, beside=free.command[0])
-        return pool
+            near = limit_turn(prepared, previous, aim, width)
+            candidates = self._descend(near, target, proposal, seeds, fallback, known=free.command[0])
+        return candidates
 
-    def _weigh(self, prepared: Prepared, target: Array, pool: Pool, previous: Array | None) -> Pool:
+    def _trade_error_for_energy(
+        self, prepared: Prepared, target: Array, candidates: RefinedCandidates, previous: Array | None
+    ) -> RefinedCandidates:
         """Trade error for energy, where the settings ask for the weighted sum."""
         weight = self.settings.energy_tradeoff
         if weight == 0.0:
-            return pool
+            return candidates
         if previous is not None:
-            prepared = turn_little(prepared, previous, pool.command[0, 0, :, 2], TURNS[0])
-        rows, p, n, _ = pool.command.shape
-        start = prepared.commands.clamp(pool.command.reshape(-1, n, 3))
-        found, energy = lessen(
+            prepared = limit_turn(prepared, previous, candidates.command[0, 0, :, 2], TURNS[0])
+        rows, p, n, _ = candidates.command.shape
+        start = prepared.commands.clamp(candidates.command.reshape(-1, n, 3))
+        found, energy = minimize_weighted_sum(
             prepared.commands, np.repeat(target, p, axis=0), start, prepared.energy, weight
         )
         total = (found.error**2 + weight * energy).reshape(rows, p)
         order = total.argsort(axis=1) + np.arange(0, rows * p, p)[:, None]
-        return Pool(*(values.take(order, axis=0) for values in (*found, energy)))
+        return RefinedCandidates(*(values.take(order, axis=0) for values in (*found, energy)))
 
     def _descend(
         self,
@@ -155,24 +177,24 @@ class Pipeline:
         target: Array,
         proposal: Proposal,
         seeds: Array,
-        lead: Lead,
-        beside: Array | None = None,
-    ) -> Pool:
-        """Search from thrust seeds (N, S, n), refine, and insist where that did not reach the target.
+        fallback: FallbackForces,
+        known: Array | None = None,
+    ) -> RefinedCandidates:
+        """Search from thrust seeds (N, S, n), refine, and go on where that did not reach the target.
 
-        From tick to tick, `beside` are commands (P, n, 3) that answer the single target whatever the turns:
+        From tick to tick, `known` are commands (P, n, 3) that answer the single target whatever the turns:
         the search in narrow arcs may miss them where they are within these.
         """
-        steady, steps = beside is not None, self.settings.refine_steps
-        command = self._search(prepared, target, seeds, steady)
-        if beside is not None:
-            within = prepared.commands.clamp(turn_short(prepared, beside))
+        keep_mode, steps = known is not None, self.settings.refine_steps
+        command = self._search(prepared, target, seeds, keep_mode)
+        if known is not None:
+            within = prepared.commands.clamp(unwrap_to_arc(prepared, known))
             command, steps = np.concatenate([command, within[None]], axis=1), steps + 1
-        pool = refine_pool(prepared, target, command, steps, steady)
-        missed = pool.error[:, 0] > TOLERANCE
+        candidates = refine_candidates(prepared, target, command, steps, keep_mode)
+        missed = candidates.error[:, 0] > RANKING.exact_error
         if missed.any():
-            insist(prepared, target, proposal, pool, missed, lead)
-        return pool
+            refine_missed(prepared, target, proposal, candidates, missed, fallback)
+        return candidates
 
     def _seeds(self, prepared: Prepared, proposal: Proposal) -> Array:
         """Thrust seeds (N, S, n): the best candidate of each component, and sub-layouts."""
@@ -192,22 +214,23 @@ class Pipeline:
         prepared: Prepared,
         target: Array,
         thrust: Array,
-        steady: bool,
+        keep_mode: bool,
         keep: int | None = None,
         steps: int | None = None,
     ) -> Array:
         """Cheapest commands (N, n_refined, n, 3) reached from thrust seeds (N, S, n).
 
-        With `steady`, the first seed is where the robot is; what it leads to stays first.
+        With `keep_mode`, the first seed is how the robot moves now; what it leads to stays first.
         """
         rows, n_seeds, n = thrust.shape
         flat = target if rows == 1 else np.repeat(target, n_seeds, axis=0)
-        steps = steps or self.settings.search_steps or (4 if n < 6 else 12)
+        usual = SEARCH.few_fins_steps if n < 6 else SEARCH.many_fins_steps
+        steps = steps or self.settings.search_steps or usual
         planar = force_space.descend(prepared.planar, flat, thrust.reshape(-1, n), steps)
         command, energy = force_space.realize(prepared.planar, planar)
         error = np.einsum("ri,ri->r", planar.residual, planar.residual)
-        score = rank(energy, error, PROMISING**2).reshape(rows, n_seeds)
-        if steady:
+        score = rank(energy, error, SEARCH.promising_error**2).reshape(rows, n_seeds)
+        if keep_mode:
             score[:, 0] = -1.0
         kept = (
             score.argsort(axis=1)[:, : keep or self.settings.n_refined]

@@ -106,7 +106,7 @@ def _draws(seed: int, rows: int, extra: int, n: int) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=64)
 def draws_of_one(seed: int, extra: int, n: int) -> tuple[Array, Array]:
-    """The same for a single target, kept: a robot asks with one seed, tick after tick."""
+    """The same for a single target, cached: a control loop uses one seed for every tick."""
     uniform, normal = _draws(seed, 1, extra, n)
     uniform.setflags(write=False)
     normal.setflags(write=False)
@@ -135,14 +135,14 @@ def propose(
     """
     x, component = sample(predict(network, prepared, centred), n_candidates, temperature, seed)
     problem = prepared.commands
-    limits = problem.rough
+    limits = problem.float32
     x += np.float32(1.0)
     x *= limits.half
     x += limits.lower
     command = problem.clamp_in_place(x)
     rows, k, n, _ = command.shape
     force = problem.fin.force(command)
-    wrench = force.reshape(rows * k, 3 * n).dot(problem.rough_columns).reshape(rows, k, 6)
+    wrench = force.reshape(rows * k, 3 * n).dot(problem.columns_float32).reshape(rows, k, 6)
     missing = wrench - target[:, None]
     error = np.sqrt(np.einsum("rki,rki->rk", missing, missing))
     across = force[..., 1:] * force[..., 1:]

@@ -1,11 +1,12 @@
 """The paper's weighted sum `err_norm^2 + w J_en`: a little of the wrench given up for a little energy.
 
-Exact answers are where it starts; Levenberg-Marquardt on the squares of error and energy together does the
-rest, through the surrogate's Jacobian and inside the limits.
+It starts from exact answers; Levenberg-Marquardt on the squares of error and energy together minimizes the
+sum, through the surrogate's Jacobian and inside the limits.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,16 +17,34 @@ from finlab.physics.energy import EnergyMeter, EnergyWeights, energy_scale
 
 Array = NDArray[Any]
 
-STEPS = 25
-"""Most steps; far fewer are needed for small weights."""
-DAMPING = (1e-4, 0.3, 10.0)
-"""First damping, and its factors after a good and after a bad step."""
-SETTLED = 1e-7
-"""Relative gain of a step from which a row counts as settled."""
+
+@dataclass(frozen=True)
+class WeightedSumSettings:
+    """How the sum is minimized."""
+
+    lm_steps: int = 25
+    """Most Levenberg-Marquardt steps; far fewer are needed for small weights."""
+    damping: float = 1e-4
+    """Damping of the first step, in units of the limit ranges."""
+    less_damping: float = 0.3
+    """Factor of the damping after a step that lowered the sum."""
+    more_damping: float = 10.0
+    """Factor of the damping after one that did not."""
+    settled_gain: float = 1e-7
+    """Relative gain of a step below which a row counts as settled."""
 
 
-def lessen(
-    problem: CommandProblem, target: Array, command: Array, energy: EnergyMeter, energy_tradeoff: float
+WEIGHTED_SUM = WeightedSumSettings()
+"""What the pipeline uses."""
+
+
+def minimize_weighted_sum(
+    problem: CommandProblem,
+    target: Array,
+    command: Array,
+    energy: EnergyMeter,
+    energy_tradeoff: float,
+    settings: WeightedSumSettings = WEIGHTED_SUM,
 ) -> tuple[Refined, Array]:
     """Commands near a local minimum of the weighted sum, and their energies (R,).
 
@@ -35,6 +54,7 @@ def lessen(
         command: where to start (R, n, 3), inside the limits.
         energy: of this robot, without inertial power: a sum of squares is needed.
         energy_tradeoff: w.
+        settings: how long and how carefully.
     """
     rows, n, _ = command.shape
     slope = _energy_slope(problem, energy.weights) * np.sqrt(energy_tradeoff)
@@ -42,13 +62,13 @@ def lessen(
     for i in range(n):
         bend[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = slope[i].T @ slope[i]
 
-    def judge(command: Array) -> Array:
+    def evaluate(command: Array) -> Array:
         error = ((problem.wrench(command) - target) ** 2).sum(-1)
         total: Array = error + energy_tradeoff * energy(command)
         return total
 
-    total, damping = judge(command), np.full(rows, DAMPING[0])
-    for _ in range(STEPS):
+    total, damping = evaluate(command), np.full(rows, settings.damping)
+    for _ in range(settings.lm_steps):
         force, by_command = problem.fin.force_and_slopes(command)
         residual = target - force.reshape(rows, 3 * n) @ problem.columns.reshape(3 * n, 6)
         jacobian = (np.matmul(by_command, problem.columns) * problem.span[..., None]).reshape(rows, 3 * n, 6)
@@ -61,13 +81,13 @@ def lessen(
         matrix.reshape(rows, -1)[:, :: 3 * n + 1] += damping[:, None] + 1e-12 + held
         change = np.linalg.solve(matrix, np.where(held, 0.0, downhill)[..., None])[..., 0]
         tried = problem.clamp(command + change.reshape(rows, n, 3) * problem.span)
-        new = judge(tried)
+        new = evaluate(tried)
         better = new < total
         gain = np.where(better, (total - new) / np.maximum(total, 1e-12), 0.0)
         command = np.where(better[:, None, None], tried, command)
         total = np.where(better, new, total)
-        damping = damping * np.where(better, *DAMPING[1:])
-        if (gain < SETTLED).all() and better.any():
+        damping = damping * np.where(better, settings.less_damping, settings.more_damping)
+        if (gain < settings.settled_gain).all() and better.any():
             break
     wrench = problem.wrench(command)
     error = np.linalg.norm(wrench - target, axis=-1)

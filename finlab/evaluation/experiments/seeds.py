@@ -18,9 +18,9 @@ from tqdm import tqdm
 
 from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.allocation.learned.levenberg_marquardt import refine
-from finlab.allocation.learned.pool import TOLERANCE
 from finlab.allocation.learned.prepared import Prepared
 from finlab.allocation.learned.proposal import propose
+from finlab.allocation.learned.refined_candidates import RANKING
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.tables import text_table
 from finlab.physics import Plant
@@ -115,7 +115,7 @@ def _answer(
     refined = refine(prepared.commands, target, start.reshape(-1, n, 3), steps)
     energy = command_energy(refined.command, prepared.upper)
     # The tolerance of the product; without refinement nothing is exact and the error decides.
-    rank = np.where(refined.error > 10 * TOLERANCE, 1e3 + refined.error, energy).reshape(rows, k)
+    rank = np.where(refined.error > 10 * RANKING.exact_error, 1e3 + refined.error, energy).reshape(rows, k)
     chosen: Array = refined.command.reshape(rows, k, n, 3)[np.arange(rows), rank.argmin(1)]
     return chosen
 

@@ -1,8 +1,8 @@
-"""From tick to tick: fins turn slowly, so an answer should ask them to turn little.
+"""From tick to tick: fins turn slowly, so each may turn only so far from its previous direction.
 
 The zero direction of a real fin follows its command with a pole of about 3.5 rad/s. Given the previous
 command, each fin's arc of zero directions is narrowed around where it points; only if the target is out
-of reach so is the arc widened. `foresight` sees to it that this is rare.
+of reach so is the arc widened. `receding_horizon` keeps that rare.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ TURNS = (0.5, 0.58, 1.2, np.pi)
 within a few ticks; only a target that leaves no other way gets the larger ones."""
 
 
-def turn_little(prepared: Prepared, previous: Array, aim: Array, width: float) -> Prepared:
+def limit_turn(prepared: Prepared, previous: Array, aim: Array, width: float) -> Prepared:
     """The layout with each fin's arc narrowed to `width` [rad] on both sides of its previous direction.
 
     Args:
         prepared: the layout.
         previous: command (n, 3) of the previous tick; a fin with NaN is left free.
         aim: zero directions (n,) [rad] to which fins at rest turn, step by step, so that they are ready
-            when their turn comes.
+            when they are needed.
         width: half of the new arc; from pi on nothing is narrowed.
     """
     direction = previous[:, 2]
@@ -58,7 +58,7 @@ def turn_little(prepared: Prepared, previous: Array, aim: Array, width: float) -
     return prepared._replace(planar=planar, commands=commands)
 
 
-def turn_short(near: Prepared, command: Array) -> Array:
+def unwrap_to_arc(near: Prepared, command: Array) -> Array:
     """Commands (..., n, 3), each zero direction a turn more or less so that it is nearest to its arc."""
     turned = command.copy()
     middle = near.planar.middle

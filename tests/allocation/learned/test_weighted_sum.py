@@ -22,7 +22,7 @@ def cases(limits: str, count: int = 8):  # type: ignore[no-untyped-def]
 
 @pytest.mark.parametrize("limits", ["nominal", "varied"])
 @pytest.mark.parametrize("weight", [1e-3, 3e-2])
-def test_no_small_change_lessens_the_sum(learned: LearnedAllocator, limits: str, weight: float) -> None:
+def test_no_small_change_lowers_the_sum(learned: LearnedAllocator, limits: str, weight: float) -> None:
     """SciPy, started from the answer on the analytic fin model, finds nothing much better next to it."""
     allocator = load_allocator(energy_tradeoff=weight)
     sigma = allocator.normalization.std

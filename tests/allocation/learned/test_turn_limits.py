@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from finlab.allocation.learned.learned_allocator import LearnedAllocator
-from finlab.allocation.learned.steady import TURNS, planar_thrust, turn_little
+from finlab.allocation.learned.turn_limits import TURNS, limit_turn, planar_thrust
 from finlab.assets import shipped_layouts
 from finlab.errors import CommandError
 from finlab.layout import Layout, load_layout
@@ -16,13 +16,13 @@ from finlab.physics import Plant
 
 TICKS = np.arange(200) * 0.1
 """20 s at 10 Hz."""
-CALM = np.array([0.98, 0.98, 1.4, 0.175, 0.175, 0.175])
+SLOW_PATH = np.array([0.98, 0.98, 1.4, 0.175, 0.175, 0.175])
 """Amplitudes of the path [N, N m], about 0.7 standard deviations of what random commands give."""
 TARGET = [1.0, 0.5, 2.0, 0.0, 0.1, 0.1]
 
 
 class Drive(NamedTuple):
-    """One ride along a path."""
+    """Answers along a path."""
 
     command: np.ndarray
     """(T, n, 3)."""
@@ -57,7 +57,7 @@ def drive(method: LearnedAllocator, layout: Layout, path: np.ndarray, *, steady:
 def smooth_path(seed: int) -> np.ndarray:
     """Slow sines (T, 6) in all axes."""
     rng = np.random.default_rng(seed)
-    return CALM * np.sin(rng.uniform(0.15, 0.6, 6) * TICKS[:, None] + rng.uniform(0.0, 2.0 * math.pi, 6))
+    return SLOW_PATH * np.sin(rng.uniform(0.15, 0.6, 6) * TICKS[:, None] + rng.uniform(0.0, 2.0 * math.pi, 6))
 
 
 def limits(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
@@ -92,7 +92,7 @@ def test_fins_turn_at_most_a_fifth_as_far(free: Drive, steady: Drive) -> None:
 
 @pytest.mark.parametrize("name", ["A", "C"])
 def test_fins_turn_before_their_thrust_passes_zero(name: str, learned: LearnedAllocator) -> None:
-    """Without foresight these robots are left no way but turns of up to half a circle."""
+    """Without the receding horizon these robots are left no way but turns of up to half a circle."""
     layout = load_layout(shipped_layouts()[name])
     ride = drive(learned, layout, 0.7 * smooth_path(3), steady=True)
     assert ride.turns.max() <= TURNS[1] + 1e-6
@@ -193,7 +193,7 @@ def test_a_previous_that_is_no_command_is_refused(
 def test_arcs_are_narrowed_around_where_the_fins_point(learned: LearnedAllocator) -> None:
     prepared = learned.pipeline.prepare(load_layout(shipped_layouts()["restricted"]))
     previous = np.column_stack([np.full(4, 0.3), np.full(4, 1.0), [0.0, 1.6, np.nan, -0.6]])
-    near = turn_little(prepared, previous, np.zeros(4), 0.35)
+    near = limit_turn(prepared, previous, np.zeros(4), 0.35)
     lower, upper = near.commands.lower[:, 2], near.commands.upper[:, 2]
     old_lower, old_upper = prepared.commands.lower[:, 2], prepared.commands.upper[:, 2]
     np.testing.assert_allclose(lower, [-0.35, old_lower[1], old_lower[2], -0.95])
@@ -201,7 +201,7 @@ def test_arcs_are_narrowed_around_where_the_fins_point(learned: LearnedAllocator
     np.testing.assert_array_equal(near.commands.lower[:, :2], prepared.commands.lower[:, :2])
     for untouched in (np.full((4, 3), np.nan), previous):
         width = TURNS[-1] if untouched is previous else 0.1
-        assert turn_little(prepared, untouched, np.zeros(4), width) is prepared
+        assert limit_turn(prepared, untouched, np.zeros(4), width) is prepared
 
 
 def test_a_full_circle_that_starts_elsewhere_is_kept(learned: LearnedAllocator, penta: Layout) -> None:
