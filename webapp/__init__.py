@@ -3,4 +3,7 @@
 What a browser shows is one `Session` (no viser in it). An event becomes an intent, the session checks it and
 changes, the view writes the difference to the page, and a worker solves the newest question. All sessions and
 widgets belong to viser's event loop; only the solving happens elsewhere.
+
+`session` is what one browser has made, `tasks` what is worked out in the background, `scene` the 3D view,
+`panels` the widgets beside it, `markup` the HTML and the sentences in them.
 """

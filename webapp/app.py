@@ -10,13 +10,13 @@ from pathlib import Path
 import viser
 
 from finlab.layout import Layout
-from webapp.keeping import SessionFiles
 from webapp.session import Display, Session
-from webapp.solver import Solver
-from webapp.store import SessionStore
+from webapp.session.session_files import SessionFiles
+from webapp.session.store import SessionStore
+from webapp.tasks.solver import Solver
+from webapp.tasks.workers import Workers
 from webapp.view import View
 from webapp.viser_internals import disable_sharing
-from webapp.workers import Workers
 
 FRAME_S = 1 / 25
 """Time between two poses of the fins [s]."""

@@ -20,10 +20,10 @@ import viser
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
 from webapp.session import Session
-from webapp.solver import Solver
+from webapp.tasks.solver import Solver
+from webapp.tasks.workers import Workers
 from webapp.view import View
 from webapp.viser_internals import start_server, stop_server
-from webapp.workers import Workers
 
 SESSIONS = 8
 LAYOUT = "penta"

@@ -9,12 +9,12 @@ from finlab.deploy.graph_file import read_graph
 from finlab.errors import FinlabError
 from finlab.layout import Layout, load_layout
 from webapp.app import App
-from webapp.files import GRAPH_SUFFIX
 from webapp.guard import Guard
-from webapp.solver import Solver
-from webapp.state import State
-from webapp.targets import FIRST
-from webapp.uploads import cache_folder
+from webapp.session.hull_files import cache_folder
+from webapp.session.layout_files import GRAPH_SUFFIX
+from webapp.session.state import State
+from webapp.session.targets import FIRST
+from webapp.tasks.solver import Solver
 from webapp.viser_internals import start_guarded, stop_server
 
 FIRST_LAYOUT = "ucat"

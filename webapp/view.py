@@ -12,26 +12,26 @@ import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
-from webapp.analyst import Question, find
-from webapp.answering import Answering
-from webapp.commands import add_commands
-from webapp.comparison import Comparison
-from webapp.exports import Exports
-from webapp.improving import Improver
+from webapp.panels.commands import add_commands
 from webapp.panels.header import Header
 from webapp.panels.host import Panel
-from webapp.panels.swim import SwimPanel
+from webapp.panels.swim_tab import SwimTab
 from webapp.panels.tabs import PANEL_WIDTH, build_panels
-from webapp.playback import Playback
-from webapp.ranging import REST_S, Beside, find_ranges
-from webapp.resting import Resting
-from webapp.scenery import Scenery
+from webapp.scene.scenery import Scenery
 from webapp.session import Session
-from webapp.solver import Solver
-from webapp.sweeping import Sweep
-from webapp.swimming import Swimming
+from webapp.tasks.analyst import Question, find
+from webapp.tasks.answering import Answering
+from webapp.tasks.comparison import Comparison
+from webapp.tasks.debounce import Debounced
+from webapp.tasks.exports import Exports
+from webapp.tasks.improving import Improver
+from webapp.tasks.playback import Playback
+from webapp.tasks.ranging import REST_S, Beside, find_ranges
+from webapp.tasks.solver import Solver
+from webapp.tasks.sweeping import Sweep
+from webapp.tasks.swimming import Swimming
+from webapp.tasks.workers import Workers
 from webapp.theme import GREEN, VERMILLION
-from webapp.workers import Workers
 
 CARD_REST_S = 0.35
 """How long a layout may not change before its card is worked out [s]: that takes a second."""
@@ -68,8 +68,8 @@ class View:
             session, solver, answers, loop, post, self._answered, partial(self.notify, "No answer")
         )
         self.playback = Playback(session, self.answering, solver, answers, loop, post, changed, refused)
-        self.ranging = Resting(find_ranges, REST_S, workers.marks, loop, post, changed)
-        self.analyst = Resting(find, CARD_REST_S, workers.cards, loop, post, changed)
+        self.ranging = Debounced(find_ranges, REST_S, workers.marks, loop, post, changed)
+        self.analyst = Debounced(find, CARD_REST_S, workers.cards, loop, post, changed)
         self.improver = Improver(workers.searches, post, changed)
         self.comparison = Comparison(solver, answers, post, changed)
         self.swimming = Swimming(solver.aside, workers.swims, post, self._swam, refused)
@@ -151,7 +151,7 @@ class View:
         with self.client.atomic():
             self.scenery.refresh_swim()
             for panel in self._panels:
-                if isinstance(panel, (Header, SwimPanel)):
+                if isinstance(panel, (Header, SwimTab)):
                     panel.refresh()
 
     def _answered(self) -> None:

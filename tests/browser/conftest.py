@@ -62,7 +62,7 @@ def served() -> Iterator[Served]:
     from tests.webapp.stand_in import load_stand_in
     from webapp.app import App
     from webapp.session import Display
-    from webapp.solver import Solver
+    from webapp.tasks.solver import Solver
     from webapp.viser_internals import start_server, stop_server
 
     server = start_server("127.0.0.1", 0)

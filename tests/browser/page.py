@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from webapp.swim_plan import SwimSettings
-from webapp.wishes import Draft
+from webapp.session.search_request import Draft
+from webapp.session.swim_plan import SwimSettings
 
 WAIT_MS = 45_000
 """Longest wait for the page: software rendering on a busy machine is slow."""

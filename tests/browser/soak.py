@@ -56,9 +56,9 @@ def main(seconds: float) -> None:
     from finlab.layout import load_layout
     from webapp.app import App
     from webapp.session import Display
-    from webapp.solver import Solver
-    from webapp.state import State
-    from webapp.targets import FIRST
+    from webapp.session.state import State
+    from webapp.session.targets import FIRST
+    from webapp.tasks.solver import Solver
     from webapp.viser_internals import start_server, stop_server
 
     server, solver = start_server("127.0.0.1", 0), Solver()

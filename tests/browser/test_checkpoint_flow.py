@@ -13,7 +13,7 @@ from tests.browser.conftest import Served
 from tests.browser.page import Page
 from webapp.app import App
 from webapp.session import Display
-from webapp.solver import Solver
+from webapp.tasks.solver import Solver
 from webapp.viser_internals import start_server, stop_server
 
 pytestmark = pytest.mark.skipif(

@@ -12,7 +12,7 @@ from tests.webapp.stand_in import load_stand_in
 from webapp.app import App
 from webapp.guard import Guard
 from webapp.session import Display
-from webapp.solver import Solver
+from webapp.tasks.solver import Solver
 from webapp.viser_internals import disconnect_all, start_guarded, stop_server
 
 

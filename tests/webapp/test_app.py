@@ -23,8 +23,8 @@ from tests.webapp.stand_in import load_stand_in
 from webapp.app import App, _session_keys
 from webapp.serving import serve
 from webapp.session import Session
-from webapp.solver import Solver
-from webapp.store import SessionStore
+from webapp.session.store import SessionStore
+from webapp.tasks.solver import Solver
 from webapp.view import View
 
 
@@ -189,7 +189,8 @@ def test_taken_port_and_bad_port_are_refused() -> None:
 
 def test_serves_until_sigterm() -> None:
     code = (
-        "import sys; from webapp import serving, solver; from tests.webapp.stand_in import load_stand_in\n"
+        "import sys; from webapp import serving; from webapp.tasks import solver\n"
+        "from tests.webapp.stand_in import load_stand_in\n"
         "serving.Solver = lambda checkpoint: solver.Solver(load=load_stand_in)\n"
         "serving.serve(port=0)"
     )

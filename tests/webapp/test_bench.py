@@ -4,7 +4,7 @@ import numpy as np
 
 from tests.webapp.stand_in import load_stand_in
 from webapp.bench import Bench
-from webapp.solver import Solver
+from webapp.tasks.solver import Solver
 
 
 def test_changes_leave_no_nodes_behind() -> None:

@@ -11,14 +11,14 @@ from finlab.assets import shipped_checkpoints, shipped_layouts
 from finlab.errors import AllocationError
 from finlab.layout import load_layout
 from tests.webapp.stand_in import StandIn, load_stand_in
-from webapp.comparison import COMPARED, Comparison
-from webapp.density import densities
 from webapp.markup.comparison import comparison_table
-from webapp.refinement import STEPS
-from webapp.solver import Solver
-from webapp.state import State
-from webapp.targets import PRESETS
-from webapp.worker import Worker
+from webapp.session.state import COMPARED, State
+from webapp.session.targets import PRESETS
+from webapp.tasks.comparison import Comparison
+from webapp.tasks.density import densities
+from webapp.tasks.refinement import STEPS
+from webapp.tasks.solver import Solver
+from webapp.tasks.worker import Worker
 
 UCAT = load_layout(shipped_layouts()["ucat"])
 

@@ -11,15 +11,15 @@ from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from finlab.sim import SHIPPED
 from tests.webapp.stand_in import load_stand_in
-from webapp.keeping import restore, to_dict
 from webapp.markup.fins import fin_table
-from webapp.retelling import command_line, python_lines
+from webapp.markup.snippets import command_line, python_lines
+from webapp.markup.words import damage_words
 from webapp.session import Session
-from webapp.solver import Solver
-from webapp.swim_plan import ALONE, OWN, SwimSettings
-from webapp.targets import axis_reach, full_thrust
-from webapp.wishes import ALL, Draft
-from webapp.words import damage_words
+from webapp.session.search_request import ALL, Draft
+from webapp.session.session_files import restore, to_dict
+from webapp.session.swim_plan import ALONE, OWN, SwimSettings
+from webapp.session.targets import axis_reach, full_thrust
+from webapp.tasks.solver import Solver
 
 UCAT = load_layout(shipped_layouts()["ucat"])
 
@@ -87,7 +87,7 @@ def test_the_page_may_send_anything(session: Session) -> None:
         lambda: draft.with_goal("<b>"),
         lambda: draft.with_way(ALL, (math.nan, 0.0, 0.0, 0.0)),
         lambda: draft.with_way(ALL, (0.0, 0.0, 0.0, 900.0)),
-        lambda: draft.with_mission("1 2 3").wish(UCAT),
+        lambda: draft.with_mission("1 2 3").request(UCAT),
     ):
         with pytest.raises(FinlabError):
             change()
@@ -95,7 +95,7 @@ def test_the_page_may_send_anything(session: Session) -> None:
     assert len(draft.with_mission("1" * 10**6).mission) == 10_000
 
 
-def test_damage_wishes_and_swim_outlive_the_server(session: Session) -> None:
+def test_damage_draft_and_swim_outlive_the_server(session: Session) -> None:
     session.weaken("front_left", 0.5)
     session.jam("back_left", -2.0)
     way = (0.01, 0.02, 0.03, 40.0)
@@ -106,9 +106,9 @@ def test_damage_wishes_and_swim_outlive_the_server(session: Session) -> None:
     again = Session(UCAT)
     restore(again, json.loads(json.dumps(to_dict(session))))
     assert again.state == session.state and again.draft == session.draft and again.swim == session.swim
-    wish = again.draft.wish(UCAT)
-    assert "back_right" not in wish.fins and wish.own_ways == {"front_left": way}
-    assert wish.way == way and np.array(wish.wrenches).shape == (1, 6)
+    request = again.draft.request(UCAT)
+    assert "back_right" not in request.fins and request.own_ways == {"front_left": way}
+    assert request.way == way and np.array(request.wrenches).shape == (1, 6)
     session.set_swim("path", OWN)
     restore(again, json.loads(json.dumps(to_dict(session))))
     assert again.swim.path in SHIPPED, "the file of the path is not there any more"

@@ -12,10 +12,10 @@ from finlab.layout import load_layout
 from tests.webapp.stand_in import load_stand_in
 from webapp.app import App
 from webapp.guard import COOKIE, Guard, is_loopback
-from webapp.keeping import SessionFiles, to_dict
 from webapp.session import Session
-from webapp.solver import Solver
-from webapp.store import SessionStore
+from webapp.session.session_files import SessionFiles, to_dict
+from webapp.session.store import SessionStore
+from webapp.tasks.solver import Solver
 from webapp.viser_internals import start_guarded, start_server, stop_server
 
 OWN = {"host": "localhost:8080"}

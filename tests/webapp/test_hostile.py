@@ -10,7 +10,7 @@ import pytest
 import viser
 
 from tests.webapp.test_app import app, on_loop, server, until, view
-from webapp.keeping import to_dict
+from webapp.session.session_files import to_dict
 from webapp.view import View
 
 __all__ = ["app", "server", "view"]

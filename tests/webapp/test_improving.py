@@ -10,12 +10,12 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from webapp.analyst import Findings, Question, find
-from webapp.improving import Improver
-from webapp.resting import Resting
 from webapp.session import Session
-from webapp.wishes import Wish, parsed_mission
-from webapp.worker import Worker
+from webapp.session.search_request import SearchRequest, parsed_mission
+from webapp.tasks.analyst import Findings, Question, find
+from webapp.tasks.debounce import Debounced
+from webapp.tasks.improving import Improver
+from webapp.tasks.worker import Worker
 
 NO_YAW = load_layout(shipped_layouts()["no_yaw"])
 
@@ -30,10 +30,10 @@ def until(condition: Callable[[], bool]) -> None:
 def test_search_is_cancelled_and_what_it_found_is_offered() -> None:
     worker = Worker()
     improver: Improver = Improver(worker, lambda act: act(), lambda: None)
-    wish = Wish("weakest direction", NO_YAW.names)
-    improver.start(NO_YAW, wish)
+    request = SearchRequest("weakest direction", NO_YAW.names)
+    improver.start(NO_YAW, request)
     with pytest.raises(FinlabError, match="running already"):
-        improver.start(NO_YAW, wish)
+        improver.start(NO_YAW, request)
     until(lambda: improver.progress is not None)
     improver.cancel()
     until(lambda: improver.found is not None)
@@ -57,7 +57,7 @@ def test_bad_searches_are_refused() -> None:
         ("weakest direction", names, (0.05, 0.05, 0.05, 720.0)),
     ):
         with pytest.raises(FinlabError):
-            Wish(goal, fins, way)
+            SearchRequest(goal, fins, way)
     with pytest.raises(FinlabError, match="line 2"):
         parsed_mission("1 0 0 0 0 0\n1 2 three 4 5 6")
     with pytest.raises(FinlabError, match="line 1"):
@@ -71,12 +71,14 @@ def test_each_fin_has_its_bounds_and_the_mission_is_the_users() -> None:
     assert mission == ((0.5, 0.0, 0.0, 0.0, 0.0, 0.1), (0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
     first, second = NO_YAW.names[:2]
     way = (0.04, 0.0, 0.0, 20.0)
-    wish = Wish("energy of a mission", (first, second), (0.01, 0.01, 0.0, 0.0), {second: way}, mission)
-    bounds = wish.bounds(NO_YAW)
+    request = SearchRequest(
+        "energy of a mission", (first, second), (0.01, 0.01, 0.0, 0.0), {second: way}, mission
+    )
+    bounds = request.bounds(NO_YAW)
     x = NO_YAW.fins[1].position[0]
     assert bounds[second].x == pytest.approx((x - 0.04, x + 0.04))
     assert bounds[first].mounting_angle[0] == bounds[first].mounting_angle[1]
-    improver.start(NO_YAW, wish)
+    improver.start(NO_YAW, request)
     until(lambda: improver.progress is not None)
     improver.cancel()
     until(lambda: improver.found is not None)
@@ -89,9 +91,9 @@ def test_analyst_answers_only_the_question_that_stays() -> None:
     worker, asked = Worker(), threading.Event()
     layout = load_layout(shipped_layouts()["pair"])
 
-    async def run() -> Resting[Question, Findings]:
+    async def run() -> Debounced[Question, Findings]:
         loop = asyncio.get_running_loop()
-        analyst = Resting(find, 0.1, worker, loop, loop.call_soon_threadsafe, asked.set)
+        analyst = Debounced(find, 0.1, worker, loop, loop.call_soon_threadsafe, asked.set)
         for k in range(20):
             moved = layout.replace_fin(layout.names[0], position=(0.01 * k, 0.2, 0.0))
             analyst.ask(Question(moved, (), layout, "none", True))

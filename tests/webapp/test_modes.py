@@ -10,14 +10,14 @@ from finlab.allocation.modes import find_modes
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
 from tests.webapp.stand_in import StandIn, load_stand_in
-from webapp.answering import Answering
-from webapp.figures import small, three_digits
+from webapp.markup.figures import small, three_digits
 from webapp.markup.mode_plot import DOT, LEFT, WIDTH, _apart, mode_plot
-from webapp.markup.modes import mode_table
-from webapp.modes import MAX_SHOWN, NamedMode, known_modes, named_modes, nearest_modes, same_mode
+from webapp.markup.mode_table import mode_table
 from webapp.session import Session
-from webapp.solver import Solver
-from webapp.targets import PRESETS
+from webapp.session.targets import PRESETS
+from webapp.tasks.answering import Answering
+from webapp.tasks.mode_names import MAX_SHOWN, NamedMode, known_modes, named_modes, nearest_modes, same_mode
+from webapp.tasks.solver import Solver
 
 
 class Timers:

@@ -6,9 +6,9 @@ import trimesh
 
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
-from webapp.meshes import arrows, fin
-from webapp.meshes.hull import Hull, hull_of
-from webapp.meshes.mesh import Mesh
+from webapp.scene.meshes import arrows, fin
+from webapp.scene.meshes.hull import Hull, hull_of
+from webapp.scene.meshes.mesh import Mesh
 
 
 def solid(mesh: Mesh) -> trimesh.Trimesh:

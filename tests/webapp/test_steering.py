@@ -10,11 +10,11 @@ from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.webapp.stand_in import load_stand_in
-from webapp import sweeping
-from webapp.answering import Answering
 from webapp.session import Session
-from webapp.solver import Solver
-from webapp.sweeping import POINTS, Sweep
+from webapp.tasks import sweeping
+from webapp.tasks.answering import Answering
+from webapp.tasks.solver import Solver
+from webapp.tasks.sweeping import POINTS, Sweep
 
 
 @pytest.fixture

@@ -13,13 +13,13 @@ from finlab.layout import load_layout
 from tests.webapp.stand_in import load_stand_in
 from webapp.markup.corner import swim_corner
 from webapp.markup.swim_card import swim_card
-from webapp.pace import LAG_S
-from webapp.solver import Solver
-from webapp.swim_plan import Plan
-from webapp.swimmer import ERROR, FORCES, POINTS, TIME
-from webapp.swimming import Swimming
-from webapp.trajectory_file import read_path
-from webapp.worker import Worker
+from webapp.session.swim_plan import Plan
+from webapp.session.trajectory_file import read_path
+from webapp.tasks.pace import LAG_S
+from webapp.tasks.solver import Solver
+from webapp.tasks.swimmer import ERROR, FORCES, POINTS, TIME
+from webapp.tasks.swimming import Swimming
+from webapp.tasks.worker import Worker
 
 UCAT = load_layout(shipped_layouts()["ucat"])
 SHORT = read_path("short.csv", b"t,x,y,z\n0,0,0,-1\n2,0.2,0,-1\n")
@@ -43,8 +43,8 @@ def swimming() -> Iterator[Swimming]:
     worker.stop()
 
 
-def begin(swimming: Swimming, **wishes: Any) -> None:
-    swimming.start(Plan(UCAT, (), **{"path": SHORT, "methods": ("analytic",), **wishes}))
+def begin(swimming: Swimming, **settings: Any) -> None:
+    swimming.start(Plan(UCAT, (), **{"path": SHORT, "methods": ("analytic",), **settings}))
     until(lambda: bool(swimming.swimmers))
 
 

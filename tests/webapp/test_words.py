@@ -8,17 +8,16 @@ from finlab.assets import shipped_layouts
 from finlab.errors import LayoutError
 from finlab.layout import load_layout
 from tests.webapp.stand_in import StandIn
-from webapp import files
-from webapp.analyst import Question, find
-from webapp.arrow_scale import LENGTH, LONGEST, fitting_newtons
-from webapp.checks import warnings
 from webapp.markup.check_card import check_card
 from webapp.markup.score_card import score_table
-from webapp.session import Session
-from webapp.state import State
-from webapp.targets import PRESETS, axis_reach, full_thrust
-from webapp.tour import STEPS
-from webapp.words import authority_sentence, reach_sentence, rest_sentence
+from webapp.markup.words import authority_sentence, reach_sentence, rest_sentence
+from webapp.scene.arrow_scale import LENGTH, LONGEST, fitting_newtons
+from webapp.scene.clearance import warnings
+from webapp.session import Session, layout_files
+from webapp.session.state import State
+from webapp.session.targets import PRESETS, axis_reach, full_thrust
+from webapp.session.tour import STEPS
+from webapp.tasks.analyst import Question, find
 
 
 def test_reachable_and_not() -> None:
@@ -55,7 +54,7 @@ def test_arrow_scale_fits_and_rests() -> None:
 
 def test_layout_files_go_out_and_come_back() -> None:
     layout = load_layout(shipped_layouts()["ucat"])
-    assert files.read_layout("x.yaml", files.layout_bytes(layout)) == layout
+    assert layout_files.read_layout("x.yaml", layout_files.layout_bytes(layout)) == layout
 
 
 @pytest.mark.parametrize(
@@ -71,17 +70,17 @@ def test_layout_files_go_out_and_come_back() -> None:
 )
 def test_bad_uploads_are_refused_by_name(name: str, content: bytes, said: str) -> None:
     with pytest.raises(LayoutError, match=said):
-        files.read_layout(name, content)
+        layout_files.read_layout(name, content)
 
 
 def test_candidates_as_csv() -> None:
     answer = StandIn().allocate(load_layout(shipped_layouts()["ucat"]), PRESETS["Turn"])
-    lines = files.candidates_csv(answer).decode().splitlines()
+    lines = layout_files.candidates_csv(answer).decode().splitlines()
     assert answer.candidates is not None
     assert len(lines) == 1 + len(answer.candidates.energy)
     assert lines[0].startswith("err_norm,energy,source,front_right.amplitude_rad")
     with pytest.raises(Exception, match="no candidates"):
-        files.candidates_csv(None)
+        layout_files.candidates_csv(None)
 
 
 def test_fins_in_the_way_are_told() -> None:

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.allocation.policy import AXES
-from webapp.state import AXIS_UNITS, AXIS_WORDS
-from webapp.targets import nice_limit
+from webapp.session.state import AXIS_UNITS, AXIS_WORDS
+from webapp.session.targets import nice_limit
 
 
 def wrench_bars(asked: ArrayLike, given: ArrayLike | None, sentence: str) -> str:

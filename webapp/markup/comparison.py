@@ -4,9 +4,10 @@ import math
 from html import escape
 
 from finlab.allocation.allocation import REACHED, Allocation
-from webapp.comparison import COMPARED, Comparison
-from webapp.figures import small, three_digits
+from webapp.markup.figures import small, three_digits
 from webapp.markup.picking import pick
+from webapp.session.state import COMPARED
+from webapp.tasks.comparison import Comparison
 
 ERRORS = (1e-12, 10.0)
 """Errors [σ] at both ends of their bars."""

@@ -3,13 +3,13 @@
 from html import escape
 
 from finlab.allocation.allocation import Allocation
-from webapp.figures import small, three_digits
+from webapp.markup.figures import small, three_digits
 from webapp.markup.swim_card import pace_words
-from webapp.state import State
-from webapp.swimmer import ERROR
-from webapp.swimming import Swimming
+from webapp.markup.words import reach_sentence
+from webapp.session.state import State
+from webapp.tasks.swimmer import ERROR
+from webapp.tasks.swimming import Swimming
 from webapp.theme import ASKED, DEAD, DELIVERED, MISSING, OTHER, css
-from webapp.words import reach_sentence
 
 
 def corner(

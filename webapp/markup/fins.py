@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
-from webapp.state import State
+from webapp.markup.words import damage_words, saturated
+from webapp.session.state import State
 from webapp.theme import DEAD, css, fin_color
-from webapp.words import damage_words, saturated
 
 HEADER = (
     "<tr><th>fin</th><th title='half amplitude'>A [°]</th><th title='frequency'>f [Hz]</th>"

@@ -4,9 +4,9 @@ import math
 from html import escape
 
 from finlab.allocation.allocation import Allocation
-from webapp.analyst import Findings
-from webapp.figures import three_digits
+from webapp.markup.figures import three_digits
 from webapp.scene.attainable_nodes import set_scale
+from webapp.tasks.analyst import Findings
 from webapp.theme import ASKED, DEAD, DELIVERED, TORQUE_SCALE, css, look, overlay_color
 
 ARROWS = (("asked", 0.65), ("delivered", 1.0), ("missing", 1.0))

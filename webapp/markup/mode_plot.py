@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
-from webapp.channel import send
 from webapp.markup.picking import pick
-from webapp.modes import NamedMode
+from webapp.panels.channel import send
+from webapp.tasks.mode_names import NamedMode
 from webapp.theme import css, mode_color
 
 WIDTH = 388

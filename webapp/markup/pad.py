@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from webapp.channel import send
-from webapp.state import AXIS_WORDS
+from webapp.panels.channel import send
+from webapp.session.state import AXIS_WORDS
 from webapp.theme import ASKED, css
 
 RADIUS = 70

@@ -5,9 +5,9 @@ from html import escape
 from finlab.analysis import AXES, Authority, ScoreCard
 from finlab.analysis.quick import QuickCheck
 from finlab.layout import Layout
-from webapp.figures import listed, three_digits
+from webapp.markup.figures import listed, three_digits
 from webapp.markup.fins import swatch
-from webapp.state import AXIS_UNITS
+from webapp.session.state import AXIS_UNITS
 
 
 def score_table(layout: Layout, card: ScoreCard, before: ScoreCard | None, name: str = "before") -> str:

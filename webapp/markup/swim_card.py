@@ -2,8 +2,8 @@
 
 from html import escape
 
-from webapp.figures import listed
-from webapp.swimming import Swimming
+from webapp.markup.figures import listed
+from webapp.tasks.swimming import Swimming
 from webapp.theme import DELIVERED, OTHER, css
 
 

@@ -2,7 +2,7 @@
 
 from html import escape
 
-from webapp.tour import STEPS
+from webapp.session.tour import STEPS
 
 
 def tour_card(index: int) -> str:

@@ -7,7 +7,7 @@ import viser
 
 from webapp.handles import on_user_change, put
 from webapp.panels.host import Host
-from webapp.state import STRENGTH_RANGE
+from webapp.session.state import STRENGTH_RANGE
 
 
 class DamagePanel:

@@ -5,8 +5,8 @@ import viser
 from viser import uplot
 
 from finlab.layout.layout import MAX_FINS
-from webapp.density import Densities
 from webapp.handles import put
+from webapp.tasks.density import Densities
 from webapp.theme import css, fin_color
 
 TITLES = ("amplitude [°]", "frequency [Hz]", "zero direction [°]")

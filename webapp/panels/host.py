@@ -7,18 +7,18 @@ import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.forces.axis_ranges import Ranges
-from webapp.analyst import Findings, Question
-from webapp.answering import Answering
-from webapp.comparison import Comparison
-from webapp.exports import Exports
-from webapp.improving import Improver
-from webapp.playback import Playback
-from webapp.ranging import Beside
-from webapp.resting import Resting
-from webapp.scenery import Scenery
+from webapp.scene.scenery import Scenery
 from webapp.session import Session
-from webapp.sweeping import Sweep
-from webapp.swimming import Swimming
+from webapp.tasks.analyst import Findings, Question
+from webapp.tasks.answering import Answering
+from webapp.tasks.comparison import Comparison
+from webapp.tasks.debounce import Debounced
+from webapp.tasks.exports import Exports
+from webapp.tasks.improving import Improver
+from webapp.tasks.playback import Playback
+from webapp.tasks.ranging import Beside
+from webapp.tasks.sweeping import Sweep
+from webapp.tasks.swimming import Swimming
 
 
 class Host(Protocol):
@@ -33,9 +33,9 @@ class Host(Protocol):
     """The newest answer, its modes and what of it is on the robot."""
     playback: Playback
     """The refinement, step by step."""
-    analyst: Resting[Question, Findings]
+    analyst: Debounced[Question, Findings]
     """What the layout can do."""
-    ranging: Resting[Beside, Ranges]
+    ranging: Debounced[Beside, Ranges]
     """How far each component of the target can go."""
     improver: Improver
     """The search for a better layout."""

@@ -7,11 +7,11 @@ import viser
 
 from finlab.layout.body import HULL_SHAPES
 from webapp.handles import hold_kind, on_user_change, put
-from webapp.hull_editing import center_of_gravity
-from webapp.meshes.hull import hull_of
-from webapp.meshes.mesh_hull import UNITS
 from webapp.panels.host import Host
-from webapp.uploads import stored_hull
+from webapp.scene.meshes.hull import hull_of
+from webapp.scene.meshes.mesh_hull import UNITS
+from webapp.session.hull_edits import center_of_gravity
+from webapp.session.hull_files import stored_hull
 
 MESH = "mesh file"
 """Entry of the list of shapes while the hull comes from a file."""

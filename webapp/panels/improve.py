@@ -6,13 +6,13 @@ from functools import partial
 import viser
 
 from finlab.analysis import Improvement
-from webapp.figures import listed, three_digits
 from webapp.handles import numbered, on_user_change, on_user_click, put
+from webapp.markup.figures import listed, three_digits
 from webapp.markup.picking import button_colors, chosen_button
 from webapp.markup.score_card import score_table
 from webapp.panels.host import Host
+from webapp.session.search_request import ALL, GOAL_WORDS, WAY, Draft
 from webapp.theme import css, fin_color
-from webapp.wishes import ALL, GOAL_WORDS, WAY, Draft
 
 
 class ImprovePanel:
@@ -92,7 +92,7 @@ class ImprovePanel:
     def _search(self) -> None:
         session = self._host.session
         layout = session.state.layout
-        self._host.improver.start(layout, session.draft.wish(layout))
+        self._host.improver.start(layout, session.draft.request(layout))
 
     def _decide(self, button: str) -> None:
         improver = self._host.improver
@@ -105,7 +105,7 @@ class ImprovePanel:
 
     def refresh(self) -> None:
         """Write how far the search is."""
-        self._refresh_wish()
+        self._refresh_request()
         improver = self._host.improver
         running, progress, found = improver.running, improver.progress, improver.found
         put(self._start, disabled=running)
@@ -126,7 +126,7 @@ class ImprovePanel:
             text = "Searching …"
         put(self._card, content=f"<div class='fl'>{text}</div>")
 
-    def _refresh_wish(self) -> None:
+    def _refresh_request(self) -> None:
         """Write which fins may move, and how far."""
         names, draft = self._host.session.state.layout.names, self._host.session.draft
         put(self._goal, value=draft.goal)

@@ -4,10 +4,10 @@ from functools import partial
 
 import viser
 
-from webapp.channel import Channel
 from webapp.handles import Changes, numbered, on_user_change, put
 from webapp.markup.mode_plot import SAMPLES, mode_plot
 from webapp.markup.picking import chosen_button, marker
+from webapp.panels.channel import Channel
 from webapp.panels.host import Host
 
 

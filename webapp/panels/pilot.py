@@ -5,9 +5,9 @@ from functools import partial
 import viser
 
 from finlab.allocation.policy import KINDS
-from webapp.channel import Channel
 from webapp.handles import on_user_change, put
 from webapp.markup.pad import PADS, pad
+from webapp.panels.channel import Channel
 from webapp.panels.host import Host
 from webapp.panels.target import TargetPanel
 

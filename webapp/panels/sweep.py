@@ -7,12 +7,12 @@ import viser
 from viser import uplot
 
 from finlab.layout.layout import MAX_FINS
-from webapp.figures import small
 from webapp.handles import hold_kind, on_user_change, on_user_click, put
+from webapp.markup.figures import small
 from webapp.panels.host import Host
-from webapp.state import AXIS_UNITS, AXIS_WORDS
-from webapp.sweeping import POINTS, Sweep
-from webapp.targets import nice_limit
+from webapp.session.state import AXIS_UNITS, AXIS_WORDS
+from webapp.session.targets import nice_limit
+from webapp.tasks.sweeping import POINTS, Sweep
 from webapp.theme import css, fin_color
 
 FONT = "11px sans-serif"

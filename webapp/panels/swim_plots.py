@@ -9,12 +9,12 @@ from viser import uplot
 
 from finlab.layout.layout import MAX_FINS
 from webapp.handles import hold_kind, put
-from webapp.state import AXIS_UNITS, AXIS_WORDS
-from webapp.swimmer import ASKED as ASKED_COLUMN
-from webapp.swimmer import DELIVERED as DELIVERED_COLUMN
-from webapp.swimmer import ERROR, FORCES, TIME
-from webapp.swimming import Swimming
-from webapp.targets import nice_limit
+from webapp.session.state import AXIS_UNITS, AXIS_WORDS
+from webapp.session.targets import nice_limit
+from webapp.tasks.swimmer import ASKED as ASKED_COLUMN
+from webapp.tasks.swimmer import DELIVERED as DELIVERED_COLUMN
+from webapp.tasks.swimmer import ERROR, FORCES, TIME
+from webapp.tasks.swimming import Swimming
 from webapp.theme import ASKED, DELIVERED, OTHER, css, fin_color
 
 EVERY_S = 0.2

@@ -4,28 +4,28 @@ from collections.abc import Callable
 
 import viser
 
-from webapp.panels.compare import ComparePanel
-from webapp.panels.display import DisplayPanel
+from webapp.panels.compare_tab import CompareTab
+from webapp.panels.files_tab import FilesTab
 from webapp.panels.header import Header
 from webapp.panels.host import Host, Panel
-from webapp.panels.layout import LayoutPanel
-from webapp.panels.limits import LimitsPanel
-from webapp.panels.modes import ModesPanel
-from webapp.panels.swim import SwimPanel
-from webapp.panels.take_home import TakeHomePanel
-from webapp.panels.wrench import WrenchPanel
+from webapp.panels.layout_tab import LayoutTab
+from webapp.panels.limits_tab import LimitsTab
+from webapp.panels.modes_tab import ModesTab
+from webapp.panels.swim_tab import SwimTab
+from webapp.panels.view_tab import ViewTab
+from webapp.panels.wrench_tab import WrenchTab
 
 PANEL_WIDTH = 410
 """Width of the panel beside the view [px]."""
 TABS: dict[str, Callable[[viser.GuiApi, Host], Panel]] = {
-    "Wrench": WrenchPanel,
-    "Layout": LayoutPanel,
-    "Modes": ModesPanel,
-    "Limits": LimitsPanel,
-    "Compare": ComparePanel,
-    "Swim": SwimPanel,
-    "View": DisplayPanel,
-    "Files": TakeHomePanel,
+    "Wrench": WrenchTab,
+    "Layout": LayoutTab,
+    "Modes": ModesTab,
+    "Limits": LimitsTab,
+    "Compare": CompareTab,
+    "Swim": SwimTab,
+    "View": ViewTab,
+    "Files": FilesTab,
 }
 """Tabs by their labels."""
 

@@ -7,12 +7,12 @@ import viser
 
 from finlab.allocation.policy import AXES
 from finlab.layout import Layout
-from webapp.figures import three_digits
 from webapp.handles import on_user_change, put
+from webapp.markup.figures import three_digits
 from webapp.markup.picking import marker
 from webapp.panels.host import Host
-from webapp.state import AXIS_UNITS, AXIS_WORDS
-from webapp.targets import PRESETS, axis_reach, slider_end
+from webapp.session.state import AXIS_UNITS, AXIS_WORDS
+from webapp.session.targets import PRESETS, axis_reach, slider_end
 from webapp.viser_internals import put_marks
 
 

@@ -5,11 +5,11 @@ import viser
 from numpy.typing import NDArray
 
 from finlab.analysis import AttainableSet
-from webapp.analyst import Findings
 from webapp.handles import put
-from webapp.meshes.arrows import NOTHING
-from webapp.meshes.mesh import Mesh, tube
+from webapp.scene.meshes.arrows import NOTHING
+from webapp.scene.meshes.mesh import Mesh, tube
 from webapp.scene.shape import Shape
+from webapp.tasks.analyst import Findings
 from webapp.theme import ASKED, DEAD, DELIVERED
 
 Array = NDArray[np.float64]

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from finlab.layout import Fin
 from webapp.handles import put
-from webapp.meshes import fin as fin_mesh
-from webapp.meshes.arrows import NOTHING, force_arrow
-from webapp.meshes.hull import AnyHull
-from webapp.meshes.mesh import Mesh, tube
+from webapp.scene.meshes import fin as fin_mesh
+from webapp.scene.meshes.arrows import NOTHING, force_arrow
+from webapp.scene.meshes.hull import AnyHull
+from webapp.scene.meshes.mesh import Mesh, tube
 from webapp.scene.shape import Shape
 from webapp.theme import DEAD, LIGHT, Rgb, fin_color
 

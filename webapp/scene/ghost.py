@@ -7,9 +7,9 @@ import viser
 
 from finlab.layout import Fin, Layout
 from webapp.handles import put
-from webapp.meshes import fin as fin_mesh
-from webapp.meshes.arrows import NOTHING
-from webapp.meshes.mesh import Mesh, joined
+from webapp.scene.meshes import fin as fin_mesh
+from webapp.scene.meshes.arrows import NOTHING
+from webapp.scene.meshes.mesh import Mesh, joined
 from webapp.scene.shape import Shape
 from webapp.theme import DEAD, Rgb
 

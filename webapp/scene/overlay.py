@@ -5,8 +5,8 @@ import viser
 
 from finlab.allocation.allocation import Allocation
 from webapp.handles import put
-from webapp.meshes.arrows import NOTHING, force_arrow
-from webapp.meshes.mesh import Mesh, joined
+from webapp.scene.meshes.arrows import NOTHING, force_arrow
+from webapp.scene.meshes.mesh import Mesh, joined
 from webapp.scene.shape import Shape
 from webapp.theme import overlay_color
 

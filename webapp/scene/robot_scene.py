@@ -8,24 +8,24 @@ from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.layout import Fin, Layout
-from webapp.analyst import Findings
-from webapp.arrow_scale import LENGTH, fitting_newtons
-from webapp.attention import Attention
 from webapp.handles import put
-from webapp.meshes.hull import hull_of
+from webapp.markup.words import damage_words, missing_part
+from webapp.scene.arrow_scale import LENGTH, fitting_newtons
 from webapp.scene.attainable_nodes import AttainableNodes
 from webapp.scene.fin_node import FinNode
 from webapp.scene.flapping import Flapping
 from webapp.scene.ghost import Ghost, moved_fins
 from webapp.scene.grips import Grips
 from webapp.scene.lines import Lines
+from webapp.scene.meshes.hull import hull_of
 from webapp.scene.overlay import Overlay
 from webapp.scene.stage import Stage
 from webapp.scene.wrench_nodes import WrenchNodes
 from webapp.session import Session
-from webapp.state import State
+from webapp.session.state import State
+from webapp.tasks.analyst import Findings
+from webapp.tasks.attention import Attention
 from webapp.theme import ASKED
-from webapp.words import damage_words, missing_part
 
 CAMERAS = {
     "3D": (0.48, 0.46, 0.58),

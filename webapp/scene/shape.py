@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from webapp.meshes.mesh import Mesh
+from webapp.scene.meshes.mesh import Mesh
 
 
 class Shape:

@@ -4,7 +4,7 @@ import numpy as np
 import viser
 
 from webapp.handles import put
-from webapp.meshes.hull import AnyHull
+from webapp.scene.meshes.hull import AnyHull
 from webapp.theme import Look, look
 
 FLOOR_SIZE = 6.0

@@ -7,15 +7,15 @@ import viser
 from numpy.typing import NDArray
 
 from finlab.layout import Layout
-from webapp.arrow_scale import LENGTH
 from webapp.handles import put
-from webapp.meshes import fin as fin_mesh
-from webapp.meshes.arrows import NOTHING, force_arrow
-from webapp.meshes.hull import hull_of
-from webapp.meshes.mesh import Mesh, joined, tube
+from webapp.scene.arrow_scale import LENGTH
 from webapp.scene.lines import NO_LINE
+from webapp.scene.meshes import fin as fin_mesh
+from webapp.scene.meshes.arrows import NOTHING, force_arrow
+from webapp.scene.meshes.hull import hull_of
+from webapp.scene.meshes.mesh import Mesh, joined, tube
 from webapp.scene.shape import Shape
-from webapp.swimmer import PLACE, Moment
+from webapp.tasks.swimmer import PLACE, Moment
 from webapp.theme import ASKED, DEAD, DELIVERED, LIGHT, Rgb, fin_color
 
 Array = NDArray[np.float64]

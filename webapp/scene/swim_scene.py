@@ -4,10 +4,10 @@ import numpy as np
 import viser
 
 from webapp.handles import put
-from webapp.meshes.arrows import NOTHING
+from webapp.scene.meshes.arrows import NOTHING
 from webapp.scene.shape import Shape
 from webapp.scene.swim_robot import SwimRobot, arrow_scale, goal
-from webapp.swimming import Swimming
+from webapp.tasks.swimming import Swimming
 from webapp.theme import ASKED, DELIVERED, OTHER, look
 
 ARROWS_N = 1.0

@@ -5,8 +5,8 @@ import viser
 from numpy.typing import NDArray
 
 from webapp.handles import put
-from webapp.meshes.arrows import NOTHING, RING_RADIUS, force_arrow, torque_ring
-from webapp.meshes.mesh import tube
+from webapp.scene.meshes.arrows import NOTHING, RING_RADIUS, force_arrow, torque_ring
+from webapp.scene.meshes.mesh import tube
 from webapp.scene.shape import Shape
 from webapp.theme import ASKED, DELIVERED, LIGHT, MISSING
 

@@ -2,12 +2,12 @@
 
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from webapp.history import History
 from webapp.session.display import Display
-from webapp.state import State
-from webapp.swim_plan import SwimSettings
-from webapp.targets import FIRST
-from webapp.wishes import Draft
+from webapp.session.history import History
+from webapp.session.search_request import Draft
+from webapp.session.state import State
+from webapp.session.swim_plan import SwimSettings
+from webapp.session.targets import FIRST
 
 
 class Core:

@@ -4,14 +4,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from finlab.errors import FinlabError
-from webapp.analyst import DRAWN
-from webapp.arrow_scale import NEWTONS
-from webapp.state import number
+from finlab.forces.attainable import Kind
+from webapp.session.state import number
 
 POSITION_STEPS = {"off": 0.0, "5 mm": 0.005, "1 cm": 0.01, "5 cm": 0.05}
 """Grids [m] that a fin's position can snap to."""
 ANGLE_STEPS = {"off": 0.0, "5°": 5.0, "15°": 15.0, "45°": 45.0}
 """Grids [deg] that a mounting angle can snap to."""
+NEWTONS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+"""Forces [N] that an arrow of 0.1 m may stand for."""
+DRAWN: dict[str, Kind | None] = {"none": None, "forces": "force", "torques": "torque"}
+"""What set can be drawn, by the word on its button."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,7 @@ class Display:
     grips: bool = False
     """Show handles on the arrows of the asked wrench."""
     drawn: str = "none"
-    """Key of `webapp.analyst.DRAWN`: the attainable set that is shown."""
+    """Key of `DRAWN`: the attainable set that is shown."""
     alone: bool = True
     """Attainable forces without torques, torques without forces."""
     center: bool = False

@@ -5,8 +5,8 @@ from dataclasses import replace
 from finlab.layout import Layout
 from webapp.session.core import Core
 from webapp.session.display import Display
-from webapp.state import State
-from webapp.tour import STEPS
+from webapp.session.state import State
+from webapp.session.tour import STEPS
 
 
 class Guiding(Core):

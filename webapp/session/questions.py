@@ -7,8 +7,8 @@ from typing import Any
 from finlab.allocation.policy import AXES
 from finlab.errors import FinlabError
 from webapp.session.core import Core
-from webapp.state import AXIS_WORDS, number
-from webapp.targets import PRESETS, axis_reach
+from webapp.session.state import AXIS_WORDS, number
+from webapp.session.targets import PRESETS, axis_reach
 
 SHARE = 0.25
 """Share of the largest wrench along an axis that its preset asks for."""

@@ -1,0 +1,78 @@
+"""Sentences about an answer, for people."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.allocation import Allocation
+from finlab.layout import Layout
+from webapp.markup.figures import listed
+from webapp.session.state import AXIS_UNITS, AXIS_WORDS, State
+
+SMALL = 0.05
+"""Normalized error of an axis that is too small to speak of."""
+AT_LIMIT = 0.995
+"""Share of the upper limit from which a command counts as saturated."""
+
+
+def missing_part(allocation: Allocation) -> NDArray[np.float64]:
+    """The unallocated wrench (6,) [N, N m] without what is too small to matter."""
+    rest = allocation.unallocated
+    return np.where(np.abs(rest / allocation.sigma) > 2 * SMALL, rest, 0.0)
+
+
+def reach_sentence(allocation: Allocation) -> str:
+    """One sentence: reachable, or what is missing most and which fins are at their limits."""
+    if allocation.reachable:
+        return "Reachable"
+    axis = int(np.argmax(np.abs(allocation.unallocated / allocation.sigma)))
+    target, given = allocation.target[axis], allocation.wrench[axis]
+    kind = "force" if axis < 3 else "torque"
+    if abs(target) > 1e-3 and -0.005 < given / target < 1.0:
+        sentence = f"Not reachable: {abs(100 * given / target):.0f} % of the {AXIS_WORDS[axis]} {kind}"
+    else:
+        sentence = (
+            f"Not reachable: {abs(given - target):.2g} {AXIS_UNITS[axis]} of {AXIS_WORDS[axis]} too much"
+        )
+    full = [str(i + 1) for i, at_limit in enumerate(saturated(allocation)) if at_limit.any()]
+    if not full:
+        return sentence
+    return f"{sentence}; fin{'s' if len(full) > 1 else ''} {listed(full)} at the limit"
+
+
+def rest_sentence(allocation: Allocation) -> str:
+    """One sentence on the unallocated wrench, axis by axis, leaving out what does not matter."""
+    rest = allocation.unallocated
+    parts = [
+        f"{abs(rest[k]):.2g} {AXIS_UNITS[k]} of {AXIS_WORDS[k]}"
+        for k in np.argsort(-np.abs(rest / allocation.sigma))
+        if abs(rest[k] / allocation.sigma[k]) > SMALL / 2
+    ]
+    if not parts:
+        return "Nothing is left undone."
+    return f"{listed(parts)} {'is' if len(parts) == 1 else 'are'} left undone."
+
+
+def authority_sentence(layout: Layout, failed: tuple[str, ...], reach: NDArray[np.float64]) -> str | None:
+    """Which axes the working fins cannot act on at all, given their reach (6,); None if there is none."""
+    blind = [AXIS_WORDS[k] for k in range(6) if reach[k] < 1e-6]
+    if not blind:
+        return None
+    numbers = [str(layout.index(name) + 1) for name in failed]
+    without = f"Without fin {listed(numbers)} this" if numbers else "This"
+    return f"{without} robot cannot {listed(blind)}."
+
+
+def saturated(allocation: Allocation) -> NDArray[np.bool_]:
+    """Which amplitudes and frequencies (n, 2) are at their upper limits."""
+    upper = np.array([fin.limits.upper[:2] for fin in allocation.layout.fins])
+    with np.errstate(invalid="ignore"):
+        return np.asarray(allocation.command[:, :2] >= AT_LIMIT * upper)
+
+
+def damage_words(state: State, name: str) -> str:
+    """What is wrong with a fin that still works: `weak 50 %, stuck at 30°`; nothing for a whole one."""
+    parts = [f"weak {100 * share:.0f} %" for fin, share in state.weak if fin == name]
+    parts += [f"stuck at {math.degrees(angle):.0f}°" for fin, angle in state.stuck if fin == name]
+    return ", ".join(parts).replace("-", "−")

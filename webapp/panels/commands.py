@@ -1,0 +1,61 @@
+"""Keyboard and command palette (Ctrl+K). The camera owns W A S D Q E and the arrow keys."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import viser
+
+from webapp.panels.host import Host
+from webapp.session.state import AXIS_WORDS
+from webapp.session.targets import PRESETS
+
+
+def add_commands(gui: viser.GuiApi, host: Host) -> None:
+    """Register the commands of one browser."""
+    session = host.session
+
+    def add(label: str, act: Callable[[], object], hotkey: Any = None, modifier: Any = None) -> None:
+        command = gui.add_command(label, hotkey=hotkey, modifier=modifier)
+
+        @command.on_trigger
+        async def _triggered(_event: Any) -> None:
+            host.do(act)
+
+    def fail_selected() -> None:
+        session.toggle_failure(session.selected or session.state.layout.names[0])
+
+    def toggle(key: str) -> None:
+        session.set_display(key, not getattr(session.display, key))
+
+    add("Undo", session.undo, "Z", "cmd/ctrl")
+    add("Redo", session.redo, "Z", "cmd/ctrl+shift")
+    add("Select the next fin", session.select_next, "N")
+    add("Select nothing", lambda: session.select(None), "X")
+    add("Fail or repair the selected fin", fail_selected, "F")
+    add("Mirror the selected fin", session.mirror_fin, "M")
+    add("Unlink the selected fin from its mirror image", session.unlink_fin)
+    add("Stick the selected fin to the hull", session.stick_fin)
+    add("Duplicate the selected fin", session.duplicate_fin)
+    add("Delete the selected fin", session.delete_fin)
+    add("Add a fin", session.add_fin)
+    add("Pin this layout to compare with", session.pin)
+    for name in PRESETS:
+        add(f"Ask for: {name}", partial(session.set_preset, name))
+    for axis, word in enumerate(AXIS_WORDS):
+        add(f"Ask for {word} alone", partial(session.set_only_axis, axis))
+    add("Compare the methods", lambda: host.comparison.start(session.state))
+    add("Play the refinement", host.playback.start)
+    add("Stop the sweep", host.sweep.stop)
+    add("Swim: pause or go on", lambda: host.swimming.set_running(not host.swimming.running), "B")
+    add("Swim: back to the design", host.scenery.end_swim)
+    add("Export the bundle for the robot", host.exports.bundle)
+    add("Tour: start, or next stop", session.next_stop, "T")
+    add("Start over", session.start_over)
+    add("Freeze or move the fins", lambda: toggle("frozen"), "P")
+    add("Drag the wrench in 3D, or stop it", lambda: toggle("grips"), "G")
+    add("Show or hide the fin graph", lambda: toggle("graph"))
+    add("Show or hide the centre of gravity", lambda: toggle("center"))
+    add("Dark or light theme", lambda: toggle("dark"))
+    for view, key in (("3D", "1"), ("Top", "2"), ("Side", "3"), ("Front", "4")):
+        add(f"Camera: {view}", partial(host.scenery.look_from, view), key)

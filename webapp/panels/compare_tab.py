@@ -1,0 +1,46 @@
+"""Several methods on the same wrench, with the forces of one of them over those of the robot."""
+
+from functools import partial
+
+import viser
+
+from webapp.handles import on_user_change, on_user_click, put
+from webapp.markup.comparison import comparison_table
+from webapp.markup.picking import chosen_button, marker
+from webapp.panels.host import Host
+from webapp.session.state import COMPARED
+
+PICKER = "fl-compare"
+
+
+class CompareTab:
+    """A button, a table, and whose arrows are shown."""
+
+    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+        """Build the widgets."""
+        self._host = host
+        self._run = gui.add_button(
+            "Compare the methods", icon=viser.Icon.SCALE, hint="On the wrench and the failures of now."
+        )
+        on_user_click(self._run, lambda: host.do(lambda: host.comparison.start(host.session.state)))
+        self._chosen = gui.add_html(marker(PICKER))
+        self._overlay = gui.add_button_group(
+            "Overlay",
+            ("none", *COMPARED),
+            hint="The fins' forces by that method, as plain arrows over those of the robot.",
+        )
+        on_user_change(self._overlay, self._choose)
+        self._table = gui.add_html("")
+
+    def _choose(self, method: str) -> None:
+        wanted = method if method in COMPARED and method != self._host.session.overlay else None
+        self._host.do(partial(self._host.session.set_overlay, wanted))
+
+    def refresh(self) -> None:
+        """Write the answers."""
+        session, comparison = self._host.session, self._host.comparison
+        stale = comparison.state is not None and comparison.state != session.state
+        put(self._run, disabled=comparison.running)
+        entries = (None, *COMPARED)
+        put(self._chosen, content=chosen_button(PICKER, entries.index(session.overlay)))
+        put(self._table, content=comparison_table(comparison, session.overlay, stale, PICKER))

@@ -1,0 +1,93 @@
+"""Files: open and save a layout, take home what the robot needs, copy the question as a command."""
+
+from collections.abc import Callable
+from html import escape
+from typing import Any
+
+import viser
+
+from webapp.handles import Changes, on_user_change, put
+from webapp.markup.snippets import command_line, export_line, python_lines
+from webapp.panels.host import Host
+from webapp.session import layout_files
+
+
+class FilesTab:
+    """Buttons for files, and the same question as a command."""
+
+    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+        """Build the widgets."""
+        self._host = host
+        self._open = gui.add_upload_button(
+            "Open a layout file",
+            icon=viser.Icon.FOLDER_OPEN,
+            mime_type=".yaml,.yml,.json",
+            hint="A layout file (YAML or JSON) or a layout graph file.",
+        )
+        self._save = gui.add_button_group(
+            "Save",
+            ("Layout (YAML)", "Candidates (CSV)", "Picture (PNG)", "3D view (HTML)"),
+            hint="The HTML page moves by itself and needs no server.",
+        )
+        on_user_change(self._save, self._press)
+        self._robot = gui.add_button_group(
+            "For the robot",
+            ("Graph file", "Bundle (ZIP)"),
+            hint="The layout graph alone, or with networks, README and checksums: what finlab export makes.",
+        )
+        on_user_change(self._robot, self._press)
+        self._command = gui.add_html("")
+        self._changes = Changes()
+
+        @self._open.on_upload
+        async def _opened(event: Any) -> None:
+            upload = event.target.value
+            host.do(lambda: host.session.open_layout(layout_files.read_layout(upload.name, upload.content)))
+
+    def _press(self, button: str) -> None:
+        host = self._host
+        acts: dict[str, Callable[[], object]] = {
+            "Layout (YAML)": self._send_layout,
+            "Candidates (CSV)": self._send_candidates,
+            "Picture (PNG)": host.exports.picture,
+            "3D view (HTML)": lambda: host.exports.html(host.shown),
+            "Graph file": host.exports.graph,
+            "Bundle (ZIP)": host.exports.bundle,
+        }
+        if button in acts:
+            host.do(acts[button])
+
+    def _send_layout(self) -> None:
+        layout = self._host.session.state.layout
+        self._host.client.send_file_download(
+            f"{layout_files.file_stem(layout.name)}.yaml",
+            layout_files.layout_bytes(layout),
+            save_immediately=True,
+        )
+        self._host.session.note_saved()
+
+    def _send_candidates(self) -> None:
+        self._host.client.send_file_download(
+            "candidates.csv", layout_files.candidates_csv(self._host.answering.best), save_immediately=True
+        )
+
+    def refresh(self) -> None:
+        """Write the command that asks the same question."""
+        state = self._host.session.state
+        if not self._changes(state):
+            return
+        texts = {
+            "The same question on the command line": command_line(state),
+            "The same in Python": python_lines(state),
+            "The bundle for the robot": export_line(state),
+        }
+        put(self._command, content=f"<div class='fl'>{''.join(map(_copied, texts, texts.values()))}</div>")
+
+
+def _copied(title: str, text: str) -> str:
+    """Lines that a click takes to the clipboard, where the browser lets it; else it selects them."""
+    copy = "navigator.clipboard?.writeText(this.innerText); this.previousSibling.dataset.done = 1"
+    return (
+        f"<div class='said copy'><span class='dim'>{title}</span></div>"
+        f'<pre class="command" title="click to copy" onclick="{copy}">{escape(text)}</pre>'
+    )

@@ -1,0 +1,146 @@
+"""The layout: pick one, and place its fins by numbers or by hand."""
+
+import math
+from collections.abc import Callable
+from functools import partial
+from html import escape
+
+import viser
+
+from finlab.analysis.quick import quick_check
+from finlab.layout import Layout
+from webapp.handles import hold_kind, on_user_change, on_user_click, put
+from webapp.markup.check_card import check_card
+from webapp.panels.host import Host
+from webapp.panels.hull import HullPanel
+from webapp.scene.clearance import warnings
+from webapp.session import ANGLE_STEPS, POSITION_STEPS
+from webapp.session.shipped import shipped, shipped_name
+from webapp.session.state import MAX_FINS
+
+NONE = "none"
+"""Entry of the list of fins that selects nothing."""
+RINGS = {"z, up": "z", "x, forward": "x", "y, to the left": "y"}
+"""Axes that copies can stand around, by what they are called."""
+RING_SIZES = ("2", "3", "4", "5", "6", "8")
+"""How many fins can stand around an axis."""
+OWN = "(edited)"
+"""Entry of the list of layouts while the robot is none of them."""
+
+
+class LayoutTab:
+    """Choose, place, copy and remove."""
+
+    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+        """Build the widgets."""
+        self._host = host
+        self._layouts = gui.add_dropdown("Layout", (*shipped(), OWN), hint="Shipped layouts to start from.")
+        on_user_change(self._layouts, self._open)
+        self._about = gui.add_html("")
+        self._fins = gui.add_dropdown("Fin", (NONE,), hint="Or click one in the view; N is next, X none.")
+        on_user_change(
+            self._fins, lambda name: host.do(partial(host.session.select, None if name == NONE else name))
+        )
+        with gui.add_folder("Place"):
+            self._position = gui.add_vector3(
+                "Position [m]", (0.0, 0.0, 0.0), step=0.005, hint="x forward, y left, z up."
+            )
+            on_user_change(self._position, self._move)
+            self._angle = gui.add_slider(
+                "Shaft [°]", -180.0, 180.0, 1.0, 0.0, hint="Azimuth of the shaft, 0 is ahead."
+            )
+            on_user_change(self._angle, self._turn)
+            self._snap_m = gui.add_dropdown("Snap place", tuple(POSITION_STEPS), hint="Grid for positions.")
+            on_user_change(self._snap_m, partial(self._set_display, "position_snap"))
+            self._snap_deg = gui.add_dropdown("Snap turn", tuple(ANGLE_STEPS), hint="Grid for the shaft.")
+            on_user_change(self._snap_deg, partial(self._set_display, "angle_snap"))
+            self._stick = gui.add_checkbox(
+                "Stick to hull", False, hint="Fins slide on the hull's surface, shafts along its normal."
+            )
+            on_user_change(self._stick, partial(self._set_display, "stick"))
+        self._edit = gui.add_button_group(
+            "Selected fin",
+            ("Mirror", "Mirror once", "Unlink", "Duplicate", "To hull", "Delete"),
+            hint="What Mirror (M) makes moves along until it is unlinked; Mirror once links nothing.",
+        )
+        on_user_change(self._edit, self._edit_fin)
+        self._axis = gui.add_dropdown(
+            "Copies around", tuple(RINGS), hint="Axis through the centre of gravity that copies stand around."
+        )
+        hold_kind(self._axis)
+        self._ring = gui.add_button_group(
+            "How many",
+            RING_SIZES,
+            hint="Copies of the selected fin, so that so many stand evenly around the axis.",
+        )
+        on_user_change(self._ring, self._copy_around)
+        self._add = gui.add_button("Add a fin", icon=viser.Icon.PLUS, hint=f"Up to {MAX_FINS} fins.")
+        on_user_click(self._add, lambda: host.do(host.session.add_fin))
+        self._card = gui.add_html("")
+        self._hull = HullPanel(gui, host)
+        self._checked: tuple[Layout, tuple[str, ...]] | None = None
+
+    def _open(self, name: str) -> None:
+        if name in shipped():
+            self._host.do(partial(self._host.session.open_layout, shipped()[name]))
+        else:
+            self.refresh()
+
+    def _move(self, position: tuple[float, float, float]) -> None:
+        if self._host.session.selected is not None:
+            self._host.do(partial(self._host.session.move_fin, self._host.session.selected, position))
+
+    def _turn(self, degrees: float) -> None:
+        if self._host.session.selected is not None:
+            self._host.do(
+                partial(self._host.session.turn_fin, self._host.session.selected, math.radians(degrees))
+            )
+
+    def _set_display(self, key: str, value: str | bool) -> None:
+        self._host.do(partial(self._host.session.set_display, key, value))
+
+    def _edit_fin(self, button: str) -> None:
+        session = self._host.session
+        acts: dict[str, Callable[[], object]] = {
+            "Mirror": session.mirror_fin,
+            "Mirror once": partial(session.mirror_fin, linked=False),
+            "Unlink": session.unlink_fin,
+            "Duplicate": session.duplicate_fin,
+            "Delete": session.delete_fin,
+            "To hull": session.stick_fin,
+        }
+        if button in acts:
+            self._host.do(acts[button])
+
+    def _copy_around(self, button: str) -> None:
+        if button in RING_SIZES:
+            axis = RINGS.get(self._axis.value, "z")
+            self._host.do(partial(self._host.session.ring_of_fins, int(button), axis))
+
+    def refresh(self) -> None:
+        """Write the layout and the selected fin."""
+        session, layout = self._host.session, self._host.session.state.layout
+        put(self._layouts, value=shipped_name(layout) or OWN)
+        put(self._fins, options=(NONE, *layout.names))
+        put(self._fins, value=session.selected or NONE)
+        selected = session.selected is not None
+        put(self._position, disabled=not selected)
+        put(self._angle, disabled=not selected)
+        if session.selected is not None:
+            fin = layout.fins[layout.index(session.selected)]
+            put(self._position, value=tuple(round(v, 4) for v in fin.position))
+            put(self._angle, value=round(math.degrees(fin.mounting_angle), 1))
+        self._hull.refresh()
+        put(self._stick, value=session.display.stick)
+        put(self._snap_m, value=session.display.position_snap)
+        put(self._snap_deg, value=session.display.angle_snap)
+        first = layout.description.strip().split("\n")[0]
+        pairs = "".join(
+            f"<div>{escape(a)} ⇄ {escape(b)} move together.</div>" for a, b in session.state.links
+        )
+        put(self._about, content=f"<div class='fl'><div class='dim'>{escape(first)}</div>{pairs}</div>")
+        state = session.state
+        if (state.able, state.failed) != self._checked:
+            self._checked = (state.able, state.failed)
+            quick = quick_check(state.able, state.failed)
+            put(self._card, content=check_card(quick, len(state.healthy) > 1, warnings(layout)))

@@ -1,0 +1,70 @@
+"""How the robot is shown: motion, what is drawn, theme and camera."""
+
+from functools import partial
+
+import viser
+
+from webapp.handles import on_user_change, put
+from webapp.panels.host import Host
+from webapp.scene.robot_scene import CAMERAS
+from webapp.session.display import NEWTONS
+
+SWITCHES = {
+    "frozen": ("Freeze", "Fins hold still at their zero direction (P)."),
+    "fans": ("Sweep fans", "The angle that each fin sweeps."),
+    "labels": ("Fin numbers", "A number at the root of each fin."),
+    "graph": (
+        "Fin graph",
+        "Edges between working fins, thick where the network lets one look at another.",
+    ),
+    "dimensions": ("Dimensions", "Coordinates of the selected fin."),
+    "ghost": ("Ghost", "Where moved fins stood when the layout was opened or saved."),
+    "center": ("Centre of gravity", "Mark it, and look through the hull."),
+    "shadows": ("Shadows", "Slow without a graphics card."),
+    "dark": ("Dark", "Dark theme."),
+}
+"""Field of `Display`, label and hint of each switch."""
+
+
+def _scale_entry(newtons: float) -> str:
+    return f"0.1 m = {newtons:g} N" if newtons else "automatic"
+
+
+SCALES = {_scale_entry(newtons): newtons for newtons in (0.0, *NEWTONS)}
+"""Entries of the arrow scale and their forces [N]."""
+
+
+class ViewTab:
+    """Switches and camera."""
+
+    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+        """Build the widgets."""
+        self._host = host
+        self._camera = gui.add_button_group("Camera", tuple(CAMERAS), hint="Keys 1, 2, 3, 4.")
+        on_user_change(self._camera, self._look)
+        self._speed = gui.add_slider("Motion speed", 0.05, 1.0, 0.05, 0.5, hint="1 is real time.")
+        on_user_change(self._speed, partial(self._set, "speed"))
+        self._scale = gui.add_dropdown(
+            "Arrow scale", tuple(SCALES), initial_value=next(iter(SCALES)), hint="Force of an arrow of 0.1 m."
+        )
+        on_user_change(self._scale, lambda entry: self._set("newtons", SCALES.get(entry)))
+        self._switches = {
+            key: gui.add_checkbox(label, False, hint=hint) for key, (label, hint) in SWITCHES.items()
+        }
+        for key, switch in self._switches.items():
+            on_user_change(switch, partial(self._set, key))
+
+    def _look(self, view: str) -> None:
+        if view in CAMERAS:
+            self._host.scenery.look_from(view)
+
+    def _set(self, key: str, value: object) -> None:
+        self._host.do(partial(self._host.session.set_display, key, value))
+
+    def refresh(self) -> None:
+        """Write the switches."""
+        display = self._host.session.display
+        put(self._speed, value=display.speed)
+        put(self._scale, value=_scale_entry(display.newtons))
+        for key, switch in self._switches.items():
+            put(switch, value=getattr(display, key))

@@ -1,0 +1,76 @@
+"""One fin in its own frame: the shaft along x', the blade trailing along -y' at zero direction zero.
+
+A fin that points aft pushes forward, so the blade lies opposite to its thrust.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from webapp.scene.meshes.mesh import Mesh, joined, tube
+
+CHORD = 0.18
+"""Length of the blade from the shaft to its trailing edge [m]."""
+SPAN = 0.10
+"""Width of the blade along the shaft [m]."""
+ROOT = 0.012
+"""Gap between the fin's position and the blade along the shaft [m]."""
+
+
+def blade() -> Mesh:
+    """The blade: thick and narrow at the shaft, thin and wide at the trailing edge, a little cambered."""
+    rows, columns = 22, 15
+    along = np.linspace(0.0, 1.0, rows)
+    across = np.linspace(-1.0, 1.0, columns)
+    # Rounded corners at both ends come from shrinking the first and last rows' width.
+    width = (0.62 + 0.38 * along**1.3) * np.clip(1 - np.clip((along - 0.86) / 0.14, 0, 1) ** 2.6 * 0.55, 0, 1)
+    width *= np.clip(0.72 + along / 0.12 * 0.28, None, 1.0)
+    middle = ROOT + SPAN / 2
+    x = middle + 0.5 * SPAN * width[:, None] * across[None]
+    # The trailing edge is a shallow fork, as of a fish's tail.
+    y = -CHORD * along[:, None] * (1 - 0.07 * along[:, None] ** 4 * (1 - across[None] ** 2)) + 0.012
+    rim = np.sqrt(np.clip(1 - across**2, 0, 1))[None]
+    thickness = (0.0075 * (1 - along) ** 0.8 + 0.0012)[:, None] * (0.15 + 0.85 * rim)
+    thickness[[0, -1]] *= 0.3
+    camber = 0.006 * (1 - across[None] ** 2) * np.sin(np.pi * along)[:, None]
+    top = np.stack([x, y, camber + thickness], axis=-1).reshape(-1, 3)
+    bottom = np.stack([x, y, camber - thickness], axis=-1).reshape(-1, 3)
+    return Mesh(np.concatenate([top, bottom]), _shell_faces(rows, columns))
+
+
+def _shell_faces(rows: int, columns: int) -> NDArray[np.int32]:
+    """Upper side, lower side, and the strip around the edge."""
+    faces, below = [], rows * columns
+    for r in range(rows - 1):
+        for k in range(columns - 1):
+            a = r * columns + k
+            b, c, d = a + 1, a + columns, a + columns + 1
+            faces += [(a, c, b), (b, c, d)]
+            faces += [(a + below, b + below, c + below), (b + below, d + below, c + below)]
+    last = (rows - 1) * columns
+    edge = [*range(columns), *(r * columns + columns - 1 for r in range(1, rows))]
+    edge += [*(last + k for k in range(columns - 2, -1, -1)), *(r * columns for r in range(rows - 2, 0, -1))]
+    for a, b in zip(edge, edge[1:] + edge[:1], strict=True):
+        faces += [(a, b, a + below), (b, b + below, a + below)]
+    return np.array(faces, dtype=np.int32)
+
+
+def shaft() -> Mesh:
+    """The servo's housing at the root and the shaft that carries the blade."""
+    housing = np.array([[-0.045, 0, 0], [-0.041, 0, 0], [-0.006, 0, 0], [-0.002, 0, 0]], dtype=float)
+    rod = np.array([[-0.002, 0, 0], [ROOT + 0.86 * SPAN, 0, 0]], dtype=float)
+    return joined(
+        tube(housing, np.array([0.014, 0.018, 0.018, 0.013]), 20),
+        tube(rod, 0.0055, 12),
+    )
+
+
+def sweep(amplitude: float) -> Mesh:
+    """The fan that the blade sweeps: +- `amplitude` [rad] about the shaft, across the blade's middle."""
+    angle = np.linspace(-amplitude, amplitude, 17)
+    x = np.full(17, ROOT + SPAN / 2)
+    inner, outer = 0.035, CHORD - 0.004
+    arc = np.stack([x, -np.cos(angle), -np.sin(angle)], axis=-1)
+    rings = [arc * [1.0, radius, radius] for radius in (inner, outer)]
+    vertices = np.concatenate(rings)
+    faces = [(k, k + 1, k + 17) for k in range(16)] + [(k + 1, k + 18, k + 17) for k in range(16)]
+    return Mesh(vertices, np.array(faces, dtype=np.int32))

@@ -1,0 +1,138 @@
+"""A hull from a mesh file: STL, OBJ, GLB or PLY, checked, repaired and brought to metres."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from finlab.errors import FinlabError
+from finlab.layout.body import MESH_SUFFIXES
+from webapp.scene.meshes.arrows import NOTHING
+from webapp.scene.meshes.mesh import Mesh
+from webapp.scene.meshes.triangles import Triangles
+
+Array = NDArray[np.float64]
+
+MAX_BYTES = 20_000_000
+"""Largest mesh file that is read."""
+MAX_FACES = 60_000
+"""Most triangles of a hull; more would make the page slow and show nothing new."""
+SMALLEST, LARGEST = 0.02, 10.0
+"""Lengths [m] that a hull may have; anything else is a mistaken unit."""
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
+"""Metres per unit of a mesh file."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeshHull:
+    """A hull of triangles. Two are equal if they come from the same file in the same way."""
+
+    source: tuple[str, float, tuple[float, float, float]]
+    """File, metres per unit, and centre."""
+    surface: Triangles
+    """Its triangles in the body frame."""
+    half: tuple[float, float, float]
+    """Half length, width and height of the box around it [m]."""
+    center: tuple[float, float, float]
+    """Where the middle of that box lies in the body frame [m]."""
+    shape: str = "mesh"
+    """Tells it from the parametric hulls."""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, MeshHull) and other.source == self.source
+
+    def __hash__(self) -> int:
+        return hash(self.source)
+
+    @staticmethod
+    @lru_cache(maxsize=8)
+    def load(path: str, scale: float, center: tuple[float, float, float]) -> "MeshHull":
+        """Read a mesh file, its box centred at `center` [m].
+
+        Raises:
+            FinlabError: the file cannot be read or is no sensible hull.
+        """
+        file = Path(path)
+        try:
+            if not file.is_file() or file.stat().st_size > MAX_BYTES:
+                raise FinlabError(f"{file.name}: expected a mesh file of at most {MAX_BYTES:,} bytes")
+            content = file.read_bytes()
+        except OSError as error:
+            raise FinlabError(f"{file.name}: cannot be read: {error.strerror}") from None
+        mesh = read_mesh(file.name, content, scale)
+        corners = mesh.vertices + np.array(center)
+        half = np.ptp(mesh.vertices, axis=0) / 2
+        x, y, z = (float(v) for v in half)
+        return MeshHull((path, scale, center), Triangles(Mesh(corners, mesh.faces)), (x, y, z), center)
+
+    def mesh(self) -> Mesh:
+        """The hull's surface."""
+        corners = self.surface.corners
+        return Mesh(corners.reshape(-1, 3), np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3))
+
+    def bow(self) -> Mesh:
+        """Nothing: a mesh shows by itself which end is the bow."""
+        return NOTHING
+
+    def contains(self, points: Array) -> NDArray[np.bool_]:
+        """Which of the points (..., 3) lie inside."""
+        points = np.asarray(points, dtype=float)
+        inside = [self.surface.contains(point) for point in points.reshape(-1, 3)]
+        return np.array(inside).reshape(points.shape[:-1])
+
+    def anchor(self, point: Array) -> Array:
+        """Where a strut from `point` meets the surface; itself if inside."""
+        return np.asarray(point) if self.contains(point) else self.nearest(point)[0]
+
+    def nearest(self, point: Array) -> tuple[Array, Array]:
+        """The point (3,) of the surface nearest to `point`, and the outward normal (3,) there."""
+        return self.surface.nearest(point)
+
+
+def read_mesh(name: str, content: bytes, scale: float) -> Mesh:
+    """The mesh in a file: whole scene, in metres, repaired, the middle of its box at the origin.
+
+    Args:
+        name: the file's name; its ending tells the format.
+        content: what is in it.
+        scale: metres per unit.
+
+    Raises:
+        FinlabError: too large, no mesh, or of a size that no hull has; the message names the file.
+    """
+    kind = Path(name).suffix.lower()
+    if kind not in MESH_SUFFIXES:
+        raise FinlabError(f"{name}: expected a file ending in {', '.join(MESH_SUFFIXES)}")
+    if len(content) > MAX_BYTES:
+        raise FinlabError(f"{name}: is {len(content):,} bytes long, expected at most {MAX_BYTES:,}")
+    try:
+        # Without a resolver nothing beside this file is read: no textures, no materials.
+        mesh = trimesh.load_mesh(BytesIO(content), file_type=kind[1:])
+        if isinstance(mesh, trimesh.Scene):
+            mesh = mesh.to_mesh()
+        faces = len(mesh.faces)
+    except Exception as error:  # trimesh's readers raise whatever went wrong inside them
+        raise FinlabError(f"{name}: is not a {kind[1:].upper()} mesh that can be read ({error})") from None
+    if faces == 0 or not np.isfinite(mesh.vertices).all():
+        raise FinlabError(f"{name}: holds no triangles with finite corners")
+    if faces > MAX_FACES:
+        raise FinlabError(f"{name}: has {faces:,} triangles, expected at most {MAX_FACES:,}; simplify it")
+    mesh.merge_vertices()
+    mesh.update_faces(mesh.nondegenerate_faces())
+    trimesh.repair.fill_holes(mesh)
+    trimesh.repair.fix_normals(mesh)
+    vertices = np.asarray(mesh.vertices, dtype=float) * scale
+    if len(mesh.faces) == 0:
+        raise FinlabError(f"{name}: holds no triangles with an area")
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    length = float((high - low).max())
+    if not SMALLEST <= length <= LARGEST:
+        raise FinlabError(
+            f"{name}: would be {length:.3g} m long, expected {SMALLEST:g} to {LARGEST:g} m; "
+            "choose another unit"
+        )
+    return Mesh(vertices - (low + high) / 2, np.asarray(mesh.faces, dtype=np.int32))

@@ -1,0 +1,126 @@
+"""What is seen beside the panel: the robot that is designed, or those that swim."""
+
+from collections.abc import Callable
+from functools import partial
+
+import viser
+
+from finlab.allocation.allocation import Allocation
+from webapp.markup.legend import graph_row, legend, overlay_row, set_rows
+from webapp.scene.dragging import Dragging
+from webapp.scene.robot_scene import RobotScene
+from webapp.scene.swim_scene import SwimScene
+from webapp.session import Session
+from webapp.session.swim_plan import SwimSettings
+from webapp.session.tour import STEPS
+from webapp.tasks.analyst import Findings
+from webapp.tasks.answering import Answering
+from webapp.tasks.comparison import Comparison
+from webapp.tasks.improving import Improver
+from webapp.tasks.swimming import Swimming
+from webapp.theme import BRAND
+
+
+class Scenery:
+    """Both scenes of one page, of which one is shown, and the theme."""
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        session: Session,
+        swimming: Swimming,
+        do: Callable[[Callable[[], object]], None],
+    ) -> None:
+        """Build the nodes.
+
+        Args:
+            client: the browser.
+            session: what it shows.
+            swimming: the robots that swim, if any do.
+            do: carries out an intent.
+        """
+        self._client, self._session, self._swimming = client, session, swimming
+        self._dark: bool | None = None
+        self._stop: int | None = None
+        dragging = Dragging(session, do)
+        self.robot = RobotScene(
+            client, session, lambda name: do(partial(session.select, name)), dragging.fin, dragging.wrench
+        )
+        self.swim = SwimScene(client, swimming)
+        self.legend = ""
+        """What is drawn of the robot that is designed, as markup."""
+
+    @property
+    def swims(self) -> bool:
+        """Whether the robots that swim are on the screen."""
+        return not self.robot.shown
+
+    def refresh(
+        self, answering: Answering, comparison: Comparison, improver: Improver, findings: Findings | None
+    ) -> None:
+        """Show what has been found for the session's state."""
+        found, reply = improver.found, answering.reply
+        offered = found.layout if found is not None and found.improved else None
+        attention = None if reply is None else reply.attention
+        other, display = self._overlaid(comparison), self._session.display
+        self.robot.refresh(answering.shown, other, findings, offered, attention)
+        self.robot.show(not self._swimming.swimmers)
+        self.legend = legend(
+            self.robot.newtons,
+            (
+                overlay_row(other, display.dark),
+                graph_row(display.graph, attention is not None, display.dark),
+                set_rows(findings if display.drawn != "none" else None),
+            ),
+        )
+        self.refresh_swim()
+
+    def refresh_swim(self) -> None:
+        """Show where the robots that swim are."""
+        self.swim.refresh(self._session.display.dark)
+
+    def animate(self, elapsed: float) -> None:
+        """Let time pass [s]: fins flap, and a robot that swims moves on."""
+        if self._swimming.active:
+            self._swimming.tick(elapsed)
+            self.swim.animate(elapsed)
+        else:
+            self.robot.animate(elapsed)
+
+    def look_from(self, view: str) -> None:
+        """Move the camera to a view of the robot that is designed."""
+        self.robot.look_from(view)
+
+    def look_after_swim(self, follow: bool) -> None:
+        """Let the camera go along with the first robot that swims, or see all of its path."""
+        if self._swimming.active:
+            self.swim.follow() if follow else self.swim.overlook()
+
+    def end_swim(self) -> None:
+        """Go back from the robot that swims to the one that is designed."""
+        if self._swimming.active:
+            self._swimming.stop()
+            self.look_from("3D")
+
+    def follow_tour(self) -> None:
+        """At some stops of the tour the robot swims; to come to a stop, or to leave the tour, ends a swim."""
+        stop = self._session.stop
+        if stop != self._stop:
+            self._stop = stop
+            self.end_swim()
+            if stop is not None and STEPS[stop].swims:
+                self._swimming.start(SwimSettings().plan(self._session.state, None))
+
+    def apply_theme(self) -> None:
+        """Light or dark."""
+        if self._session.display.dark != self._dark:
+            self._dark = self._session.display.dark
+            self._client.gui.configure_theme(
+                dark_mode=self._dark, show_logo=False, show_share_button=False, brand_color=BRAND
+            )
+
+    def _overlaid(self, comparison: Comparison) -> Allocation | None:
+        """The compared answer whose forces are shown, unless the question has changed since."""
+        answer = comparison.answers.get(self._session.overlay or "")
+        fits = comparison.state == self._session.state
+        return answer if fits and isinstance(answer, Allocation) else None

@@ -1,0 +1,144 @@
+"""Changes of a layout that a designer makes by hand. Each takes a layout and returns another one."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.errors import FinlabError
+from finlab.layout import Fin, Layout
+from webapp.scene.meshes.hull import hull_of
+from webapp.session.angles import wrapped
+from webapp.session.links import existing_image, image
+from webapp.session.state import MAX_FINS, number
+
+MAX_COORDINATE = 2.0
+"""How far out a fin may be placed in the browser [m]."""
+AXES = ("x", "y", "z")
+"""Body axes that copies can stand around: forward, left, up."""
+STAND_OFF = 0.02
+"""Distance of a fin that sticks to the hull from its surface: room for the servo [m]."""
+
+
+def snapped(value: float, step: float) -> float:
+    """The nearest multiple of `step`; a step of zero leaves the value alone."""
+    return round(value / step) * step if step > 0 else value
+
+
+def moved(layout: Layout, name: str, position: tuple[float, float, float], step: float = 0.0) -> Layout:
+    """A fin at another place [m], snapped to multiples of `step` [m]."""
+    checked = tuple(
+        snapped(number(v, f"{axis} of {name} [m]", -MAX_COORDINATE, MAX_COORDINATE), step)
+        for v, axis in zip(position, "xyz", strict=True)
+    )
+    return layout.replace_fin(name, position=checked)
+
+
+def turned(layout: Layout, name: str, angle: float, step: float = 0.0) -> Layout:
+    """A fin with another mounting angle [rad], snapped to multiples of `step` [rad]."""
+    checked = number(angle, f"mounting angle of {name} [rad]", -100.0, 100.0)
+    return layout.replace_fin(name, mounting_angle=wrapped(snapped(checked, step)))
+
+
+def mirrored(layout: Layout, name: str) -> tuple[Layout, str]:
+    """The layout with a fin's image on the other side of the robot, and the image's name.
+
+    A fin that already stands there is taken for the image, and nothing is added.
+    """
+    fin = layout.fins[layout.index(name)]
+    if abs(fin.position[1]) < 1e-3:
+        raise FinlabError(f"{name} sits on the mirror plane (y = 0), so its mirror image is itself")
+    there = existing_image(layout, name)
+    return (layout, there) if there is not None else _added(layout, image(fin), _mirror_name(name))
+
+
+def ring(layout: Layout, name: str, count: int, axis: str = "z") -> Layout:
+    """The layout with copies of a fin, so that `count` of them stand evenly around a body axis.
+
+    Shafts are horizontal, so around x and y only the azimuth of a turned shaft is kept; one that would point
+    straight up or down keeps that of the fin.
+    """
+    if axis not in AXES:
+        raise FinlabError(f"axis: expected one of {', '.join(AXES)}, got {axis!r:.40}")
+    fin = layout.fins[layout.index(name)]
+    place = np.array(fin.position)
+    if np.linalg.norm(np.delete(place, AXES.index(axis))) < 1e-3:
+        raise FinlabError(f"{name} stands on the axis {axis}, so its copies would all be in one place")
+    shaft = np.array([math.cos(fin.mounting_angle), math.sin(fin.mounting_angle), 0.0])
+    for k in range(1, round(number(count, "fins around the axis", 2, MAX_FINS))):
+        turn = _rotation(axis, 2 * math.pi * k / count)
+        x, y, z = (round(float(v), 9) for v in turn @ place)
+        ahead, left, _ = turn @ shaft
+        azimuth = fin.mounting_angle if math.hypot(ahead, left) < 0.2 else math.atan2(left, ahead)
+        copy = replace(fin, position=(x, y, z), mounting_angle=wrapped(azimuth))
+        layout, _ = _added(layout, copy, name)
+    return layout
+
+
+def _rotation(axis: str, angle: float) -> NDArray[np.float64]:
+    """The matrix (3, 3) of a right-handed turn [rad] about a body axis."""
+    a, b = ((1, 2), (2, 0), (0, 1))[AXES.index(axis)]
+    turn = np.eye(3)
+    turn[a, a] = turn[b, b] = math.cos(angle)
+    turn[b, a], turn[a, b] = math.sin(angle), -math.sin(angle)
+    return turn
+
+
+def stuck(layout: Layout, name: str) -> Layout:
+    """The layout with a fin moved onto the hull's surface, its shaft along the surface's normal.
+
+    Shafts are horizontal, so of the normal only the azimuth is taken; where it points straight up or down
+    the shaft stays.
+    """
+    fin = layout.fins[layout.index(name)]
+    point, normal = hull_of(layout).nearest(np.array(fin.position))
+    azimuth = fin.mounting_angle if np.hypot(*normal[:2]) < 0.2 else math.atan2(normal[1], normal[0])
+    x, y, z = (round(float(v), 4) for v in point + STAND_OFF * normal)
+    return layout.replace_fin(name, position=(x, y, z), mounting_angle=wrapped(azimuth))
+
+
+def duplicated(layout: Layout, name: str) -> tuple[Layout, str]:
+    """The layout with a copy of a fin 5 cm above it, and the copy's name."""
+    fin = layout.fins[layout.index(name)]
+    x, y, z = fin.position
+    return _added(layout, replace(fin, position=(x, y, z + 0.05)), name)
+
+
+def added(layout: Layout) -> tuple[Layout, str]:
+    """The layout with one more fin at the stern, and its name."""
+    reach = max(abs(fin.position[0]) for fin in layout.fins)
+    return _added(layout, Fin("fin", (-max(reach, 0.1), 0.0, 0.0), math.pi), "fin")
+
+
+def deleted(layout: Layout, name: str) -> Layout:
+    """The layout without a fin; the last one stays."""
+    layout.index(name)
+    if layout.n_fins == 1:
+        raise FinlabError(f"{name} is the only fin; a layout needs at least one")
+    return layout.without([name])
+
+
+def _added(layout: Layout, fin: Fin, wanted: str) -> tuple[Layout, str]:
+    if layout.n_fins >= MAX_FINS:
+        raise FinlabError(f"the layout has {layout.n_fins} fins already; the app places at most {MAX_FINS}")
+    name = _free_name(layout, wanted)
+    return replace(layout, fins=(*layout.fins, replace(fin, name=name))), name
+
+
+def _free_name(layout: Layout, wanted: str) -> str:
+    """`wanted`, or `wanted_2`, `wanted_3`, ... if it is taken."""
+    names, k = set(layout.names), 2
+    name = wanted[:56]
+    while name in names:
+        name, k = f"{wanted[:56]}_{k}", k + 1
+    return name
+
+
+def _mirror_name(name: str) -> str:
+    for left, right in (("left", "right"), ("port", "starboard")):
+        if left in name:
+            return name.replace(left, right)
+        if right in name:
+            return name.replace(right, left)
+    return f"{name}_mirror"

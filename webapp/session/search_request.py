@@ -1,0 +1,175 @@
+"""What a search for a better layout may do: which fins move, how far each, and for which wrenches."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from finlab.analysis import Bounds
+from finlab.analysis.goals import MISSION
+from finlab.errors import FinlabError
+from finlab.layout import Layout
+from webapp.session.state import MAX_TARGET, number
+
+GOAL_WORDS = {
+    "weakest direction": "weakest_direction",
+    "energy of a mission": "mission_energy",
+    "worst single failure": "worst_single_failure",
+}
+"""What may be improved, in words, and the name that the search knows."""
+MAX_MISSION = 40
+"""Most wrenches of a mission; each costs time in every round of the search."""
+WAY = (0.05, 0.05, 0.05, 180.0)
+"""How far a fin may go along x, y and z [m] and turn either way [deg] unless it is said otherwise."""
+
+MAX_TEXT = 10_000
+"""Longest text of a mission that is taken."""
+ALL = "all"
+"""Stands for all fins that have no bounds of their own."""
+
+Way = tuple[float, float, float, float]
+Wrench = tuple[float, float, float, float, float, float]
+
+
+@dataclass(frozen=True)
+class SearchRequest:
+    """Everything that a search is told; checked on construction as far as it can be without a layout."""
+
+    goal: str
+    """Key of `GOAL_WORDS`."""
+    fins: tuple[str, ...]
+    """Names of fins that may move."""
+    way: Way = WAY
+    """How far each of them may go along x, y, z [m] and turn [deg]."""
+    own_ways: Mapping[str, Way] = field(default_factory=dict)
+    """Fins with bounds of their own."""
+    mission: tuple[Wrench, ...] = ()
+    """Wrenches [N, N m] of the goal `energy of a mission`; none means the common ones."""
+
+    def __post_init__(self) -> None:
+        if self.goal not in GOAL_WORDS:
+            raise FinlabError(f"goal: expected one of {', '.join(GOAL_WORDS)}, got {self.goal!r:.40}")
+        if not self.fins:
+            raise FinlabError("no fin may move; press the numbers of those that may")
+        for way in (self.way, *self.own_ways.values()):
+            checked_way(way)
+
+    def bounds(self, layout: Layout) -> dict[str, Bounds]:
+        """Where each fin may go from where it is."""
+        bounds = {}
+        for name in self.fins:
+            *reach, turn = self.own_ways.get(name, self.way)
+            bounds[name] = Bounds.around(layout.fins[layout.index(name)], reach, math.radians(turn))
+        return bounds
+
+    @property
+    def wrenches(self) -> Any:
+        """The mission (N, 6) [N, N m]."""
+        return self.mission or MISSION
+
+
+@dataclass(frozen=True)
+class Draft:
+    """What the user has asked for so far; it may name fins that are gone by now."""
+
+    goal: str = next(iter(GOAL_WORDS))
+    """Key of `GOAL_WORDS`."""
+    held: tuple[str, ...] = ()
+    """Fins that may not move."""
+    ways: tuple[tuple[str, Way], ...] = ()
+    """How far fins may go, by name or `ALL`; see `SearchRequest.way`."""
+    mission: str = ""
+    """The mission as text, see `parsed_mission`."""
+
+    def with_goal(self, goal: Any) -> "Draft":
+        """Another goal.
+
+        Raises:
+            FinlabError: there is no such goal.
+        """
+        if goal not in GOAL_WORDS:
+            raise FinlabError(f"goal: expected one of {', '.join(GOAL_WORDS)}, got {goal!r:.40}")
+        return replace(self, goal=goal)
+
+    def with_held_toggled(self, name: str) -> "Draft":
+        """A fin held, or free to move again."""
+        held = tuple(other for other in self.held if other != name)
+        return replace(self, held=held if name in self.held else (*held, name))
+
+    def with_way(self, name: str, way: tuple[Any, ...]) -> "Draft":
+        """Other bounds of a fin, or of `ALL`.
+
+        Raises:
+            FinlabError: they are too far, or no numbers.
+        """
+        others = tuple(pair for pair in self.ways if pair[0] != name)
+        return replace(self, ways=(*others, (name, checked_way(way))))
+
+    def with_mission(self, text: Any) -> "Draft":
+        """Another mission; it is read when the search begins, so that half a line may be typed."""
+        return replace(self, mission=str(text)[:MAX_TEXT])
+
+    def way(self, name: str) -> Way:
+        """How far a fin may go."""
+        ways = dict(self.ways)
+        return ways.get(name, ways.get(ALL, WAY))
+
+    def request(self, layout: Layout) -> SearchRequest:
+        """What a search of this layout is told.
+
+        Raises:
+            FinlabError: no fin may move, or the mission makes no sense.
+        """
+        fins = tuple(name for name in layout.names if name not in self.held)
+        own = {name: way for name, way in self.ways if name in layout.names}
+        return SearchRequest(self.goal, fins, self.way(ALL), own, parsed_mission(self.mission))
+
+
+def restored_draft(values: Mapping[str, Any]) -> Draft:
+    """A draft that was kept as plain values, checked like anything that a page sends.
+
+    Raises:
+        FinlabError: a value is not allowed. So may KeyError, TypeError and ValueError tell.
+    """
+    draft = Draft().with_goal(values["goal"]).with_mission(values["mission"])
+    for name in values["held"]:
+        draft = draft.with_held_toggled(str(name))
+    for name, way in values["ways"]:
+        draft = draft.with_way(str(name), tuple(way))
+    return draft
+
+
+def checked_way(way: tuple[Any, ...]) -> Way:
+    """How far a fin may go, as the page sent it.
+
+    Raises:
+        FinlabError: it is too far, or no number.
+    """
+    x, y, z = (number(v, f"reach along {axis} [m]", 0.0, 0.5) for v, axis in zip(way, "xyz", strict=False))
+    return x, y, z, number(way[3], "turn of the shaft [°]", 0.0, 180.0)
+
+
+def parsed_mission(text: str) -> tuple[Wrench, ...]:
+    """The wrenches in a text, one line each: six numbers, commas or blanks between them.
+
+    Raises:
+        FinlabError: a line is something else; the message names it.
+    """
+    wrenches: list[Wrench] = []
+    for place, line in enumerate(text[:MAX_TEXT].splitlines(), start=1):
+        words = line.replace(",", " ").split()
+        if not words:
+            continue
+        try:
+            values = [float(word) for word in words]
+        except ValueError:
+            values = []
+        if len(values) != 6 or not all(abs(value) <= MAX_TARGET for value in values):
+            raise FinlabError(
+                f"mission, line {place}: expected six numbers Fx Fy Fz Tx Ty Tz [N, N m], got {line!r:.60}"
+            )
+        fx, fy, fz, tx, ty, tz = values
+        wrenches.append((fx, fy, fz, tx, ty, tz))
+    if len(wrenches) > MAX_MISSION:
+        raise FinlabError(f"mission: expected at most {MAX_MISSION} wrenches, got {len(wrenches)}")
+    return tuple(wrenches)

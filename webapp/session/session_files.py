@@ -1,0 +1,150 @@
+"""Sessions on disk, so that a browser finds its work again after the server was restarted."""
+
+import json
+import os
+import re
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from finlab.errors import FinlabError
+from finlab.layout import Layout, layout_to_dict, parse_layout
+from webapp.session import Session
+from webapp.session.search_request import restored_draft
+from webapp.session.state import SETTINGS, State
+
+VERSION = 3
+"""Of what stands in the files; others are not read."""
+MAX_FILES = 64
+"""Sessions that are kept; the oldest go first."""
+MAX_BYTES = 3_000_000
+"""Largest session file that is read."""
+MAX_STEPS = 100
+"""Steps of undo, and of redo, that are kept."""
+_KEY = re.compile(r"[A-Za-z0-9_-]{8,64}")
+
+
+class SessionFiles:
+    """One JSON file per session in a folder that only the user can read."""
+
+    def __init__(self, folder: Path) -> None:
+        """`folder` is made when the first session is written."""
+        self._folder = folder
+
+    def write(self, key: str, session: Session) -> None:
+        """Keep a session; a full disk or a missing right loses it silently: the page goes on."""
+        path = self._path(key)
+        if path is None:
+            return
+        text = json.dumps(to_dict(session))
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            part = path.with_suffix(".part")
+            part.touch(mode=0o600)
+            part.write_text(text, encoding="utf-8")
+            os.replace(part, path)
+            self._prune()
+        except OSError:
+            return
+
+    def read(self, key: str, session: Session) -> bool:
+        """Bring a fresh session to what is kept under a key; False if there is none or it makes no sense."""
+        path = self._path(key)
+        try:
+            if path is None or not path.is_file() or path.stat().st_size > MAX_BYTES:
+                return False
+            restore(session, json.loads(path.read_text(encoding="utf-8")))
+        except (OSError, ValueError, TypeError, LookupError, AttributeError, FinlabError, RecursionError):
+            return False
+        return True
+
+    def _path(self, key: str) -> Path | None:
+        # Keys come from browsers: nothing in one may lead out of the folder.
+        return self._folder / f"{key}.json" if _KEY.fullmatch(key) else None
+
+    def _prune(self) -> None:
+        files = sorted(self._folder.glob("*.json"), key=lambda path: path.stat().st_mtime)
+        for path in files[:-MAX_FILES]:
+            path.unlink(missing_ok=True)
+
+
+def to_dict(session: Session) -> dict[str, Any]:
+    """A session as plain values. Layouts are written once each, however many steps share them."""
+    layouts: list[Layout] = []
+
+    def place(layout: Layout) -> int:
+        if layout not in layouts:
+            layouts.append(layout)
+        return layouts.index(layout)
+
+    def plain(state: State) -> dict[str, Any]:
+        return {
+            "layout": place(state.layout),
+            "failed": list(state.failed),
+            "weak": [list(pair) for pair in state.weak],
+            "stuck": [list(pair) for pair in state.stuck],
+            "target": list(state.target),
+            "links": [list(pair) for pair in state.links],
+            "settings": {key: getattr(state, key) for key in SETTINGS},
+        }
+
+    history = session.history
+    values = {
+        "version": VERSION,
+        "state": plain(session.state),
+        "past": [[name, plain(state)] for name, state in history.past[-MAX_STEPS:]],
+        "future": [[name, plain(state)] for name, state in history.future[-MAX_STEPS:]],
+        "saved": place(session.saved),
+        "pinned": None if session.pinned is None else place(session.pinned),
+        "beside": session.beside,
+        "display": asdict(session.display),
+        "draft": asdict(session.draft),
+        "swim": asdict(session.swim),
+    }
+    return {**values, "layouts": [layout_to_dict(layout) for layout in layouts]}
+
+
+def restore(session: Session, values: dict[str, Any]) -> None:
+    """Bring a fresh session to what `to_dict` wrote, checked like anything that a page sends.
+
+    Raises:
+        FinlabError: a value is not allowed. So may KeyError, TypeError, ValueError and IndexError tell.
+    """
+    if values["version"] != VERSION:
+        raise FinlabError(f"kept session: expected version {VERSION}, got {values['version']!r:.20}")
+    layouts = [parse_layout(layout, source="kept session") for layout in values["layouts"]]
+
+    def steps(key: str) -> list[tuple[str, State]]:
+        return [(str(name)[:200], _state(state, layouts)) for name, state in values[key][-MAX_STEPS:]]
+
+    state, past, future = _state(values["state"], layouts), steps("past"), steps("future")
+    saved, pinned = layouts[values["saved"]], values["pinned"]
+    display = session.display
+    for key, value in values["display"].items():
+        display = display.with_value(key, value)
+    draft, swim = restored_draft(values["draft"]), session.swim
+    for key, value in values["swim"].items():
+        swim = swim.with_value(key, value)
+    session.resume(state)
+    session.history.restore(past, future)
+    session.saved, session.display = saved, display
+    session.draft, session.swim = draft, swim.without_own_path()
+    session.pinned = None if pinned is None else layouts[pinned]
+    session.compare_with(values["beside"])
+
+
+def _state(values: dict[str, Any], layouts: list[Layout]) -> State:
+    state = State(layouts[values["layout"]])
+    for axis, value in enumerate(values["target"][:6]):
+        state = state.with_target(axis, value)
+    for name in values["failed"]:
+        state = state.with_failure_toggled(name)
+    for name, share in values["weak"]:
+        state = state.with_strength(str(name), share)
+    for name, angle in values["stuck"]:
+        state = state.with_stop(str(name), angle)
+    for key in SETTINGS:
+        state = state.with_setting(key, values["settings"][key])
+    for a, b in values["links"]:
+        state = state.with_link(str(a), str(b))
+    return state

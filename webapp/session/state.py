@@ -1,0 +1,160 @@
+"""What a browser works on: one immutable, checked value that undo can put back."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+from finlab.allocation.health import Health
+from finlab.allocation.methods import METHODS
+from finlab.allocation.policy import AXES, KINDS
+from finlab.errors import FinlabError
+from finlab.layout import Layout
+from webapp.session.links import Links, kept, linked
+
+AXIS_WORDS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+"""What a pilot calls them."""
+AXIS_UNITS = ("N", "N", "N", "N m", "N m", "N m")
+"""Their units."""
+
+MAX_TARGET = 1000.0
+"""Largest target component that the page may ask for [N, N m]."""
+MAX_FINS = 8
+"""Most fins that can be placed in the browser; files may hold more."""
+CANDIDATE_RANGE = (4, 256)
+"""How many candidates K the mixture may be asked for."""
+TEMPERATURE_RANGE = (0.0, 2.0)
+"""Temperatures T of the mixture."""
+GAMMA_RANGE = (0.0, 1.0)
+"""Weights gamma of the energy in the ranking."""
+STRENGTH_RANGE = (0.05, 1.0)
+"""Shares that may be left of a weak fin's largest amplitude and frequency."""
+COMPARED = ("learned", "paper", "analytic", "qp", "sqp", "multistart")
+"""Methods that answer quickly enough to be compared while one waits."""
+SETTINGS = ("method", "policy", "n_candidates", "temperature", "gamma")
+"""Fields of `State` that say how the question is answered."""
+
+
+@dataclass(frozen=True)
+class State:
+    """A layout, its failures and the question asked of it."""
+
+    layout: Layout
+    """The robot."""
+    failed: tuple[str, ...] = ()
+    """Names of failed fins, in the order of the layout."""
+    weak: tuple[tuple[str, float], ...] = ()
+    """Weak fins: name, and the share that is left of the largest amplitude and frequency."""
+    stuck: tuple[tuple[str, float], ...] = ()
+    """Fins that no longer turn: name, and the zero direction [rad] at which they stay."""
+    target: tuple[float, float, float, float, float, float] = (0.0,) * 6
+    """Desired wrench [N, N m], body frame."""
+    n_candidates: int = 64
+    """K, how many candidates are drawn from the mixture."""
+    temperature: float = 0.02
+    """T, how far the draws may stray from the mixture's means."""
+    gamma: float = 0.01
+    """Weight of the energy in the ranking."""
+    method: str = "learned"
+    """Name of the allocation method."""
+    policy: str = "closest"
+    """What to do about a wrench that is out of reach: one of `KINDS`."""
+    links: Links = ()
+    """Mirror pairs of fins that move together."""
+
+    @property
+    def healthy(self) -> tuple[str, ...]:
+        """Names of the fins that work."""
+        return tuple(name for name in self.layout.names if name not in self.failed)
+
+    @property
+    def health(self) -> Health | None:
+        """What is known of damaged fins; None where all are whole."""
+        return Health(self.weak, self.stuck) if self.weak or self.stuck else None
+
+    @property
+    def able(self) -> Layout:
+        """The layout with the limits that are left to damaged fins."""
+        return self.layout if self.health is None else self.health.applied_to(self.layout)
+
+    def with_target(self, axis: int, value: Any) -> "State":
+        """One component of the target changed."""
+        checked = number(value, f"{AXES[axis]} [{AXIS_UNITS[axis]}]", -MAX_TARGET, MAX_TARGET)
+        target = list(self.target)
+        target[axis] = checked
+        fx, fy, fz, tx, ty, tz = target
+        return replace(self, target=(fx, fy, fz, tx, ty, tz))
+
+    def with_failure_toggled(self, name: str) -> "State":
+        """One fin failed or repaired; the last working fin cannot fail."""
+        self.layout.index(name)
+        lost = set(self.failed) ^ {name}
+        if len(lost) == self.layout.n_fins:
+            raise FinlabError(
+                f"{name} is the last fin that works, so it cannot fail too; repair another one first"
+            )
+        return replace(self, failed=tuple(n for n in self.layout.names if n in lost))
+
+    def with_strength(self, name: str, share: Any) -> "State":
+        """A fin that is weak, with a share left of its largest amplitude and frequency; 1 is a whole one."""
+        self.layout.index(name)
+        checked = number(share, f"strength left of {name}", *STRENGTH_RANGE)
+        others = tuple(pair for pair in self.weak if pair[0] != name)
+        return replace(self, weak=others if checked == 1.0 else (*others, (name, checked)))
+
+    def with_stop(self, name: str, angle: Any) -> "State":
+        """A fin that is stuck at a zero direction [rad]; None frees it."""
+        self.layout.index(name)
+        others = tuple(pair for pair in self.stuck if pair[0] != name)
+        if angle is None:
+            return replace(self, stuck=others)
+        checked = number(angle, f"direction of {name}, stuck, in radians", -math.pi - 1e-6, math.pi + 1e-6)
+        return replace(self, stuck=(*others, (name, checked)))
+
+    def with_layout(self, layout: Layout) -> "State":
+        """Another layout; damage of fins that still exist stays, unless none would work."""
+        failed = tuple(name for name in layout.names if name in self.failed)
+        return replace(
+            self,
+            layout=layout,
+            failed=() if len(failed) == layout.n_fins else failed,
+            weak=tuple(pair for pair in self.weak if pair[0] in layout.names),
+            stuck=tuple(pair for pair in self.stuck if pair[0] in layout.names),
+            links=kept(self.links, layout),
+        )
+
+    def with_link(self, a: str, b: str) -> "State":
+        """Two fins become a mirror pair that moves together."""
+        for name in (a, b):
+            self.layout.index(name)
+        return replace(self, links=linked(self.links, a, b))
+
+    def with_setting(self, key: str, value: Any) -> "State":
+        """K, T, gamma or the method changed: `key` is the field's name."""
+        if key == "method":
+            if value not in METHODS:
+                raise FinlabError(f"method: expected one of {', '.join(METHODS)}, got {value!r:.60}")
+            return replace(self, method=value)
+        if key == "policy":
+            if value not in KINDS:
+                raise FinlabError(f"policy: expected one of {', '.join(KINDS)}, got {value!r:.60}")
+            return replace(self, policy=value)
+        if key == "n_candidates":
+            return replace(self, n_candidates=round(number(value, "candidates K", *CANDIDATE_RANGE)))
+        if key == "temperature":
+            return replace(self, temperature=number(value, "temperature T", *TEMPERATURE_RANGE))
+        if key == "gamma":
+            return replace(self, gamma=number(value, "energy weight gamma", *GAMMA_RANGE))
+        raise FinlabError(f"there is no setting {key!r:.40}")
+
+
+def number(value: Any, name: str, low: float, high: float) -> float:
+    """A finite number within limits, or a sentence that says what is wrong; the page may send anything.
+
+    Raises:
+        FinlabError: `value` is not such a number.
+    """
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise FinlabError(f"{name}: expected a number, got {value!r:.60}")
+    if not low <= value <= high:  # a NaN compares false as well
+        raise FinlabError(f"{name}: expected a number from {low:g} to {high:g}, got {value:g}")
+    return float(value)

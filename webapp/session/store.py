@@ -1,0 +1,83 @@
+"""Sessions by key. A browser keeps keys, the server keeps what they stand for."""
+
+import secrets
+import time
+from collections.abc import Callable, Iterable
+
+from webapp.session import Session
+from webapp.session.session_files import SessionFiles
+
+MAX_SESSIONS = 64
+"""Sessions that are kept; beyond it the ones left longest ago are forgotten."""
+
+
+class SessionStore:
+    """All sessions of this server, each shown in one tab at a time."""
+
+    def __init__(self, make: Callable[[], Session], files: SessionFiles | None = None) -> None:
+        """`make` gives a fresh session; `files` keep sessions beyond the life of the server."""
+        self._make = make
+        self._files = files
+        self._fresh = make()
+        self._kept: dict[str, object] = {}
+        self._sessions: dict[str, Session] = {}
+        self._open: set[str] = set()
+        self._left: dict[str, float] = {}
+
+    def enter(self, keys: Iterable[str]) -> tuple[str, Session]:
+        """The session for a tab, and its key.
+
+        Args:
+            keys: what this browser remembers. Of those that no other tab shows, the one left last is taken:
+                a reload finds its work again, and a second tab gets a session of its own.
+        """
+        keys = list(keys)
+        for key in keys:
+            self._resume(key)
+        free = [k for k in keys if k in self._sessions and k not in self._open]
+        found = max(free, key=lambda k: self._left.get(k, 0.0), default=None)
+        key = found or secrets.token_urlsafe(12)
+        if found is None:
+            self._sessions[key] = self._make()
+            self._forget_old()
+        self._open.add(key)
+        return key, self._sessions[key]
+
+    def leave(self, key: str) -> None:
+        """The tab has gone; its session waits for the next one."""
+        self._open.discard(key)
+        self._left[key] = time.monotonic()
+
+    def _resume(self, key: str) -> None:
+        """Bring a session back that an earlier server has kept."""
+        if self._files is None or key in self._sessions:
+            return
+        session = self._make()
+        if self._files.read(key, session):
+            self._sessions[key] = session
+            self._kept[key] = _mark(session)
+            self._forget_old()
+
+    def keep(self) -> None:
+        """Write the sessions that have changed since the last time."""
+        if self._files is None:
+            return
+        for key, session in self._sessions.items():
+            if _mark(session) != self._kept.get(key, _mark(self._fresh)):
+                self._kept[key] = _mark(session)
+                self._files.write(key, session)
+
+    def _forget_old(self) -> None:
+        waiting = sorted(
+            (k for k in self._sessions if k not in self._open), key=lambda k: self._left.get(k, 0.0)
+        )
+        for key in waiting[: max(0, len(self._sessions) - MAX_SESSIONS)]:
+            del self._sessions[key]
+            self._left.pop(key, None)
+            self._kept.pop(key, None)
+
+
+def _mark(session: Session) -> object:
+    """Differs whenever there is something new to keep."""
+    looks = session.display, session.saved, session.pinned, session.beside
+    return session.revision, *looks, session.draft, session.swim

@@ -1,0 +1,62 @@
+"""What a layout can do, and the set that is drawn of it: about a second of work."""
+
+from dataclasses import dataclass
+
+from finlab.analysis import AttainableSet, ScoreCard, attainable_set, score_card
+from finlab.layout import Layout
+from webapp.session.display import DRAWN
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is to be worked out."""
+
+    layout: Layout
+    """The robot."""
+    failed: tuple[str, ...]
+    """Names of failed fins."""
+    beside: Layout
+    """The layout to compare with."""
+    drawn: str
+    """Key of `DRAWN`."""
+    alone: bool
+    """Whether the set keeps all else at zero."""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What came of it."""
+
+    question: Question
+    """What was asked."""
+    card: ScoreCard
+    """What the working fins can do."""
+    before: ScoreCard | None
+    """The same for the layout to compare with, where it is another one."""
+    now: AttainableSet | None
+    """What the working fins attain, where a set is drawn."""
+    whole: AttainableSet | None
+    """The same with all fins, where one has failed; else that of the layout to compare with."""
+
+
+def find(question: Question) -> Findings:
+    """Answer a question; takes about a second.
+
+    Raises:
+        FinlabError: the layout cannot be analysed.
+    """
+    layout, failed, beside = question.layout, question.failed, question.beside
+    other = beside != layout
+    # A fin that the other layout does not have cannot have failed there.
+    lost = tuple(name for name in failed if name in beside.names)
+    kind = DRAWN[question.drawn]
+    now = whole = None
+    if kind is not None:
+        now = attainable_set(layout, kind, failed=failed, alone=question.alone)
+        if failed:
+            whole = attainable_set(layout, kind, alone=question.alone)
+        elif other:
+            whole = attainable_set(beside, kind, alone=question.alone)
+    card = score_card(layout, failed)
+    before = score_card(beside, lost) if other and len(lost) < beside.n_fins else None
+    return Findings(question, card, before, now, whole)

@@ -1,0 +1,109 @@
+"""Names that tell an answer's modes apart; what counts as one is for `finlab.allocation.modes` to say."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.allocation import Allocation, Candidates
+from finlab.allocation.modes import SAME_DIRECTION, Mode, Way, differences, find_modes, same_way, way_of
+from webapp.markup.figures import listed
+from webapp.theme import MODE_COLORS
+
+Array = NDArray[np.float64]
+
+MAX_SHOWN = len(MODE_COLORS)
+"""Modes that are shown, each in its own colour; a robot with many fins has dozens, the last ones dear."""
+
+
+class NamedMode(NamedTuple):
+    """One way to deliver the wrench, as people call it."""
+
+    mode: Mode
+    """The way itself."""
+    name: str
+    """What makes it different from the others that are shown."""
+
+
+def known_modes(answer: Allocation) -> tuple[Mode, ...]:
+    """The modes among the candidates that an answer has refined anyway: a few, but they cost no time."""
+    if answer.candidates is None:
+        return ()
+    limits = [fin.limits for fin in answer.layout.fins]
+    lower, upper = (np.array([getattr(limit, end) for limit in limits]) for end in ("lower", "upper"))
+    return find_modes(answer.candidates, lower, upper)
+
+
+def named_modes(modes: tuple[Mode, ...]) -> tuple[NamedMode, ...]:
+    """The first `MAX_SHOWN` modes with their names, no two alike."""
+    shown = modes[:MAX_SHOWN]
+    names = _names([way_of(mode.command) for mode in shown])
+    return tuple(NamedMode(mode, name) for mode, name in zip(shown, names, strict=True))
+
+
+def same_mode(wanted: Mode, modes: tuple[NamedMode, ...]) -> int:
+    """The place of a mode that is known from another list; 0, the best one, where it is not there."""
+    way = way_of(wanted.command)
+    return next((k for k, (mode, _) in enumerate(modes) if same_way(way_of(mode.command), way)), 0)
+
+
+def nearest_modes(samples: Candidates | None, modes: tuple[NamedMode, ...]) -> NDArray[np.intp] | None:
+    """For each raw sample (K,) the mode whose thrusts are nearest to its own; None where there are none."""
+    if samples is None or not modes:
+        return None
+    raw = _push(samples.command)
+    refined = _push(np.array([mode.command for mode, _ in modes]))
+    gap = np.abs(raw[:, None] - refined[None]) ** 2
+    return np.asarray(np.argmin(gap.sum(axis=-1), axis=1))
+
+
+def _push(command: Array) -> NDArray[np.complex128]:
+    """Thrusts (..., n) in each fin's plane as complex numbers, up to a common factor; 0 for failed fins."""
+    strength = np.sin(command[..., 0]) ** 2 * command[..., 1] ** 2
+    return np.asarray(np.nan_to_num(strength * np.exp(1j * command[..., 2])))
+
+
+def _names(ways: list[Way]) -> list[str]:
+    """Who rests; where that is not enough, the largest differences from the first mode with the same name."""
+    names: list[str] = []
+    firsts: dict[str, Way] = {}
+    for way in ways:
+        base = _resting_words(way)
+        name = base
+        if base in firsts:
+            told = _difference_words(firsts[base], way)
+            # One difference is enough to tell two modes apart; a third one may need more, or a number.
+            tries = [", ".join([base, *told[:n]]) for n in range(1, len(told) + 1)]
+            tries += [f"{tries[-1] if tries else base} ({k})" for k in range(2, len(ways) + 2)]
+            name = next(text for text in tries if text not in names)
+        else:
+            firsts[base] = way
+        names.append(name)
+    return names
+
+
+def _resting_words(way: Way) -> str:
+    if not way.resting:
+        return "all fins push"
+    several = len(way.resting) > 1
+    fins = listed([str(i + 1) for i in way.resting])
+    return f"fins {fins} rest" if several else f"fin {fins} rests"
+
+
+def _difference_words(first: Way, way: Way) -> list[str]:
+    """What differs, the largest difference first."""
+    told = differences(first, way)
+    words = []
+    for flat in np.argsort(-np.abs(told), axis=None):
+        kind, fin = divmod(int(flat), told.shape[1])
+        value = float(told[kind, fin])
+        if abs(value) < 1.0:
+            break
+        if kind == 0:
+            degrees = round(np.degrees(value * SAME_DIRECTION))
+            words.append(f"fin {fin + 1} {'reversed' if abs(degrees) > 135 else f'turned {degrees:+d}°'}")
+        elif kind == 1:
+            words.append(f"fin {fin + 1} pushes {'harder' if value > 0 else 'less'}")
+        else:
+            words.append(f"fin {fin + 1} {'wider and slower' if value > 0 else 'narrower and quicker'}")
+    return [word.replace("-", "−") for word in words]

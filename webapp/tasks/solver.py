@@ -1,0 +1,112 @@
+"""From a state to an answer: picks the allocator for the state's settings and keeps it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from finlab.allocation.allocation import Allocation
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.methods import load_allocator
+from finlab.allocation.modes import Mode
+from webapp.session.state import State
+from webapp.tasks.attention import Attention, attention
+from webapp.tasks.density import Densities, densities
+from webapp.tasks.refinement import refinement
+
+Load = Callable[..., Allocator]
+
+SAMPLING_METHODS = ("learned", "paper")
+"""Methods that K, T and gamma mean something to."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reply:
+    """An answer and what belongs to it."""
+
+    answer: Allocation
+    """The answer itself."""
+    densities: Densities | None
+    """What the network proposed, for methods with one."""
+    attention: Attention | None
+    """How much its fins look at each other, for methods with a network."""
+
+
+class Solver:
+    """Answers states. Used from one thread only, the worker's."""
+
+    def __init__(self, checkpoint: str | Path | None = None, load: Load = load_allocator) -> None:
+        """`checkpoint` is a name or folder, None for the shipped one; `load` is replaced in tests."""
+        self._checkpoint = checkpoint
+        self._load = load
+        self._allocators: dict[str, Allocator] = {}
+
+    @cached_property
+    def aside(self) -> "Solver":
+        """Another solver with the same checkpoint, for another thread."""
+        return Solver(self._checkpoint, self._load)
+
+    def allocator(self, state: State) -> Allocator:
+        """The allocator for the state's method and settings, loaded once per method.
+
+        Raises:
+            FinlabError: it cannot be loaded.
+        """
+        if state.method not in self._allocators:
+            checkpoint = None if state.method == "paper" else self._checkpoint
+            self._allocators[state.method] = self._load(state.method, checkpoint=checkpoint)
+        allocator = self._allocators[state.method]
+        if state.method in SAMPLING_METHODS:
+            _take_settings(allocator, state)
+        return allocator
+
+    def reply(self, state: State) -> Reply:
+        """The answer to a state with all that a page shows of it, computed to the end.
+
+        Raises:
+            FinlabError: the method cannot be loaded or cannot answer.
+        """
+        answer, allocator, target = self.solve(state), self.allocator(state), np.array(state.target)
+        # What is computed when first asked for belongs to this thread too.
+        _ = answer.wrench, answer.energy, answer.fin_forces, answer.candidates, answer.samples
+        return Reply(
+            answer,
+            densities(allocator, answer.layout, state.failed, target, state.temperature),
+            attention(allocator, answer.layout, state.failed, target),
+        )
+
+    def modes(self, reply: Reply) -> tuple[Mode, ...]:
+        """All distinct ways to do what an answer does: a search of its own, tens of milliseconds."""
+        return reply.answer.modes
+
+    def refinement(self, state: State, answer: Allocation) -> tuple[Allocation, ...]:
+        """The steps of the refinement behind an answer to a state.
+
+        Raises:
+            FinlabError: the method refines nothing.
+        """
+        return refinement(self.allocator(state), answer)
+
+    def solve(self, state: State) -> Allocation:
+        """The answer to a state.
+
+        Raises:
+            FinlabError: the method cannot be loaded or cannot answer.
+        """
+        return self.allocator(state).allocate(
+            state.layout, state.target, failed=state.failed, policy=state.policy, health=state.health, seed=0
+        )
+
+
+def _take_settings(allocator: Allocator, state: State) -> None:
+    """Let K, T and gamma take effect on the next answer; no network is loaded again for a slider's step."""
+    from finlab.allocation.learned.learned_allocator import LearnedAllocator
+
+    values = {key: getattr(state, key) for key in ("n_candidates", "temperature", "gamma")}
+    if isinstance(allocator, LearnedAllocator):
+        allocator.settings = allocator.pipeline.settings = replace(allocator.settings, **values)
+        return
+    for key, value in values.items():
+        setattr(allocator, key, value)

@@ -1,0 +1,107 @@
+"""Plays one component of the target through a range, and notes what the fins do at each value."""
+
+import asyncio
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.errors import FinlabError
+from webapp.session import Session
+from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_TARGET, number
+from webapp.tasks.answering import Answering
+
+POINTS = 61
+"""Values of a range, ends included."""
+STEP_S = 1 / 15
+"""Time between two values [s]: 4 s for one way through the range."""
+
+
+class Sweep:
+    """Goes to and fro through a range until it is stopped; the target stays where it then is."""
+
+    def __init__(
+        self,
+        session: Session,
+        loop: asyncio.AbstractEventLoop,
+        do: Callable[[Callable[[], object]], None],
+    ) -> None:
+        """Prepare.
+
+        Args:
+            session: whose target is moved.
+            loop: the event loop that everything here runs on.
+            do: carries out an intent on the page.
+        """
+        self._session, self._loop, self._do = session, loop, do
+        self._timer: asyncio.TimerHandle | None = None
+        self._place, self._step, self._revision = 0, 1, -1
+        self.axis = 0
+        """Which component is moved."""
+        self.values: NDArray[np.float64] = np.zeros(POINTS)
+        """Its values [N or N m]."""
+        self.fins: tuple[str, ...] = ()
+        """Fins that the notes are about."""
+        self.force: NDArray[np.float64] = np.full((0, POINTS), np.nan)
+        """Mean force of each fin at each value (n, POINTS) [N]; NaN where it is not known yet."""
+        self.error: NDArray[np.float64] = np.full(POINTS, np.nan)
+        """Error at each value (POINTS,) [σ]."""
+
+    @property
+    def running(self) -> bool:
+        """True from start to stop."""
+        return self._timer is not None
+
+    def start(self, axis: int, low: float, high: float) -> None:
+        """Begin at the low end.
+
+        Raises:
+            FinlabError: the range is none.
+        """
+        self.stop()
+        name = f"{AXIS_WORDS[axis]} [{AXIS_UNITS[axis]}]"
+        low, high = (number(v, f"range of {name}", -MAX_TARGET, MAX_TARGET) for v in (low, high))
+        if not low < high:
+            raise FinlabError(f"range of {name}: expected the smaller end first, got {low:g} and {high:g}")
+        self.axis, self.values = axis, np.linspace(low, high, POINTS)
+        self.fins = self._session.state.layout.names
+        self.force = np.full((len(self.fins), POINTS), np.nan)
+        self.error = np.full(POINTS, np.nan)
+        self._place, self._step = 0, 1
+        self._session.history.end_merge()
+        self._timer = self._loop.call_later(0.0, self._go)
+
+    def stop(self) -> None:
+        """Leave the target where it is."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._session.history.end_merge()
+        self._timer = None
+
+    def _go(self) -> None:
+        # Whoever changes anything else takes over: the sweep ends.
+        if (
+            self._revision not in (-1, self._session.revision)
+            or self.fins != self._session.state.layout.names
+        ):
+            self._revision = -1
+            self.stop()
+            self._do(lambda: None)
+            return
+        self._timer = self._loop.call_later(STEP_S, self._go)
+        self._do(partial(self._session.sweep_target, self.axis, float(self.values[self._place])))
+        self._revision = self._session.revision
+        if not 0 <= self._place + self._step < POINTS:
+            self._step = -self._step
+        self._place += self._step
+
+    def note(self, answering: Answering) -> None:
+        """Note a new answer, if it is to one of the values."""
+        answer = answering.best
+        if answer is None or not self.running or answer.layout.names != self.fins:
+            return
+        at = int(np.argmin(np.abs(self.values - answer.target[self.axis])))
+        if abs(self.values[at] - answer.target[self.axis]) < 1e-9:
+            self.force[:, at] = np.linalg.norm(answer.fin_forces, axis=1)
+            self.error[at] = answer.err_norm
