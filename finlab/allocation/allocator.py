@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from inspect import signature
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,6 +39,33 @@ class Allocator(ABC):
     def option_names(cls) -> list[str]:
         """Names of what can be set when the method is made."""
         return list(signature(cls).parameters)[1:]
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Present values of all that can be set, by name; `load_allocator` makes the same method of them."""
+        return {name: getattr(self, name) for name in self.option_names()}
+
+    def with_settings(self, **changes: Any) -> Self:
+        """The same method with other settings. This one stays as it is; what it has loaded is shared.
+
+        Raises:
+            AllocationError: the method knows no such setting, or cannot work with its value.
+        """
+        self.check_options(changes)
+        return self._made_with({**self.options, **changes})
+
+    @classmethod
+    def check_options(cls, names: Iterable[str]) -> None:
+        """Raise an `AllocationError` at a setting that the method does not know."""
+        known = cls.option_names()
+        if unknown := [name for name in names if name not in known]:
+            raise AllocationError(
+                f"method {cls.name!r} knows the options {', '.join(known) or 'none'}, got {unknown[0]!r}"
+            )
+
+    def _made_with(self, options: dict[str, Any]) -> Self:
+        """The same method made again; those with networks override this."""
+        return type(self)(self.normalization, **options)  # type: ignore[call-arg]
 
     @abstractmethod
     def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:

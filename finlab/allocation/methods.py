@@ -61,10 +61,6 @@ def load_allocator(
     module, name = METHODS[method]
     kind = getattr(import_module(module), name)
     model = load_allocator_checkpoint(path) if method in LEARNED else load_normalization(path)
-    known = kind.option_names()
-    if unknown := [name for name in options if name not in known]:
-        raise AllocationError(
-            f"method {method!r} knows the options {', '.join(known) or 'none'}, got {unknown[0]!r}"
-        )
+    kind.check_options(options)
     allocator: Allocator = kind(model, **options)
     return allocator

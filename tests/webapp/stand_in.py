@@ -25,10 +25,17 @@ class StandIn(Allocator):
 
     name = "learned"
 
-    def __init__(self) -> None:
+    def __init__(
+        self,
+        normalization: Normalization = NORMALIZATION,
+        *,
+        n_candidates: int = 64,
+        temperature: float = 0.02,
+        gamma: float = 0.01,
+    ) -> None:
         """Settings as the learned method has them; the temperature widens the samples."""
-        self.normalization = NORMALIZATION
-        self.n_candidates, self.temperature, self.gamma = 64, 0.02, 0.01
+        self.normalization = normalization
+        self.n_candidates, self.temperature, self.gamma = n_candidates, temperature, gamma
         self._inner = Multistart(NORMALIZATION, n_candidates=2)
 
     def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:

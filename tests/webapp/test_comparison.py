@@ -77,3 +77,14 @@ def test_refinement_makes_a_raw_candidate_exact() -> None:
     assert errors[0] > 10 * errors[STEPS] and np.isnan(frames[0].command[2]).all()
     with pytest.raises(AllocationError, match="learned"):
         Solver(load=load_stand_in).refinement(state, answer)
+
+
+def test_what_a_page_tries_out_stays_with_its_own_answers() -> None:
+    solver, target = Solver(load=load_stand_in), PRESETS["Turn"]
+    loaded = solver.loaded("learned")
+    few = solver.allocator(State(UCAT, target=target, n_candidates=8, temperature=1.5, gamma=0.5))
+    assert few.options == {"n_candidates": 8, "temperature": 1.5, "gamma": 0.5}
+    assert solver.loaded("learned") is loaded and loaded.options["n_candidates"] == 64
+    assert solver.allocator(State(UCAT, target=target, method="multistart", n_candidates=8)).options == (
+        solver.loaded("multistart").options
+    )

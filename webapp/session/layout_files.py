@@ -74,12 +74,8 @@ def bundle_bytes(layout: Layout, failed: tuple[str, ...], allocator: Allocator) 
     Raises:
         FinlabError: the allocator has no trained network.
     """
-    from finlab.allocation.learned.learned_allocator import LearnedAllocator
     from finlab.deploy.bundle import make_bundle
 
-    if isinstance(allocator, LearnedAllocator):
-        # As the command line has it: what was tried out with K and T on the page does not go to the robot.
-        allocator = LearnedAllocator(allocator.trained or allocator.weights)
     return make_bundle(layout, allocator, failed).zip_bytes()
 
 

@@ -46,13 +46,16 @@ class Exports:
 
     def graph(self) -> None:
         """Send the layout graph file."""
-        state, solver = self._session.state, self._solver
-        self._send(".graph.json", lambda: graph_bytes(state.layout, state.failed, solver.allocator(state)))
+        state, loaded = self._session.state, self._solver.loaded
+        self._send(".graph.json", lambda: graph_bytes(state.layout, state.failed, loaded(state.method)))
 
     def bundle(self) -> None:
-        """Send the bundle for the robot: the same bytes as `finlab export --zip`."""
-        state, solver = self._session.state, self._solver
-        self._send(".zip", lambda: bundle_bytes(state.layout, state.failed, solver.allocator(state)))
+        """Send the bundle for the robot: the same bytes as `finlab export --zip`.
+
+        What was tried out with K and T on the page does not go to the robot.
+        """
+        state, loaded = self._session.state, self._solver.loaded
+        self._send(".zip", lambda: bundle_bytes(state.layout, state.failed, loaded(state.method)))
 
     def html(self, shown: Allocation | None) -> None:
         """Send a standalone page of the 3D view with an answer.

@@ -1,7 +1,7 @@
 """From a state to an answer: picks the allocator for the state's settings and keeps it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -18,8 +18,8 @@ from webapp.tasks.refinement import refinement
 
 Load = Callable[..., Allocator]
 
-SAMPLING_METHODS = ("learned", "paper")
-"""Methods that K, T and gamma mean something to."""
+SAMPLING = ("n_candidates", "temperature", "gamma")
+"""Fields of a state that are settings of the methods which draw candidates."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,19 +48,27 @@ class Solver:
         """Another solver with the same checkpoint, for another thread."""
         return Solver(self._checkpoint, self._load)
 
-    def allocator(self, state: State) -> Allocator:
-        """The allocator for the state's method and settings, loaded once per method.
+    def loaded(self, method: str) -> Allocator:
+        """The allocator of a method as it is shipped, loaded once.
 
         Raises:
             FinlabError: it cannot be loaded.
         """
-        if state.method not in self._allocators:
-            checkpoint = None if state.method == "paper" else self._checkpoint
-            self._allocators[state.method] = self._load(state.method, checkpoint=checkpoint)
-        allocator = self._allocators[state.method]
-        if state.method in SAMPLING_METHODS:
-            _take_settings(allocator, state)
-        return allocator
+        if method not in self._allocators:
+            checkpoint = None if method == "paper" else self._checkpoint
+            self._allocators[method] = self._load(method, checkpoint=checkpoint)
+        return self._allocators[method]
+
+    def allocator(self, state: State) -> Allocator:
+        """The allocator for the state's method with the state's settings.
+
+        Raises:
+            FinlabError: it cannot be loaded.
+        """
+        allocator = self.loaded(state.method)
+        if not set(SAMPLING) <= set(allocator.option_names()):
+            return allocator
+        return allocator.with_settings(**{key: getattr(state, key) for key in SAMPLING})
 
     def reply(self, state: State) -> Reply:
         """The answer to a state with all that a page shows of it, computed to the end.
@@ -98,15 +106,3 @@ class Solver:
         return self.allocator(state).allocate(
             state.layout, state.target, failed=state.failed, policy=state.policy, health=state.health, seed=0
         )
-
-
-def _take_settings(allocator: Allocator, state: State) -> None:
-    """Let K, T and gamma take effect on the next answer; no network is loaded again for a slider's step."""
-    from finlab.allocation.learned.learned_allocator import LearnedAllocator
-
-    values = {key: getattr(state, key) for key in ("n_candidates", "temperature", "gamma")}
-    if isinstance(allocator, LearnedAllocator):
-        allocator.settings = allocator.pipeline.settings = replace(allocator.settings, **values)
-        return
-    for key, value in values.items():
-        setattr(allocator, key, value)

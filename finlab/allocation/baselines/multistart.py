@@ -41,8 +41,8 @@ class Multistart(ModelBased):
         energy_tradeoff: float = ENERGY_TRADEOFF,
     ) -> None:
         super().__init__(normalization)
-        self.n_candidates = n_candidates
-        self.options = DescentOptions(n_steps=n_steps, energy_tradeoff=energy_tradeoff)
+        self.n_candidates, self.n_steps, self.energy_tradeoff = n_candidates, n_steps, energy_tradeoff
+        self._descent = DescentOptions(n_steps=n_steps, energy_tradeoff=energy_tradeoff)
 
     def _commands(self, actuation: Actuation, targets: Array, seed: int) -> Array:
         start = actuation.sample(np.random.default_rng(seed), (self.n_candidates,))
@@ -57,7 +57,7 @@ class Multistart(ModelBased):
         sigma, n_targets = self.normalization.std, len(targets)
         starts = np.tile(start, (n_targets, 1, 1))
         repeated = np.repeat(targets, len(start), axis=0)
-        refined = descend(actuation, starts, repeated, sigma, self.options)
+        refined = descend(actuation, starts, repeated, sigma, self._descent)
         winner = refined.objective.reshape(n_targets, -1).argmin(axis=1)
         command = refined.command.reshape(n_targets, len(start), -1, 3)[np.arange(n_targets), winner]
         return descend(actuation, command, targets, sigma, POLISH).command

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from dataclasses import fields
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,6 +83,21 @@ class LearnedAllocator(Allocator):
     def option_names(cls) -> list[str]:
         """Names of the settings."""
         return ["energy_weights", *(field.name for field in fields(Settings))]
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Present settings, by name."""
+        return {"energy_weights": self.energy_weights, **vars(self.settings)}
+
+    def _made_with(self, options: dict[str, Any]) -> Self:
+        energy_weights = options.pop("energy_weights")
+        if energy_weights != self.energy_weights:
+            return type(self)(self.trained or self.weights, energy_weights=energy_weights, **options)
+        # Networks, and what is known of layouts, do not depend on the settings.
+        other = copy(self)
+        other.settings = Settings(**options)
+        other.pipeline = self.pipeline.with_settings(other.settings)
+        return other
 
     def _solve(
         self,

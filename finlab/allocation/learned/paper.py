@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -77,6 +79,9 @@ class PaperAllocator(Allocator):
         self.n_refined, self.n_steps = n_refined, n_steps
         self.warm_start, self.ranking, self.refine, self.mean_only = warm_start, ranking, refine, mean_only
         self._mean, self._std = (torch.tensor(v, dtype=torch.float32) for v in self.normalization)
+
+    def _made_with(self, options: dict[str, Any]) -> PaperAllocator:
+        return PaperAllocator(self.trained, **options)
 
     def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         robot = _Robot(layout)

@@ -7,6 +7,7 @@ Levenberg-Marquardt on the commands. Nothing here knows the analytic fin model.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Any
@@ -65,17 +66,27 @@ class Pipeline:
         self, weights: LearnedWeights, settings: Settings, energy_weights: EnergyWeights = DEFAULT_WEIGHTS
     ) -> None:
         """Take over trained weights; energies are compared by `energy_weights`."""
-        if settings.energy_tradeoff > 0.0 and energy_weights.inertial > 0.0:
-            raise AllocationError(
-                "energy_tradeoff: the weighted sum needs an energy of squares, got energy_weights with "
-                "inertial power; leave energy_tradeoff at 0 or take other energy_weights"
-            )
-        self.settings, self.normalization = settings, weights.normalization
+        self.energy_weights = energy_weights
+        self.settings, self.normalization = self._checked(settings), weights.normalization
         self.network = NumpyNetwork(weights.network, weights.heads, weights.n_components)
         self.propose: Proposer = partial(propose, self.network)
         fin = LearnedFin(weights.surrogate, weights.reference, weights.force_unit)
         std = self.normalization.std
         self.prepare = lru_cache(maxsize=128)(lambda layout: prepare(layout, fin, std, energy_weights))
+
+    def with_settings(self, settings: Settings) -> Pipeline:
+        """The same networks, and the same layouts prepared, with other settings."""
+        other = copy(self)
+        other.settings = self._checked(settings)
+        return other
+
+    def _checked(self, settings: Settings) -> Settings:
+        if settings.energy_tradeoff > 0.0 and self.energy_weights.inertial > 0.0:
+            raise AllocationError(
+                "energy_tradeoff: the weighted sum needs an energy of squares, got energy_weights with "
+                "inertial power; leave energy_tradeoff at 0 or take other energy_weights"
+            )
+        return settings
 
     def solve(
         self,
