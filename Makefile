@@ -8,7 +8,7 @@ HOST_PORT ?= 8080
 THREADS := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup app test test-fast check format checkpoint bench bench-runtime wheel wheel-check clean
+.PHONY: help setup app test test-fast mutate check format checkpoint bench bench-runtime wheel wheel-check clean
 
 help:
 	@echo "make setup        make .venv with everything pinned in constraints.txt"
@@ -16,6 +16,7 @@ help:
 	@echo "make test         every test, browser tests included"
 	@echo "make test-fast    every test but those of the browser and the packaging"
 	@echo "make check        ruff, ruff format and mypy"
+	@echo "make mutate       change the source at MUTANTS=300 random places; which changes does no test notice?"
 	@echo "make format       let ruff mend what it can"
 	@echo "make checkpoint   train what is shipped, PRESET=default or PRESET=paper (hours)"
 	@echo "make bench        print data throughput, accuracy and latency"
@@ -45,6 +46,12 @@ check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+MUTANTS ?= 300
+SEED ?= 0
+
+mutate: setup
+	$(THREADS) $(BIN)/python tools/mutate --mutants $(MUTANTS) --seed $(SEED)
 
 format: setup
 	$(BIN)/ruff check --fix .
