@@ -46,8 +46,6 @@ class Solution(NamedTuple):
     """Wrench (N, 6) that the method itself believed, where it used a model of its own."""
     candidates: Callable[[], Candidates] | None = None
     """Gives the refined candidates, for a single target; made only when asked for."""
-    notes: tuple[str, ...] = ()
-    """Sentences that the user should read."""
     samples: Callable[[], Candidates] | None = None
     """Gives the raw candidates before refinement, for a single target."""
     alternatives: Callable[[], Candidates] | None = None

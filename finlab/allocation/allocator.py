@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
 from inspect import signature
 from typing import Any, Self
 
@@ -16,7 +17,7 @@ from finlab.allocation.health import Health
 from finlab.allocation.policy import AXES, CLOSEST, Policy, as_policy, largest_share
 from finlab.errors import AllocationError, CommandError
 from finlab.inference.normalization import Normalization
-from finlab.layout import Layout
+from finlab.layout import FinModelSpec, Layout
 
 Array = NDArray[np.float64]
 
@@ -32,8 +33,17 @@ class Allocator(ABC):
     """
 
     name: str
+    """What the method is called."""
     normalization: Normalization
+    """Yardstick of the error."""
     checkpoint: str | None = None
+    """Name of the checkpoint that the networks come from; None for methods without networks."""
+    fin_model: FinModelSpec | None = None
+    """Fin model that the networks have learned; None for methods that ask every fin's own model."""
+
+    def unknown_fins(self, layout: Layout) -> tuple[str, ...]:
+        """Names of the fins whose model the networks have not learned; answers for them are wrong."""
+        return () if self.fin_model is None else _other_fins(layout, self.fin_model)
 
     @classmethod
     def option_names(cls) -> list[str]:
@@ -125,11 +135,21 @@ class Allocator(ABC):
             solve_ms=solve_ms,
             checkpoint=self.checkpoint,
             wrench_surrogate=None if solution.wrench_surrogate is None else solution.wrench_surrogate[0],
-            notes=solution.notes,
+            notes=self._notes(healthy),
             make_candidates=lambda: _candidates_with_failed(solution.candidates, alive),
             make_samples=lambda: _candidates_with_failed(solution.samples, alive),
             make_alternatives=lambda: _candidates_with_failed(solution.alternatives, alive),
             previous=None if before is None else _with_failed(before, alive),
+        )
+
+    def _notes(self, layout: Layout) -> tuple[str, ...]:
+        """Sentences that the user should read before trusting an answer for this layout."""
+        unknown = self.unknown_fins(layout)
+        if not unknown or self.fin_model is None:
+            return ()
+        return (
+            f"checkpoint {self.checkpoint!r} knows fins of model {self.fin_model.type!r} and takes these for "
+            f"such: {', '.join(unknown)}; trust the plant's error or train a surrogate for them",
         )
 
     def _solve_by(
@@ -253,6 +273,16 @@ def remove_failed(layout: Layout, failed: Sequence[str]) -> tuple[Layout, NDArra
         return layout, np.ones(layout.n_fins, dtype=bool)
     alive = np.array([name not in set(failed) for name in layout.names])
     return layout.without(failed), alive
+
+
+@lru_cache(maxsize=256)
+def _other_fins(layout: Layout, known: FinModelSpec) -> tuple[str, ...]:
+    """Names of the fins of another model than the known one."""
+    return tuple(
+        fin.name
+        for fin in layout.fins
+        if fin.model.type != known.type or fin.model.values() != known.values()
+    )
 
 
 def _with_failed(command: Array, alive: NDArray[np.bool_]) -> Array:

@@ -70,7 +70,7 @@ class FastAllocator(LearnedAllocator):
         usual = self.energy_weights == DEFAULT_WEIGHTS and self.settings.energy_tradeoff == 0.0
         if previous is not None or not usual:
             return super()._solve(layout, targets, seed=seed, previous=previous, fallback=fallback)
-        prepared, notes = self._prepared(layout)
+        prepared = self.pipeline.prepare(layout)
         target = targets / self.normalization.std
         x = fin_frame_features(prepared.geometry, target - self._scaled_mean).astype(np.float32)
         share = self.network(x).astype(np.float64)
@@ -86,4 +86,4 @@ class FastAllocator(LearnedAllocator):
             slow = super()._solve(layout, targets[missed], seed=seed, previous=None, fallback=fallback)
             assert slow.wrench_surrogate is not None
             command[missed], wrench[missed] = slow.command, slow.wrench_surrogate
-        return Solution(command, wrench, notes=notes)
+        return Solution(command, wrench)

@@ -10,7 +10,6 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import fields
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -76,8 +75,7 @@ class LearnedAllocator(Allocator):
         self.pipeline = Pipeline(self.weights, self.settings, energy_weights)
         # All products here are too small to be shared among threads; chunks of targets are not.
         self._one_thread = single_threaded_products()
-        self._fin_model = FinModelSpec.from_values(self.weights.fin_model)
-        self._prepared = lru_cache(maxsize=128)(self._prepare)
+        self.fin_model = FinModelSpec.from_values(self.weights.fin_model)
 
     @classmethod
     def option_names(cls) -> list[str]:
@@ -108,7 +106,7 @@ class LearnedAllocator(Allocator):
         previous: Array | None,
         fallback: FallbackForces = nearest_forces,
     ) -> Solution:
-        prepared, notes = self._prepared(layout)
+        prepared = self.pipeline.prepare(layout)
         if len(targets) == 1:
             with self._one_thread():
                 refined, proposal = self.pipeline.solve(prepared, targets, seed, previous, fallback=fallback)
@@ -116,7 +114,6 @@ class LearnedAllocator(Allocator):
             return Solution(
                 refined.command[:, 0],
                 refined.wrench[:, 0] * std,
-                notes=notes,
                 candidates=lambda: _candidates(refined, std),
                 samples=lambda: _samples(proposal, prepared, std),
                 alternatives=lambda: _alternatives(
@@ -131,7 +128,7 @@ class LearnedAllocator(Allocator):
             parts = list(executor.map(solve, range(0, len(targets), CHUNK)))
         command = np.concatenate([part.command[:, 0] for part in parts])
         wrench = np.concatenate([part.wrench[:, 0] for part in parts]) * self.normalization.std
-        return Solution(command, wrench, notes=notes)
+        return Solution(command, wrench)
 
     def _solve_by(
         self, policy: Policy, layout: Layout, target: Array, *, seed: int, previous: Array | None
@@ -146,25 +143,6 @@ class LearnedAllocator(Allocator):
         served = project_target(self.pipeline.prepare(layout).planar, policy, target[0] / std)
         return self._solve(
             layout, served.wrench * std, seed=seed, previous=previous, fallback=lambda *_: served.force
-        )
-
-    def _prepare(self, layout: Layout) -> tuple[Prepared, tuple[str, ...]]:
-        """What is computed once for a layout, and the notes to the user about it."""
-        return self.pipeline.prepare(layout), self._notes(layout)
-
-    def _notes(self, layout: Layout) -> tuple[str, ...]:
-        """Sentences that the user should read before trusting an answer for this layout."""
-        known = self._fin_model
-        unknown = [
-            fin.name
-            for fin in layout.fins
-            if fin.model.type != known.type or fin.model.values() != known.values()
-        ]
-        if not unknown:
-            return ()
-        return (
-            f"checkpoint {self.checkpoint!r} knows fins of model {known.type!r} and takes these for "
-            f"such: {', '.join(unknown)}; trust the plant's error or train a surrogate for them",
         )
 
 

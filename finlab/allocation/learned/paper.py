@@ -13,7 +13,7 @@ from finlab.allocation.allocation import Candidates, Solution
 from finlab.allocation.allocator import Allocator
 from finlab.errors import AllocationError, CheckpointError
 from finlab.inference.features import fin_frame_features, geometry, raw_features
-from finlab.layout import Layout, stack_layouts
+from finlab.layout import FinModelSpec, Layout, stack_layouts
 from finlab.physics.energy import command_energy
 from finlab.training.data.sampling import seeded_generator
 from finlab.training.networks.checkpoint import Checkpoint
@@ -74,6 +74,7 @@ class PaperAllocator(Allocator):
                 raise AllocationError(f"{key}: expected one of {', '.join(known)}, got {value!r}")
         self.checkpoint, self.trained = checkpoint.name, checkpoint
         self.normalization = checkpoint.normalization
+        self.fin_model = FinModelSpec.from_values(checkpoint.fin_model)
         self.network, self.surrogate = checkpoint.network, checkpoint.surrogate
         self.n_candidates, self.temperature, self.gamma = n_candidates, temperature, gamma
         self.n_refined, self.n_steps = n_refined, n_steps
