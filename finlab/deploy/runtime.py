@@ -119,7 +119,7 @@ class Runtime:
 
     def neutral(self, failed: Sequence[str] = ()) -> Array:
         """Commands (n, 3) that push least: least amplitude and frequency, zero direction nearest to 0."""
-        command = self.layout.lower
+        command = self.layout.lower.copy()
         upper = self.layout.upper
         command[:, 2] = np.clip(0.0, command[:, 2], upper[:, 2])
         lost = {*self.failed, *failed}
