@@ -8,31 +8,26 @@ against `finlab.training.networks.allocator_network.AllocatorNetwork`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.inference.activations import elu, silu, softmax
+from finlab.inference.mixture import LOG_STD_BOUND, MixtureArrays
+
 Array = NDArray[Any]
 
 _LAYER_NORM_EPS = np.float32(1e-5)
-_LOG_STD_LOW, _LOG_STD_RANGE = np.float32(-3.0), np.float32(6.0)
+_LOG_STD_BOUND = np.float32(LOG_STD_BOUND)
 _TURN = np.float32(2 * np.pi)
-
-
-class MixtureArrays(NamedTuple):
-    """A joint mixture over the commands of n fins for N targets, in normalized coordinates."""
-
-    weight: Array
-    """Weights of the components (N, M)."""
-    mean: Array
-    """Means (N, n, M, 3)."""
-    std: Array
-    """Standard deviations (N, n, M, 3)."""
+_PER_FIN = 6
+"""Outputs per component of one mixture per fin: means and standard deviations of three commands. A joint
+mixture has seven, since its directions are vectors."""
 
 
 class NumpyNetwork:
-    """A joint-mixture allocator network: features and target in, mixture out."""
+    """The allocator network, with a joint mixture or one per fin: features and target in, mixture out."""
 
     def __init__(self, weights: Mapping[str, NDArray[np.floating]], heads: int, n_components: int) -> None:
         """Take over a trained network.
@@ -68,9 +63,9 @@ class NumpyNetwork:
         flat = x.reshape(rows * n, -1)
         hidden = flat
         for graph in self.graph:
-            hidden = _elu(graph(hidden, rows))
+            hidden = elu(graph(hidden, rows))
         hidden += _apply(self.skip, flat)
-        wrench = _apply(self.wrench[1], _silu(_apply(self.wrench[0], target)))
+        wrench = _apply(self.wrench[1], silu(_apply(self.wrench[0], target)))
         weight, bias = self.join
         width = hidden.shape[-1]
         wrench = wrench.dot(weight[width:])
@@ -80,7 +75,10 @@ class NumpyNetwork:
         for layer in self.transformer:
             hidden = layer(hidden, rows)
         hidden = _norm(hidden)
-        raw = _apply(self.head, hidden).reshape(rows, n, self.n_components, 7)
+        raw = _apply(self.head, hidden).reshape(rows, n, self.n_components, -1)
+        if raw.shape[-1] == _PER_FIN:
+            weight = softmax(_apply(self.weight, hidden)).reshape(rows, n, self.n_components)
+            return MixtureArrays(weight, raw[..., :3], _std(raw[..., 3:]))
         everyone = np.add.reduce(hidden.reshape(rows, n, width), axis=1)
         everyone /= np.float32(n)
         # In memory each component's commands lie together, since that is how they are drawn.
@@ -88,11 +86,8 @@ class NumpyNetwork:
         np.tanh(raw[..., :2], out=mean[..., :2])
         _direction(raw[..., 2], raw[..., 3], lower, upper, mean[..., 2])
         std = np.empty((rows, self.n_components, n, 3), dtype=np.float32).swapaxes(1, 2)
-        np.exp(np.negative(raw[..., 4:], out=std), out=std)
-        std += np.float32(1.0)
-        np.divide(_LOG_STD_RANGE, std, out=std)
-        std += _LOG_STD_LOW
-        return MixtureArrays(_softmax(_apply(self.weight, everyone)), mean, np.exp(std, out=std))
+        _std(raw[..., 4:], std)
+        return MixtureArrays(softmax(_apply(self.weight, everyone)), mean, std)
 
     def attention(self, x: Array) -> Array:
         """How much each fin looks at each (N, n, n) in the first layer, mean of its heads; rows sum to 1.
@@ -130,7 +125,7 @@ class _Graph:
         leak = pair * np.float32(0.2)
         np.maximum(pair, leak, out=leak)
         score = leak.reshape(-1, self.width).dot(self.score).reshape(rows, n, n, self.heads)
-        return _softmax(score, axis=2), source
+        return softmax(score, axis=2), source
 
     def __call__(self, x: Array, rows: int) -> Array:
         """Hidden features (N n, width) of features (N n, F) of N robots."""
@@ -164,7 +159,7 @@ class _Transformer:
         q, k, v = qkv.transpose(2, 0, 3, 1, 4)
         score = q @ k.swapaxes(-1, -2)
         heard = np.empty((rows, qkv.shape[1], self.heads, self.depth), dtype=np.float32)
-        np.matmul(_softmax(score), v, out=heard.transpose(0, 2, 1, 3))
+        np.matmul(softmax(score), v, out=heard.transpose(0, 2, 1, 3))
         x += _apply(self.out, heard.reshape(x.shape))
         up = _apply(self.up, _norm(x))
         x += _apply(self.down, np.maximum(up, 0, out=up))
@@ -210,29 +205,13 @@ def _norm(x: Array) -> Array:
     return x / np.sqrt(square, out=square)[:, None]
 
 
-def _softmax(x: Array, axis: int = -1) -> Array:
-    """Softmax, in place."""
-    x -= np.maximum.reduce(x, axis=axis, keepdims=True)
-    np.exp(x, out=x)
-    x /= np.add.reduce(x, axis=axis, keepdims=True)
-    return x
-
-
-def _elu(x: Array) -> Array:
-    """Exponential linear unit, in place."""
-    below = np.minimum(x, 0)
-    np.expm1(below, out=below)
-    np.maximum(x, 0, out=x)
-    x += below
-    return x
-
-
-def _silu(x: Array) -> Array:
-    """Sigmoid linear unit; far out the exponential would overflow."""
-    slow = np.maximum(x, np.float32(-80.0))
-    np.exp(np.negative(slow, out=slow), out=slow)
-    slow += np.float32(1.0)
-    return np.divide(x, slow, out=slow)
+def _std(raw: Array, out: Array | None = None) -> Array:
+    """Standard deviations of the network's outputs, written to `out` where it is given: their logarithm is a
+    sigmoid between the bounds, which are as far above zero as below."""
+    out = np.multiply(raw, np.float32(0.5), out=out)
+    np.tanh(out, out=out)
+    out *= _LOG_STD_BOUND
+    return np.exp(out, out=out)
 
 
 def _direction(

@@ -89,3 +89,14 @@ class EnergyMeter:
         scaled *= scaled
         beats += scaled.reshape(len(scaled), -1).dot(squares)
         return beats
+
+    def slopes(self, command: NDArray[np.floating]) -> NDArray[Any]:
+        """Derivatives (R, n, 3) of the energies by commands (R, n, 3)."""
+        scale, squares = self._rough if command.dtype == np.float32 else self._exact
+        scaled = command / scale
+        a, f, w = scaled[..., 0], scaled[..., 1], self.weights
+        slopes = 2 * squares.reshape(scale.shape) * scaled
+        slopes[..., 0] += w.product * f + w.inertial * 2 * a * f**3
+        slopes[..., 1] += w.product * a + w.inertial * 3 * (a * f) ** 2
+        slopes /= scale
+        return slopes

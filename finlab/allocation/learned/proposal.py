@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation.learned.prepared import Prepared
 from finlab.inference.features import fin_frame_features
-from finlab.inference.network import MixtureArrays
+from finlab.inference.mixture import MixtureArrays
 
 Array = NDArray[Any]
 
