@@ -25,6 +25,8 @@ from finlab.layout import Layout
 from finlab.sim import ClosedLoop, RunLog, Trajectory
 
 HEALTHY = "healthy"
+ALLOWED = 1.15
+"""Growth of the error over the healthy robot's that one lost fin should not exceed."""
 
 
 @dataclass(frozen=True)
@@ -125,6 +127,16 @@ def fault_rows(faults: Sequence[Fault], runs: Sequence[tuple[tuple[str, str], Ru
                 row["ate_over_healthy"] = row["ate"] / over_seeds(groups[HEALTHY, method])["ate"]
             rows.append(row)
     return rows
+
+
+def fault_verdict(row: Row) -> str:
+    """`lost` its reference, else how the error compares with `ALLOWED` times that of the healthy robot."""
+    if not row["tracked"]:
+        return "lost"
+    growth = row.get("ate_over_healthy")
+    if growth is None or row["kind"] == HEALTHY:
+        return ""
+    return f"{'within' if growth <= ALLOWED else 'beyond'} {ALLOWED}"
 
 
 def fault_report(rows: Sequence[Row], layout: Layout, trajectory: Trajectory, plant: str) -> str:

@@ -15,6 +15,7 @@ from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
 from finlab.evaluation.splits import Case
+from finlab.evaluation.statistics.bootstrap import quantile_interval
 from finlab.evaluation.statistics.tables import text_table
 
 REFERENCE = "learned"
@@ -52,6 +53,7 @@ def latency_rows(
                 "method": name,
                 "calls": len(times),
                 "p50_ms": float(np.quantile(times, 0.5)),
+                "p50_ms_interval": list(quantile_interval(np.array(times), 0.5, np.arange(len(times)))),
                 "p99_ms": float(np.quantile(times, 0.99)),
             }
         )

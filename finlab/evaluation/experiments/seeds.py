@@ -22,6 +22,7 @@ from finlab.allocation.learned.prepared import Prepared
 from finlab.allocation.learned.proposal import propose
 from finlab.allocation.learned.refined_candidates import RANKING
 from finlab.evaluation.splits import Case
+from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.evaluation.statistics.tables import text_table
 from finlab.physics import Plant
 from finlab.physics.energy import command_energy
@@ -50,8 +51,8 @@ def seed_rows(
         n_seeds: commands per target.
         seed: of all draws.
     """
-    found: dict[tuple[int, str, int], list[tuple[Array, Array]]] = {}
-    for case in tqdm(cases, unit="layout", disable=None, leave=False, file=sys.stderr):
+    found: dict[tuple[int, str, int], list[tuple[Array, Array, Array]]] = {}
+    for k, case in enumerate(tqdm(cases, unit="layout", disable=None, leave=False, file=sys.stderr)):
         layout = case.layout.without(case.failed) if case.failed else case.layout
         prepared, plant = allocator.pipeline.prepare(layout), Plant(layout)
         for kind in KINDS:
@@ -60,9 +61,13 @@ def seed_rows(
                 command = _answer(allocator, prepared, case.targets, start, steps)
                 error = allocator.normalization.error(plant.wrench(command), case.targets)
                 energy = command_energy(command, prepared.upper)
-                found.setdefault((layout.n_fins, kind, steps), []).append((error, energy))
+                found.setdefault((layout.n_fins, kind, steps), []).append(
+                    (np.full(len(error), k), error, energy)
+                )
     joined = {key: tuple(map(np.concatenate, zip(*parts, strict=True))) for key, parts in found.items()}
-    return [_row(*key, *joined[key], *joined[key[0], KINDS[0], key[2]]) for key in sorted(joined, key=_order)]
+    return [
+        _row(*key, *joined[key], *joined[key[0], KINDS[0], key[2]][1:]) for key in sorted(joined, key=_order)
+    ]
 
 
 def seed_report(rows: Sequence[Row], n_seeds: int) -> str:
@@ -124,6 +129,7 @@ def _row(
     fins: int,
     kind: str,
     steps: int,
+    layout: Array,
     error: Array,
     energy: Array,
     network_error: Array,
@@ -136,6 +142,7 @@ def _row(
         "seeds": kind,
         "n": len(error),
         "err_norm_mean": float(error.mean()),
+        "err_norm_mean_interval": list(mean_interval(error, layout)),
         "success_0.01": float((error <= 0.01).mean()),
         "success_0.05": float((error <= MET).mean()),
         "energy_over_network": float(energy[both].sum() / network_energy[both].sum()) if both.any() else None,

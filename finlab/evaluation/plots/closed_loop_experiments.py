@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from finlab.evaluation.experiments.closed_loop_runs import Row
-from finlab.evaluation.experiments.faults import HEALTHY
+from finlab.evaluation.experiments.faults import ALLOWED, HEALTHY
 from finlab.evaluation.plots.closed_loop_run import save
 from finlab.evaluation.plots.style import COLOURS, GREY, ORANGE, VERMILION, clean, picture
 from finlab.evaluation.statistics.trajectory_errors import absolute_error
@@ -17,8 +17,6 @@ from finlab.sim import RunLog
 
 METHOD_COLOURS = {**COLOURS, "on-board": ORANGE, "learned-power": VERMILION}
 """Method -> colour."""
-ALLOWED = 1.15
-"""Growth of the error that one lost fin should not exceed."""
 
 Run = tuple[Any, RunLog]
 

@@ -63,16 +63,6 @@ class Cards:
 
 
 @dataclass(frozen=True)
-class TwoSides:
-    """Two lists beside each other."""
-
-    titles: tuple[str, str]
-    """Of the left one and of the right one."""
-    items: tuple[tuple[str, ...], tuple[str, ...]]
-    """Their entries."""
-
-
-@dataclass(frozen=True)
 class Column:
     """A column of a table."""
 
@@ -127,7 +117,7 @@ class Fold:
     """What is inside."""
 
 
-Block = Heading | Text | Bullets | Cards | TwoSides | Table | Figure | Fold
+Block = Heading | Text | Bullets | Cards | Table | Figure | Fold
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,6 @@ from finlab.evaluation.report.document import (
     Heading,
     Table,
     Text,
-    TwoSides,
 )
 
 
@@ -65,12 +64,6 @@ def _block(block: Block) -> str:
                 for card in cards
             )
             return f'<div class="cards">{inside}</div>'
-        case TwoSides(titles, items):
-            sides = "".join(
-                f'<div class="side {kind}"><h3>{_inline(title)}</h3>{_list(entries)}</div>'
-                for kind, title, entries in zip(("good", "other"), titles, items, strict=True)
-            )
-            return f'<div class="sides">{sides}</div>'
         case Table():
             return _table(block)
         case Figure(_, svg, caption):

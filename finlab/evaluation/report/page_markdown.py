@@ -14,7 +14,6 @@ from finlab.evaluation.report.document import (
     Heading,
     Table,
     Text,
-    TwoSides,
 )
 
 
@@ -43,10 +42,6 @@ def _block(block: Block, pictures: str) -> str:
             return _list(items)
         case Cards(cards):
             return _list([f"**{card.value}** {card.label}: {card.detail}" for card in cards])
-        case TwoSides(titles, items):
-            return "\n\n".join(
-                f"**{title}**\n\n{_list(entries)}" for title, entries in zip(titles, items, strict=True)
-            )
         case Table():
             return _table(block)
         case Figure(name, _, caption):

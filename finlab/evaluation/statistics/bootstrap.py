@@ -7,11 +7,13 @@ percentiles are those of a normal variable at sqrt(2) x 1.96, so that the rerun 
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 Array = NDArray[np.float64]
 
@@ -80,6 +82,12 @@ def quantile_interval(values: Array, quantile: float, group: NDArray[np.int64], 
     # The smallest value of each rank, so that a rank without one takes the next.
     edges = values[order][np.minimum(-(-np.arange(BINS) * len(values) // BINS), len(values) - 1)]
     return _ends(edges[at])
+
+
+def spread_interval(mean: float, std: float, runs: int) -> Interval:
+    """Of the mean of at least two runs with a standard deviation, by Student's t."""
+    half = math.sqrt(2.0 / runs) * std * float(stats.t.ppf(0.975, runs - 1))
+    return Interval(mean - half, mean + half)
 
 
 def _members(group: NDArray[np.int64]) -> tuple[NDArray[np.intp], int]:

@@ -21,7 +21,7 @@ from finlab.errors import DataError
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
-VERSION = 1
+VERSION = 2
 """Of the file format; part of the settings that a file is found by."""
 
 

@@ -1,4 +1,4 @@
-"""Rows (one dict each) as an aligned text table or as Markdown."""
+"""Rows (one dict each) as an aligned text table."""
 
 from __future__ import annotations
 
@@ -42,11 +42,3 @@ def text_table(rows: Sequence[Row], columns: Sequence[str] | None = None) -> str
         return "  ".join(padded).rstrip()
 
     return "\n".join([line(columns), "  ".join("-" * width for width in widths), *map(line, cells)])
-
-
-def markdown_table(rows: Sequence[Row], columns: Sequence[str] | None = None) -> str:
-    """A GitHub-flavoured Markdown table."""
-    columns = list(columns or columns_of(rows))
-    lines = [columns, ["---"] * len(columns)]
-    lines += [[format_cell(row.get(column)) for column in columns] for row in rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)

@@ -8,7 +8,13 @@ import pytest
 
 from finlab.allocation.allocator import Allocator
 from finlab.cli import main
-from finlab.evaluation.experiments.faults import all_faults, fault_report, fault_rows, run_faults
+from finlab.evaluation.experiments.faults import (
+    all_faults,
+    fault_report,
+    fault_rows,
+    fault_verdict,
+    run_faults,
+)
 from finlab.evaluation.experiments.trajectory import run_trajectory, trajectory_report, trajectory_rows
 from finlab.evaluation.experiments.velocity import run_velocity, velocity_report, velocity_rows
 from finlab.evaluation.on_board import OnBoard
@@ -57,6 +63,16 @@ def test_faults(layout_a: Layout, analytic: Allocator, line: Trajectory, tmp_pat
     assert report.startswith("Not swum") and hopeless["fault"] in report and "ate" not in hopeless
     save_faults_figure(rows, tmp_path / "faults.png")
     assert is_small_png(tmp_path / "faults.png")
+
+
+@pytest.mark.parametrize(
+    ("growth", "tracked", "verdict"),
+    [(1.15, True, "within 1.15"), (1.16, True, "beyond 1.15"), (1.0, False, "lost"), (None, True, "")],
+)
+def test_a_lost_fin_may_let_the_error_grow_a_little(growth: float, tracked: bool, verdict: str) -> None:
+    row = {"kind": "one fin", "tracked": tracked, "ate_over_healthy": growth}
+    assert fault_verdict(row) == verdict
+    assert fault_verdict({**row, "kind": "healthy", "tracked": True}) == ""
 
 
 def test_velocity(layout_a: Layout, analytic: Allocator, tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ COLUMNS = [
     "seeds",
     "n",
     "err_norm_mean",
+    "err_norm_mean_interval",
     "success_0.01",
     "success_0.05",
     "energy_over_network",
@@ -46,7 +47,8 @@ def test_one_row_for_each_fin_count_step_and_kind(rows: list[Row]) -> None:
         assert list(row) == COLUMNS
         assert row["n"] == 6
         assert 0.0 <= row["success_0.01"] <= row["success_0.05"] <= 1.0
-        assert np.isfinite(row["err_norm_mean"])
+        low, high = row["err_norm_mean_interval"]
+        assert 0.0 <= low <= row["err_norm_mean"] <= high < np.inf
         if row["seeds"] == "network" and row["success_0.05"] > 0:
             assert row["energy_over_network"] == 1.0
 

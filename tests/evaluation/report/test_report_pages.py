@@ -13,7 +13,6 @@ from finlab.evaluation.report.document import (
     Heading,
     Table,
     Text,
-    TwoSides,
     figures_of,
 )
 from finlab.evaluation.report.numbers import FORMATS
@@ -31,7 +30,6 @@ DOCUMENT = Document(
     "One **line**.",
     (
         Cards((Card("1.8 ms", "a call", "others 90"),)),
-        TwoSides(("good", "bad"), (("this",), ("that",))),
         Heading("First section"),
         Text("See [the docs](docs/x.md), `code` and 1 < 2."),
         Table(COLUMNS, ROWS),
@@ -57,7 +55,6 @@ def test_markdown() -> None:
     assert text.startswith("# A title & more\n\nOne **line**.")
     assert "| method | error < |\n| --- | ---: |\n| **`ours`** | 0.00029 (0.00020 – 0.00040) |" in text
     assert "![Some dots.](pictures/dots.svg)" in text and "- **1.8 ms** a call: others 90" in text
-    assert "**good**\n\n- this\n\n**bad**\n\n- that" in text
 
 
 def test_folded_pictures_are_found() -> None:

@@ -7,7 +7,7 @@ from finlab.evaluation.experiments.wrench_tracking import energy_comparison
 from finlab.evaluation.paper_figures import paper_figures, paper_wrench_rows
 from finlab.evaluation.statistics.metrics import energy_rows, rows_by_fin_count, wrench_intervals, wrench_row
 from finlab.evaluation.statistics.records import Records, join_records
-from finlab.evaluation.statistics.tables import format_cell, markdown_table, text_table
+from finlab.evaluation.statistics.tables import format_cell, text_table
 
 KEYS = [
     *("split", "method", "n", "scored_by"),
@@ -88,10 +88,6 @@ def test_paper_rows_have_our_columns() -> None:
 def test_text_table_aligns_and_leaves_gaps() -> None:
     lines = text_table([{"name": "a", "value": 1.5}, {"name": "long", "other": 12}]).splitlines()
     assert lines == ["name   value  other", "----  ------  -----", "a     1.5000", "long             12"]
-
-
-def test_markdown_table() -> None:
-    assert markdown_table([{"a": 1, "b": 0.5}]) == "| a | b |\n| --- | --- |\n| 1 | 0.5000 |"
 
 
 @pytest.mark.parametrize(

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
+from finlab.evaluation.experiments.faults import fault_verdict
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.plots.closed_loop_report import fault_dots, paths
-from finlab.evaluation.report.claims import Claims
 from finlab.evaluation.report.document import Block, Bullets, Column, Figure, Heading, Row, Table, Text
 from finlab.evaluation.report.results import Results
 
@@ -44,55 +44,6 @@ def closed_loop_blocks(results: Results) -> list[Block]:
     ]
 
 
-def closed_loop_claims(rows: Mapping[str, Sequence[Row]]) -> Claims:
-    """The closed loop in words; rows of the three experiments, as far as they have run."""
-    leads: list[str] = []
-    trails: list[str] = []
-    whole = {r["method"]: r for r in rows.get("trajectory", ()) if r["layout"] == "all"}
-    if "learned" in whole:
-        ours, printed = whole["learned"], paper_figures()["trajectory"]["all"]
-        words = (
-            f"Closed loop on layouts A to D: ATE {100 * ours['ate']:.1f} cm and depth RMSE "
-            f"{100 * ours['depth_rmse']:.1f} cm in our simulation (printed, in another: "
-            f"{100 * printed['ate']:.1f} and {100 * printed['depth_rmse']:.1f} cm)."
-        )
-        (leads if ours["ate"] < printed["ate"] else trails).append(words)
-        trails += [
-            f"`{name}` follows the trajectories closer: ATE {100 * row['ate']:.1f} cm."
-            for name, row in whole.items()
-            if row["ate"] < ours["ate"]
-        ]
-    swum = [r for r in rows.get("faults", ()) if r.get("method") == "learned"]
-    healthy = {r["method"]: r["ate"] for r in rows.get("faults", ()) if r["kind"] == "healthy"}
-    trails += [
-        f"Healthy, on the layout of the faults: ATE {100 * healthy['learned']:.1f} cm against "
-        f"{100 * ate:.1f} cm of `{name}`."
-        for name, ate in healthy.items()
-        if "learned" in healthy and ate < healthy["learned"]
-    ]
-    single = [r["ate_over_healthy"] for r in swum if r["kind"] == "one fin" and "ate_over_healthy" in r]
-    if single:
-        words = f"With one fin lost the ATE is at most {max(single):.2f} times that of the healthy robot."
-        (leads if max(single) <= 1.15 else trails).append(words)
-        trails += [f"Loses its way with {r['fault']}." for r in swum if not r["tracked"]]
-    speeds = {r["method"]: r for r in rows.get("velocity", ()) if r["speed"] is None}
-    for mine in (name for name in ("learned-power", "learned") if name in speeds):
-        goal = "inertial power" if mine == "learned-power" else "the energy proxy"
-        sides: dict[bool, list[str]] = {True: [], False: []}
-        for name in (name for name in ("analytic", "on-board") if name in speeds):
-            power = speeds[mine]["inertial_w"] / speeds[name]["inertial_w"] - 1
-            missed = speeds[mine]["mae"] / speeds[name]["mae"] - 1
-            sides[power < 0 and missed <= 0.01].append(
-                f"{abs(100 * power):.0f} % {'less' if power < 0 else 'more'} inertial power than `{name}` "
-                f"with {abs(100 * missed):.0f} % {'smaller' if missed < 0 else 'larger'} speed error"
-            )
-        for ahead, found in sides.items():
-            if found:
-                sentence = f"At constant speed, minimizing {goal} (`{mine}`): {', '.join(found)}."
-                (leads if ahead else trails).append(sentence)
-    return Claims(tuple(leads), tuple(trails))
-
-
 def _trajectory(rows: Sequence[Row], results: Results) -> list[Block]:
     printed = paper_figures()["trajectory"]
     shown: list[Row] = []
@@ -119,7 +70,7 @@ def _trajectory(rows: Sequence[Row], results: Results) -> list[Block]:
 
 def _faults(rows: Sequence[Row]) -> list[Block]:
     printed = paper_figures()["fault_tolerance"]
-    swum = [_ours(row) for row in rows if row["controllable"]]
+    swum = [{**_ours(row), "verdict": fault_verdict(row)} for row in rows if row["controllable"]]
     names = {"ours": "paper's method, printed", "baseline": "paper's baseline, printed"}
     theirs = [
         {"fault": FAULT_WORDS[fault], "method": names[method], "_kind": "printed", **values}
@@ -132,6 +83,7 @@ def _faults(rows: Sequence[Row]) -> list[Block]:
         Column("runs", "runs", "count"),
         *ERRORS,
         Column("ate_over_healthy", "over healthy", "ratio"),
+        Column("verdict", "verdict"),
     )
     hopeless = tuple(row["fault"] for row in rows if not row["controllable"])
     beside = {f"{FAULT_WORDS[k]} (printed)": v["ours"]["ate"] for k, v in printed.items()}

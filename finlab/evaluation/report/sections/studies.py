@@ -41,7 +41,7 @@ def latency_blocks(results: Results) -> list[Block]:
     columns = (
         Column("method", "method"),
         Column("calls", "calls", "count"),
-        Column("p50_ms", "median [ms]", "three"),
+        Column("p50_ms", "median [ms]", "three", "p50_ms_interval"),
         Column("p99_ms", "99th percentile [ms]", "three"),
         Column("p50_over_learned", "times that of learned", "three"),
     )
@@ -152,7 +152,7 @@ def seed_blocks(results: Results) -> list[Block]:
         Column("steps", "steps"),
         Column("seeds", "seeds"),
         Column("n", "targets", "count"),
-        Column("err_norm_mean", "mean error", "error"),
+        Column("err_norm_mean", "mean error", "error", "err_norm_mean_interval"),
         Column("success_0.01", "within 0.01", "share"),
         Column("success_0.05", "within 0.05", "share"),
         Column("energy_over_network", "energy over the network's", "ratio"),
