@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from finlab.allocation.allocator import Allocator
 from finlab.errors import AllocationError
+from finlab.inference.checkpoint import read_checkpoint, read_normalization, resolve_checkpoint
 
 METHODS: dict[str, tuple[str, str]] = {
     "learned": ("finlab.allocation.learned.learned_allocator", "LearnedAllocator"),
@@ -51,16 +52,10 @@ def load_allocator(
     """
     if method not in METHODS:
         raise AllocationError(f"method: expected one of {', '.join(METHODS)}, got {method!r}")
-    from finlab.training.networks.checkpoint import (
-        load_allocator_checkpoint,
-        load_normalization,
-        resolve_checkpoint,
-    )
-
     path = resolve_checkpoint(checkpoint or ("paper" if method == "paper" else "default"))
     module, name = METHODS[method]
     kind = getattr(import_module(module), name)
-    model = load_allocator_checkpoint(path) if method in LEARNED else load_normalization(path)
+    model = read_checkpoint(path) if method in LEARNED else read_normalization(path)
     kind.check_options(options)
     allocator: Allocator = kind(model, **options)
     return allocator

@@ -23,6 +23,7 @@ from finlab.deploy.onnx.network import network_model
 from finlab.deploy.onnx.surrogate import surrogate_model
 from finlab.deploy.readme import readme_text
 from finlab.errors import AllocationError, DataError
+from finlab.inference.learned_fin import FORCE_UNIT, REFERENCE
 from finlab.layout import Layout
 
 if TYPE_CHECKING:
@@ -110,10 +111,9 @@ def make_bundle(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = 
     graph = build_graph(layout, allocator, failed)
     weights = allocator.weights
     about = network_metadata(graph, weights, allocator.settings, allocator.energy_weights)
-    network = network_model(weights.network, weights.heads, weights.n_components, about)
-    surrogate = surrogate_model(
-        weights.surrogate, weights.reference, weights.force_unit, surrogate_metadata(graph, weights)
-    )
+    sizes = weights.check_network()
+    network = network_model(weights.network, sizes.heads, sizes.n_components, about)
+    surrogate = surrogate_model(weights.surrogate, REFERENCE, FORCE_UNIT, surrogate_metadata(graph, weights))
     files = {
         GRAPH: graph_bytes(graph),
         NETWORK: model_bytes(network),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from finlab.deploy.onnx.reading import read_model
 from finlab.deploy.onnx.surrogate import surrogate_model, surrogate_weights
 from finlab.errors import DataError
 from finlab.inference.fast_weights import FastWeights
-from finlab.inference.weights import LearnedWeights
+from finlab.inference.weights import NetworkConfig, SurrogateConfig, TrainedWeights
 from finlab.layout import FinModelSpec
 
 REQUIRED = (GRAPH, NETWORK, SURROGATE, CHECKSUMS)
@@ -37,7 +37,7 @@ class RobotBundle:
 
     graph: LayoutGraph
     """The robot, and self-tests."""
-    weights: LearnedWeights
+    weights: TrainedWeights
     """The trained networks as arrays."""
     settings: Mapping[str, Any]
     """What the allocator is made with: fields of the pipeline's `Settings`, and `energy_weights`."""
@@ -69,13 +69,13 @@ def parse_bundle(files: Mapping[str, bytes], source: str = "bundle") -> RobotBun
     models = {name: read_model(files[name], f"{source}: {name}") for name in names}
     weights = _weights(models[NETWORK], models[SURROGATE], files, source)
     if FAST in models:
-        weights = weights._replace(fast=_fast(models[FAST], files[FAST], f"{source}: {FAST}"))
+        weights = replace(weights, fast=_fast(models[FAST], files[FAST], f"{source}: {FAST}"))
     _check_kinship(graph, models, source)
     settings = metadata.settings_of(models[NETWORK], f"{source}: {NETWORK}")
     return RobotBundle(graph, weights, settings, dict(files))
 
 
-def _weights(network: Model, surrogate: Model, files: Mapping[str, bytes], source: str) -> LearnedWeights:
+def _weights(network: Model, surrogate: Model, files: Mapping[str, bytes], source: str) -> TrainedWeights:
     """The arrays in two models, each of which must be exactly what finlab writes for them."""
     place = f"{source}: {NETWORK}"
     metadata.check_format(network, metadata.NETWORK_FORMAT, place)
@@ -99,16 +99,14 @@ def _weights(network: Model, surrogate: Model, files: Mapping[str, bytes], sourc
     if not isinstance(fin_model, dict) or "type" not in fin_model:
         raise DataError(f"{place}: fin_model must name a fin model, got {fin_model!r:.40}")
     FinModelSpec.from_values(fin_model)
-    return LearnedWeights(
-        network.metadata.get("checkpoint", ""),
-        state,
-        heads,
-        n_components,
-        physics,
-        (amplitude, frequency),
-        unit,
-        metadata.normalization_of(network, f"{source}: {NETWORK}"),
-        fin_model,
+    return TrainedWeights(
+        name=network.metadata.get("checkpoint", ""),
+        normalization=metadata.normalization_of(network, f"{source}: {NETWORK}"),
+        fin_model=fin_model,
+        surrogate_config=SurrogateConfig(),
+        surrogate=physics,
+        network_config=NetworkConfig(heads=heads, n_components=n_components),
+        network=state,
     )
 
 

@@ -21,7 +21,7 @@ from finlab.deploy.onnx.model import model_bytes
 from finlab.deploy.onnx.proposal import proposal_model
 from finlab.errors import DataError
 from finlab.inference.network import MixtureArrays
-from finlab.inference.weights import LearnedWeights
+from finlab.inference.weights import TrainedWeights
 
 Array = NDArray[Any]
 
@@ -97,7 +97,7 @@ class OnnxProposer:
     that, a proposal takes half of numpy's time.
     """
 
-    def __init__(self, network: OnnxNetwork, weights: LearnedWeights, settings: Settings) -> None:
+    def __init__(self, network: OnnxNetwork, weights: TrainedWeights, settings: Settings) -> None:
         """Take over checked weights."""
         self._network, self._weights, self._settings = network, weights, settings
         self._sessions: OrderedDict[int, tuple[Prepared, OnnxSession]] = OrderedDict()
@@ -113,7 +113,7 @@ class OnnxProposer:
         /,
     ) -> Proposal:
         """As `propose`; many targets, or another seed than 0, go by steps."""
-        if len(target) != 1 or seed != SEED or n_candidates <= self._weights.n_components:
+        if len(target) != 1 or seed != SEED or n_candidates <= self._weights.check_network().n_components:
             return propose(self._network, prepared, centred, target, n_candidates, temperature, seed)
         parts = self._session(prepared).run(
             target=centred.astype(np.float32), wanted=target.astype(np.float32)

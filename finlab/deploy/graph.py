@@ -79,12 +79,12 @@ def build_graph(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = 
     from finlab.physics import Plant
 
     healthy = layout.without(failed) if failed else layout
-    checkpoint = getattr(allocator, "trained", None)
-    if checkpoint is None or checkpoint.network is None:
+    checkpoint = getattr(allocator, "weights", None)
+    if checkpoint is None:
         raise AllocationError(
             f"method {allocator.name!r} has no trained network to make a graph for; use learned"
         )
-    features = NodeFeatures(checkpoint.network.config.features, healthy, checkpoint.normalization)
+    features = NodeFeatures(checkpoint.check_network().features, healthy, checkpoint.normalization)
     lower = healthy.lower
     upper = healthy.upper
     draws = np.random.default_rng(0).uniform(size=(N_SELF_TEST, *lower.shape))

@@ -17,8 +17,9 @@ from finlab.allocation.learned.settings import Settings
 from finlab.deploy.graph import LayoutGraph
 from finlab.deploy.onnx.model import Model
 from finlab.errors import DataError
+from finlab.inference.learned_fin import FORCE_UNIT, REFERENCE
 from finlab.inference.normalization import Normalization
-from finlab.inference.weights import LearnedWeights
+from finlab.inference.weights import TrainedWeights
 from finlab.physics.energy import EnergyWeights
 
 VERSION = "1"
@@ -30,13 +31,13 @@ _MOST = {"n_candidates": 4096, "n_seeds": 256, "n_refined": 256, "search_steps":
 
 
 def network_metadata(
-    graph: LayoutGraph, weights: LearnedWeights, settings: Settings, energy_weights: EnergyWeights
+    graph: LayoutGraph, weights: TrainedWeights, settings: Settings, energy_weights: EnergyWeights
 ) -> dict[str, str]:
     """What to write into `network.onnx`."""
     return _shared(NETWORK_FORMAT, graph, weights) | {
         "features": graph.feature_set,
-        "heads": str(weights.heads),
-        "n_components": str(weights.n_components),
+        "heads": str(weights.check_network().heads),
+        "n_components": str(weights.check_network().n_components),
         "settings": json.dumps(asdict(settings)),
         "energy_weights": json.dumps(asdict(energy_weights)),
         "fins": json.dumps(list(graph.layout.names), ensure_ascii=False),
@@ -46,21 +47,21 @@ def network_metadata(
     }
 
 
-def surrogate_metadata(graph: LayoutGraph, weights: LearnedWeights) -> dict[str, str]:
+def surrogate_metadata(graph: LayoutGraph, weights: TrainedWeights) -> dict[str, str]:
     """What to write into `surrogate.onnx`."""
     return _shared(SURROGATE_FORMAT, graph, weights) | {
-        "reference": json.dumps(list(weights.reference)),
-        "force_unit_n": json.dumps(weights.force_unit),
+        "reference": json.dumps(list(REFERENCE)),
+        "force_unit_n": json.dumps(FORCE_UNIT),
         "fin_model": json.dumps(dict(weights.fin_model), sort_keys=True),
     }
 
 
-def fast_metadata(graph: LayoutGraph, weights: LearnedWeights) -> dict[str, str]:
+def fast_metadata(graph: LayoutGraph, weights: TrainedWeights) -> dict[str, str]:
     """What to write into `fast.onnx`."""
     return _shared(FAST_FORMAT, graph, weights) | {"features": graph.feature_set}
 
 
-def _shared(form: str, graph: LayoutGraph, weights: LearnedWeights) -> dict[str, str]:
+def _shared(form: str, graph: LayoutGraph, weights: TrainedWeights) -> dict[str, str]:
     mean, std = weights.normalization
     return {
         "format": form,

@@ -9,6 +9,7 @@ from pathlib import Path
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import LEARNED, load_allocator
 from finlab.errors import AllocationError
+from finlab.inference.checkpoint import read_checkpoint, read_normalization, resolve_checkpoint
 
 SLOW = ("trf", "slsqp", "ipopt")
 """Methods that take a tenth of a second per target, each from several starts; they run on a subsample."""
@@ -55,31 +56,25 @@ def load_method_spec(name: str, checkpoint: str | Path | None = None) -> Allocat
 def fingerprint(name: str, checkpoint: str | Path | None = None) -> str:
     """What a method's answers depend on besides its settings: the weights' SHA-256 for a learned method,
     a digest of the normalization for the others."""
-    from finlab.training.networks.checkpoint import load_checkpoint, load_normalization, resolve_checkpoint
-
     method = method_and_starts(name)[0]
     path = resolve_checkpoint(checkpoint or ("paper" if method == "paper" else "default"))
     if method == "fast":
         weights = b"".join(file.read_bytes() for file in sorted((path / DISTILLED).iterdir()))
-        return load_checkpoint(path).sha256 + hashlib.sha256(weights).hexdigest()
+        return read_checkpoint(path).sha256 + hashlib.sha256(weights).hexdigest()
     if method in LEARNED:
-        return load_checkpoint(path).sha256
-    return hashlib.sha256(b"".join(values.tobytes() for values in load_normalization(path))).hexdigest()
+        return read_checkpoint(path).sha256
+    return hashlib.sha256(b"".join(values.tobytes() for values in read_normalization(path))).hexdigest()
 
 
 def has_distilled(checkpoint: str | Path | None = None) -> bool:
     """Whether a checkpoint holds the distilled network of method `fast`."""
-    from finlab.training.networks.checkpoint import resolve_checkpoint
-
     return (resolve_checkpoint(checkpoint or "default") / DISTILLED).is_dir()
 
 
 def surrogate_fingerprint(checkpoint: str | Path) -> str:
     """Digest of a checkpoint's surrogate alone, which stays the same while the network learns on."""
-    from finlab.training.networks.checkpoint import load_checkpoint, resolve_checkpoint
-
-    state = load_checkpoint(resolve_checkpoint(checkpoint)).surrogate.state_dict()
-    return hashlib.sha256(b"".join(state[key].numpy().tobytes() for key in sorted(state))).hexdigest()
+    state = read_checkpoint(resolve_checkpoint(checkpoint)).surrogate
+    return hashlib.sha256(b"".join(state[key].tobytes() for key in sorted(state))).hexdigest()
 
 
 def method_and_starts(name: str) -> tuple[str, int | None]:

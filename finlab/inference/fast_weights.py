@@ -1,4 +1,4 @@
-"""The distilled network's weights on disk, in the folder `fast` of a checkpoint. No torch.
+"""The distilled network's weights as files, in the folder `fast` of a checkpoint. No torch.
 
 As with checkpoints: safetensors and JSON, loaded strictly.
 """
@@ -15,13 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.errors import CheckpointError
+from finlab.inference.features import FIN_FRAME_SIZE
 
-FOLDER = "fast"
-"""Its folder inside that of the checkpoint."""
 FORMAT, VERSION = "finlab-fast", 1
 WEIGHTS_FILE, CONFIG_FILE = "model.safetensors", "config.json"
-MAX_BYTES = 20_000_000
-"""Largest file that is read."""
+MAX_ROUNDS = 100
+"""Most rounds that a distilled network may have."""
 
 
 class FastWeights(NamedTuple):
@@ -33,20 +32,25 @@ class FastWeights(NamedTuple):
     """Rounds of hearing from all fins."""
 
 
-def save_fast(folder: Path, weights: FastWeights, about: Mapping[str, Any]) -> None:
-    """Write a folder; `about` says of what checkpoint it is, how it was trained and what was measured."""
-    from safetensors.numpy import save_file
+def fast_files(weights: FastWeights, about: Mapping[str, Any]) -> dict[str, bytes]:
+    """The two files by name; `about` says of what checkpoint it is and how it was made."""
+    from safetensors.numpy import save
 
-    folder.mkdir(parents=True, exist_ok=True)
-    save_file({k: np.ascontiguousarray(v) for k, v in weights.state.items()}, folder / WEIGHTS_FILE)
-    (folder / WEIGHTS_FILE).chmod(0o644)
-    digest = hashlib.sha256((folder / WEIGHTS_FILE).read_bytes()).hexdigest()
+    content = save({k: np.ascontiguousarray(v) for k, v in weights.state.items()})
+    digest = hashlib.sha256(content).hexdigest()
     config = {"format": FORMAT, "version": VERSION, "sha256": digest, "rounds": weights.rounds, **about}
-    (folder / CONFIG_FILE).write_text(json.dumps(config, indent=2) + "\n")
+    return {CONFIG_FILE: (json.dumps(config, indent=2) + "\n").encode(), WEIGHTS_FILE: content}
 
 
-def load_fast(folder: Path) -> FastWeights | None:
-    """The distilled network in a folder; None where there is no such folder.
+def save_fast(folder: Path, weights: FastWeights, about: Mapping[str, Any]) -> None:
+    """Write a folder; arguments as in `fast_files`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, content in fast_files(weights, about).items():
+        (folder / name).write_bytes(content)
+
+
+def parse_fast(config_file: bytes, weights_file: bytes, source: str) -> FastWeights:
+    """The distilled network in the contents of its two files.
 
     Raises:
         CheckpointError: corrupt, changed, or of another format.
@@ -54,18 +58,36 @@ def load_fast(folder: Path) -> FastWeights | None:
     from safetensors import SafetensorError
     from safetensors.numpy import load
 
-    path = folder / CONFIG_FILE
-    if not path.is_file():
-        return None
     try:
-        if max(path.stat().st_size, (folder / WEIGHTS_FILE).stat().st_size) > MAX_BYTES:
-            raise CheckpointError(f"{folder}: larger than {MAX_BYTES} bytes; this is no distilled network")
-        config = json.loads(path.read_text())
-        content = (folder / WEIGHTS_FILE).read_bytes()
+        config = json.loads(config_file)
         if (config["format"], config["version"]) != (FORMAT, VERSION):
-            raise CheckpointError(f"{path}: expected format {FORMAT}, version {VERSION}; train it again")
-        if hashlib.sha256(content).hexdigest() != config["sha256"]:
-            raise CheckpointError(f"{folder}: the SHA-256 of {WEIGHTS_FILE} is not the one in {CONFIG_FILE}")
-        return FastWeights(load(content), int(config["rounds"]))
-    except (OSError, KeyError, TypeError, ValueError, SafetensorError) as error:
-        raise CheckpointError(f"{folder}: not a distilled network ({error})") from None
+            raise CheckpointError(f"{source}: expected format {FORMAT}, version {VERSION}; train it again")
+        if hashlib.sha256(weights_file).hexdigest() != config["sha256"]:
+            raise CheckpointError(f"{source}: the SHA-256 of {WEIGHTS_FILE} is not the one in {CONFIG_FILE}")
+        state, rounds = load(weights_file), config["rounds"]
+        if isinstance(rounds, bool) or not isinstance(rounds, int) or not 0 <= rounds <= MAX_ROUNDS:
+            raise ValueError(f"expected 0 to {MAX_ROUNDS} rounds, got {rounds!r:.40}")
+        check_state(state, _shapes(len(state["first.bias"]), rounds))
+        return FastWeights(state, rounds)
+    except (KeyError, TypeError, ValueError, RecursionError, SafetensorError) as error:
+        raise CheckpointError(f"{source}: not a distilled network ({error})") from None
+
+
+def check_state(state: Mapping[str, NDArray[Any]], shapes: Mapping[str, tuple[int, ...]]) -> None:
+    """Raise a `ValueError` unless a network has exactly these arrays, in single precision and finite."""
+    if wrong := sorted(set(shapes) ^ set(state)):
+        raise ValueError(f"{wrong[0]!r:.80} is missing or not expected")
+    for name, shape in shapes.items():
+        array = state[name]
+        if array.shape != shape or array.dtype != np.float32:
+            raise ValueError(f"{name}: expected float32 of shape {shape}, got {array.dtype} {array.shape}")
+        if not np.isfinite(array).all():
+            raise ValueError(f"{name}: holds a number that is not finite")
+
+
+def _shapes(width: int, rounds: int) -> dict[str, tuple[int, ...]]:
+    shapes = {"first.weight": (width, FIN_FRAME_SIZE), "first.bias": (width,)}
+    for i in range(rounds):
+        shapes |= {f"own.{i}.weight": (width, width), f"own.{i}.bias": (width,)}
+        shapes |= {f"all.{i}.weight": (width, width)}
+    return shapes | {"last.weight": (1, width), "last.bias": (1,)}

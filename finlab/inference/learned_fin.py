@@ -14,21 +14,20 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 
+REFERENCE = (0.6, 2.1)
+"""Amplitude [rad] and frequency [Hz] at which the scale of the force is one."""
+FORCE_UNIT = 4.0
+"""Force [N] of order one for the networks' outputs: that of a coefficient of one."""
+
 
 class LearnedFin:
     """Force of one fin in its own frame (shaft, e_h, e_z) by the learned force coefficients."""
 
-    def __init__(self, weights: Mapping[str, Array], reference: tuple[float, float], unit: float) -> None:
-        """Take over a trained surrogate.
-
-        Args:
-            weights: state of the perceptron, `net.<i>.weight` (out, in) and `net.<i>.bias` (out,).
-            reference: amplitude [rad] and frequency [Hz] at which the scale is one.
-            unit: force [N] of a coefficient of one.
-        """
+    def __init__(self, weights: Mapping[str, Array]) -> None:
+        """Take over a surrogate: its perceptron's `net.<i>.weight` (out, in) and `net.<i>.bias` (out,)."""
         layers = sorted({int(key.split(".")[1]) for key in weights})
         self._layers = [
-            (np.array(weights[f"net.{i}.weight"], np.float64), np.array(weights[f"net.{i}.bias"], np.float64))
+            tuple(np.array(weights[f"net.{i}.{part}"], np.float64, order="C") for part in ("weight", "bias"))
             for i in layers
         ]
         self._columns = [(weight, bias[:, None]) for weight, bias in self._layers]
@@ -36,10 +35,10 @@ class LearnedFin:
         self._rows = [(weight.T.copy(), bias) for weight, bias in self._layers]
         weight = self._rows[0][0]
         # Cosine and sine change with the zero direction as minus the sine and the cosine.
-        self._first_slopes = weight[:2] / np.array([reference]).T, np.stack([weight[3], -weight[2]])
-        self._a0, self._f0 = reference
-        self._unit = unit
-        self._scale = np.array([[reference[0]], [reference[1]]])
+        self._first_slopes = weight[:2] / np.array([REFERENCE]).T, np.stack([weight[3], -weight[2]])
+        self._a0, self._f0 = REFERENCE
+        self._unit = FORCE_UNIT
+        self._scale = np.array([REFERENCE]).T
         self._rough_scale = self._scale.astype(np.float32)
 
     def force(self, command: NDArray[np.floating]) -> NDArray[np.floating]:

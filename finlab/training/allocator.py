@@ -10,7 +10,9 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from finlab.inference.checkpoint import resolve_checkpoint
 from finlab.inference.features import SIZES, fin_frame_features, geometry, raw_features
+from finlab.inference.weights import NetworkConfig
 from finlab.layout import FinModelSpec
 from finlab.physics import make_fin_model
 from finlab.training import losses
@@ -24,11 +26,10 @@ from finlab.training.device import (
     training_device,
 )
 from finlab.training.loop import LoopSettings, train
-from finlab.training.networks.allocator_network import AllocatorNetwork, NetworkConfig
+from finlab.training.networks.allocator_network import AllocatorNetwork
 from finlab.training.networks.checkpoint import (
     Checkpoint,
     load_checkpoint,
-    resolve_checkpoint,
     save_checkpoint,
 )
 from finlab.training.presets import AllocatorTraining, get_preset

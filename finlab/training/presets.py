@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from finlab.errors import DataError
-from finlab.training.networks.allocator_network import NetworkConfig
-from finlab.training.networks.surrogate import SurrogateConfig
+from finlab.inference.weights import NetworkConfig, SurrogateConfig
 
 
 @dataclass(frozen=True)

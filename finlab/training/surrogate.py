@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from finlab.inference.learned_fin import REFERENCE
 from finlab.inference.normalization import Normalization
 from finlab.layout import FinModelSpec
 from finlab.physics import FinModel, make_fin_model
@@ -138,7 +139,7 @@ def _coefficient_terms(
     low, high = (
         torch.tensor(v, dtype=torch.float32, device=device) for v in zip(*COMMAND_RANGE, strict=True)
     )
-    a0, f0 = CoefficientSurrogate.REFERENCE
+    a0, f0 = REFERENCE
     # Of a lone fin at the origin, shaft along x, the wrench's force is the force in the fin frame.
     position, angle = torch.zeros(1, 3, device=device), torch.zeros(1, device=device)
 

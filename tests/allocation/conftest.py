@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from finlab.allocation.learned.learned_allocator import LearnedAllocator
+from finlab.inference.checkpoint import resolve_checkpoint
 from finlab.inference.learned_fin import LearnedFin
-from finlab.training.networks.checkpoint import Checkpoint, load_allocator_checkpoint, resolve_checkpoint
-from finlab.training.networks.surrogate import FORCE_UNIT, CoefficientSurrogate, Surrogate
+from finlab.training.networks.checkpoint import Checkpoint, load_allocator_checkpoint
+from finlab.training.networks.surrogate import CoefficientSurrogate, Surrogate
 
 
 @pytest.fixture
@@ -39,7 +40,7 @@ def default_checkpoint() -> Checkpoint:
 @pytest.fixture(scope="session")
 def learned(default_checkpoint: Checkpoint) -> LearnedAllocator:
     """The product's default method with the shipped checkpoint."""
-    return LearnedAllocator(default_checkpoint)
+    return LearnedAllocator(default_checkpoint.weights())
 
 
 @pytest.fixture(scope="session")
@@ -56,4 +57,4 @@ def fin_of() -> Callable[[CoefficientSurrogate], LearnedFin]:
 
 def make_fin(surrogate: Surrogate) -> LearnedFin:
     weights = {key: value.numpy() for key, value in surrogate.state_dict().items()}
-    return LearnedFin(weights, CoefficientSurrogate.REFERENCE, FORCE_UNIT)
+    return LearnedFin(weights)

@@ -10,11 +10,12 @@ import torch
 from finlab.inference.features import SIZES
 from finlab.inference.learned_fin import LearnedFin
 from finlab.inference.network import NumpyNetwork
+from finlab.inference.weights import NetworkConfig, SurrogateConfig
 from finlab.layout import random_layouts
 from finlab.physics import Drag
-from finlab.training.networks.allocator_network import AllocatorNetwork, NetworkConfig
+from finlab.training.networks.allocator_network import AllocatorNetwork
 from finlab.training.networks.checkpoint import Checkpoint
-from finlab.training.networks.surrogate import CoefficientSurrogate, SurrogateConfig
+from finlab.training.networks.surrogate import CoefficientSurrogate
 
 MakeFin = Callable[[CoefficientSurrogate], LearnedFin]
 

@@ -9,11 +9,12 @@ from finlab.assets import shipped_layouts
 from finlab.errors import AllocationError, CheckpointError
 from finlab.inference.features import SIZES
 from finlab.inference.normalization import Normalization
+from finlab.inference.weights import NetworkConfig, SurrogateConfig
 from finlab.layout import Fin, Layout, Limits, load_layout
 from finlab.physics import Plant
-from finlab.training.networks.allocator_network import AllocatorNetwork, NetworkConfig
+from finlab.training.networks.allocator_network import AllocatorNetwork
 from finlab.training.networks.checkpoint import Checkpoint
-from finlab.training.networks.surrogate import SurrogateConfig, make_surrogate
+from finlab.training.networks.surrogate import make_surrogate
 
 TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]
 
@@ -72,7 +73,7 @@ ABLATIONS: list[dict[str, object]] = [
 def test_every_variant_keeps_the_limits_bit_for_bit(
     options: dict[str, object], checkpoint: Checkpoint, robot: Layout
 ) -> None:
-    method = PaperAllocator(checkpoint, n_steps=5, **options)  # type: ignore[arg-type]
+    method = PaperAllocator(checkpoint.weights(), n_steps=5, **options)  # type: ignore[arg-type]
     targets = np.random.default_rng(0).normal(size=(6, 6)) * np.array([[1.0], [1], [1], [50], [0], [1e5]])
     assert keeps_limits(robot, method.allocate_batch(robot, targets).command)
     result = method.allocate(robot, TARGET, seed=1)
@@ -85,7 +86,7 @@ def test_every_variant_keeps_the_limits_bit_for_bit(
 def test_the_same_seed_gives_the_same_answer(
     options: dict[str, object], checkpoint: Checkpoint, robot: Layout
 ) -> None:
-    method = PaperAllocator(checkpoint, n_steps=5, **options)  # type: ignore[arg-type]
+    method = PaperAllocator(checkpoint.weights(), n_steps=5, **options)  # type: ignore[arg-type]
     first, second, other = (method.allocate(robot, TARGET, seed=seed).command for seed in (4, 4, 5))
     np.testing.assert_array_equal(first, second)
     if not options.get("mean_only"):
@@ -94,7 +95,7 @@ def test_the_same_seed_gives_the_same_answer(
 
 def test_refinement_lowers_what_the_surrogate_sees(checkpoint: Checkpoint, robot: Layout) -> None:
     def believed(**options: object) -> float:
-        method = PaperAllocator(checkpoint, **options)  # type: ignore[arg-type]
+        method = PaperAllocator(checkpoint.weights(), **options)  # type: ignore[arg-type]
         wrench = method.allocate_batch(robot, targets).wrench_surrogate
         return float(method.normalization.error(wrench, targets).mean())
 
@@ -104,7 +105,7 @@ def test_refinement_lowers_what_the_surrogate_sees(checkpoint: Checkpoint, robot
 
 
 def test_answers_believe_what_the_surrogate_says(checkpoint: Checkpoint, robot: Layout) -> None:
-    result = PaperAllocator(checkpoint, n_steps=5).allocate(robot, TARGET)
+    result = PaperAllocator(checkpoint.weights(), n_steps=5).allocate(robot, TARGET)
     layout = [(fin.position, fin.mounting_angle, fin.limits.lower, fin.limits.upper) for fin in robot.fins]
     rest = [torch.tensor(np.array(value), dtype=torch.float32) for value in zip(*layout, strict=True)]
     wrench = checkpoint.surrogate(torch.tensor(result.command, dtype=torch.float32), *rest)
@@ -112,7 +113,7 @@ def test_answers_believe_what_the_surrogate_says(checkpoint: Checkpoint, robot: 
 
 
 def test_candidates_come_best_first(checkpoint: Checkpoint, robot: Layout) -> None:
-    method = PaperAllocator(checkpoint, n_candidates=20, n_refined=3, n_steps=5)
+    method = PaperAllocator(checkpoint.weights(), n_candidates=20, n_refined=3, n_steps=5)
     result = method.allocate(robot, TARGET)
     assert result.candidates is not None and result.samples is not None
     assert result.candidates.source == ("refined",) * 3 and result.samples.source == ("sample",) * 20
@@ -123,7 +124,7 @@ def test_candidates_come_best_first(checkpoint: Checkpoint, robot: Layout) -> No
 
 
 def test_failed_fins_are_left_out(checkpoint: Checkpoint, robot: Layout) -> None:
-    method = PaperAllocator(checkpoint, n_steps=5)
+    method = PaperAllocator(checkpoint.weights(), n_steps=5)
     lost = robot.names[2]
     result = method.allocate(robot, TARGET, failed=[lost])
     assert np.isnan(result.command[2]).all()
@@ -132,7 +133,7 @@ def test_failed_fins_are_left_out(checkpoint: Checkpoint, robot: Layout) -> None
 
 
 def test_targets_beyond_one_chunk_get_their_answers(checkpoint: Checkpoint) -> None:
-    method = PaperAllocator(checkpoint, n_candidates=2, refine=False)
+    method = PaperAllocator(checkpoint.weights(), n_candidates=2, refine=False)
     layout = Layout("pair", (Fin("a", (0.1, 0.0, 0.0), 0.0), Fin("b", (-0.1, 0.0, 0.0), 2.0)))
     targets = np.random.default_rng(0).normal(size=(CHUNK + 1, 6))
     batch = method.allocate_batch(layout, targets)
@@ -142,7 +143,7 @@ def test_targets_beyond_one_chunk_get_their_answers(checkpoint: Checkpoint) -> N
 
 
 def test_on_our_networks_it_reaches_the_target(default_checkpoint: Checkpoint) -> None:
-    method = PaperAllocator(default_checkpoint)
+    method = PaperAllocator(default_checkpoint.weights())
     layout = load_layout(shipped_layouts()["A"])
     lower = layout.lower
     upper = layout.upper
@@ -154,12 +155,12 @@ def test_on_our_networks_it_reaches_the_target(default_checkpoint: Checkpoint) -
 
 def test_refuses_options_nobody_knows(checkpoint: Checkpoint) -> None:
     with pytest.raises(AllocationError, match="warm_start: expected one of mdn, random, got 'magic'"):
-        PaperAllocator(checkpoint, warm_start="magic")
+        PaperAllocator(checkpoint.weights(), warm_start="magic")
     with pytest.raises(AllocationError, match="ranking: expected one of physics, nll, got 'magic'"):
-        PaperAllocator(checkpoint, ranking="magic")
+        PaperAllocator(checkpoint.weights(), ranking="magic")
 
 
 def test_refuses_a_checkpoint_without_network(checkpoint: Checkpoint) -> None:
     alone = Checkpoint("alone", checkpoint.surrogate, checkpoint.normalization, {"type": "drag"})
-    with pytest.raises(CheckpointError, match="checkpoint 'alone' holds no allocator network"):
-        PaperAllocator(alone)
+    with pytest.raises(CheckpointError, match="checkpoint 'alone' holds a surrogate only"):
+        PaperAllocator(alone.weights())

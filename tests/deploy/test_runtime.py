@@ -87,7 +87,7 @@ def test_every_shipped_layout_passes_its_self_test(name: str, shipped_allocator:
 def test_self_test_notices_other_physics(bundle: Bundle) -> None:
     robot = parse_bundle(bundle.files)
     bent = {key: array * 1.05 for key, array in robot.weights.surrogate.items()}
-    other = replace(robot, weights=robot.weights._replace(surrogate=bent))
+    other = replace(robot, weights=replace(robot.weights, surrogate=bent))
     findings = self_check(Runtime(other))
     assert not all(finding.good for finding in findings)
 

@@ -1,8 +1,11 @@
 """Checkpoints: what is saved comes back, and everything that is not one is refused with a sentence."""
 
+import hashlib
 import json
 import re
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,16 +16,25 @@ import torch
 from safetensors.torch import load_file, save_file
 
 from finlab.allocation import load_allocator
+from finlab.assets import checkpoint_path, shipped_checkpoints
 from finlab.errors import CheckpointError
+from finlab.inference.checkpoint import (
+    checkpoint_files,
+    read_checkpoint,
+    read_normalization,
+    resolve_checkpoint,
+)
 from finlab.training.networks.checkpoint import (
     Checkpoint,
-    file_sha256,
     load_allocator_checkpoint,
     load_checkpoint,
-    load_normalization,
-    resolve_checkpoint,
     save_checkpoint,
 )
+
+
+def file_sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
 
 Config = dict[str, Any]
 
@@ -173,9 +185,43 @@ def test_refuses_tensors_nobody_asked_for(folder: Path) -> None:
     assert "do not fit together" in refusal(folder)
 
 
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_refuses_weights_that_are_no_numbers(folder: Path, value: float) -> None:
+    change_weights(folder, lambda tensors: tensors["network.head.bias"].fill_(value))
+    assert "network.head.bias: holds a number that is not finite" in refusal(folder)
+
+
+def test_refuses_another_precision(folder: Path) -> None:
+    change_weights(folder, lambda tensors: tensors.update({k: v.double() for k, v in tensors.items()}))
+    assert "expected float32" in refusal(folder)
+
+
+@pytest.mark.parametrize("name", shipped_checkpoints())
+def test_shipped_files_are_what_is_written_for_their_weights(name: str) -> None:
+    folder = checkpoint_path(name)
+    files = checkpoint_files(read_checkpoint(folder))
+    for file in ("config.json", "model.safetensors"):
+        assert files[file] == (folder / file).read_bytes()
+
+
+def test_reading_needs_no_torch() -> None:
+    code = (
+        "import sys\n"
+        "for name in ('torch', 'scipy', 'yaml', 'tqdm', 'tyro'):\n"
+        "    sys.modules[name] = None\n"
+        "from finlab.assets import checkpoint_path\n"
+        "from finlab.inference.checkpoint import read_checkpoint\n"
+        "assert len(read_checkpoint(checkpoint_path('paper')).network) > 10\n"
+        "assert read_checkpoint(checkpoint_path()).fast.rounds == 3"
+    )
+    subprocess.run([sys.executable, "-c", code], timeout=60, check=True)
+
+
 @pytest.mark.parametrize(
     "change",
     [
+        lambda config: config["network"].update(graph_layers=10**9),
+        lambda config: config["network"].update(n_components=True),
         lambda config: config["network"].update(width=64),
         lambda config: config["network"].update(heads=3),
         lambda config: config["network"].update(features="magic"),
@@ -209,10 +255,10 @@ def test_a_surrogate_alone_loads_but_cannot_allocate(folder: Path) -> None:
 def test_normalization_alone_is_read_without_the_weights(folder: Path) -> None:
     expected = load_checkpoint(folder).normalization
     (folder / "model.safetensors").unlink()
-    np.testing.assert_array_equal(load_normalization(folder).std, expected.std)
+    np.testing.assert_array_equal(read_normalization(folder).std, expected.std)
     change_config(folder, lambda config: config["normalization"].pop("std"))
     with pytest.raises(CheckpointError, match="normalization is missing or malformed"):
-        load_normalization(folder)
+        read_normalization(folder)
 
 
 def test_names_and_folders_are_told_apart(folder: Path) -> None:

@@ -6,11 +6,11 @@ import pytest
 import torch
 from torch import Tensor
 
+from finlab.inference.weights import SurrogateConfig
 from finlab.physics import Drag, assemble_wrench
 from finlab.training.networks.surrogate import (
     CoefficientSurrogate,
     MlpSurrogate,
-    SurrogateConfig,
     make_surrogate,
     sum_wrench,
     to_body,

@@ -9,6 +9,7 @@ import torch
 from safetensors.torch import load_file
 
 from finlab.errors import CheckpointError, DataError
+from finlab.inference.checkpoint import resolve_checkpoint
 from finlab.inference.features import SIZES
 from finlab.physics import Drag
 from finlab.training import train_allocator, train_surrogate
@@ -18,7 +19,6 @@ from finlab.training.networks.checkpoint import (
     Checkpoint,
     load_allocator_checkpoint,
     load_checkpoint,
-    resolve_checkpoint,
 )
 from finlab.training.networks.surrogate import make_surrogate
 from finlab.training.presets import get_preset

@@ -8,7 +8,7 @@ full pipeline answers instead.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +20,9 @@ from finlab.errors import AllocationError
 from finlab.forces import force_space
 from finlab.inference.fast_network import NumpyFastNetwork
 from finlab.inference.features import fin_frame_features
-from finlab.inference.weights import LearnedWeights
+from finlab.inference.weights import TrainedWeights
 from finlab.layout import Layout
 from finlab.physics.energy import DEFAULT_WEIGHTS
-
-if TYPE_CHECKING:
-    from finlab.training.networks.checkpoint import Checkpoint
 
 Array = NDArray[Any]
 
@@ -41,7 +38,7 @@ class FastAllocator(LearnedAllocator):
 
     name = "fast"
 
-    def __init__(self, weights: LearnedWeights | Checkpoint, **settings: Any) -> None:
+    def __init__(self, weights: TrainedWeights, **settings: Any) -> None:
         """Make it from weights that hold a distilled network; settings are those of the full pipeline.
 
         Raises:

@@ -10,7 +10,7 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,13 +25,11 @@ from finlab.allocation.learned.refined_candidates import RefinedCandidates
 from finlab.allocation.learned.settings import Settings
 from finlab.allocation.learned.unreachable import project_target
 from finlab.allocation.policy import Policy
+from finlab.errors import CheckpointError
 from finlab.inference.threads import single_threaded_products
-from finlab.inference.weights import LearnedWeights, weights_of
+from finlab.inference.weights import TrainedWeights
 from finlab.layout import FinModelSpec, Layout
 from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyWeights
-
-if TYPE_CHECKING:
-    from finlab.training.networks.checkpoint import Checkpoint
 
 Array = NDArray[Any]
 
@@ -50,12 +48,12 @@ class LearnedAllocator(Allocator):
 
     def __init__(
         self,
-        weights: LearnedWeights | Checkpoint,
+        weights: TrainedWeights,
         *,
         energy_weights: EnergyWeights = DEFAULT_WEIGHTS,
         **settings: Any,
     ) -> None:
-        """Make it from a checkpoint, or from the weights of one.
+        """Make it from the weights of a checkpoint.
 
         Args:
             weights: trained weights.
@@ -66,11 +64,10 @@ class LearnedAllocator(Allocator):
             AllocationError: settings that leave nothing to answer with.
             CheckpointError: the checkpoint's networks are of another kind.
         """
+        _check_kind(weights)
         self.settings = Settings(**settings)
-        self.trained = None if isinstance(weights, LearnedWeights) else weights
-        self.weights = weights if isinstance(weights, LearnedWeights) else weights_of(weights)
-        self.checkpoint = self.weights.checkpoint
-        self.normalization = self.weights.normalization
+        self.weights, self.checkpoint = weights, weights.name
+        self.normalization = weights.normalization
         self.energy_weights = energy_weights
         self.pipeline = Pipeline(self.weights, self.settings, energy_weights)
         # All products here are too small to be shared among threads; chunks of targets are not.
@@ -90,7 +87,7 @@ class LearnedAllocator(Allocator):
     def _made_with(self, options: dict[str, Any]) -> Self:
         energy_weights = options.pop("energy_weights")
         if energy_weights != self.energy_weights:
-            return type(self)(self.trained or self.weights, energy_weights=energy_weights, **options)
+            return type(self)(self.weights, energy_weights=energy_weights, **options)
         # Networks, and what is known of layouts, do not depend on the settings.
         other = copy(self)
         other.settings = Settings(**options)
@@ -144,6 +141,17 @@ class LearnedAllocator(Allocator):
         return self._solve(
             layout, served.wrench * std, seed=seed, previous=previous, fallback=lambda *_: served.force
         )
+
+
+def _check_kind(weights: TrainedWeights) -> None:
+    """Raise a `CheckpointError` for networks that this method cannot work with."""
+    if weights.surrogate_config.kind != "coefficient":
+        raise CheckpointError(
+            f"checkpoint {weights.name!r}: method `learned` needs a surrogate of kind `coefficient`, "
+            f"got {weights.surrogate_config.kind!r}; use method `paper` with this checkpoint"
+        )
+    if not weights.check_network().joint:
+        raise CheckpointError(f"checkpoint {weights.name!r}: method `learned` needs a joint-mixture network")
 
 
 def _candidates(refined: RefinedCandidates, std: Array) -> Candidates:

@@ -11,8 +11,9 @@ from torch import Tensor
 
 from finlab.allocation.allocation import Candidates, Solution
 from finlab.allocation.allocator import Allocator
-from finlab.errors import AllocationError, CheckpointError
+from finlab.errors import AllocationError
 from finlab.inference.features import fin_frame_features, geometry, raw_features
+from finlab.inference.weights import TrainedWeights
 from finlab.layout import FinModelSpec, Layout, stack_layouts
 from finlab.physics.energy import command_energy
 from finlab.training.data.sampling import seeded_generator
@@ -38,7 +39,7 @@ class PaperAllocator(Allocator):
 
     def __init__(
         self,
-        checkpoint: Checkpoint,
+        weights: TrainedWeights,
         *,
         n_candidates: int = 64,
         temperature: float = 0.02,
@@ -50,10 +51,10 @@ class PaperAllocator(Allocator):
         refine: bool = True,
         mean_only: bool = False,
     ) -> None:
-        """Make it from a checkpoint.
+        """Make it from the weights of a checkpoint.
 
         Args:
-            checkpoint: trained networks of any preset.
+            weights: trained networks of any preset.
             n_candidates: number K of candidates drawn from the mixture.
             temperature: T of the sampling; 0.02 in the paper.
             gamma: weight of the energy in J = J_norm + gamma J_en.
@@ -64,17 +65,18 @@ class PaperAllocator(Allocator):
             refine: whether to refine at all (ablation).
             mean_only: take the mixture's mean and nothing else (ablation).
         """
-        if checkpoint.network is None:
-            raise CheckpointError(f"checkpoint {checkpoint.name!r} holds no allocator network")
+        weights.check_network()
         for value, known, key in (
             (warm_start, ("mdn", "random"), "warm_start"),
             (ranking, ("physics", "nll"), "ranking"),
         ):
             if value not in known:
                 raise AllocationError(f"{key}: expected one of {', '.join(known)}, got {value!r}")
-        self.checkpoint, self.trained = checkpoint.name, checkpoint
-        self.normalization = checkpoint.normalization
-        self.fin_model = FinModelSpec.from_values(checkpoint.fin_model)
+        checkpoint = Checkpoint.of(weights)
+        assert checkpoint.network is not None
+        self.weights, self.checkpoint = weights, weights.name
+        self.normalization = weights.normalization
+        self.fin_model = FinModelSpec.from_values(weights.fin_model)
         self.network, self.surrogate = checkpoint.network, checkpoint.surrogate
         self.n_candidates, self.temperature, self.gamma = n_candidates, temperature, gamma
         self.n_refined, self.n_steps = n_refined, n_steps
@@ -82,7 +84,7 @@ class PaperAllocator(Allocator):
         self._mean, self._std = (torch.tensor(v, dtype=torch.float32) for v in self.normalization)
 
     def _made_with(self, options: dict[str, Any]) -> PaperAllocator:
-        return PaperAllocator(self.trained, **options)
+        return PaperAllocator(self.weights, **options)
 
     def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         robot = _Robot(layout)

@@ -27,7 +27,7 @@ from finlab.errors import AllocationError
 from finlab.forces import force_space
 from finlab.inference.learned_fin import LearnedFin
 from finlab.inference.network import NumpyNetwork
-from finlab.inference.weights import LearnedWeights
+from finlab.inference.weights import TrainedWeights
 from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyWeights
 
 Array = NDArray[Any]
@@ -63,14 +63,15 @@ class Pipeline:
     """Answers targets on layouts without failures; every array is numpy's."""
 
     def __init__(
-        self, weights: LearnedWeights, settings: Settings, energy_weights: EnergyWeights = DEFAULT_WEIGHTS
+        self, weights: TrainedWeights, settings: Settings, energy_weights: EnergyWeights = DEFAULT_WEIGHTS
     ) -> None:
         """Take over trained weights; energies are compared by `energy_weights`."""
+        sizes = weights.check_network()
         self.energy_weights = energy_weights
         self.settings, self.normalization = self._checked(settings), weights.normalization
-        self.network = NumpyNetwork(weights.network, weights.heads, weights.n_components)
+        self.network = NumpyNetwork(weights.network, sizes.heads, sizes.n_components)
         self.propose: Proposer = partial(propose, self.network)
-        fin = LearnedFin(weights.surrogate, weights.reference, weights.force_unit)
+        fin = LearnedFin(weights.surrogate)
         std = self.normalization.std
         self.prepare = lru_cache(maxsize=128)(lambda layout: prepare(layout, fin, std, energy_weights))
 

@@ -15,19 +15,20 @@ from finlab.allocation.learned.settings import Settings
 from finlab.deploy.onnx.builder import Builder
 from finlab.deploy.onnx.model import Model
 from finlab.deploy.onnx.single_network import TURN, add_hidden, add_mixture
-from finlab.inference.weights import LearnedWeights
+from finlab.inference.learned_fin import FORCE_UNIT, REFERENCE
+from finlab.inference.weights import TrainedWeights
 from finlab.physics.energy import DEFAULT_WEIGHTS, energy_scale
 
 OUTPUTS = ("command", "component", "wrench", "error", "thrust", "energy")
 """In the order of `Proposal`."""
 
 
-def proposal_model(weights: LearnedWeights, prepared: Prepared, settings: Settings, seed: int) -> Model:
+def proposal_model(weights: TrainedWeights, prepared: Prepared, settings: Settings, seed: int) -> Model:
     """One target in, K candidates with their scores out."""
     g = Builder()
-    n, k, m = len(prepared.lower), settings.n_candidates, weights.n_components
+    n, k, m = len(prepared.lower), settings.n_candidates, weights.check_network().n_components
     static = prepared.geometry.static[0]
-    hidden = add_hidden(g, _features(g, prepared, n), static, weights.network, weights.heads)
+    hidden = add_hidden(g, _features(g, prepared, n), static, weights.network, weights.check_network().heads)
     mixture = add_mixture(g, hidden, weights.network, m, prepared.lower, prepared.upper)
     x = _candidates(g, mixture, settings, n, m, seed)
     half = 0.5 * (prepared.upper - prepared.lower)
@@ -107,7 +108,7 @@ def _clamp(g: Builder, x: str, prepared: Prepared) -> str:
 
 
 def _force(
-    g: Builder, beat: str, direction: str, product: str, weights: LearnedWeights, k: int, n: int
+    g: Builder, beat: str, direction: str, product: str, weights: TrainedWeights, k: int, n: int
 ) -> str:
     """Forces (3, K, n) in the fins' own frames, as in `LearnedFin`; also the output `thrust`."""
     c, s = g.add("Cos", direction), g.add("Sin", direction)
@@ -117,11 +118,11 @@ def _force(
     layers = sorted({int(name.split(".")[1]) for name in state})
     first, last = f"net.{layers[0]}", f"net.{layers[-1]}"
     # How commands are scaled and shifted goes into the first layer, how forces are into the last.
-    a0, f0 = weights.reference
+    a0, f0 = REFERENCE
     state[f"{first}.bias"] = state[f"{first}.bias"] - 0.5 * state[f"{first}.weight"][:, :2].sum(1)
     state[f"{first}.weight"] = state[f"{first}.weight"] / np.array([a0, f0, 1.0, 1.0])
     for part in ("weight", "bias"):
-        state[f"{last}.{part}"] = state[f"{last}.{part}"] * (weights.force_unit / (a0 * f0) ** 2)
+        state[f"{last}.{part}"] = state[f"{last}.{part}"] * (FORCE_UNIT / (a0 * f0) ** 2)
     for i in layers:
         matrix = g.weight(f"net.{i}.weight", state[f"net.{i}.weight"])
         hidden = g.add("Gemm", matrix, hidden, g.weight(f"net.{i}.bias", state[f"net.{i}.bias"][:, None]))

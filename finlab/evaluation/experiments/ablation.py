@@ -25,7 +25,7 @@ from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.evaluation.statistics.records import Records, join_records
 from finlab.evaluation.statistics.tables import text_table
-from finlab.training.networks.checkpoint import load_allocator_checkpoint, resolve_checkpoint
+from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
 
 VARIANTS: dict[str, dict[str, Any]] = {
     "mean_only": {"mean_only": True, "refine": False},
@@ -80,7 +80,7 @@ def ablation_method(
     """
     if refinement not in REFINEMENTS:
         raise AllocationError(f"refinement: expected one of {', '.join(REFINEMENTS)}, got {refinement!r}")
-    loaded = load_allocator_checkpoint(resolve_checkpoint(checkpoint or "paper"))
+    loaded = read_checkpoint(resolve_checkpoint(checkpoint or "paper"))
     options = {"n_candidates": n_candidates, "temperature": temperature, **VARIANTS[variant]}
     return REFINEMENTS[refinement](loaded, **options)
 

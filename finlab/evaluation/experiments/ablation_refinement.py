@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from finlab.allocation.learned.paper import PaperAllocator
-from finlab.training.networks.checkpoint import Checkpoint
+from finlab.inference.weights import TrainedWeights
 from finlab.training.networks.mixture import to_command, to_normalized
 
 STEPS = 20
@@ -21,15 +21,15 @@ DAMPING = 1e-4
 class PaperWithLevenbergMarquardt(PaperAllocator):
     """Method `paper`, refined by Levenberg-Marquardt on the surrogate's error."""
 
-    def __init__(self, checkpoint: Checkpoint, *, n_lm_steps: int = STEPS, **options: Any) -> None:
-        """Make it from a checkpoint.
+    def __init__(self, weights: TrainedWeights, *, n_lm_steps: int = STEPS, **options: Any) -> None:
+        """Make it from the weights of a checkpoint.
 
         Args:
-            checkpoint: as for `PaperAllocator`.
+            weights: as for `PaperAllocator`.
             n_lm_steps: Levenberg-Marquardt steps.
             options: of `PaperAllocator`.
         """
-        super().__init__(checkpoint, **options)
+        super().__init__(weights, **options)
         self.n_lm_steps = n_lm_steps
 
     def _adam(self, robot: Any, command: Tensor, target: Tensor) -> Tensor:

@@ -15,8 +15,8 @@ from finlab.allocation.learned.paper import PaperAllocator
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.evaluation.statistics.tables import text_table
+from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.layout import Layout
-from finlab.training.networks.checkpoint import load_allocator_checkpoint, resolve_checkpoint
 
 Array = NDArray[Any]
 Columns = dict[str, Array]
@@ -139,4 +139,4 @@ def temperature_report(rows: Sequence[Row]) -> str:
 
 
 def _method(checkpoint: str | Path | None, **options: Any) -> PaperAllocator:
-    return PaperAllocator(load_allocator_checkpoint(resolve_checkpoint(checkpoint or "paper")), **options)
+    return PaperAllocator(read_checkpoint(resolve_checkpoint(checkpoint or "paper")), **options)

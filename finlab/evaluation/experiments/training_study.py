@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.evaluation.statistics.records import columns_of_records
 from finlab.evaluation.statistics.tables import text_table
-from finlab.training.networks.checkpoint import resolve_checkpoint
+from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
 
 LM_STEPS = 4
 """Levenberg-Marquardt steps after which the refined error is taken."""
@@ -97,7 +97,6 @@ def train_and_run(
         seed: of data and weights.
     """
     from finlab.training.allocator import train_allocator
-    from finlab.training.networks.checkpoint import load_checkpoint
 
     change = CHANGES[name]
     start = time.perf_counter()
@@ -112,9 +111,12 @@ def train_and_run(
         network_overrides=change.network,
     )
     train_s = time.perf_counter() - start
-    trained.surrogate = load_checkpoint(resolve_checkpoint("default")).surrogate
-    raw = run_method(PaperWithLevenbergMarquardt(trained, refine=False), cases, seed=seed)
-    refined = run_method(PaperWithLevenbergMarquardt(trained, n_lm_steps=LM_STEPS), cases, seed=seed)
+    physics = read_checkpoint(resolve_checkpoint("default"))
+    weights = replace(
+        trained.weights(), surrogate=physics.surrogate, surrogate_config=physics.surrogate_config
+    )
+    raw = run_method(PaperWithLevenbergMarquardt(weights, refine=False), cases, seed=seed)
+    refined = run_method(PaperWithLevenbergMarquardt(weights, n_lm_steps=LM_STEPS), cases, seed=seed)
     after = {"refined_err_norm": refined.err_norm, "refined_energy": refined.energy}
     return columns_of_records(raw) | after | {"train_s": np.array(train_s)}
 

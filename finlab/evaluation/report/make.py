@@ -27,7 +27,7 @@ from finlab.evaluation.report.sections.studies import (
 from finlab.evaluation.report.sections.summary import summary_blocks
 from finlab.evaluation.report.sizes import SIZES, Sizes
 from finlab.evaluation.statistics.store import Store
-from finlab.training.networks.checkpoint import load_checkpoint, load_normalization, resolve_checkpoint
+from finlab.inference.checkpoint import read_checkpoint, read_normalization, resolve_checkpoint
 
 PAGE, TWIN, TABLES, PICTURES = "index.html", "report.md", "tables.json", "pictures"
 """What a report's folder holds."""
@@ -72,8 +72,8 @@ def make_report(
         "learned": resolve_checkpoint(checkpoints.learned or "default"),
         "paper": resolve_checkpoint(checkpoints.paper or "paper"),
     }
-    prints = {f"{path.name} ({name})": load_checkpoint(path).sha256 for name, path in paths.items()}
-    results = Results(plan, store, load_normalization(paths["learned"]).std)
+    prints = {f"{path.name} ({name})": read_checkpoint(path).sha256 for name, path in paths.items()}
+    results = Results(plan, store, read_normalization(paths["learned"]).std)
     provenance = make_provenance(prints, seed, command)
     write_report(out, make_document(results, provenance, sizes, left_out), tables_of(results, provenance))
     return out / PAGE

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from finlab.allocation.learned.fast import FastAllocator
@@ -22,7 +24,7 @@ def fast_metrics(
 
     `energy_ratio` is the mean over targets of the one energy over the other.
     """
-    fast = FastAllocator(allocator.weights._replace(fast=weights))
+    fast = FastAllocator(replace(allocator.weights, fast=weights))
     rng = np.random.default_rng(SEED)
     errors, ratios = [], []
     for _ in range(n_layouts):

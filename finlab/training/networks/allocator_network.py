@@ -7,35 +7,13 @@ Paper, "Layout-independent allocation" and "Implementation details". The network
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 
+from finlab.inference.weights import NetworkConfig
 from finlab.training.networks.gatv2 import DenseGATv2
 from finlab.training.networks.mixture import LOG_STD_RANGE, Mixture, turns_fully
-
-
-@dataclass(frozen=True)
-class NetworkConfig:
-    """Sizes of the allocator network."""
-
-    features: str = "fin_frame"
-    """Which node features it is fed: `raw` (the paper's ten) or `fin_frame`."""
-    joint: bool = True
-    """One mixture component for all fins together (True) or one mixture per fin (False, the paper)."""
-    width: int = 128
-    """Width of every hidden layer."""
-    heads: int = 4
-    """Attention heads of GATv2 and of the Transformer."""
-    graph_layers: int = 2
-    """Number of GATv2 layers."""
-    transformer_layers: int = 3
-    """Number of Transformer encoder layers."""
-    feedforward: int = 256
-    """Hidden width of the Transformer's feed-forward blocks."""
-    n_components: int = 8
-    """Number M of mixture components."""
 
 
 class AllocatorNetwork(nn.Module):

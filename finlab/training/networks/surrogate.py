@@ -7,26 +7,14 @@ Torque is computed from force and position in both.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 
 from finlab.inference.features import raw_features
+from finlab.inference.learned_fin import FORCE_UNIT, REFERENCE
+from finlab.inference.weights import DESCRIPTOR, SurrogateConfig
 from finlab.training.networks.mixture import to_normalized
-
-FORCE_UNIT = 4.0
-"""Force [N] of order one for the networks' outputs."""
-
-
-@dataclass(frozen=True)
-class SurrogateConfig:
-    """Kind and size of a surrogate."""
-
-    kind: str = "coefficient"
-    """`coefficient` (force coefficient in the fin's own frame) or `mlp` (the paper's)."""
-    hidden: tuple[int, ...] = (32, 32)
-    """Widths of the hidden layers."""
 
 
 def mlp(n_in: int, hidden: Sequence[int], n_out: int, activation: type[nn.Module]) -> nn.Sequential:
@@ -68,9 +56,6 @@ class CoefficientSurrogate(nn.Module):
     mounting angle are geometry and need not be learned.
     """
 
-    REFERENCE = (0.6, 2.1)
-    """Amplitude [rad] and frequency [Hz] at which the scale is one."""
-
     def __init__(self, config: SurrogateConfig) -> None:
         """Make it; see `SurrogateConfig`."""
         super().__init__()
@@ -80,7 +65,7 @@ class CoefficientSurrogate(nn.Module):
     def fin_force(self, command: Tensor) -> Tensor:
         """Force (..., 3) in the fin frame (shaft, e_h, e_z) [N] of commands (..., 3)."""
         amplitude, frequency, direction = command.unbind(-1)
-        a0, f0 = self.REFERENCE
+        a0, f0 = REFERENCE
         c, s = torch.cos(direction), torch.sin(direction)
         inputs = torch.stack([amplitude / a0 - 0.5, frequency / f0 - 0.5, c, s], dim=-1)
         shaft, along, across = (self.net(inputs) * FORCE_UNIT).unbind(-1)
@@ -116,8 +101,8 @@ class MlpSurrogate(nn.Module):
         # Angles enter as plain numbers and their sines must be learned; wider first weights start
         # nearer to that (measured: a sixth of the loss after the same minute).
         nn.init.uniform_(first_layer(self.net).weight, -0.8, 0.8)
-        self.descriptor = nn.Sequential(nn.Linear(10, 64), nn.Tanh())
-        self.affine = nn.Linear(64, 12)
+        self.descriptor = nn.Sequential(nn.Linear(10, DESCRIPTOR), nn.Tanh())
+        self.affine = nn.Linear(DESCRIPTOR, 12)
         nn.init.zeros_(self.affine.weight)
         nn.init.zeros_(self.affine.bias)
 

@@ -1,6 +1,7 @@
 """The fast path: true to its network, as exact as the full pipeline, hardly dearer, and never stuck."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,9 @@ from finlab.allocation.learned.fast import FastAllocator
 from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.assets import checkpoint_path, shipped_layouts
 from finlab.errors import AllocationError, CheckpointError
+from finlab.inference.checkpoint import read_checkpoint
 from finlab.inference.fast_network import NumpyFastNetwork
-from finlab.inference.fast_weights import FastWeights, load_fast, save_fast
+from finlab.inference.fast_weights import FastWeights, save_fast
 from finlab.layout import random_layout
 from finlab.physics import Plant
 from finlab.physics.energy import command_energy
@@ -101,13 +103,22 @@ def test_checkpoint_without_a_distilled_network_says_so(untrained_checkpoint: Pa
 
 
 def test_changed_weights_are_refused(tmp_path: Path) -> None:
-    shipped = load_fast(checkpoint_path() / "fast")
-    assert shipped is not None and load_fast(tmp_path) is None
-    save_fast(tmp_path, shipped, {"who": "a test"})
-    back = load_fast(tmp_path)
+    shutil.copytree(checkpoint_path(), tmp_path / "mine")
+    folder = tmp_path / "mine" / "fast"
+    shipped = read_checkpoint(checkpoint_path()).fast
+    assert shipped is not None
+    save_fast(folder, shipped, {"who": "a test"})
+    back = read_checkpoint(folder.parent).fast
     assert back is not None and all(np.array_equal(back.state[k], v) for k, v in shipped.state.items())
-    config = json.loads((tmp_path / "config.json").read_text())
-    for key, value, message in (("version", 2, "version 1"), ("sha256", "0" * 64, "SHA-256")):
-        (tmp_path / "config.json").write_text(json.dumps(config | {key: value}))
+    config = json.loads((folder / "config.json").read_text())
+    for key, value, message in (
+        ("version", 2, "version 1"),
+        ("sha256", "0" * 64, "SHA-256"),
+        ("rounds", 2, "not a distilled network"),
+        ("rounds", 10**9, "not a distilled network"),
+    ):
+        (folder / "config.json").write_text(json.dumps(config | {key: value}))
         with pytest.raises(CheckpointError, match=message):
-            load_fast(tmp_path)
+            read_checkpoint(folder.parent)
+    shutil.rmtree(folder)
+    assert read_checkpoint(folder.parent).fast is None

@@ -11,11 +11,12 @@ from finlab.allocation.learned.learned_allocator import CHUNK, LearnedAllocator
 from finlab.assets import shipped_layouts
 from finlab.errors import CheckpointError
 from finlab.inference.features import SIZES
+from finlab.inference.weights import NetworkConfig, SurrogateConfig
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout, random_layout
 from finlab.physics import Plant
-from finlab.training.networks.allocator_network import AllocatorNetwork, NetworkConfig
+from finlab.training.networks.allocator_network import AllocatorNetwork
 from finlab.training.networks.checkpoint import Checkpoint, load_checkpoint
-from finlab.training.networks.surrogate import SurrogateConfig, make_surrogate
+from finlab.training.networks.surrogate import make_surrogate
 
 GOOD = 5e-3
 """Normalized error below which an answer counts as exact here."""
@@ -144,7 +145,7 @@ def test_the_same_question_gets_the_same_answer(
     target = reachable(layout, 1)[0]
     first = learned.allocate(layout, target, seed=3)
     learned.allocate(layout, -target, seed=9)  # what was asked in between leaves no trace
-    for other in (learned, LearnedAllocator(default_checkpoint)):
+    for other in (learned, LearnedAllocator(default_checkpoint.weights())):
         again = other.allocate(layout, target, seed=3)
         np.testing.assert_array_equal(again.command, first.command)
         assert again.candidates is not None and first.candidates is not None
@@ -203,7 +204,7 @@ def test_candidates_are_offered_best_first(learned: LearnedAllocator) -> None:
 def test_every_option_still_answers_exactly(
     options: dict[str, float], default_checkpoint: Checkpoint
 ) -> None:
-    method = LearnedAllocator(default_checkpoint, **options)  # type: ignore[arg-type]
+    method = LearnedAllocator(default_checkpoint.weights(), **options)  # type: ignore[arg-type]
     layout = load_layout(shipped_layouts()["A"])
     result = method.allocate(layout, reachable(layout, 1)[0])
     assert result.err_norm < GOOD and keeps_limits(layout, result.command)
@@ -221,15 +222,15 @@ def test_refuses_checkpoints_of_the_other_kind(untrained_checkpoint: Path) -> No
     checkpoint = load_checkpoint(untrained_checkpoint)
     whole = checkpoint.network
     checkpoint.network = None
-    with pytest.raises(CheckpointError, match="'untrained'.* needs a joint-mixture network"):
-        LearnedAllocator(checkpoint)
+    with pytest.raises(CheckpointError, match="'untrained'.* holds a surrogate only"):
+        LearnedAllocator(checkpoint.weights())
     sizes = NetworkConfig(features="raw", joint=False, width=8, heads=2, feedforward=8, n_components=2)
     checkpoint.network = AllocatorNetwork(sizes, SIZES["raw"])
     with pytest.raises(CheckpointError, match="needs a joint-mixture network"):
-        LearnedAllocator(checkpoint)
+        LearnedAllocator(checkpoint.weights())
     checkpoint.network, checkpoint.surrogate = whole, make_surrogate(SurrogateConfig("mlp", (8,)))
     with pytest.raises(CheckpointError, match="kind `coefficient`, got 'mlp'; use method `paper`"):
-        LearnedAllocator(checkpoint)
+        LearnedAllocator(checkpoint.weights())
 
 
 def test_turning_the_robot_does_not_make_it_worse(learned: LearnedAllocator) -> None:
