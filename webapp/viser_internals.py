@@ -62,6 +62,11 @@ def put_marks(slider: viser.GuiSliderHandle, marks: tuple[tuple[float, str], ...
         slider._marks = wanted
 
 
+def run_script(gui: viser.GuiApi, source: str) -> None:
+    """Run a script in the page, as viser does to bring its plots."""
+    gui._websock_interface.queue_message(_messages.RunJavascriptMessage(source=source))
+
+
 def stop_server(server: viser.ViserServer) -> None:
     """Stop a server, silently."""
     with contextlib.redirect_stdout(io.StringIO()):

@@ -49,6 +49,7 @@ class LayoutTab:
             self._angle = gui.add_slider(
                 "Shaft [°]", -180.0, 180.0, 1.0, 0.0, hint="Azimuth of the shaft, 0 is ahead."
             )
+            self._angle.precision = 1  # typed more finely than dragged
             on_user_change(self._angle, self._turn)
             self._snap_m = gui.add_dropdown("Snap place", tuple(POSITION_STEPS), hint="Grid for positions.")
             on_user_change(self._snap_m, partial(self._set_display, "position_snap"))
