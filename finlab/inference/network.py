@@ -202,7 +202,8 @@ def _norm(x: Array) -> Array:
     """Layer normalization of features (R, width) of mean 0; divided by the root of the width."""
     square = np.einsum("ri,ri->r", x, x)
     square += np.float32(x.shape[-1]) * _LAYER_NORM_EPS
-    return x / np.sqrt(square, out=square)[:, None]
+    normed: Array = x / np.sqrt(square, out=square)[:, None]
+    return normed
 
 
 def _std(raw: Array, out: Array | None = None) -> Array:

@@ -28,4 +28,4 @@ class Normalization(NamedTuple):
     def error(self, wrench: NDArray[np.floating], target: NDArray[np.floating]) -> NDArray[np.float64]:
         """`err_norm = ||(wrench - target) / std||`, over the last axis."""
         scaled = (np.asarray(wrench, np.float64) - np.asarray(target, np.float64)) / self.std
-        return np.linalg.norm(scaled, axis=-1)
+        return np.asarray(np.linalg.norm(scaled, axis=-1))

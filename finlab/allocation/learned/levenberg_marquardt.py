@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.forces.small_systems import solve
-from finlab.inference.learned_fin import LearnedFin
+from finlab.inference.surrogate import FinForces
 
 Array = NDArray[Any]
 
@@ -42,10 +42,10 @@ class Limits(NamedTuple):
 class CommandProblem:
     """One layout as the refinement sees it."""
 
-    fin: LearnedFin
-    """The learned fin."""
+    fin: FinForces
+    """The surrogate of the fins."""
     columns: Array
-    """Normalized wrench per newton (n, 3, 6) of each fin's force along shaft, e_h and e_z."""
+    """Normalized wrench per newton (n, 3, 6) of each fin's force along the axes of the surrogate's frame."""
     lower: Array
     """Lower limits (n, 3)."""
     upper: Array

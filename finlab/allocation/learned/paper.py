@@ -1,209 +1,271 @@
-"""The paper's own pipeline: sample the mixture, rank by the surrogate, refine with Adam."""
+"""The paper's own pipeline: sample the mixture, rank by the surrogate, refine with Adam. numpy only."""
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass, fields
+from functools import lru_cache
+from typing import Any, NamedTuple, Self
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from finlab.allocation.allocation import Candidates, Solution
 from finlab.allocation.allocator import Allocator
+from finlab.allocation.learned.levenberg_marquardt import CommandProblem, refine
 from finlab.errors import AllocationError
-from finlab.inference.features import fin_frame_features, geometry, raw_features
+from finlab.inference.features import Geometry, fin_frame_features, geometry, raw_features
+from finlab.inference.mixture import MixtureArrays
+from finlab.inference.network import NumpyNetwork
+from finlab.inference.surrogate import LayoutSurrogate, surrogate_on
+from finlab.inference.threads import single_threaded_products
 from finlab.inference.weights import TrainedWeights
-from finlab.layout import FinModelSpec, Layout, stack_layouts
-from finlab.physics.energy import command_energy
-from finlab.training.data.sampling import seeded_generator
-from finlab.training.networks.checkpoint import Checkpoint
-from finlab.training.networks.mixture import Mixture, clamp_to_limits, to_command, to_normalized
+from finlab.layout import FinModelSpec, Layout
+from finlab.layout.angles import is_full_turn
+from finlab.physics.energy import EnergyMeter
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 CHUNK = 250
 """Targets that are solved together; keeps memory flat for any number of targets."""
 ADAM_RATE = 0.03
-"""Adam's step, in units of half a limit range."""
+"""Adam's first step, in units of half a limit range; it falls to a twentieth of that."""
+ADAM_DECAY = (0.9, 0.999)
+"""Decays of Adam's running means of the gradient and of its square (Kingma and Ba, 2015)."""
+STEPS = {"none": 0, "adam": 80, "levenberg-marquardt": 20}
+"""Refinement -> its number of steps where the settings name none."""
+LM_DAMPING = 4e-4
+"""First damping of Levenberg-Marquardt, in squared normalized error per squared limit range."""
+
+
+@dataclass(frozen=True)
+class PaperSettings:
+    """The stages of the paper's pipeline.
+
+    What the paper does not print is a choice made here: gamma, Adam's rate, the number of refined candidates
+    and steps.
+    """
+
+    n_candidates: int = 64
+    """Number K of candidates drawn from the mixture."""
+    temperature: float = 0.02
+    """T of the sampling; 0.02 in the paper."""
+    gamma: float = 1e-4
+    """Weight of the energy in J = J_norm + gamma J_en."""
+    n_refined: int = 2
+    """Best-ranked candidates that are refined."""
+    refinement: str = "adam"
+    """`adam`, `levenberg-marquardt` (ablation) or `none` (ablation)."""
+    n_steps: int | None = None
+    """Steps of the refinement; as in `STEPS` where None."""
+    warm_start: str = "mdn"
+    """`mdn` samples the mixture, `random` draws uniform commands (ablation)."""
+    ranking: str = "physics"
+    """`physics` ranks by J, `nll` by the mixture's likelihood (ablation)."""
+    mean_only: bool = False
+    """Take the mixture's mean and nothing else (ablation)."""
+
+    def __post_init__(self) -> None:
+        for key, known in (
+            ("refinement", tuple(STEPS)),
+            ("warm_start", ("mdn", "random")),
+            ("ranking", ("physics", "nll")),
+        ):
+            if getattr(self, key) not in known:
+                got = getattr(self, key)
+                raise AllocationError(f"{key}: expected one of {', '.join(known)}, got {got!r}")
+        if self.n_candidates < 1 or self.n_refined < 1 or not self.temperature >= 0.0:
+            raise AllocationError(
+                "method 'paper' needs at least one candidate and refined one and a temperature from 0, got "
+                f"n_candidates={self.n_candidates}, n_refined={self.n_refined}, "
+                f"temperature={self.temperature}"
+            )
+
+
+class _Robot(NamedTuple):
+    """One layout of n healthy fins, ready for the pipeline."""
+
+    surrogate: LayoutSurrogate
+    """Learned fin physics."""
+    problem: CommandProblem
+    """The surrogate in normalized wrenches, and the limits."""
+    features: Array | Geometry
+    """The network's raw features (1, n, 10), or what the fin-frame features are made of."""
+    energy: EnergyMeter
+    """J_en."""
 
 
 class PaperAllocator(Allocator):
-    """Mixture density network, physics-guided ranking and gradient refinement, as printed.
-
-    What the paper does not print is a choice made here: gamma, Adam's rate, the number of refined
-    candidates and steps.
-    """
+    """Mixture density network, physics-guided ranking and gradient refinement, as printed."""
 
     name = "paper"
 
-    def __init__(
-        self,
-        weights: TrainedWeights,
-        *,
-        n_candidates: int = 64,
-        temperature: float = 0.02,
-        gamma: float = 1e-4,
-        n_refined: int = 2,
-        n_steps: int = 80,
-        warm_start: str = "mdn",
-        ranking: str = "physics",
-        refine: bool = True,
-        mean_only: bool = False,
-    ) -> None:
-        """Make it from the weights of a checkpoint.
+    def __init__(self, weights: TrainedWeights, **settings: Any) -> None:
+        """Make it from trained weights of any preset; settings are fields of `PaperSettings`.
 
-        Args:
-            weights: trained networks of any preset.
-            n_candidates: number K of candidates drawn from the mixture.
-            temperature: T of the sampling; 0.02 in the paper.
-            gamma: weight of the energy in J = J_norm + gamma J_en.
-            n_refined: best-ranked candidates that are refined.
-            n_steps: Adam steps.
-            warm_start: `mdn` samples the mixture, `random` draws uniform commands (ablation).
-            ranking: `physics` ranks by J, `nll` by the mixture's likelihood (ablation).
-            refine: whether to refine at all (ablation).
-            mean_only: take the mixture's mean and nothing else (ablation).
+        Raises:
+            AllocationError: a setting is unknown or leaves nothing to answer with.
+            CheckpointError: there is no allocator network.
         """
-        weights.check_network()
-        for value, known, key in (
-            (warm_start, ("mdn", "random"), "warm_start"),
-            (ranking, ("physics", "nll"), "ranking"),
-        ):
-            if value not in known:
-                raise AllocationError(f"{key}: expected one of {', '.join(known)}, got {value!r}")
-        checkpoint = Checkpoint.of(weights)
-        assert checkpoint.network is not None
-        self.weights, self.checkpoint = weights, weights.name
-        self.normalization = weights.normalization
+        self.weights, self.config = weights, weights.check_network()
+        self.checkpoint, self.normalization = weights.name, weights.normalization
         self.fin_model = FinModelSpec.from_values(weights.fin_model)
-        self.network, self.surrogate = checkpoint.network, checkpoint.surrogate
-        self.n_candidates, self.temperature, self.gamma = n_candidates, temperature, gamma
-        self.n_refined, self.n_steps = n_refined, n_steps
-        self.warm_start, self.ranking, self.refine, self.mean_only = warm_start, ranking, refine, mean_only
-        self._mean, self._std = (torch.tensor(v, dtype=torch.float32) for v in self.normalization)
+        self.settings = PaperSettings(**settings)
+        self.network = NumpyNetwork(weights.network, self.config.heads, self.config.n_components)
+        self._one_thread = single_threaded_products()
+        self._prepared = lru_cache(maxsize=128)(self._prepare)
 
-    def _made_with(self, options: dict[str, Any]) -> PaperAllocator:
-        return PaperAllocator(self.weights, **options)
+    @classmethod
+    def option_names(cls) -> list[str]:
+        """Names of the settings."""
+        return [field.name for field in fields(PaperSettings)]
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Present settings, by name."""
+        return dict(vars(self.settings))
+
+    def _made_with(self, options: dict[str, Any]) -> Self:
+        return type(self)(self.weights, **options)
 
     def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
-        robot = _Robot(layout)
-        parts = []
-        for start in range(0, len(targets), CHUNK):
-            parts.append(
-                self._solve_chunk(robot, targets[start : start + CHUNK], seed + start, len(targets) == 1)
-            )
-        if len(parts) == 1:
-            return parts[0]
+        robot = self._prepared(layout)
+        if len(targets) == 1:
+            with self._one_thread():
+                return self._solve_chunk(robot, targets, seed)
+        starts = range(0, len(targets), CHUNK)
+        parts = [self._solve_chunk(robot, targets[k : k + CHUNK], seed + k) for k in starts]
         wrench = [part.wrench_surrogate for part in parts if part.wrench_surrogate is not None]
         return Solution(np.concatenate([part.command for part in parts]), np.concatenate(wrench))
 
-    def _solve_chunk(self, robot: _Robot, targets: Array, seed: int, keep: bool) -> Solution:
-        target = (torch.tensor(targets, dtype=torch.float32) - self._mean) / self._std
-        generator = seeded_generator(seed, stream=0)
-        with torch.no_grad():
-            mixture = self._predict(robot, target)
-            if self.mean_only:
-                x = _mean_of(mixture)[:, None]
-            elif self.warm_start == "random":
-                shape = (len(targets), self.n_candidates, robot.n, 3)
-                x = 2.0 * torch.rand(shape, generator=generator) - 1.0
-            else:
-                x = mixture.sample(self.n_candidates, self.temperature, generator)
-            command = clamp_to_limits(to_command(x, robot.lower, robot.upper), robot.lower, robot.upper)
-            score = self._score(robot, command, target)
-            if self.ranking == "nll" and not self.mean_only:
-                score = -self._likelihood(robot, mixture, command)
-            best = score.topk(min(self.n_refined, score.shape[1]), largest=False).indices
-            chosen = command.gather(1, best[..., None, None].expand(-1, -1, robot.n, 3))
-        if self.refine and not self.mean_only:
-            chosen = self._adam(robot, chosen, target)
-        with torch.no_grad():
-            # Without physics in the ranking the likeliest candidate stays the answer.
-            order = self._score(robot, chosen, target).argsort(1)
-            if self.ranking == "nll":
-                order = torch.arange(chosen.shape[1]).expand(len(targets), -1)
-            chosen = chosen.gather(1, order[..., None, None].expand(-1, -1, robot.n, 3))
-            wrench = self._wrench(robot, chosen[:, :1])[:, 0]
-        answer = robot.inside(chosen)
-        solution = Solution(answer[:, 0], wrench.numpy().astype(np.float64))
-        if not keep:
-            return solution
-        return solution._replace(
-            candidates=lambda: self._candidates(robot, chosen, target, "refined"),
-            samples=lambda: self._candidates(robot, command, target, "sample"),
+    def _solve_chunk(self, robot: _Robot, targets: Array, seed: int) -> Solution:
+        std, settings = self.normalization.std, self.settings
+        wanted = ((targets - robot.surrogate.bias) / std).astype(np.float32)
+        mixture = self._predict(robot, (targets - self.normalization.mean) / std)
+        sampled = robot.problem.clamp_in_place(_to_command(robot, self._draw(mixture, seed)))
+        by_likelihood = settings.ranking == "nll" and not settings.mean_only
+        if by_likelihood:
+            x = _to_normalized(robot, sampled)
+            score = -mixture.log_likelihood(x, robot.problem.wraps)
+        else:
+            score = self._score(robot, sampled, wanted)
+        chosen = _take(sampled, np.argsort(score, axis=1, kind="stable")[:, : settings.n_refined])
+        if not settings.mean_only:
+            chosen = self._refine(robot, chosen, wanted)
+        if not by_likelihood:  # without physics in the ranking the likeliest candidate stays the answer
+            chosen = _take(chosen, np.argsort(self._score(robot, chosen, wanted), axis=1, kind="stable"))
+        return Solution(
+            _inside(robot, chosen[:, 0]),
+            robot.surrogate.wrench(chosen[:, 0]).astype(np.float64),
+            candidates=lambda: self._candidates(robot, chosen[0], targets[0], "refined"),
+            samples=lambda: self._candidates(robot, sampled[0], targets[0], "sample"),
         )
 
-    def _predict(self, robot: _Robot, target: Tensor) -> Mixture:
-        layout = (robot.position, robot.angle, robot.lower[None], robot.upper[None])
-        if self.network.config.features == "raw":
-            x = raw_features(*layout).expand(len(target), -1, -1)
+    def _prepare(self, layout: Layout) -> _Robot:
+        surrogate, std = surrogate_on(layout, self.weights), self.normalization.std
+        lower, upper = layout.lower, layout.upper
+        turns_fully = np.asarray(is_full_turn(upper[:, 2] - lower[:, 2]))
+        problem = CommandProblem(surrogate.fins, surrogate.columns / std, lower, upper, turns_fully)
+        place = layout.position[None], layout.mounting_angle[None], lower[None], upper[None]
+        raw = self.config.features == "raw"
+        features = raw_features(*place) if raw else geometry(*place, std)
+        return _Robot(surrogate, problem, features, EnergyMeter(upper))
+
+    def _predict(self, robot: _Robot, centred: Array) -> MixtureArrays:
+        """The network's mixture for normalized, centred targets (N, 6)."""
+        if isinstance(robot.features, Geometry):
+            x = fin_frame_features(robot.features, centred)
         else:
-            x = fin_frame_features(geometry(*layout, self._std), target)
-        limits = (robot.lower.expand(len(target), -1, -1), robot.upper.expand(len(target), -1, -1))
-        return self.network(x, target, *limits)
+            x = np.repeat(robot.features, len(centred), axis=0)
+        limits = robot.problem.lower, robot.problem.upper
+        return self.network(x.astype(np.float32), centred.astype(np.float32), *limits)
 
-    def _wrench(self, robot: _Robot, command: Tensor) -> Tensor:
-        """Wrenches (N, K, 6) of commands (N, K, n, 3) by the surrogate."""
-        return self.surrogate(command, robot.position[0], robot.angle[0], robot.lower, robot.upper)
+    def _draw(self, mixture: MixtureArrays, seed: int) -> Array:
+        """Candidates (N, K, n, 3) in normalized coordinates."""
+        rows, n, k = *mixture.mean.shape[:2], self.settings.n_candidates
+        rng = np.random.default_rng(seed)
+        if self.settings.mean_only:
+            return mixture.expected()[:, None]
+        if self.settings.warm_start == "random":
+            return np.float32(2.0) * rng.random((rows, k, n, 3), dtype=np.float32) - np.float32(1.0)
+        uniform = rng.random((rows, k) if mixture.joint else (rows, n, k), dtype=np.float32)
+        normal = rng.standard_normal((rows, n, k, 3), dtype=np.float32)
+        return mixture.tempered(self.settings.temperature, uniform, normal)
 
-    def _score(self, robot: _Robot, command: Tensor, target: Tensor) -> Tensor:
-        """J = J_norm + gamma J_en (N, K), by the surrogate."""
-        error = (self._wrench(robot, command) - self._mean) / self._std - target[:, None]
-        a, f, d = (command / robot.upper.abs().clamp_min(1e-3)).unbind(-1)
-        energy = (a * a + f * f + 0.1 * d * d + a * f).sum(-1)
-        return error.square().sum(-1) + self.gamma * energy
+    def _score(self, robot: _Robot, command: Array, wanted: Array) -> Array:
+        """J = J_norm + gamma J_en (N, K) of commands (N, K, n, 3), by the surrogate."""
+        rows, k, n, _ = command.shape
+        flat = command.reshape(-1, n, 3)
+        error = robot.problem.wrench(flat).reshape(rows, k, 6) - wanted[:, None]
+        energy = robot.energy(flat).reshape(rows, k)
+        return np.asarray(np.einsum("rki,rki->rk", error, error) + self.settings.gamma * energy)
 
-    def _likelihood(self, robot: _Robot, mixture: Mixture, command: Tensor) -> Tensor:
-        """Log likelihood (N, K) of commands (N, K, n, 3)."""
-        x = to_normalized(command, robot.lower, robot.upper)
-        mask = torch.ones(x.shape[0], robot.n, dtype=torch.bool)
-        return torch.stack([mixture.log_prob(x[:, k], mask) for k in range(x.shape[1])], dim=1)
+    def _refine(self, robot: _Robot, command: Array, wanted: Array) -> Array:
+        """Refined commands (N, K, n, 3), inside the limits."""
+        shape, kind = command.shape, self.settings.refinement
+        steps = STEPS[kind] if self.settings.n_steps is None else self.settings.n_steps
+        flat, target = command.reshape(-1, *shape[2:]), np.repeat(wanted, shape[1], axis=0)
+        if kind == "none":
+            return command
+        if kind == "adam":
+            return self._adam(robot, flat, target, steps).reshape(shape)
+        return refine(robot.problem, target, flat, steps, damping=LM_DAMPING).command.reshape(shape)
 
-    def _adam(self, robot: _Robot, command: Tensor, target: Tensor) -> Tensor:
-        """Adam on the commands through the surrogate, inside the limits; keeps the best step of each."""
-        x = to_normalized(command, robot.lower, robot.upper).requires_grad_(True)
-        optimizer = torch.optim.Adam([x], lr=ADAM_RATE)
-        for step in range(self.n_steps):
-            optimizer.param_groups[0]["lr"] = ADAM_RATE * (1.0 - 0.95 * step / self.n_steps)
-            score = self._score(robot, to_command(x, robot.lower, robot.upper), target)
-            (x.grad,) = torch.autograd.grad(score.sum(), x)
-            optimizer.step()
-            with torch.no_grad():
-                x.clamp_(-1.0, 1.0)
-        return to_command(x.detach(), robot.lower, robot.upper)
+    def _adam(self, robot: _Robot, command: Array, target: Array, steps: int) -> Array:
+        """Adam on J for commands (R, n, 3) and normalized targets (R, 6); the last step of each.
 
-    def _candidates(self, robot: _Robot, command: Tensor, target: Tensor, source: str) -> Candidates:
-        """Candidates of a single target, best first; commands (1, K, n, 3)."""
-        with torch.no_grad():
-            wrench = self._wrench(robot, command)
-            error = (((wrench - self._mean) / self._std) - target[:, None]).norm(dim=-1)[0]
-        order = error.argsort()
-        inside = robot.inside(command[:, order])[0]
-        energy = command_energy(inside, robot.upper.numpy())
-        pick = wrench[0, order].numpy().astype(np.float64), error[order].numpy().astype(np.float64)
-        return Candidates(inside, pick[0], pick[1], energy, (source,) * len(energy))
+        It works in normalized coordinates, inside the limits, with a step that falls linearly.
+        """
+        x, half = _to_normalized(robot, command), robot.problem.float32.half
+        mean, square = np.zeros_like(x), np.zeros_like(x)
+        keep_mean, keep_square = ADAM_DECAY
+        for step in range(steps):
+            gradient = half * self._gradient(robot, _to_command(robot, x), target)
+            mean += (1.0 - keep_mean) * (gradient - mean)
+            square += (1.0 - keep_square) * (gradient * gradient - square)
+            rate = ADAM_RATE * (1.0 - 0.95 * step / steps) / (1.0 - keep_mean ** (step + 1))
+            size = np.sqrt(square / np.float32(1.0 - keep_square ** (step + 1)))
+            x -= np.float32(rate) * mean / (size + np.float32(1e-8))
+            np.clip(x, -1.0, 1.0, out=x)
+        return _to_command(robot, x)
 
+    def _gradient(self, robot: _Robot, command: Array, target: Array) -> Array:
+        """Derivatives (R, n, 3) of J by each command."""
+        rows, n, _ = command.shape
+        columns = robot.problem.columns_float32
+        force, slopes = robot.problem.fin.force_and_slopes(command)
+        error = force.reshape(rows, -1) @ columns - target
+        by_force = (2.0 * error @ columns.T).reshape(rows, n, 3)
+        by_command: Array = (slopes @ by_force[..., None])[..., 0]
+        return by_command + np.float32(self.settings.gamma) * robot.energy.slopes(command)
 
-class _Robot:
-    """One layout as float32 tensors."""
-
-    def __init__(self, layout: Layout) -> None:
-        arrays = stack_layouts([layout])
-        self._lower, self._upper = arrays.lower[0], arrays.upper[0]
-        self.position = torch.tensor(arrays.position, dtype=torch.float32)
-        self.angle = torch.tensor(arrays.mounting_angle, dtype=torch.float32)
-        self.lower = torch.tensor(self._lower, dtype=torch.float32)
-        self.upper = torch.tensor(self._upper, dtype=torch.float32)
-        self.n = layout.n_fins
-
-    def inside(self, command: Tensor) -> Array:
-        """Commands in double precision, inside the limits to the last bit."""
-        return np.clip(command.numpy().astype(np.float64), self._lower, self._upper)
+    def _candidates(self, robot: _Robot, command: Array, target: Array, source: str) -> Candidates:
+        """Candidates (K, n, 3) of a single target (6,), best first."""
+        wrench = robot.surrogate.wrench(command).astype(np.float64)
+        error = self.normalization.error(wrench, target)
+        order = np.argsort(error, kind="stable")
+        inside = _inside(robot, command[order])
+        names = (source,) * len(order)
+        return Candidates(inside, wrench[order], error[order], robot.energy(inside), names)
 
 
-def _mean_of(mixture: Mixture) -> Tensor:
-    """Mean (N, n, 3) of a mixture, in normalized coordinates."""
-    weight = mixture.logits.softmax(-1)
-    weight = weight[:, None, :, None] if mixture.joint else weight[..., None]
-    return (weight * mixture.mean).sum(2)
+def _to_command(robot: _Robot, x: Array) -> Array:
+    """Commands (..., n, 3) of normalized ones, -1 at the lower and 1 at the upper limits; not clamped."""
+    limits = robot.problem.float32
+    command: Array = limits.lower + limits.half + x * limits.half
+    return command
+
+
+def _to_normalized(robot: _Robot, command: Array) -> Array:
+    """Inverse of `_to_command`; where a limit range has no width, 0."""
+    limits = robot.problem.float32
+    return np.asarray((command - limits.lower - limits.half) / np.maximum(limits.half, np.float32(1e-9)))
+
+
+def _take(command: Array, index: Array) -> Array:
+    """Of commands (N, K, n, 3) those with the numbers (N, k)."""
+    return np.asarray(np.take_along_axis(command, index[..., None, None], axis=1))
+
+
+def _inside(robot: _Robot, command: Array) -> Array:
+    """Commands in double precision, inside the limits to the last bit."""
+    return np.clip(command.astype(np.float64), robot.problem.lower, robot.problem.upper)

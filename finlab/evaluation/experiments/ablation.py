@@ -17,8 +17,6 @@ from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.learned.paper import PaperAllocator
-from finlab.errors import AllocationError
-from finlab.evaluation.experiments.ablation_refinement import PaperWithLevenbergMarquardt
 from finlab.evaluation.experiments.wrench_tracking import score
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.splits import Case
@@ -28,19 +26,16 @@ from finlab.evaluation.statistics.tables import text_table
 from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
 
 VARIANTS: dict[str, dict[str, Any]] = {
-    "mean_only": {"mean_only": True, "refine": False},
-    "without_refinement": {"refine": False},
+    "mean_only": {"mean_only": True},
+    "without_refinement": {"refinement": "none"},
     "nll_selection": {"ranking": "nll"},
     "random_warm_start": {"warm_start": "random"},
     "ours": {},
 }
 """The paper's rows as options of method `paper`. Its mean-only row takes a tenth of the time of the refined
 ones, so no refinement follows the mean."""
-REFINEMENTS: dict[str, type[PaperAllocator]] = {
-    "adam": PaperAllocator,
-    "levenberg-marquardt": PaperWithLevenbergMarquardt,
-}
-"""Refinement -> method."""
+REFINEMENTS = ("adam", "levenberg-marquardt")
+"""Refinements of method `paper` that are compared."""
 TIMED_CALLS = 10
 """Single calls whose mean time a row shows, after one that is not counted."""
 
@@ -78,11 +73,9 @@ def ablation_method(
     Raises:
         AllocationError: unknown refinement.
     """
-    if refinement not in REFINEMENTS:
-        raise AllocationError(f"refinement: expected one of {', '.join(REFINEMENTS)}, got {refinement!r}")
-    loaded = read_checkpoint(resolve_checkpoint(checkpoint or "paper"))
-    options = {"n_candidates": n_candidates, "temperature": temperature, **VARIANTS[variant]}
-    return REFINEMENTS[refinement](loaded, **options)
+    weights = read_checkpoint(resolve_checkpoint(checkpoint or "paper"))
+    options = {"n_candidates": n_candidates, "temperature": temperature, "refinement": refinement}
+    return PaperAllocator(weights, **{**options, **VARIANTS[variant]})
 
 
 def run_variant(allocator: Allocator, cases: Sequence[Case], *, seed: int = 0) -> Scored:

@@ -50,14 +50,14 @@ def temperature_columns(
         n_candidates: candidates drawn per target.
         seed: of the draw.
     """
-    allocator = _method(checkpoint, n_candidates=n_candidates, temperature=temperature, refine=False)
+    allocator = _method(checkpoint, n_candidates=n_candidates, temperature=temperature, refinement="none")
     rows: list[tuple[float, ...]] = []
     for k, case in enumerate(tqdm(cases, unit="layout", disable=None, leave=False, file=sys.stderr)):
         layout = case.layout.without(case.failed) if case.failed else case.layout
         for number, target in enumerate(case.targets):
             samples = allocator.allocate(layout, target, seed=seed).samples
             assert samples is not None
-            j = samples.err_norm**2 + allocator.gamma * samples.energy
+            j = samples.err_norm**2 + allocator.settings.gamma * samples.energy
             spread = diversity(samples.command, layout)
             rows.append((k, number, layout.n_fins, spread, float(j.min()), float(j.mean())))
     names = ("layout", "target", "n_fins", "diversity", "best_j", "mean_j")

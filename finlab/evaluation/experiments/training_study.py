@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.evaluation.experiments.ablation_refinement import PaperWithLevenbergMarquardt
+from finlab.allocation.learned.paper import PaperAllocator
 from finlab.evaluation.experiments.wrench_tracking import run_method
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
@@ -115,8 +115,9 @@ def train_and_run(
     weights = replace(
         trained.weights(), surrogate=physics.surrogate, surrogate_config=physics.surrogate_config
     )
-    raw = run_method(PaperWithLevenbergMarquardt(weights, refine=False), cases, seed=seed)
-    refined = run_method(PaperWithLevenbergMarquardt(weights, n_lm_steps=LM_STEPS), cases, seed=seed)
+    raw = run_method(PaperAllocator(weights, refinement="none"), cases, seed=seed)
+    few_steps = PaperAllocator(weights, refinement="levenberg-marquardt", n_steps=LM_STEPS)
+    refined = run_method(few_steps, cases, seed=seed)
     after = {"refined_err_norm": refined.err_norm, "refined_energy": refined.energy}
     return columns_of_records(raw) | after | {"train_s": np.array(train_s)}
 

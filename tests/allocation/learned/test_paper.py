@@ -1,10 +1,13 @@
 """The paper's own pipeline on untrained networks: repeatable, inside limits, and refinement refines."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import torch
 
-from finlab.allocation.learned.paper import CHUNK, PaperAllocator
+from finlab.allocation.learned.paper import ADAM_RATE, CHUNK, PaperAllocator
 from finlab.assets import shipped_layouts
 from finlab.errors import AllocationError, CheckpointError
 from finlab.inference.features import SIZES
@@ -14,6 +17,7 @@ from finlab.layout import Fin, Layout, Limits, load_layout
 from finlab.physics import Plant
 from finlab.training.networks.allocator_network import AllocatorNetwork
 from finlab.training.networks.checkpoint import Checkpoint
+from finlab.training.networks.mixture import to_command, to_normalized
 from finlab.training.networks.surrogate import make_surrogate
 
 TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]
@@ -59,11 +63,12 @@ def keeps_limits(layout: Layout, command: np.ndarray) -> bool:
 
 ABLATIONS: list[dict[str, object]] = [
     {},
-    {"refine": False},
+    {"refinement": "none"},
     {"mean_only": True},
     {"warm_start": "random"},
+    {"refinement": "levenberg-marquardt"},
     {"ranking": "nll"},
-    {"ranking": "nll", "refine": False},
+    {"ranking": "nll", "refinement": "none"},
     {"n_candidates": 1},
     {"temperature": 1.0, "n_refined": 100},
 ]
@@ -100,7 +105,7 @@ def test_refinement_lowers_what_the_surrogate_sees(checkpoint: Checkpoint, robot
         return float(method.normalization.error(wrench, targets).mean())
 
     targets = np.random.default_rng(1).normal(size=(10, 6)) * checkpoint.normalization.std
-    mean, ranked, refined = believed(mean_only=True), believed(refine=False), believed()
+    mean, ranked, refined = believed(mean_only=True), believed(refinement="none"), believed()
     assert refined < 0.9 * ranked < 0.9 * mean
 
 
@@ -133,7 +138,7 @@ def test_failed_fins_are_left_out(checkpoint: Checkpoint, robot: Layout) -> None
 
 
 def test_targets_beyond_one_chunk_get_their_answers(checkpoint: Checkpoint) -> None:
-    method = PaperAllocator(checkpoint.weights(), n_candidates=2, refine=False)
+    method = PaperAllocator(checkpoint.weights(), n_candidates=2, refinement="none")
     layout = Layout("pair", (Fin("a", (0.1, 0.0, 0.0), 0.0), Fin("b", (-0.1, 0.0, 0.0), 2.0)))
     targets = np.random.default_rng(0).normal(size=(CHUNK + 1, 6))
     batch = method.allocate_batch(layout, targets)
@@ -164,3 +169,85 @@ def test_refuses_a_checkpoint_without_network(checkpoint: Checkpoint) -> None:
     alone = Checkpoint("alone", checkpoint.surrogate, checkpoint.normalization, {"type": "drag"})
     with pytest.raises(CheckpointError, match="checkpoint 'alone' holds a surrogate only"):
         PaperAllocator(alone.weights())
+
+
+def tensors_of(robot: Layout) -> list[torch.Tensor]:
+    layout = (robot.position, robot.mounting_angle, robot.lower, robot.upper)
+    return [torch.tensor(part, dtype=torch.float32) for part in layout]
+
+
+def test_adam_goes_where_torch_goes(checkpoint: Checkpoint, robot: Layout) -> None:
+    """The whole refinement in PyTorch, from the raw candidates that the method drew."""
+    method = PaperAllocator(checkpoint.weights(), n_candidates=3, n_refined=3, gamma=0.05, n_steps=25)
+    before = PaperAllocator(checkpoint.weights(), n_candidates=3, n_refined=3, gamma=0.05, refinement="none")
+    target = np.array(TARGET) * 0.3
+    start = before.allocate(robot, target).candidates
+    assert start is not None
+    layout, std = tensors_of(robot), torch.tensor(method.normalization.std, dtype=torch.float32)
+    wanted = torch.tensor(target, dtype=torch.float32)
+    lower, upper = layout[2:]
+    x = to_normalized(torch.tensor(start.command, dtype=torch.float32), lower, upper).requires_grad_(True)
+    optimizer = torch.optim.Adam([x], lr=ADAM_RATE)
+    for step in range(25):
+        optimizer.param_groups[0]["lr"] = ADAM_RATE * (1.0 - 0.95 * step / 25)
+        command = to_command(x, lower, upper)
+        error = (checkpoint.surrogate(command, *layout) - wanted) / std
+        a, f, d = (command / upper.abs()).unbind(-1)
+        energy = (a * a + f * f + 0.1 * d * d + a * f).sum(-1)
+        optimizer.zero_grad()
+        (error.square().sum(-1) + 0.05 * energy).sum().backward()
+        optimizer.step()
+        with torch.no_grad():
+            x.clamp_(-1.0, 1.0)
+    expected = to_command(x.detach(), lower, upper).numpy()
+    assert np.abs(expected - start.command).max() > 0.1
+    got = method.allocate(robot, target).candidates
+    assert got is not None
+    # Both list their candidates best first; those that were refined may have changed places.
+    distance = np.abs(got.command[:, None] - expected[None]).max((2, 3))
+    np.testing.assert_allclose(distance.min(1), 0.0, atol=2e-4)
+    assert sorted(distance.argmin(1)) == [0, 1, 2]
+
+
+def test_levenberg_marquardt_reaches_what_the_surrogate_can_give(
+    checkpoint: Checkpoint, robot: Layout
+) -> None:
+    """A target that the surrogate itself gives is met to rounding, correction included."""
+    method = PaperAllocator(checkpoint.weights(), refinement="levenberg-marquardt", n_refined=8)
+    share = np.random.default_rng(3).random((8, robot.n_fins, 3))
+    command = torch.tensor(robot.lower + share * (robot.upper - robot.lower), dtype=torch.float32)
+    targets = checkpoint.surrogate(command, *tensors_of(robot)).numpy().astype(np.float64)
+    error = method.normalization.error(method.allocate_batch(robot, targets).wrench_surrogate, targets)
+    raw = PaperAllocator(checkpoint.weights(), refinement="none").allocate_batch(robot, targets)
+    assert np.median(error) < 0.05 * np.median(method.normalization.error(raw.wrench_surrogate, targets))
+
+
+def test_the_shipped_checkpoint_answers_without_torch() -> None:
+    code = (
+        "import sys\n"
+        "sys.modules['torch'] = None\n"
+        "import finlab\n"
+        "allocator = finlab.load_allocator('paper')\n"
+        "print(allocator.allocate(finlab.load_layout('A'), [1, 0, 0.5, 0, 0, 0.1]).command.shape)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert done.stdout == "(4, 3)\n"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"n_candidates": 0}, "at least one candidate"),
+        ({"n_refined": 0}, "at least one candidate"),
+        ({"temperature": -0.1}, "a temperature from 0"),
+        ({"temperature": float("nan")}, "a temperature from 0"),
+        ({"refinement": "magic"}, "refinement: expected one of none, adam, levenberg-marquardt, got 'magic'"),
+    ],
+)
+def test_refuses_settings_that_leave_nothing_to_answer_with(
+    options: dict[str, object], message: str, checkpoint: Checkpoint
+) -> None:
+    with pytest.raises(AllocationError, match=message):
+        PaperAllocator(checkpoint.weights(), **options)

@@ -1,0 +1,28 @@
+"""A surrogate on a layout against the trained module, for both kinds."""
+
+import numpy as np
+import pytest
+import torch
+
+from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
+from finlab.inference.surrogate import surrogate_on
+from finlab.layout import random_layout
+from finlab.training.networks.checkpoint import Checkpoint
+
+
+@pytest.mark.parametrize("name", ["default", "paper"])
+@pytest.mark.parametrize("seed", range(3))
+def test_wrenches_are_those_of_the_trained_one(name: str, seed: int) -> None:
+    weights = read_checkpoint(resolve_checkpoint(name))
+    rng = np.random.default_rng(seed)
+    robot = random_layout(rng, limits="varied")
+    share = rng.random((4, 5, robot.n_fins, 3))
+    command = (robot.lower + share * (robot.upper - robot.lower)).astype(np.float32)
+    layout = (robot.position, robot.mounting_angle, robot.lower, robot.upper)
+    tensors = [torch.tensor(part, dtype=torch.float32) for part in layout]
+    expected = Checkpoint.of(weights).surrogate(torch.from_numpy(command), *tensors).numpy()
+    surrogate = surrogate_on(robot, weights)
+    np.testing.assert_allclose(surrogate.wrench(command[0]), expected[0], atol=2e-5)
+    force, slopes = surrogate.fins.force_and_slopes(command[1])
+    assert slopes.shape == (5, robot.n_fins, 3, 3)
+    np.testing.assert_allclose(force, surrogate.fins.force(command[1]), atol=2e-5)
