@@ -63,13 +63,13 @@ _DESCRIPTION = "Control allocation for fin-actuated underwater robots: a target 
 
 def _command_line() -> SubcommandApp:
     """All verbs; a function may return an exit code, None means 0."""
-    from finlab.cli import allocate, app, eval_allocation, export, layout, simulate, train
+    from finlab.cli import allocate, app, evaluate, export, layout, simulate, train
 
     root = SubcommandApp()
     root.command(allocate.allocate)
     root.command(layout.verbs, name="layout", help="Check, show and optimize layout files.")
     root.command(train.verbs, name="train", help="Train the surrogate and the allocator.")
-    root.command(eval_allocation.verbs, name="eval", help="Measure methods against the analytic fin model.")
+    root.command(evaluate.verbs, name="eval", help="Measure methods against the analytic fin model.")
     root.command(simulate.simulate)
     root.command(export.export)
     root.command(app.app)

@@ -1,35 +1,172 @@
-"""`finlab eval steadiness|modes|unreachable`: what an allocator does from tick to tick,
-how many ways it knows, and what it delivers of wrenches out of reach."""
+"""`finlab eval wrench|seeds|ablation|temperature|latency|...`: methods on targets, without a body."""
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Annotated
 
 from tyro.conf import arg
 
 from finlab.cli.eval_arguments import (
-    Checkpoint,
+    Cases,
     Count,
-    JsonFile,
-    Split,
+    Folder,
+    Names,
+    Run,
+    check_folder,
     check_positive,
-    check_writable,
     open_layouts,
-    write_json,
 )
-from finlab.cli.eval_closed_loop import verbs
 
-Layouts = Annotated[str, arg(metavar="A,B,...")]
+RUN = Run()
+MANY, FORTY, TWENTY = Cases(), Cases(layouts=40, targets=25), Cases(layouts=20, targets=100)
+FEW, PAIRS = Cases(layouts=20, targets=2), Cases(targets=2)
+SUBSAMPLE = 10
+"""Targets of each layout that methods of a tenth of a second solve unless told otherwise."""
 
 
-@verbs.command
+def wrench(
+    cases: Annotated[Cases, arg(name="")] = MANY,
+    methods: Names = "learned,paper",
+    single: Annotated[int | None, arg(metavar="N")] = None,
+    subsample: Count = SUBSAMPLE,
+    records: Folder = None,
+    run: Annotated[Run, arg(name="")] = RUN,
+) -> None:
+    """Track reachable wrenches on held-out layouts; error, energy and time of each method.
+
+    Args:
+        methods: names with commas between: learned, fast, paper, qp, sqp, analytic, multistart, trf, slsqp,
+            ipopt; a number of starts may follow the last three, as in ipopt-32.
+        single: solve only the first N targets of each layout, one call each, and time the calls.
+        subsample: trf, slsqp and ipopt solve only the first N targets of each layout; column n says how many.
+        records: folder for the records, one NPZ file for each split and method.
+    """
+    from finlab.evaluation.experiments.wrench_tracking import (
+        energy_comparison,
+        interval_rows,
+        run_method,
+        wrench_report,
+        wrench_rows,
+    )
+    from finlab.evaluation.method_specs import is_slow
+    from finlab.evaluation.splits import SPLITS
+    from finlab.evaluation.statistics.records import columns_of_records, save_columns
+
+    check_positive("single", single)
+    check_positive("subsample", subsample)
+    check_folder("records", records)
+    allocators = run.methods(methods)
+    rows, intervals, energies = [], [], []
+    for k, part in enumerate(SPLITS if cases.split == "all" else (cases.split,)):
+        drawn = cases.draw(part)
+        found = {
+            name: run_method(allocator, drawn, single=single, first=subsample if is_slow(name) else None)
+            for name, allocator in allocators.items()
+        }
+        if records is not None:
+            for name, each in found.items():
+                made = asdict(cases) | {"split": part, "method": name}
+                made["checkpoint"] = allocators[name].checkpoint
+                save_columns(records / f"wrench-{part}-{name}.npz", columns_of_records(each), made)
+        rows += wrench_rows(found, part)
+        intervals += interval_rows(found, part)
+        energies += [{"split": part, **row} for row in energy_comparison(found)]
+        print(("\n" if k else "") + wrench_report(found, part, single=single))
+    run.write(rows=rows, intervals=intervals, energies=energies)
+
+
+def seeds(
+    cases: Annotated[Cases, arg(name="")] = FORTY,
+    candidates: Count = 16,
+    run: Annotated[Run, arg(name="")] = RUN,
+) -> None:
+    """What learning buys: the network's seeds against random ones, at equal numbers and refinement steps.
+
+    Args:
+        candidates: seeds per target, of every kind.
+    """
+    from finlab.evaluation.experiments.seeds import learned_allocator, seed_report, seed_rows
+
+    check_positive("candidates", candidates)
+    allocator = learned_allocator(run.checkpoint)
+    rows = seed_rows(allocator, cases.draw(), n_seeds=candidates, seed=cases.seed)
+    run.show(seed_report(rows, candidates), rows=rows)
+
+
+def ablation(
+    cases: Annotated[Cases, arg(name="")] = TWENTY,
+    candidates: Count = 64,
+    temperature: Annotated[float, arg(metavar="T")] = 0.02,
+    run: Annotated[Run, arg(name="")] = RUN,
+) -> None:
+    """Change one stage of the paper's pipeline at a time; scored by its surrogate and by the plant.
+
+    Args:
+        candidates: candidates drawn per target.
+        temperature: of the draw.
+    """
+    from finlab.evaluation.experiments.ablation import ablation_report, ablation_rows
+
+    rows = ablation_rows(
+        cases.draw(),
+        checkpoint=run.checkpoint,
+        n_candidates=candidates,
+        temperature=temperature,
+        seed=cases.seed,
+    )
+    run.show(ablation_report(rows), rows=rows)
+
+
+def temperature(
+    cases: Annotated[Cases, arg(name="")] = PAIRS,
+    candidates: Count = 64,
+    run: Annotated[Run, arg(name="")] = RUN,
+) -> None:
+    """Diversity and best J of the candidates against the temperature of the draw (the paper's figure A).
+
+    Args:
+        candidates: candidates drawn per target.
+    """
+    from finlab.evaluation.experiments.temperature import temperature_report, temperature_rows
+
+    check_positive("candidates", candidates)
+    rows = temperature_rows(cases.draw(), checkpoint=run.checkpoint, n_candidates=candidates, seed=cases.seed)
+    run.show(temperature_report(rows), rows=rows)
+
+
+def latency(
+    methods: Names = "learned,paper,analytic,qp,sqp,multistart,trf,slsqp",
+    fins: Count = 4,
+    calls: Count = 200,
+    budget: Annotated[float, arg(metavar="SECONDS")] = 20.0,
+    seed: Count = 0,
+    run: Annotated[Run, arg(name="")] = RUN,
+) -> None:
+    """Time single calls of methods side by side in one run.
+
+    Args:
+        methods: names with commas between; ipopt needs its extra.
+        fins: fins of the layouts, 2 to 5.
+        calls: calls of each method.
+        budget: a slow method stops after this long.
+        seed: draws layouts and targets.
+    """
+    from finlab.evaluation.experiments.latency import latency_cases, latency_report, latency_rows, machine
+
+    check_positive("calls", calls)
+    cases = latency_cases(fins, seed)
+    rows = latency_rows(run.methods(methods), cases, n_calls=calls, budget_s=budget)
+    described = machine()
+    run.show(latency_report(rows, described), rows=rows, machine=described)
+
+
 def steadiness(
-    layouts: Layouts = "A,B,C,D,ucat,asymmetric,penta,hexa,octo,restricted,pair",
+    layouts: Names = "A,B,C,D,ucat,asymmetric,penta,hexa,octo,restricted,pair",
     paths: Count = 3,
     ticks: Count = 600,
     seed: Count = 0,
-    checkpoint: Checkpoint = None,
-    json: JsonFile = None,
+    run: Annotated[Run, arg(name="")] = RUN,
 ) -> None:
     """Follow smooth paths of wrenches at 10 Hz with and without the previous command; turns and energy.
 
@@ -38,76 +175,42 @@ def steadiness(
         paths: random paths of each layout.
         ticks: length of a path; 600 are a minute.
         seed: draws the paths; same numbers, same paths.
-        checkpoint: trained checkpoint; the shipped one by default.
-        json: file for the rows.
     """
-    from finlab.allocation import load_allocator
     from finlab.evaluation.experiments.steadiness import steadiness_report, steadiness_rows
 
     check_positive("paths", paths)
     check_positive("ticks", ticks - 1)
-    check_writable(json)
     robots = open_layouts(layouts)
-    rows = steadiness_rows(
-        load_allocator(checkpoint=checkpoint), robots, n_paths=paths, ticks=ticks, seed=seed
-    )
-    write_json(json, {"rows": rows})
-    print(steadiness_report(rows))
+    rows = steadiness_rows(run.learned(), robots, n_paths=paths, ticks=ticks, seed=seed)
+    run.show(steadiness_report(rows), rows=rows)
 
 
-@verbs.command
 def modes(
-    split: Split = "id",
-    layouts: Count = 20,
-    targets: Count = 2,
+    cases: Annotated[Cases, arg(name="")] = FEW,
     starts: Count = 256,
-    seed: Count = 0,
-    checkpoint: Checkpoint = None,
-    json: JsonFile = None,
+    run: Annotated[Run, arg(name="")] = RUN,
 ) -> None:
     """Compare the distinct ways that an answer tells with those that many random starts lead to.
 
     Args:
-        split: id, ood, ood-fins, limits, failure or near-singular.
-        layouts: layouts of the split.
-        targets: targets on each layout.
         starts: random starts of the ground truth, per target.
-        seed: draws layouts, targets and starts.
-        checkpoint: trained checkpoint; the shipped one by default.
-        json: file for the rows.
     """
-    from finlab.allocation import load_allocator
     from finlab.evaluation.experiments.mode_coverage import mode_report, mode_rows
-    from finlab.evaluation.splits import make_split
 
     check_positive("starts", starts)
-    check_writable(json)
-    cases = make_split(split, layouts, targets, seed)
-    rows = mode_rows(load_allocator(checkpoint=checkpoint), cases, n_starts=starts, seed=seed)
-    write_json(json, {"rows": rows})
-    print(mode_report(rows, starts))
+    rows = mode_rows(run.learned(), cases.draw(), n_starts=starts, seed=cases.seed)
+    run.show(mode_report(rows, starts), rows=rows)
 
 
-@verbs.command
-def unreachable(
-    layouts: Count = 50,
-    seed: Count = 0,
-    checkpoint: Checkpoint = None,
-    json: JsonFile = None,
-) -> None:
+def unreachable(layouts: Count = 50, seed: Count = 0, run: Annotated[Run, arg(name="")] = RUN) -> None:
     """Ask for wrenches out of reach; what each policy delivers against the best possible.
 
     Args:
         layouts: random layouts of 2 to 8 fins per kind of limits, with one target each.
         seed: draws layouts and targets.
-        checkpoint: trained checkpoint; the shipped one by default.
-        json: file for the rows.
     """
-    from finlab.allocation import load_allocator
     from finlab.evaluation.experiments.unreachable import unreachable_report, unreachable_rows
 
     check_positive("layouts", layouts)
-    check_writable(json)
-    rows = unreachable_rows(load_allocator(checkpoint=checkpoint), n_layouts=layouts, seed=seed)
-    write_json(json, {"rows": rows})
-    print(unreachable_report(rows))
+    rows = unreachable_rows(run.learned(), n_layouts=layouts, seed=seed)
+    run.show(unreachable_report(rows), rows=rows)

@@ -1,30 +1,128 @@
-"""What the `eval` verbs share: kinds of arguments, checks before the work, JSON files after it."""
+"""What the `eval` verbs share: groups of arguments, checked before the work, and JSON files after it."""
 
 from __future__ import annotations
 
-import json
+import json as json_text
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import arg
 
+from finlab.errors import DataError
+
 if TYPE_CHECKING:
     from finlab.allocation import Allocator
+    from finlab.evaluation.splits import Case
     from finlab.layout import Layout
 
 Count = Annotated[int, arg(metavar="N")]
-Split = Annotated[str, arg(metavar="NAME")]
-Methods = Annotated[str, arg(metavar="A,B,...")]
+Name = Annotated[str, arg(metavar="NAME")]
+Names = Annotated[str, arg(metavar="A,B,...")]
 Checkpoint = Annotated[str | None, arg(metavar="NAME|FOLDER")]
-JsonFile = Annotated[Path | None, arg(metavar="FILE")]
 Folder = Annotated[Path | None, arg(metavar="DIR")]
+Source = Annotated[str, arg(metavar="NAME|FILE")]
 
 
-def load_methods(methods: str, checkpoint: str | None) -> dict[str, Allocator]:
-    """All methods, loaded before the first one runs so that a wrong name costs no time."""
-    from finlab.evaluation.method_specs import load_method_spec, method_names
+@dataclass(frozen=True)
+class Cases:
+    """Held-out layouts with reachable targets."""
 
-    return {name: load_method_spec(name, checkpoint) for name in method_names(methods)}
+    split: Name = "id"
+    """One of id, ood, ood-fins, limits, failure, near-singular; `eval wrench` takes all, too."""
+    layouts: Count = 100
+    """Layouts of the split."""
+    targets: Count = 1000
+    """Targets on each layout."""
+    seed: Count = 0
+    """Of all draws; same numbers, same cases."""
+
+    def draw(self, split: str | None = None) -> list[Case]:
+        """The cases, of this or another split."""
+        from finlab.evaluation.splits import make_split
+
+        return make_split(split or self.split, self.layouts, self.targets, self.seed)
+
+
+@dataclass(frozen=True)
+class Output:
+    """Where the rows go."""
+
+    json: Annotated[Path | None, arg(metavar="FILE")] = None
+    """File for the rows."""
+
+    def __post_init__(self) -> None:
+        """Refuses a file that cannot be written before the work, not after."""
+        if self.json is not None and (self.json.is_dir() or not self.json.absolute().parent.is_dir()):
+            raise DataError(f"json: expected a file in an existing folder, got {self.json}")
+
+    def write(self, **content: Any) -> None:
+        """Write the rows, where a file was named."""
+        if self.json is not None:
+            self.json.write_text(json_text.dumps(content, indent=1, allow_nan=False) + "\n", "utf-8")
+
+    def show(self, text: str, **content: Any) -> None:
+        """Write the rows, and print the tables."""
+        self.write(**content)
+        print(text)
+
+
+@dataclass(frozen=True)
+class Run(Output):
+    """What is measured, and where the rows go."""
+
+    checkpoint: Checkpoint = None
+    """Trained checkpoint, a shipped name or a folder; the shipped one of each method by default."""
+
+    def methods(self, names: str) -> dict[str, Allocator]:
+        """All methods, loaded before the first one runs so that a wrong name costs no time."""
+        from finlab.evaluation.method_specs import load_method_specs
+
+        return load_method_specs(names, self.checkpoint)
+
+    def learned(self) -> Allocator:
+        """The learned method."""
+        from finlab.allocation import load_allocator
+
+        return load_allocator(checkpoint=self.checkpoint)
+
+
+@dataclass(frozen=True)
+class ClosedLoopRuns:
+    """Runs in simulation."""
+
+    methods: Names = "learned"
+    """Names with commas between; also on-board, U-CAT's own law at a fixed frequency, and learned-power, the
+    learned method with inertial power for its energy."""
+    runs: Count = 5
+    """Runs of each, with other noise."""
+    seed: Count = 0
+    """Of the first run; the others follow on."""
+    plant: Name = "mean"
+    """One of mean, ripple, flexible."""
+    steady: bool = False
+    """Tell the allocator its previous command."""
+    figures: Folder = None
+    """Existing folder for pictures."""
+
+    def __post_init__(self) -> None:
+        """Refuses before the runs what would fail after them."""
+        check_positive("runs", self.runs)
+        if self.figures is not None and not self.figures.is_dir():
+            raise DataError(f"figures: expected a folder that exists, got {self.figures}")
+
+    @property
+    def seeds(self) -> range:
+        """Of every run."""
+        return range(self.seed, self.seed + self.runs)
+
+    def draw(self, name: str, save: Callable[[Any, Path], None], content: Any) -> None:
+        """Draw into the folder, where one was named, and say so."""
+        if self.figures is not None:
+            path = self.figures / f"{name}.png"
+            save(content, path)
+            print(f"\n{path}: written.")
 
 
 def open_layouts(names: str) -> list[Layout]:
@@ -40,29 +138,11 @@ def open_layouts(names: str) -> list[Layout]:
 
 def check_positive(name: str, value: int | None) -> None:
     """Refuse a number below one."""
-    from finlab.errors import DataError
-
     if value is not None and value < 1:
         raise DataError(f"{name}: expected a number of at least 1, got {value}")
 
 
-def check_writable(path: Path | None) -> None:
-    """Refuse a file that cannot be written before the work, not after."""
-    from finlab.errors import DataError
-
-    if path is not None and (path.is_dir() or not path.absolute().parent.is_dir()):
-        raise DataError(f"json: expected a file in an existing folder, got {path}")
-
-
 def check_folder(name: str, path: Path | None) -> None:
     """Refuse a folder that cannot be one."""
-    from finlab.errors import DataError
-
     if path is not None and path.exists() and not path.is_dir():
         raise DataError(f"{name}: expected a folder, got the file {path}")
-
-
-def write_json(path: Path | None, content: dict[str, Any]) -> None:
-    """Write the rows, where a file was named."""
-    if path is not None:
-        path.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", "utf-8")

@@ -1,80 +1,27 @@
-"""`finlab eval temperature|training|report`: the studies behind the pictures, and the whole page."""
+"""`finlab eval training|report`: what is made of many jobs, kept in a folder."""
 
 from __future__ import annotations
 
 import shlex
-import sys
 from pathlib import Path
 from typing import Annotated
 
 from tyro.conf import arg
 
-from finlab.cli.eval import verbs
-from finlab.cli.eval_arguments import (
-    Checkpoint,
-    Count,
-    Folder,
-    JsonFile,
-    Split,
-    check_folder,
-    check_positive,
-    check_writable,
-    write_json,
-)
+from finlab.cli.eval_arguments import Checkpoint, Count, Folder, Name, Output, check_folder, check_positive
+
+OUTPUT = Output()
 
 
-@verbs.command
-def temperature(
-    split: Split = "id",
-    layouts: Count = 100,
-    targets: Count = 2,
-    candidates: Count = 64,
-    seed: Count = 0,
-    checkpoint: Checkpoint = None,
-    json: JsonFile = None,
-) -> None:
-    """Diversity and best J of the candidates against the temperature of the draw (the paper's figure A).
-
-    Args:
-        split: id, ood, ood-fins, limits, failure or near-singular.
-        layouts: layouts of the split.
-        targets: targets on each layout.
-        candidates: candidates drawn per target.
-        seed: draws layouts, targets and candidates.
-        checkpoint: trained checkpoint of method paper; the shipped one by default.
-        json: file for the rows.
-    """
-    from tqdm import tqdm
-
-    from finlab.evaluation.experiments.temperature import (
-        TEMPERATURES,
-        temperature_columns,
-        temperature_report,
-        temperature_row,
-    )
-    from finlab.evaluation.splits import make_split
-
-    check_positive("candidates", candidates)
-    check_writable(json)
-    cases = make_split(split, layouts, targets, seed)
-    rows = []
-    for value in tqdm(TEMPERATURES, unit="temperature", disable=None, leave=False, file=sys.stderr):
-        columns = temperature_columns(cases, value, checkpoint=checkpoint, n_candidates=candidates, seed=seed)
-        rows.append(temperature_row(value, columns))
-    write_json(json, {"rows": rows})
-    print(temperature_report(rows))
-
-
-@verbs.command
 def training(
     out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")] = Path("runs/training-study"),
-    preset: Annotated[str, arg(metavar="NAME")] = "default",
+    preset: Name = "default",
     steps: Count = 600,
     batch_size: Count = 256,
     layouts: Count = 40,
     targets: Count = 25,
     seed: Count = 0,
-    json: JsonFile = None,
+    output: Annotated[Output, arg(name="")] = OUTPUT,
 ) -> None:
     """What each part of the training brings: small trainings on equal budgets, one thing changed at a time.
 
@@ -88,7 +35,6 @@ def training(
         layouts: layouts of split id on which the networks are tried.
         targets: targets on each layout.
         seed: draws data, weights, layouts and targets.
-        json: file for the rows.
     """
     from finlab.evaluation.experiments.training_study import training_report, training_row
     from finlab.evaluation.report.jobs import run_jobs
@@ -100,20 +46,18 @@ def training(
 
     for name, value in (("steps", steps), ("batch-size", batch_size)):
         check_positive(name, value)
-    check_writable(json)
     check_folder("out", out)
     get_preset(preset)
     make_split("id", layouts, targets, seed)
     settings = {"preset": preset, "steps": steps, "batch_size": batch_size}
-    jobs = training_jobs({**settings, "layouts": layouts, "targets": targets, "seed": seed}, out)
+    settings |= {"layouts": layouts, "targets": targets, "seed": seed}
+    jobs = training_jobs(settings, out)
     store = Store(out)
     run_jobs(list(jobs.values()), store, commit=source_commit(), processes=0)
     rows = [training_row(name, job.result(store).columns) for name, job in jobs.items()]
-    write_json(json, {"rows": rows})
-    print(training_report(rows, preset, steps, batch_size))
+    output.show(training_report(rows, preset, steps, batch_size), rows=rows)
 
 
-@verbs.command
 def report(
     out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
     quick: bool = False,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from finlab.deploy.graph_file import LayoutGraph
+    from finlab.deploy.graph import LayoutGraph
     from finlab.layout import Layout
 
 GRAPH_SUFFIX = ".graph.json"

@@ -50,7 +50,7 @@ def simulate(
 
     from finlab.cli.inputs import open_robot
     from finlab.control import WaypointController, WaypointGains, load_gains
-    from finlab.evaluation.experiments.closed_loop_runs import load_methods
+    from finlab.evaluation.method_specs import load_method_spec
     from finlab.sim import NO_NOISE, ClosedLoop, make_trajectory
 
     robot = open_robot(layout)
@@ -58,7 +58,7 @@ def simulate(
     _check_folder(output)
     swim = ClosedLoop(
         robot.layout,
-        next(iter(load_methods(method, checkpoint).values())),
+        load_method_spec(method, checkpoint),
         make_trajectory(trajectory, duration),
         WaypointController(load_gains(WaypointGains, gains)),
         plant=plant,

@@ -9,7 +9,9 @@ from pathlib import Path
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import LEARNED, load_allocator
 from finlab.errors import AllocationError
+from finlab.evaluation.on_board import OnBoard
 from finlab.inference.checkpoint import read_checkpoint, read_normalization, resolve_checkpoint
+from finlab.physics.energy import POWER_WEIGHTS
 
 SLOW = ("trf", "slsqp", "ipopt")
 """Methods that take a tenth of a second per target, each from several starts; they run on a subsample."""
@@ -33,16 +35,26 @@ def is_slow(name: str) -> bool:
     return method_and_starts(name)[0] in SLOW
 
 
+def load_method_specs(names: str, checkpoint: str | Path | None = None) -> dict[str, Allocator]:
+    """Allocators by name, from names with commas between; `AllocationError` where there is none."""
+    return {name: load_method_spec(name, checkpoint) for name in method_names(names)}
+
+
 def load_method_spec(name: str, checkpoint: str | Path | None = None) -> Allocator:
     """The allocator of a specification, as `finlab.load_allocator` makes it.
 
     Args:
-        name: `sqp`, say, or `ipopt-32` for 32 starts.
+        name: a method; `ipopt-32`, say, for 32 starts; `on-board`, U-CAT's own method; or `learned-power`,
+            the learned method with the inertial power in place of the paper's energy proxy.
         checkpoint: as in `load_allocator`.
 
     Raises:
         AllocationError: unknown method, or starts for a method that has none.
     """
+    if name == "learned-power":
+        return load_allocator("learned", checkpoint=checkpoint, energy_weights=POWER_WEIGHTS)
+    if name == OnBoard.name:
+        return OnBoard(load_allocator("analytic", checkpoint=checkpoint).normalization)
     method, starts = method_and_starts(name)
     if starts is None:
         return load_allocator(method, checkpoint=checkpoint)

@@ -15,7 +15,9 @@ PAPER_METHODS = {"paper": "ours", "qp": "qp", "sqp": "sqp"}
 @cache
 def paper_figures() -> dict[str, Any]:
     """The whole file, by table."""
-    return yaml.safe_load(files("finlab.evaluation").joinpath("paper_figures.yaml").read_text("utf-8"))
+    text = files("finlab.evaluation").joinpath("paper_figures.yaml").read_text("utf-8")
+    tables: dict[str, Any] = yaml.safe_load(text)
+    return tables
 
 
 def paper_wrench_rows(split: str) -> list[dict[str, Any]]:

@@ -109,8 +109,9 @@ class FlexibleForce:
             (0.5 * a**2 * speed)[:, None] * root_normal
             + (b * across + 0.5 * b**2 * self._tip_speed)[:, None] * normal
         )
-        return (
+        force: Array = (
             (mass * end * slip - strip_drag.sum(axis=1))[:, None] * normal
             - (0.5 * mass * end**2)[:, None] * tangent
             - root_drag[:, None] * root_normal
         )
+        return force

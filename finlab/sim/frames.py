@@ -30,12 +30,14 @@ QUADRATIC = ("X_uu", "Y_vv", "Z_ww", "K_pp", "M_qq", "N_rr")
 def flip_vector(vector: ArrayLike) -> Array:
     """NED to FLU or back: a vector (..., 3), or motion or wrench (..., 6)."""
     values = np.asarray(vector, dtype=np.float64)
-    return values * FLIP[: values.shape[-1]]
+    flipped: Array = values * FLIP[: values.shape[-1]]
+    return flipped
 
 
 def flip_matrix(matrix: ArrayLike) -> Array:
     """NED to FLU or back: a matrix (6, 6) that takes motions to wrenches, such as added mass."""
-    return np.asarray(matrix, dtype=np.float64) * FLIP[:, None] * FLIP
+    flipped: Array = np.asarray(matrix, dtype=np.float64) * FLIP[:, None] * FLIP
+    return flipped
 
 
 def body_from_ned(

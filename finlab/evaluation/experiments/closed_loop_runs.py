@@ -1,4 +1,4 @@
-"""What the closed-loop experiments share: methods, rows of single runs, means over seeds."""
+"""What the closed-loop experiments share: rows of single runs, means over seeds."""
 
 from __future__ import annotations
 
@@ -9,43 +9,18 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from finlab.allocation import load_allocator
-from finlab.allocation.allocator import Allocator
-from finlab.evaluation.method_specs import method_names
-from finlab.evaluation.on_board import OnBoard
 from finlab.evaluation.statistics.trajectory_errors import (
     RTE_DELTA_S,
     absolute_error,
     depth_error,
     relative_error,
 )
-from finlab.physics.energy import POWER_WEIGHTS
 from finlab.sim import ClosedLoop, RunLog
 
 Row = dict[str, Any]
 
 LOST_M = 1.0
 """A robot that is ever farther than this from its reference has lost it."""
-
-
-def load_methods(names: str, checkpoint: str | None = None) -> dict[str, Allocator]:
-    """Allocators by name, from names with commas between.
-
-    Beside the methods of `load_allocator` there are `on-board`, U-CAT's own, and `learned-power`, the learned
-    method with the inertial power in place of the paper's energy proxy.
-
-    Raises:
-        AllocationError: an unknown method, or none.
-    """
-    return {name: _load(name, checkpoint) for name in method_names(names)}
-
-
-def _load(name: str, checkpoint: str | None) -> Allocator:
-    if name == "learned-power":
-        return load_allocator("learned", checkpoint=checkpoint, energy_weights=POWER_WEIGHTS)
-    if name != OnBoard.name:
-        return load_allocator(name, checkpoint=checkpoint)
-    return OnBoard(load_allocator("analytic", checkpoint=checkpoint).normalization)
 
 
 def follow_row(log: RunLog) -> Row:

@@ -7,23 +7,36 @@ import platform
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_info
 from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
-from finlab.evaluation.splits import Case
+from finlab.errors import DataError
+from finlab.evaluation.splits import Case, make_split
 from finlab.evaluation.statistics.bootstrap import quantile_interval
 from finlab.evaluation.statistics.tables import text_table
 
 REFERENCE = "learned"
 """The method that the others are compared with, where it takes part."""
+LAYOUTS = 5
+"""Layouts whose calls are timed."""
 WARM_UP = 2
 """First calls on each layout that are not counted; a robot keeps its layout for long."""
 
 Row = dict[str, Any]
+
+
+def latency_cases(fins: int, seed: int) -> list[Case]:
+    """The first layouts of split `id` with so many fins; `DataError` if it has none of them."""
+    if not 2 <= fins <= 5:
+        raise DataError(f"fins: expected 2 to 5, the fin counts of split id, got {fins}")
+    return [case for case in make_split("id", 100, 50, seed) if case.layout.n_fins == fins][:LAYOUTS]
 
 
 def latency_rows(
@@ -87,18 +100,17 @@ def _time_calls(
 
 
 def machine() -> dict[str, str]:
-    """What this ran on: processor, cores, threads and versions."""
-    import scipy
-    import torch
-
+    """What this ran on: processor, cores, threads and versions of what is installed."""
+    versions = {}
+    for package in ("numpy", "scipy", "torch"):
+        with suppress(PackageNotFoundError):
+            versions[package] = version(package)
     return {
         "processor": _processor(),
         "cores": str(os.cpu_count()),
-        "torch_threads": str(torch.get_num_threads()),
+        "threads": str(max((pool["num_threads"] for pool in threadpool_info()), default=1)),
         "python": platform.python_version(),
-        "numpy": np.__version__,
-        "scipy": scipy.__version__,
-        "torch": torch.__version__,
+        **versions,
     }
 
 

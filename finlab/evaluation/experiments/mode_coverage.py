@@ -147,7 +147,8 @@ def _covered(wanted: list[Any], known: list[Any]) -> float:
 
 def _forces(layout: Layout, command: Array) -> Array:
     """Forces of all fins (M, 3n) [N] by the plant."""
-    return Plant(layout).fin_forces(command).reshape(len(command), 3 * layout.n_fins)
+    force: Array = Plant(layout).fin_forces(command).reshape(len(command), 3 * layout.n_fins)
+    return force
 
 
 def _energy_distance(one: Array, other: Array) -> float:

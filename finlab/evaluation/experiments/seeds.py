@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from finlab.allocation.learned.refined_candidates import RANKING
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.evaluation.statistics.tables import text_table
+from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.physics import Plant
 from finlab.physics.energy import command_energy
 
@@ -38,6 +40,11 @@ MET = 0.05
 """Normalized error up to which a target counts as met when energies are compared."""
 
 Row = dict[str, Any]
+
+
+def learned_allocator(checkpoint: str | Path | None = None) -> LearnedAllocator:
+    """The learned method of a checkpoint, the shipped one by default."""
+    return LearnedAllocator(read_checkpoint(resolve_checkpoint(checkpoint or "default")))
 
 
 def seed_rows(
@@ -108,7 +115,8 @@ def _commands(
         block = int(np.ceil(np.log2(n_seeds)))
         points = qmc.Sobol(3 * n, rng=np.random.default_rng(seed)).random_base2(block)[:n_seeds]
         unit = np.broadcast_to(points.reshape(1, n_seeds, n, 3), (len(targets), n_seeds, n, 3))
-    return lower + unit * (upper - lower)
+    uniform: Array = lower + unit * (upper - lower)
+    return uniform
 
 
 def _answer(

@@ -73,8 +73,8 @@ def smooth_path(layout: Layout, sigma: Array, seed: int, ticks: int = TICKS) -> 
         path += size * np.sin(2.0 * np.pi * frequency * time + phase)
     spread = _even_spread(layout, path, sigma)
     share = np.linalg.norm(spread.reshape(ticks, -1, 2), axis=-1) / _largest_thrust(layout)
-    pushed: Array = spread @ layout_effectiveness(layout).T
-    return pushed * (LOAD / share.max())
+    pushed: Array = spread @ layout_effectiveness(layout).T * (LOAD / share.max())
+    return pushed
 
 
 def rollout(allocator: Allocator, layout: Layout, path: Array, *, steady: bool, seed: int = 0) -> Rollout:

@@ -115,6 +115,12 @@ def diversity(command: Array, layout: Layout) -> float:
     return float(np.sqrt(((gap / width) ** 2).mean(axis=(1, 2))).mean())
 
 
+def temperature_rows(cases: Sequence[Case], **options: Any) -> list[Row]:
+    """The table's rows, one per temperature; options as in `temperature_columns`."""
+    bar = tqdm(TEMPERATURES, unit="temperature", disable=None, leave=False, file=sys.stderr)
+    return [temperature_row(value, temperature_columns(cases, value, **options)) for value in bar]
+
+
 def temperature_row(temperature: float, columns: Columns) -> Row:
     """One row of the table, from the records of one temperature."""
     j, group = columns["best_j"], columns["layout"]

@@ -176,8 +176,11 @@ def _far_target(rng: np.random.Generator, layout: Layout, sigma: Array) -> Array
     """A wrench (6,) [N, N m] that is probably out of reach."""
     farther = rng.choice(FARTHER)
     if rng.uniform() < 0.5:
-        return Plant(layout).wrench(Actuation(layout).sample(rng, ())) * farther
-    return rng.standard_normal(6) * sigma * farther
+        near = Plant(layout).wrench(Actuation(layout).sample(rng, ()))
+    else:
+        near = rng.standard_normal(6) * sigma
+    far: Array = near * farther
+    return far
 
 
 def _convex_arcs(lower: Array, upper: Array) -> list[Array]:

@@ -92,7 +92,8 @@ def count_resting(plant: Plant, command: Array) -> NDArray[np.int64]:
     largest = np.linalg.norm(plant.fin_forces(upper), axis=-1)
     force = np.linalg.norm(plant.fin_forces(command), axis=-1)
     rests = (force < RESTING * largest) & ~np.isnan(command).any(axis=-1)
-    return rests.sum(axis=-1)
+    count: NDArray[np.int64] = rests.sum(axis=-1)
+    return count
 
 
 def _one_by_one(allocator: Allocator, case: Case, targets: Array, seed: int) -> BatchAllocation:

@@ -12,6 +12,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from finlab.evaluation.report.work import WORK
@@ -83,7 +84,7 @@ def run_jobs(jobs: Sequence[Job], store: Store, *, commit: str, processes: int |
 
 
 def _run_pool(jobs: Sequence[Job], folder: Path, commit: str, processes: int, bar: tqdm[Any]) -> None:
-    # Fresh processes: a fork would copy the threads of torch and BLAS in whatever state they are.
+    # Fresh processes: a fork would copy the threads of BLAS in whatever state they are.
     pool = ProcessPoolExecutor(processes, mp_context=get_context("spawn"), initializer=_calm)
     try:
         waiting = {pool.submit(_run_one, job, folder, commit): job for job in jobs}
@@ -97,11 +98,8 @@ def _run_pool(jobs: Sequence[Job], folder: Path, commit: str, processes: int, ba
 
 def _calm() -> None:
     """One thread for each process, no bars of its own, and an end at once when a user interrupts."""
-    import torch
-    from threadpoolctl import threadpool_limits
-
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    torch.set_num_threads(1)
+    os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")  # of what is loaded later
     threadpool_limits(1)
     sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 - for the life of the process
 

@@ -14,8 +14,6 @@ from finlab.evaluation.statistics.store import Columns, columns_of_rows
 
 MOST_FINS = 8
 """Commands are padded to so many fins, those that are not there hold NaN."""
-LATENCY_LAYOUTS = 5
-"""Layouts whose calls are timed."""
 LATENCY_FINS = 4
 """Their fins."""
 
@@ -93,14 +91,10 @@ def scatter(*, fins: int, targets: int, seed: int, checkpoint: str | None) -> Co
 
 def seeds(*, layouts: int, targets: int, candidates: int, seed: int, checkpoint: str | None) -> Columns:
     """Rows of the comparison of the network's seeds with random ones."""
-    from finlab.allocation.learned.learned_allocator import LearnedAllocator
-    from finlab.evaluation.experiments.seeds import seed_rows
-    from finlab.evaluation.method_specs import load_method_spec
+    from finlab.evaluation.experiments.seeds import learned_allocator, seed_rows
 
-    allocator = load_method_spec("learned", checkpoint)
-    assert isinstance(allocator, LearnedAllocator)
     cases = make_split("id", layouts, targets, seed)
-    return columns_of_rows(seed_rows(allocator, cases, n_seeds=candidates, seed=seed))
+    return columns_of_rows(seed_rows(learned_allocator(checkpoint), cases, n_seeds=candidates, seed=seed))
 
 
 def latency(
@@ -113,16 +107,14 @@ def latency(
     paper_checkpoint: str | None,
 ) -> Columns:
     """Rows of the comparison of times; to be run with nothing beside it."""
-    from finlab.evaluation.experiments.latency import latency_rows
+    from finlab.evaluation.experiments.latency import latency_cases, latency_rows
     from finlab.evaluation.method_specs import load_method_spec
 
-    cases = [c for c in make_split("id", 100, 50, seed) if c.layout.n_fins == LATENCY_FINS]
+    cases = latency_cases(LATENCY_FINS, seed)
     allocators = {
         name: load_method_spec(name, paper_checkpoint if name == "paper" else checkpoint) for name in methods
     }
-    return columns_of_rows(
-        latency_rows(allocators, cases[:LATENCY_LAYOUTS], n_calls=calls, budget_s=budget_s)
-    )
+    return columns_of_rows(latency_rows(allocators, cases, n_calls=calls, budget_s=budget_s))
 
 
 def training(

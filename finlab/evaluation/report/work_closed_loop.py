@@ -11,13 +11,13 @@ PAPER_LAYOUTS = ("A", "B", "C", "D")
 def trajectory(*, methods: str, runs: int, seed: int, checkpoint: str | None) -> Columns:
     """Rows of the trajectory experiment, and one path on each layout, five points a second."""
     from finlab.assets import shipped_layouts
-    from finlab.evaluation.experiments.closed_loop_runs import load_methods
     from finlab.evaluation.experiments.trajectory import run_trajectory, trajectory_rows
+    from finlab.evaluation.method_specs import load_method_specs
     from finlab.layout import load_layout
     from finlab.sim import make_trajectory
 
     robots = [load_layout(shipped_layouts()[name]) for name in PAPER_LAYOUTS]
-    allocators = load_methods(methods, checkpoint)
+    allocators = load_method_specs(methods, checkpoint)
     found = run_trajectory(robots, allocators, make_trajectory("lissajous"), range(seed, seed + runs), "mean")
     columns = columns_of_rows(trajectory_rows(found))
     for (layout, method), log in found:
@@ -30,24 +30,24 @@ def trajectory(*, methods: str, runs: int, seed: int, checkpoint: str | None) ->
 def faults(*, methods: str, runs: int, pairs: bool, seed: int, checkpoint: str | None) -> Columns:
     """Rows of the fault experiment on layout A."""
     from finlab.assets import shipped_layouts
-    from finlab.evaluation.experiments.closed_loop_runs import load_methods
     from finlab.evaluation.experiments.faults import all_faults, fault_rows, run_faults
+    from finlab.evaluation.method_specs import load_method_specs
     from finlab.layout import load_layout
     from finlab.sim import make_trajectory
 
     robot, path = load_layout(shipped_layouts()["A"]), make_trajectory("circle")
     cases = [c for c in all_faults(robot, path.duration_s / 2) if pairs or len(c.fins) < 2]
     seeds = range(seed, seed + runs)
-    found = run_faults(robot, load_methods(methods, checkpoint), path, cases, seeds, "mean")
+    found = run_faults(robot, load_method_specs(methods, checkpoint), path, cases, seeds, "mean")
     return columns_of_rows(fault_rows(cases, found))
 
 
 def velocity(*, methods: str, runs: int, seed: int, checkpoint: str | None) -> Columns:
     """Rows of the velocity experiment on layout A."""
     from finlab.assets import shipped_layouts
-    from finlab.evaluation.experiments.closed_loop_runs import load_methods
     from finlab.evaluation.experiments.velocity import run_velocity, velocity_rows
+    from finlab.evaluation.method_specs import load_method_specs
     from finlab.layout import load_layout
 
     robot, seeds = load_layout(shipped_layouts()["A"]), range(seed, seed + runs)
-    return columns_of_rows(velocity_rows(run_velocity(robot, load_methods(methods, checkpoint), seeds)))
+    return columns_of_rows(velocity_rows(run_velocity(robot, load_method_specs(methods, checkpoint), seeds)))
