@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.errors import CommandError
+from finlab.layout.angles import is_full_turn
 
 Array = NDArray[np.float64]
 
@@ -108,7 +109,7 @@ def describe_binding(
         rests = at_low[i, 0] and at_low[i, 1]
         if at_high[i, 0] and at_high[i, 1]:
             sentences.append(f"{name} at full thrust")
-        if upper[i, 2] - lower[i, 2] >= 2 * np.pi - 1e-6:
+        if is_full_turn(upper[i, 2] - lower[i, 2]):
             continue
         middle, half = 0.5 * (lower[i, 2] + upper[i, 2]), 0.5 * (upper[i, 2] - lower[i, 2])
         outside = abs((wanted[i] - middle + np.pi) % (2 * np.pi) - np.pi) > half

@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.baselines.actuation import Actuation
 from finlab.allocation.baselines.model_based import ModelBased
 from finlab.inference.normalization import Normalization
+from finlab.physics import Plant
 
 Array = NDArray[np.float64]
 
@@ -35,18 +35,18 @@ class OnBoard(ModelBased):
         super().__init__(normalization)
         self.frequency_hz = frequency_hz
 
-    def _commands(self, actuation: Actuation, targets: Array, seed: int) -> Array:
-        planar = np.stack([actuation.horizontal, actuation.vertical], axis=-1).reshape(6, -1)
-        force = (targets @ np.linalg.pinv(planar, rcond=1e-6).T).reshape(len(targets), actuation.n_fins, 2)
-        frequency = np.clip(self.frequency_hz, actuation.lower[:, 1], actuation.upper[:, 1])
+    def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
+        planar = plant.planar
+        force = (targets @ np.linalg.pinv(planar, rcond=1e-6).T).reshape(len(targets), plant.n_fins, 2)
+        frequency = np.clip(self.frequency_hz, plant.lower[:, 1], plant.upper[:, 1])
         # Beyond the limit too, so that the scaling sees how much too large an amplitude is.
         amplitudes = np.linspace(0.0, 0.5 * np.pi, TABLE_SIZE)
-        thrust = actuation.thrust(amplitudes[:, None] + np.zeros(actuation.n_fins), frequency)
+        thrust = plant.thrust(amplitudes[:, None] + np.zeros(plant.n_fins), frequency)
         wanted = np.linalg.norm(force, axis=-1)
         amplitude = np.empty_like(wanted)
         for i, column in enumerate(np.maximum.accumulate(thrust, axis=0).T):
             amplitude[:, i] = np.interp(wanted[:, i], column, amplitudes)
-        excess = (amplitude / actuation.upper[:, 0]).max(axis=1, keepdims=True)
+        excess = (amplitude / plant.upper[:, 0]).max(axis=1, keepdims=True)
         amplitude /= np.maximum(excess, 1.0)
         direction = np.arctan2(force[..., 1], force[..., 0])
         return np.stack([amplitude, np.broadcast_to(frequency, amplitude.shape), direction], axis=-1)

@@ -12,10 +12,9 @@ FULL_TURN_TOLERANCE = 1e-6
 """By how much [rad] an arc may fall short of a full turn and still be one."""
 
 
-def is_full_turn(arc: ArrayLike) -> Any:
-    """Says whether arcs [rad] cover the circle, as a bool or an array of bools."""
-    full = np.asarray(arc) >= TURN - FULL_TURN_TOLERANCE
-    return full if full.ndim else bool(full)
+def is_full_turn(arc: Any) -> Any:
+    """Says whether arcs [rad] cover the circle, for a number, an array or a tensor."""
+    return arc >= TURN - FULL_TURN_TOLERANCE
 
 
 def wrapped(angle: ArrayLike) -> NDArray[np.float64]:

@@ -1,11 +1,12 @@
 """Layouts as padded arrays, and the geometry of their forces. numpy only."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.array_library import library_of
 from finlab.errors import LayoutError
 from finlab.layout.fin import Limits
 from finlab.layout.layout import Layout
@@ -64,13 +65,31 @@ def stack_layouts(layouts: Sequence[Layout], n_fins: int | None = None) -> Layou
         )
     arrays = empty_arrays(len(layouts), width)
     for b, layout in enumerate(layouts):
-        for i, fin in enumerate(layout.fins):
-            arrays.position[b, i] = fin.position
-            arrays.mounting_angle[b, i] = fin.mounting_angle
-            arrays.lower[b, i] = fin.limits.lower
-            arrays.upper[b, i] = fin.limits.upper
-        arrays.mask[b, : layout.n_fins] = True
+        n = layout.n_fins
+        arrays.position[b, :n], arrays.mounting_angle[b, :n] = layout.position, layout.mounting_angle
+        arrays.lower[b, :n], arrays.upper[b, :n] = layout.lower, layout.upper
+        arrays.mask[b, :n] = True
     return arrays
+
+
+def force_columns(position: Any, mounting_angle: Any) -> Any:
+    """Returns what one newton along each fin's three axes does to the robot.
+
+    Args:
+        position: (..., n, 3), body frame [m]; an array or a tensor.
+        mounting_angle: (..., n) [rad].
+
+    Returns:
+        (..., n, 3, 6): wrench [Fx, Fy, Fz, Tx, Ty, Tz] about the origin of 1 N along shaft, e_h and e_z.
+    """
+    xp = library_of(position)
+    x, y, z = position[..., 0], position[..., 1], position[..., 2]
+    c, s = xp.cos(mounting_angle), xp.sin(mounting_angle)
+    zero, one = xp.zeros_like(x), xp.ones_like(x)
+    shaft = [c, s, zero, -z * s, z * c, x * s - y * c]
+    horizontal = [-s, c, zero, -z * c, -z * s, x * c + y * s]
+    vertical = [zero, zero, one, y, -x, zero]
+    return xp.stack([xp.stack(axis, axis=-1) for axis in (shaft, horizontal, vertical)], axis=-2)
 
 
 def planar_effectiveness(position: Array, mounting_angle: Array) -> Array:
@@ -83,18 +102,12 @@ def planar_effectiveness(position: Array, mounting_angle: Array) -> Array:
     Returns:
         (..., n, 6, 2): wrench [Fx, Fy, Fz, Tx, Ty, Tz] of 1 N along e_h (column 0) and along e_z (column 1).
     """
-    position = np.asarray(position, dtype=np.float64)
-    angle = np.asarray(mounting_angle, dtype=np.float64)
-    axes = np.zeros((*angle.shape, 2, 3))
-    axes[..., 0, 0] = -np.sin(angle)
-    axes[..., 0, 1] = np.cos(angle)
-    axes[..., 1, 2] = 1.0
-    wrenches = np.concatenate([axes, np.cross(position[..., None, :], axes)], axis=-1)
-    return np.swapaxes(wrenches, -1, -2)
+    columns = force_columns(np.asarray(position, np.float64), np.asarray(mounting_angle, np.float64))
+    planar: Array = np.swapaxes(columns[..., 1:, :], -1, -2)
+    return planar
 
 
 def layout_effectiveness(layout: Layout) -> Array:
     """Returns one layout's planar effectiveness as a matrix (6, 2 n), fins side by side."""
-    arrays = stack_layouts([layout])
-    blocks = planar_effectiveness(arrays.position[0], arrays.mounting_angle[0])
+    blocks = planar_effectiveness(layout.position, layout.mounting_angle)
     return np.concatenate(list(blocks), axis=1)

@@ -1,24 +1,14 @@
-"""Command to force to wrench: fin models, the plant, energy."""
+"""Command to force to wrench, and what it costs: the fins' laws, the plant, energy."""
 
-from importlib import import_module
-from typing import Any
-
-_HOME = {
-    "Drag": "drag",
-    "FinModel": "fin_model",
-    "make_fin_model": "fin_model",
-    "Lighthill": "lighthill",
-    "Plant": "plant",
-    "TableFinModel": "table",
-    "write_table": "table",
-    "assemble_wrench": "wrench",
-    "body_force": "wrench",
-    "effectiveness_matrix": "wrench",
-    "wrench_of_forces": "wrench",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(name)
-    return getattr(import_module(f"finlab.physics.{_HOME[name]}"), name)
+from finlab.physics.fin_law import FinLaw as FinLaw
+from finlab.physics.fin_law import PlanarLaw as PlanarLaw
+from finlab.physics.fin_model import make_law as make_law
+from finlab.physics.fin_model import stack_laws as stack_laws
+from finlab.physics.plant import Plant as Plant
+from finlab.physics.plant import plant_of as plant_of
+from finlab.physics.table import TableLaw as TableLaw
+from finlab.physics.table import read_table as read_table
+from finlab.physics.table import write_table as write_table
+from finlab.physics.wrench import assemble_wrench as assemble_wrench
+from finlab.physics.wrench import body_force as body_force
+from finlab.physics.wrench import wrench_of_forces as wrench_of_forces

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.physics.fin_law import Values
+
 
 @dataclass(frozen=True)
 class EnergyWeights:
@@ -32,35 +34,35 @@ POWER_WEIGHTS = EnergyWeights(0.0, 0.0, 0.0, 0.0, 1.0)
 """Inertial power and nothing else: large strokes, slow beats, the load on all fins."""
 
 
-def energy_scale(upper: NDArray[np.floating]) -> NDArray[np.float64]:
+def energy_scale(upper: Values) -> Values:
     """What each command is divided by: its own fin's upper limit.
 
     A fin whose upper limit is zero or negative (an arc of zero directions below zero, say) would
     blow up or change sign, so the magnitude is taken and floored.
 
     Args:
-        upper: upper limits (..., 3).
+        upper: upper limits (..., 3), an array or a tensor.
     """
-    return np.maximum(np.abs(np.asarray(upper, np.float64)), 1e-3)
+    return abs(upper).clip(1e-3)
 
 
-def fin_energy(
-    command: NDArray[np.floating],
-    upper: NDArray[np.floating],
-    weights: EnergyWeights = DEFAULT_WEIGHTS,
-) -> NDArray[Any]:
-    """Energy of each fin, shape (...,): the summand of the paper's `J_en`."""
-    scaled = command / energy_scale(upper).astype(command.dtype)
-    a, f, d = scaled[..., 0], scaled[..., 1], scaled[..., 2]
-    w = weights
+def energy_of_shares(
+    amplitude: Values, frequency: Values, zero_direction: Values, weights: EnergyWeights = DEFAULT_WEIGHTS
+) -> Values:
+    """One fin's summand of `J_en`, from commands over their scale: arrays, tensors or symbols."""
+    a, f, d, w = amplitude, frequency, zero_direction, weights
     energy = w.amplitude * a * a + w.frequency * f * f + w.zero_direction * d * d + w.product * a * f
     return energy + w.inertial * (a * f) ** 2 * f if w.inertial else energy
 
 
+def fin_energy(command: Values, upper: Values, weights: EnergyWeights = DEFAULT_WEIGHTS) -> Values:
+    """Energy (...,) of each fin: commands (..., 3) and upper limits (..., 3), arrays or tensors."""
+    scaled = command / energy_scale(upper)
+    return energy_of_shares(scaled[..., 0], scaled[..., 1], scaled[..., 2], weights)
+
+
 def command_energy(
-    command: NDArray[np.floating],
-    upper: NDArray[np.floating],
-    weights: EnergyWeights = DEFAULT_WEIGHTS,
+    command: NDArray[np.floating], upper: NDArray[np.floating], weights: EnergyWeights = DEFAULT_WEIGHTS
 ) -> NDArray[Any]:
     """`J_en` of whole robots: commands (..., n, 3) to energies (...,). Failed fins (NaN) count nothing."""
     energy = fin_energy(command, upper, weights)

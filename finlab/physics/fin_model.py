@@ -1,40 +1,70 @@
-"""The one interface of all fin models, and how a model is made from its description."""
+"""From the description of a fin's model to its law."""
 
-from collections.abc import Callable
-from typing import Any, Protocol
+from __future__ import annotations
 
-from torch import Tensor
+import os
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from finlab.layout.fin_model import FinModelSpec
 from finlab.physics.drag import Drag
+from finlab.physics.fin_law import FinLaw, PlanarLaw
 from finlab.physics.lighthill import Lighthill
+from finlab.physics.soft import Soft
+from finlab.physics.table import TableLaw, read_table
+
+PLANAR_LAWS: dict[str, type[PlanarLaw]] = {"drag": Drag, "lighthill": Lighthill, "soft": Soft}
+"""Fin model -> law with a formula; its parameters may be arrays, one number for each of n fins."""
 
 
-class FinModel(Protocol):
-    """Command to mean force of one fin, batched and differentiable, float32 or float64 as the command is."""
-
-    name: str
-    """Type name, as in a layout file."""
-
-    def force(self, command: Tensor) -> Tensor:
-        """Returns the mean force (..., 3) [N] in the fin frame of command (..., 3) [rad, Hz, rad]."""
-        ...
-
-
-def make_fin_model(spec: FinModelSpec) -> FinModel:
-    """Returns the fin model that `spec` describes.
+def make_law(spec: FinModelSpec) -> FinLaw:
+    """Returns the law of one fin model.
 
     Raises:
         DataError: it is a table whose file is missing or wrong.
     """
-    return _MAKERS[spec.type](**spec.values())
+    values: dict[str, Any] = spec.values()
+    if spec.type == "table":
+        return _table(values["path"], file_stamp(spec))
+    return PLANAR_LAWS[spec.type](**values)
 
 
-def _table(path: str) -> FinModel:
-    # Imported late because a table can be written from any other model, so it knows this interface.
-    from finlab.physics.table import TableFinModel
+def stack_laws(specs: Sequence[FinModelSpec]) -> list[tuple[NDArray[np.intp], FinLaw]]:
+    """Returns the laws of n fins as (places, law); fins of one formula or one table are evaluated together.
 
-    return TableFinModel(path)
+    Raises:
+        DataError: a table's file is missing or wrong.
+    """
+    kinds = [spec if spec.type == "table" else spec.type for spec in specs]
+    groups: list[tuple[NDArray[np.intp], FinLaw]] = []
+    for kind in dict.fromkeys(kinds):
+        places = np.array([i for i, own in enumerate(kinds) if own == kind])
+        same = [specs[i] for i in places]
+        if isinstance(kind, FinModelSpec) or all(spec == same[0] for spec in same):
+            law = make_law(same[0])
+        else:
+            rows: list[dict[str, Any]] = [spec.values() for spec in same]
+            law = PLANAR_LAWS[kind](**{name: np.array([row[name] for row in rows]) for name in rows[0]})
+        groups.append((places, law))
+    return groups
 
 
-_MAKERS: dict[str, Callable[..., Any]] = {"drag": Drag, "lighthill": Lighthill, "table": _table}
+def file_stamp(spec: FinModelSpec) -> tuple[int, int] | None:
+    """Returns time and size of the file that a model reads, None where it reads none."""
+    if spec.type != "table":
+        return None
+    try:
+        found = os.stat(str(spec.values()["path"]))
+    except OSError:
+        return 0, 0
+    return found.st_mtime_ns, found.st_size
+
+
+@lru_cache(maxsize=64)
+def _table(path: str, stamp: tuple[int, int] | None) -> TableLaw:
+    """The table in a file, read again when the file has changed."""
+    return read_table(path)

@@ -1,51 +1,55 @@
 """Reactive propulsion: Lighthill's large-amplitude elongated-body theory for a rigid fin in still water."""
 
+from __future__ import annotations
+
 import math
+from typing import Any
 
-import torch
-from torch import Tensor
+from finlab.physics.fin_law import Array, PlanarLaw, Values
 
-from finlab.layout.fin_model import MODEL_DEFAULTS
-from finlab.physics.drag import direct_thrust
-
-_DEFAULT = MODEL_DEFAULTS["lighthill"]
-
-# J1(x) = x/2 sum_k (-1)^k (x/2)^(2k) / (k! (k+1)!). An amplitude is at most pi/2, where the terms fall below
-# 1e-17 after k = 11; a few more keep float64 exact to |x| = 4. A polynomial differentiates to any order,
-# which torch.special.bessel_j1 does not.
-_J1_COEFFICIENTS = tuple((-1) ** k / (math.factorial(k) * math.factorial(k + 1)) for k in range(17))
+# J_n(x) = (x/2)^n sum_k (-1)^k (x/2)^(2k) / (k! (k+n)!). An amplitude is at most pi/2, where the terms fall
+# below 1e-17 after k = 11; a few more keep float64 exact to |x| = 4.
+_TERMS = 17
+_J0, _J1 = (
+    tuple((-1) ** k / (math.factorial(k) * math.factorial(k + n)) for k in range(_TERMS)) for n in (0, 1)
+)
 
 
-def bessel_j1(x: Tensor) -> Tensor:
-    """Returns the Bessel function J1 of x, |x| <= 4, differentiable to any order."""
-    squared = torch.square(x / 2)
-    total = torch.full_like(x, _J1_COEFFICIENTS[-1])
-    for coefficient in reversed(_J1_COEFFICIENTS[:-1]):
+def _series(coefficients: tuple[float, ...], x: Values) -> Values:
+    squared = (0.5 * x) ** 2
+    total = coefficients[-1]
+    for coefficient in reversed(coefficients[:-1]):
         total = total * squared + coefficient
-    return x / 2 * total
+    return total
 
 
-class Lighthill:
+def bessel_j0(x: Values) -> Values:
+    """Returns the Bessel function J0 of x, |x| <= 4: a polynomial, for arrays, tensors and symbols alike."""
+    return _series(_J0, x)
+
+
+def bessel_j1(x: Values) -> Values:
+    """Returns the Bessel function J1 of x, |x| <= 4."""
+    return 0.5 * x * _series(_J1, x)
+
+
+class Lighthill(PlanarLaw):
     """T = 1/2 m L^2 (2 pi f)^2 A J1(A) with m = pi/4 rho W^2, the water moved per metre of trailing edge."""
 
-    name = "lighthill"
-
-    def __init__(
-        self,
-        density: float = _DEFAULT["density"],
-        length: float = _DEFAULT["length"],
-        width: float = _DEFAULT["width"],
-    ) -> None:
+    def __init__(self, density: Any, length: Any, width: Any) -> None:
         """Takes water density [kg/m^3], fin length from the shaft [m] and trailing-edge width [m]."""
         virtual_mass = math.pi / 4.0 * density * width**2
         self.coefficient = 0.5 * virtual_mass * length**2 * (2.0 * math.pi) ** 2
         """Thrust over f^2 A J1(A) [N s^2]; 6.20 for the defaults."""
 
-    def thrust(self, amplitude: Tensor, frequency: Tensor) -> Tensor:
-        """Returns the mean thrust [N] at half amplitude [rad] and frequency [Hz], same shape."""
-        return self.coefficient * torch.square(frequency) * amplitude * bessel_j1(amplitude)
+    def thrust(self, amplitude: Values, frequency: Values, zero_direction: Values = 0.0) -> Values:
+        """See `PlanarLaw`; the zero direction does not matter."""
+        return self.coefficient * frequency**2 * amplitude * bessel_j1(amplitude)
 
-    def force(self, command: Tensor) -> Tensor:
-        """Returns the mean force (..., 3) [N] in the fin frame of command (..., 3) [rad, Hz, rad]."""
-        amplitude, frequency, zero_direction = command.unbind(dim=-1)
-        return direct_thrust(self.thrust(amplitude, frequency), zero_direction)
+    def thrust_slopes(
+        self, amplitude: Array, frequency: Array, zero_direction: Array
+    ) -> tuple[Array, Array, Array | float]:
+        """See `PlanarLaw`."""
+        beat = self.coefficient * frequency * amplitude
+        # d(A J1)/dA = A J0
+        return beat * frequency * bessel_j0(amplitude), 2.0 * beat * bessel_j1(amplitude), 0.0

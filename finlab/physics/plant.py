@@ -1,38 +1,45 @@
-"""The plant: what a robot's fins really do, in float64. It judges every allocation method."""
+"""The plant: what a robot's fins really do, in numpy and float64.
+
+It judges every allocation method, and the model-based methods optimize over it.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
 
 import numpy as np
-import torch
 from numpy.typing import ArrayLike, NDArray
-from torch import Tensor
 
 from finlab.errors import CommandError
-from finlab.layout.arrays import stack_layouts
+from finlab.layout.angles import TURN, is_full_turn
+from finlab.layout.arrays import force_columns
 from finlab.layout.layout import Layout
-from finlab.physics.fin_model import make_fin_model
-from finlab.physics.wrench import body_force, effectiveness_matrix, wrench_of_forces
+from finlab.physics.fin_model import file_stamp, stack_laws
+from finlab.physics.wrench import body_force, wrench_of_forces
+
+Array = NDArray[np.float64]
 
 
 class Plant:
-    """The analytic model of one layout, each fin with its own fin model."""
+    """The fins of one layout, each with its own law: commands to wrenches and their derivatives."""
 
     def __init__(self, layout: Layout) -> None:
-        """Prepares the fin models of `layout`.
+        """Prepares the laws of the layout's fins; `plant_of` keeps plants that were made.
 
         Raises:
             DataError: a fin's force table cannot be read.
         """
-        self.layout = layout
-        arrays = stack_layouts([layout])
-        self._position = torch.from_numpy(arrays.position[0])
-        self._mounting_angle = torch.from_numpy(arrays.mounting_angle[0])
-        specs = [fin.model for fin in layout.fins]
-        # Fins that share a model are evaluated together.
-        self._groups = [
-            (make_fin_model(spec), [i for i, other in enumerate(specs) if other == spec])
-            for spec in dict.fromkeys(specs)
-        ]
+        self.layout, self.n_fins = layout, layout.n_fins
+        self.lower, self.upper = layout.lower, layout.upper
+        self.width = self.upper - self.lower
+        """Ranges of the limits (n, 3)."""
+        self.full_turn: NDArray[np.bool_] = is_full_turn(self.width[:, 2])
+        """Fins (n,) whose zero direction may turn freely; theirs wraps instead of ending at a limit."""
+        self.columns: Array = force_columns(layout.position, layout.mounting_angle)
+        """Wrench (n, 3, 6) of 1 N along each fin's shaft, horizontal axis and z."""
+        self._laws = stack_laws([fin.model for fin in layout.fins])
 
-    def wrench(self, command: ArrayLike | Tensor) -> NDArray[np.float64]:
+    def wrench(self, command: ArrayLike) -> Array:
         """Returns the wrench that a command causes.
 
         Args:
@@ -44,52 +51,101 @@ class Plant:
         Raises:
             CommandError: the shape does not fit the layout, or a value is infinite or partly NaN.
         """
-        force = torch.from_numpy(self.fin_forces(command))
-        return np.asarray(wrench_of_forces(force, self._position).numpy())
+        wrench: Array = wrench_of_forces(self.forces(command), self.columns)
+        return wrench
 
-    def fin_forces(self, command: ArrayLike | Tensor) -> NDArray[np.float64]:
-        """Returns each fin's mean force (..., n, 3) [N] in the body frame; arguments as for `wrench`."""
-        values, alive = self._checked(command)
-        force = torch.zeros_like(values)
-        with torch.no_grad():
-            for model, members in self._groups:
-                force[..., members, :] = model.force(values[..., members, :])
-            force = torch.where(alive.unsqueeze(-1), body_force(force, self._mounting_angle), 0.0)
-        return np.asarray(force.numpy())
+    def forces(self, command: ArrayLike) -> Array:
+        """Returns each fin's mean force (..., n, 3) [N] in its own frame (shaft, e_h, e_z); see `wrench`."""
+        values, failed = self._checked(command)
+        force: Array
+        if len(self._laws) == 1:
+            force = self._laws[0][1].force(values)
+        else:
+            force = np.empty_like(values)
+            for places, law in self._laws:
+                force[..., places, :] = law.force(values[..., places, :])
+        if failed is not None:
+            force[failed] = 0.0
+        return force
 
-    def effectiveness(self, command: ArrayLike | Tensor) -> NDArray[np.float64]:
-        """Returns d wrench / d command (..., 6, n, 3) per rad, Hz, rad; a failed fin's columns are zero."""
-        values, alive = self._checked(command)
-        result = values.new_zeros((*values.shape[:-2], 6, *values.shape[-2:]))
-        for model, members in self._groups:
-            result[..., members, :] = effectiveness_matrix(
-                model,
-                values[..., members, :],
-                self._position[members],
-                self._mounting_angle[members],
-                alive[..., members],
-            )
-        return np.asarray(result.numpy())
+    def fin_forces(self, command: ArrayLike) -> Array:
+        """Returns each fin's mean force (..., n, 3) [N] in the body frame; see `wrench`."""
+        force: Array = body_force(self.forces(command), self.layout.mounting_angle)
+        return force
 
-    def _checked(self, command: ArrayLike | Tensor) -> tuple[Tensor, Tensor]:
-        """Returns finite float64 commands (..., n, 3) and which fins are alive (..., n)."""
-        raw = command.detach().cpu().numpy() if isinstance(command, Tensor) else command
+    def linearize(self, command: Array) -> tuple[Array, Array]:
+        """Returns wrenches (..., 6) of commands (..., n, 3) without failed fins, and their derivatives
+        (..., 6, 3 n), fin by fin."""
+        if len(self._laws) == 1:
+            force, slopes = self._laws[0][1].force_and_slopes(command)
+        else:
+            force, slopes = np.empty(command.shape), np.empty((*command.shape, 3))
+            for places, law in self._laws:
+                force[..., places, :], slopes[..., places, :, :] = law.force_and_slopes(
+                    command[..., places, :]
+                )
+        jacobian = (slopes @ self.columns).reshape(*command.shape[:-2], 3 * self.n_fins, 6)
+        wrench: Array = wrench_of_forces(force, self.columns)
+        return wrench, jacobian.swapaxes(-1, -2)
+
+    @property
+    def planar(self) -> Array:
+        """Wrench (6, 2 n) of 1 N along each fin's horizontal axis and z, fins side by side."""
+        planar: Array = self.columns[:, 1:].reshape(2 * self.n_fins, 6).T
+        return planar
+
+    def thrust(self, amplitude: Array, frequency: Array) -> Array:
+        """Returns the size of each fin's force (..., n) [N] at zero direction zero."""
+        command = np.stack(np.broadcast_arrays(amplitude, frequency, 0.0), axis=-1)
+        size: Array = np.linalg.norm(self.forces(command), axis=-1)
+        return size
+
+    def feasible(self, command: Array) -> Array:
+        """Returns commands (..., n, 3) brought within the limits exactly: full turns wrap, all else clips."""
+        result = np.array(command, np.float64)
+        direction = result[..., 2]
+        wrapped = self.lower[:, 2] + np.mod(direction - self.lower[:, 2], TURN)
+        result[..., 2] = np.where(self.full_turn, wrapped, direction)
+        return np.clip(result, self.lower, self.upper)
+
+    def sample(self, rng: np.random.Generator, size: tuple[int, ...]) -> Array:
+        """Returns uniform commands (*size, n, 3) within the limits."""
+        return np.asarray(self.lower + rng.uniform(size=(*size, self.n_fins, 3)) * self.width)
+
+    def _checked(self, command: ArrayLike) -> tuple[Array, NDArray[np.bool_] | None]:
+        """Finite float64 commands (..., n, 3), and which fins have failed (..., n), None where none has."""
         try:
-            values = np.array(raw, dtype=np.float64)
+            values = np.asarray(command, dtype=np.float64)
         except (TypeError, ValueError):
             raise CommandError(
                 "expected commands as numbers [rad, Hz, rad] per fin, got something else"
             ) from None
-        n_fins = self.layout.n_fins
-        if values.ndim < 2 or values.shape[-2:] != (n_fins, 3):
+        if values.ndim < 2 or values.shape[-2:] != (self.n_fins, 3):
             raise CommandError(
-                f"expected commands (..., {n_fins}, 3) for layout {self.layout.name}, got {values.shape}"
+                f"expected commands (..., {self.n_fins}, 3) for layout {self.layout.name}, got {values.shape}"
             )
+        if np.isfinite(values).all():
+            return values, None
         failed = np.isnan(values).all(axis=-1)
-        if not np.isfinite(values[~failed]).all():
+        values = np.where(failed[..., None], 0.0, values)
+        if not np.isfinite(values).all():
             raise CommandError(
                 f"the command for layout {self.layout.name} holds NaN or infinite values; "
                 "a failed fin has NaN in all three entries, any other has none"
             )
-        values[failed] = 0.0
-        return torch.from_numpy(values), torch.from_numpy(~failed)
+        return values, failed
+
+
+def plant_of(layout: Layout) -> Plant:
+    """Returns the plant of a layout, kept from the last time it was asked for.
+
+    Raises:
+        DataError: a fin's force table cannot be read.
+    """
+    return _made(layout, tuple(file_stamp(fin.model) for fin in layout.fins))
+
+
+@lru_cache(maxsize=256)
+def _made(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> Plant:
+    """A plant; tables whose files have changed are read again."""
+    return Plant(layout)

@@ -8,120 +8,142 @@ forces and their derivatives are continuous. When the zero directions cover the 
 Amplitudes and frequencies beyond the table count as its edge.
 """
 
+from __future__ import annotations
+
 import csv
-import itertools
 import math
 import os
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
+from finlab.array_library import library_of
 from finlab.errors import DataError
-from finlab.physics.fin_model import FinModel
+from finlab.layout.angles import TURN
+from finlab.physics.fin_law import Array, FinLaw, Values
 
 COLUMNS = ("A", "f", "phi", "Fx", "Fy", "Fz")
 """Columns of a force table, by name; their order in the file is free."""
 MAX_BYTES = 50_000_000
 """Largest table that is read [bytes]."""
+NEIGHBOURS = (-1, 0, 1, 2)
+"""Grid points that a value between points 0 and 1 depends on, along each axis."""
 
 
-class TableFinModel:
-    """Interpolates a table of forces, differentiably."""
+class TableLaw:
+    """Interpolates forces on a grid of amplitude, frequency and zero direction; see `FinLaw`."""
 
-    name = "table"
+    def __init__(self, axes: list[Array], forces: Array, periodic: bool) -> None:
+        """Takes the grid's axes [rad, Hz, rad], rising, two points or more each, and forces (a, f, d, 3) [N].
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
-        """Reads and checks the table at `path`.
-
-        Raises:
-            DataError: the file is missing, lacks a column, holds something that is not a finite number,
-                or its rows do not fill a grid with at least two points per axis.
+        A periodic grid's zero directions cover the circle, without the first one again at the end.
         """
-        self.path = str(path)
-        rows = _read_rows(Path(path))
-        axes, forces = _grid(rows, self.path)
-        self.periodic, axes[2], forces = _close_circle(axes[2], forces, self.path)
-        for name, axis in zip(COLUMNS, axes, strict=False):
-            if len(axis) < 2:
-                raise DataError(
-                    f"{self.path}: column {name} has one value, expected at least 2 to interpolate"
-                )
-        self._axes = [torch.from_numpy(axis) for axis in axes]
-        self._forces = torch.from_numpy(forces).reshape(-1, 3)
+        self.periodic = periodic
+        self._axes = axes
+        self._forces = np.ascontiguousarray(forces).reshape(-1, 3)
         self._strides = (forces.shape[1] * forces.shape[2], forces.shape[2], 1)
 
-    def force(self, command: Tensor) -> Tensor:
-        """Returns the mean force (..., 3) [N] in the fin frame of command (..., 3) [rad, Hz, rad]."""
-        corners = [self._stencil(axis, command[..., axis]) for axis in range(3)]
-        table = self._forces.to(command)
-        total = torch.zeros_like(command)
-        # 4 x 4 x 4 neighbours, each weighted by the product of three one-dimensional weights.
-        for steps in itertools.product(range(4), repeat=3):
-            weight = torch.ones_like(command[..., 0])
-            place = torch.zeros_like(corners[0].place[0])
-            for axis, step in enumerate(steps):
-                weight = weight * corners[axis].weight[step]
-                place = place + corners[axis].place[step] * self._strides[axis]
-            total = total + weight.unsqueeze(-1) * table[place]
-        return total
+    def force(self, command: Values) -> Values:
+        """See `FinLaw`. Tensors are answered, too, but nothing is differentiated through the table."""
+        xp = library_of(command)
+        if xp is not np:
+            values = self.force(command.detach().cpu().numpy())
+            return xp.from_numpy(np.ascontiguousarray(values)).to(command)
+        (by_a, by_f, by_d), grid = self._gathered(np.asarray(command, np.float64))
+        turned = np.einsum("...k,...ijkc->...ijc", by_d[0], grid)
+        force = np.einsum("...i,...ic->...c", by_a[0], np.einsum("...j,...ijc->...ic", by_f[0], turned))
+        return force.astype(command.dtype, copy=False)
 
-    def _stencil(self, axis: int, value: Tensor) -> "_Stencil":
-        """Returns the four grid points around each value on one axis and their cubic Hermite weights."""
-        knots = self._axes[axis].to(value)
+    def force_and_slopes(self, command: Array) -> tuple[Array, Array]:
+        """See `FinLaw`; exact derivatives of the interpolation."""
+        (by_a, by_f, by_d), grid = self._gathered(command)
+        # Value and slope along the last axis, then each along the one before: (2, ..., 4, 4, 3) and so on.
+        turned = np.einsum("s...k,...ijkc->s...ijc", by_d, grid)
+        value_f = np.einsum("s...j,...ijc->s...ic", by_f, turned[0])
+        slope_d = np.einsum("...j,...ijc->...ic", by_f[0], turned[1])
+        force, slope_a = np.einsum("s...i,...ic->s...c", by_a, value_f[0])
+        slope_f = np.einsum("...i,...ic->...c", by_a[0], value_f[1])
+        slope_d = np.einsum("...i,...ic->...c", by_a[0], slope_d)
+        return force, np.stack([slope_a, slope_f, slope_d], axis=-2)
+
+    def _gathered(self, command: Array) -> tuple[list[Array], Array]:
+        """Per axis the weights of four neighbours and their slopes (2, ..., 4), and the forces of all 64
+        neighbours (..., 4, 4, 4, 3)."""
+        stencils = [self._stencil(axis, command[..., axis]) for axis in range(3)]
+        (a, f, d), strides = (place for place, _ in stencils), self._strides
+        flat = (
+            a[..., :, None, None] * strides[0]
+            + f[..., None, :, None] * strides[1]
+            + d[..., None, None, :] * strides[2]
+        )
+        return [weight for _, weight in stencils], self._forces[flat]
+
+    def _stencil(self, axis: int, value: Array) -> tuple[NDArray[np.intp], Array]:
+        """The four grid points (..., 4) around each value on one axis; their cubic Hermite weights and those
+        weights' slopes (2, ..., 4)."""
+        knots = self._axes[axis]
         n = len(knots)
         if axis == 2 and self.periodic:
             # n points and the first one again, one turn later.
-            knots = torch.cat([knots, knots[:1] + 2 * math.pi])
-            value = knots[0] + torch.remainder(value - knots[0], 2 * math.pi)
+            knots = np.append(knots, knots[0] + TURN)
+            value = knots[0] + np.mod(value - knots[0], TURN)
         elif axis == 2:
             middle = (knots[0] + knots[-1]) / 2
-            value = middle + torch.remainder(value - middle + math.pi, 2 * math.pi) - math.pi
-        value = value.clamp(knots[0], knots[-1])
-        cell = (torch.searchsorted(knots, value.detach().contiguous(), right=True) - 1).clamp(
-            0, len(knots) - 2
-        )
+            value = middle + np.mod(value - middle + math.pi, TURN) - math.pi
+        inside = (value >= knots[0]) & (value <= knots[-1])
+        value = np.clip(value, knots[0], knots[-1])
+        cell = np.clip(np.searchsorted(knots, value, side="right") - 1, 0, len(knots) - 2)
         x1, x2 = knots[cell], knots[cell + 1]
+        place = cell[..., None] + np.array(NEIGHBOURS)
         if axis == 2 and self.periodic:
-            gaps = knots.diff()
-            x0 = x1 - gaps[(cell - 1) % n]
-            x3 = x2 + gaps[(cell + 1) % n]
-            index = [(cell + step) % n for step in (-1, 0, 1, 2)]
+            gaps = np.diff(knots)
+            x0, x3 = x1 - gaps[(cell - 1) % n], x2 + gaps[(cell + 1) % n]
+            place = place % n
         else:
             # At an edge the missing neighbour is the edge itself, which makes its slope one-sided.
-            index = [(cell + step).clamp(0, n - 1) for step in (-1, 0, 1, 2)]
-            x0, x3 = knots[index[0]], knots[index[3]]
+            place = np.clip(place, 0, n - 1)
+            x0, x3 = knots[place[..., 0]], knots[place[..., 3]]
         width = x2 - x1
         t = (value - x1) / width
-        slope1 = t * (1 - t) ** 2 * width / (x2 - x0)  # weight of the slope at x1, over its two neighbours
-        slope2 = t * t * (t - 1) * width / (x3 - x1)
-        rise = t * t * (3 - 2 * t)
-        return _Stencil(index, [-slope1, 1 - rise - slope2, rise + slope1, slope2])
+        # The slope at a knot is that of the line through its neighbours; these are the two knots' shares.
+        early, late = width / (x2 - x0), width / (x3 - x1)
+        weights = _hermite(t * (1 - t) ** 2 * early, t * t * (t - 1) * late, t * t * (3 - 2 * t))
+        slopes = _hermite(
+            (1 - t) * (1 - 3 * t) * early, t * (3 * t - 2) * late, 6 * t * (1 - t), constant=0.0
+        ) * (inside / width)
+        return place, np.moveaxis(np.stack([weights, slopes]), 1, -1)
 
 
-class _Stencil(NamedTuple):
-    place: list[Tensor]
-    """Four grid indices, each of the command's batch shape."""
+def _hermite(early: Array, late: Array, rise: Array, constant: float = 1.0) -> Array:
+    """Weights (4, ...) of the four neighbours, from the two slopes' shares and the rise in between."""
+    return np.stack([-early, constant - rise - late, rise + early, late])
 
-    weight: list[Tensor]
-    """Their weights, which sum to one."""
+
+def read_table(path: str | os.PathLike[str]) -> TableLaw:
+    """Returns the law in a CSV file.
+
+    Raises:
+        DataError: the file is missing, lacks a column, holds something that is not a finite number, or its
+            rows do not fill a grid with at least two points per axis.
+    """
+    source = str(path)
+    axes, forces = _grid(_read_rows(Path(path)), source)
+    periodic, axes[2], forces = _close_circle(axes[2], forces, source)
+    for name, axis in zip(COLUMNS, axes, strict=False):
+        if len(axis) < 2:
+            raise DataError(f"{source}: column {name} has one value, expected at least 2 to interpolate")
+    return TableLaw(axes, forces, periodic)
 
 
 def write_table(
-    path: str | os.PathLike[str],
-    model: FinModel,
-    amplitude: NDArray[np.float64],
-    frequency: NDArray[np.float64],
-    zero_direction: NDArray[np.float64],
+    path: str | os.PathLike[str], law: FinLaw, amplitude: Array, frequency: Array, zero_direction: Array
 ) -> None:
-    """Writes the forces of `model` on a grid of amplitude [rad], frequency [Hz] and zero direction [rad]."""
+    """Writes the forces of a law on a grid of amplitude [rad], frequency [Hz] and zero direction [rad]."""
     axes = [np.asarray(axis, dtype=np.float64) for axis in (amplitude, frequency, zero_direction)]
     command = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    with torch.no_grad():
-        force = model.force(torch.from_numpy(command)).numpy()
+    force: Any = law.force(command)
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
@@ -191,9 +213,9 @@ def _close_circle(
 ) -> tuple[bool, NDArray[np.float64], NDArray[np.float64]]:
     """Returns whether the zero directions cover the circle, and the grid without a repeated end point."""
     span = angle[-1] - angle[0]
-    if span > 2 * math.pi + 1e-3:
+    if span > TURN + 1e-3:
         raise DataError(f"{source}: zero directions span {span:.4g} rad, expected at most one turn (6.283)")
-    if abs(span - 2 * math.pi) <= 1e-3:
+    if abs(span - TURN) <= 1e-3:
         scale = np.abs(forces).max()
         if not np.allclose(forces[:, :, 0], forces[:, :, -1], rtol=0.0, atol=0.05 * scale + 1e-12):
             raise DataError(
@@ -201,5 +223,5 @@ def _close_circle(
             )
         return True, angle[:-1], forces[:, :, :-1]
     # A full circle given without its end point leaves a last gap like the others.
-    closes = len(angle) > 2 and 2 * math.pi - span <= 1.5 * np.diff(angle).max()
+    closes = len(angle) > 2 and TURN - span <= 1.5 * np.diff(angle).max()
     return bool(closes), angle, forces

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.baselines.actuation import Actuation
 from finlab.control import Completion, Controller, Measurement, VelocityController, WaypointController
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.arrays import stack_layouts
+from finlab.physics import plant_of
 from finlab.sim.attitude import euler, quaternion_of_yaw
 from finlab.sim.fin_motion import FinMotion, Servo
 from finlab.sim.fin_power import fin_power
@@ -87,7 +87,7 @@ class ClosedLoop:
         self.fins = FinMotion(layout, servo)
         """The fins' motion: amplitude, frequency, zero direction and phase of each."""
         self._fin_force = make_plant(plant, layout)
-        self._actuation = Actuation(layout)
+        self._plant = plant_of(layout)
         self._axes, self._position = _geometry(layout)
         self._sensors = Sensors(SensorSettings() if sensors is None else sensors, np.random.default_rng(seed))
         self._pending = sorted(failures, key=lambda failure: failure[1])
@@ -221,7 +221,7 @@ class ClosedLoop:
             inertial += power.inertial / n_steps
             torque += power.torque / n_steps
         idle = np.where(alive[:, None], command, 0.0)
-        planned = self._actuation.wrench(idle)
+        planned = self._plant.wrench(idle)
         return Tick(
             time=time,
             position=before[:3].copy(),

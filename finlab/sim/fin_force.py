@@ -11,8 +11,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.baselines.fin_laws import group_laws
 from finlab.layout import Layout
+from finlab.layout.angles import wrapped
+from finlab.physics import plant_of
 from finlab.sim.fin_motion import FinMotion
 
 Array = NDArray[np.float64]
@@ -59,18 +60,12 @@ class MeanForce:
     step_s = 0.02
 
     def __init__(self, layout: Layout) -> None:
-        self._n_fins = layout.n_fins
-        self._laws = group_laws([fin.model for fin in layout.fins])
+        self._plant = plant_of(layout)
 
     def step(self, motion: FinMotion, dt: float) -> Array:
         command = motion.command
-        command[:, 2] = np.mod(command[:, 2] + math.pi, 2 * math.pi) - math.pi
-        result = np.zeros((self._n_fins, 3))
-        for places, law in self._laws:
-            force = law.force(command[places])
-            result[places, 1], result[places, 2] = force.horizontal, force.vertical
-            if force.shaft is not None:
-                result[places, 0] = force.shaft
+        command[:, 2] = wrapped(command[:, 2])
+        result = self._plant.forces(command)
         result[(motion.amplitude <= 0.0) | (motion.frequency <= 0.0)] = 0.0
         return result
 

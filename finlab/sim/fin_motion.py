@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.layout import Layout
+from finlab.layout.angles import is_full_turn
 from finlab.layout.arrays import stack_layouts
 
 Array = NDArray[np.float64]
-
-FULL_TURN = 2 * math.pi - 1e-9
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,7 @@ class FinMotion:
         self.servo = Servo() if servo is None else servo
         arrays = stack_layouts([layout])
         lower, upper = arrays.lower[0, :, 2], arrays.upper[0, :, 2]
-        self._turns_fully = upper - lower >= FULL_TURN
+        self._turns_fully = is_full_turn(upper - lower)
         n = layout.n_fins
         self.amplitude = np.zeros(n)
         """Half amplitude [rad]."""

@@ -14,7 +14,7 @@ from finlab.inference.checkpoint import resolve_checkpoint
 from finlab.inference.features import SIZES, fin_frame_features, geometry, raw_features
 from finlab.inference.weights import NetworkConfig
 from finlab.layout import FinModelSpec
-from finlab.physics import make_fin_model
+from finlab.physics import make_law
 from finlab.training import losses
 from finlab.training.curves import plot_log
 from finlab.training.data.sampling import Batch, ForwardSampler, seeded_generator
@@ -117,7 +117,7 @@ def make_terms(
     world: int = 1,
 ) -> Callable[[nn.Module, int], dict[str, Tensor]]:
     """The loss terms of a step, for this process's share of the batch."""
-    model = make_fin_model(FinModelSpec.from_values(base.fin_model))
+    model = make_law(FinModelSpec.from_values(base.fin_model))
     sampler = ForwardSampler(
         TRAIN_SEED + seed, training.batch_size, fin_model=model, varied_limits=training.varied_limits
     )

@@ -14,7 +14,7 @@ from torch import Tensor, nn
 from finlab.inference.learned_fin import REFERENCE
 from finlab.inference.normalization import Normalization
 from finlab.layout import FinModelSpec
-from finlab.physics import FinModel, make_fin_model
+from finlab.physics import FinLaw, make_law
 from finlab.training.curves import plot_log
 from finlab.training.data.sampling import Batch, ForwardSampler
 from finlab.training.device import join_processes, leave_processes, share_of_batch, training_device
@@ -55,7 +55,7 @@ def train_surrogate(
     """
     recipe = get_preset(preset)
     spec = fin_model or FinModelSpec()
-    model = make_fin_model(spec)
+    model = make_law(spec)
     training = recipe.surrogate_training
     total = steps or training.steps
     rank, world = join_processes()
@@ -103,13 +103,13 @@ def spec_to_dict(spec: FinModelSpec) -> dict[str, Any]:
     return {"type": spec.type, **dict(spec.parameters)}
 
 
-def measure_normalization(model: FinModel, seed: int) -> Normalization:
+def measure_normalization(model: FinLaw, seed: int) -> Normalization:
     """Wrench statistics over layouts of 2-5 fins with nominal limits."""
     sampler = ForwardSampler(TRAIN_SEED + seed, NORMALIZATION_SAMPLES, fin_model=model, varied_limits=0.0)
     return Normalization.of(sampler.batch(0).wrench.numpy())
 
 
-def surrogate_metrics(surrogate: Surrogate, model: FinModel, seed: int) -> dict[str, float]:
+def surrogate_metrics(surrogate: Surrogate, model: FinLaw, seed: int) -> dict[str, float]:
     """Accuracy against the fin model on fresh samples, half of them with varied limits.
 
     `relative_force_error` is RMS(F - F_plant) / RMS(F_plant) per fin and is known only where the
@@ -133,7 +133,7 @@ def surrogate_metrics(surrogate: Surrogate, model: FinModel, seed: int) -> dict[
 
 
 def _coefficient_terms(
-    model: FinModel, batch_size: int, seed: int, device: torch.device, share: slice
+    model: FinLaw, batch_size: int, seed: int, device: torch.device, share: slice
 ) -> Terms:
     """Mean squared error of force coefficients over single fins: the same relative weight for all forces."""
     low, high = (
@@ -155,7 +155,7 @@ def _coefficient_terms(
 
 
 def _wrench_terms(
-    model: FinModel,
+    model: FinLaw,
     batch_size: int,
     seed: int,
     normalization: Normalization,

@@ -11,11 +11,13 @@ from finlab.inference.features import SIZES
 from finlab.inference.learned_fin import LearnedFin
 from finlab.inference.network import NumpyNetwork
 from finlab.inference.weights import NetworkConfig, SurrogateConfig
-from finlab.layout import random_layouts
-from finlab.physics import Drag
+from finlab.layout import FinModelSpec, random_layouts
+from finlab.physics import make_law
 from finlab.training.networks.allocator_network import AllocatorNetwork
 from finlab.training.networks.checkpoint import Checkpoint
 from finlab.training.networks.surrogate import CoefficientSurrogate
+
+DRAG = make_law(FinModelSpec())
 
 MakeFin = Callable[[CoefficientSurrogate], LearnedFin]
 
@@ -53,7 +55,7 @@ def test_shipped_fin_equals_the_shipped_surrogate(
 
 def test_shipped_fin_knows_the_physics_to_a_thousandth(learned_fin: LearnedFin) -> None:
     command = commands(20_000)
-    truth = Drag().force(torch.from_numpy(command)).numpy()
+    truth = DRAG.force(torch.from_numpy(command)).numpy()
     error = learned_fin.force(command) - truth
     assert np.sqrt((error**2).mean() / (truth**2).mean()) < 1e-3
 

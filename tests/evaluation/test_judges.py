@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from finlab.allocation.baselines.actuation import Actuation
 from finlab.allocation.baselines.qp import LinearMap, Qp
 from finlab.evaluation.splits import make_split
 from finlab.inference.normalization import Normalization
+from finlab.physics import plant_of
 
 NORMALIZATION = Normalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35]))
 
@@ -16,11 +16,11 @@ def test_qp_answers_meet_their_kkt_conditions(split: str) -> None:
     """Stationary where free, pushing outwards where held."""
     method = Qp(NORMALIZATION)
     for case in make_split(split, 3, 8, 31):
-        actuation = Actuation(case.layout)
-        linear = LinearMap(actuation, NORMALIZATION.std)
+        plant = plant_of(case.layout)
+        linear = LinearMap(plant, NORMALIZATION.std)
         # Before directions are wrapped: at the seam both ends of the box are one direction.
-        command = method._commands(actuation, case.targets, seed=0)
-        step = ((command - linear.reference) / actuation.width).reshape(len(command), -1)[:, linear.free]
+        command = method._commands(plant, case.targets, seed=0)
+        step = ((command - linear.reference) / plant.width).reshape(len(command), -1)[:, linear.free]
         wanted = (case.targets - linear.wrench) / NORMALIZATION.std
         gradient = (step @ linear.matrix.T - wanted) @ linear.matrix + method.regularization * step
         # A step along the negative gradient, brought back into the box, must not move.

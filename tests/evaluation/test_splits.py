@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from finlab.allocation.baselines.actuation import Actuation
 from finlab.allocation.baselines.actuation_descent import DescentOptions, descend
 from finlab.errors import DataError
 from finlab.evaluation.splits import NEAR_ANGLE, NEAR_POSITION, SPLITS, Case, make_split
 from finlab.layout import Limits
+from finlab.physics import plant_of
 
 N = 60
 
@@ -88,11 +88,9 @@ def test_targets_are_reachable(split: str) -> None:
     sigma = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35])
     rng = np.random.default_rng(0)
     for case in make_split(split, 4, 3, 77):
-        actuation = Actuation(case.layout.without(case.failed) if case.failed else case.layout)
-        start = actuation.sample(rng, (30 * len(case.targets),))
-        end = descend(
-            actuation, start, np.repeat(case.targets, 30, axis=0), sigma, DescentOptions(n_steps=60)
-        )
+        plant = plant_of(case.layout.without(case.failed) if case.failed else case.layout)
+        start = plant.sample(rng, (30 * len(case.targets),))
+        end = descend(plant, start, np.repeat(case.targets, 30, axis=0), sigma, DescentOptions(n_steps=60))
         assert np.sqrt(end.objective.reshape(len(case.targets), -1).min(axis=1)).max() < 0.02
 
 

@@ -5,8 +5,10 @@ import pytest
 
 from finlab.forces.thrust_law import thrust_laws
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
-from finlab.physics import Drag, Plant, write_table
+from finlab.physics import Plant, make_law, write_table
 from finlab.physics.energy import fin_energy
+
+DRAG = make_law(FinModelSpec())
 
 SPECS = [
     FinModelSpec(),
@@ -41,7 +43,7 @@ def test_thrust_and_energy_agree_with_the_plant(spec: FinModelSpec) -> None:
 def test_a_table_counts_with_its_largest_thrust(tmp_path: object) -> None:
     path = f"{tmp_path}/forces.csv"
     turn = np.linspace(-np.pi, np.pi, 9)
-    write_table(path, Drag(), np.linspace(0.0, 0.7, 8), np.linspace(0.0, 2.5, 8), turn)
+    write_table(path, DRAG, np.linspace(0.0, 0.7, 8), np.linspace(0.0, 2.5, 8), turn)
     drag = thrust_laws(one_fin(FinModelSpec(), Limits()))[0]
     table = thrust_laws(one_fin(FinModelSpec("table", (("path", path),)), Limits()))[0]
     assert table.maximum == pytest.approx(drag.maximum, rel=0.02)

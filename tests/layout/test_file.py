@@ -129,7 +129,7 @@ BAD = [
     (
         "fins[0].model.type",
         edited("fins", 0, "model", value={"type": "jet"}),
-        "expected one of drag, lighthill, table",
+        "expected one of drag, lighthill, soft, table",
     ),
     ("fins[0].model.type", edited("fins", 0, "model", value={"area": 1}), "required key is missing"),
     ("fins[0].model.area", edited("fins", 0, "model", "area", value=-1), "must be above 0, got -1"),

@@ -11,7 +11,7 @@ import yaml
 from finlab import layout as layout_package
 from finlab.assets import shipped_layouts
 from finlab.layout.body import BODY_KEYS, HULL_KEYS, HULL_SHAPES
-from finlab.layout.fin_model import MODEL_DEFAULTS
+from finlab.layout.fin_model import FIN_MODELS
 
 SCHEMA = json.loads((Path(layout_package.__file__).parent / "layout.schema.json").read_text())
 VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
@@ -54,4 +54,4 @@ def test_the_schema_lists_the_keys_the_reader_knows():
         m["properties"]["type"]["const"]: set(m["properties"]) - {"type"}
         for m in definitions["model"]["oneOf"]
     }
-    assert models == {name: set(keys) or {"path"} for name, keys in MODEL_DEFAULTS.items()}
+    assert models == {name: set(keys) or {"path"} for name, keys in FIN_MODELS.items()}

@@ -7,7 +7,8 @@ import torch
 from torch import Tensor
 
 from finlab.inference.weights import SurrogateConfig
-from finlab.physics import Drag, assemble_wrench
+from finlab.layout import FinModelSpec
+from finlab.physics import assemble_wrench, make_law
 from finlab.training.networks.surrogate import (
     CoefficientSurrogate,
     MlpSurrogate,
@@ -17,6 +18,7 @@ from finlab.training.networks.surrogate import (
 )
 
 F64 = torch.float64
+DRAG = make_law(FinModelSpec())
 
 
 def make(kind: str) -> CoefficientSurrogate | MlpSurrogate:
@@ -47,8 +49,10 @@ def robots() -> dict[str, Tensor]:
 def test_torque_and_rotation_are_those_of_the_physics() -> None:
     unit = torch.rand(5, 3, 7, generator=torch.Generator().manual_seed(1), dtype=F64)
     command, position, angle = unit[..., :3], unit[..., 3:6], 6 * unit[..., 6]
-    got = sum_wrench(to_body(Drag().force(command), angle), position)
-    torch.testing.assert_close(got, assemble_wrench(Drag(), command, position, angle))
+    got = sum_wrench(to_body(DRAG.force(command), angle), position)
+    torch.testing.assert_close(
+        got, assemble_wrench(DRAG, command, position, angle, torch.ones_like(angle) > 0)
+    )
 
 
 def test_a_fin_that_pushes_up_at_the_bow_pitches_up_the_way_the_frame_says() -> None:

@@ -1,13 +1,22 @@
-"""Assembling wrenches: symmetries, padding, and the effectiveness matrix against differences."""
+"""Assembling wrenches, as training does: symmetries, padding, derivatives, numpy against tensors."""
 
 import math
 
+import numpy as np
 import pytest
 import torch
 
-from finlab.physics import Drag, Lighthill, assemble_wrench, body_force, effectiveness_matrix
+from finlab.layout import FinModelSpec
+from finlab.layout.arrays import force_columns
+from finlab.physics import assemble_wrench, body_force, make_law, wrench_of_forces
 
 F64 = torch.float64
+DRAG = make_law(FinModelSpec())
+
+
+def drag_wrench(command, position, angle, mask=None):
+    mask = torch.ones(angle.shape, dtype=torch.bool) if mask is None else mask
+    return assemble_wrench(DRAG, command, position, angle, mask)
 
 
 @pytest.fixture
@@ -35,8 +44,8 @@ def test_the_order_of_fins_does_not_matter(robots):
     command, position, angle = robots
     order = torch.tensor([3, 0, 4, 1, 2])
     torch.testing.assert_close(
-        assemble_wrench(Drag(), command, position, angle),
-        assemble_wrench(Drag(), command[:, order], position[:, order], angle[:, order]),
+        drag_wrench(command, position, angle),
+        drag_wrench(command[:, order], position[:, order], angle[:, order]),
     )
 
 
@@ -45,8 +54,8 @@ def test_turning_the_whole_robot_turns_the_wrench(robots):
     turn = 0.8
     c, s = math.cos(turn), math.sin(turn)
     rotation = torch.tensor([[c, -s, 0], [s, c, 0], [0, 0, 1]], dtype=F64)
-    wrench = assemble_wrench(Drag(), command, position, angle)
-    turned = assemble_wrench(Drag(), command, position @ rotation.T, angle + turn)
+    wrench = drag_wrench(command, position, angle)
+    turned = drag_wrench(command, position @ rotation.T, angle + turn)
     torch.testing.assert_close(turned[:, :3], wrench[:, :3] @ rotation.T)
     torch.testing.assert_close(turned[:, 3:], wrench[:, 3:] @ rotation.T)
 
@@ -57,8 +66,8 @@ def test_mirroring_left_and_right_mirrors_the_wrench(robots):
     mirrored = command.clone()
     mirrored[..., 2] = math.pi - command[..., 2]
     flip = torch.tensor([1.0, -1.0, 1.0], dtype=F64)
-    wrench = assemble_wrench(Drag(), command, position, angle)
-    other = assemble_wrench(Drag(), mirrored, position * flip, -angle)
+    wrench = drag_wrench(command, position, angle)
+    other = drag_wrench(mirrored, position * flip, -angle)
     torch.testing.assert_close(other[:, :3], wrench[:, :3] * flip)
     torch.testing.assert_close(other[:, 3:], -wrench[:, 3:] * flip)  # a torque is an axial vector
 
@@ -68,8 +77,8 @@ def test_turning_a_shaft_half_a_turn_and_reversing_the_fin_changes_nothing(robot
     other = command.clone()
     other[..., 2] = math.pi - command[..., 2]
     torch.testing.assert_close(
-        assemble_wrench(Drag(), command, position, angle),
-        assemble_wrench(Drag(), other, position, angle + math.pi),
+        drag_wrench(command, position, angle),
+        drag_wrench(other, position, angle + math.pi),
     )
 
 
@@ -77,42 +86,33 @@ def test_turning_a_shaft_half_a_turn_and_reversing_the_fin_changes_nothing(robot
 def test_padding_never_leaks_into_wrench_or_gradient(robots, rubbish):
     command, position, angle = robots
     mask = torch.tensor([True, True, False, True, False]).expand(6, 5)
-    clean = assemble_wrench(Drag(), command[:, [0, 1, 3]], position[:, [0, 1, 3]], angle[:, [0, 1, 3]])
+    clean = drag_wrench(command[:, [0, 1, 3]], position[:, [0, 1, 3]], angle[:, [0, 1, 3]])
     dirty = command.masked_fill(~mask.unsqueeze(-1), rubbish).requires_grad_()
-    wrench = assemble_wrench(Drag(), dirty, position, angle, mask)
+    wrench = drag_wrench(dirty, position, angle, mask)
     torch.testing.assert_close(wrench, clean)
     (gradient,) = torch.autograd.grad(wrench.square().sum(), dirty)
     assert torch.isfinite(gradient).all() and not gradient[~mask].any()
 
 
-@pytest.mark.parametrize("model", [Drag(), Lighthill()], ids=lambda m: m.name)
-def test_effectiveness_agrees_with_central_differences(robots, model):
-    command, position, angle = robots
-    mask = torch.tensor([True, True, False, True, True]).expand(6, 5)
-    matrix = effectiveness_matrix(model, command, position, angle, mask)
-    assert matrix.shape == (6, 6, 5, 3)
-    step = 1e-6
-    for fin in range(5):
-        for entry in range(3):
-            offset = torch.zeros_like(command)
-            offset[:, fin, entry] = step
-            ahead = assemble_wrench(model, command + offset, position, angle, mask)
-            behind = assemble_wrench(model, command - offset, position, angle, mask)
-            torch.testing.assert_close(
-                matrix[:, :, fin, entry], (ahead - behind) / (2 * step), rtol=1e-6, atol=1e-7
-            )
-    assert not matrix[:, :, 2].any()
-
-
-def test_effectiveness_works_without_gradients_and_in_float32(robots):
-    command, position, angle = robots
-    exact = effectiveness_matrix(Drag(), command, position, angle)
-    with torch.no_grad():
-        single = effectiveness_matrix(Drag(), command.float(), position.float(), angle.float())
-    assert single.dtype == torch.float32 and not single.requires_grad
-    torch.testing.assert_close(single.double(), exact, rtol=1e-4, atol=1e-4)
-
-
 def test_the_wrench_is_differentiable_by_command_and_geometry(robots):
     inputs = tuple(part[:1, :2].clone().requires_grad_() for part in robots)
-    assert torch.autograd.gradcheck(lambda u, r, a: assemble_wrench(Drag(), u, r, a), inputs)
+    assert torch.autograd.gradcheck(lambda u, r, a: drag_wrench(u, r, a), inputs)
+
+
+def test_arrays_and_tensors_give_the_same_wrench(robots):
+    tensors = drag_wrench(*robots).numpy()
+    command, position, angle = (part.numpy() for part in robots)
+    arrays = assemble_wrench(DRAG, command, position, angle, np.ones(angle.shape, dtype=bool))
+    np.testing.assert_allclose(arrays, tensors, rtol=1e-13, atol=1e-14)
+    # By hand: forces in the body frame, and their moments.
+    force = body_force(DRAG.force(command), angle)
+    np.testing.assert_allclose(arrays[:, :3], force.sum(1), atol=1e-14)
+    np.testing.assert_allclose(arrays[:, 3:], np.cross(position, force).sum(1), atol=1e-14)
+
+
+def test_one_robot_serves_many_commands(robots):
+    command, position, angle = (part.numpy() for part in robots)
+    force = DRAG.force(command)
+    columns = force_columns(position[0], angle[0])
+    expected = [wrench_of_forces(one, columns) for one in force]
+    np.testing.assert_allclose(wrench_of_forces(force, columns), expected, atol=1e-14)

@@ -7,11 +7,14 @@ import pytest
 import torch
 from torch import Tensor
 
-from finlab.physics import Drag, assemble_wrench
+from finlab.layout import FinModelSpec
+from finlab.physics import assemble_wrench, make_law
 from finlab.physics.energy import command_energy
 from finlab.training import losses
 from finlab.training.data.sampling import Batch, ForwardSampler
 from finlab.training.networks.mixture import Mixture, to_normalized, turns_fully
+
+DRAG = make_law(FinModelSpec())
 
 B, N, M = 6, 4, 3
 STD = torch.tensor([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
@@ -21,7 +24,7 @@ def physics(
     command: Tensor, position: Tensor, mounting_angle: Tensor, lower: Tensor, upper: Tensor, mask: Tensor
 ) -> Tensor:
     """The fin physics itself in place of a surrogate, so that recorded commands give the recorded wrench."""
-    return assemble_wrench(Drag(), command, position, mounting_angle, mask)
+    return assemble_wrench(DRAG, command, position, mounting_angle, mask)
 
 
 @pytest.fixture
@@ -142,7 +145,7 @@ def test_mode_guidance_by_hand(batch: Batch) -> None:
         for k in range(M):
             command = (batch.lower + half + mixture.mean[:, :, k] * half)[row]
             wrench = assemble_wrench(
-                Drag(), command, batch.position[row], batch.mounting_angle[row], batch.mask[row]
+                DRAG, command, batch.position[row], batch.mounting_angle[row], batch.mask[row]
             )
             squared = float(((wrench - batch.wrench[row]) / STD).square().sum())
             real = batch.mask[row].numpy()

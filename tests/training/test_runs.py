@@ -11,7 +11,8 @@ from safetensors.torch import load_file
 from finlab.errors import CheckpointError, DataError
 from finlab.inference.checkpoint import resolve_checkpoint
 from finlab.inference.features import SIZES
-from finlab.physics import Drag
+from finlab.layout import FinModelSpec
+from finlab.physics import make_law
 from finlab.training import train_allocator, train_surrogate
 from finlab.training.allocator import make_terms
 from finlab.training.networks.allocator_network import AllocatorNetwork
@@ -23,6 +24,8 @@ from finlab.training.networks.checkpoint import (
 from finlab.training.networks.surrogate import make_surrogate
 from finlab.training.presets import get_preset
 from finlab.training.surrogate import surrogate_metrics
+
+DRAG = make_law(FinModelSpec())
 
 FIXED = ["step", "samples", "seconds", "learning_rate", "loss"]
 
@@ -56,7 +59,7 @@ def held_out_guidance(base: Checkpoint, network: AllocatorNetwork) -> float:
 
 def test_the_surrogate_learns(smoke_surrogate) -> None:
     torch.manual_seed(0)
-    fresh = surrogate_metrics(make_surrogate(get_preset("smoke").surrogate), Drag(), seed=1)
+    fresh = surrogate_metrics(make_surrogate(get_preset("smoke").surrogate), DRAG, seed=1)
     learned = smoke_surrogate.checkpoint.metrics["surrogate"]
     assert learned["relative_force_error"] < 0.95 * fresh["relative_force_error"]
     assert learned["wrench_error_norm"] < 0.95 * fresh["wrench_error_norm"]

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.baselines.actuation import Actuation
+from finlab.physics import Plant
 from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyWeights, command_energy, energy_scale
 
 Array = NDArray[np.float64]
@@ -54,32 +54,30 @@ class Descent(NamedTuple):
     """J (B,)."""
 
 
-def descend(
-    actuation: Actuation, start: Array, target: Array, sigma: Array, options: DescentOptions
-) -> Descent:
+def descend(plant: Plant, start: Array, target: Array, sigma: Array, options: DescentOptions) -> Descent:
     """Minimize J from B start commands.
 
     Args:
-        actuation: the robot.
+        plant: the robot.
         start: commands (B, n, 3), within the limits.
         target: desired wrench of each row (B, 6).
         sigma: per-axis standard deviation (6,).
         options: see `DescentOptions`.
     """
-    energy = _EnergyForm(actuation, options)
-    command = actuation.feasible(start)
-    wrench, slope = actuation.linearize(command)
-    objective = _objective(actuation, command, wrench, target, sigma, options)
+    energy = _EnergyForm(plant, options)
+    command = plant.feasible(start)
+    wrench, slope = plant.linearize(command)
+    objective = _objective(plant, command, wrench, target, sigma, options)
     damping = options.damping * (1.0 + objective)
     busy = np.arange(len(command))
     slope = slope * energy.width / sigma[:, None]
     for _ in range(options.n_steps):
         residual = (wrench[busy] - target[busy]) / sigma
-        position = (command[busy] - actuation.lower) / energy.safe_width
-        step = _clamped_step(position, residual, slope[busy], damping[busy], energy, actuation)
-        trial = actuation.feasible(command[busy] + (step * energy.width).reshape(-1, actuation.n_fins, 3))
-        trial_wrench, trial_slope = actuation.linearize(trial)
-        trial_objective = _objective(actuation, trial, trial_wrench, target[busy], sigma, options)
+        position = (command[busy] - plant.lower) / energy.safe_width
+        step = _clamped_step(position, residual, slope[busy], damping[busy], energy, plant)
+        trial = plant.feasible(command[busy] + (step * energy.width).reshape(-1, plant.n_fins, 3))
+        trial_wrench, trial_slope = plant.linearize(trial)
+        trial_objective = _objective(plant, trial, trial_wrench, target[busy], sigma, options)
         better = trial_objective < objective[busy]
         gain = objective[busy] - trial_objective
         rows = busy[better]
@@ -97,12 +95,12 @@ def descend(
 class _EnergyForm:
     """The energy as a quadratic form in positions between the limits (0 at the lower, 1 at the upper one)."""
 
-    def __init__(self, actuation: Actuation, options: DescentOptions) -> None:
-        self.width = actuation.width.ravel()
-        self.safe_width = np.where(actuation.width > 0, actuation.width, 1.0)
-        scale = energy_scale(actuation.upper)
-        self.slope = actuation.width / scale
-        self.offset = actuation.lower / scale
+    def __init__(self, plant: Plant, options: DescentOptions) -> None:
+        self.width = plant.width.ravel()
+        self.safe_width = np.where(plant.width > 0, plant.width, 1.0)
+        scale = energy_scale(plant.upper)
+        self.slope = plant.width / scale
+        self.offset = plant.lower / scale
         weights, gamma = options.energy_weights, options.energy_tradeoff
         self.diagonal = gamma * np.array([weights.amplitude, weights.frequency, weights.zero_direction])
         self.product = gamma * weights.product / 2
@@ -139,14 +137,14 @@ class _EnergyForm:
 
 
 def _clamped_step(
-    position: Array, residual: Array, slope: Array, damping: Array, energy: _EnergyForm, actuation: Actuation
+    position: Array, residual: Array, slope: Array, damping: Array, energy: _EnergyForm, plant: Plant
 ) -> Array:
     """The damped step (B, 3 n) in positions, with variables fixed at the limits that it would cross."""
     shape = position.shape
     pull = energy.gradient(position)
     gradient = np.einsum("bij,bi->bj", slope, residual).reshape(shape) + pull
     free_turn = np.zeros(shape[1:], dtype=bool)
-    free_turn[:, 2] = actuation.full_turn
+    free_turn[:, 2] = plant.full_turn
     at_low, at_high = position <= 0, position >= 1
     held = ((at_low & (gradient > 0)) | (at_high & (gradient < 0))) & ~free_turn
     moved = np.zeros(shape)
@@ -183,7 +181,7 @@ def _damped_step(
 
 
 def _objective(
-    actuation: Actuation,
+    plant: Plant,
     command: Array,
     wrench: Array,
     target: Array,
@@ -193,4 +191,4 @@ def _objective(
     error = (((wrench - target) / sigma) ** 2).sum(axis=-1)
     if options.energy_tradeoff == 0:
         return error
-    return error + options.energy_tradeoff * command_energy(command, actuation.upper, options.energy_weights)
+    return error + options.energy_tradeoff * command_energy(command, plant.upper, options.energy_weights)

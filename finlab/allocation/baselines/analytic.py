@@ -7,9 +7,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.baselines.actuation import Actuation
 from finlab.allocation.baselines.model_based import CACHE_SIZE, ModelBased
 from finlab.inference.normalization import Normalization
+from finlab.physics import Plant
 
 Array = NDArray[np.float64]
 
@@ -20,18 +20,18 @@ TABLE_SIZE = 2049
 class ForceInverse:
     """Everything about one layout that does not depend on the target."""
 
-    def __init__(self, actuation: Actuation, sigma: Array, rcond: float) -> None:
-        self.actuation = actuation
-        lower, upper = actuation.lower, actuation.upper
+    def __init__(self, plant: Plant, sigma: Array, rcond: float) -> None:
+        self.plant = plant
+        lower, upper = plant.lower, plant.upper
         share = np.linspace(0.0, 1.0, TABLE_SIZE)[:, None]
         self.share = share[:, 0]
-        thrust = actuation.thrust(
+        thrust = plant.thrust(
             np.maximum(share * upper[:, 0], lower[:, 0]), np.maximum(share * upper[:, 1], lower[:, 1])
         )
         # A table of measured forces may dip; the inverse needs a rising curve.
         self.root_thrust = np.maximum.accumulate(np.sqrt(np.maximum(thrust, 0.0)), axis=0).T.copy()
         most = np.repeat(np.maximum(thrust[-1], 1e-9), 2)
-        planar = np.stack([actuation.horizontal, actuation.vertical], axis=-1).reshape(6, -1)
+        planar = plant.planar
         scaled = planar * most / sigma[:, None]
         self.inverse = (most[:, None] * np.linalg.pinv(scaled, rcond=rcond) / sigma).T.copy()
         """Target (6,) times this (6, 2 n) gives each fin's horizontal and vertical force [N]."""
@@ -40,19 +40,17 @@ class ForceInverse:
 
     def command(self, targets: Array) -> Array:
         """Commands (N, n, 3) for targets (N, 6)."""
-        force = (targets @ self.inverse).reshape(len(targets), self.actuation.n_fins, 2)
+        force = (targets @ self.inverse).reshape(len(targets), self.plant.n_fins, 2)
         horizontal, vertical = force[..., 0], force[..., 1]
         thrust = np.hypot(horizontal, vertical)
         direction = np.arctan2(vertical, horizontal)
-        if not self.actuation.full_turn.all():
+        if not self.plant.full_turn.all():
             thrust, direction = self._into_arc(thrust, direction)
         root = np.sqrt(thrust)
         share = np.empty_like(root)
         for i, curve in enumerate(self.root_thrust):
             share[:, i] = np.interp(root[:, i], curve, self.share)
-        return np.stack(
-            [share * self.actuation.upper[:, 0], share * self.actuation.upper[:, 1], direction], axis=-1
-        )
+        return np.stack([share * self.plant.upper[:, 0], share * self.plant.upper[:, 1], direction], axis=-1)
 
     def _into_arc(self, thrust: Array, direction: Array) -> tuple[Array, Array]:
         """The nearest allowed direction, and of the thrust what points there."""
@@ -80,8 +78,8 @@ class Analytic(ModelBased):
         self.rcond = rcond
         self._inverse = lru_cache(CACHE_SIZE)(self._prepare)
 
-    def _commands(self, actuation: Actuation, targets: Array, seed: int) -> Array:
-        return self._inverse(actuation).command(targets)
+    def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
+        return self._inverse(plant).command(targets)
 
-    def _prepare(self, actuation: Actuation) -> ForceInverse:
-        return ForceInverse(actuation, self.normalization.std, self.rcond)
+    def _prepare(self, plant: Plant) -> ForceInverse:
+        return ForceInverse(plant, self.normalization.std, self.rcond)

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Solution
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.baselines.actuation import Actuation
 from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
+from finlab.physics import Plant, plant_of
 from finlab.physics.energy import command_energy
 
 Array = NDArray[np.float64]
@@ -32,10 +31,10 @@ class ModelBased(Allocator):
 
     def __init__(self, normalization: Normalization) -> None:
         self.normalization = normalization
-        self._actuation = lru_cache(CACHE_SIZE)(Actuation)
+        self._plant = plant_of
 
     @abstractmethod
-    def _commands(self, actuation: Actuation, targets: Array, seed: int) -> Array:
+    def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
         """Commands (N, n, 3) for targets (N, 6).
 
         Random starts are drawn once and shared by all targets, so that a target gets the same answer alone
@@ -43,11 +42,11 @@ class ModelBased(Allocator):
         """
 
     def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
-        actuation = self._actuation(layout)
-        command = self._commands(actuation, targets, seed)
-        return Solution(actuation.feasible(command))
+        plant = self._plant(layout)
+        command = self._commands(plant, targets, seed)
+        return Solution(plant.feasible(command))
 
-    def _objective(self, actuation: Actuation, command: Array, target: Array) -> Array:
+    def _objective(self, plant: Plant, command: Array, target: Array) -> Array:
         """`J = err_norm^2 + ENERGY_TRADEOFF * J_en` of commands (..., n, 3)."""
-        error = self.normalization.error(actuation.wrench(command), target)
-        return error**2 + ENERGY_TRADEOFF * command_energy(command, actuation.upper)
+        error = self.normalization.error(plant.wrench(command), target)
+        return error**2 + ENERGY_TRADEOFF * command_energy(command, plant.upper)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.baselines.actuation import Actuation
 from finlab.allocation.baselines.actuation_descent import DescentOptions, descend
 from finlab.allocation.baselines.model_based import ENERGY_TRADEOFF, ModelBased
 from finlab.inference.normalization import Normalization
+from finlab.physics import Plant
 
 Array = NDArray[np.float64]
 
@@ -44,20 +44,19 @@ class Multistart(ModelBased):
         self.n_candidates, self.n_steps, self.energy_tradeoff = n_candidates, n_steps, energy_tradeoff
         self._descent = DescentOptions(n_steps=n_steps, energy_tradeoff=energy_tradeoff)
 
-    def _commands(self, actuation: Actuation, targets: Array, seed: int) -> Array:
-        start = actuation.sample(np.random.default_rng(seed), (self.n_candidates,))
+    def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
+        start = plant.sample(np.random.default_rng(seed), (self.n_candidates,))
         size = max(1, CHUNK_ROWS // self.n_candidates)
         parts = [
-            self._best(actuation, start, targets[first : first + size])
-            for first in range(0, len(targets), size)
+            self._best(plant, start, targets[first : first + size]) for first in range(0, len(targets), size)
         ]
-        return np.concatenate(parts) if parts else np.empty((0, actuation.n_fins, 3))
+        return np.concatenate(parts) if parts else np.empty((0, plant.n_fins, 3))
 
-    def _best(self, actuation: Actuation, start: Array, targets: Array) -> Array:
+    def _best(self, plant: Plant, start: Array, targets: Array) -> Array:
         sigma, n_targets = self.normalization.std, len(targets)
         starts = np.tile(start, (n_targets, 1, 1))
         repeated = np.repeat(targets, len(start), axis=0)
-        refined = descend(actuation, starts, repeated, sigma, self._descent)
+        refined = descend(plant, starts, repeated, sigma, self._descent)
         winner = refined.objective.reshape(n_targets, -1).argmin(axis=1)
         command = refined.command.reshape(n_targets, len(start), -1, 3)[np.arange(n_targets), winner]
-        return descend(actuation, command, targets, sigma, POLISH).command
+        return descend(plant, command, targets, sigma, POLISH).command

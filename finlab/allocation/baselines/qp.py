@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from finlab.allocation.baselines.actuation import Actuation
 from finlab.allocation.baselines.model_based import CACHE_SIZE, ModelBased
 from finlab.inference.normalization import Normalization
+from finlab.physics import Plant
 
 Array = NDArray[np.float64]
 
@@ -24,15 +24,15 @@ class LinearMap:
     Commands are positions between the limits, 0 at the lower and 1 at the upper one.
     """
 
-    def __init__(self, actuation: Actuation, sigma: Array) -> None:
-        self.reference = (actuation.lower + actuation.upper) / 2
+    def __init__(self, plant: Plant, sigma: Array) -> None:
+        self.reference = (plant.lower + plant.upper) / 2
         n = self.reference.size
-        offset = DIFFERENCE_STEP * np.eye(n).reshape(n, -1, 3) * actuation.width
-        rise = actuation.wrench(self.reference + offset) - actuation.wrench(self.reference - offset)
-        self.free = actuation.width.ravel() > 0
+        offset = DIFFERENCE_STEP * np.eye(n).reshape(n, -1, 3) * plant.width
+        rise = plant.wrench(self.reference + offset) - plant.wrench(self.reference - offset)
+        self.free = plant.width.ravel() > 0
         """Commands (3 n,) that have a range at all; SciPy takes no others."""
         self.matrix = (rise / (2 * DIFFERENCE_STEP) / sigma).T[:, self.free]
-        self.wrench = actuation.wrench(self.reference)
+        self.wrench = plant.wrench(self.reference)
 
 
 class Qp(ModelBased):
@@ -54,8 +54,8 @@ class Qp(ModelBased):
         self.regularization = regularization
         self._map = lru_cache(CACHE_SIZE)(self._prepare)
 
-    def _commands(self, actuation: Actuation, targets: Array, seed: int) -> Array:
-        linear = self._map(actuation)
+    def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
+        linear = self._map(plant)
         n_free = int(linear.free.sum())
         step = np.zeros((len(targets), linear.free.size))
         if n_free:
@@ -64,7 +64,7 @@ class Qp(ModelBased):
             wanted[:, :6] = (targets - linear.wrench) / self.normalization.std
             for i, right in enumerate(wanted):
                 step[i, linear.free] = lsq_linear(matrix, right, (-0.5, 0.5), method="bvls").x
-        return linear.reference + step.reshape(-1, actuation.n_fins, 3) * actuation.width
+        return linear.reference + step.reshape(-1, plant.n_fins, 3) * plant.width
 
-    def _prepare(self, actuation: Actuation) -> LinearMap:
-        return LinearMap(actuation, self.normalization.std)
+    def _prepare(self, plant: Plant) -> LinearMap:
+        return LinearMap(plant, self.normalization.std)

@@ -7,9 +7,9 @@ from abc import abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.baselines.actuation import Actuation
 from finlab.allocation.baselines.model_based import ENERGY_TRADEOFF, ModelBased
 from finlab.inference.normalization import Normalization
+from finlab.physics import Plant
 from finlab.physics.energy import DEFAULT_WEIGHTS, energy_scale
 
 Array = NDArray[np.float64]
@@ -22,40 +22,40 @@ class Problem:
     """One target on one layout, over the commands that have a range at all, as positions in 0..1.
 
     Args:
-        actuation: the robot.
+        plant: the robot.
         target: desired wrench (6,).
         sigma: per-axis standard deviation (6,).
     """
 
-    def __init__(self, actuation: Actuation, target: Array, sigma: Array) -> None:
-        self.actuation, self.target, self.sigma = actuation, target, sigma
-        self.free = actuation.width.ravel() > 0
+    def __init__(self, plant: Plant, target: Array, sigma: Array) -> None:
+        self.plant, self.target, self.sigma = plant, target, sigma
+        self.free = plant.width.ravel() > 0
         self.n_free = int(self.free.sum())
-        self._scale = energy_scale(actuation.upper)
+        self._scale = energy_scale(plant.upper)
 
     def command(self, x: Array) -> Array:
         """Command (n, 3) at positions (n_free,)."""
         position = np.zeros(self.free.size)
         position[self.free] = x
-        return self.actuation.lower + position.reshape(-1, 3) * self.actuation.width
+        return self.plant.lower + position.reshape(-1, 3) * self.plant.width
 
     def position(self, command: Array) -> Array:
         """Positions (n_free,) of a command (n, 3)."""
-        return ((command - self.actuation.lower).ravel()[self.free]) / self.actuation.width.ravel()[self.free]
+        return ((command - self.plant.lower).ravel()[self.free]) / self.plant.width.ravel()[self.free]
 
     def residual(self, x: Array) -> Array:
         """Normalized error (6,)."""
-        return (self.actuation.wrench(self.command(x)) - self.target) / self.sigma
+        return (self.plant.wrench(self.command(x)) - self.target) / self.sigma
 
     def residual_slope(self, x: Array) -> Array:
         """Derivative (6, n_free) of `residual`."""
-        _, jacobian = self.actuation.linearize(self.command(x))
-        return (jacobian * self.actuation.width.ravel() / self.sigma[:, None])[:, self.free]
+        _, jacobian = self.plant.linearize(self.command(x))
+        return (jacobian * self.plant.width.ravel() / self.sigma[:, None])[:, self.free]
 
     def objective(self, x: Array) -> tuple[float, Array]:
         """`err_norm^2 + ENERGY_TRADEOFF * J_en` and its gradient (n_free,)."""
         command = self.command(x)
-        wrench, jacobian = self.actuation.linearize(command)
+        wrench, jacobian = self.plant.linearize(command)
         residual = (wrench - self.target) / self.sigma
         weights = DEFAULT_WEIGHTS
         share = command / self._scale
@@ -66,7 +66,7 @@ class Problem:
         by_command = (
             2 * (residual / self.sigma) @ jacobian + 2 * ENERGY_TRADEOFF * (half / self._scale).ravel()
         )
-        return value, (by_command * self.actuation.width.ravel())[self.free]
+        return value, (by_command * self.plant.width.ravel())[self.free]
 
 
 class SingleTarget(ModelBased):
@@ -85,19 +85,19 @@ class SingleTarget(ModelBased):
     def _minimize(self, problem: Problem, start: Array) -> Array:
         """Positions (n_free,) where the solver ends from a start (n_free,)."""
 
-    def _commands(self, actuation: Actuation, targets: Array, seed: int) -> Array:
-        starts = actuation.sample(np.random.default_rng(seed), (self.n_starts,))
-        result = np.empty((len(targets), actuation.n_fins, 3))
+    def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
+        starts = plant.sample(np.random.default_rng(seed), (self.n_starts,))
+        result = np.empty((len(targets), plant.n_fins, 3))
         for i, target in enumerate(targets):
-            problem = Problem(actuation, target, self.normalization.std)
+            problem = Problem(plant, target, self.normalization.std)
             if problem.n_free == 0:
-                result[i] = actuation.lower
+                result[i] = plant.lower
                 continue
             ends = np.array([self._end(problem, start) for start in starts])
-            result[i] = ends[self._objective(actuation, ends, target).argmin()]
+            result[i] = ends[self._objective(plant, ends, target).argmin()]
         return result
 
     def _end(self, problem: Problem, start: Array) -> Array:
         """The command (n, 3) a solver ends at, or the start itself where it breaks down."""
         end = problem.command(self._minimize(problem, problem.position(start)))
-        return problem.actuation.feasible(end) if np.isfinite(end).all() else start
+        return problem.plant.feasible(end) if np.isfinite(end).all() else start

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.baselines.actuation import Actuation
 from finlab.allocation.baselines.box_least_squares import solve_box_quadratics
 from finlab.allocation.baselines.model_based import ModelBased
 from finlab.inference.normalization import Normalization
+from finlab.physics import Plant
 
 Array = NDArray[np.float64]
 
@@ -47,34 +47,34 @@ class Sqp(ModelBased):
         self.n_starts = n_starts
         self.regularization = regularization
 
-    def _commands(self, actuation: Actuation, targets: Array, seed: int) -> Array:
-        best = np.empty((len(targets), actuation.n_fins, 3))
+    def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
+        best = np.empty((len(targets), plant.n_fins, 3))
         error = np.full(len(targets), np.inf)
-        middle = (actuation.lower + actuation.upper) / 2
-        others = actuation.sample(np.random.default_rng(seed), (self.n_starts - 1,))
+        middle = (plant.lower + plant.upper) / 2
+        others = plant.sample(np.random.default_rng(seed), (self.n_starts - 1,))
         for start in (middle, *others):
             for first in range(0, len(targets), CHUNK):
                 rows = np.arange(first, min(first + CHUNK, len(targets)))
                 rows = rows[error[rows] > SOLVED]
                 if not len(rows):
                     continue
-                command, reached = self._descend(actuation, start, targets[rows])
+                command, reached = self._descend(plant, start, targets[rows])
                 better = reached < error[rows]
                 best[rows[better]], error[rows[better]] = command[better], reached[better]
         return best
 
-    def _descend(self, actuation: Actuation, start: Array, targets: Array) -> tuple[Array, Array]:
+    def _descend(self, plant: Plant, start: Array, targets: Array) -> tuple[Array, Array]:
         """Where one start (n, 3) ends for each target (B, 6), and the normalized error (B,) there."""
-        sigma, width = self.normalization.std, actuation.width.ravel()
+        sigma, width = self.normalization.std, plant.width.ravel()
         command = np.tile(start, (len(targets), 1, 1))
         busy = np.arange(len(command))
-        error = self.normalization.error(actuation.wrench(command), targets)
+        error = self.normalization.error(plant.wrench(command), targets)
         for _ in range(self.n_steps):
             busy = busy[error[busy] > SOLVED]
             if not len(busy):
                 break
             at = command[busy]
-            wrench, jacobian = actuation.linearize(at)
+            wrench, jacobian = plant.linearize(at)
             residual = (wrench - targets[busy]) / sigma
             slope = jacobian * width / sigma[:, None]
             hessian = slope.transpose(0, 2, 1) @ slope
@@ -82,24 +82,24 @@ class Sqp(ModelBased):
             weight = np.maximum(self.regularization * error[busy] ** 2, 1e-12)
             hessian[:, diagonal, diagonal] += weight[:, None]
             gradient = np.einsum("bij,bi->bj", slope, residual)
-            low, high = self._room(actuation, at)
-            step = solve_box_quadratics(hessian, gradient, low, high).reshape(at.shape) * actuation.width
-            moved = self._search(actuation, command, error, targets, busy, step)
+            low, high = self._room(plant, at)
+            step = solve_box_quadratics(hessian, gradient, low, high).reshape(at.shape) * plant.width
+            moved = self._search(plant, command, error, targets, busy, step)
             busy = busy[moved]
         return command, error
 
     @staticmethod
-    def _room(actuation: Actuation, command: Array) -> tuple[Array, Array]:
+    def _room(plant: Plant, command: Array) -> tuple[Array, Array]:
         """How far each command may step (B, 3 n), as a share of its range; a free turn, half a turn."""
-        safe = np.where(actuation.width > 0, actuation.width, 1.0)
-        low, high = (actuation.lower - command) / safe, (actuation.upper - command) / safe
-        low[:, actuation.full_turn, 2], high[:, actuation.full_turn, 2] = -0.5, 0.5
+        safe = np.where(plant.width > 0, plant.width, 1.0)
+        low, high = (plant.lower - command) / safe, (plant.upper - command) / safe
+        low[:, plant.full_turn, 2], high[:, plant.full_turn, 2] = -0.5, 0.5
         shape = (len(command), -1)
         return np.minimum(low, 0.0).reshape(shape), np.maximum(high, 0.0).reshape(shape)
 
     def _search(
         self,
-        actuation: Actuation,
+        plant: Plant,
         command: Array,
         error: Array,
         targets: Array,
@@ -111,8 +111,8 @@ class Sqp(ModelBased):
         pending = np.arange(len(rows))
         length = 1.0
         for _ in range(8):
-            trial = actuation.feasible(command[rows[pending]] + length * step[pending])
-            reached = self.normalization.error(actuation.wrench(trial), targets[rows[pending]])
+            trial = plant.feasible(command[rows[pending]] + length * step[pending])
+            reached = self.normalization.error(plant.wrench(trial), targets[rows[pending]])
             good = reached < error[rows[pending]] * (1 - 1e-4 * length)
             done = rows[pending[good]]
             command[done], error[done] = trial[good], reached[good]

@@ -14,14 +14,14 @@ from finlab.forces.thrust_curve import thrust_curves
 from finlab.inference.features import Geometry, geometry
 from finlab.inference.learned_fin import LearnedFin
 from finlab.layout import Layout
+from finlab.layout.angles import is_full_turn
+from finlab.layout.arrays import force_columns
 from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyMeter, EnergyWeights, energy_scale
 
 Array = NDArray[Any]
 
 MAX_SUBSETS = 40
 """Most sub-layouts that are searched beside the network's proposals."""
-FULL_TURN = 2 * np.pi - 1e-6
-"""Arc of zero directions [rad] from which a fin counts as able to point anywhere."""
 
 
 class Prepared(NamedTuple):
@@ -49,19 +49,12 @@ def prepare(
     layout: Layout, fin: LearnedFin, std: Array, weights: EnergyWeights = DEFAULT_WEIGHTS
 ) -> Prepared:
     """Prepare a layout whose fins are all healthy; `std` (6,) normalizes wrenches."""
-    position = layout.position
-    angle = layout.mounting_angle
-    lower = layout.lower
-    upper = layout.upper
-    c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
-    axes = np.stack(
-        [np.stack([c, s, zero], -1), np.stack([-s, c, zero], -1), np.stack([zero, zero, one], -1)], axis=1
-    )
-    torque = np.cross(position[:, None], axes)
-    columns = np.concatenate([axes, torque], axis=-1) / std  # (n, 3, 6)
+    position, angle, lower, upper = layout.position, layout.mounting_angle, layout.lower, layout.upper
+    columns: Array = force_columns(position, angle) / std
     curves = thrust_curves(fin, lower, upper, weights)
     arc = upper[:, 2] - lower[:, 2]
-    half = np.where(arc >= FULL_TURN, np.pi, 0.5 * arc)
+    wraps: NDArray[np.bool_] = is_full_turn(arc)
+    half = np.where(wraps, np.pi, 0.5 * arc)
     cost = weights.zero_direction / energy_scale(upper)[:, 2] ** 2
     in_plane = np.ascontiguousarray(columns[:, 1:])
     planar = PlanarProblem(
@@ -72,7 +65,7 @@ def prepare(
         half=half,
         direction_cost=cost,
         idle_direction=np.clip(0.0, lower[:, 2], upper[:, 2]),
-        turns_fully=bool((arc >= FULL_TURN).all()),
+        turns_fully=bool(wraps.all()),
         free=free_terms(in_plane, curves.maximum),
         growth=1.5 if weights.inertial else 0.5,
     )
@@ -81,7 +74,7 @@ def prepare(
         upper,
         geometry(position[None], angle[None], lower[None], upper[None], std),
         planar,
-        CommandProblem(fin, columns, lower, upper, arc >= FULL_TURN),
+        CommandProblem(fin, columns, lower, upper, wraps),
         _subset_seeds(curves.maximum),
         EnergyMeter(upper, weights),
         EnergyMeter(upper),

@@ -17,14 +17,13 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.baselines.actuation import Actuation
 from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, Ipopt
 from finlab.allocation.baselines.single_target import Problem
 from finlab.allocation.modes import cluster, same_way, way_of
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.tables import text_table
 from finlab.layout import Layout
-from finlab.physics import Plant
+from finlab.physics import Plant, plant_of
 from finlab.physics.energy import command_energy
 
 Array = NDArray[np.float64]
@@ -43,25 +42,25 @@ class CheapestWays(Ipopt):
 
     def ends(self, layout: Layout, target: Array, starts: Array) -> Array:
         """The commands (M, n, 3) that converged, cheapest first, of those from starts (S, n, 3)."""
-        actuation = Actuation(layout)
-        problem = Problem(actuation, target, self.normalization.std)
+        plant = plant_of(layout)
+        problem = Problem(plant, target, self.normalization.std)
         found = np.array([self._minimize(problem, problem.position(start)) for start in starts])
         found = np.array([problem.command(end) for end in found if np.isfinite(end).all()])
-        command = actuation.feasible(found.reshape(-1, actuation.n_fins, 3))
-        sorted_: Array = command[np.argsort(command_energy(command, actuation.upper))]
+        command = plant.feasible(found.reshape(-1, plant.n_fins, 3))
+        sorted_: Array = command[np.argsort(command_energy(command, plant.upper))]
         return sorted_
 
     def _minimize(self, problem: Problem, start: Array) -> Array:
         end = super()._minimize(problem, start)
-        converged = self._solver(problem.actuation).stats()["success"]
+        converged = self._solver(problem.plant).stats()["success"]
         return end if converged else np.full_like(end, np.nan)
 
     @staticmethod
     def _bounds(problem: Problem) -> dict[str, Array]:
         return {**Ipopt._bounds(problem), "lbg": np.full(6, -EXACT), "ubg": np.full(6, EXACT)}
 
-    def _build(self, actuation: Actuation) -> Any:
-        command, target, residual, energy = self._formulas(actuation)
+    def _build(self, plant: Plant) -> Any:
+        command, target, residual, energy = self._formulas(plant)
         program = {"x": command, "p": target, "f": energy, "g": residual}
         return self._casadi.nlpsol("ways", "ipopt", program, SOLVER_OPTIONS)
 
@@ -131,7 +130,7 @@ def _compare(
 
 def _truth(truth: CheapestWays, layout: Layout, target: Array, n_starts: int, seed: int) -> Array:
     """The best command of each mode (M, n, 3) that random starts lead to, cheapest first."""
-    starts = Actuation(layout).sample(np.random.default_rng(seed), (n_starts,))
+    starts = plant_of(layout).sample(np.random.default_rng(seed), (n_starts,))
     command = truth.ends(layout, target, starts)
     first = [group[0] for group in cluster([way_of(one) for one in command])]
     kept: Array = command[first]

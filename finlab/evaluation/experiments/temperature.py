@@ -17,6 +17,7 @@ from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.evaluation.statistics.tables import text_table
 from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.layout import Layout
+from finlab.layout.angles import is_full_turn
 
 Array = NDArray[Any]
 Columns = dict[str, Array]
@@ -26,8 +27,6 @@ TEMPERATURES = tuple(float(t) for t in np.logspace(-3, 1, 13))
 """From 0.001 to 10, three to a decade."""
 PAPER_TEMPERATURE = 0.02
 """The paper's choice."""
-FULL_TURN = 2 * np.pi - 1e-6
-"""Arc of zero directions [rad] from which they are compared as angles."""
 
 
 def temperature_columns(
@@ -110,7 +109,7 @@ def diversity(command: Array, layout: Layout) -> float:
     if len(first) == 0:
         return 0.0
     gap = np.abs(command[first] - command[second])
-    turns = width[:, 2] >= FULL_TURN
+    turns = is_full_turn(width[:, 2])
     gap[..., 2] = np.where(turns, np.minimum(gap[..., 2], 2 * np.pi - gap[..., 2]), gap[..., 2])
     return float(np.sqrt(((gap / width) ** 2).mean(axis=(1, 2))).mean())
 

@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.baselines.actuation import FULL_TURN, Actuation
 from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, import_casadi
 from finlab.allocation.policy import KINDS, Policy
 from finlab.evaluation.statistics.tables import text_table
 from finlab.layout import Layout, random_layout
+from finlab.layout.angles import is_full_turn
 from finlab.layout.arrays import layout_effectiveness
-from finlab.physics import Plant
+from finlab.physics import Plant, plant_of
 
 Array = NDArray[np.float64]
 Row = dict[str, Any]
@@ -62,9 +62,9 @@ class Judge:
     def __init__(self, layout: Layout, sigma: Array) -> None:
         self.casadi, self.sigma = import_casadi(), sigma
         self.effect = layout_effectiveness(layout) / sigma[:, None]
-        actuation = Actuation(layout)
-        self.thrust = actuation.thrust(actuation.upper[:, 0], actuation.upper[:, 1])
-        self.arcs = _convex_arcs(actuation.lower[:, 2], actuation.upper[:, 2])
+        plant = plant_of(layout)
+        self.thrust = plant.thrust(plant.upper[:, 0], plant.upper[:, 1])
+        self.arcs = _convex_arcs(plant.lower[:, 2], plant.upper[:, 2])
 
     def least_error(self, target: Array, axes: NDArray[np.bool_]) -> float:
         """The least error on some axes (6,) of a normalized target (6,)."""
@@ -90,7 +90,7 @@ class Judge:
         for i, (first, last) in enumerate(arcs):
             across, up = force[2 * i], force[2 * i + 1]
             limits.append((across**2 + up**2, 0.0, self.thrust[i] ** 2))
-            if last - first < FULL_TURN:
+            if not is_full_turn(last - first):
                 limits.append((np.cos(first) * up - np.sin(first) * across, 0.0, np.inf))
                 limits.append((np.sin(last) * across - np.cos(last) * up, 0.0, np.inf))
                 middle = 0.5 * (first + last)
@@ -176,7 +176,7 @@ def _far_target(rng: np.random.Generator, layout: Layout, sigma: Array) -> Array
     """A wrench (6,) [N, N m] that is probably out of reach."""
     farther = rng.choice(FARTHER)
     if rng.uniform() < 0.5:
-        near = Plant(layout).wrench(Actuation(layout).sample(rng, ()))
+        near = plant_of(layout).wrench(plant_of(layout).sample(rng, ()))
     else:
         near = rng.standard_normal(6) * sigma
     far: Array = near * farther
@@ -188,6 +188,6 @@ def _convex_arcs(lower: Array, upper: Array) -> list[Array]:
     choices = []
     for first, last in zip(lower, upper, strict=True):
         middle = 0.5 * (first + last)
-        wide = np.pi < last - first < FULL_TURN
+        wide = np.pi < last - first and not is_full_turn(last - first)
         choices.append([(first, middle), (middle, last)] if wide else [(first, last)])
     return [np.array(arcs) for arcs in product(*choices)]

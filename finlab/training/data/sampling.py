@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from finlab.layout.fin import Limits
+from finlab.layout.fin_model import FinModelSpec
 from finlab.layout.random import (
     AMPLITUDE_MAX_RANGE,
     ARC_RANGE,
@@ -20,9 +21,7 @@ from finlab.layout.random import (
     TRAINING_BOX,
     TRAINING_FINS,
 )
-from finlab.physics.drag import Drag
-from finlab.physics.fin_model import FinModel
-from finlab.physics.wrench import assemble_wrench
+from finlab.physics import FinLaw, assemble_wrench, make_law
 from finlab.training.data.reserved import ReservedLayouts, shipped_reserved
 
 
@@ -134,14 +133,14 @@ class ForwardSampler:
         seed: int,
         batch_size: int,
         n_fins: tuple[int, int] = TRAINING_FINS,
-        fin_model: FinModel | None = None,
+        fin_model: FinLaw | None = None,
         varied_limits: float = 0.5,
     ) -> None:
-        """Describes the stream; see `sample_layouts`. `fin_model` is `Drag()` when None."""
+        """Describes the stream; see `sample_layouts`. `fin_model` is the default law when None."""
         self.seed = seed
         self.batch_size = batch_size
         self.n_fins = n_fins
-        self.fin_model = Drag() if fin_model is None else fin_model
+        self.fin_model = make_law(FinModelSpec()) if fin_model is None else fin_model
         self.varied_limits = varied_limits
 
     @torch.no_grad()

@@ -13,10 +13,10 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from finlab.layout.angles import is_full_turn
+
 LOG_STD_RANGE = (-3.0, 3.0)
 """Range of the components' log standard deviation (paper, implementation details)."""
-
-_FULL_TURN = 2.0 * math.pi - 1e-4
 
 
 class Mixture(NamedTuple):
@@ -90,7 +90,8 @@ class Mixture(NamedTuple):
 
 def turns_fully(lower: Tensor, upper: Tensor) -> Tensor:
     """True (B, n) for fins whose zero direction may turn a full circle; limits (B, n, 3)."""
-    return upper[..., 2] - lower[..., 2] >= _FULL_TURN
+    full: Tensor = is_full_turn(upper[..., 2] - lower[..., 2])
+    return full
 
 
 def to_normalized(command: Tensor, lower: Tensor, upper: Tensor) -> Tensor:

@@ -146,7 +146,7 @@ def test_other_fin_models_and_mixtures_of_them(method: str) -> None:
 
 def test_ipopt_says_which_fin_models_it_knows(force_table: str) -> None:
     table = one_fin(model=FinModelSpec("table", (("path", force_table),)))
-    with pytest.raises(AllocationError, match="knows the fin models drag and lighthill, got 'table'"):
+    with pytest.raises(AllocationError, match="needs a closed formula, fin fin follows a table"):
         make("ipopt").allocate(table, [0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
 
 

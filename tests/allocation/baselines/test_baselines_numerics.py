@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from finlab.allocation.baselines.actuation import Actuation
 from finlab.allocation.baselines.actuation_descent import DescentOptions, descend
 from finlab.allocation.baselines.box_least_squares import solve_box_quadratics
 from finlab.allocation.baselines.single_target import Problem
 from finlab.layout import Fin, FinModelSpec, Layout, random_layout
-from finlab.physics import Plant
+from finlab.physics import plant_of
 from finlab.physics.energy import command_energy
 
 SIGMA = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35])
@@ -26,32 +25,16 @@ def _layout(*specs: FinModelSpec) -> Layout:
     )
 
 
-@pytest.mark.parametrize("kinds", [("drag",) * 3, ("lighthill",) * 2, ("drag", "lighthill", "table", "drag")])
-def test_actuation_is_the_plant(kinds: tuple[str, ...], force_table: str) -> None:
-    layout = _layout(*(FinModelSpec(k, (("path", force_table),) if k == "table" else ()) for k in kinds))
-    actuation, plant = Actuation(layout), Plant(layout)
-    command = np.random.default_rng(0).uniform([0.06, 0.2, -3.0], [0.59, 2.0, 3.0], (20, layout.n_fins, 3))
-    wrench, jacobian = actuation.linearize(command)
-    np.testing.assert_allclose(wrench, plant.wrench(command), atol=1e-12)
-    np.testing.assert_allclose(actuation.wrench(command), wrench, atol=1e-12)
-    expected = plant.effectiveness(command).reshape(jacobian.shape)
-    np.testing.assert_allclose(jacobian, expected, atol=1e-6)
-    forward = command.copy()
-    forward[..., 2] = 0.0
-    size = np.linalg.norm(plant.fin_forces(forward), axis=-1)
-    np.testing.assert_allclose(actuation.thrust(forward[..., 0], forward[..., 1]), size, atol=1e-9)
-
-
 def test_feasible_wraps_full_turns_and_clips_the_rest() -> None:
     rng = np.random.default_rng(1)
     layout = random_layout(rng, n_fins=5, limits="varied")
-    actuation = Actuation(layout)
+    plant = plant_of(layout)
     wild = rng.normal(scale=20.0, size=(100, 5, 3))
-    tame = actuation.feasible(wild)
-    assert (tame >= actuation.lower).all() and (tame <= actuation.upper).all()
-    turns = (tame - wild)[:, actuation.full_turn, 2] / (2 * np.pi)
+    tame = plant.feasible(wild)
+    assert (tame >= plant.lower).all() and (tame <= plant.upper).all()
+    turns = (tame - wild)[:, plant.full_turn, 2] / (2 * np.pi)
     np.testing.assert_allclose(turns, np.round(turns), atol=1e-9)
-    np.testing.assert_array_equal(actuation.feasible(tame), tame)
+    np.testing.assert_array_equal(plant.feasible(tame), tame)
 
 
 @pytest.mark.parametrize("n_variables", [1, 6, 15, 48])
@@ -92,15 +75,15 @@ def test_a_fixed_variable_stays() -> None:
 @pytest.mark.parametrize("energy_tradeoff", [0.0, 1e-3])
 def test_descent_lowers_its_objective_and_reports_it(energy_tradeoff: float) -> None:
     rng = np.random.default_rng(3)
-    actuation = Actuation(random_layout(rng, n_fins=4, limits="varied"))
-    start = actuation.sample(rng, (50,))
-    target = actuation.wrench(actuation.sample(rng, (50,)))
+    plant = plant_of(random_layout(rng, n_fins=4, limits="varied"))
+    start = plant.sample(rng, (50,))
+    target = plant.wrench(plant.sample(rng, (50,)))
 
     def objective(command: np.ndarray) -> np.ndarray:
-        error = (((actuation.wrench(command) - target) / SIGMA) ** 2).sum(-1)
-        return error + energy_tradeoff * command_energy(command, actuation.upper)
+        error = (((plant.wrench(command) - target) / SIGMA) ** 2).sum(-1)
+        return error + energy_tradeoff * command_energy(command, plant.upper)
 
-    end = descend(actuation, start, target, SIGMA, DescentOptions(energy_tradeoff=energy_tradeoff))
+    end = descend(plant, start, target, SIGMA, DescentOptions(energy_tradeoff=energy_tradeoff))
     np.testing.assert_allclose(end.objective, objective(end.command), rtol=1e-9)
     assert (end.objective <= objective(start)).all()
     assert np.median(objective(end.command)) < 0.05 * np.median(objective(start))
@@ -108,21 +91,19 @@ def test_descent_lowers_its_objective_and_reports_it(energy_tradeoff: float) -> 
 
 def test_energy_in_the_descent_finds_cheaper_commands() -> None:
     rng = np.random.default_rng(4)
-    actuation = Actuation(random_layout(rng, n_fins=5))
-    start, target = actuation.sample(rng, (50,)), actuation.wrench(actuation.sample(rng, (50,)))
+    plant = plant_of(random_layout(rng, n_fins=5))
+    start, target = plant.sample(rng, (50,)), plant.wrench(plant.sample(rng, (50,)))
     plain, cheap = (
-        descend(actuation, start, target, SIGMA, DescentOptions(energy_tradeoff=weight, n_steps=60)).command
+        descend(plant, start, target, SIGMA, DescentOptions(energy_tradeoff=weight, n_steps=60)).command
         for weight in (0.0, 1e-4)
     )
-    assert (
-        command_energy(cheap, actuation.upper).mean() < 0.95 * command_energy(plain, actuation.upper).mean()
-    )
+    assert command_energy(cheap, plant.upper).mean() < 0.95 * command_energy(plain, plant.upper).mean()
 
 
 def test_single_target_derivatives_match_finite_differences() -> None:
     rng = np.random.default_rng(5)
-    actuation = Actuation(random_layout(rng, n_fins=3, limits="varied"))
-    problem = Problem(actuation, rng.normal(size=6), SIGMA)
+    plant = plant_of(random_layout(rng, n_fins=3, limits="varied"))
+    problem = Problem(plant, rng.normal(size=6), SIGMA)
     x = rng.uniform(0.2, 0.8, problem.n_free)
     step = 1e-6 * np.eye(problem.n_free)
     numeric = np.array([(problem.residual(x + d) - problem.residual(x - d)) / 2e-6 for d in step]).T
@@ -131,6 +112,6 @@ def test_single_target_derivatives_match_finite_differences() -> None:
     numeric = np.array([(problem.objective(x + d)[0] - problem.objective(x - d)[0]) / 2e-6 for d in step])
     np.testing.assert_allclose(gradient, numeric, rtol=1e-4, atol=1e-5)
     command = problem.command(x)
-    expected = (problem.residual(x) ** 2).sum() + 1e-4 * command_energy(command, actuation.upper)
+    expected = (problem.residual(x) ** 2).sum() + 1e-4 * command_energy(command, plant.upper)
     assert value == pytest.approx(float(expected))
     np.testing.assert_allclose(problem.position(command), x)

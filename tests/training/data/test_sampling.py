@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import torch
 
-from finlab.layout import LayoutArrays, Limits, layout_from_arrays, random_layouts
+from finlab.layout import FinModelSpec, LayoutArrays, Limits, layout_from_arrays, random_layouts
 from finlab.layout.random import TRAINING_BOX
-from finlab.physics import Lighthill, Plant
+from finlab.physics import Plant, make_law
 from finlab.training.data.sampling import ForwardSampler, sample_layouts, seeded_generator
 
 BATCH = ForwardSampler(seed=1, batch_size=20_000).batch(0)
@@ -95,6 +95,6 @@ def test_the_plant_confirms_the_wrenches():
 
 
 def test_another_fin_model_and_another_range_of_fins():
-    batch = ForwardSampler(0, 100, n_fins=(6, 8), fin_model=Lighthill()).batch(0)
+    batch = ForwardSampler(0, 100, n_fins=(6, 8), fin_model=make_law(FinModelSpec("lighthill"))).batch(0)
     assert batch.mask.shape == (100, 8) and batch.mask.sum(1).min() >= 6
     assert not torch.equal(batch.wrench, ForwardSampler(0, 100, n_fins=(6, 8)).batch(0).wrench)

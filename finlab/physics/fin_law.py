@@ -1,0 +1,75 @@
+"""What a fin's law is: command to cycle-mean force in the fin's own frame, with derivatives.
+
+Fin frame: x' = shaft, y' = e_h, z' = e_z (see `finlab.layout.fin`). A law's parameters are numbers, or arrays
+(n,) where it speaks for n fins at once. Each law is written once, for numpy's arrays, torch's tensors (which
+training differentiates by itself) and CasADi's symbols; its derivatives in closed form stand beside it.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.array_library import library_of
+
+Array = NDArray[np.float64]
+Values = Any
+"""A numpy array, a tensor or a symbol."""
+
+
+class FinLaw(Protocol):
+    """Command to force of one fin, or of n fins that share a model."""
+
+    def force(self, command: Values) -> Values:
+        """Returns the mean force (..., n, 3) [N] in the fin frame of commands (..., n, 3) [rad, Hz, rad]."""
+        ...
+
+    def force_and_slopes(self, command: Array) -> tuple[Array, Array]:
+        """Returns the force and its derivative by each command in turn (..., n, 3 commands, 3 axes)."""
+        ...
+
+
+class PlanarLaw(ABC):
+    """A fin whose mean force lies in the plane that its tip sweeps: a size and a direction, none along the
+    shaft."""
+
+    offset: Any = 0.0
+    """Angle [rad] from the zero direction to the thrust."""
+
+    @abstractmethod
+    def thrust(self, amplitude: Values, frequency: Values, zero_direction: Values) -> Values:
+        """Returns the size [N] of the force at half amplitude [rad], frequency [Hz], zero direction [rad]."""
+
+    @abstractmethod
+    def thrust_slopes(
+        self, amplitude: Array, frequency: Array, zero_direction: Array
+    ) -> tuple[Array, Array, Array | float]:
+        """Returns the thrust's derivatives by amplitude, frequency and zero direction."""
+
+    def force(self, command: Values) -> Values:
+        """See `FinLaw`; for numpy's arrays and tensors, float32 or float64 as the command is."""
+        xp = library_of(command)
+        amplitude, frequency, zero_direction = command[..., 0], command[..., 1], command[..., 2]
+        thrust = self.thrust(amplitude, frequency, zero_direction)
+        direction = zero_direction + self.offset
+        # Nothing acts along the shaft.
+        planar = [xp.zeros_like(thrust), thrust * xp.cos(direction), thrust * xp.sin(direction)]
+        return xp.stack(planar, axis=-1)
+
+    def force_and_slopes(self, command: Array) -> tuple[Array, Array]:
+        """See `FinLaw`."""
+        parts = command[..., 0], command[..., 1], command[..., 2]
+        direction = parts[2] + self.offset
+        cos, sin = np.cos(direction), np.sin(direction)
+        thrust = self.thrust(*parts)
+        force = np.zeros((*thrust.shape, 3))
+        slopes = np.zeros((*thrust.shape, 3, 3))
+        force[..., 1], force[..., 2] = thrust * cos, thrust * sin
+        for k, slope in enumerate(self.thrust_slopes(*parts)):
+            slopes[..., k, 1], slopes[..., k, 2] = slope * cos, slope * sin
+        slopes[..., 2, 1] -= force[..., 2]
+        slopes[..., 2, 2] += force[..., 1]
+        return force, slopes

@@ -1,0 +1,153 @@
+"""The laws of single fins: numbers, directions, derivatives, precision, for arrays, tensors and symbols."""
+
+import math
+
+import casadi
+import numpy as np
+import pytest
+import torch
+from scipy.special import j0, j1
+
+from finlab.layout import FinModelSpec
+from finlab.layout.fin_model import FIN_MODELS
+from finlab.physics import make_law, stack_laws
+from finlab.physics.fin_model import PLANAR_LAWS
+from finlab.physics.lighthill import bessel_j0, bessel_j1
+
+SPECS = [
+    FinModelSpec("drag"),
+    FinModelSpec("lighthill"),
+    FinModelSpec("soft"),
+    FinModelSpec("soft", (("d", 0.1), ("e", 0.2), ("k", 2.0), ("p", 1.7), ("phi_e", 2.0), ("q", 3.0))),
+]
+DRAG, LIGHTHILL, SOFT, UNEVEN = (make_law(spec) for spec in SPECS)
+LAWS = [DRAG, LIGHTHILL, SOFT, UNEVEN]
+NAMES = ["drag", "lighthill", "soft", "uneven"]
+every_law = pytest.mark.parametrize("law", LAWS, ids=NAMES)
+
+
+def commands(n, seed=0):
+    unit = np.random.default_rng(seed).random((n, 3))
+    return np.array([0.05, 0.1, -math.pi]) + unit * np.array([1.4, 3.0, 2 * math.pi])
+
+
+def test_drag_thrust_is_4_737_f2_sin2_a():
+    a, f, _ = commands(100).T
+    np.testing.assert_allclose(DRAG.thrust(a, f), 4.737 * f**2 * np.sin(a) ** 2, rtol=1e-4)
+    printed = 2 * 1000 * 0.15 * 0.02 * 0.1**2 * (2 * math.pi * f) ** 2 * (1 - np.cos(2 * a))
+    np.testing.assert_allclose(DRAG.thrust(a, f), printed, rtol=1e-12)
+
+
+def test_lighthill_thrust_is_the_formula_with_the_bessel_function():
+    a, f, _ = commands(100).T
+    mass = math.pi / 4 * 1000 * 0.10**2
+    expected = 0.5 * mass * 0.20**2 * (2 * math.pi * f) ** 2 * a * j1(a)
+    np.testing.assert_allclose(LIGHTHILL.thrust(a, f), expected, rtol=1e-13)
+    # At small angles about 3.10 (A f)^2 N.
+    assert LIGHTHILL.thrust(0.01, 1.0) == pytest.approx(3.10e-4, rel=1e-3)
+
+
+def test_bessel_series_are_exact_where_they_say():
+    x = np.linspace(-4, 4, 2001)
+    np.testing.assert_allclose(bessel_j0(x), j0(x), atol=2e-15)
+    np.testing.assert_allclose(bessel_j1(x), j1(x), atol=2e-15)
+
+
+def test_soft_thrust_is_the_contract_by_hand():
+    assert SOFT.thrust(0.4, 2.5, 0.0) == pytest.approx(3.6 / (1 + (1 / 1.3) ** 5))
+    # Beating fast it thrusts less at a larger amplitude.
+    assert SOFT.thrust(0.6, 2.5, 0.0) < SOFT.thrust(0.4, 2.5, 0.0)
+    x = 0.5 * 1.2
+    by_hand = 2.0 * x**1.7 / (1 + (x / 1.3) ** 3) * (1 + 0.2 * math.cos(0.7 - 2.0))
+    assert UNEVEN.thrust(0.5, 1.2, 0.7) == pytest.approx(by_hand, rel=1e-14)
+    force = UNEVEN.force(np.array([0.5, 1.2, 0.7]))
+    np.testing.assert_allclose(force, by_hand * np.array([0.0, math.cos(0.8), math.sin(0.8)]), atol=1e-14)
+
+
+@every_law
+def test_force_points_where_the_law_says_and_never_along_the_shaft(law):
+    u = commands(200)
+    force = law.force(u)
+    assert not force[:, 0].any()
+    turn = np.arctan2(force[:, 2], force[:, 1]) - u[:, 2] - law.offset
+    np.testing.assert_allclose(np.exp(1j * turn), 1.0, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(force, axis=-1), law.thrust(*u.T), rtol=1e-12)
+
+
+@every_law
+def test_slopes_are_those_of_the_tensors_own_differentiation(law):
+    u = torch.from_numpy(commands(50)).requires_grad_()
+    force, slopes = law.force_and_slopes(u.detach().numpy())
+    np.testing.assert_array_equal(force, law.force(u.detach().numpy()))
+    tensor = law.force(u)
+    np.testing.assert_allclose(force, tensor.detach().numpy(), rtol=1e-13, atol=1e-14)
+    for axis in (1, 2):
+        (by_command,) = torch.autograd.grad(tensor[:, axis].sum(), u, retain_graph=True)
+        np.testing.assert_allclose(slopes[..., axis], by_command.numpy(), rtol=1e-10, atol=1e-12)
+    assert not slopes[..., 0].any()
+
+
+@every_law
+def test_tensors_can_be_differentiated_twice(law):
+    u = torch.from_numpy(commands(5)).requires_grad_()
+    assert torch.autograd.gradgradcheck(law.force, u)
+
+
+@every_law
+def test_symbols_give_the_same_thrust(law):
+    a, f, d = casadi.SX.sym("a"), casadi.SX.sym("f"), casadi.SX.sym("d")
+    formula = casadi.Function("thrust", [a, f, d], [law.thrust(a, f, d)])
+    for command in commands(10):
+        assert float(formula(*command)) == pytest.approx(float(law.thrust(*command)), rel=1e-12)
+
+
+@every_law
+def test_single_precision_and_any_batch_shape(law):
+    u = commands(24)
+    rough = law.force(u.astype(np.float32))
+    assert rough.dtype == np.float32
+    assert law.force(torch.from_numpy(u).float()).dtype == torch.float32
+    np.testing.assert_allclose(rough, law.force(u), rtol=2e-5, atol=2e-5)
+    np.testing.assert_array_equal(law.force(u.reshape(2, 3, 4, 3)), law.force(u).reshape(2, 3, 4, 3))
+
+
+@pytest.mark.parametrize("law", [DRAG, LIGHTHILL], ids=NAMES[:2])
+def test_thrust_grows_with_amplitude_and_with_the_square_of_frequency(law):
+    amplitude = np.linspace(0.0, math.pi / 2, 50)
+    thrust = law.thrust(amplitude, np.ones_like(amplitude))
+    assert thrust[0] == 0.0 and (np.diff(thrust) > 0).all()
+    np.testing.assert_allclose(law.thrust(amplitude, 3.0), 9.0 * thrust)
+
+
+@every_law
+def test_a_fin_that_does_not_beat_gives_nothing_and_its_slopes_are_finite(law):
+    for still in ([0.0, 1.0, 0.3], [0.4, 0.0, 0.3], [0.0, 0.0, 0.3]):
+        force, slopes = law.force_and_slopes(np.array(still))
+        assert not force.any() and np.isfinite(slopes).all()
+
+
+@pytest.mark.parametrize("name", PLANAR_LAWS)
+def test_every_parameter_of_a_description_reaches_its_law(name):
+    u = commands(7)
+    for key, rule in FIN_MODELS[name].items():
+        other = make_law(FinModelSpec(name, ((key, rule.default + 0.1),)))
+        changed = np.abs(other.force(u) - make_law(FinModelSpec(name)).force(u)).max() > 1e-6
+        assert changed or (name, key) == ("soft", "phi_e")  # the angle of an unevenness that is zero
+    doubled = make_law(FinModelSpec("drag", (("area", 0.04),)))
+    np.testing.assert_allclose(doubled.force(u), 2.0 * DRAG.force(u))
+
+
+def test_fins_of_one_formula_are_evaluated_together_whatever_their_numbers():
+    specs = [SPECS[0], FinModelSpec("drag", (("area", 0.01),)), *SPECS[1:], SPECS[0]]
+    u = commands(12).reshape(2, 6, 3)
+    found = np.full((2, 6, 3), np.nan)
+    groups = stack_laws(specs)
+    assert len(groups) == 3
+    for places, law in groups:
+        force, slopes = law.force_and_slopes(u[:, places])
+        found[:, places] = force
+        for k, place in enumerate(places):
+            alone = make_law(specs[place]).force_and_slopes(u[:, place])
+            np.testing.assert_allclose(force[:, k], alone[0], rtol=1e-13)
+            np.testing.assert_allclose(slopes[:, k], alone[1], rtol=1e-13)
+    assert np.isfinite(found).all()
