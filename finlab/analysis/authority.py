@@ -109,13 +109,13 @@ def losses(layout: Layout, failed: Collection[str] = (), before: Authority | Non
 
 def _authorities(layout: Layout, failures: Sequence[Collection[str]]) -> list[Authority]:
     """What is held after each of several failures; one call for all is quicker than many."""
-    sets = fin_sets([layout]).take(np.zeros(len(failures), dtype=np.intp))
+    sets = fin_sets(layout).tile(len(failures))
     for row, failed in enumerate(failures):
         sets.radius[row, list(layout.indices(tuple(failed)))] = 0.0
     values, vectors = singular_values(sets)
     axes = np.concatenate([np.eye(6), -np.eye(6)])
     size, gap = max_wrench_along_exactly(sets, axes)
-    rows = sets.take(np.repeat(np.arange(len(failures)), 12))
+    rows = sets.repeat(12)
     free = rows.farthest(np.tile(axes, (len(failures), 1)))[0].reshape(-1, 2, 6).max(axis=1)
     size, free = (np.where(value > NOTHING, value, 0.0) for value in (size, free))
     least, most = weakest(sets), strongest(sets)
@@ -176,7 +176,7 @@ def model_error(layout: Layout, failed: Collection[str] = ()) -> Array:
     A fin cannot go below its least thrust where its set lets it rest, and a table may give less in some
     directions than in its strongest one.
     """
-    sets = fin_sets([layout], failed)
+    sets = fin_sets(layout, failed)
     off = np.array([law.minimum + law.spread for law in thrust_laws(layout)]) * (sets.radius[0] > 0.0)
     return (np.linalg.norm(sets.columns[0], axis=1) * off[:, None]).sum(axis=0) * SCALE
 

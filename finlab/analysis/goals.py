@@ -83,7 +83,7 @@ def _quick(sets: FinSets) -> Array:
 def _after_worst_failure(of_rest: Goal) -> Goal:
     def goal(sets: FinSets) -> Array:
         robots, n = sets.radius.shape
-        rows = sets.take(np.repeat(np.arange(robots), n))
+        rows = sets.repeat(n)
         rows.radius[np.arange(robots * n), np.tile(np.arange(n), robots)] = 0.0
         return of_rest(rows).reshape(robots, n).min(axis=1)
 
@@ -93,13 +93,13 @@ def _after_worst_failure(of_rest: Goal) -> Goal:
 def _mission_energy(layout: Layout, mission: Array, fine: bool) -> Goal:
     """Energy from starts in which a few fins rest; a wrench out of reach costs by what is missing."""
     wanted = mission / SCALE
-    softness, most_resting = (FINE, 2) if fine else (COARSE, 1)
+    tolerance, most_resting = (FINE, 2) if fine else (COARSE, 1)
 
     def goal(sets: FinSets) -> Array:
         robots = len(sets.radius)
-        rows = sets.take(np.repeat(np.arange(robots), len(wanted)))
+        rows = sets.repeat(len(wanted))
         target = np.tile(wanted, (robots, 1))
-        missing = _missing(rows, target, softness)
+        missing = _missing(rows, target, tolerance)
         cost = UNREACHED * (1.0 + missing)
         able = np.flatnonzero(missing < ALL_THERE)
         if len(able):
@@ -113,12 +113,12 @@ def _mission_energy(layout: Layout, mission: Array, fine: bool) -> Goal:
     return goal
 
 
-def _missing(sets: FinSets, target: Array, softness: tuple[float, ...]) -> Array:
+def _missing(sets: FinSets, target: Array, tolerance: float) -> Array:
     """Share (R,) of scaled wrenches (R, 6) that is out of reach."""
     size = np.linalg.norm(target, axis=-1)
     asked = size > 0.0
     unit = np.where(asked[:, None], target / np.where(asked, size, 1.0)[:, None], np.eye(6)[0])
-    given = (max_wrench_along(sets, unit, softness).wrench * unit).sum(-1)
+    given = (max_wrench_along(sets, unit, tolerance).wrench * unit).sum(-1)
     return np.where(asked, 1.0 - np.clip(given / np.where(asked, size, 1.0), 0.0, 1.0), 0.0)
 
 

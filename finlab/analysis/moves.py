@@ -109,7 +109,7 @@ class Moves:
         self._twin = [layout.index(twins[name]) if name in twins else -1 for name in leaders]
         self.names = tuple(name for name in layout.names if name in leaders or twins.get(name) in leaders)
         """All fins that move, twins included, in the layout's order."""
-        self._sets = fin_sets([layout])
+        self._sets = fin_sets(layout)
         self.start_position = layout.position
         """Where all fins are now (n, 3) [m]."""
         self._angle = layout.mounting_angle
@@ -141,7 +141,7 @@ class Moves:
     def sets(self, vectors: Array) -> FinSets:
         """Returns what the fins can push once moved by vectors (P, D)."""
         blocks = planar_effectiveness(*self.geometry(vectors)) / SCALE[:, None]
-        still = self._sets.take(np.zeros(len(vectors), dtype=np.intp))
+        still = self._sets.tile(len(vectors))
         return still._replace(columns=np.ascontiguousarray(np.swapaxes(blocks, -1, -2)))
 
     def moved(self, vector: Array) -> Layout:

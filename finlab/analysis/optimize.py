@@ -102,10 +102,10 @@ def optimize_layout(
     moves = Moves(layout, fins, known, pairs)
     measure = make_goal(goal, layout, mission)
     quick = make_goal(goal, layout, mission, fine=False)
-    before = float(measure(fin_sets([layout]))[0])
+    before = float(measure(fin_sets(layout))[0])
     found, stopped = _search(moves, quick, before, clearance, rounds, seed, progress, cancelled)
     best = moves.moved(found)
-    after = float(measure(fin_sets([best]))[0])
+    after = float(measure(fin_sets(best))[0])
     improved = after > before + 1e-9 * abs(before)
     card = score_card(layout)
     return Improvement(

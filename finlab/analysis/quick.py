@@ -38,7 +38,7 @@ def quick_check(layout: Layout, failed: Collection[str] = ()) -> QuickCheck:
     """
     working = [name for name in layout.names if name not in failed]
     losses = working if len(working) > 1 else []
-    sets = fin_sets([layout], failed).take(np.zeros(1 + len(losses), dtype=np.intp))
+    sets = fin_sets(layout, failed).tile(1 + len(losses))
     for row, name in enumerate(losses, start=1):
         sets.radius[row, layout.index(name)] = 0.0
     values, vectors = singular_values(sets)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from finlab.analysis.authority import AXES, Authority, Loss, authority, losses, model_error
-from finlab.forces.fin_sets import MAX_PIECES, fin_sets, wide_fins
+from finlab.forces.fin_sets import MAX_CUT, fin_sets, wide_fins
 from finlab.forces.least_energy import least_energy
 from finlab.layout import Layout
 
@@ -93,12 +93,12 @@ def _left(loss: Loss) -> tuple[float, ...]:
 
 def _notes(layout: Layout, failed: Collection[str]) -> tuple[str, ...]:
     """What is not exact."""
-    sets = fin_sets([layout], failed)
+    sets = fin_sets(layout, failed)
     notes = []
     n_wide = len(wide_fins(sets))
     if n_wide:
         what = "Weakest direction and isotropy are"
-        if 2**n_wide > MAX_PIECES:
+        if n_wide > MAX_CUT:
             what = "Largest wrenches, weakest direction, isotropy and energies are"
         notes.append(
             f"{what} those of the convex hull: some arcs are wider than half a turn but not full circles."

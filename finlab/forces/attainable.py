@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.forces.fin_sets import SCALE, FinSets, convex_parts, fin_sets, joined, wide_fins
+from finlab.forces.fin_sets import SCALE, FinSets, convex_parts, fin_sets, wide_fins
 from finlab.forces.hull import hull_of
 from finlab.forces.reach import largest
 from finlab.layout import Layout
@@ -19,8 +19,6 @@ Kind = Literal["force", "torque"]
 
 N_DIRECTIONS = 120
 """Directions that are looked at first; faces that are too far off add theirs."""
-MAX_DRAWN_PIECES = 4
-"""Most combinations of convex pieces that a picture is made of; with more, arcs count with their hulls."""
 MAX_ROUNDS = 4
 """Most times that directions are added."""
 SPECK = 1e-5
@@ -81,7 +79,7 @@ def attainable_set(
         LayoutError: there is no fin of a name in `failed`.
     """
     layout.indices(tuple(failed))
-    sets = fin_sets([layout], failed)
+    sets = fin_sets(layout, failed)
     support = _without_specks(
         _alone_support(sets, kind) if alone else _free_support(sets, kind), SPECK * float(sets.radius.sum())
     )
@@ -139,7 +137,7 @@ def _free_support(sets: FinSets, kind: Kind) -> Support:
         normal = np.zeros((len(directions), 6))
         # A scaled wrench times its scale is the wrench; so a normal is multiplied, too.
         normal[:, own] = directions * SCALE[own]
-        rows = sets.take(np.zeros(len(directions), dtype=np.intp))
+        rows = sets.tile(len(directions))
         reach, force = rows.farthest(normal)
         return rows.wrench(force)[:, own] * SCALE[own], reach
 
@@ -147,9 +145,9 @@ def _free_support(sets: FinSets, kind: Kind) -> Support:
 
 
 def _alone_support(sets: FinSets, kind: Kind) -> Support:
-    """Farthest points with all else zero: by the dual, in each convex piece."""
+    """Farthest points with all else zero: by the solver, in each convex part."""
     own, other = (slice(0, 3), slice(3, 6)) if kind == "force" else (slice(3, 6), slice(0, 3))
-    parts = joined(convex_parts(sets, MAX_DRAWN_PIECES))
+    parts = convex_parts(sets)
     n_parts = len(parts.radius)
 
     def support(directions: Array) -> tuple[Array, Array]:
@@ -157,7 +155,7 @@ def _alone_support(sets: FinSets, kind: Kind) -> Support:
         normal = np.zeros((n_parts * rows, 6))
         normal[:, own] = np.tile(directions, (n_parts, 1))
         basis = np.broadcast_to(np.eye(6)[:, other], (len(normal), 6, 3))
-        answer = largest(parts.take(np.repeat(np.arange(n_parts), rows)), normal, basis)
+        answer = largest(parts.repeat(rows), normal, basis)
         reach = answer.size.reshape(n_parts, rows)
         best = reach.argmax(axis=0) * rows + np.arange(rows)
         # The origin stands in for a point that is not proven to be attained.

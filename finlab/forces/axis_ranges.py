@@ -8,16 +8,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finlab.forces.answers import strong
-from finlab.forces.dual import Dual, minimize_dual
-from finlab.forces.fin_sets import SCALE, fin_sets
-from finlab.forces.reach import orthogonal_complement
+from finlab.forces.fin_sets import SCALE, convex_parts, fin_sets
+from finlab.forces.reach import largest, orthogonal_complement
 from finlab.layout import Layout
 
 Array = NDArray[np.float64]
 
-SOFTNESS = (1.0, 0.1, 0.03, 0.01, 1e-3)
-"""Softness of the fins' answers, in falling order: good for a mark on a scale, in a millisecond."""
+TOLERANCE = 1e-6
+"""Where the solver stops: good for a mark on a scale, in a millisecond."""
+
+
+NOTHING = 1e-6
+"""Scaled wrench [N] by which the ends of a range may pass each other and it still is one."""
 
 
 class Ranges(NamedTuple):
@@ -30,9 +32,7 @@ class Ranges(NamedTuple):
 
 
 def axis_ranges(layout: Layout, wrench: ArrayLike, failed: Collection[str] = ()) -> Ranges:
-    """Returns the range of each axis with the others as in a wrench, too wide by about a thousandth at most.
-
-    Fins whose arc is wider than half a turn count with the convex hull of what they can push.
+    """Returns the range of each axis with the others as in a wrench, too wide by about a millionth at most.
 
     Args:
         layout: the robot.
@@ -43,19 +43,19 @@ def axis_ranges(layout: Layout, wrench: ArrayLike, failed: Collection[str] = ())
         LayoutError: there is no fin of a name in `failed`.
     """
     axes = np.concatenate([np.eye(6), -np.eye(6)])
-    sets = fin_sets([layout], failed).take(np.zeros(12, dtype=np.intp))
-    scaled = np.asarray(wrench, dtype=np.float64) / SCALE
-    held = np.tile(scaled, (12, 1)) * (1.0 - np.abs(axes))
-    pull = np.sqrt((sets.pull(axes) ** 2).sum(-1)).max(-1)
-    unit = np.maximum(pull, 1e-6)[:, None] * np.ones(sets.radius.shape[1])
+    parts = convex_parts(fin_sets(layout, failed))
+    n_parts = len(parts.radius)
     basis = orthogonal_complement(axes)
-    x = np.zeros((12, 5))
-    for factor in SOFTNESS:
-        dual = Dual(strong, sets, factor * unit, axes, basis, held)
-        x = minimize_dual(dual, x, 1e-6 if factor == SOFTNESS[-1] else 1e-3)
-    normal = dual.normal(x)
-    size = sets.farthest(normal)[0] - (held * normal).sum(-1)
-    low, high = -size[6:], size[:6]
+    held = (np.asarray(wrench, dtype=np.float64) / SCALE) @ basis
+    found = largest(
+        parts.repeat(12),
+        np.tile(axes, (n_parts, 1)),
+        np.tile(basis, (n_parts, 1, 1)),
+        np.tile(held, (n_parts, 1)),
+        TOLERANCE,
+    )
+    size = found.size.reshape(n_parts, 2, 6)
     # Planes that leave nothing between them prove that the five others cannot be had together.
-    there = high - low >= -1e-6
-    return Ranges(*(np.where(there, value * SCALE, np.nan) + 0.0 for value in (low, high)))
+    there = size.sum(axis=1) >= -NOTHING
+    high, low = (np.where(there, size[:, k], -np.inf).max(axis=0) for k in range(2))
+    return Ranges(*(np.where(there.any(axis=0), value * SCALE, np.nan) + 0.0 for value in (-low, high)))

@@ -32,17 +32,9 @@ class Extent(NamedTuple):
 def singular_values(sets: FinSets) -> tuple[Array, Array]:
     """Returns singular values (P, 6) [N], falling, and their directions (P, 6, 6), in columns.
 
-    Each column of the matrix is what one fin does at its largest thrust along one axis of its plane; a fin
-    whose stops coincide has but one.
+    Each column of the matrix is what one fin does at its largest thrust along one axis of its plane.
     """
-    strong = sets.columns * sets.radius[..., None, None]
-    fixed = sets.half == 0.0
-    if fixed.any():
-        only = np.stack([np.cos(sets.middle), np.sin(sets.middle)], axis=-1)
-        along_it = np.einsum("pnc,pnck->pnk", only, strong)[..., None, :] * np.array([1.0, 0.0])[:, None]
-        strong = np.where(fixed[..., None, None], along_it, strong)
-    robots, n = sets.radius.shape
-    matrix = np.swapaxes(strong.reshape(robots, 2 * n, 6), -1, -2)
+    matrix = np.swapaxes(sets.full_columns(), -1, -2)
     directions, values, _ = np.linalg.svd(matrix, full_matrices=True)
     return np.pad(values, ((0, 0), (0, 6 - values.shape[-1]))), directions
 
@@ -91,7 +83,7 @@ def strongest(sets: FinSets) -> Extent:
         [np.broadcast_to(np.eye(6), (robots, 6, 6)), np.swapaxes(vectors, -1, -2)], axis=1
     )
     ends = np.concatenate([starts, -starts], axis=1).reshape(-1, 6)
-    rows = sets.take(np.repeat(np.arange(robots), 24))
+    rows = sets.repeat(24)
     for _ in range(50):
         wrench = rows.wrench(rows.farthest(ends)[1])
         size = np.linalg.norm(wrench, axis=-1)

@@ -2,15 +2,15 @@
 
 A fin that may turn a full circle pushes anywhere within a disc whose radius is its largest thrust. A fin with
 stops pushes within a sector of that disc. A sector wider than half a turn is not convex: here it stands for
-its convex hull, the disc cut off along the chord between the stops, unless `convex_parts` has cut it
-in two sectors that are convex. Every fin may rest: the tiny thrust that it cannot go below is left out.
+its convex hull, the disc cut off along the chord between the stops, unless `convex_parts` has cut it in two.
+Every fin may rest: the tiny thrust that it cannot go below is left out.
 
 Wrenches are scaled: torques are divided by `LEVER`, so that all six entries are in newton.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from itertools import product
 from typing import NamedTuple
 
@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.forces.thrust_law import thrust_laws
-from finlab.layout import Layout, planar_effectiveness, stack_layouts
+from finlab.layout import Layout, planar_effectiveness
+from finlab.layout.angles import is_full_turn, wrapped
 
 Array = NDArray[np.float64]
 
@@ -26,17 +27,17 @@ LEVER = 0.2
 """Length [m] that makes torques comparable to forces: about the distance of a fin from the centre."""
 SCALE = np.array([1.0, 1.0, 1.0, LEVER, LEVER, LEVER])
 """What a wrench is divided by, entry by entry."""
-FULL_TURN = 2 * np.pi - 1e-6
-"""Arc of zero directions [rad] from which a fin counts as able to point anywhere."""
-MAX_PIECES = 8
-"""Most combinations of convex pieces that are looked at one by one, unless less is asked for."""
+HALF_TURN_TOLERANCE = 1e-9
+"""By how much half an arc [rad] may exceed a quarter turn and still be convex."""
+MAX_CUT = 3
+"""Most fins whose wide sectors are cut with both halves kept, which doubles the number of parts each time."""
 
 
 class FinSets(NamedTuple):
-    """R robots of n fins each. A fin with radius 0 is not there."""
+    """R robots of n fins each, in m coordinates of a wrench. A fin with radius 0 is not there."""
 
     columns: Array
-    """Scaled wrench per newton (R, n, 2, 6) of each fin's horizontal and vertical force."""
+    """Scaled wrench per newton (R, n, 2, m) of each fin's horizontal and vertical force."""
     radius: Array
     """Largest thrust (R, n) [N]."""
     middle: Array
@@ -48,26 +49,34 @@ class FinSets(NamedTuple):
         """Returns some of the robots, in the order asked for, repeated where asked for twice."""
         return FinSets(*(field[rows] for field in self))
 
+    def repeat(self, times: int) -> FinSets:
+        """Returns each robot several times, side by side."""
+        return self.take(np.repeat(np.arange(len(self.radius)), times))
+
+    def tile(self, times: int) -> FinSets:
+        """Returns all robots several times, one round after the other."""
+        return self.take(np.tile(np.arange(len(self.radius)), times))
+
     def pull(self, normal: Array) -> Array:
-        """Returns what each fin feels (R, n, 2) of the direction `normal` (R, 6): the columns' dot
+        """Returns what each fin feels (R, n, 2) of the direction `normal` (R, m): the columns' dot
         products."""
         rows, n = self.radius.shape
-        return (self.columns.reshape(rows, 2 * n, 6) @ normal[..., None]).reshape(rows, n, 2)
+        return (self.columns.reshape(rows, 2 * n, -1) @ normal[..., None]).reshape(rows, n, 2)
 
     def wrench(self, force: Array) -> Array:
-        """Returns the scaled wrenches (R, 6) of planar forces (R, n, 2) [N]."""
+        """Returns the scaled wrenches (R, m) of planar forces (R, n, 2) [N]."""
         rows, n = self.radius.shape
-        return (force.reshape(rows, 1, 2 * n) @ self.columns.reshape(rows, 2 * n, 6))[:, 0]
+        return (force.reshape(rows, 1, 2 * n) @ self.columns.reshape(rows, 2 * n, -1))[:, 0]
 
     def farthest(self, normal: Array) -> tuple[Array, Array]:
-        """Returns how far the sets reach along `normal` (R, 6), and the planar forces (R, n, 2) that do it.
+        """Returns how far the sets reach along `normal` (R, m), and the planar forces (R, n, 2) that do it.
 
         The first, (R,), is the support function of the set of all wrenches: exact, or exact for the hull
         where a sector is wider than half a turn.
         """
         pull = self.pull(normal)
         size = np.sqrt((pull**2).sum(-1))
-        angle = _wrapped(np.arctan2(pull[..., 1], pull[..., 0]) - self.middle)
+        angle = wrapped(np.arctan2(pull[..., 1], pull[..., 0]) - self.middle)
         held = np.clip(angle, -self.half, self.half)
         share = np.cos(angle - held)
         thrust = np.where(share > 1e-12, self.radius, 0.0)
@@ -75,55 +84,70 @@ class FinSets(NamedTuple):
         force = thrust[..., None] * np.stack([np.cos(direction), np.sin(direction)], axis=-1)
         return (thrust * size * share).sum(-1), force
 
+    def full_columns(self) -> Array:
+        """Returns the scaled wrenches (R, 2n, m) of each fin's largest thrust along both axes of its plane.
 
-def fin_sets(layouts: Sequence[Layout], failed: Collection[str] = ()) -> FinSets:
-    """Returns what the fins of layouts can push; those called `failed` push nothing. Padded to one width."""
-    arrays = stack_layouts(layouts)
-    blocks = planar_effectiveness(arrays.position, arrays.mounting_angle)  # (R, n, 6, 2)
-    radius = np.zeros(arrays.mask.shape)
-    for row, layout in enumerate(layouts):
-        for i, (name, law) in enumerate(zip(layout.names, thrust_laws(layout), strict=True)):
-            radius[row, i] = 0.0 if name in failed else law.maximum
-    arc = arrays.upper[..., 2] - arrays.lower[..., 2]
+        A fin whose stops coincide has but one, and zeros for the other.
+        """
+        full = self.columns * self.radius[..., None, None]
+        fixed = self.half == 0.0
+        if fixed.any():
+            only = np.stack([np.cos(self.middle), np.sin(self.middle)], axis=-1)
+            both = np.stack([(only[..., None] * full).sum(-2), np.zeros_like(full[..., 0, :])], axis=-2)
+            full = np.where(fixed[..., None, None], both, full)
+        rows, n = self.radius.shape
+        return full.reshape(rows, 2 * n, -1)
+
+
+def fin_sets(layout: Layout, failed: Collection[str] = ()) -> FinSets:
+    """Returns what the fins of one robot can push; those called `failed` push nothing.
+
+    Raises:
+        LayoutError: there is no fin of a name in `failed`.
+    """
+    lost = layout.indices(tuple(failed))
+    blocks = planar_effectiveness(layout.position, layout.mounting_angle)  # (n, 6, 2)
+    radius = np.array([law.maximum for law in thrust_laws(layout)])
+    radius[list(lost)] = 0.0
+    lower, upper = layout.lower[:, 2], layout.upper[:, 2]
     return FinSets(
-        np.ascontiguousarray(np.swapaxes(blocks / SCALE[:, None], -1, -2)),
-        radius,
-        0.5 * (arrays.upper[..., 2] + arrays.lower[..., 2]),
-        np.where(arc >= FULL_TURN, np.pi, 0.5 * arc),
+        np.ascontiguousarray(np.swapaxes(blocks / SCALE[:, None], -1, -2))[None],
+        radius[None],
+        0.5 * (upper + lower)[None],
+        half_arcs(lower, upper)[None],
     )
 
 
-def convex_parts(sets: FinSets, most: int = MAX_PIECES) -> list[FinSets]:
-    """Returns sets of the same robots, all convex, whose union is exactly what each robot can push.
-
-    Each fin whose sector is wider than half a turn but no full circle is cut in two along its middle; each
-    combination of halves is one of the sets. All robots have the same arcs. Where there would be more than
-    `most`, the sets are returned as they are, with the convex hulls of what is not convex.
-    """
-    wide = wide_fins(sets)
-    if 2 ** len(wide) > most:
-        return [sets]
-    cut = []
-    for signs in product((-0.5, 0.5), repeat=len(wide)):
-        part = sets._replace(middle=sets.middle.copy(), half=sets.half.copy())
-        part.middle[:, wide] += np.array(signs) * sets.half[:, wide]
-        part.half[:, wide] *= 0.5
-        cut.append(part)
-    return cut
+def half_arcs(lower: Array, upper: Array) -> Array:
+    """Returns half of each arc between two zero directions [rad]; pi for a full turn."""
+    return np.where(is_full_turn(upper - lower), np.pi, 0.5 * (upper - lower))
 
 
 def wide_fins(sets: FinSets) -> NDArray[np.intp]:
     """Returns the places of working fins whose sets are not convex: wider than half a turn, no full
     circle."""
     alive = (sets.radius > 0.0).any(axis=0)
-    return np.flatnonzero((sets.half[0] > np.pi / 2) & (sets.half[0] < np.pi) & alive)
+    half = sets.half[0]
+    return np.flatnonzero((half > np.pi / 2 + HALF_TURN_TOLERANCE) & (half < np.pi) & alive)
 
 
-def joined(parts: Sequence[FinSets]) -> FinSets:
-    """Returns the robots of several sets as one, in order."""
-    return FinSets(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
+def convex_parts(sets: FinSets, force: Array | None = None) -> FinSets:
+    """Returns convex sets of R robots with the same arcs, P of each, one round of robots after the other.
 
-
-def _wrapped(angle: Array) -> Array:
-    """Angles [rad] within half a turn either way."""
-    return (angle + np.pi) % (2 * np.pi) - np.pi
+    Wide sectors are cut along their middle. Of the first `MAX_CUT` of them both halves are kept, in all
+    combinations: their union is exactly what each robot can push. Further ones stay what they are, with
+    their hulls, or with forces (R, n, 2) the half is kept into which these point.
+    """
+    wide = wide_fins(sets)
+    cut, rest = wide[:MAX_CUT], wide[MAX_CUT:]
+    signs = np.zeros((2 ** len(cut), 1, sets.radius.shape[1]))
+    signs[:, 0, cut] = list(product((-0.5, 0.5), repeat=len(cut)))
+    signs = np.repeat(signs, len(sets.radius), axis=1)
+    if force is not None:
+        angle = np.arctan2(force[..., 1], force[..., 0]) - sets.middle
+        signs[:, :, rest] = np.where(np.sin(angle) >= 0.0, 0.5, -0.5)[:, rest]
+    signs = signs.reshape(-1, signs.shape[-1])
+    parts = sets.tile(2 ** len(cut))
+    return parts._replace(
+        middle=parts.middle + signs * parts.half, half=np.where(signs == 0.0, 1.0, 0.5) * parts.half
+    )

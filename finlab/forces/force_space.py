@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.forces.fin_sets import FinSets
 from finlab.forces.small_systems import solve
 from finlab.forces.thrust_curve import ThrustCurves
 
@@ -73,6 +74,11 @@ class PlanarProblem(NamedTuple):
     """What is computed ahead for fins that may point anywhere."""
     growth: float = 0.5
     """Exponent with which a fin's energy grows with its thrust: below 1 some fins rest, above 1 all work."""
+
+    @property
+    def sets(self) -> FinSets:
+        """What the fins can push, as one robot of a batch."""
+        return FinSets(self.columns[None], self.curves.maximum[None], self.middle[None], self.half[None])
 
 
 class Planar(NamedTuple):

@@ -1,9 +1,9 @@
-"""A primal-dual interior-point method for planar forces within discs and sectors.
+"""A primal-dual interior-point method for planar forces within discs and sectors: the one convex solver.
 
-    min 1/2 sum_j v_j^2 / c_j   s.t.   v = w - sum_i B_i y_i,   |y_i| <= 1,   y_i within its sector,
+    min 1/2 sum_j v_j^2 / c_j + 1/2 sum_i b_i |y_i|^2   s.t.   v = w - sum_i B_i y_i,   y_i within its set,
 
-for many rows at once. Newton's systems are reduced to the six multipliers l = v / c, so that an axis with a
-tiny c, which must be met, costs no accuracy, and more fins hardly cost time.
+for many robots at once. Newton's systems are reduced to the multipliers l = v / c of the wrench, so that an
+axis with a tiny c, which must be met, costs no accuracy, and more fins hardly cost time.
 """
 
 from __future__ import annotations
@@ -13,14 +13,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.forces.fin_sets import FinSets
+from finlab.forces.small_systems import solve
+
 Array = NDArray[Any]
 
 ITERATIONS = 40
 """Most Newton steps; usually about 10 are taken."""
 GAP = 1e-11
-"""Mean product of a limit's multiplier and slack that ends the search, relative to the objective plus one."""
+"""Mean product of a limit's multiplier and slack that ends the search, relative to the wrench's error plus
+one, where the strongest fin's wrench is one."""
 UNMET = 1e-8
-"""Largest violation of any condition at the end."""
+"""Largest violation of any condition at the end, relative to the same."""
 CENTRING = (0.05, 0.3)
 """By how much a step aims to lessen that product: after a long step, and after a short one."""
 LEAST_GAP, SHORT = 1e-13, 1e-6
@@ -30,7 +34,7 @@ LONG = 0.9
 STIFF = 1e-10
 """Least stiffness of a fin: steps of those that nothing holds stay bounded."""
 RIDGE = 1e-15
-"""Relative regularization of the 6 x 6 systems."""
+"""Relative regularization of the systems."""
 KEPT = 0.99
 """Share of the way to the nearest limit that a step goes at most."""
 SLACK, WEIGHT = 3.0, 10.0
@@ -39,81 +43,182 @@ NARROWEST = 1e-6
 """Half of a sector's angle [rad] at least, so that it has an inside."""
 
 
-class Discs(NamedTuple):
-    """What R rows of n fins can do."""
+class Optimum(NamedTuple):
+    """Solutions of R problems."""
 
-    columns: Array
-    """B (n, 2, 6): normalized wrench of each fin's largest force along its two axes."""
-    middle: Array
-    """Middle of each fin's sector (R, n) [rad]."""
-    half: Array
-    """Half of its angle (R, n) [rad], at most a quarter turn; pi for a full circle."""
+    force: Array
+    """Planar forces (R, n, 2) [N], within the fins' sets."""
+    multiplier: Array
+    """Multiplier (R, m) of the wrench: what its error would gain from one more of it."""
 
 
-def minimize(discs: Discs, wanted: Array, c: Array) -> tuple[Array, Array]:
-    """Forces (R, n, 2) as shares of the largest, and the multiplier (R, 6).
+class _State(NamedTuple):
+    """R problems on their way; forces are shares of each fin's largest, components before fins."""
+
+    full: Array
+    """Wrench (R, 2n, m) of the largest forces."""
+    sides: Array
+    """Outward normals (R, K, 2, n) of the sectors' sides."""
+    beyond: Array
+    """How far out those sides are (R, K, n); 1 where there is none."""
+    wanted: Array
+    """(R, m)."""
+    c: Array
+    """(R, m)."""
+    bend: Array
+    """b (R, n) times the squared largest thrust."""
+    point: Array
+    """(R, 2, n)."""
+    multiplier: Array
+    """(R, m)."""
+    slack: Array
+    """Of each limit (R, 1 + K, n): the disc, then the sides."""
+    weight: Array
+    """The limits' multipliers (R, 1 + K, n)."""
+    length: Array
+    """Of the last step (R,)."""
+
+
+def minimize(
+    sets: FinSets,
+    wanted: Array,
+    c: Array,
+    bend: Array | float = 0.0,
+    gap: float = GAP,
+) -> Optimum:
+    """Solves R problems.
 
     Args:
-        discs: what the fins can do.
-        wanted: normalized wrenches w (R, 6).
-        c: what each axis' squared error is divided by (6,), positive.
+        sets: what the fins of R robots can do, in m coordinates of a wrench; sectors wider than half a turn
+            count with their convex hulls.
+        wanted: wrenches w (R, m).
+        c: what each coordinate's squared error is divided by (m,) or (R, m), positive.
+        bend: cost b (R, n) of a fin's squared force [1/N^2].
+        gap: when to stop, see `GAP`.
     """
-    rows, n = discs.middle.shape
-    flat = discs.columns.reshape(2 * n, 6)
-    normals, sectors = _normals(discs)
-    point, multiplier = np.zeros((rows, n, 2)), np.zeros((rows, 6))
-    # Of the limits: the disc, and the sector's two sides.
-    slack, weight = np.full((rows, n, 3), SLACK), np.full((rows, n, 3), WEIGHT)
-    held, length = np.diag(c), np.ones(rows)
+    state = _outset(sets, wanted, c, bend)
+    busy, least = np.arange(len(wanted)), np.full(len(wanted), np.inf)
+    point, multiplier = state.point.copy(), state.multiplier.copy()
     for _ in range(ITERATIONS):
-        missing = wanted - point.reshape(rows, 2 * n) @ flat
-        astray = _limits(point, normals, sectors) + slack
-        size = 1.0 + 0.5 * (missing * missing / c).sum(-1)
-        gap = (weight * slack).mean((1, 2))
-        unmet = np.abs(missing - c * multiplier).max(-1) + np.abs(astray).max((1, 2))
-        done = ((gap <= GAP * size) & (unmet <= UNMET)) | (gap <= LEAST_GAP) | (length < SHORT)
+        before = state
+        done, off, state = _step(before, gap)
+        # At a corner rounding may spoil the last steps.
+        better = off < least[busy]
+        at = busy[better]
+        least[at], point[at], multiplier[at] = off[better], before.point[better], before.multiplier[better]
         if done.all():
             break
-        slope = np.concatenate([point[..., None, :], normals], axis=-2)  # of the limits (R, n, 3, 2)
-        ratio = weight / slack
-        aim = (np.where(length > LONG, *CENTRING) * gap)[:, None, None] / slack + ratio * astray
-        soft = _softness(slope, ratio, weight[..., 0] + STIFF)
-        pull = (multiplier @ flat.T).reshape(rows, n, 2) - (aim[..., None, :] @ slope)[..., 0, :]
-        spread = soft @ discs.columns  # (R, n, 2, 6)
-        gram = held + flat.T @ spread.reshape(rows, 2 * n, 6)
-        gram.reshape(rows, 36)[:, ::7] += RIDGE * np.trace(gram, axis1=1, axis2=2)[:, None]
-        right = missing - c * multiplier - (pull[..., None, :] @ spread)[..., 0, :].sum(1)
-        turn = np.linalg.solve(gram, right[..., None])[..., 0]
-        step = (soft @ (pull + (turn @ flat.T).reshape(rows, n, 2))[..., None])[..., 0]
-        along = (slope @ step[..., None])[..., 0]
-        growth = aim - weight + ratio * along
-        length = np.minimum(_way_to_zero(slack, -astray - along), _way_to_zero(weight, growth))
-        length = np.where(done, 0.0, np.minimum(KEPT * length, 1.0))
-        point = point + length[:, None, None] * step
-        slack = slack - length[:, None, None] * (astray + along)
-        weight = weight + length[:, None, None] * growth
-        multiplier = multiplier + length[:, None] * turn
+        if 2 * done.sum() > len(done):  # the few that are left need not drag all others along
+            busy, state = busy[~done], _State(*(field[~done] for field in state))
     # Should a row not be done, its forces are at least such that the fins can give.
-    point = np.nan_to_num(point)
-    return point / np.maximum(np.linalg.norm(point, axis=-1, keepdims=True), 1.0), multiplier
+    force = np.nan_to_num(point).swapaxes(1, 2)
+    force /= np.maximum(np.sqrt((force * force).sum(-1, keepdims=True)), 1.0)
+    return Optimum(force * sets.radius[..., None], multiplier * _unit(sets)[:, None])
 
 
-def _unit(angle: Array) -> Array:
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+def _outset(sets: FinSets, wanted: Array, c: Array, bend: Array | float) -> _State:
+    rows, n = sets.radius.shape
+    m = sets.columns.shape[-1]
+    unit = _unit(sets)
+    full = sets.columns * (sets.radius / unit[:, None])[..., None, None]
+    sides, beyond = _sides(sets)
+    limits = 1 + sides.shape[1]
+    return _State(
+        full.swapaxes(1, 2).reshape(rows, 2 * n, m),
+        sides,
+        beyond,
+        wanted / unit[:, None],
+        np.broadcast_to(np.asarray(c, np.float64), (rows, m)),
+        np.broadcast_to(bend * (sets.radius / unit[:, None]) ** 2, (rows, n)),
+        np.zeros((rows, 2, n)),
+        np.zeros((rows, m)),
+        np.full((rows, limits, n), SLACK),
+        np.full((rows, limits, n), WEIGHT),
+        np.ones(rows),
+    )
 
 
-def _normals(discs: Discs) -> tuple[Array, NDArray[np.bool_]]:
-    """Normals (R, n, 2, 2) that point out of each sector, zero for full circles; which have one (R, n)."""
-    sectors = discs.half < np.pi - 1e-6
-    side = np.pi / 2 - np.maximum(discs.half, NARROWEST)
-    ends = np.stack([discs.middle + side, discs.middle - side], axis=-1)
-    return np.where(sectors[..., None, None], -_unit(ends), 0.0), sectors
+def _unit(sets: FinSets) -> Array:
+    """Wrench (R,) of each robot's strongest fin, by which all are divided."""
+    size: Array = (np.sqrt((sets.columns**2).sum((-1, -2))) * sets.radius).max(-1)
+    return np.where(size > 0.0, size, 1.0)
 
 
-def _limits(point: Array, normals: Array, sectors: NDArray[np.bool_]) -> Array:
-    """Each limit (R, n, 3), negative inside: the disc's and the sector's sides; -1 where there are none."""
-    sides = np.where(sectors[..., None], (normals @ point[..., None])[..., 0], -1.0)
-    return np.concatenate([0.5 * ((point * point).sum(-1, keepdims=True) - 1.0), sides], axis=-1)
+def _sides(sets: FinSets) -> tuple[Array, Array]:
+    """Normals (R, K, 2, n) that point out of each sector, and how far out its sides are (R, K, n).
+
+    A sector has two sides through the origin. The hull of one wider than half a turn has one, the chord
+    between its stops. Where no fin has any, K is 0.
+    """
+    circle = sets.half >= np.pi
+    rows, n = sets.half.shape
+    if circle.all():
+        return np.zeros((rows, 0, 2, n)), np.zeros((rows, 0, n))
+    wide = sets.half > np.pi / 2
+    half = np.maximum(sets.half, NARROWEST)
+    ends = np.stack([sets.middle + half - np.pi / 2, sets.middle - half + np.pi / 2], axis=1)
+    ends = np.where(wide[:, None], sets.middle[:, None], ends)
+    none = np.stack([circle, circle | wide], axis=1)
+    normals = -np.stack([np.cos(ends), np.sin(ends)], axis=2)
+    beyond = np.where(wide[:, None], -np.cos(half)[:, None], 0.0)
+    return np.where(none[:, :, None], 0.0, normals), np.where(none, 1.0, beyond)
+
+
+def _step(state: _State, tolerance: float) -> tuple[NDArray[np.bool_], Array, _State]:
+    """Which rows are done, how far off each is (R,), and all others one Newton step on."""
+    full, sides, beyond, wanted, c, bend, point, multiplier, slack, weight, length = state
+    rows, _, n = point.shape
+    missing = wanted - _wrench(full, point)
+    disc = 0.5 * ((point * point).sum(1, keepdims=True) - 1.0)
+    flat = (sides * point[:, None]).sum(2) - beyond
+    astray = np.concatenate([disc, flat], axis=1) + slack
+    size = 1.0 + np.sqrt((missing * missing / c).sum(-1) + (bend * (2.0 * disc[:, 0] + 1.0)).sum(-1))
+    gap = (weight * slack).mean((1, 2))
+    unmet = np.abs(missing - c * multiplier).max(-1) + np.abs(astray).max((1, 2))
+    gap, unmet = gap / size, unmet / size
+    done = ((gap <= tolerance) & (unmet <= UNMET)) | (gap <= LEAST_GAP) | (length < SHORT)
+    off = gap + unmet
+    if done.all():
+        return done, off, state
+    slope = np.concatenate([point[:, None], sides], axis=1)  # of the limits (R, 1 + K, 2, n)
+    ratio = weight / slack
+    aim = (np.where(length > LONG, *CENTRING) * gap * size)[:, None, None] / slack + ratio * astray
+    xx, xy, yy = _softness(slope, ratio, weight[:, 0] + bend + STIFF)
+    pull = (full @ multiplier[..., None]).reshape(point.shape) - (aim[:, :, None] * slope).sum(1)
+    pull -= bend[:, None] * point
+    blocks = full.reshape(rows, 2, n, -1)
+    x, y = blocks[:, 0], blocks[:, 1]
+    spread = np.concatenate(
+        [xx[..., None] * x + xy[..., None] * y, xy[..., None] * x + yy[..., None] * y], axis=1
+    )
+    gram = full.swapaxes(1, 2) @ spread
+    diagonal = gram.reshape(rows, -1)[:, :: gram.shape[-1] + 1]
+    diagonal += c + RIDGE * diagonal.sum(1, keepdims=True)
+    right = missing - c * multiplier - _wrench(spread, pull)
+    turn = solve(gram, right[..., None])[..., 0]
+    pull += (full @ turn[..., None]).reshape(point.shape)
+    step = np.stack([xx * pull[:, 0] + xy * pull[:, 1], xy * pull[:, 0] + yy * pull[:, 1]], axis=1)
+    along = (slope * step[:, None]).sum(2)
+    growth = aim - weight + ratio * along
+    length = np.minimum(_way_to_zero(slack, -astray - along), _way_to_zero(weight, growth))
+    length = np.where(done, 0.0, np.minimum(KEPT * length, 1.0))
+    far = length[:, None, None]
+    return (
+        done,
+        off,
+        state._replace(
+            point=point + far * step,
+            slack=slack - far * (astray + along),
+            weight=weight + far * growth,
+            multiplier=multiplier + length[:, None] * turn,
+            length=length,
+        ),
+    )
+
+
+def _wrench(full: Array, point: Array) -> Array:
+    wrench: Array = (point.reshape(len(point), 1, -1) @ full)[:, 0]
+    return wrench
 
 
 def _way_to_zero(weight: Array, growth: Array) -> Array:
@@ -123,15 +228,14 @@ def _way_to_zero(weight: Array, growth: Array) -> Array:
     return shortest
 
 
-def _softness(slope: Array, ratio: Array, stiff: Array) -> Array:
-    """Inverses (R, n, 2, 2) of stiff I + sum_k ratio_k slope_k slope_k^T, for three slopes (R, n, 3, 2)."""
-    pushed = slope * np.sqrt(ratio)[..., None]
-    x, y = pushed[..., 0], pushed[..., 1]
-    a, b, d = stiff + (x * x).sum(-1), (x * y).sum(-1), stiff + (y * y).sum(-1)
+def _softness(slope: Array, ratio: Array, stiff: Array) -> tuple[Array, Array, Array]:
+    """Entries xx, xy, yy (R, n) of the inverses of stiff I + sum_k ratio_k slope_k slope_k^T."""
+    pushed = slope * np.sqrt(ratio)[:, :, None]
+    x, y = pushed[:, :, 0], pushed[:, :, 1]
+    a, b, d = stiff + (x * x).sum(1), (x * y).sum(1), stiff + (y * y).sum(1)
     # The determinant as a sum of squares, which rounding cannot bring to zero where two sides are close.
-    cross = x * np.roll(y, 1, axis=-1) - y * np.roll(x, 1, axis=-1)
-    scale = 1.0 / (stiff * (a + d - stiff) + (cross * cross).sum(-1))
-    softness = np.empty((*a.shape, 2, 2))
-    softness[..., 0, 0], softness[..., 1, 1] = d * scale, a * scale
-    softness[..., 0, 1] = softness[..., 1, 0] = -b * scale
-    return softness
+    determinant = stiff * (a + d - stiff)
+    if x.shape[1] > 1:
+        cross = x * np.roll(y, 1, axis=1) - y * np.roll(x, 1, axis=1)
+        determinant += (cross * cross).sum(1)
+    return d / determinant, -b / determinant, a / determinant

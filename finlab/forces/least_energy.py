@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.forces.answers import cheap
 from finlab.forces.dual import Dual, minimize_dual
-from finlab.forces.fin_sets import SCALE, FinSets, convex_parts, fin_sets, joined
+from finlab.forces.fin_sets import SCALE, FinSets, convex_parts, fin_sets
 from finlab.forces.reach import max_wrench_along
 from finlab.forces.thrust_law import thrust_laws
 from finlab.layout import Layout, stack_layouts
@@ -46,12 +46,10 @@ def least_energy(
     Raises:
         LayoutError: there is no fin of a name in `failed`.
     """
-    layout.indices(tuple(failed))
     wanted = np.asarray(wrenches, dtype=np.float64).reshape(-1, 6) / SCALE
-    sets = fin_sets([layout], failed)
-    parts = convex_parts(sets)
-    robots = joined(parts).take(np.repeat(np.arange(len(parts)), len(wanted)))
-    target = np.tile(wanted, (len(parts), 1))
+    sets = fin_sets(layout, failed)
+    robots = convex_parts(sets).repeat(len(wanted))
+    target = np.tile(wanted, (len(robots.radius) // max(len(wanted), 1), 1))
     seeds = starts(sets.radius[0], n_random)
     energy = np.full(len(target), np.nan)
     able = np.flatnonzero(within_reach(robots, target))
@@ -61,7 +59,7 @@ def least_energy(
         cost = np.where(good, planar_energy(layout, failed, force), np.inf)
         best = cost.reshape(len(some), len(seeds)).min(axis=1)
         energy[some] = np.where(np.isfinite(best), best, np.nan)
-    return np.asarray(np.fmin.reduce(energy.reshape(len(parts), len(wanted)), axis=0))
+    return np.asarray(np.fmin.reduce(energy.reshape(-1, len(wanted)), axis=0))
 
 
 def within_reach(sets: FinSets, target: Array) -> NDArray[np.bool_]:
@@ -90,9 +88,9 @@ def descend(rows: FinSets, target: Array, thrust: Array) -> tuple[Array, NDArray
     for _ in range(N_TOUCHES):
         held = np.clip(thrust, REST * top, top)
         # The slope of sqrt(T) over T, which is what a quadratic that touches there bends by.
-        softness = held**-1.5 * top**-0.5
-        x = minimize_dual(Dual(cheap, rows, softness, origin, basis, target), x)
-        force = cheap(rows, rows.pull(x), softness)[1]
+        bend = held**-1.5 * top**-0.5
+        x = minimize_dual(Dual(cheap, rows, bend, origin, basis, target), x)
+        force = cheap(rows, rows.pull(x), bend)[1]
         thrust = np.linalg.norm(force, axis=-1)
     return force, np.abs(rows.wrench(force) - target).max(-1) <= OFF
 

@@ -1,4 +1,4 @@
-"""The largest wrench in a given direction with nothing beside it."""
+"""The largest wrench in a given direction with nothing beside it, between proven bounds."""
 
 from __future__ import annotations
 
@@ -7,18 +7,21 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.forces.answers import strong
-from finlab.forces.dual import Dual, minimize_dual
-from finlab.forces.fin_sets import FinSets, convex_parts, joined
+from finlab.forces.fin_sets import FinSets, convex_parts
+from finlab.forces.interior_point import minimize
 
 Array = NDArray[np.float64]
 
-FINE = (1.0, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6)
-"""Softness of the fins' answers, in falling order, for results to be shown."""
-COARSE = (1.0, 0.1, 0.03, 0.01)
-"""The same for searches that ask thousands of times."""
+HELD = 1e-9
+"""What the squared error of an entry that must be met is divided by, beside one that is free to grow."""
+BEYOND = 2.0
+"""How much more than all fins could give along a direction alone is asked for."""
+FINE, COARSE = 1e-9, 1e-4
+"""Where the solver stops: for results to be shown, and for searches that ask thousands of times."""
 BESIDE = 1e-6
 """Scaled wrench [N, as a share of the size plus 1 N] that may be left beside the one asked for."""
+SPAN_TOLERANCE = 1e-9
+"""Share of the largest singular value below which the fins do not act along a direction at all."""
 
 
 class Largest(NamedTuple):
@@ -28,55 +31,78 @@ class Largest(NamedTuple):
     """How much the fins can give (R,) [N]; proven to be no less than the truth."""
     gap: Array
     """The truth is at most this much smaller (R,) [N]."""
+    force: Array
+    """Planar forces (R, n, 2) [N] that give it."""
     wrench: Array
-    """The scaled wrench (R, 6) itself."""
+    """Their scaled wrench (R, 6)."""
     normal: Array
     """Direction (R, 6) of the plane that touches the set of wrenches there, not normalized."""
 
 
-def largest(sets: FinSets, origin: Array, basis: Array, softness: tuple[float, ...] = FINE) -> Largest:
-    """Returns the largest wrenches along `origin` (R, 6) that have no part along `basis` (R, 6, k).
+def largest(
+    sets: FinSets, origin: Array, basis: Array, held: Array | float = 0.0, tolerance: float = FINE
+) -> Largest:
+    """Returns the largest wrenches along `origin` (R, 6) whose parts along `basis` (R, 6, k) are as held.
 
-    Each is bracketed: the plane that the dual ends with lies outside of the set of all wrenches, and the
-    forces that answer it lie inside.
+    Each is bracketed: a plane across the solver's multiplier lies outside of the set of all wrenches, and its
+    forces lie inside.
+
+    Args:
+        sets: R robots.
+        origin: unit scaled wrenches.
+        basis: orthonormal, and at right angles to `origin`.
+        held: wanted parts (R, k) along the basis.
+        tolerance: see `FINE`.
     """
-    rows, n = sets.radius.shape
-    pull = np.sqrt((sets.pull(origin) ** 2).sum(-1)).max(-1)
-    unit = np.maximum(pull, 1e-6)[:, None] * np.ones(n)
-    nothing = np.zeros((rows, 6))
-    x = np.zeros((rows, basis.shape[-1]))
-    for factor in softness:
-        # Only the last, hardest answer is what counts.
-        tolerance = 1e-9 if factor == softness[-1] else 1e-3
-        dual = Dual(strong, sets, factor * unit, origin, basis, nothing)
-        x = minimize_dual(dual, x, tolerance)
-    normal = dual.normal(x)
-    wrench = sets.wrench(strong(sets, sets.pull(normal), dual.softness)[1])
-    size = sets.farthest(normal)[0]
-    beside = np.abs((wrench[:, None] @ basis)[:, 0]).max(-1)
+    rows, _, k = basis.shape
+    frame = np.concatenate([origin[:, :, None], basis], axis=-1)
+    seen = sets._replace(columns=sets.columns @ frame[:, None])
+    wanted = np.empty((rows, 1 + k))
+    wanted[:, 1:] = held
+    full = np.sqrt((seen.full_columns() ** 2).sum(-1)).sum(-1)
+    wanted[:, 0] = np.maximum(BEYOND * full, 1e-9)
+    found = minimize(seen, wanted, np.array([1.0, *(HELD,) * k]), gap=tolerance)
+    normal = found.multiplier / found.multiplier[:, :1]
+    size = seen.farthest(normal)[0] - (wanted[:, 1:] * normal[:, 1:]).sum(-1)
+    given = seen.wrench(found.force)
     # A wrench that is not where it was asked for proves nothing.
-    proven = np.where(beside <= BESIDE * (1.0 + size), (wrench * origin).sum(-1), 0.0)
-    return Largest(size, np.maximum(size - proven, 0.0), wrench, normal)
+    beside = np.abs(given - wanted)[:, 1:].max(-1, initial=0.0)
+    proven = np.where(beside <= BESIDE * (1.0 + np.abs(size)), given[:, 0], 0.0)
+    return Largest(
+        size, np.maximum(size - proven, 0.0), found.force, sets.wrench(found.force), _apply(frame, normal)
+    )
 
 
-def max_wrench_along(sets: FinSets, direction: Array, softness: tuple[float, ...] = FINE) -> Largest:
+def max_wrench_along(sets: FinSets, direction: Array, tolerance: float = FINE) -> Largest:
     """Returns the largest wrenches that point exactly along unit `direction` (R, 6), all else zero."""
-    return largest(sets, direction, orthogonal_complement(direction), softness)
+    found = largest(sets, direction, orthogonal_complement(direction), tolerance=tolerance)
+    # Where fins do not act along a direction at all, no force proves that, but a plane through the origin.
+    unsure = np.flatnonzero(found.gap > 1e-6 * (1.0 + found.size))
+    if len(unsure):
+        matrix = sets.take(unsure).full_columns()
+        _, values, axes = np.linalg.svd(matrix, full_matrices=True)
+        values = np.pad(values, ((0, 0), (0, 6 - values.shape[-1])))
+        free = values <= SPAN_TOLERANCE * values[:, :1]
+        off = np.where(free, _apply(axes, direction[unsure]), 0.0)
+        share = (off * off).sum(-1)
+        outside = unsure[share > SPAN_TOLERANCE]
+        normal = _apply(axes.swapaxes(1, 2), off)[share > SPAN_TOLERANCE]
+        found.normal[outside] = normal / (normal * direction[outside]).sum(-1, keepdims=True)
+        for field in found[:4]:
+            field[outside] = 0.0
+    return found
 
 
 def max_wrench_along_exactly(sets: FinSets, directions: Array) -> tuple[Array, float]:
     """Returns the largest wrenches (P, D) of robots (P) along unit `directions` (D, 6), and the largest gap.
 
-    Sectors wider than half a turn are taken in pieces, so that the result is theirs and not their hull's;
-    with too many of them the hull's, larger, result is returned.
+    Sectors wider than half a turn are taken in convex parts, so that the result is theirs and not their
+    hull's; with too many of them some count with their hulls, see `convex_parts`.
     """
     robots, n = len(sets.radius), len(directions)
     parts = convex_parts(sets)
-    rows = np.repeat(np.arange(len(parts) * robots), n)
-    found = max_wrench_along(joined(parts).take(rows), np.tile(directions, (len(parts) * robots, 1)))
-    size, proven = (
-        v.reshape(len(parts), robots, n).max(axis=0) for v in (found.size, found.size - found.gap)
-    )
+    found = max_wrench_along(parts.repeat(n), np.tile(directions, (len(parts.radius), 1)))
+    size, proven = (v.reshape(-1, robots, n).max(axis=0) for v in (found.size, found.size - found.gap))
     return size, float((size - proven).max())
 
 
@@ -92,3 +118,9 @@ def orthogonal_complement(direction: Array) -> Array:
     reflection = np.eye(k) - 2.0 * mirror[..., :, None] * mirror[..., None, :]
     keep = np.arange(k) != axis[:, None]
     return np.swapaxes(np.swapaxes(reflection, -1, -2)[keep].reshape(rows, k - 1, k), -1, -2)
+
+
+def _apply(matrix: Array, vector: Array) -> Array:
+    """Matrices (R, a, b) times vectors (R, b)."""
+    product: Array = (matrix @ vector[..., None])[..., 0]
+    return product

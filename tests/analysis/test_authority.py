@@ -41,7 +41,7 @@ def test_layout_d_has_no_sway(shipped: Layouts) -> None:
 
 @pytest.mark.parametrize("name", ["A", "B", "mixed", "restricted", "hexa"])
 def test_extremes_are_those_of_all_directions(shipped: Layouts, name: str) -> None:
-    sets = fin_sets([shipped(name)])
+    sets = fin_sets(shipped(name))
     drawn = np.random.default_rng(5).standard_normal((20_000, 6))
     drawn /= np.linalg.norm(drawn, axis=1, keepdims=True)
     near, far = weakest(sets), strongest(sets)
@@ -49,7 +49,7 @@ def test_extremes_are_those_of_all_directions(shipped: Layouts, name: str) -> No
     close = near.direction[0] + 0.05 * drawn[:2000]
     close /= np.linalg.norm(close, axis=1, keepdims=True)
     directions = np.concatenate([drawn, close])
-    reach = sets.take(np.zeros(len(directions), dtype=np.intp)).farthest(directions)[0]
+    reach = sets.tile(len(directions)).farthest(directions)[0]
     assert reach.min() >= near.size[0] - 1e-4
     assert reach.max() <= far.size[0] + 1e-9
     assert sets.farthest(near.direction)[0] == pytest.approx(near.size, abs=1e-6)

@@ -41,11 +41,11 @@ def test_sets_are_those_of_the_moved_layout(shipped: Layouts) -> None:
     moves = Moves(layout, layout.names, bounds, mirror_pairs(layout))
     vectors = np.random.default_rng(0).uniform(moves.lower, moves.upper, (5, len(moves.lower)))
     for row, vector in enumerate(vectors):
-        expected = fin_sets([moves.moved(vector)])
+        expected = fin_sets(moves.moved(vector))
         for field, other in zip(moves.sets(vectors), expected, strict=True):
             assert field[row] == pytest.approx(other[0])
     still = moves.sets(moves.start[None])
-    assert still.columns == pytest.approx(fin_sets([layout]).columns)
+    assert still.columns == pytest.approx(fin_sets(layout).columns)
 
 
 def test_angles_come_back_within_half_a_turn(shipped: Layouts) -> None:

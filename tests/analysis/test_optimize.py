@@ -81,9 +81,9 @@ def test_fins_keep_their_distance(shipped: Layouts) -> None:
 def test_an_unreachable_mission_costs_by_what_is_missing(shipped: Layouts) -> None:
     layout = shipped("no_yaw")
     goal = make_goal("mission_energy", layout, [[0, 0, 0, 0, 0, 1.0]])
-    assert goal(fin_sets([layout]))[0] == pytest.approx(-2 * UNREACHED)
+    assert goal(fin_sets(layout))[0] == pytest.approx(-2 * UNREACHED)
     half = make_goal("mission_energy", layout, [[26.6432, 0, 0, 0, 0, 0]])
-    assert half(fin_sets([layout]))[0] == pytest.approx(-1.5 * UNREACHED, rel=1e-3)
+    assert half(fin_sets(layout))[0] == pytest.approx(-1.5 * UNREACHED, rel=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,7 @@ def test_no_sampled_wrench_lies_outside(shipped: Layouts, name: str, kind: str) 
 def test_sets_with_all_else_zero_hold_what_was_found_otherwise(shipped: Layouts, kind: str) -> None:
     # Sums of planar forces that leave no other wrench, made by projecting random ones and shrinking them.
     layout = shipped("mixed")
-    sets = fin_sets([layout])
+    sets = fin_sets(layout)
     own, other = OWN[kind], OWN["torque" if kind == "force" else "force"]
     columns = sets.columns[0].reshape(-1, 6)
     _, _, directions = np.linalg.svd(columns[:, other].T)

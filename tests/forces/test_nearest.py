@@ -36,7 +36,7 @@ def test_no_wrench_within_reach_is_nearer(learned: LearnedAllocator, limits: str
     proven = 0
     for seed in range(5000, 5020):
         planar, target = problem(learned, seed, limits)
-        found = nearest(planar, target[None])
+        found = nearest(planar.sets, target[None])
         assert (np.linalg.norm(found.force[0], axis=1) <= planar.curves.maximum * (1 + 1e-9)).all()
         missing = target - found.wrench[0]
         # The plane across what is missing separates the target from all that the fins can do.
@@ -50,16 +50,16 @@ def test_no_wrench_within_reach_is_nearer(learned: LearnedAllocator, limits: str
 
 def test_many_targets_are_answered_like_single_ones(learned: LearnedAllocator) -> None:
     planar, target = problem(learned, 5003, "varied")
-    many = nearest(planar, np.stack([target, -target, 0.1 * target]))
+    many = nearest(planar.sets, np.stack([target, -target, 0.1 * target]))
     for row, wanted in enumerate((target, -target, 0.1 * target)):
-        np.testing.assert_allclose(many.wrench[row], nearest(planar, wanted[None]).wrench[0], atol=1e-4)
+        np.testing.assert_allclose(many.wrench[row], nearest(planar.sets, wanted[None]).wrench[0], atol=1e-4)
 
 
 def test_an_axis_that_is_ignored_costs_nothing(learned: LearnedAllocator) -> None:
     planar = learned.pipeline.prepare(load_layout(shipped_layouts()["A"])).planar
     target = np.array([30.0, 0.0, 30.0, 0.0, 0.0, 0.0])
-    heave = nearest(planar, target[None], np.array([np.inf, np.inf, 1.0, np.inf, np.inf, np.inf]))
-    both = nearest(planar, target[None])
+    heave = nearest(planar.sets, target[None], np.array([np.inf, np.inf, 1.0, np.inf, np.inf, np.inf]))
+    both = nearest(planar.sets, target[None])
     assert heave.wrench[0, 2] > both.wrench[0, 2] + 0.1
 
 
@@ -67,8 +67,8 @@ def test_an_axis_that_is_ignored_costs_nothing(learned: LearnedAllocator) -> Non
 def test_groups_are_served_strictly_in_order(learned: LearnedAllocator, limits: str) -> None:
     for seed in range(5020, 5035):
         planar, target = problem(learned, seed, limits)
-        first = nearest(planar, target[None], np.where(GROUPS[0], 1.0, np.inf)).wrench[0]
-        served = nearest_in_turn(planar, target, GROUPS).wrench[0]
+        first = nearest(planar.sets, target[None], np.where(GROUPS[0], 1.0, np.inf)).wrench[0]
+        served = nearest_in_turn(planar.sets, target, GROUPS).wrench[0]
         assert abs(served[2] - target[2]) < abs(first[2] - target[2]) + 2e-3
 
 
@@ -76,13 +76,13 @@ def test_groups_are_served_strictly_in_order(learned: LearnedAllocator, limits: 
 def test_the_direction_is_kept_and_no_more_can_be_had(learned: LearnedAllocator, limits: str) -> None:
     for seed in range(5040, 5055):
         planar, target = problem(learned, seed, limits)
-        wrench = nearest_along(planar, target).wrench[0]
+        wrench = nearest_along(planar.sets, target).wrench[0]
         share = float(wrench @ target / (target @ target))
         assert -1e-6 <= share <= 1.0 + 1e-6
         assert np.linalg.norm(wrench - share * target) < 2e-3
         if share < 0.99:
             beyond = (share + 0.01) * target
-            assert np.linalg.norm(nearest(planar, beyond[None]).wrench[0] - beyond) > 1e-4
+            assert np.linalg.norm(nearest(planar.sets, beyond[None]).wrench[0] - beyond) > 1e-4
 
 
 def test_a_general_solver_finds_nothing_nearer(learned: LearnedAllocator) -> None:
@@ -97,7 +97,7 @@ def test_a_general_solver_finds_nothing_nearer(learned: LearnedAllocator) -> Non
         method="SLSQP",
         options={"maxiter": 300, "ftol": 1e-12},
     )
-    mine = 0.5 * ((nearest(planar, target[None]).wrench[0] - target) ** 2).sum()
+    mine = 0.5 * ((nearest(planar.sets, target[None]).wrench[0] - target) ** 2).sum()
     assert mine == pytest.approx(found.fun, rel=1e-5)
 
 
@@ -112,7 +112,7 @@ def test_where_forces_are_unique_the_weakest_fin_sets_the_share(learned: Learned
         if np.linalg.cond(flat) > 50.0:
             continue
         load = np.linalg.norm(np.linalg.solve(flat.T, target).reshape(3, 2), axis=1) / planar.curves.maximum
-        found = nearest_along(planar, target).wrench[0]
+        found = nearest_along(planar.sets, target).wrench[0]
         np.testing.assert_allclose(found, target * min(1.0, 1.0 / load.max()), atol=1e-4)
         checked += 1
     assert checked > 20

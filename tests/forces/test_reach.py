@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from finlab.analysis import authority
-from finlab.forces.answers import strong
 from finlab.forces.fin_sets import SCALE, convex_parts, fin_sets
 from finlab.forces.reach import max_wrench_along, max_wrench_along_exactly, orthogonal_complement
 from finlab.layout import Layout
@@ -29,7 +28,7 @@ def test_layout_b_in_closed_form(shipped: Layouts) -> None:
 
 @pytest.mark.parametrize("name", ["A", "D", "no_yaw", "restricted", "mixed", "octo"])
 def test_bracketed_by_linear_programmes(shipped: Layouts, name: str) -> None:
-    sets = fin_sets([shipped(name)])
+    sets = fin_sets(shipped(name))
     mixture = np.random.default_rng(0).standard_normal((3, 6))
     directions = np.concatenate([BOTH_WAYS[::3], mixture / np.linalg.norm(mixture, axis=1, keepdims=True)])
     found, gap = max_wrench_along_exactly(sets, directions)
@@ -41,29 +40,28 @@ def test_bracketed_by_linear_programmes(shipped: Layouts, name: str) -> None:
 
 
 def test_wide_arcs_count_piece_by_piece(wide: Layout) -> None:
-    sets = fin_sets([wide])
+    sets = fin_sets(wide)
     size = max_wrench_along_exactly(sets, BOTH_WAYS)[0][0]
     parts = convex_parts(sets)
-    assert len(parts) == 4
+    assert len(parts.radius) == 4
     by_piece = np.array(
         [
             [largest_by_polygons(part, direction, 180, outer=False) for direction in BOTH_WAYS]
-            for part in parts
+            for part in (parts.take(np.array([k])) for k in range(4))
         ]
     )
     assert size == pytest.approx(by_piece.max(axis=0), rel=1e-3, abs=1e-4)
-    hull = max_wrench_along(sets.take(np.zeros(12, dtype=np.intp)), BOTH_WAYS).size
+    hull = max_wrench_along(sets.tile(12), BOTH_WAYS).size
     assert (hull >= size - 1e-4).all()
     assert (hull > size + 1e-3).any()
 
 
 def test_the_plant_gives_the_largest_wrench(shipped: Layouts) -> None:
     layout = shipped("mixed")
-    sets = fin_sets([layout])
+    sets = fin_sets(layout)
     for direction in BOTH_WAYS:
         found = max_wrench_along(sets, direction[None])
-        unit = np.maximum(np.sqrt((sets.pull(direction[None]) ** 2).sum(-1)).max(-1), 1e-6)
-        force = strong(sets, sets.pull(found.normal), 1e-6 * unit[:, None] * np.ones((1, 4)))[1][0]
+        force = found.force[0]
         thrust, angle = np.hypot(*force.T), np.arctan2(force[:, 1], force[:, 0])
         wrench = Plant(layout).wrench(_commands(layout, thrust, angle))
         assert wrench / SCALE == pytest.approx(found.size[0] * direction, abs=1e-3)
@@ -83,7 +81,7 @@ def test_no_sampled_command_goes_beyond(shipped: Layouts, name: str) -> None:
     lower = layout.lower
     upper = layout.upper
     wrench = Plant(layout).wrench(rng.uniform(lower, upper, (4_000, layout.n_fins, 3))) / SCALE
-    size, _ = fin_sets([layout]).take(np.zeros(12, dtype=np.intp)).farthest(BOTH_WAYS)
+    size, _ = fin_sets(layout).tile(12).farthest(BOTH_WAYS)
     assert ((wrench @ BOTH_WAYS.T).max(axis=0) <= size + 1e-3).all()
 
 
@@ -100,7 +98,7 @@ def test_the_plant_reaches_as_far_as_it_is_said_to(shipped: Layouts, name: str) 
         command[:, i, :2] = fin.limits.upper[:2]
         command[:, i, 2] = np.linspace(*fin.limits.zero_direction, 2_000)
         best += np.maximum((plant.wrench(command) / SCALE @ directions.T).max(axis=0), 0.0)
-    size, _ = fin_sets([layout]).take(np.zeros(len(directions), dtype=np.intp)).farthest(directions)
+    size, _ = fin_sets(layout).tile(len(directions)).farthest(directions)
     assert size == pytest.approx(best, rel=1e-5, abs=1e-9)
 
 

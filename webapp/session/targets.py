@@ -23,14 +23,14 @@ FIRST = PRESETS["Turn"]
 
 def axis_reach(layout: Layout, failed: tuple[str, ...] = ()) -> NDArray[np.float64]:
     """Largest size of each wrench component (6,) [N, N m] that the working fins give with the others free."""
-    sets = fin_sets([layout], failed)
-    both = sets.take(np.zeros(12, dtype=np.intp)).farthest(np.concatenate([np.eye(6), -np.eye(6)]))[0]
+    sets = fin_sets(layout, failed)
+    both = sets.tile(12).farthest(np.concatenate([np.eye(6), -np.eye(6)]))[0]
     return np.asarray(both.reshape(2, 6).max(axis=0) * SCALE)
 
 
 def full_thrust(layout: Layout) -> NDArray[np.float64]:
     """Mean thrust (n,) of each fin at its largest amplitude and frequency [N]."""
-    return fin_sets([layout]).radius[0]
+    return fin_sets(layout).radius[0]
 
 
 def slider_end(reach: float) -> float:

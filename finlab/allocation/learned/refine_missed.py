@@ -48,7 +48,7 @@ FallbackForces = Callable[[PlanarProblem, Array], Array | None]
 
 def nearest_forces(problem: PlanarProblem, target: Array) -> Array:
     """The forces (R, n, 2) whose wrench is nearest."""
-    return nearest(problem, target).force
+    return nearest(problem.sets, target).force
 
 
 def refine_missed(

@@ -23,9 +23,9 @@ def project_target(problem: PlanarProblem, policy: Policy, target: Array) -> Nea
         target: the wrench (6,) that was asked for.
     """
     if policy.kind == "direction":
-        return nearest_along(problem, target)
+        return nearest_along(problem.sets, target)
     if policy.kind == "priority":
-        return nearest_in_turn(problem, target, policy.groups)
+        return nearest_in_turn(problem.sets, target, policy.groups)
     weights = np.array(policy.axis_weights, np.float64)
     with np.errstate(divide="ignore"):
-        return nearest(problem, target[None], (weights.max() / weights) ** 2)
+        return nearest(problem.sets, target[None], (weights.max() / weights) ** 2)
