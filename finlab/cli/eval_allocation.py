@@ -214,3 +214,40 @@ def unreachable(layouts: Count = 50, seed: Count = 0, run: Annotated[Run, arg(na
     check_positive("layouts", layouts)
     rows = unreachable_rows(run.learned(), n_layouts=layouts, seed=seed)
     run.show(unreachable_report(rows), rows=rows)
+
+
+def fuzz(
+    robots: Count = 50,
+    targets: Count = 60,
+    single: Count = 6,
+    methods: Names = "learned,fast,paper,qp,sqp,analytic,multistart,trf,slsqp",
+    seed: Count = 0,
+    first: Count = 0,
+    run: Annotated[Run, arg(name="")] = RUN,
+) -> int | None:
+    """Look for answers on hostile robots that are not finite, leave their limits, fail or are late.
+
+    Ends with exit code 1 where there is any.
+
+    Args:
+        robots: robots to draw.
+        targets: targets on each robot, solved together; trf, slsqp and ipopt solve a few.
+        single: targets on each robot that are solved again in calls of their own.
+        methods: names with commas between, as in `eval wrench`.
+        seed: draws robots and targets; same numbers, same cases.
+        first: number of the first robot, to go on from where another run ended.
+    """
+    from finlab.evaluation.experiments.fuzz import fuzz_methods, fuzz_report
+
+    check_positive("robots", robots)
+    check_positive("targets", targets)
+    counts = fuzz_methods(
+        run.methods(methods),
+        n_robots=robots,
+        n_targets=targets,
+        n_single=single,
+        seed=seed,
+        first_robot=first,
+    )
+    run.show(fuzz_report(counts), rows=[count.row() for count in counts])
+    return None if all(count.clean for count in counts) else 1

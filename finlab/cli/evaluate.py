@@ -15,6 +15,7 @@ for verb in (
     eval_allocation.steadiness,
     eval_allocation.modes,
     eval_allocation.unreachable,
+    eval_allocation.fuzz,
     eval_closed_loop.trajectory,
     eval_closed_loop.faults,
     eval_closed_loop.velocity,

@@ -1,0 +1,151 @@
+"""Robots and targets that are valid but hostile: degenerate limits, geometry, fin models and wrenches."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.layout import Fin, FinModelSpec, Layout, Limits
+from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY, MAX_POSITION
+from finlab.layout.layout import MAX_FINS
+from finlab.physics import Plant
+
+Array = NDArray[np.float64]
+
+DOMAIN = 0xF022
+"""Leads the seed of every robot."""
+GEOMETRIES = ("box", "far", "origin", "coincident", "collinear", "parallel", "nearly parallel")
+"""How fins stand to each other."""
+RANGES = ("nominal", "fixed", "from zero", "tiny", "large", "narrow")
+"""What ranges of amplitude and frequency there are."""
+ARCS = ("full", "fixed", "almost full", "within a turn", "past the seam", "ends at zero", "shifted full")
+"""What arcs of zero directions there are."""
+TARGETS = ("reachable", "zero", "huge", "tiny", "unreachable", "one axis")
+"""What wrenches are asked for."""
+
+
+def hostile_robot(number: int, seed: int, table: str | None = None) -> Layout:
+    """Robot `number` of a seed: 1 to 16 fins, each robot with a mixture of degeneracies of its own.
+
+    Args:
+        number: which robot.
+        seed: of the whole set.
+        table: path of a table of forces; without one no fin follows a table.
+    """
+    rng = np.random.default_rng([DOMAIN, seed, number])
+    n = int(rng.choice([1, 2, 3, 4, 5, 6, 8, 12, MAX_FINS]))
+    position, angle = _places(rng, str(rng.choice(GEOMETRIES)), n)
+    ranges = rng.choice(RANGES, size=int(rng.integers(1, 4)))
+    arcs = rng.choice(ARCS, size=int(rng.integers(1, 4)))
+    models = _models(rng, table)
+    fins = (
+        Fin(
+            f"fin_{i}",
+            (float(position[i, 0]), float(position[i, 1]), float(position[i, 2])),
+            float(angle[i]),
+            Limits(
+                _range(rng, str(rng.choice(ranges)), (0.05, 0.6), MAX_AMPLITUDE),
+                _range(rng, str(rng.choice(ranges)), (0.1, 2.1), MAX_FREQUENCY),
+                _arc(rng, str(rng.choice(arcs))),
+            ),
+            models[int(rng.integers(len(models)))],
+        )
+        for i in range(n)
+    )
+    return Layout(f"hostile {number}", tuple(fins))
+
+
+def hostile_targets(layout: Layout, count: int, number: int, seed: int) -> Array:
+    """Wrenches (count, 6) for robot `number`, of every kind in `TARGETS` in turn."""
+    rng = np.random.default_rng([DOMAIN, seed, number, 1])
+    command = layout.lower + rng.uniform(size=(count, layout.n_fins, 3)) * (layout.upper - layout.lower)
+    targets = np.clip(Plant(layout).wrench(command), -1e6, 1e6).reshape(count, 6)
+    for i in range(count):
+        kind = TARGETS[i % len(TARGETS)]
+        if kind == "zero":
+            targets[i] = 0.0
+        elif kind == "huge":
+            targets[i] = rng.uniform(-1e6, 1e6, 6)
+        elif kind == "tiny":
+            targets[i] = rng.normal(size=6) * 1e-12
+        elif kind == "unreachable":
+            targets[i] = np.clip(rng.normal(size=6) * 10.0 * np.abs(targets).max(), -1e6, 1e6)
+        elif kind == "one axis":
+            targets[i] = np.eye(6)[rng.integers(6)] * rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-3, 3)
+    return targets
+
+
+def _places(rng: np.random.Generator, geometry: str, n: int) -> tuple[Array, Array]:
+    """Positions (n, 3) [m] and mounting angles (n,) [rad]."""
+    position = rng.uniform(-1.0, 1.0, (n, 3)) * [0.3, 0.3, 0.1]
+    angle = rng.uniform(-math.pi, math.pi, n)
+    if geometry == "far":
+        position *= rng.uniform(3.0, MAX_POSITION) / np.abs(position).max()
+    elif geometry == "origin":
+        position[:] = 0.0
+    elif geometry == "coincident":
+        position[:], angle[:] = position[0], angle[0]
+    elif geometry == "collinear":
+        position = np.linspace(-1.0, 1.0, n)[:, None] * position[0]
+    elif geometry == "parallel":
+        angle[:] = angle[0]
+    elif geometry == "nearly parallel":
+        angle = angle[0] + rng.normal(size=n) * 1e-9
+    return position, angle
+
+
+def _range(
+    rng: np.random.Generator, kind: str, nominal: tuple[float, float], most: float
+) -> tuple[float, float]:
+    """Minimum and maximum of an amplitude [rad] or a frequency [Hz]."""
+    low, high = nominal
+    if kind == "fixed":
+        value = float(rng.uniform(low, most))
+        return value, value
+    if kind == "from zero":
+        return 0.0, high
+    if kind == "tiny":
+        high = 10.0 ** float(rng.uniform(-12.0, -2.0))
+        return float(rng.choice([0.0, 0.5 * high, high])), high
+    if kind == "large":
+        return float(rng.choice([0.0, low, 0.9 * most])), most
+    if kind == "narrow":
+        return high * (1.0 - 10.0 ** float(rng.uniform(-14.0, -2.0))), high
+    return nominal
+
+
+def _arc(rng: np.random.Generator, kind: str) -> tuple[float, float]:
+    """First and last zero direction [rad]."""
+    start = float(rng.uniform(-math.pi, math.pi))
+    if kind == "fixed":
+        return start, start
+    if kind == "almost full":
+        short = float(rng.choice([1e-3, 1e-4, 1e-5, 2e-6, 1e-6, 1e-7, 1e-9]))
+        return -math.pi, math.pi - short
+    if kind == "within a turn":
+        return start, start + float(rng.uniform(0.0, 1.0)) * (math.pi - start)
+    if kind == "past the seam":
+        return float(rng.uniform(1.0, 3.0)), float(rng.uniform(3.2, 2 * math.pi))
+    if kind == "ends at zero":
+        return -float(rng.uniform(0.1, 3.0)), float(rng.choice([0.0, 1e-12, 1e-6]))
+    if kind == "shifted full":
+        start = float(rng.choice([-2 * math.pi, 0.0, -1.0]))
+        return start, start + 2 * math.pi
+    return -math.pi, math.pi
+
+
+def _models(rng: np.random.Generator, table: str | None) -> Sequence[FinModelSpec]:
+    """The fin models of one robot: one kind, or a mixture."""
+    large = float(rng.uniform(1.0, 5.0))
+    kinds = [
+        FinModelSpec(),
+        FinModelSpec("drag", (("area", 0.04 * large), ("lever", 0.1 * large))),
+        FinModelSpec("lighthill", (("length", 0.2 * large), ("width", 0.1 * large))),
+    ]
+    if table is not None:
+        kinds.append(FinModelSpec("table", (("path", table),)))
+    chosen = int(rng.integers(len(kinds) + 2))
+    return kinds if chosen >= len(kinds) else [kinds[chosen]]
