@@ -42,4 +42,5 @@ class NumpyFastNetwork:
             heard += mean
             np.maximum(heard, 0, out=heard)
             hidden = hidden + heard.reshape(rows * n, -1)
-        return 1.0 / (1.0 + np.exp(-(hidden @ self._last[0] + self._last[1]).reshape(rows, n)))
+        share = np.tanh(0.5 * (hidden @ self._last[0] + self._last[1]))  # the sigmoid, without overflow
+        return (0.5 + 0.5 * share).reshape(rows, n)

@@ -21,6 +21,9 @@ Array = NDArray[Any]
 
 AT_LIMIT = 1e-9
 """How near [rad, Hz, rad] to a limit a command counts as being at it."""
+RIDGE = (1e-9, 1e-14)
+"""Regularization of the 6 x 6 systems: absolute, and relative to the largest squared derivative. Without the
+latter those of strong fins on long levers are singular to rounding."""
 
 
 class Limits(NamedTuple):
@@ -57,6 +60,13 @@ class CommandProblem:
     def span(self) -> Array:
         """Ranges of the limits (n, 3)."""
         return self.upper - self.lower
+
+    @cached_property
+    def ridge(self) -> float:
+        """What regularizes the systems of each step: `RIDGE`, for derivatives of at most a turn of all fins'
+        largest forces."""
+        largest = 2 * np.pi * np.linalg.norm(self.fin.force(self.upper), axis=-1)
+        return RIDGE[0] + RIDGE[1] * float((largest[:, None, None] ** 2 * self.columns**2).sum())
 
     @cached_property
     def edges(self) -> tuple[Array, Array]:
@@ -133,8 +143,8 @@ def refine(
         damping: first damping of each row.
     """
     damping_of = np.full(len(command), damping)
-    # Where nothing better is found this is the answer: it must not lie outside by a rounding error.
-    command = np.minimum(np.maximum(command, problem.lower), problem.upper)
+    # Where nothing better is found this is the answer: it must not lie outside by a turn or a rounding error.
+    command = problem.clamp(command)
     best = _evaluated(problem, target, command, None if steps else _NO_SLOPES)
     for step in range(steps):
         # (R, n, 3 commands, 6): change of the normalized wrench per unit of each limit range.
@@ -146,7 +156,7 @@ def refine(
         # The last commands are only evaluated: no step follows.
         last = step == steps - 1
         new = _evaluated(problem, target, problem.clamp_in_place(moved), best.slopes if last else None)
-        worse = new.error > best.error
+        worse = ~(new.error <= best.error)  # an error that is not a number is no improvement
         if worse.any():
             rows = [worse.reshape(-1, *(1,) * (part.ndim - 1)) for part in new]
             new = _Evaluated(*map(np.where, rows, best, new))
@@ -191,20 +201,20 @@ def _step(problem: CommandProblem, at: _Evaluated, jacobian: Array, damping: Arr
     rows, n, _ = at.command.shape
     free = jacobian.reshape(rows, 3 * n, 6)
     right = at.residual[..., None]
-    change = _smallest_change(free, right, damping)
+    change = _smallest_change(free, right, damping + problem.ridge)
     # Hold what is at a limit and wants out, then solve again with the rest.
     low, high = problem.edges
     moved = change.reshape(rows, n, 3)
     out = (at.command <= low) & (moved < 0)
     out |= (at.command >= high) & (moved > 0)
     if out.any():
-        change = _smallest_change(free * ~out.reshape(rows, 3 * n, 1), right, damping)
+        change = _smallest_change(free * ~out.reshape(rows, 3 * n, 1), right, damping + problem.ridge)
     return change.reshape(rows, n, 3)
 
 
 def _smallest_change(free: Array, right: Array, damping: Array) -> Array:
     """The change (R, 3n, 1) that gives the wrenches (R, 6, 1) by a Jacobian (R, 3n, 6)."""
     gram = free.swapaxes(1, 2) @ free
-    gram.reshape(-1, 36)[:, ::7] += (damping + 1e-9)[:, None]
+    gram.reshape(-1, 36)[:, ::7] += damping[:, None]
     change: Array = free @ solve(gram, right)
     return change

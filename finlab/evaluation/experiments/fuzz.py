@@ -1,4 +1,4 @@
-"""Methods on hostile robots: whether answers are finite, within the limits and in time, without other errors."""
+"""Methods on hostile robots: are answers finite, within the limits and in time, without other errors?"""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from finlab.physics.table import write_table
 Array = NDArray[np.float64]
 
 LATE_S = 1.0
-"""A single call that takes longer counts as late [s]."""
+"""A single call that takes longer counts as late [s of processor time]."""
 SLOW_BATCH = 3
 """Targets in the batch of a method that takes a tenth of a second each."""
 EXAMPLES = 5
@@ -58,9 +58,9 @@ class FuzzCount:
     refused: int = 0
     """Calls that were refused with a `FinlabError`: the method does not know the fin model."""
     slowest_ms: float = 0.0
-    """The slowest single call [ms]."""
+    """The slowest single call [ms of this process' processor time, which other work does not prolong]."""
     slowest_in_batch_ms: float = 0.0
-    """The slowest batch's time per target [ms]."""
+    """The slowest batch's time per target, likewise [ms]."""
     examples: list[str] = field(default_factory=list)
     """The first faults, in words."""
 
@@ -163,7 +163,7 @@ def _watched(
 ) -> tuple[Array | None, float]:
     """What a call returns, None where it failed, and its time [s]; errors and warnings are counted."""
     count.calls += 1
-    start = time.perf_counter()
+    start = time.process_time()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         answer = None
@@ -174,7 +174,7 @@ def _watched(
         except Exception as error:  # any other is the fault that is looked for
             count.foreign_errors += 1
             count.note(layout, f"{where}: {type(error).__name__}: {error}")
-    seconds = time.perf_counter() - start
+    seconds = time.process_time() - start
     if caught:
         count.warnings += 1
         at = f"{Path(caught[0].filename).name}:{caught[0].lineno}"

@@ -1,7 +1,10 @@
 """The fast path: true to its network, as exact as the full pipeline, hardly dearer, and never stuck."""
 
 import json
+import math
 import shutil
+import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +20,7 @@ from finlab.errors import AllocationError, CheckpointError
 from finlab.inference.checkpoint import read_checkpoint
 from finlab.inference.fast_network import NumpyFastNetwork
 from finlab.inference.fast_weights import FastWeights, save_fast
-from finlab.layout import random_layout
+from finlab.layout import Limits, random_layout
 from finlab.physics import Plant
 from finlab.physics.energy import command_energy
 from finlab.training.networks.fast_network import FastConfig, FastNetwork
@@ -78,6 +81,25 @@ def test_answers_stay_inside_limits_also_with_arcs(fast: FastAllocator) -> None:
             alive = ~np.isnan(result.command).any(axis=1)
             assert (result.command >= [limit.lower for limit in limits])[alive].all()
             assert (result.command <= [limit.upper for limit in limits])[alive].all()
+
+
+def test_answers_stay_inside_full_turns_that_begin_anywhere(fast: FastAllocator) -> None:
+    layout = random_layout(np.random.default_rng(8), n_fins=4)
+    for start in (0.0, -2.0 * math.pi, -1.0):
+        limits = Limits(zero_direction=(start, start + 2.0 * math.pi))
+        turned = replace(layout, fins=tuple(replace(fin, limits=limits) for fin in layout.fins))
+        wanted = targets(turned, 40)
+        command = fast.allocate_batch(turned, wanted).command
+        assert ((command >= turned.lower) & (command <= turned.upper)).all()
+        assert np.median(fast.normalization.error(Plant(turned).wrench(command), wanted)) < 5e-3
+
+
+def test_far_from_its_training_the_network_still_gives_shares(fast: FastAllocator) -> None:
+    x = np.random.default_rng(0).normal(size=(4, 3, 25)).astype(np.float32) * np.float32(1e8)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        share = fast.network(x)
+    assert ((share >= 0.0) & (share <= 1.0)).all()
 
 
 def test_out_of_reach_the_full_pipeline_answers(fast: FastAllocator) -> None:

@@ -1,6 +1,7 @@
 """Levenberg-Marquardt on commands: never worse, never outside the limits, never NaN."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -88,6 +89,27 @@ def test_hostile_layouts_give_numbers_inside_the_limits(
     assert np.isfinite(refined.command).all() and np.isfinite(refined.error).all()
     assert keeps_limits(problem, refined.command)
     assert (error(problem, target, refined.command) <= error(problem, target, starts) * (1 + 1e-12)).all()
+
+
+def test_strong_fins_on_long_levers_give_numbers(learned: LearnedAllocator) -> None:
+    """Their derivatives are large and of too low a rank: without a relative ridge a step is no number."""
+    limits = Limits((0.0, 1.5), (0.0, 20.0))
+    layout = Layout("far", tuple(Fin(f"f{i}", (8.0, 5.0, 1.0), 0.3 + i, limits) for i in range(3)))
+    problem = problem_of(learned, layout)
+    target = 1e3 * np.random.default_rng(0).normal(size=(200, 6))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        refined = refine(problem, target, draw(problem, 200, 1), 40)
+    assert np.isfinite(refined.command).all() and np.isfinite(refined.error).all()
+
+
+def test_a_start_a_whole_turn_off_is_the_same_start(learned: LearnedAllocator) -> None:
+    limits = Limits(zero_direction=(0.0, 2.0 * math.pi))
+    problem = problem_of(learned, Layout("one", (Fin("a", (0.0, 0.0, 0.0), 0.0, limits),)))
+    start = np.array([[[0.4, 1.5, -1.0]]])
+    refined = refine(problem, problem.wrench(start), start, 0)
+    np.testing.assert_allclose(refined.command[0, 0], [0.4, 1.5, 2.0 * math.pi - 1.0])
+    assert refined.error[0] < 1e-9
 
 
 def test_commands_without_room_stay_bit_for_bit(learned: LearnedAllocator) -> None:
