@@ -64,7 +64,9 @@ def test_nothing_better_leaves_the_layout_as_it_was(shipped: Layouts) -> None:
     layout = shipped("B")
     x, y, z = layout.fins[0].position
     angle = layout.fins[0].mounting_angle
-    inwards = Bounds(x=(x, x), y=(y, y + 0.05), z=(z, z), mounting_angle=(angle, angle))  # shorter levers only
+    inwards = Bounds(
+        x=(x, x), y=(y, y + 0.05), z=(z, z), mounting_angle=(angle, angle)
+    )  # shorter levers only
     found = optimize_layout(layout, layout.names[:1], {layout.names[0]: inwards}, rounds=1, mirror=())
     assert found.value_after == found.value_before
     assert not found.improved

@@ -6,9 +6,9 @@ killed in each room: `make mutate MUTANTS=300 SEED=0`. Equivalent mutants are li
 """
 
 import argparse
+import dataclasses
 import os
 import random
-import shutil
 import signal
 import sys
 import tempfile
@@ -26,18 +26,28 @@ EQUIVALENT = Path(__file__).with_name("equivalent.yaml")
 SURVIVORS = STORE / "survivors.yaml"
 
 
+def is_equivalent(mutant: Mutant) -> bool:
+    """Whether the list knows the change: parts of the lines before and after, and perhaps the file."""
+    before, after = mutant.change()
+    return any(
+        entry["before"] in before
+        and entry["after"] in after
+        and entry.get("file", mutant.file) == mutant.file
+        for entry in yaml.safe_load(EQUIVALENT.read_text())
+    )
+
+
 def draw(only: list[str], count: int, seed: int) -> list[Mutant]:
     """Mutants at places drawn without replacement; known equivalent ones are passed over."""
     files = sorted(
         p for name in only for p in ([ROOT / name] if name.endswith(".py") else (ROOT / name).rglob("*.py"))
     )
     places = [place for path in files for place in find_places(path.relative_to(ROOT).as_posix())]
-    known = {(e["file"], e["before"], e["after"]) for e in yaml.safe_load(EQUIVALENT.read_text()) or ()}
     dice = random.Random(seed)
     drawn: list[Mutant] = []
     for place in dice.sample(places, len(places)):
         mutant = dice.choice(place)
-        if len(drawn) < count and (mutant.file, *mutant.change()) not in known:
+        if len(drawn) < count and not is_equivalent(mutant):
             drawn.append(mutant)
     return drawn
 
@@ -66,10 +76,11 @@ def judge(mutants: list[Mutant], copies: list[Path]) -> Iterator[tuple[Mutant, s
                 os.waitpid(child, 0)
             if done or late:
                 code = os.waitstatus_to_exitcode(status)
-                if code in (5, 70):
-                    raise RuntimeError(f"no test ran for {mutant}:\n{(copy / 'tests.log').read_text()}")
+                output = (copy / "tests.log").read_text(errors="replace")
+                if code in (5, 70) or "ERROR: not found" in output:
+                    raise RuntimeError(f"a test that was measured is not there for {mutant}:\n{output}")
                 del running[child]
-                shutil.copy2(ROOT / mutant.file, copy / mutant.file)
+                (copy / mutant.file).write_text(mutant.original)
                 free.append(copy)
                 yield mutant, "timeout" if late else "killed" if code else "survived"
 
@@ -88,7 +99,7 @@ def report(judged: list[tuple[Mutant, str]]) -> float:
         share = 100.0 * killed / len(verdicts)
         print(f"{room:20} {killed:4} of {len(verdicts):4} killed: {share:5.1f} %", end="")
         print(f" ({verdicts.count('timeout')} by running out of time)")
-    SURVIVORS.write_text(yaml.safe_dump([vars(mutant) for mutant in survivors]))
+    SURVIVORS.write_text(yaml.safe_dump([dataclasses.asdict(mutant) for mutant in survivors]))
     return share
 
 
@@ -108,12 +119,12 @@ def main() -> int:
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         copies = [copy_tree(Path(folder) / str(job)) for job in range(given.jobs)]
-        if not given.reuse:
-            measure(copies[0], given.jobs)
         if given.again:
             mutants = [Mutant(**entry) for entry in yaml.safe_load(SURVIVORS.read_text())]
         else:
             mutants = draw(given.only, given.mutants, given.seed)
+        if not given.reuse:
+            measure(copies[0], given.jobs)
         judged = list(tqdm(judge(mutants, copies), total=len(mutants), disable=None, unit="mutant"))
     return int(report(judged) < given.at_least)
 

@@ -2,7 +2,7 @@
 
 import ast
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from cosmic_ray.ast import ast_nodes, get_ast
@@ -30,16 +30,18 @@ class Mutant:
     """cosmic-ray's name of the kind of change."""
     occurrence: int
     """Which of the places in the file where the operator can work."""
+    original: str = field(repr=False, compare=False)
+    """The file's text without the change."""
 
     def source(self) -> str:
         """The file's text with the change."""
-        text = mutate_code((ROOT / self.file).read_text(), get_operator(self.operator)(), self.occurrence)
+        text = mutate_code(self.original, get_operator(self.operator)(), self.occurrence)
         assert text is not None, "every mutant was found by its operator in this very text"
         return str(text)
 
     def change(self) -> tuple[str, str]:
         """The text of the changed lines before and after, each on one line."""
-        before, after = (ROOT / self.file).read_text().splitlines(), self.source().splitlines()
+        before, after = self.original.splitlines(), self.source().splitlines()
         first = next(i for i, pair in enumerate(zip(before, after, strict=False)) if len(set(pair)) > 1)
         last = next(
             i for i, pair in enumerate(zip(before[::-1], after[::-1], strict=False)) if len(set(pair)) > 1
@@ -79,6 +81,6 @@ def find_places(file: str) -> list[list[Mutant]]:
         for node in nodes:
             for start, _ in operator.mutation_positions(node):
                 if start not in skipped:
-                    places.setdefault(start, []).append(Mutant(file, start[0], name, occurrence))
+                    places.setdefault(start, []).append(Mutant(file, start[0], name, occurrence, text))
                 occurrence += 1
     return list(places.values())
