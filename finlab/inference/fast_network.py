@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.inference.activations import sigmoid
 from finlab.inference.fast_weights import FastWeights
 
 Array = NDArray[Any]
@@ -42,5 +43,4 @@ class NumpyFastNetwork:
             heard += mean
             np.maximum(heard, 0, out=heard)
             hidden = hidden + heard.reshape(rows * n, -1)
-        share = np.tanh(0.5 * (hidden @ self._last[0] + self._last[1]))  # the sigmoid, without overflow
-        return (0.5 + 0.5 * share).reshape(rows, n)
+        return sigmoid((hidden @ self._last[0] + self._last[1]).reshape(rows, n))

@@ -2,7 +2,6 @@
 
 import itertools
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +9,7 @@ import pytest
 
 from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.inference.checkpoint import resolve_checkpoint
-from finlab.inference.learned_fin import LearnedFin
 from finlab.training.networks.checkpoint import Checkpoint, load_allocator_checkpoint
-from finlab.training.networks.surrogate import CoefficientSurrogate, Surrogate
 
 
 @pytest.fixture
@@ -41,20 +38,3 @@ def default_checkpoint() -> Checkpoint:
 def learned(default_checkpoint: Checkpoint) -> LearnedAllocator:
     """The product's default method with the shipped checkpoint."""
     return LearnedAllocator(default_checkpoint.weights())
-
-
-@pytest.fixture(scope="session")
-def learned_fin(default_checkpoint: Checkpoint) -> LearnedFin:
-    """The shipped surrogate, in numpy."""
-    return make_fin(default_checkpoint.surrogate)
-
-
-@pytest.fixture
-def fin_of() -> Callable[[CoefficientSurrogate], LearnedFin]:
-    """Takes over a surrogate into numpy."""
-    return make_fin
-
-
-def make_fin(surrogate: Surrogate) -> LearnedFin:
-    weights = {key: value.numpy() for key, value in surrogate.state_dict().items()}
-    return LearnedFin(weights)

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 
 import finlab
 from finlab.allocation import load_allocator
@@ -18,12 +17,10 @@ from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.assets import checkpoint_path, shipped_layouts
 from finlab.errors import AllocationError, CheckpointError
 from finlab.inference.checkpoint import read_checkpoint
-from finlab.inference.fast_network import NumpyFastNetwork
-from finlab.inference.fast_weights import FastWeights, save_fast
+from finlab.inference.fast_weights import save_fast
 from finlab.layout import Limits, random_layout
 from finlab.physics import Plant
 from finlab.physics.energy import command_energy
-from finlab.training.networks.fast_network import FastConfig, FastNetwork
 
 
 @pytest.fixture(scope="module")
@@ -39,21 +36,6 @@ def targets(layout: finlab.Layout, count: int, seed: int = 0) -> np.ndarray:
     upper = layout.upper
     draws = np.random.default_rng(seed).random((count, layout.n_fins, 3))
     return Plant(layout).wrench(lower + draws * (upper - lower))
-
-
-@pytest.mark.parametrize("n_fins", [1, 4, 7])
-def test_numpy_answers_as_torch(n_fins: int) -> None:
-    torch.manual_seed(0)
-    network = FastNetwork(FastConfig(width=32, rounds=2), 25)
-    state = {key: value.detach().numpy() for key, value in network.named_parameters()}
-    x = np.random.default_rng(0).normal(size=(5, n_fins, 25)).astype(np.float32)
-    with torch.inference_mode():
-        truth = network(torch.tensor(x), torch.ones(5, n_fins)).numpy()
-        wider = torch.nn.functional.pad(torch.tensor(x), (0, 0, 0, 2))
-        mask = torch.tensor([[1.0] * n_fins + [0.0] * 2] * 5)
-        padded = network(wider, mask).numpy()[:, :n_fins]
-    np.testing.assert_allclose(NumpyFastNetwork(FastWeights(state, 2))(x), truth, atol=1e-5)
-    np.testing.assert_allclose(padded, truth, atol=1e-5)
 
 
 def test_exact_and_hardly_dearer_on_new_layouts(fast: FastAllocator) -> None:

@@ -11,7 +11,7 @@ from finlab.training.networks.mixture import LOG_STD_RANGE, Mixture
 
 
 def predict(network: AllocatorNetwork, robots, mask: Tensor | None) -> Mixture:
-    """The mixture for robots of tests/model/conftest.py."""
+    """The mixture for robots of the conftest."""
     x = robots.features(network.config.features)
     return network(x, robots.target, robots.lower, robots.upper, mask)
 
