@@ -14,6 +14,7 @@ from finlab.errors import DataError
 
 if TYPE_CHECKING:
     from finlab.allocation import Allocator
+    from finlab.evaluation.plots.style import Picture
     from finlab.evaluation.splits import Case
     from finlab.layout import Layout
 
@@ -117,11 +118,10 @@ class ClosedLoopRuns:
         """Of every run."""
         return range(self.seed, self.seed + self.runs)
 
-    def draw(self, name: str, save: Callable[[Any, Path], None], content: Any) -> None:
+    def save(self, name: str, draw: Callable[[], Picture]) -> None:
         """Draw into the folder, where one was named, and say so."""
         if self.figures is not None:
-            path = self.figures / f"{name}.png"
-            save(content, path)
+            path = draw().save(self.figures / f"{name}.png")
             print(f"\n{path}: written.")
 
 

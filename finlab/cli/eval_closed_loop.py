@@ -27,7 +27,7 @@ def trajectory(
         trajectory: circle, lissajous, square, or a CSV file with the columns t, x, y, z.
     """
     from finlab.evaluation.experiments.trajectory import run_trajectory, trajectory_report, trajectory_rows
-    from finlab.evaluation.plots.closed_loop_experiments import save_layouts_figure
+    from finlab.evaluation.plots.closed_loop_experiments import draw_layouts, tracks_of
     from finlab.sim import make_trajectory
 
     robots, path = open_layouts(layouts), make_trajectory(trajectory)
@@ -35,7 +35,7 @@ def trajectory(
     found = run_trajectory(robots, methods, path, loop.seeds, loop.plant, steady=loop.steady)
     rows = trajectory_rows(found)
     run.show(trajectory_report(rows, path, loop.plant), rows=rows)
-    loop.draw("trajectory", save_layouts_figure, found)
+    loop.save("trajectory", lambda: draw_layouts(tracks_of(found), rows))
 
 
 def faults(
@@ -52,7 +52,7 @@ def faults(
     """
     from finlab.cli.inputs import open_robot
     from finlab.evaluation.experiments.faults import all_faults, fault_report, fault_rows, run_faults
-    from finlab.evaluation.plots.closed_loop_experiments import save_faults_figure
+    from finlab.evaluation.plots.closed_loop_experiments import draw_faults
     from finlab.sim import make_trajectory
 
     robot, path = open_robot(layout).layout, make_trajectory(trajectory)
@@ -60,7 +60,7 @@ def faults(
     found = run_faults(robot, methods, path, cases, loop.seeds, loop.plant, steady=loop.steady)
     rows = fault_rows(cases, found)
     run.show(fault_report(rows, robot, path, loop.plant), rows=rows)
-    loop.draw("faults", save_faults_figure, rows)
+    loop.save("faults", lambda: draw_faults(rows))
 
 
 def velocity(
@@ -86,7 +86,7 @@ def velocity(
         velocity_report,
         velocity_rows,
     )
-    from finlab.evaluation.plots.closed_loop_experiments import save_velocity_figure
+    from finlab.evaluation.plots.closed_loop_experiments import draw_velocity
 
     if not SETTLED_S < duration <= 3600.0:
         raise DataError(f"duration: expected more than {SETTLED_S:g} s and at most 3600 s, got {duration:g}")
@@ -94,4 +94,4 @@ def velocity(
     found = run_velocity(robot, methods, loop.seeds, SPEEDS, duration, loop.plant, steady=loop.steady)
     rows = velocity_rows(found)
     run.show(velocity_report(rows, baseline, robot, loop.plant), rows=rows)
-    loop.draw("velocity", save_velocity_figure, found)
+    loop.save("velocity", lambda: draw_velocity(found))

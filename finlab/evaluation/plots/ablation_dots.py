@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from finlab.evaluation.plots.style import BLACK, BLUE, ORANGE, clean, picture
+from finlab.evaluation.plots.style import BLACK, BLUE, ORANGE, Picture, clean, picture
 
 COLOUR = {"adam": ORANGE, "levenberg-marquardt": BLUE}
 
 
 def ablation_dots(
     rows: Sequence[dict[str, Any]], printed: Mapping[str, float], titles: Mapping[str, str]
-) -> str:
+) -> Picture:
     """Mean normalized error of each row; rows of `ablation_row`, `printed` by variant."""
     variants = list(titles)
     with picture(height=3.1) as view:
@@ -43,4 +43,4 @@ def ablation_dots(
         axis.invert_yaxis()
         clean(axis)
         view.legend(ncols=3)
-        return view.svg("ablation")
+        return view

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,10 +31,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-DPI = 110
-"""Of a picture."""
-COLOURS_IN_PNG = 96
-"""Of its palette; enough for smooth edges of ten colours."""
 FIN_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK, YELLOW)
 """Colour of each fin, in the layout's order."""
 ASKED, DELIVERED, MISSING = BLUE, GREEN, VERMILION
@@ -45,17 +40,7 @@ ASKED, DELIVERED, MISSING = BLUE, GREEN, VERMILION
 def save_pictures(log: RunLog, folder: Path) -> list[Path]:
     """Writes path.png, errors.png, commands.png and wrench.png into a folder; returns their paths."""
     drawers = {"path": draw_path, "errors": draw_errors, "commands": draw_commands, "wrench": draw_wrench}
-    return [save(draw(log), folder / f"{name}.png") for name, draw in drawers.items()]
-
-
-def save(drawn: Picture, path: Path) -> Path:
-    """Writes a picture as PNG with a palette, a third of the size of one with full colours."""
-    from PIL import Image  # comes with matplotlib
-
-    canvas = io.BytesIO()
-    drawn.figure.savefig(canvas, format="png", dpi=DPI)
-    Image.open(canvas).convert("RGB").quantize(COLOURS_IN_PNG).save(path, format="PNG", optimize=True)
-    return path
+    return [draw(log).save(folder / f"{name}.png") for name, draw in drawers.items()]
 
 
 def failures(log: RunLog) -> list[tuple[float, str]]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from finlab.evaluation.plots.style import COLOURS, INK, clean, picture
+from finlab.evaluation.plots.style import COLOURS, INK, Picture, clean, picture
 
 
-def energy_by_fins(rows: Sequence[dict[str, Any]], reference: str) -> str:
+def energy_by_fins(rows: Sequence[dict[str, Any]], reference: str) -> Picture:
     """Energy over the reference's, and resting fins, for each number of fins; rows of `energy_rows`."""
     methods = list(dict.fromkeys(row["method"] for row in rows))
     fins = sorted({row["fins"] for row in rows if row["fins"] != "all"})
@@ -36,4 +36,4 @@ def energy_by_fins(rows: Sequence[dict[str, Any]], reference: str) -> str:
             axis.set(xlabel="fins", xticks=fins)
             clean(axis, grid="y")
         view.legend()
-        return view.svg("energy-by-fins")
+        return view

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from finlab.evaluation.plots.style import COLOURS, GREY, SOFT, clean, picture
+from finlab.evaluation.plots.style import COLOURS, GREY, SOFT, Picture, clean, picture
 from finlab.evaluation.statistics.records import Records
 
 QUANTILES = np.concatenate([np.linspace(0, 0.9, 91), 1 - np.logspace(-1, -5, 60)])
@@ -15,7 +15,7 @@ FLOOR = 1e-8
 """Errors below are drawn here: they are rounding."""
 
 
-def error_distribution(records: Mapping[str, Mapping[str, Records]], printed: Mapping[str, float]) -> str:
+def error_distribution(records: Mapping[str, Mapping[str, Records]], printed: Mapping[str, float]) -> Picture:
     """For each split, the share of targets above each error.
 
     Args:
@@ -45,10 +45,10 @@ def error_distribution(records: Mapping[str, Mapping[str, Records]], printed: Ma
             clean(axis)
         view.axes[0].set_ylabel("share of targets above")
         view.legend()
-        return view.svg("error-distribution")
+        return view
 
 
-def error_by_fins(records: Mapping[str, Records], order: Sequence[str]) -> str:
+def error_by_fins(records: Mapping[str, Records], order: Sequence[str]) -> Picture:
     """Mean, and the span from median to 95th percentile, for each number of fins."""
     fins = sorted({int(n) for part in records.values() for n in np.unique(part.n_fins)})
     with picture(height=3.3) as view:
@@ -68,4 +68,4 @@ def error_by_fins(records: Mapping[str, Records], order: Sequence[str]) -> str:
         axis.set(yscale="log", xlabel="working fins", ylabel="normalized error", xticks=fins)
         clean(axis, grid="y")
         view.legend()
-        return view.svg("error-by-fins")
+        return view

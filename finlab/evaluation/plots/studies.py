@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from finlab.evaluation.plots.style import BLUE, COLOURS, GREEN, GREY, INK, ORANGE, clean, picture
+from finlab.evaluation.plots.style import BLUE, COLOURS, GREEN, GREY, INK, ORANGE, Picture, clean, picture
 
 SEEDS = {"network": BLUE, "random": GREY, "quasi-random": ORANGE}
 
 
-def latency_dots(rows: Sequence[dict[str, Any]], paper_ms: float) -> str:
+def latency_dots(rows: Sequence[dict[str, Any]], paper_ms: float) -> Picture:
     """Median and 99th percentile of each method's calls."""
     ordered = sorted(rows, key=lambda row: row["p50_ms"])
     with picture(height=0.9 + 0.26 * len(rows)) as view:
@@ -25,10 +25,10 @@ def latency_dots(rows: Sequence[dict[str, Any]], paper_ms: float) -> str:
         axis.set_yticks(range(len(ordered)), [row["method"] for row in ordered])
         axis.invert_yaxis()
         clean(axis, grid="x")
-        return view.svg("latency")
+        return view
 
 
-def seed_lines(rows: Sequence[dict[str, Any]]) -> str:
+def seed_lines(rows: Sequence[dict[str, Any]]) -> Picture:
     """Mean error against refinement steps for each number of fins and kind of seed."""
     fins = sorted({row["fins"] for row in rows})
     with picture(1, len(fins), height=2.9, sharey=True) as view:
@@ -43,10 +43,10 @@ def seed_lines(rows: Sequence[dict[str, Any]]) -> str:
             clean(axis)
         view.axes[0].set_ylabel("mean normalized error")
         view.legend()
-        return view.svg("seeds")
+        return view
 
 
-def training_bars(rows: Sequence[dict[str, Any]], titles: Mapping[str, str]) -> str:
+def training_bars(rows: Sequence[dict[str, Any]], titles: Mapping[str, str]) -> Picture:
     """Error of each small training before and after refinement, with intervals."""
     with picture(height=0.9 + 0.34 * len(rows)) as view:
         (axis,) = view.axes
@@ -64,4 +64,4 @@ def training_bars(rows: Sequence[dict[str, Any]], titles: Mapping[str, str]) -> 
         axis.invert_yaxis()
         clean(axis)
         view.legend()
-        return view.svg("training")
+        return view

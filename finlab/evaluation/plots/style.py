@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from finlab.errors import DataError
@@ -29,12 +30,18 @@ COLOURS = {
     "slsqp": "#B8A800",
     "ipopt": BLACK,
     "ipopt-32": BLACK,
+    "on-board": ORANGE,
+    "learned-power": VERMILION,
 }
 """Method -> colour."""
 WIDTH = 9.6
 """Inches of a picture across the page."""
 FONT = 9.5
 """Points."""
+DPI = 110
+"""Of a PNG."""
+COLOURS_IN_PNG = 96
+"""Of its palette; enough for smooth edges of ten colours."""
 
 
 @contextmanager
@@ -77,6 +84,15 @@ class Picture:
                 found.setdefault(label, handle)
         settings = {"loc": "outside upper left", "ncols": min(len(found), 10), "frameon": False, **options}
         self.figure.legend(list(found.values()), list(found), **settings)
+
+    def save(self, path: Path) -> Path:
+        """Write a PNG with a palette, a third of the size of one with full colours."""
+        from PIL import Image  # comes with matplotlib
+
+        canvas = io.BytesIO()
+        self.figure.savefig(canvas, format="png", dpi=DPI)
+        Image.open(canvas).convert("RGB").quantize(COLOURS_IN_PNG).save(path, format="PNG", optimize=True)
+        return path
 
     def svg(self, name: str) -> str:
         """The picture; `name` keeps its identifiers apart from those of other pictures on the page."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.evaluation.plots.style import BLUE, GREY, ORANGE, SOFT, VERMILION, clean, picture
+from finlab.evaluation.plots.style import BLUE, GREY, ORANGE, SOFT, VERMILION, Picture, clean, picture
 
 FLOOR = 1e-5
 """Errors below are drawn here."""
@@ -16,7 +16,7 @@ FLOOR = 1e-5
 
 def figure_a(
     rows: Sequence[dict[str, Any]], scatter: Mapping[str, NDArray[Any]], paper_temperature: float
-) -> str:
+) -> Picture:
     """Left: diversity and best J against T, rows of `temperature_row`. Right: columns of
     `refinement_columns`, one target's candidates, energy against error."""
     temperature = [row["temperature"] for row in rows]
@@ -47,4 +47,4 @@ def figure_a(
         right.legend(frameon=False, labelcolor=SOFT)
         for axis in view.axes:
             clean(axis)
-        return view.svg("figure-a")
+        return view

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from finlab.evaluation.plots.style import Picture
 from finlab.evaluation.report.numbers import FORMATS
 
 Row = dict[str, Any]
@@ -105,6 +106,11 @@ class Figure:
     """The picture itself."""
     caption: str
     """What is to be seen."""
+
+    @classmethod
+    def drawn(cls, name: str, picture: Picture, caption: str) -> Figure:
+        """Of a picture that was drawn with matplotlib."""
+        return cls(name, picture.svg(name), caption)
 
 
 @dataclass(frozen=True)

@@ -18,11 +18,6 @@ from finlab.evaluation.experiments.faults import (
 from finlab.evaluation.experiments.trajectory import run_trajectory, trajectory_report, trajectory_rows
 from finlab.evaluation.experiments.velocity import run_velocity, velocity_report, velocity_rows
 from finlab.evaluation.on_board import OnBoard
-from finlab.evaluation.plots.closed_loop_experiments import (
-    save_faults_figure,
-    save_layouts_figure,
-    save_velocity_figure,
-)
 from finlab.layout import Layout
 from finlab.sim import Trajectory, load_log
 
@@ -40,18 +35,16 @@ def is_small_png(path: Path) -> bool:
     return content.startswith(b"\x89PNG") and 5_000 < len(content) < MOST_BYTES
 
 
-def test_trajectory(layout_a: Layout, analytic: Allocator, line: Trajectory, tmp_path: Path) -> None:
+def test_trajectory(layout_a: Layout, analytic: Allocator, line: Trajectory) -> None:
     runs = run_trajectory([layout_a], {"analytic": analytic}, line, range(2))
     one, every = trajectory_rows(runs)
     assert (one["layout"], one["runs"], every["layout"]) == ("A", 2, "all")
     assert 0.0 < one["ate"] < 0.3 and one["ate_std"] > 0.0
     report = trajectory_report([one, every], line, "mean")
     assert "printed in the paper" in report and "0.134" in report and "no alignment" in report
-    save_layouts_figure(runs, tmp_path / "layouts.png")
-    assert is_small_png(tmp_path / "layouts.png")
 
 
-def test_faults(layout_a: Layout, analytic: Allocator, line: Trajectory, tmp_path: Path) -> None:
+def test_faults(layout_a: Layout, analytic: Allocator, line: Trajectory) -> None:
     faults = all_faults(layout_a, 4.0)
     assert len(faults) == 1 + 4 + 6 + 4
     assert sum(not fault.controllable for fault in faults) == 2
@@ -61,8 +54,6 @@ def test_faults(layout_a: Layout, analytic: Allocator, line: Trajectory, tmp_pat
     hopeless = next(row for row in rows if not row["controllable"])
     report = fault_report(rows, layout_a, line, "mean")
     assert report.startswith("Not swum") and hopeless["fault"] in report and "ate" not in hopeless
-    save_faults_figure(rows, tmp_path / "faults.png")
-    assert is_small_png(tmp_path / "faults.png")
 
 
 @pytest.mark.parametrize(
@@ -75,15 +66,13 @@ def test_a_lost_fin_may_let_the_error_grow_a_little(growth: float, tracked: bool
     assert fault_verdict({**row, "kind": "healthy", "tracked": True}) == ""
 
 
-def test_velocity(layout_a: Layout, analytic: Allocator, tmp_path: Path) -> None:
+def test_velocity(layout_a: Layout, analytic: Allocator) -> None:
     methods = {"analytic": analytic, "on-board": OnBoard(analytic.normalization)}
     runs = run_velocity(layout_a, methods, [0], (0.1,), duration_s=12.0)
     rows = velocity_rows(runs)
     assert [row["speed"] for row in rows] == [0.1, 0.1, None, None]
     assert rows[0]["inertial_w"] < rows[1]["inertial_w"], "a fixed fast beat costs more"
     assert "%" in velocity_report(rows, "analytic", layout_a, "mean")
-    save_velocity_figure(runs, tmp_path / "velocity.png")
-    assert is_small_png(tmp_path / "velocity.png")
 
 
 def test_on_board_is_exact_within_its_limits_and_scales_beyond(layout_a: Layout, analytic: Allocator) -> None:
@@ -156,7 +145,10 @@ def test_verbs_have_help_and_write_json(tmp_path: Path, capsys: pytest.CaptureFi
         "11",
         "--json",
         str(file),
+        "--figures",
+        str(tmp_path),
     ]
     assert main(argv) == 0
+    assert "velocity.png: written." in capsys.readouterr().out and is_small_png(tmp_path / "velocity.png")
     rows = json.loads(file.read_text())["rows"]
     assert {row["speed"] for row in rows} == {0.1, 0.15, 0.2, None}

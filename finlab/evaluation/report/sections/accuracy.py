@@ -68,7 +68,7 @@ def accuracy_blocks(results: Results) -> list[Block]:
         return []
     shown = {split: _quick(results.wrench[split]) for split in printed if split in results.wrench}
     blocks.append(
-        Figure(
+        Figure.drawn(
             "error-distribution",
             error_distribution(shown, {split: printed[split]["ours"]["err_norm_mean"] for split in shown}),
             "How large errors are: the further left and the steeper a curve falls, the better. Errors of "
@@ -76,7 +76,7 @@ def accuracy_blocks(results: Results) -> list[Block]:
         )
     )
     blocks.append(
-        Figure(
+        Figure.drawn(
             "error-by-fins",
             error_by_fins(_by_fins(results), ORDER),
             "Figure B of the paper: the error by number of working fins, splits `id` (2 to 5) and `ood-fins` "

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 from finlab.evaluation.experiments.faults import fault_verdict
 from finlab.evaluation.paper_figures import paper_figures
-from finlab.evaluation.plots.closed_loop_report import fault_dots, paths
+from finlab.evaluation.plots.closed_loop_experiments import draw_faults, draw_layouts
 from finlab.evaluation.report.document import Block, Bullets, Column, Figure, Heading, Row, Table, Text
 from finlab.evaluation.report.results import Results
+from finlab.evaluation.report.work_closed_loop import tracks_of_columns
 
 ERRORS = (
     Column("ate", "ATE [m]", "metres"),
@@ -59,10 +60,10 @@ def _trajectory(rows: Sequence[Row], results: Results) -> list[Block]:
     )
     return [
         Heading("Trajectories", 3),
-        Figure(
+        Figure.drawn(
             "paths",
-            paths(results.columns(results.plan.swims["trajectory"]), rows),
-            "One run on each of the paper's layouts, seen from above.",
+            draw_layouts(tracks_of_columns(results.columns(results.plan.swims["trajectory"])), rows),
+            "One run on each of the paper's layouts: from above, and its depth over time.",
         ),
         Table(columns, shown),
     ]
@@ -89,7 +90,7 @@ def _faults(rows: Sequence[Row]) -> list[Block]:
     beside = {f"{FAULT_WORDS[k]} (printed)": v["ours"]["ate"] for k, v in printed.items()}
     blocks: list[Block] = [
         Heading("Lost fins", 3),
-        Figure("faults", fault_dots(rows, beside), "Layout A. Diamonds: the paper's pool."),
+        Figure.drawn("faults", draw_faults(rows, beside), "Layout A. Diamonds: the paper's pool."),
         Table(columns, [*swum, *theirs]),
     ]
     if hopeless:

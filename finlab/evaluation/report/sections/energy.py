@@ -39,7 +39,7 @@ def energy_blocks(results: Results) -> list[Block]:
             "the first ones of each layout, compared where both methods come within 0.05. The energy is "
             "concave in a fin's force, so the cheapest answer often lets some fins rest."
         ),
-        Figure(
+        Figure.drawn(
             "energy-by-fins",
             energy_by_fins(rows, REFERENCE),
             f"Energy over that of `{REFERENCE}` with the interval of a rerun, and how many fins give less "

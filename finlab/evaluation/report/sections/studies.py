@@ -51,7 +51,7 @@ def latency_blocks(results: Results) -> list[Block]:
             "Whole calls of `allocate`, one target each, four fins, one after the other in one run with "
             "nothing beside it. `trf`, `slsqp` and `ipopt` start from 8 points."
         ),
-        Figure(
+        Figure.drawn(
             "latency",
             latency_dots(results.latency_rows, paper_ms),
             "Dots are medians, bars end at the 99th percentile.",
@@ -75,7 +75,7 @@ def ablation_blocks(results: Results) -> list[Block]:
             "cannot be the same one. So the same commands are scored twice: by the surrogate that refined "
             "them and by the analytic fin model."
         ),
-        Figure(
+        Figure.drawn(
             "ablation",
             ablation_dots(rows, {name: row["err_norm_mean"] for name, row in printed.items()}, TITLES),
             "Filled: scored by the plant. Hollow: by the surrogate. Diamonds: printed in the paper.",
@@ -132,7 +132,7 @@ def temperature_blocks(results: Results) -> list[Block]:
             "distance between two candidates in units of the command ranges; J is squared error plus "
             "weighted energy, by the surrogate, before refinement."
         ),
-        Figure(
+        Figure.drawn(
             "figure-a",
             figure_a(rows, results.scatter, PAPER_TEMPERATURE),
             "Left and middle: what the temperature does; dashes mark the paper's choice, the band is where "
@@ -164,7 +164,7 @@ def seed_blocks(results: Results) -> list[Block]:
             "The network's best 16 candidates against 16 random and 16 quasi-random ones, refined by the "
             "same number of Levenberg-Marquardt steps on the surrogate, scored by the plant."
         ),
-        Figure("seeds", seed_lines(results.seed_rows), "Mean error against the number of refinement steps."),
+        Figure.drawn("seeds", seed_lines(results.seed_rows), "Mean error against refinement steps."),
         Fold("The numbers", (Table(columns, rows),)),
     ]
 
@@ -192,6 +192,6 @@ def training_blocks(results: Results) -> list[Block]:
             "shipped networks: read the order, not the size. The same surrogate ranks and refines in all "
             "of them."
         ),
-        Figure("training", training_bars(rows, titles), "Mean error with the interval of a rerun."),
+        Figure.drawn("training", training_bars(rows, titles), "Mean error with the interval of a rerun."),
         Table(columns, [{**row, "title": titles[row["change"]]} for row in rows]),
     ]
