@@ -40,7 +40,7 @@ def serve(
     _check_port(host, port)
     solver = Solver(checkpoint)
     # A missing checkpoint is reported now, not in the browser; and the first page finds a warm solver.
-    _ = solver.solve(State(first, target=FIRST)).samples
+    solver.solve(State(first, target=FIRST))
     guard = Guard.of(host)
     server = start_guarded(guard, port)
     app = App(server, solver, first, folder=cache_folder() / "sessions")

@@ -2,131 +2,86 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import NamedTuple
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.allocation.judging import REACHED, judge
 from finlab.allocation.modes import Mode, find_modes
-from finlab.allocation.policy import describe_binding
+from finlab.allocation.plain_data import PlainData
+from finlab.allocation.policy import CLOSEST, Policy, describe_binding
+from finlab.allocation.solution import Candidates
 from finlab.layout import Layout
 from finlab.layout.arrays import layout_effectiveness
-from finlab.physics.energy import command_energy
+
+if TYPE_CHECKING:
+    from finlab.allocation.allocator import Allocator
 
 Array = NDArray[np.float64]
-
-REACHED = 0.01
-"""Normalized error up to which a wrench counts as delivered."""
+Judge = Literal["plant", "surrogate"]
 
 
-class Candidates(NamedTuple):
-    """Several commands for one target, best first. Failed fins hold NaN."""
+@dataclass(frozen=True, eq=False, repr=False)
+class Allocation(PlainData):
+    """The answer to one allocation problem, as plain data: it can be compared, copied, pickled and printed.
 
-    command: Array
-    """Commands (K, n, 3): amplitude [rad], frequency [Hz], zero direction [rad]."""
-    wrench: Array
-    """Wrench (K, 6) that the method's own model expects [N, N m]."""
-    err_norm: Array
-    """Normalized error (K,) of that wrench."""
-    energy: Array
-    """Energy proxy (K,)."""
-    source: tuple[str, ...]
-    """Where each one comes from, in words."""
-
-
-class Solution(NamedTuple):
-    """What a method's solver returns for N targets on the n healthy fins of one layout."""
-
-    command: Array
-    """Chosen commands (N, n, 3)."""
-    wrench_surrogate: Array | None = None
-    """Wrench (N, 6) that the method itself believed, where it used a model of its own."""
-    candidates: Callable[[], Candidates] | None = None
-    """Gives the refined candidates, for a single target; made only when asked for."""
-    samples: Callable[[], Candidates] | None = None
-    """Gives the raw candidates before refinement, for a single target."""
-    alternatives: Callable[[], Candidates] | None = None
-    """Gives many refined answers to a single target, the chosen one first, by a wider search."""
-
-
-@dataclass(frozen=True)
-class Allocation:
-    """The answer to one allocation problem; it can judge itself with the analytic fin model."""
+    `print(result)` shows it as a table.
+    """
 
     layout: Layout
-    """The whole layout, failed fins included."""
+    """The whole layout, failed fins included, with the limits that damage has left."""
     failed: tuple[str, ...]
     """Names of the fins that were left out."""
     target: Array
     """Desired wrench (6,), [N, N m], body frame."""
     command: Array
     """Command (n, 3) of every fin: amplitude [rad], frequency [Hz], zero direction [rad]; NaN if failed."""
+    fin_forces: Array
+    """Force (n, 3) that the judge finds for each fin [N], body frame; zero if failed."""
+    wrench: Array
+    """Delivered wrench (6,) as the judge finds it [N, N m]."""
+    err_norm: float
+    """Size of what is missing from the target, each axis over its `sigma`."""
+    energy: float
+    """Energy proxy `J_en` of the command."""
     sigma: Array
     """Per-axis standard deviation (6,) of the error measure."""
+    judged_by: Judge
+    """Who computed `fin_forces` and `wrench`: the analytic fin models, or the learned surrogate."""
     method: str
     """Name of the method that answered."""
-    solve_ms: float
-    """Time spent solving [ms], scoring by the plant not included."""
+    solve_ms: float = field(compare=False)
+    """Time spent solving [ms], judging not included."""
     checkpoint: str | None = None
     """Name of the checkpoint that was used, if any."""
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    """Settings of the method, by name."""
+    policy: Policy = CLOSEST
+    """What was to be done if the target was out of reach."""
+    seed: int = 0
+    """Seed that makes the answer repeatable."""
+    previous: Array | None = None
+    """Command (n, 3) of the previous tick, if it was told."""
     wrench_surrogate: Array | None = None
     """Wrench (6,) that the method itself expected, if it used a learned model."""
+    unknown_fins: tuple[str, ...] = ()
+    """Names of fins whose model the method's networks have not learned; answers for them are wrong."""
     notes: tuple[str, ...] = ()
     """Sentences that the user should read, such as a fin model that the checkpoint never saw."""
-    make_candidates: Callable[[], Candidates | None] = field(default=lambda: None, repr=False, compare=False)
-    """Gives `candidates` when they are first asked for."""
-    make_samples: Callable[[], Candidates | None] = field(default=lambda: None, repr=False, compare=False)
-    """Gives `samples` when they are first asked for."""
-
-    make_alternatives: Callable[[], Candidates | None] = field(
-        default=lambda: None, repr=False, compare=False
-    )
-    """Gives the alternatives among which `modes` are found."""
-    previous: Array | None = field(default=None, repr=False, compare=False)
-    """Command (n, 3) of the previous tick, if it was told."""
-
-    @cached_property
-    def modes(self) -> tuple[Mode, ...]:
-        """Distinct ways to deliver the wrench, the chosen one first; none for methods with a single answer.
-
-        Found by a wider search when first asked for.
-        """
-        alternatives = self.make_alternatives() or self.candidates
-        if alternatives is None:
-            return ()
-        return find_modes(alternatives, *self._limits, self.previous)
-
-    @cached_property
-    def candidates(self) -> Candidates | None:
-        """Refined candidates, best first; None for methods that have a single answer."""
-        return self.make_candidates()
-
-    @cached_property
-    def samples(self) -> Candidates | None:
-        """Raw candidates before refinement, best first; None for methods that draw none."""
-        return self.make_samples()
+    candidates: Candidates | None = None
+    """Refined candidates, best first; None for methods that have a single answer."""
+    samples: Candidates | None = None
+    """Raw candidates before refinement, best first; None for methods that draw none."""
+    _allocator: Allocator | None = field(default=None, compare=False)
+    """Who answered; forgotten by copies and pickles."""
 
     @property
     def fins(self) -> tuple[str, ...]:
         """Names of the fins, in the order of `command`."""
         return self.layout.names
-
-    @cached_property
-    def fin_forces(self) -> Array:
-        """Force of each fin (n, 3) in the body frame [N], by the analytic fin model."""
-        from finlab.physics import Plant  # torch is loaded only where the plant is asked
-
-        return Plant(self.layout).fin_forces(self.command)
-
-    @cached_property
-    def wrench(self) -> Array:
-        """Delivered wrench (6,) by the analytic fin model [N, N m]."""
-        force = self.fin_forces
-        position = self.layout.position
-        return np.concatenate([force.sum(0), np.cross(position, force).sum(0)])
 
     @property
     def unallocated(self) -> Array:
@@ -134,13 +89,8 @@ class Allocation:
         return self.target - self.wrench
 
     @property
-    def err_norm(self) -> float:
-        """Normalized error of the delivered wrench, scored by the analytic fin model."""
-        return float(np.linalg.norm(self.unallocated / self.sigma))
-
-    @property
     def reachable(self) -> bool:
-        """Whether the target is delivered, scored by the analytic fin model: err_norm of at most 0.01."""
+        """Whether the target is delivered: an `err_norm` of at most 0.01."""
         return self.err_norm <= REACHED
 
     @property
@@ -152,31 +102,77 @@ class Allocation:
 
     @property
     def binding(self) -> tuple[str, ...]:
-        """Sentences about the limits that keep the robot from delivering the target; none where it does."""
-        if self.reachable:
+        """Sentences about the limits that keep the robot from delivering the target.
+
+        None where it does, nor where the method does not know the fins: then limits are not what keeps it.
+        """
+        if self.reachable or self.unknown_fins:
             return ()
         missing = self.unallocated / self.sigma**2
         pull = (missing @ layout_effectiveness(self.layout)).reshape(-1, 2)
-        return tuple(describe_binding(self.fins, self.command, *self._limits, pull))
+        return tuple(describe_binding(self.fins, self.command, self.layout.lower, self.layout.upper, pull))
 
-    @property
-    def _limits(self) -> tuple[Array, Array]:
-        """Lower and upper limits (n, 3) of all fins."""
-        limits = [fin.limits for fin in self.layout.fins]
-        return np.array([limit.lower for limit in limits]), np.array([limit.upper for limit in limits])
+    def explore(self, allocator: Allocator | None = None) -> tuple[Mode, ...]:
+        """Distinct ways to deliver the wrench, the chosen one first, by a search of tens of milliseconds.
 
-    @cached_property
-    def energy(self) -> float:
-        """Energy proxy of the command."""
-        return float(command_energy(self.command, self._limits[1]))
+        Methods that have a single answer know none.
 
+        Args:
+            allocator: the one that answered. It need not be given: the result remembers it, and a copy or a
+                pickle loads it again by method, checkpoint and settings.
 
-class BatchAllocation(NamedTuple):
-    """Answers to N targets on one layout."""
+        Raises:
+            AllocationError: the allocator gives another answer, such as one of another checkpoint.
+            CheckpointError: the checkpoint is not among the shipped ones; hand over the allocator.
+        """
+        found = (allocator or self._allocator or self._loaded()).alternatives(self)
+        if found is None:
+            return ()
+        return find_modes(found, self.layout.lower, self.layout.upper, self.previous)
 
-    command: Array
-    """Commands (N, n, 3), NaN for failed fins."""
-    wrench_surrogate: Array | None
-    """Wrenches (N, 6) that the method itself expected, if it used a learned model."""
-    solve_ms: Array
-    """Time per target (N,) [ms]; the whole time divided by N where targets were solved together."""
+    def with_command(self, command: Array) -> Allocation:
+        """The same question with another command (n, 3) in place of the answer, judged by the plant."""
+        verdict = judge(self.layout, command[None], self.target[None], self.sigma)
+        return replace(
+            self,
+            command=command,
+            fin_forces=verdict.fin_forces[0],
+            wrench=verdict.wrench[0],
+            err_norm=float(verdict.err_norm[0]),
+            energy=float(verdict.energy[0]),
+            judged_by="plant",
+            wrench_surrogate=None,
+        )
+
+    def _loaded(self) -> Allocator:
+        from finlab.allocation.methods import load_allocator
+        from finlab.errors import CheckpointError
+
+        try:
+            return load_allocator(self.method, checkpoint=self.checkpoint, **self.settings)
+        except CheckpointError as error:
+            raise CheckpointError(
+                f"{error}; hand over the allocator that answered: result.explore(allocator)"
+            ) from None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_allocator": None}
+
+    def __repr__(self) -> str:
+        failed = f", failed={', '.join(self.failed)!r:.60}" if self.failed else ""
+        return (
+            f"Allocation(layout={self.layout.name!r:.60}, fins={len(self.fins)}{failed}, "
+            f"method={self.method!r}, err_norm={self.err_norm:.2e} by the {self.judged_by}, "
+            f"energy={self.energy:.3f}, reachable={self.reachable}, solve_ms={self.solve_ms:.1f})"
+        )
+
+    def __str__(self) -> str:
+        from finlab.allocation.tables import allocation_text
+
+        return allocation_text(self)
+
+    def _repr_html_(self) -> str:
+        """The table of the command line, for notebooks."""
+        from finlab.allocation.tables import allocation_html
+
+        return allocation_html(self)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from inspect import signature
 from typing import Any, Self
@@ -12,17 +13,27 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finlab.allocation.allocation import REACHED, Allocation, BatchAllocation, Candidates, Solution
+from finlab.allocation.allocation import Allocation, Judge
+from finlab.allocation.batch import BatchAllocation
 from finlab.allocation.health import Health
-from finlab.allocation.policy import AXES, CLOSEST, Policy, as_policy, largest_share
-from finlab.errors import AllocationError, CommandError
+from finlab.allocation.judging import REACHED, Verdict, judge
+from finlab.allocation.policy import CLOSEST, Policy, as_policy, largest_share
+from finlab.allocation.question import (
+    Fins,
+    check_layout_and_seed,
+    check_previous,
+    check_wrenches,
+    usable_fins,
+)
+from finlab.allocation.solution import Candidates, Solution
+from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
 from finlab.layout import FinModelSpec, Layout
 
 Array = NDArray[np.float64]
 
-MAX_WRENCH = 1e6
-"""Largest magnitude of a target component [N, N m]; beyond it something is wrong upstream."""
+SAME_COMMAND = 1e-6
+"""Two commands [rad, Hz, rad] that differ by less are one answer, given on two machines."""
 
 
 class Allocator(ABC):
@@ -38,6 +49,8 @@ class Allocator(ABC):
     """Yardstick of the error."""
     checkpoint: str | None = None
     """Name of the checkpoint that the networks come from; None for methods without networks."""
+    judged_by: Judge = "plant"
+    """Who computes what its commands give."""
     fin_model: FinModelSpec | None = None
     """Fin model that the networks have learned; None for methods that ask every fin's own model."""
 
@@ -119,28 +132,64 @@ class Allocator(ABC):
         """
         target, policy = check_wrenches(wrench, single=True), as_policy(policy)
         check_layout_and_seed(layout, seed)
-        layout = layout if health is None else health.applied_to(layout)
-        healthy, alive = remove_failed(layout, failed)
-        before = None if previous is None else check_previous(previous, layout)[alive]
+        self._check_policy(policy)
+        fins = usable_fins(layout, failed, health)
+        before = None if previous is None else check_previous(previous, layout)[fins.alive]
         start = time.perf_counter()
-        solution = self._solve_by(policy, healthy, target[None], seed=seed, previous=before)
+        solution = self._solve_by(policy, fins.healthy, target[None], seed=seed, previous=before)
         solve_ms = (time.perf_counter() - start) * 1e3
+        command = fins.among_all(solution.command)
+        verdict = self._judge(fins, solution, command, target[None])
         return Allocation(
-            layout=layout,
-            failed=tuple(failed),
+            layout=fins.layout,
+            failed=fins.failed,
             target=target,
-            command=_with_failed(solution.command[0], alive),
+            command=command[0].copy(),
+            fin_forces=verdict.fin_forces[0],
+            wrench=verdict.wrench[0],
+            err_norm=float(verdict.err_norm[0]),
+            energy=float(verdict.energy[0]),
             sigma=self.normalization.std,
+            judged_by=self.judged_by,
             method=self.name,
             solve_ms=solve_ms,
             checkpoint=self.checkpoint,
+            settings=self.options,
+            policy=policy,
+            seed=seed,
+            previous=None if before is None else fins.among_all(before),
             wrench_surrogate=None if solution.wrench_surrogate is None else solution.wrench_surrogate[0],
-            notes=self._notes(healthy),
-            make_candidates=lambda: _candidates_with_failed(solution.candidates, alive),
-            make_samples=lambda: _candidates_with_failed(solution.samples, alive),
-            make_alternatives=lambda: _candidates_with_failed(solution.alternatives, alive),
-            previous=None if before is None else _with_failed(before, alive),
+            unknown_fins=self.unknown_fins(fins.healthy),
+            notes=self._notes(fins.healthy),
+            candidates=_made(solution.candidates, fins),
+            samples=_made(solution.samples, fins),
+            _allocator=self,
         )
+
+    def alternatives(self, result: Allocation) -> Candidates | None:
+        """Many refined answers to the question of a result, its own first, by a wide search.
+
+        None for methods that have a single answer.
+
+        Raises:
+            AllocationError: the method gives another answer to that question.
+        """
+        fins = usable_fins(result.layout, result.failed)
+        previous = None if result.previous is None else result.previous[fins.alive]
+        solution = self._solve_by(
+            result.policy, fins.healthy, result.target[None], seed=result.seed, previous=previous
+        )
+        again = fins.among_all(solution.command[0])
+        if not np.allclose(again, result.command, rtol=0.0, atol=SAME_COMMAND, equal_nan=True):
+            raise AllocationError(
+                f"method {self.name!r} with checkpoint {self.checkpoint!r} gives another answer than this "
+                "one; hand over the allocator that answered: result.explore(allocator)"
+            )
+        return _made(solution.alternatives or solution.candidates, fins)
+
+    def _judge(self, fins: Fins, solution: Solution, command: Array, targets: Array) -> Verdict:
+        """What commands (N, n, 3) give, by the plant; methods that cannot ask it override this."""
+        return judge(fins.layout, command, targets, self.normalization.std)
 
     def _notes(self, layout: Layout) -> tuple[str, ...]:
         """Sentences that the user should read before trusting an answer for this layout."""
@@ -148,9 +197,18 @@ class Allocator(ABC):
         if not unknown or self.fin_model is None:
             return ()
         return (
-            f"checkpoint {self.checkpoint!r} knows fins of model {self.fin_model.type!r} and takes these for "
-            f"such: {', '.join(unknown)}; trust the plant's error or train a surrogate for them",
+            f"the method does not know these fins: {', '.join(unknown)}; checkpoint {self.checkpoint!r} "
+            f"takes them for fins of model {_listed(self.fin_model)}: trust the plant's error or train a "
+            "surrogate for them",
         )
+
+    def _check_policy(self, policy: Policy) -> None:
+        """Refuse a policy that the method does not know; those that know all override this."""
+        if not policy.is_plain and policy.kind != "direction":
+            raise AllocationError(
+                f"policy: method {self.name!r} minimizes the plain error and knows neither axis weights nor "
+                "priorities; use method 'learned', or policy 'closest' or 'direction'"
+            )
 
     def _solve_by(
         self, policy: Policy, layout: Layout, target: Array, *, seed: int, previous: Array | None
@@ -158,11 +216,6 @@ class Allocator(ABC):
         """Solve for one target (1, 6) under a policy. Methods that minimize the plain error override this."""
         if policy.kind == "direction":
             return self._solve_direction(layout, target, seed=seed, previous=previous)
-        if policy.kind == "priority" or len(set(policy.axis_weights)) > 1:
-            raise AllocationError(
-                f"policy: method {self.name!r} minimizes the plain error and knows neither axis weights nor "
-                "priorities; use method 'learned', or policy 'closest' or 'direction'"
-            )
         return self._solve(layout, target, seed=seed, previous=previous)
 
     def _solve_direction(
@@ -194,85 +247,70 @@ class Allocator(ABC):
         wrenches: ArrayLike,
         *,
         failed: Sequence[str] = (),
+        policy: Policy | str = CLOSEST,
         health: Health | None = None,
         seed: int = 0,
     ) -> BatchAllocation:
-        """Commands for many targets (N, 6) on one layout; errors as in `allocate`."""
-        targets = check_wrenches(wrenches, single=False)
+        """Commands for many targets (N, 6) on one layout; arguments and errors as in `allocate`."""
+        targets, policy = check_wrenches(wrenches, single=False), as_policy(policy)
         check_layout_and_seed(layout, seed)
-        layout = layout if health is None else health.applied_to(layout)
-        healthy, alive = remove_failed(layout, failed)
+        self._check_policy(policy)
+        fins = usable_fins(layout, failed, health)
         start = time.perf_counter()
-        if len(targets) == 0:
-            return BatchAllocation(np.empty((0, layout.n_fins, 3)), None, np.empty(0))
-        solution = self._solve(healthy, targets, seed=seed, previous=None)
+        solution = self._solve_many(policy, fins.healthy, targets, seed=seed)
         elapsed_ms = (time.perf_counter() - start) * 1e3
+        command = fins.among_all(solution.command)
+        verdict = self._judge(fins, solution, command, targets)
         return BatchAllocation(
-            _with_failed(solution.command, alive),
-            solution.wrench_surrogate,
-            np.full(len(targets), elapsed_ms / max(len(targets), 1)),
+            layout=fins.layout,
+            failed=fins.failed,
+            target=targets,
+            command=command,
+            fin_forces=verdict.fin_forces,
+            wrench=verdict.wrench,
+            err_norm=verdict.err_norm,
+            energy=verdict.energy,
+            sigma=self.normalization.std,
+            judged_by=self.judged_by,
+            method=self.name,
+            solve_ms=np.full(len(targets), elapsed_ms / max(len(targets), 1)),
+            checkpoint=self.checkpoint,
+            policy=policy,
+            seed=seed,
+            wrench_surrogate=solution.wrench_surrogate,
+            unknown_fins=self.unknown_fins(fins.healthy),
+            notes=self._notes(fins.healthy),
         )
 
-
-def check_wrenches(wrench: ArrayLike, *, single: bool) -> Array:
-    """One wrench (6,) or many (N, 6) as finite float64, or a `CommandError` that says what is wrong."""
-    expected = "six numbers [Fx, Fy, Fz, Tx, Ty, Tz]" if single else "an array of shape (N, 6)"
-    try:
-        if np.iscomplexobj(wrench):
-            raise TypeError("complex")
-        array = np.array(wrench, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise CommandError(f"wrench: expected {expected} in N and N m, got {wrench!r}") from error
-    if array.shape != (6,) if single else (array.ndim != 2 or array.shape[1] != 6):
-        raise CommandError(f"wrench: expected {expected} in N and N m, got an array of shape {array.shape}")
-    bad = ~(np.abs(array) <= MAX_WRENCH)
-    if bad.any():
-        axis = AXES[int(np.argwhere(bad)[0][-1])]
-        value = array[bad][0]
-        raise CommandError(f"wrench: {axis} must be finite and at most {MAX_WRENCH:g} in size, got {value}")
-    return array
+    def _solve_many(self, policy: Policy, layout: Layout, targets: Array, *, seed: int) -> Solution:
+        """Solve for targets (N, 6) together, then for those out of reach one by one, as the policy says."""
+        if len(targets) == 0:
+            return Solution(np.empty((0, layout.n_fins, 3)))
+        solution = self._solve(layout, targets, seed=seed, previous=None)
+        if policy.is_plain:
+            return solution
+        command, wrench = solution.command.copy(), solution.wrench_surrogate
+        wrench = None if wrench is None else wrench.copy()
+        for row in np.flatnonzero(~self._reaches(layout, solution, targets)):
+            answer = self._solve_by(policy, layout, targets[row : row + 1], seed=seed, previous=None)
+            command[row] = answer.command[0]
+            if wrench is not None and answer.wrench_surrogate is not None:
+                wrench[row] = answer.wrench_surrogate[0]
+        return Solution(command, wrench)
 
 
-def check_layout_and_seed(layout: object, seed: object) -> None:
-    """Refuse what is no layout, and seeds that are no whole number from 0."""
-    if not isinstance(layout, Layout):
-        raise AllocationError(
-            f"layout: expected a Layout, got {layout!r}; read a file with finlab.load_layout"
-        )
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise AllocationError(f"seed: expected a whole number from 0, got {seed!r}")
+def _made(make: Callable[[], Candidates] | None, fins: Fins) -> Candidates | None:
+    """Candidates of the healthy fins, put among all."""
+    if make is None:
+        return None
+    found = make()
+    return found if len(fins.failed) == 0 else replace(found, command=fins.among_all(found.command))
 
 
-def check_previous(previous: ArrayLike, layout: Layout) -> Array:
-    """The previous command (n, 3), failed fins may hold NaN."""
-    try:
-        array = np.array(previous, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise CommandError(
-            f"previous: expected a command of shape ({layout.n_fins}, 3), got {previous!r}"
-        ) from error
-    if np.isinf(array).any():
-        raise CommandError("previous: expected finite commands (NaN only for failed fins), got infinity")
-    if array.shape != (layout.n_fins, 3):
-        raise CommandError(
-            f"previous: expected a command of shape ({layout.n_fins}, 3) for layout {layout.name!r}, "
-            f"got shape {array.shape}; pass the `command` of the last allocation"
-        )
-    return array
-
-
-def remove_failed(layout: Layout, failed: Sequence[str]) -> tuple[Layout, NDArray[np.bool_]]:
-    """The layout without its failed fins, and the mask (n,) of the healthy ones."""
-    if isinstance(failed, str):
-        raise AllocationError(
-            f"failed: expected a list of fin names, got the text {failed!r}; write [{failed!r}]"
-        )
-    if not isinstance(failed, Sequence) or not all(isinstance(name, str) for name in failed):
-        raise AllocationError(f"failed: expected a list of fin names, got {failed!r}")
-    if not failed:
-        return layout, np.ones(layout.n_fins, dtype=bool)
-    alive = np.array([name not in set(failed) for name in layout.names])
-    return layout.without(failed), alive
+def _listed(model: FinModelSpec) -> str:
+    """A fin model with its parameters in words."""
+    values = [f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in model.values().items()]
+    return f"{model.type!r} ({', '.join(values)})"
 
 
 @lru_cache(maxsize=256)
@@ -283,21 +321,3 @@ def _other_fins(layout: Layout, known: FinModelSpec) -> tuple[str, ...]:
         for fin in layout.fins
         if fin.model.type != known.type or fin.model.values() != known.values()
     )
-
-
-def _with_failed(command: Array, alive: NDArray[np.bool_]) -> Array:
-    """Put the healthy fins' commands (..., m, 3) back among all n fins; the failed ones are NaN."""
-    if len(alive) == command.shape[-2]:
-        return command
-    full = np.full((*command.shape[:-2], len(alive), 3), np.nan)
-    full[..., alive, :] = command
-    return full
-
-
-def _candidates_with_failed(
-    make: Callable[[], Candidates] | None, alive: NDArray[np.bool_]
-) -> Candidates | None:
-    if make is None:
-        return None
-    candidates = make()
-    return candidates._replace(command=_with_failed(candidates.command, alive))

@@ -7,13 +7,16 @@ round.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.allocation.plain_data import PlainData
+
 if TYPE_CHECKING:
-    from finlab.allocation.allocation import Candidates
+    from finlab.allocation.solution import Candidates
 
 Array = NDArray[np.float64]
 
@@ -25,7 +28,8 @@ SAME_SIZE = 0.25
 """Thrusts, and ratios of amplitude to frequency, whose logarithms differ by less are the same."""
 
 
-class Mode(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Mode(PlainData):
     """One way to deliver the wrench: the best of the alternatives that do the same."""
 
     command: Array
@@ -49,7 +53,7 @@ class Mode(NamedTuple):
     """Places of the alternatives that do the same, best first."""
 
 
-class Way(NamedTuple):
+class ModeSignature(NamedTuple):
     """What matters of one command: numbers per fin (n,), NaN where the fin rests or has failed."""
 
     resting: tuple[int, ...]
@@ -74,7 +78,7 @@ def find_modes(
         previous: command (n, 3) of the previous tick.
     """
     modes = []
-    for members in cluster([way_of(command) for command in candidates.command]):
+    for members in cluster([mode_signature(command) for command in candidates.command]):
         first = members[0]
         command = candidates.command[first]
         distance, turn = (None, None) if previous is None else _change(command, previous, lower, upper)
@@ -89,18 +93,18 @@ def find_modes(
                 saturation=float(np.clip(np.nanmax(used), 0.0, 1.0)),
                 distance=distance,
                 turn=turn,
-                resting=way_of(command).resting,
+                resting=mode_signature(command).resting,
                 members=tuple(members),
             )
         )
     return tuple(modes)
 
 
-def cluster(ways: list[Way]) -> list[list[int]]:
-    """Places of ways that are the same, each group led by its first."""
+def cluster(signatures: list[ModeSignature]) -> list[list[int]]:
+    """Places of signatures that are the same, each group led by its first."""
     groups: list[list[int]] = []
-    for k, way in enumerate(ways):
-        home = next((group for group in groups if same_way(ways[group[0]], way)), None)
+    for k, signature in enumerate(signatures):
+        home = next((group for group in groups if same_signature(signatures[group[0]], signature)), None)
         if home is None:
             groups.append([k])
         else:
@@ -108,28 +112,28 @@ def cluster(ways: list[Way]) -> list[list[int]]:
     return groups
 
 
-def way_of(command: Array) -> Way:
+def mode_signature(command: Array) -> ModeSignature:
     """What matters of a command (n, 3)."""
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         thrust = 2 * np.log(np.sin(command[:, 0])) + 2 * np.log(command[:, 1])  # grows with sin^2(A) f^2
         style = np.log(command[:, 0]) - np.log(command[:, 1])
     resting = np.isfinite(thrust) & (thrust < np.nanmax(thrust) + np.log(RESTING))
     pushes = np.isfinite(thrust) & ~resting
     values = [np.where(pushes, value, np.nan) for value in (thrust, command[:, 2], style)]
-    return Way(tuple(int(i) for i in np.flatnonzero(resting)), *values)
+    return ModeSignature(tuple(int(i) for i in np.flatnonzero(resting)), *values)
 
 
-def differences(a: Way, b: Way) -> Array:
+def signature_difference(a: ModeSignature, b: ModeSignature) -> Array:
     """How `b` differs from `a` (3, n) in direction, thrust and style; 1 is what counts as different."""
     turn = np.angle(np.exp(1j * (b.direction - a.direction))) / SAME_DIRECTION
     rest = np.array([b.thrust - a.thrust, b.style - a.style]) / SAME_SIZE
-    told: Array = np.nan_to_num(np.concatenate([turn[None], rest]))
-    return told
+    difference: Array = np.nan_to_num(np.concatenate([turn[None], rest]))
+    return difference
 
 
-def same_way(a: Way, b: Way) -> bool:
-    """Whether two ways are one mode."""
-    return a.resting == b.resting and bool((np.abs(differences(a, b)) < 1.0).all())
+def same_signature(a: ModeSignature, b: ModeSignature) -> bool:
+    """Whether two commands with these signatures are one mode."""
+    return a.resting == b.resting and bool((np.abs(signature_difference(a, b)) < 1.0).all())
 
 
 def _change(command: Array, previous: Array, lower: Array, upper: Array) -> tuple[float | None, float | None]:

@@ -49,6 +49,11 @@ class Policy:
             raise CommandError(f"priority: every axis may be named once, got {', '.join(named)}")
 
     @property
+    def is_plain(self) -> bool:
+        """Whether it asks for nothing but the least plain error, which every method minimizes."""
+        return self.kind == "closest" and len(set(self.axis_weights)) == 1
+
+    @property
     def groups(self) -> list[NDArray[np.bool_]]:
         """For `priority`: masks (6,) of the groups of axes in order; those that are not named come last."""
         named = {axis for group in self.order for axis in group}

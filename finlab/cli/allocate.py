@@ -69,7 +69,7 @@ def allocate(
     if json:
         print(json_format.dumps(allocation_record(result, lost_axes), allow_nan=False))
     else:
-        print("\n".join([allocation_text(result), *([loss_text(lost_axes)] if lost_axes else [])]))
+        print("\n".join([str(result), *([loss_text(lost_axes)] if lost_axes else [])]))
 
 
 def health_from(weak: Sequence[str], stuck: Sequence[str], running: Sequence[str]) -> Health | None:
@@ -131,7 +131,7 @@ def allocation_record(result: Allocation, lost_axes: dict[str, list[str]] | None
         ],
         "target": _numbers(result.target),
         "wrench_surrogate": None if surrogate is None else _numbers(surrogate),
-        "wrench_plant": _numbers(result.wrench),
+        "wrench_plant": _numbers(result.wrench) if result.judged_by == "plant" else None,
         "unallocated": _numbers(result.unallocated),
         "err_norm": result.err_norm,
         "energy": result.energy,
@@ -142,50 +142,11 @@ def allocation_record(result: Allocation, lost_axes: dict[str, list[str]] | None
         "reachable": result.reachable,
         "scale": result.scale,
         "binding": list(result.binding),
+        "judged_by": result.judged_by,
+        "unknown_fins": list(result.unknown_fins),
         "notes": list(result.notes),
     }
     return record if lost_axes is None else {**record, "axes": lost_axes}
-
-
-def allocation_text(result: Allocation) -> str:
-    """The answer as two small tables, for people: angles in degrees, three digits."""
-    width = max(len("fin"), *(len(name) for name in result.fins))
-    lines = [f"{'fin':<{width}}  A [rad]  f [Hz]  zero direction [deg]  force [N]"]
-    for name, command, force in zip(result.fins, result.command, result.fin_forces, strict=True):
-        if name in result.failed:
-            lines.append(f"{name:<{width}}   failed")
-            continue
-        amplitude, frequency, direction = command
-        lines.append(
-            f"{name:<{width}}  {amplitude:7.3f}  {frequency:6.3f}  {math.degrees(direction):20.1f}"
-            f"  {math.hypot(*force):9.3f}"
-        )
-    lines += ["", f"{'':9}  Fx [N]  Fy [N]  Fz [N]  Tx [N m]  Ty [N m]  Tz [N m]"]
-    rows = {"asked": result.target, "delivered": result.wrench, "missing": result.unallocated}
-    for label, row in rows.items():
-        # `+ 0.0` turns a rounded -0.0 into 0.0.
-        cells = [f"{round(value, 3) + 0.0:{size}.3f}" for value, size in zip(row, _AXIS_WIDTHS, strict=True)]
-        lines.append(f"{label:<9}  " + "  ".join(cells))
-    source = f", checkpoint {result.checkpoint}" if result.checkpoint else ""
-    lines += [
-        "",
-        f"err_norm {result.err_norm:.2e}   energy {result.energy:.3f}   {result.solve_ms:.1f} ms   "
-        f"method {result.method}{source}",
-        *_words(result),
-    ]
-    return "\n".join(lines)
-
-
-def _words(result: Allocation) -> list[str]:
-    """Sentences about a wrench out of reach, and what else the user should read."""
-    words = list(result.notes)
-    if not result.reachable:
-        limits = f"; {', '.join(result.binding)}" if result.binding else ""
-        words.insert(0, f"not reached: {100 * result.scale:.0f} % of the wrench is delivered{limits}")
-    return words
-
-
-_AXIS_WIDTHS = (6, 6, 6, 8, 8, 8)
 
 
 def _numbers(row: np.ndarray) -> list[float]:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from finlab.allocation import load_allocator
-from finlab.allocation.allocation import Candidates
 from finlab.allocation.learned.learned_allocator import LearnedAllocator
-from finlab.allocation.modes import find_modes, same_way, way_of
+from finlab.allocation.modes import find_modes, mode_signature, same_signature
+from finlab.allocation.solution import Candidates
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
 from finlab.physics import Plant
@@ -32,9 +32,9 @@ def test_the_same_fins_at_rest_are_the_same_mode_whatever_they_do_there() -> Non
 
 
 def test_angles_are_compared_the_shorter_way_round() -> None:
-    one = way_of(np.array([PUSH, (0.4, 1.5, math.pi - 0.05)]))
-    assert same_way(one, way_of(np.array([PUSH, (0.4, 1.5, 0.05 - math.pi)])))
-    assert not same_way(one, way_of(np.array([PUSH, (0.4, 1.5, 0.6 - math.pi)])))
+    one = mode_signature(np.array([PUSH, (0.4, 1.5, math.pi - 0.05)]))
+    assert same_signature(one, mode_signature(np.array([PUSH, (0.4, 1.5, 0.05 - math.pi)])))
+    assert not same_signature(one, mode_signature(np.array([PUSH, (0.4, 1.5, 0.6 - math.pi)])))
 
 
 def test_distance_and_saturation() -> None:
@@ -52,18 +52,18 @@ def test_modes_of_an_answer_deliver_the_wrench_in_different_ways(learned: Learne
     target = np.array([1.0, 0.5, 2.0, 0.0, 0.1, 0.1])
     before = learned.allocate(layout, 0.9 * target).command
     result = learned.allocate(layout, target, failed=["bow"], previous=before)
-    modes = result.modes
+    modes = result.explore()
     assert len(modes) >= 2
     np.testing.assert_array_equal(modes[0].command, result.command)
     assert modes[0].energy == pytest.approx(result.energy)
     wrench = Plant(layout).wrench(np.array([mode.command for mode in modes]))
     assert learned.normalization.error(wrench, target).max() < 5e-3
-    ways = [way_of(mode.command) for mode in modes]
-    assert not any(same_way(a, b) for i, a in enumerate(ways) for b in ways[:i])
+    ways = [mode_signature(mode.command) for mode in modes]
+    assert not any(same_signature(a, b) for i, a in enumerate(ways) for b in ways[:i])
     bow = layout.index("bow")
     assert all(mode.distance is not None and np.isnan(mode.command[bow]).all() for mode in modes)
 
 
 def test_a_method_with_one_answer_tells_no_modes() -> None:
     layout = load_layout(shipped_layouts()["A"])
-    assert load_allocator("analytic").allocate(layout, [1, 0, 0, 0, 0, 0]).modes == ()
+    assert load_allocator("analytic").allocate(layout, [1, 0, 0, 0, 0, 0]).explore() == ()

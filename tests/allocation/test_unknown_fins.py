@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from finlab.allocation import METHODS, load_allocator
+from finlab.allocation import METHODS
 from finlab.allocation.methods import LEARNED
 from finlab.assets import shipped_checkpoints
 from finlab.layout import FinModelSpec, Layout, load_layout
+from tests.allocation.quick import quick_allocator
 
 SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
 
@@ -23,7 +24,7 @@ def with_models(**models: FinModelSpec) -> Layout:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_fins_that_no_network_learned_are_named(method: str) -> None:
-    allocator = load_allocator(method)
+    allocator = quick_allocator(method)
     wide = FinModelSpec("drag", (("area", 0.03),))
     layout = with_models(front_left=FinModelSpec("lighthill"), back_right=wide)
     expected = ("front_left", "back_right") if method in LEARNED else ()
@@ -34,7 +35,7 @@ def test_fins_that_no_network_learned_are_named(method: str) -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_the_note_names_the_fins_that_work(method: str) -> None:
     layout = with_models(front_left=FinModelSpec("lighthill"))
-    allocator = load_allocator(method)
+    allocator = quick_allocator(method)
     notes = allocator.allocate(layout, SURGE).notes
     assert len(notes) == (method in LEARNED)
     assert all("front_left" in note and "drag" in note for note in notes)

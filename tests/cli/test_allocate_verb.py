@@ -33,6 +33,8 @@ KEYS = [
     "reachable",
     "scale",
     "binding",
+    "judged_by",
+    "unknown_fins",
     "notes",
 ]
 

@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.allocation import Candidates, Solution
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.multistart import Multistart
 from finlab.allocation.methods import METHODS
+from finlab.allocation.solution import Candidates, Solution
 from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
 from finlab.layout import Layout

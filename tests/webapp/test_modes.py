@@ -1,12 +1,13 @@
 """Candidates that do the same are one mode, and no two modes share a name."""
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from finlab.allocation.allocation import Candidates
 from finlab.allocation.modes import find_modes
+from finlab.allocation.solution import Candidates
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
 from tests.webapp.stand_in import StandIn, load_stand_in
@@ -88,7 +89,7 @@ def test_real_candidates_are_drawn_and_listed() -> None:
     assert sum(len(mode.members) for mode in found) == len(answer.candidates.energy)
     nearest = nearest_modes(answer.samples, modes)
     assert nearest is not None and len(nearest) == len(answer.samples.energy)
-    raw = answer.samples._replace(command=np.array([mode.command for mode, _ in modes]))
+    raw = replace(answer.samples, command=np.array([mode.command for mode, _ in modes]))
     again = nearest_modes(raw, modes)
     assert again is not None and list(again) == list(range(len(modes))), "each mode is nearest to itself"
     plot = mode_plot(answer, modes, nearest, 0, None, 200, "here")

@@ -3,7 +3,8 @@
 import math
 from html import escape
 
-from finlab.allocation.allocation import REACHED, Allocation
+from finlab.allocation.allocation import Allocation
+from finlab.allocation.judging import REACHED
 from webapp.markup.figures import small, three_digits
 from webapp.markup.picking import pick
 from webapp.session.state import COMPARED

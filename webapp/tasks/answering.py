@@ -2,7 +2,6 @@
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -107,8 +106,7 @@ class Answering:
         """The answer with another command; kept, because every refresh asks for it."""
         known = self._shown
         if known is None or known[0] is not best or not np.array_equal(known[1], command, equal_nan=True):
-            other = replace(best, command=command, wrench_surrogate=None)
-            known = self._shown = (best, command, other)
+            known = self._shown = (best, command, best.with_command(command))
         return known[2]
 
     def ask(self) -> None:

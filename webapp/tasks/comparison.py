@@ -66,7 +66,6 @@ class Comparison:
             question = replace(state, method=method)
             answers = [self._solver.solve(question) for _ in range(TRIES)]
             answer = min(answers, key=lambda answer: answer.solve_ms)
-            _ = answer.wrench, answer.energy, answer.fin_forces
             self._post(partial(self._take, state, method, answer))
 
         def failed(text: str) -> None:

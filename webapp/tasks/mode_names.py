@@ -5,8 +5,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.allocation import Allocation, Candidates
-from finlab.allocation.modes import SAME_DIRECTION, Mode, Way, differences, find_modes, same_way, way_of
+from finlab.allocation.allocation import Allocation
+from finlab.allocation.modes import (
+    SAME_DIRECTION,
+    Mode,
+    ModeSignature,
+    find_modes,
+    mode_signature,
+    same_signature,
+    signature_difference,
+)
+from finlab.allocation.solution import Candidates
 from webapp.markup.figures import listed
 from webapp.theme import MODE_COLORS
 
@@ -29,22 +38,22 @@ def known_modes(answer: Allocation) -> tuple[Mode, ...]:
     """The modes among the candidates that an answer has refined anyway: a few, but they cost no time."""
     if answer.candidates is None:
         return ()
-    limits = [fin.limits for fin in answer.layout.fins]
-    lower, upper = (np.array([getattr(limit, end) for limit in limits]) for end in ("lower", "upper"))
-    return find_modes(answer.candidates, lower, upper)
+    return find_modes(answer.candidates, answer.layout.lower, answer.layout.upper)
 
 
 def named_modes(modes: tuple[Mode, ...]) -> tuple[NamedMode, ...]:
     """The first `MAX_SHOWN` modes with their names, no two alike."""
     shown = modes[:MAX_SHOWN]
-    names = _names([way_of(mode.command) for mode in shown])
+    names = _names([mode_signature(mode.command) for mode in shown])
     return tuple(NamedMode(mode, name) for mode, name in zip(shown, names, strict=True))
 
 
 def same_mode(wanted: Mode, modes: tuple[NamedMode, ...]) -> int:
     """The place of a mode that is known from another list; 0, the best one, where it is not there."""
-    way = way_of(wanted.command)
-    return next((k for k, (mode, _) in enumerate(modes) if same_way(way_of(mode.command), way)), 0)
+    signature = mode_signature(wanted.command)
+    return next(
+        (k for k, (mode, _) in enumerate(modes) if same_signature(mode_signature(mode.command), signature)), 0
+    )
 
 
 def nearest_modes(samples: Candidates | None, modes: tuple[NamedMode, ...]) -> NDArray[np.intp] | None:
@@ -63,36 +72,36 @@ def _push(command: Array) -> NDArray[np.complex128]:
     return np.asarray(np.nan_to_num(strength * np.exp(1j * command[..., 2])))
 
 
-def _names(ways: list[Way]) -> list[str]:
+def _names(signatures: list[ModeSignature]) -> list[str]:
     """Who rests; where that is not enough, the largest differences from the first mode with the same name."""
     names: list[str] = []
-    firsts: dict[str, Way] = {}
-    for way in ways:
-        base = _resting_words(way)
+    firsts: dict[str, ModeSignature] = {}
+    for signature in signatures:
+        base = _resting_words(signature)
         name = base
         if base in firsts:
-            told = _difference_words(firsts[base], way)
+            told = _difference_words(firsts[base], signature)
             # One difference is enough to tell two modes apart; a third one may need more, or a number.
             tries = [", ".join([base, *told[:n]]) for n in range(1, len(told) + 1)]
-            tries += [f"{tries[-1] if tries else base} ({k})" for k in range(2, len(ways) + 2)]
+            tries += [f"{tries[-1] if tries else base} ({k})" for k in range(2, len(signatures) + 2)]
             name = next(text for text in tries if text not in names)
         else:
-            firsts[base] = way
+            firsts[base] = signature
         names.append(name)
     return names
 
 
-def _resting_words(way: Way) -> str:
-    if not way.resting:
+def _resting_words(signature: ModeSignature) -> str:
+    if not signature.resting:
         return "all fins push"
-    several = len(way.resting) > 1
-    fins = listed([str(i + 1) for i in way.resting])
+    several = len(signature.resting) > 1
+    fins = listed([str(i + 1) for i in signature.resting])
     return f"fins {fins} rest" if several else f"fin {fins} rests"
 
 
-def _difference_words(first: Way, way: Way) -> list[str]:
+def _difference_words(first: ModeSignature, signature: ModeSignature) -> list[str]:
     """What differs, the largest difference first."""
-    told = differences(first, way)
+    told = signature_difference(first, signature)
     words = []
     for flat in np.argsort(-np.abs(told), axis=None):
         kind, fin = divmod(int(flat), told.shape[1])

@@ -1,7 +1,5 @@
 """The way from a raw candidate to an exact one: the steps of the learned method's own refinement."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from finlab.allocation.allocation import Allocation
@@ -32,5 +30,5 @@ def refinement(allocator: Allocator, answer: Allocation) -> tuple[Allocation, ..
     for steps in range(STEPS + 1):
         command = np.full_like(answer.command, np.nan)
         command[alive] = refine(problem, target, raw[None], steps).command[0]
-        frames.append(replace(answer, command=command, wrench_surrogate=None))
+        frames.append(answer.with_command(command))
     return (*frames, answer)

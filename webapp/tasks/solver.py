@@ -77,8 +77,6 @@ class Solver:
             FinlabError: the method cannot be loaded or cannot answer.
         """
         answer, allocator, target = self.solve(state), self.allocator(state), np.array(state.target)
-        # What is computed when first asked for belongs to this thread too.
-        _ = answer.wrench, answer.energy, answer.fin_forces, answer.candidates, answer.samples
         return Reply(
             answer,
             densities(allocator, answer.layout, state.failed, target, state.temperature),
@@ -87,7 +85,7 @@ class Solver:
 
     def modes(self, reply: Reply) -> tuple[Mode, ...]:
         """All distinct ways to do what an answer does: a search of its own, tens of milliseconds."""
-        return reply.answer.modes
+        return reply.answer.explore()
 
     def refinement(self, state: State, answer: Allocation) -> tuple[Allocation, ...]:
         """The steps of the refinement behind an answer to a state.

@@ -7,8 +7,8 @@ from abc import abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.allocation import Solution
 from finlab.allocation.allocator import Allocator
+from finlab.allocation.solution import Solution
 from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
 from finlab.physics import Plant, plant_of

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.allocation import Solution
 from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.allocation.learned.refine_missed import FallbackForces, nearest_forces
+from finlab.allocation.solution import Solution
 from finlab.errors import AllocationError
 from finlab.forces import force_space
 from finlab.inference.fast_network import NumpyFastNetwork

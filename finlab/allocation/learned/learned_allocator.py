@@ -15,7 +15,6 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.allocation import Candidates, Solution
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.learned.pipeline import Pipeline
 from finlab.allocation.learned.prepared import Prepared
@@ -25,6 +24,7 @@ from finlab.allocation.learned.refined_candidates import RefinedCandidates
 from finlab.allocation.learned.settings import Settings
 from finlab.allocation.learned.unreachable import project_target
 from finlab.allocation.policy import Policy
+from finlab.allocation.solution import Candidates, Solution
 from finlab.errors import CheckpointError
 from finlab.inference.threads import single_threaded_products
 from finlab.inference.weights import TrainedWeights
@@ -127,10 +127,13 @@ class LearnedAllocator(Allocator):
         wrench = np.concatenate([part.wrench[:, 0] for part in parts]) * self.normalization.std
         return Solution(command, wrench)
 
+    def _check_policy(self, policy: Policy) -> None:
+        """All policies are known."""
+
     def _solve_by(
         self, policy: Policy, layout: Layout, target: Array, *, seed: int, previous: Array | None
     ) -> Solution:
-        if policy.kind == "closest" and len(set(policy.axis_weights)) == 1:
+        if policy.is_plain:
             return self._solve(layout, target, seed=seed, previous=previous)
         plain = self._solve(layout, target, seed=seed, previous=previous, fallback=lambda *_: None)
         if self._reaches(layout, plain, target)[0]:

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.allocation import Candidates, Solution
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.learned.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.solution import Candidates, Solution
 from finlab.errors import AllocationError
 from finlab.inference.features import Geometry, fin_frame_features, geometry, raw_features
 from finlab.inference.mixture import MixtureArrays

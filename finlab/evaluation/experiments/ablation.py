@@ -87,7 +87,7 @@ def run_variant(allocator: Allocator, cases: Sequence[Case], *, seed: int = 0) -
     bar = tqdm(cases, desc="layouts", unit="layout", disable=None, leave=False, file=sys.stderr)
     for k, case in enumerate(bar):
         answer = allocator.allocate_batch(case.layout, case.targets, failed=case.failed, seed=seed)
-        by_plant = score(case, case.targets, answer, sigma, number=k)
+        by_plant = score(case, case.targets, answer.command, answer.solve_ms, sigma, number=k)
         plant.append(by_plant)
         assert answer.wrench_surrogate is not None
         difference = answer.wrench_surrogate - case.targets

@@ -19,7 +19,7 @@ from tqdm import tqdm
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, Ipopt
 from finlab.allocation.baselines.single_target import Problem
-from finlab.allocation.modes import cluster, same_way, way_of
+from finlab.allocation.modes import cluster, mode_signature, same_signature
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.tables import text_table
 from finlab.layout import Layout
@@ -108,14 +108,14 @@ def _compare(
 ) -> Row | None:
     """Counts and coverage for one target; None where no start delivers it."""
     truth = _truth(ways, layout, target, n_starts, seed)
-    mine = np.array([mode.command for mode in allocator.allocate(layout, target).modes])
+    mine = np.array([mode.command for mode in allocator.allocate(layout, target).explore()])
     upper = layout.upper
     if not len(truth) or not len(mine):
         return None
     truth_energy, energy = command_energy(truth, upper), command_energy(mine, upper)
     least = min(truth_energy.min(), energy.min())
-    truth_ways = [way_of(command) for command in truth[truth_energy <= CHEAP * least]]
-    own_ways = [way_of(command) for command in mine[energy <= CHEAP * least]]
+    truth_ways = [mode_signature(command) for command in truth[truth_energy <= CHEAP * least]]
+    own_ways = [mode_signature(command) for command in mine[energy <= CHEAP * least]]
     return {
         "truth": len(truth_ways),
         "modes": len(own_ways),
@@ -132,7 +132,7 @@ def _truth(truth: CheapestWays, layout: Layout, target: Array, n_starts: int, se
     """The best command of each mode (M, n, 3) that random starts lead to, cheapest first."""
     starts = plant_of(layout).sample(np.random.default_rng(seed), (n_starts,))
     command = truth.ends(layout, target, starts)
-    first = [group[0] for group in cluster([way_of(one) for one in command])]
+    first = [group[0] for group in cluster([mode_signature(one) for one in command])]
     kept: Array = command[first]
     return kept
 
@@ -141,7 +141,7 @@ def _covered(wanted: list[Any], known: list[Any]) -> float:
     """Share of some ways that are among others; one where nothing is wanted."""
     if not wanted:
         return 1.0
-    return float(np.mean([any(same_way(way, other) for other in known) for way in wanted]))
+    return float(np.mean([any(same_signature(way, other) for other in known) for way in wanted]))
 
 
 def _forces(layout: Layout, command: Array) -> Array:

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from finlab.allocation.allocation import BatchAllocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.single_target import DEFAULT_STARTS
 from finlab.evaluation.method_specs import method_and_starts
@@ -54,35 +53,41 @@ def run_method(
         if single is None:
             targets = case.targets[:first]
             answer = allocator.allocate_batch(case.layout, targets, failed=case.failed, seed=seed)
+            command, solve_ms = answer.command, answer.solve_ms
         else:
             targets = case.targets[:single]
-            answer = _one_by_one(allocator, case, targets, seed)
-        parts.append(score(case, targets, answer, allocator.normalization.std, number=k))
+            answers = [allocator.allocate(case.layout, t, failed=case.failed, seed=seed) for t in targets]
+            command = np.array([answer.command for answer in answers])
+            solve_ms = np.array([answer.solve_ms for answer in answers])
+        parts.append(score(case, targets, command, solve_ms, allocator.normalization.std, number=k))
     return join_records(parts)
 
 
-def score(case: Case, targets: Array, answer: BatchAllocation, sigma: Array, *, number: int = 0) -> Records:
+def score(
+    case: Case, targets: Array, command: Array, solve_ms: Array, sigma: Array, *, number: int = 0
+) -> Records:
     """Records of a method's answers to targets (N, 6) of a case, the wrench computed by the plant.
 
     Args:
         case: the layout.
         targets: desired wrenches (N, 6).
-        answer: the method's commands.
+        command: the method's answers (N, n, 3).
+        solve_ms: what each took (N,) [ms].
         sigma: per-axis standard deviation (6,).
         number: of the layout in its split.
     """
     plant = Plant(case.layout)
     upper = case.layout.upper
-    difference = plant.wrench(answer.command) - targets
+    difference = plant.wrench(command) - targets
     return Records(
         layout=np.full(len(targets), number, np.int64),
         target=np.arange(len(targets)),
         n_fins=np.full(len(targets), case.layout.n_fins - len(case.failed), np.int64),
         err_norm=np.linalg.norm(difference / sigma, axis=-1),
         err_phys=np.linalg.norm(difference, axis=-1),
-        energy=command_energy(answer.command, upper),
-        resting=count_resting(plant, answer.command),
-        solve_ms=np.asarray(answer.solve_ms, np.float64),
+        energy=command_energy(command, upper),
+        resting=count_resting(plant, command),
+        solve_ms=np.asarray(solve_ms, np.float64),
     )
 
 
@@ -94,15 +99,6 @@ def count_resting(plant: Plant, command: Array) -> NDArray[np.int64]:
     rests = (force < RESTING * largest) & ~np.isnan(command).any(axis=-1)
     count: NDArray[np.int64] = rests.sum(axis=-1)
     return count
-
-
-def _one_by_one(allocator: Allocator, case: Case, targets: Array, seed: int) -> BatchAllocation:
-    results = [allocator.allocate(case.layout, target, failed=case.failed, seed=seed) for target in targets]
-    return BatchAllocation(
-        np.array([result.command for result in results]),
-        None,
-        np.array([result.solve_ms for result in results]),
-    )
 
 
 def wrench_rows(records: dict[str, Records], split: str) -> list[dict[str, Any]]:

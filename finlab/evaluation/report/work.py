@@ -38,7 +38,9 @@ def energy(*, layouts: int, targets: int, method: str, seed: int, checkpoint: st
     allocator, parts, commands = load_method_spec(method, checkpoint), [], []
     for k, case in enumerate(make_split("id", layouts, targets, seed)):
         answer = allocator.allocate_batch(case.layout, case.targets)
-        parts.append(score(case, case.targets, answer, allocator.normalization.std, number=k))
+        parts.append(
+            score(case, case.targets, answer.command, answer.solve_ms, allocator.normalization.std, number=k)
+        )
         padded = np.full((len(case.targets), MOST_FINS, 3), np.nan)
         padded[:, : case.layout.n_fins] = answer.command
         commands.append(padded)

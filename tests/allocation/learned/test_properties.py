@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from finlab.allocation import Allocation
 from finlab.allocation.learned.learned_allocator import LearnedAllocator
-from finlab.allocation.modes import same_way, way_of
+from finlab.allocation.modes import mode_signature, same_signature
 from finlab.layout import Fin, Layout, Limits, random_layout
 from finlab.physics import Plant
 
@@ -172,7 +172,7 @@ def test_a_small_change_of_the_layout_changes_the_answer_little(learned: Learned
     ]
     one, other = learned.allocate(layout, target), learned.allocate(replace(layout, fins=tuple(fins)), target)
     assert other.err_norm < GOOD and same_energy(one, other, 0.01)
-    if same_way(way_of(one.command), way_of(other.command)):
+    if same_signature(mode_signature(one.command), mode_signature(other.command)):
         np.testing.assert_allclose(one.fin_forces, other.fin_forces, atol=0.05)
 
 

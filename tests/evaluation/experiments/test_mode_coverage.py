@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from finlab.allocation.modes import way_of
+from finlab.allocation.modes import mode_signature
 from finlab.cli import main
 from finlab.evaluation.experiments.mode_coverage import _covered, _energy_distance
 
@@ -11,7 +11,7 @@ PUSH, REST = (0.4, 1.5, 0.0), (0.05, 0.1, 0.0)
 
 
 def test_coverage_counts_ways_that_are_the_same() -> None:
-    one, other = way_of(np.array([PUSH, REST])), way_of(np.array([REST, PUSH]))
+    one, other = mode_signature(np.array([PUSH, REST])), mode_signature(np.array([REST, PUSH]))
     assert _covered([one, other], [one]) == 0.5
     assert _covered([], [one]) == 1.0 and _covered([one], []) == 0.0
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.allocation.allocation import Solution
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.analytic import Analytic
+from finlab.allocation.solution import Solution
 from finlab.cli import main
 from finlab.evaluation.experiments.ablation import REFINEMENTS, VARIANTS, ablation_report, paper_ablation_rows
 from finlab.evaluation.experiments.latency import latency_report, latency_rows, machine

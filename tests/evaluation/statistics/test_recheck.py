@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from finlab.allocation.allocation import BatchAllocation
 from finlab.errors import DataError
 from finlab.evaluation.experiments.wrench_tracking import score
 from finlab.evaluation.splits import Case, make_split
@@ -41,7 +40,7 @@ def test_wins_are_counted_and_broken_limits_seen() -> None:
     command = _commands(base, 4)
     case = base._replace(targets=Plant(base.layout).wrench(command))
     command[3, 0, 0] = 0.0  # below its limit, and off the target
-    ours = score(case, case.targets, BatchAllocation(command, None, np.ones(4)), SIGMA)
+    ours = score(case, case.targets, command, np.ones(4), SIGMA)
     dearer = ours.__class__(**{**vars(ours), "energy": ours.energy + np.array([1.0, 1.0, -1.0, 1.0])})
     found = recheck([case], ours, np.pad(command, ((0, 0), (0, 3), (0, 0))), dearer, SIGMA)
     assert ours.err_norm[3] > 0.05

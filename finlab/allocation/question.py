@@ -1,0 +1,110 @@
+"""What an allocator is asked: checked wrenches, previous commands, failed and damaged fins."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from finlab.allocation.health import Health
+from finlab.allocation.policy import AXES
+from finlab.errors import AllocationError, CommandError
+from finlab.layout import Layout
+
+Array = NDArray[np.float64]
+
+MAX_WRENCH = 1e6
+"""Largest magnitude of a target component [N, N m]; beyond it something is wrong upstream."""
+
+
+class Fins(NamedTuple):
+    """Which fins there are, and which of them an allocator may use."""
+
+    layout: Layout
+    """All fins, with the limits that damage has left."""
+    failed: tuple[str, ...]
+    """Names of those that are left out."""
+    healthy: Layout
+    """The others."""
+    alive: NDArray[np.bool_]
+    """Mask (n,) of the others."""
+
+    def among_all(self, command: Array) -> Array:
+        """Commands (..., m, 3) of the healthy fins put among all n; the failed ones hold NaN."""
+        if len(self.alive) == command.shape[-2]:
+            return command
+        full = np.full((*command.shape[:-2], len(self.alive), 3), np.nan)
+        full[..., self.alive, :] = command
+        return full
+
+
+def usable_fins(layout: Layout, failed: Sequence[str], health: Health | None = None) -> Fins:
+    """The fins of a robot some of which are lost or damaged.
+
+    Raises:
+        AllocationError: `failed` is no list of names, `health` no `Health`.
+        LayoutError: an unknown fin, or none left.
+    """
+    if health is not None:
+        if not isinstance(health, Health):
+            raise AllocationError(f"health: expected a Health, got {health!r}; make one with Health.of")
+        layout = health.applied_to(layout)
+    if isinstance(failed, str):
+        raise AllocationError(
+            f"failed: expected a list of fin names, got the text {failed!r}; write [{failed!r}]"
+        )
+    if not isinstance(failed, Sequence) or not all(isinstance(name, str) for name in failed):
+        raise AllocationError(f"failed: expected a list of fin names, got {failed!r}")
+    if not failed:
+        return Fins(layout, (), layout, np.ones(layout.n_fins, dtype=bool))
+    alive = np.array([name not in set(failed) for name in layout.names])
+    return Fins(layout, tuple(failed), layout.without(failed), alive)
+
+
+def check_wrenches(wrench: ArrayLike, *, single: bool) -> Array:
+    """One wrench (6,) or many (N, 6) as finite float64, or a `CommandError` that says what is wrong."""
+    expected = "six numbers [Fx, Fy, Fz, Tx, Ty, Tz]" if single else "an array of shape (N, 6)"
+    try:
+        if np.iscomplexobj(wrench):
+            raise TypeError("complex")
+        array = np.array(wrench, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise CommandError(f"wrench: expected {expected} in N and N m, got {wrench!r}") from error
+    if array.shape != (6,) if single else (array.ndim != 2 or array.shape[1] != 6):
+        raise CommandError(f"wrench: expected {expected} in N and N m, got an array of shape {array.shape}")
+    bad = ~(np.abs(array) <= MAX_WRENCH)
+    if bad.any():
+        axis = AXES[int(np.argwhere(bad)[0][-1])]
+        value = array[bad][0]
+        raise CommandError(f"wrench: {axis} must be finite and at most {MAX_WRENCH:g} in size, got {value}")
+    return array
+
+
+def check_layout_and_seed(layout: object, seed: object) -> None:
+    """Refuse what is no layout, and seeds that are no whole number from 0."""
+    if not isinstance(layout, Layout):
+        raise AllocationError(
+            f"layout: expected a Layout, got {layout!r}; read a file with finlab.load_layout"
+        )
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise AllocationError(f"seed: expected a whole number from 0, got {seed!r}")
+
+
+def check_previous(previous: ArrayLike, layout: Layout) -> Array:
+    """The previous command (n, 3), failed fins may hold NaN."""
+    try:
+        array = np.array(previous, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise CommandError(
+            f"previous: expected a command of shape ({layout.n_fins}, 3), got {previous!r}"
+        ) from error
+    if np.isinf(array).any():
+        raise CommandError("previous: expected finite commands (NaN only for failed fins), got infinity")
+    if array.shape != (layout.n_fins, 3):
+        raise CommandError(
+            f"previous: expected a command of shape ({layout.n_fins}, 3) for layout {layout.name!r}, "
+            f"got shape {array.shape}; pass the `command` of the last allocation"
+        )
+    return array

@@ -1,0 +1,84 @@
+"""An answer as two small tables, for people: angles in degrees, three digits."""
+
+from __future__ import annotations
+
+import math
+from html import escape
+from typing import TYPE_CHECKING
+
+from finlab.allocation.policy import AXES
+
+if TYPE_CHECKING:
+    from finlab.allocation.allocation import Allocation
+
+FIN_COLUMNS = ("A [rad]", "f [Hz]", "zero direction [deg]", "force [N]")
+"""What is told of each fin."""
+WRENCH_COLUMNS = tuple(f"{axis} [{'N' if axis.startswith('F') else 'N m'}]" for axis in AXES)
+"""What is told of each wrench."""
+
+
+def fin_rows(result: Allocation) -> list[tuple[str, ...]]:
+    """Name and cells of each fin; a failed one has no cells."""
+    rows: list[tuple[str, ...]] = []
+    for name, command, force in zip(result.fins, result.command, result.fin_forces, strict=True):
+        if name in result.failed:
+            rows.append((name,))
+            continue
+        amplitude, frequency, direction = command
+        cells = (amplitude, frequency, math.degrees(direction), math.hypot(*force))
+        rows.append((name, *(f"{cell:.{digits}f}" for cell, digits in zip(cells, (3, 3, 1, 3), strict=True))))
+    return rows
+
+
+def wrench_rows(result: Allocation) -> list[tuple[str, ...]]:
+    """Name and cells of what was asked, what is delivered and what is missing."""
+    wrenches = {"asked": result.target, "delivered": result.wrench, "missing": result.unallocated}
+    # `+ 0.0` turns a rounded -0.0 into 0.0.
+    return [(name, *(f"{round(v, 3) + 0.0:.3f}" for v in row)) for name, row in wrenches.items()]
+
+
+def summary(result: Allocation) -> str:
+    """The figures of an answer in one line."""
+    source = f", checkpoint {result.checkpoint}" if result.checkpoint else ""
+    judge = "" if result.judged_by == "plant" else f"   judged by the {result.judged_by}"
+    return (
+        f"err_norm {result.err_norm:.2e}   energy {result.energy:.3f}   {result.solve_ms:.1f} ms   "
+        f"method {result.method}{source}{judge}"
+    )
+
+
+def remarks(result: Allocation) -> list[str]:
+    """Sentences about a wrench that is not delivered, and what else the user should read."""
+    words = list(result.notes)
+    if result.reachable or result.unknown_fins:
+        # With fins that the method does not know, what is missing says nothing about the robot.
+        return words
+    limits = f"; {', '.join(result.binding)}" if result.binding else ""
+    return [f"not reached: {100 * result.scale:.0f} % of the wrench is delivered{limits}", *words]
+
+
+def allocation_text(result: Allocation) -> str:
+    """The answer as plain text."""
+    width = max(len("fin"), *(len(name) for name in result.fins))
+    lines = ["  ".join([f"{'fin':<{width}}", *FIN_COLUMNS])]
+    for name, *cells in fin_rows(result):
+        padded = [f"{cell:>{len(column)}}" for cell, column in zip(cells, FIN_COLUMNS, strict=False)]
+        lines.append("  ".join([f"{name:<{width}}", *(padded or [" failed"])]))
+    lines += ["", "  ".join([" " * 9, *WRENCH_COLUMNS])]
+    for name, *cells in wrench_rows(result):
+        padded = [f"{cell:>{len(column)}}" for cell, column in zip(cells, WRENCH_COLUMNS, strict=True)]
+        lines.append("  ".join([f"{name:<9}", *padded]))
+    return "\n".join([*lines, "", summary(result), *remarks(result)])
+
+
+def allocation_html(result: Allocation) -> str:
+    """The same tables for a notebook."""
+    fins = [row if len(row) > 1 else (*row, "failed") for row in fin_rows(result)]
+    words = "".join(f"<div>{escape(line)}</div>" for line in (summary(result), *remarks(result)))
+    return _html(("fin", *FIN_COLUMNS), fins) + _html(("", *WRENCH_COLUMNS), wrench_rows(result)) + words
+
+
+def _html(columns: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    head = "".join(f"<th>{escape(column)}</th>" for column in columns)
+    body = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"

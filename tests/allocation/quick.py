@@ -1,0 +1,19 @@
+"""Every method with settings that answer quickly, for tests of what methods have in common."""
+
+from typing import Any
+
+from finlab.allocation import Allocator, load_allocator
+
+QUICK: dict[str, dict[str, Any]] = {
+    "paper": {"n_candidates": 4, "n_steps": 2},
+    "trf": {"n_starts": 1, "max_evaluations": 10},
+    "slsqp": {"n_starts": 1, "max_iterations": 10},
+    "ipopt": {"n_starts": 1},
+    "sqp": {"n_starts": 1, "n_steps": 5},
+    "multistart": {"n_candidates": 2, "n_steps": 5},
+}
+
+
+def quick_allocator(method: str) -> Allocator:
+    """The allocator of a method, with few starts and steps."""
+    return load_allocator(method, **QUICK.get(method, {}))

@@ -1,0 +1,219 @@
+"""An answer is plain data: it compares, copies, pickles and prints, and searches further only when told."""
+
+import copy
+import pickle
+from dataclasses import fields, replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from finlab.allocation import METHODS, Allocation, Allocator, Health, load_allocator
+from finlab.allocation.modes import mode_signature, same_signature
+from finlab.allocation.plain_data import equal
+from finlab.assets import shipped_checkpoints
+from finlab.errors import AllocationError, CheckpointError
+from finlab.layout import Fin, FinModelSpec, Layout, load_layout, random_layout
+from finlab.physics import Plant
+from tests.allocation.quick import quick_allocator
+
+SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
+FAR = [40.0, 5.0, -30.0, 1.0, 2.0, 3.0]
+
+pytestmark = pytest.mark.skipif(
+    not {"default", "paper"} <= set(shipped_checkpoints()), reason="no trained checkpoints in the tree"
+)
+
+
+@pytest.fixture(scope="module")
+def learned() -> Allocator:
+    return load_allocator()
+
+
+def round_trips(result: Allocation) -> list[Allocation]:
+    return [pickle.loads(pickle.dumps(result)), copy.copy(result), copy.deepcopy(result)]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("wrench", [SURGE, FAR])
+def test_answers_compare_pickle_and_copy(method: str, wrench: list[float]) -> None:
+    allocator = quick_allocator(method)
+    layout = load_layout("A")
+    previous = allocator.allocate(layout, SURGE).command
+    health = Health.of(weak={"back_left": 0.5})
+    result = allocator.allocate(layout, wrench, failed=["front_left"], previous=previous, health=health)
+    for twin in round_trips(result):
+        assert twin == result
+        for field in fields(result):
+            if field.compare:
+                assert equal(getattr(twin, field.name), getattr(result, field.name)), field.name
+        assert str(twin) == str(result) and repr(twin) == repr(result)
+    assert (
+        allocator.allocate(layout, wrench, failed=["front_left"], previous=previous, health=health) == result
+    )
+    assert allocator.allocate(layout, wrench, failed=["front_left"], health=health) != result
+
+
+def test_every_field_counts_but_the_time(learned: Allocator) -> None:
+    result = learned.allocate(load_layout("A"), SURGE)
+    assert replace(result, solve_ms=1e3) == result
+    assert result.candidates is not None and result.samples is not None
+    for changed in (
+        {"command": result.command + 1e-15},
+        {"command": result.command[:3]},
+        {"wrench_surrogate": None},
+        {"previous": result.command},
+        {"failed": ("front_left",)},
+        {"notes": ("beware",)},
+        {"judged_by": "surrogate"},
+        {"candidates": replace(result.candidates, energy=result.candidates.energy + 1.0)},
+        {"samples": None},
+        {"seed": 1},
+    ):
+        assert replace(result, **changed) != result, changed  # type: ignore[arg-type]
+    assert result != "an answer" and result is not None
+    with pytest.raises(TypeError, match="unhashable"):
+        hash(result)
+
+
+def test_nan_equals_nan_and_kinds_differ() -> None:
+    nan = float("nan")
+    assert equal(nan, nan) and equal(np.array([1.0, nan]), np.array([1.0, nan])) and equal((nan,), (nan,))
+    assert (
+        not equal(np.array([1.0]), 1.0)
+        and not equal((1.0,), (1.0, 2.0))
+        and not equal(np.ones(2), np.ones(3))
+    )
+    assert not equal(1.0, nan) and not equal(None, np.ones(2))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_all_figures_are_those_of_the_plant(method: str) -> None:
+    layout = load_layout("ucat")
+    for wrench, failed in ((SURGE, []), (FAR, [layout.names[1]])):
+        result = quick_allocator(method).allocate(layout, wrench, failed=failed)
+        plant = Plant(layout)
+        np.testing.assert_allclose(result.wrench, plant.wrench(result.command), atol=1e-12)
+        np.testing.assert_allclose(result.fin_forces, plant.fin_forces(result.command), atol=1e-12)
+        assert result.err_norm == pytest.approx(np.linalg.norm(result.unallocated / result.sigma), abs=1e-12)
+        assert result.judged_by == "plant" and isinstance(result.err_norm, float)
+        assert all(not np.any(result.fin_forces[i]) for i in layout.indices(failed))
+
+
+def test_what_the_user_writes_into_an_answer_stays_there(learned: Allocator) -> None:
+    layout = load_layout("A")
+    first, second = (learned.allocate(layout, SURGE) for _ in range(2))
+    assert first.candidates is not None and first.candidates.command.base is not first.command
+    first.command[:] = 0.0
+    assert learned.allocate(layout, SURGE) == second
+    assert first.candidates == second.candidates
+
+
+@pytest.mark.parametrize("n_fins", [1, 4, 16])
+def test_the_short_form_is_short(n_fins: int, learned: Allocator) -> None:
+    fins = tuple(Fin(f"{'long' * 14}_{i}", (0.1, 0.01 * i, 0.0), 0.3 * i) for i in range(n_fins))
+    layout = Layout("the longest name of a layout that " + "x" * 30, fins)
+    result = learned.allocate(layout, SURGE, failed=[fin.name for fin in fins[: n_fins // 2]])
+    assert len(repr(result)) <= 400 and "err_norm=" in repr(result) and "plant" in repr(result)
+    batch = learned.allocate_batch(layout, [SURGE] * 5)
+    assert len(repr(batch)) <= 400 and "5 targets" in repr(batch)
+    assert "0 targets" in repr(learned.allocate_batch(layout, np.empty((0, 6))))
+
+
+class Cells(HTMLParser):
+    """The texts of a page's cells."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.texts: list[str] = []
+        self.open: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: object) -> None:
+        self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.texts.append(data)
+
+
+def test_notebooks_show_the_table_of_the_command_line(learned: Allocator) -> None:
+    layout = load_layout("A")
+    layout = replace(layout, fins=(replace(layout.fins[0], name="<b>bow</b> & co"), *layout.fins[1:]))
+    for wrench in (SURGE, FAR):
+        result = learned.allocate(layout, wrench, failed=["front_left"])
+        page = Cells()
+        page.feed(result._repr_html_())
+        assert page.open == []
+        shown, printed = " ".join(page.texts).split(), str(result).split()
+        assert [word for word in shown if word != "fin"] == [word for word in printed if word != "fin"]
+        assert "<b>bow</b> & co" in page.texts
+
+
+def test_a_copy_explores_like_the_original(learned: Allocator) -> None:
+    layout = load_layout("A")
+    few = learned.with_settings(n_candidates=8, energy_tradeoff=1e-3)
+    for allocator, policy, wrench in (
+        (learned, "closest", SURGE),
+        (few, "closest", SURGE),
+        (learned, "direction", FAR),
+    ):
+        result = allocator.allocate(layout, wrench, failed=["back_left"], policy=policy, seed=3)
+        modes = result.explore()
+        assert len(modes) > 0
+        np.testing.assert_allclose(modes[0].command, result.command, atol=1e-12)
+        signatures = [mode_signature(mode.command) for mode in modes]
+        assert not any(same_signature(a, b) for i, a in enumerate(signatures) for b in signatures[:i])
+        for twin in round_trips(result):
+            assert twin.explore() == modes and twin.explore(allocator) == modes
+
+
+def test_exploring_knows_the_previous_command(learned: Allocator) -> None:
+    layout = load_layout("A")
+    before = learned.allocate(layout, SURGE).command
+    result = learned.allocate(layout, [1.1, *SURGE[1:]], previous=before, failed=["back_left"])
+    modes = result.explore()
+    assert modes[0].turn is not None and all(mode.distance is not None for mode in modes)
+    assert pickle.loads(pickle.dumps(result)).explore() == modes
+
+
+def test_exploring_with_another_allocator_says_what_to_do(learned: Allocator) -> None:
+    result = learned.allocate(load_layout("A"), SURGE)
+    with pytest.raises(AllocationError, match=r"another answer than this one; .*result.explore\(allocator\)"):
+        result.with_command(result.command + 0.01).explore()
+    lost = pickle.loads(pickle.dumps(replace(result, checkpoint="gone")))
+    with pytest.raises(CheckpointError, match=r"gone.*; hand over .*result.explore\(allocator\)"):
+        lost.explore()
+    assert lost.explore(learned) == result.explore()
+
+
+def test_another_command_is_judged_anew(learned: Allocator) -> None:
+    layout = load_layout("A")
+    result = learned.allocate(layout, SURGE, failed=["front_left"])
+    least = np.where(np.isnan(result.command), np.nan, layout.lower)
+    other = result.with_command(least)
+    np.testing.assert_allclose(other.wrench, Plant(layout).wrench(least), atol=1e-12)
+    assert not other.reachable and other.err_norm > 0.1 > result.err_norm and other.energy < result.energy
+    assert other.wrench_surrogate is None and other.target is result.target
+
+
+def test_a_method_that_does_not_know_the_fins_blames_no_limit(learned: Allocator) -> None:
+    layout = load_layout("A")
+    strange = replace(layout, fins=tuple(replace(f, model=FinModelSpec("lighthill")) for f in layout.fins))
+    result = learned.allocate(strange, SURGE)
+    assert not result.reachable and result.binding == () and result.unknown_fins == layout.names
+    assert "not reached" not in str(result) and "the method does not know these fins: front_right" in str(
+        result
+    )
+    known = load_allocator("multistart").allocate(strange, SURGE)
+    assert known.reachable and known.unknown_fins == ()
+
+
+@pytest.mark.parametrize("k", range(5))
+def test_random_robots_too(k: int, learned: Allocator) -> None:
+    rng = np.random.default_rng(k)
+    layout = random_layout(rng, n_fins=2 + k)
+    result = learned.allocate(layout, rng.normal(size=6), failed=[layout.names[0]], seed=k)
+    assert all(twin == result for twin in round_trips(result))
+    assert len(repr(result)) <= 400
