@@ -54,7 +54,7 @@ def test_a_win_by_broken_limits_is_seen() -> None:
     command[1, 0, 0] = base.layout.lower[0, 0] - 1e-9
     command[2, 0, 1] = base.layout.upper[0, 1] + 1e-9
     case = base._replace(targets=Plant(base.layout).wrench(command))
-    ours = score(case, case.targets, BatchAllocation(command, None, np.ones(4)), SIGMA)
+    ours = score(case, case.targets, command, np.ones(4), SIGMA)
     dearer = ours.__class__(**{**vars(ours), "energy": ours.energy + 1.0})
     found = recheck([case], ours, np.pad(command, ((0, 0), (0, 3), (0, 0))), dearer, SIGMA)
     assert found["wins"] == 4 and found["outside"] == 2 and found["worst_error"] < 1e-12
