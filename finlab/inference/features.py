@@ -26,10 +26,11 @@ index       meaning
 from __future__ import annotations
 
 import math
-import sys
 from typing import Any, NamedTuple
 
 import numpy as np
+
+from finlab.array_library import library_of
 
 RAW_SIZE = 10
 """Number of raw node features (paper: x_i in R^10)."""
@@ -64,7 +65,7 @@ class Geometry(NamedTuple):
 
 def raw_features(position: Array, mounting_angle: Array, lower: Array, upper: Array) -> Array:
     """The paper's node features (..., n, 10): position, mounting angle and six limits, scaled."""
-    xp = _library(position)
+    xp = library_of(position)
     limits = _scaled_limits(xp, lower, upper)
     return xp.concatenate([position / 0.3, mounting_angle[..., None] / math.pi, limits], axis=-1)
 
@@ -82,7 +83,7 @@ def geometry(
         std: per-axis standard deviation (6,) of the wrench.
         mask: True where a fin exists (B, n).
     """
-    xp = _library(position)
+    xp = library_of(position)
     full = upper[..., 0] * upper[..., 1] / (NOMINAL_AMPLITUDE * NOMINAL_FREQUENCY)
     full = full * full
     if mask is not None:
@@ -114,7 +115,7 @@ def geometry(
 
 def fin_frame_features(layout: Geometry, target: Array) -> Array:
     """Fin-frame node features (B, n, 25) of B layouts (or one, repeated) for normalized targets (B, 6)."""
-    xp = _library(target)
+    xp = library_of(target)
     batch, n = target.shape[0], layout.static.shape[1]
     static = layout.static
     if static.shape[0] == 1 and batch > 1:
@@ -133,8 +134,3 @@ def _scaled_limits(xp: Any, lower: Array, upper: Array) -> Array:
 
 def _unbind(position: Array) -> tuple[Array, Array, Array]:
     return position[..., 0], position[..., 1], position[..., 2]
-
-
-def _library(array: Array) -> Any:
-    """numpy for numpy arrays, torch (whoever made the tensor loaded it) for tensors."""
-    return np if isinstance(array, np.ndarray) else sys.modules["torch"]

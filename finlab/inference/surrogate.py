@@ -11,6 +11,7 @@ from finlab.inference.learned_fin import LearnedFin
 from finlab.inference.mlp_surrogate import MlpFins
 from finlab.inference.weights import TrainedWeights
 from finlab.layout import Layout
+from finlab.layout.arrays import force_columns
 
 Array = NDArray[Any]
 
@@ -49,15 +50,8 @@ def surrogate_on(layout: Layout, weights: TrainedWeights) -> LayoutSurrogate:
     if weights.surrogate_config.kind == "mlp":
         limits = layout.lower, layout.upper
         fins = MlpFins(weights.surrogate, layout.position, angle, *limits)
-        body_axes = np.broadcast_to(np.eye(3), (layout.n_fins, 3, 3))
-        columns = _columns(layout.position, body_axes) * (1.0 + fins.scale)
+        # The perceptron speaks in the body frame, that of a fin whose shaft points forward.
+        columns = force_columns(layout.position, np.zeros_like(angle)) * (1.0 + fins.scale)
         return LayoutSurrogate(fins, columns, fins.bias)
-    zero, one = np.zeros_like(angle), np.ones_like(angle)
-    cos, sin = np.cos(angle), np.sin(angle)
-    axes = np.array([[cos, sin, zero], [-sin, cos, zero], [zero, zero, one]]).transpose(2, 0, 1)
-    return LayoutSurrogate(LearnedFin(weights.surrogate), _columns(layout.position, axes), np.zeros(6))
-
-
-def _columns(position: Array, axes: Array) -> Array:
-    """Wrench per newton (n, 3, 6) along axes (n, 3, 3), one per row, of fins at positions (n, 3)."""
-    return np.concatenate([axes, np.cross(position[:, None], axes)], axis=-1)
+    columns = force_columns(layout.position, angle)
+    return LayoutSurrogate(LearnedFin(weights.surrogate), columns, np.zeros(6))

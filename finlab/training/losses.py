@@ -6,8 +6,10 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from finlab.inference.coordinates import clamp_to_limits, to_command, to_normalized
+from finlab.physics.energy import fin_energy
 from finlab.training.data.sampling import Batch
-from finlab.training.networks.mixture import Mixture, clamp_to_limits, to_command, to_normalized
+from finlab.training.networks.mixture import Mixture
 from finlab.training.networks.surrogate import Surrogate
 
 HUBER = 0.02
@@ -36,8 +38,8 @@ def tracking_error(
 
 def energy(command: Tensor, batch: Batch) -> Tensor:
     """The paper's J_en (B, K) of commands (B, K, n, 3), with the default weights."""
-    a, f, d = (command / batch.upper.abs().clamp_min(1e-3)[:, None]).unbind(-1)
-    return ((a * a + f * f + 0.1 * d * d + a * f) * batch.mask[:, None]).sum(-1)
+    energies: Tensor = fin_energy(command, batch.upper[:, None]) * batch.mask[:, None]
+    return energies.sum(-1)
 
 
 def sample_guidance(

@@ -7,12 +7,14 @@ import pytest
 import torch
 from torch import Tensor
 
+from finlab.inference.coordinates import to_normalized
 from finlab.layout import FinModelSpec
+from finlab.layout.angles import is_full_turn
 from finlab.physics import assemble_wrench, make_law
 from finlab.physics.energy import command_energy
 from finlab.training import losses
 from finlab.training.data.sampling import Batch, ForwardSampler
-from finlab.training.networks.mixture import Mixture, to_normalized, turns_fully
+from finlab.training.networks.mixture import Mixture
 
 DRAG = make_law(FinModelSpec())
 
@@ -40,7 +42,7 @@ def make_mixture(batch: Batch, joint: bool = True, exact: int | None = None) -> 
         mean[:, :, exact] = to_normalized(batch.command, batch.lower, batch.upper)
     logits = torch.randn((B, M) if joint else (B, N, M), generator=draw)
     log_std = torch.randn(B, N, M, 3, generator=draw) * 0.3
-    return Mixture(logits, mean, log_std, turns_fully(batch.lower, batch.upper))
+    return Mixture(logits, mean, log_std, is_full_turn(batch.upper[..., 2] - batch.lower[..., 2]))
 
 
 def target_of(batch: Batch) -> Tensor:

@@ -4,9 +4,9 @@ import pytest
 
 from finlab.errors import DataError
 from finlab.inference.features import SIZES
+from finlab.inference.mixture import LOG_STD_BOUND
 from finlab.training.loop import LoopSettings, learning_rate
 from finlab.training.networks.allocator_network import AllocatorNetwork
-from finlab.training.networks.mixture import LOG_STD_RANGE
 from finlab.training.networks.surrogate import make_surrogate
 from finlab.training.presets import PRESETS, get_preset
 
@@ -17,7 +17,7 @@ def test_paper_is_as_printed() -> None:
     assert (network.features, SIZES[network.features], network.joint) == ("raw", 10, False)
     assert (network.width, network.heads) == (128, 4)
     assert (network.graph_layers, network.transformer_layers, network.n_components) == (2, 3, 8)
-    assert LOG_STD_RANGE == (-3.0, 3.0)
+    assert LOG_STD_BOUND == 3.0
     assert (paper.surrogate.kind, paper.surrogate.hidden[0]) == ("mlp", 512)
     assert (training.guide, training.imitate, training.cosine, training.ema) == ("samples", "all", False, 0.0)
     assert training.steps * training.batch_size == pytest.approx(575e6, rel=0.01)  # 5 M x 115 epochs

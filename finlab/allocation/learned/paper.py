@@ -13,6 +13,7 @@ from finlab.allocation.allocator import Allocator
 from finlab.allocation.learned.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.solution import Candidates, Solution
 from finlab.errors import AllocationError
+from finlab.inference.coordinates import clamp_to_limits, to_command, to_normalized
 from finlab.inference.features import Geometry, fin_frame_features, geometry, raw_features
 from finlab.inference.mixture import MixtureArrays
 from finlab.inference.network import NumpyNetwork
@@ -88,6 +89,8 @@ class _Robot(NamedTuple):
     """Learned fin physics."""
     problem: CommandProblem
     """The surrogate in normalized wrenches, and the limits."""
+    limits: tuple[Array, Array]
+    """Lower and upper limits (n, 3), in single precision as all else here."""
     features: Array | Geometry
     """The network's raw features (1, n, 10), or what the fin-frame features are made of."""
     energy: EnergyMeter
@@ -141,10 +144,10 @@ class PaperAllocator(Allocator):
         std, settings = self.normalization.std, self.settings
         wanted = ((targets - robot.surrogate.bias) / std).astype(np.float32)
         mixture = self._predict(robot, (targets - self.normalization.mean) / std)
-        sampled = robot.problem.clamp_in_place(_to_command(robot, self._draw(mixture, seed)))
+        sampled = clamp_to_limits(to_command(self._draw(mixture, seed), *robot.limits), *robot.limits)
         by_likelihood = settings.ranking == "nll" and not settings.mean_only
         if by_likelihood:
-            x = _to_normalized(robot, sampled)
+            x = to_normalized(sampled, *robot.limits)
             score = -mixture.log_likelihood(x, robot.problem.wraps)
         else:
             score = self._score(robot, sampled, wanted)
@@ -168,7 +171,8 @@ class PaperAllocator(Allocator):
         place = layout.position[None], layout.mounting_angle[None], lower[None], upper[None]
         raw = self.config.features == "raw"
         features = raw_features(*place) if raw else geometry(*place, std)
-        return _Robot(surrogate, problem, features, EnergyMeter(upper))
+        limits = lower.astype(np.float32), upper.astype(np.float32)
+        return _Robot(surrogate, problem, limits, features, EnergyMeter(upper))
 
     def _predict(self, robot: _Robot, centred: Array) -> MixtureArrays:
         """The network's mixture for normalized, centred targets (N, 6)."""
@@ -215,18 +219,19 @@ class PaperAllocator(Allocator):
 
         It works in normalized coordinates, inside the limits, with a step that falls linearly.
         """
-        x, half = _to_normalized(robot, command), robot.problem.float32.half
+        lower, upper = robot.limits
+        x, half = to_normalized(command, lower, upper), np.float32(0.5) * (upper - lower)
         mean, square = np.zeros_like(x), np.zeros_like(x)
         keep_mean, keep_square = ADAM_DECAY
         for step in range(steps):
-            gradient = half * self._gradient(robot, _to_command(robot, x), target)
+            gradient = half * self._gradient(robot, to_command(x, lower, upper), target)
             mean += (1.0 - keep_mean) * (gradient - mean)
             square += (1.0 - keep_square) * (gradient * gradient - square)
             rate = ADAM_RATE * (1.0 - 0.95 * step / steps) / (1.0 - keep_mean ** (step + 1))
             size = np.sqrt(square / np.float32(1.0 - keep_square ** (step + 1)))
             x -= np.float32(rate) * mean / (size + np.float32(1e-8))
             np.clip(x, -1.0, 1.0, out=x)
-        return _to_command(robot, x)
+        return np.asarray(to_command(x, lower, upper))
 
     def _gradient(self, robot: _Robot, command: Array, target: Array) -> Array:
         """Derivatives (R, n, 3) of J by each command."""
@@ -246,19 +251,6 @@ class PaperAllocator(Allocator):
         inside = _inside(robot, command[order])
         names = (source,) * len(order)
         return Candidates(inside, wrench[order], error[order], robot.energy(inside), names)
-
-
-def _to_command(robot: _Robot, x: Array) -> Array:
-    """Commands (..., n, 3) of normalized ones, -1 at the lower and 1 at the upper limits; not clamped."""
-    limits = robot.problem.float32
-    command: Array = limits.lower + limits.half + x * limits.half
-    return command
-
-
-def _to_normalized(robot: _Robot, command: Array) -> Array:
-    """Inverse of `_to_command`; where a limit range has no width, 0."""
-    limits = robot.problem.float32
-    return np.asarray((command - limits.lower - limits.half) / np.maximum(limits.half, np.float32(1e-9)))
 
 
 def _take(command: Array, index: Array) -> Array:

@@ -6,16 +6,18 @@ forces that add up to the target exactly. The energy of a force grows like the s
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
 from finlab.forces.force_space import REST, RIDGE
+from finlab.physics.energy import DEFAULT_WEIGHTS, energy_of_shares
 
-FULL_ENERGY = 3.0
-"""Energy proxy of a fin at full thrust: three terms of one each, see `finlab.physics.energy`."""
-DIRECTION = 0.1 / torch.pi**2
+FULL_ENERGY = energy_of_shares(1.0, 1.0, 0.0)
+"""Energy proxy of a fin at full thrust, pointing where that costs nothing."""
+DIRECTION = DEFAULT_WEIGHTS.zero_direction / math.pi**2
 """Energy per squared zero direction [1/rad^2] of a fin that turns fully."""
 OVERLOAD = 3.0
 """Cost of asking a fin for twice what it has, in units of energy."""

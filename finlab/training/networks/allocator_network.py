@@ -11,9 +11,11 @@ import math
 import torch
 from torch import Tensor, nn
 
+from finlab.inference.mixture import LOG_STD_BOUND
 from finlab.inference.weights import NetworkConfig
+from finlab.layout.angles import is_full_turn
 from finlab.training.networks.gatv2 import DenseGATv2
-from finlab.training.networks.mixture import LOG_STD_RANGE, Mixture, turns_fully
+from finlab.training.networks.mixture import Mixture
 
 
 class AllocatorNetwork(nn.Module):
@@ -75,7 +77,7 @@ class AllocatorNetwork(nn.Module):
         hidden = self.encode(x, target, mask)
         batch, n, _ = hidden.shape
         raw = self.head(hidden).float().view(batch, n, self.config.n_components, -1)
-        log_std = _bounded_log_std(raw[..., -3:])
+        log_std = LOG_STD_BOUND * torch.tanh(0.5 * raw[..., -3:])
         if not self.config.joint:
             logits = self.weight(hidden).float()
             return Mixture(logits, raw[..., :3], log_std, torch.zeros_like(lower[..., 0], dtype=torch.bool))
@@ -83,7 +85,7 @@ class AllocatorNetwork(nn.Module):
         pooled = hidden if mask is None else hidden * mask[..., None]
         count = float(n) if mask is None else mask.sum(1, keepdim=True).to(hidden.dtype)
         logits = self.weight(pooled.sum(1) / count).float()
-        return Mixture(logits, mean, log_std, turns_fully(lower, upper))
+        return Mixture(logits, mean, log_std, is_full_turn(upper[..., 2] - lower[..., 2]))
 
     @staticmethod
     def _direction(vector: Tensor, lower: Tensor, upper: Tensor) -> Tensor:
@@ -98,8 +100,3 @@ class AllocatorNetwork(nn.Module):
         offset = torch.remainder(angle - middle + math.pi, 2 * math.pi) - math.pi
         clamped = torch.minimum(torch.maximum(offset, -half), half)
         return ((offset + (clamped - offset).detach()) / half)[..., None]
-
-
-def _bounded_log_std(raw: Tensor) -> Tensor:
-    low, high = LOG_STD_RANGE
-    return low + (high - low) * torch.sigmoid(raw)

@@ -13,11 +13,6 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from finlab.layout.angles import is_full_turn
-
-LOG_STD_RANGE = (-3.0, 3.0)
-"""Range of the components' log standard deviation (paper, implementation details)."""
-
 
 class Mixture(NamedTuple):
     """A mixture of M diagonal Gaussians per fin, for B robots of n fins."""
@@ -86,33 +81,3 @@ class Mixture(NamedTuple):
         index = choice[..., None].expand(-1, -1, -1, 3)
         mean, std = self.mean.gather(2, index), self.log_std.gather(2, index).exp()
         return (mean + math.sqrt(temperature) * std * noise).transpose(1, 2)
-
-
-def turns_fully(lower: Tensor, upper: Tensor) -> Tensor:
-    """True (B, n) for fins whose zero direction may turn a full circle; limits (B, n, 3)."""
-    full: Tensor = is_full_turn(upper[..., 2] - lower[..., 2])
-    return full
-
-
-def to_normalized(command: Tensor, lower: Tensor, upper: Tensor) -> Tensor:
-    """Commands (..., 3) between limits (..., 3) to [-1, 1]; a zero-width range maps to 0."""
-    half = 0.5 * (upper - lower)
-    return (command - lower - half) / half.clamp_min(1e-9)
-
-
-def to_command(x: Tensor, lower: Tensor, upper: Tensor) -> Tensor:
-    """Inverse of `to_normalized`; not clamped."""
-    half = 0.5 * (upper - lower)
-    return lower + half + x * half
-
-
-def clamp_to_limits(command: Tensor, lower: Tensor, upper: Tensor) -> Tensor:
-    """Commands (..., n, 3) inside their limits (n, 3 or broadcastable).
-
-    Zero directions are angles: one outside an arc is first brought to the turn nearest the middle of
-    the arc, then to its nearer end.
-    """
-    middle = 0.5 * (lower[..., 2] + upper[..., 2])
-    direction = middle + torch.remainder(command[..., 2] - middle + math.pi, 2 * math.pi) - math.pi
-    unwrapped = torch.stack([command[..., 0], command[..., 1], direction], dim=-1)
-    return torch.minimum(torch.maximum(unwrapped, lower), upper)

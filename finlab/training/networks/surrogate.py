@@ -11,10 +11,12 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor, nn
 
+from finlab.inference.coordinates import to_normalized
 from finlab.inference.features import raw_features
 from finlab.inference.learned_fin import FORCE_UNIT, REFERENCE
 from finlab.inference.weights import DESCRIPTOR, SurrogateConfig
-from finlab.training.networks.mixture import to_normalized
+from finlab.layout.arrays import force_columns
+from finlab.physics.wrench import wrench_of_forces
 
 
 def mlp(n_in: int, hidden: Sequence[int], n_out: int, activation: type[nn.Module]) -> nn.Sequential:
@@ -31,21 +33,6 @@ def first_layer(net: nn.Sequential) -> nn.Linear:
     layer = net[0]
     assert isinstance(layer, nn.Linear)
     return layer
-
-
-def to_body(force: Tensor, mounting_angle: Tensor) -> Tensor:
-    """Forces (..., 3) from fin frames (shaft, e_h, e_z) to the body frame; angles (...,) [rad]."""
-    c, s = torch.cos(mounting_angle), torch.sin(mounting_angle)
-    shaft, horizontal, vertical = force.unbind(-1)
-    return torch.stack([c * shaft - s * horizontal, s * shaft + c * horizontal, vertical], dim=-1)
-
-
-def sum_wrench(force: Tensor, position: Tensor, mask: Tensor | None = None) -> Tensor:
-    """Wrench (..., 6) of body-frame forces (..., n, 3) at positions (..., n, 3)."""
-    if mask is not None:
-        force = force * mask[..., None]
-    torque = torch.linalg.cross(position.expand_as(force), force)
-    return torch.cat([force.sum(-2), torque.sum(-2)], dim=-1)
 
 
 class CoefficientSurrogate(nn.Module):
@@ -82,8 +69,11 @@ class CoefficientSurrogate(nn.Module):
         mask: Tensor | None = None,
     ) -> Tensor:
         """Wrench (..., 6) of commands (..., n, 3) on layouts broadcastable to them."""
-        force = to_body(self.fin_force(command), mounting_angle)
-        return sum_wrench(force, position, mask)
+        force = self.fin_force(command)
+        if mask is not None:
+            force = force * mask[..., None]
+        wrench: Tensor = wrench_of_forces(force, force_columns(position, mounting_angle))
+        return wrench
 
 
 class MlpSurrogate(nn.Module):
@@ -119,7 +109,10 @@ class MlpSurrogate(nn.Module):
         x = raw_features(position, mounting_angle, lower, upper)
         x = x.expand(*command.shape[:-1], x.shape[-1])
         force = self.net(torch.cat([x, to_normalized(command, lower, upper)], dim=-1)) * FORCE_UNIT
-        wrench = sum_wrench(force, position, mask)
+        if mask is not None:
+            force = force * mask[..., None]
+        # The perceptron speaks in the body frame, that of a fin whose shaft points forward.
+        wrench = wrench_of_forces(force, force_columns(position, torch.zeros_like(mounting_angle)))
         described = self.descriptor(x)
         if mask is not None:
             described = described * mask[..., None]

@@ -10,6 +10,7 @@ import torch
 from finlab.allocation.learned.paper import ADAM_RATE, CHUNK, PaperAllocator
 from finlab.assets import shipped_layouts
 from finlab.errors import AllocationError, CheckpointError
+from finlab.inference.coordinates import to_command, to_normalized
 from finlab.inference.features import SIZES
 from finlab.inference.normalization import Normalization
 from finlab.inference.weights import NetworkConfig, SurrogateConfig
@@ -17,7 +18,6 @@ from finlab.layout import Fin, Layout, Limits, load_layout
 from finlab.physics import Plant
 from finlab.training.networks.allocator_network import AllocatorNetwork
 from finlab.training.networks.checkpoint import Checkpoint
-from finlab.training.networks.mixture import to_command, to_normalized
 from finlab.training.networks.surrogate import make_surrogate
 
 TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]

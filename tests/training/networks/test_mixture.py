@@ -1,13 +1,11 @@
-"""Mixture densities against `torch.distributions`, their samples, coordinates and clamps."""
-
-import math
+"""Mixture densities against `torch.distributions`, and their samples."""
 
 import pytest
 import torch
 from torch import Tensor
 from torch.distributions import Categorical, Independent, MixtureSameFamily, Normal
 
-from finlab.training.networks.mixture import Mixture, clamp_to_limits, to_command, to_normalized, turns_fully
+from finlab.training.networks.mixture import Mixture
 
 B, N, M = 4, 3, 5
 
@@ -134,53 +132,3 @@ def test_the_same_generator_gives_the_same_samples() -> None:
     first, second, other = (mixture.sample(5, 1.0, torch.Generator().manual_seed(seed)) for seed in (4, 4, 5))
     assert torch.equal(first, second)
     assert not torch.equal(first, other)
-
-
-LOWER = torch.tensor([[0.05, 0.1, -math.pi], [0.1, 0.2, 0.5], [0.3, 0.7, -2.5]], dtype=torch.float64)
-UPPER = torch.tensor([[0.6, 2.1, math.pi], [0.5, 1.0, 2.0], [0.3, 0.7, -2.0]], dtype=torch.float64)
-
-
-def test_normalized_coordinates_go_from_minus_one_to_one_and_back() -> None:
-    torch.testing.assert_close(to_normalized(LOWER, LOWER, UPPER)[:2], -torch.ones(2, 3).double())
-    torch.testing.assert_close(to_normalized(UPPER, LOWER, UPPER)[:2], torch.ones(2, 3).double())
-    command = LOWER + 0.3 * (UPPER - LOWER)
-    torch.testing.assert_close(to_command(to_normalized(command, LOWER, UPPER), LOWER, UPPER), command)
-
-
-def test_a_range_of_no_width_normalizes_to_zero() -> None:
-    assert to_normalized(LOWER, LOWER, UPPER)[2, :2].tolist() == [0.0, 0.0]
-
-
-def test_only_a_whole_circle_turns_fully() -> None:
-    assert turns_fully(LOWER, UPPER).tolist() == [True, False, False]
-
-
-@pytest.mark.parametrize(
-    ("fin", "direction", "expected"),
-    [
-        (0, 3.5, 3.5 - 2 * math.pi),  # a full circle: only the turn changes
-        (0, -10.0, -10.0 + 4 * math.pi),
-        (1, 1.2, 1.2),
-        (1, 1.2 - 2 * math.pi, 1.2),
-        (1, 2.4, 2.0),
-        (1, 0.1, 0.5),
-        (1, -2.0, 2.0),  # 2.5 before the start of the arc, but 2.28 after its end
-        (1, -1.0, 0.5),
-        (1, -math.pi + 0.1, 2.0),
-        (2, math.pi, -2.5),  # across the seam, -2.5 is the nearer end of the arc
-        (2, 0.0, -2.0),
-    ],
-)
-def test_directions_are_clamped_as_angles(fin: int, direction: float, expected: float) -> None:
-    command = torch.tensor([0.3, 0.7, direction], dtype=torch.float64)
-    clamped = clamp_to_limits(command, LOWER[fin], UPPER[fin])
-    assert clamped[2].item() == pytest.approx(expected)
-
-
-def test_clamped_commands_keep_their_limits_and_inner_ones_stay() -> None:
-    draw = torch.Generator().manual_seed(0)
-    command = torch.randn(500, 3, 3, generator=draw, dtype=torch.float64) * 5
-    clamped = clamp_to_limits(command, LOWER, UPPER)
-    assert (clamped >= LOWER).all() and (clamped <= UPPER).all()
-    inner = LOWER + torch.rand(500, 3, 3, generator=draw, dtype=torch.float64) * (UPPER - LOWER)
-    torch.testing.assert_close(clamp_to_limits(inner, LOWER, UPPER), inner)

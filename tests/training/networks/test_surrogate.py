@@ -7,18 +7,10 @@ import torch
 from torch import Tensor
 
 from finlab.inference.weights import SurrogateConfig
-from finlab.layout import FinModelSpec
-from finlab.physics import assemble_wrench, make_law
-from finlab.training.networks.surrogate import (
-    CoefficientSurrogate,
-    MlpSurrogate,
-    make_surrogate,
-    sum_wrench,
-    to_body,
-)
+from finlab.physics import body_force
+from finlab.training.networks.surrogate import CoefficientSurrogate, MlpSurrogate, make_surrogate
 
 F64 = torch.float64
-DRAG = make_law(FinModelSpec())
 
 
 def make(kind: str) -> CoefficientSurrogate | MlpSurrogate:
@@ -46,21 +38,12 @@ def robots() -> dict[str, Tensor]:
     }
 
 
-def test_torque_and_rotation_are_those_of_the_physics() -> None:
-    unit = torch.rand(5, 3, 7, generator=torch.Generator().manual_seed(1), dtype=F64)
-    command, position, angle = unit[..., :3], unit[..., 3:6], 6 * unit[..., 6]
-    got = sum_wrench(to_body(DRAG.force(command), angle), position)
-    torch.testing.assert_close(
-        got, assemble_wrench(DRAG, command, position, angle, torch.ones_like(angle) > 0)
-    )
-
-
-def test_a_fin_that_pushes_up_at_the_bow_pitches_up_the_way_the_frame_says() -> None:
-    force = torch.tensor([[0.0, 0.0, 2.0]], dtype=F64)
-    position = torch.tensor([[0.3, 0.1, 0.0]], dtype=F64)
-    torch.testing.assert_close(
-        sum_wrench(force, position), torch.tensor([0.0, 0.0, 2.0, 0.2, -0.6, 0.0], dtype=F64)
-    )
+def test_the_wrench_is_the_sum_of_the_fins_forces_and_torques(robots: dict[str, Tensor]) -> None:
+    surrogate = make("coefficient")
+    assert isinstance(surrogate, CoefficientSurrogate)
+    force = body_force(surrogate.fin_force(robots["command"]), robots["mounting_angle"])
+    torque = torch.linalg.cross(robots["position"], force)
+    torch.testing.assert_close(surrogate(**robots), torch.cat([force.sum(1), torque.sum(1)], dim=-1))
 
 
 def test_turning_the_robot_turns_the_wrench(robots: dict[str, Tensor]) -> None:
