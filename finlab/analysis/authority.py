@@ -178,7 +178,8 @@ def model_error(layout: Layout, failed: Collection[str] = ()) -> Array:
     """
     sets = fin_sets(layout, failed)
     off = np.array([law.minimum + law.spread for law in thrust_laws(layout)]) * (sets.radius[0] > 0.0)
-    return (np.linalg.norm(sets.columns[0], axis=1) * off[:, None]).sum(axis=0) * SCALE
+    lever = np.linalg.norm(sets.columns[0], axis=1)
+    return np.asarray((lever * off[:, None]).sum(axis=0) * SCALE)
 
 
 def _floats(values: Array) -> tuple[float, ...]:

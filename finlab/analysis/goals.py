@@ -85,7 +85,8 @@ def _after_worst_failure(of_rest: Goal) -> Goal:
         robots, n = sets.radius.shape
         rows = sets.repeat(n)
         rows.radius[np.arange(robots * n), np.tile(np.arange(n), robots)] = 0.0
-        return of_rest(rows).reshape(robots, n).min(axis=1)
+        least: Array = of_rest(rows).reshape(robots, n).min(axis=1)
+        return least
 
     return goal
 

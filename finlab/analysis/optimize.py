@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import Bounds as Box
 from scipy.optimize import differential_evolution
 
 from finlab.analysis.goals import MISSION, Goal, make_goal
@@ -144,7 +145,7 @@ def _search(
         best = max(best, float(fine.max())) if len(fine) else best
         return np.asarray(-value + PENALTY * close)
 
-    def after_round(vector: Array, convergence: float = 0.0) -> bool:
+    def after_round(vector: Array, convergence: float) -> bool:
         nonlocal done, stopped
         done += 1
         if progress is not None:
@@ -153,8 +154,8 @@ def _search(
         return stopped
 
     result = differential_evolution(
-        cost,
-        np.stack([moves.lower, moves.upper], axis=1),
+        cost,  # type: ignore[arg-type]  # of all vectors at once, since it is vectorized
+        Box(moves.lower, moves.upper),
         x0=moves.start,
         popsize=max(4, -(-24 // len(moves.start))),
         maxiter=rounds,
@@ -163,7 +164,7 @@ def _search(
         polish=False,
         vectorized=True,
         updating="deferred",
-        callback=after_round,
+        callback=after_round,  # type: ignore[arg-type]  # True stops it
     )
     return result.x, stopped
 
@@ -171,4 +172,4 @@ def _search(
 def _gaps(position: Array) -> Array:
     """Distances (P, pairs) [m] between the fins at positions (P, n, 3)."""
     first, second = np.triu_indices(position.shape[1], k=1)
-    return np.linalg.norm(position[:, first] - position[:, second], axis=-1)
+    return np.asarray(np.linalg.norm(position[:, first] - position[:, second], axis=-1))

@@ -1,7 +1,7 @@
 """YAML layout files: untrusted text to plain values, and values to text people like to edit."""
 
 import re
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import yaml
 
@@ -12,8 +12,10 @@ MAX_EVENTS = 30_000
 MAX_DEPTH = 20
 """Deepest nesting; a layout needs five levels."""
 
-# libyaml's parser is ten times as fast, but PyYAML may have been built without it.
-_Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+if TYPE_CHECKING:
+    _Base = yaml.SafeLoader
+else:  # libyaml's parser is ten times as fast, but PyYAML may have been built without it
+    _Base = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 class _Loader(_Base):

@@ -181,7 +181,7 @@ class ClosedLoop:
         self._ticks.append(tick)
         return tick
 
-    def run(self, progress: Callable[[float], None] | None = None) -> RunLog:
+    def run(self, progress: Callable[[float], object] | None = None) -> RunLog:
         """Swims to the end of the task.
 
         Args:
