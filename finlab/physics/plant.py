@@ -126,7 +126,7 @@ class Plant:
             )
         if np.isfinite(values).all():
             return values, None
-        failed = np.isnan(values).all(axis=-1)
+        failed: NDArray[np.bool_] = np.asarray(np.isnan(values).all(axis=-1))
         values = np.where(failed[..., None], 0.0, values)
         if not np.isfinite(values).all():
             raise CommandError(
