@@ -144,6 +144,7 @@ def _models(rng: np.random.Generator, table: str | None) -> Sequence[FinModelSpe
         FinModelSpec(),
         FinModelSpec("drag", (("area", 0.04 * large), ("lever", 0.1 * large))),
         FinModelSpec("lighthill", (("length", 0.2 * large), ("width", 0.1 * large))),
+        FinModelSpec("soft", (("k", 8.0 * large),)),
     ]
     if table is not None:
         kinds.append(FinModelSpec("table", (("path", table),)))

@@ -8,6 +8,7 @@ variable there and the rest of the step is solved anew.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -22,9 +23,6 @@ Mask = NDArray[np.bool_]
 
 HELD = 1e30
 """Damping that keeps a variable where it is."""
-MIN_DAMPING, MAX_DAMPING = 1e-12, 1e9
-PASSES = 2
-"""Times a step is solved: once freely, then with the limits it crossed."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +39,17 @@ class DescentOptions:
     """A row whose objective is below, or whose step lowers it by less than this share of itself, is done."""
     energy_weights: EnergyWeights = DEFAULT_WEIGHTS
     """Weights within the energy proxy."""
+    least_damping: float = 1e-12
+    """Least damping, absolute."""
+    least_relative_damping: float = 1e-13
+    """Least damping relative to a row's squared derivatives: less would leave systems singular to rounding
+    where fins are strong and levers long."""
+    largest_damping: float = 1e9
+    """A row whose damping is larger is done: no step in any direction helps."""
+    damping_factors: tuple[float, float] = (0.2, 6.0)
+    """Factor of the damping after a step that lowers the objective, and after one that does not."""
+    passes: int = 2
+    """Times a step is solved: once freely, then with the limits it crossed."""
 
 
 class Descent(NamedTuple):
@@ -54,7 +63,14 @@ class Descent(NamedTuple):
     """J (B,)."""
 
 
-def descend(plant: Plant, start: Array, target: Array, sigma: Array, options: DescentOptions) -> Descent:
+def descend(
+    plant: Plant,
+    start: Array,
+    target: Array,
+    sigma: Array,
+    options: DescentOptions,
+    is_over: Callable[[], bool] = lambda: False,
+) -> Descent:
     """Minimize J from B start commands.
 
     Args:
@@ -63,18 +79,20 @@ def descend(plant: Plant, start: Array, target: Array, sigma: Array, options: De
         target: desired wrench of each row (B, 6).
         sigma: per-axis standard deviation (6,).
         options: see `DescentOptions`.
+        is_over: says when to stop with the best commands so far.
     """
     energy = _EnergyForm(plant, options)
     command = plant.feasible(start)
     wrench, slope = plant.linearize(command)
     objective = _objective(plant, command, wrench, target, sigma, options)
-    damping = options.damping * (1.0 + objective)
-    busy = np.arange(len(command))
     slope = slope * energy.width / sigma[:, None]
+    largest = options.largest_damping
+    damping = np.minimum(np.maximum(options.damping * (1.0 + objective), _least(slope, options)), largest)
+    busy = np.arange(len(command))
     for _ in range(options.n_steps):
         residual = (wrench[busy] - target[busy]) / sigma
         position = (command[busy] - plant.lower) / energy.safe_width
-        step = _clamped_step(position, residual, slope[busy], damping[busy], energy, plant)
+        step = _clamped_step(position, residual, slope[busy], damping[busy], energy, plant, options.passes)
         trial = plant.feasible(command[busy] + (step * energy.width).reshape(-1, plant.n_fins, 3))
         trial_wrench, trial_slope = plant.linearize(trial)
         trial_objective = _objective(plant, trial, trial_wrench, target[busy], sigma, options)
@@ -84,12 +102,19 @@ def descend(plant: Plant, start: Array, target: Array, sigma: Array, options: De
         command[rows], wrench[rows] = trial[better], trial_wrench[better]
         slope[rows] = trial_slope[better] * energy.width / sigma[:, None]
         objective[rows] = trial_objective[better]
-        damping[busy] = np.clip(damping[busy] * np.where(better, 0.2, 6.0), MIN_DAMPING, MAX_DAMPING)
+        changed = damping[busy] * np.where(better, *options.damping_factors)
+        damping[busy] = np.minimum(np.maximum(changed, _least(slope[busy], options)), largest)
         settled = better & (gain <= options.tolerance * np.maximum(objective[busy], options.tolerance))
-        busy = busy[~settled & (objective[busy] > options.tolerance**2) & (damping[busy] < MAX_DAMPING)]
-        if not len(busy):
+        busy = busy[~settled & (objective[busy] > options.tolerance**2) & (damping[busy] < largest)]
+        if not len(busy) or is_over():
             break
     return Descent(command, wrench, objective)
+
+
+def _least(slope: Array, options: DescentOptions) -> Array:
+    """Least damping (B,) of rows with these derivatives (B, 6, 3 n)."""
+    squared: Array = np.einsum("bij,bij->b", slope, slope)
+    return np.maximum(options.least_damping, options.least_relative_damping * squared)
 
 
 class _EnergyForm:
@@ -137,7 +162,13 @@ class _EnergyForm:
 
 
 def _clamped_step(
-    position: Array, residual: Array, slope: Array, damping: Array, energy: _EnergyForm, plant: Plant
+    position: Array,
+    residual: Array,
+    slope: Array,
+    damping: Array,
+    energy: _EnergyForm,
+    plant: Plant,
+    passes: int,
 ) -> Array:
     """The damped step (B, 3 n) in positions, with variables fixed at the limits that it would cross."""
     shape = position.shape
@@ -149,7 +180,7 @@ def _clamped_step(
     held = ((at_low & (gradient > 0)) | (at_high & (gradient < 0))) & ~free_turn
     moved = np.zeros(shape)
     low, high = np.where(free_turn, -0.5, -position), np.where(free_turn, 0.5, 1 - position)
-    for _ in range(PASSES):
+    for _ in range(passes):
         step = np.where(held, moved, _damped_step(residual, slope, pull, damping, held, energy))
         bounded = np.clip(step, low, high)
         crossing = (bounded != step) & ~free_turn & ~held

@@ -7,19 +7,41 @@ after a finite number of steps; tests compare it with SciPy's active-set solver 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-MAX_STEPS = 60
-TOLERANCE = 1e-10
-"""Largest projected gradient, relative to the size of the gradient at zero, of a solved problem."""
-SEARCH_HALVINGS = 40
-SUFFICIENT_DECREASE = 1e-4
+
+@dataclass(frozen=True)
+class BoxSettings:
+    """How exactly the programs are solved."""
+
+    max_steps: int = 60
+    """Most projected Newton steps; a dozen are usual."""
+    tolerance: float = 1e-10
+    """Largest projected gradient, relative to the size of the gradient at zero, of a solved problem."""
+    halvings: int = 40
+    """Most halvings of a step: beyond them it is as short as rounding."""
+    sufficient_decrease: float = 1e-4
+    """Share of the first-order decrease that a step must reach (Armijo's rule)."""
 
 
-def solve_box_quadratics(hessian: Array, gradient: Array, lower: Array, upper: Array) -> Array:
+EXACTLY = BoxSettings()
+"""To rounding."""
+
+
+def solve_box_quadratics(
+    hessian: Array,
+    gradient: Array,
+    lower: Array,
+    upper: Array,
+    settings: BoxSettings = EXACTLY,
+    is_over: Callable[[], bool] = lambda: False,
+) -> Array:
     """Minimize `0.5 x' H x + g' x` subject to `lower <= x <= upper`, for B problems of m variables.
 
     Args:
@@ -27,6 +49,8 @@ def solve_box_quadratics(hessian: Array, gradient: Array, lower: Array, upper: A
         gradient: g (B, m).
         lower: (B, m), not above `upper`.
         upper: (B, m).
+        settings: how exactly.
+        is_over: says when to stop with what there is.
 
     Returns:
         x (B, m), within the limits exactly.
@@ -35,12 +59,12 @@ def solve_box_quadratics(hessian: Array, gradient: Array, lower: Array, upper: A
     scale = np.maximum(np.abs(gradient).max(axis=1), 1e-300)
     busy = np.arange(len(x))
     identity = np.eye(gradient.shape[1])
-    for _ in range(MAX_STEPS):
+    for _ in range(settings.max_steps):
         h, low, high, at = hessian[busy], lower[busy], upper[busy], x[busy]
         slope = np.einsum("bij,bj->bi", h, at) + gradient[busy]
         projected = at - np.clip(at - slope, low, high)
-        unsolved = np.abs(projected).max(axis=1) > TOLERANCE * np.minimum(scale[busy], 1.0)
-        if not unsolved.any():
+        unsolved = np.abs(projected).max(axis=1) > settings.tolerance * np.minimum(scale[busy], 1.0)
+        if not unsolved.any() or is_over():
             break
         busy, h, low, high = busy[unsolved], h[unsolved], low[unsolved], high[unsolved]
         at, slope = at[unsolved], slope[unsolved]
@@ -49,11 +73,13 @@ def solve_box_quadratics(hessian: Array, gradient: Array, lower: Array, upper: A
         free_slope = np.where(held, 0.0, slope)
         reduced = np.where(pair_free, h, identity)
         step = -np.linalg.solve(reduced, free_slope[..., None])[..., 0]
-        x[busy] = _search(h, slope, at, step, low, high)
+        x[busy] = _search(h, slope, at, step, low, high, settings)
     return x
 
 
-def _search(h: Array, slope: Array, at: Array, step: Array, low: Array, high: Array) -> Array:
+def _search(
+    h: Array, slope: Array, at: Array, step: Array, low: Array, high: Array, settings: BoxSettings
+) -> Array:
     """The first point on the projected path `clip(at + t step)`, t = 1, 1/2, ..., that falls enough.
 
     Where none does, because a variable that is only just free blocks the way, a projected gradient step,
@@ -63,12 +89,12 @@ def _search(h: Array, slope: Array, at: Array, step: Array, low: Array, high: Ar
     best = np.clip(at - slope / lipschitz, low, high)
     pending = np.arange(len(at))
     length = 1.0
-    for _ in range(SEARCH_HALVINGS):
+    for _ in range(settings.halvings):
         trial = np.clip(at[pending] + length * step[pending], low[pending], high[pending])
         move = trial - at[pending]
         linear = np.einsum("bi,bi->b", slope[pending], move)
         change = linear + 0.5 * np.einsum("bi,bij,bj->b", move, h[pending], move)
-        good = (change <= SUFFICIENT_DECREASE * linear) & (linear < 0)
+        good = (change <= settings.sufficient_decrease * linear) & (linear < 0)
         best[pending[good]] = trial[good]
         pending = pending[~good]
         if not len(pending):

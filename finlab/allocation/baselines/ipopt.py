@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.baselines.model_based import CACHE_SIZE, ENERGY_TRADEOFF
+from finlab.allocation.baselines.model_based import CACHE_SIZE, ENERGY_TRADEOFF, TIME_LIMIT_S
 from finlab.allocation.baselines.single_target import DEFAULT_STARTS, Problem, SingleTarget
 from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
@@ -36,6 +36,7 @@ class Ipopt(SingleTarget):
     Args:
         normalization: sigma scales the error.
         n_starts: uniform random starts per target.
+        time_limit_s: processor time per target after which no start begins; each may take half as long.
 
     Raises:
         AllocationError: CasADi is not installed.
@@ -43,8 +44,14 @@ class Ipopt(SingleTarget):
 
     name = "ipopt"
 
-    def __init__(self, normalization: Normalization, *, n_starts: int = DEFAULT_STARTS) -> None:
-        super().__init__(normalization, n_starts=n_starts)
+    def __init__(
+        self,
+        normalization: Normalization,
+        *,
+        n_starts: int = DEFAULT_STARTS,
+        time_limit_s: float = TIME_LIMIT_S,
+    ) -> None:
+        super().__init__(normalization, n_starts=n_starts, time_limit_s=time_limit_s)
         self._casadi = import_casadi()
         self._solver = lru_cache(CACHE_SIZE)(self._build)
 
@@ -62,7 +69,8 @@ class Ipopt(SingleTarget):
         command, target, residual, energy = self._formulas(plant)
         objective = self._casadi.sumsqr(residual) + ENERGY_TRADEOFF * energy
         program = {"x": command, "p": target, "f": objective}
-        return self._casadi.nlpsol("allocation", "ipopt", program, SOLVER_OPTIONS)
+        options = SOLVER_OPTIONS | {"ipopt.max_cpu_time": 0.5 * self.time_limit_s}
+        return self._casadi.nlpsol("allocation", "ipopt", program, options)
 
     def _formulas(self, plant: Plant) -> tuple[Any, Any, Any, Any]:
         """Symbolic command (3n), target (6), normalized error (6) and energy."""

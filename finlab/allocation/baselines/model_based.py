@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from abc import abstractmethod
 
 import numpy as np
@@ -9,6 +11,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.solution import Solution
+from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
 from finlab.physics import Plant, plant_of
@@ -18,8 +21,34 @@ Array = NDArray[np.float64]
 
 ENERGY_TRADEOFF = 1e-4
 """Weight of the energy proxy beside the squared normalized error where a method weighs the two."""
+TIME_LIMIT_S = 0.6
+"""Processor time [s] that a slow method takes for one target unless set otherwise: with what a call does
+besides, less than a second."""
 CACHE_SIZE = 64
 """Layouts whose prepared quantities a method keeps; a control loop asks for the same one again and again."""
+
+
+class TimeLimit:
+    """Processor time of this thread, which other work on the machine does not shorten.
+
+    Args:
+        seconds: how long from now; None for as long as it takes.
+    """
+
+    def __init__(self, seconds: float | None = None) -> None:
+        self._end = math.inf if seconds is None else time.thread_time() + seconds
+
+    @property
+    def over(self) -> bool:
+        """Whether the time is up."""
+        return time.thread_time() > self._end
+
+
+def check_time_limit(seconds: float) -> float:
+    """A time limit as a setting; `AllocationError` where there is no time at all."""
+    if not seconds > 0.0:
+        raise AllocationError(f"time_limit_s: expected a number of seconds above 0, got {seconds}")
+    return float(seconds)
 
 
 class ModelBased(Allocator):

@@ -6,7 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.baselines.actuation_descent import DescentOptions, descend
-from finlab.allocation.baselines.model_based import ENERGY_TRADEOFF, ModelBased
+from finlab.allocation.baselines.model_based import (
+    ENERGY_TRADEOFF,
+    TIME_LIMIT_S,
+    ModelBased,
+    TimeLimit,
+    check_time_limit,
+)
 from finlab.inference.normalization import Normalization
 from finlab.physics import Plant
 
@@ -28,6 +34,7 @@ class Multistart(ModelBased):
         n_candidates: random commands per target.
         n_steps: most refinement steps of each.
         energy_tradeoff: w of the energy proxy beside the squared normalized error.
+        time_limit_s: processor time per target after which the best command so far is the answer.
     """
 
     name = "multistart"
@@ -39,24 +46,28 @@ class Multistart(ModelBased):
         n_candidates: int = 16,
         n_steps: int = 20,
         energy_tradeoff: float = ENERGY_TRADEOFF,
+        time_limit_s: float = TIME_LIMIT_S,
     ) -> None:
         super().__init__(normalization)
         self.n_candidates, self.n_steps, self.energy_tradeoff = n_candidates, n_steps, energy_tradeoff
+        self.time_limit_s = check_time_limit(time_limit_s)
         self._descent = DescentOptions(n_steps=n_steps, energy_tradeoff=energy_tradeoff)
 
     def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
         start = plant.sample(np.random.default_rng(seed), (self.n_candidates,))
         size = max(1, CHUNK_ROWS // self.n_candidates)
+        limit = TimeLimit(self.time_limit_s * len(targets))
         parts = [
-            self._best(plant, start, targets[first : first + size]) for first in range(0, len(targets), size)
+            self._best(plant, start, targets[first : first + size], limit)
+            for first in range(0, len(targets), size)
         ]
         return np.concatenate(parts) if parts else np.empty((0, plant.n_fins, 3))
 
-    def _best(self, plant: Plant, start: Array, targets: Array) -> Array:
+    def _best(self, plant: Plant, start: Array, targets: Array, limit: TimeLimit) -> Array:
         sigma, n_targets = self.normalization.std, len(targets)
         starts = np.tile(start, (n_targets, 1, 1))
         repeated = np.repeat(targets, len(start), axis=0)
-        refined = descend(plant, starts, repeated, sigma, self._descent)
+        refined = descend(plant, starts, repeated, sigma, self._descent, lambda: limit.over)
         winner = refined.objective.reshape(n_targets, -1).argmin(axis=1)
         command = refined.command.reshape(n_targets, len(start), -1, 3)[np.arange(n_targets), winner]
-        return descend(plant, command, targets, sigma, POLISH).command
+        return descend(plant, command, targets, sigma, POLISH, lambda: limit.over).command

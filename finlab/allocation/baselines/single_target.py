@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.baselines.model_based import ENERGY_TRADEOFF, ModelBased
+from finlab.allocation.baselines.model_based import (
+    ENERGY_TRADEOFF,
+    TIME_LIMIT_S,
+    ModelBased,
+    TimeLimit,
+    check_time_limit,
+)
 from finlab.inference.normalization import Normalization
 from finlab.physics import Plant
 from finlab.physics.energy import DEFAULT_WEIGHTS, energy_scale
@@ -18,6 +25,10 @@ DEFAULT_STARTS = 8
 """Random starts per target unless told otherwise."""
 
 
+class OutOfTime(Exception):
+    """Ends a solver whose time is up, from within the function that it minimizes."""
+
+
 class Problem:
     """One target on one layout, over the commands that have a range at all, as positions in 0..1.
 
@@ -25,9 +36,12 @@ class Problem:
         plant: the robot.
         target: desired wrench (6,).
         sigma: per-axis standard deviation (6,).
+        limit: when to stop.
     """
 
-    def __init__(self, plant: Plant, target: Array, sigma: Array) -> None:
+    def __init__(self, plant: Plant, target: Array, sigma: Array, limit: TimeLimit | None = None) -> None:
+        self.limit = TimeLimit() if limit is None else limit
+        self._best: tuple[float, Array | None] = (np.inf, None)
         self.plant, self.target, self.sigma = plant, target, sigma
         self.free = plant.width.ravel() > 0
         self.n_free = int(self.free.sum())
@@ -44,8 +58,10 @@ class Problem:
         return ((command - self.plant.lower).ravel()[self.free]) / self.plant.width.ravel()[self.free]
 
     def residual(self, x: Array) -> Array:
-        """Normalized error (6,)."""
-        return (self.plant.wrench(self.command(x)) - self.target) / self.sigma
+        """Normalized error (6,); `OutOfTime` where the time is up."""
+        error = (self.plant.wrench(self.command(x)) - self.target) / self.sigma
+        self._keep(x, float(error @ error))
+        return error
 
     def residual_slope(self, x: Array) -> Array:
         """Derivative (6, n_free) of `residual`."""
@@ -53,7 +69,7 @@ class Problem:
         return (jacobian * self.plant.width.ravel() / self.sigma[:, None])[:, self.free]
 
     def objective(self, x: Array) -> tuple[float, Array]:
-        """`err_norm^2 + ENERGY_TRADEOFF * J_en` and its gradient (n_free,)."""
+        """`err_norm^2 + ENERGY_TRADEOFF * J_en` and its gradient (n_free,); may raise `OutOfTime`."""
         command = self.command(x)
         wrench, jacobian = self.plant.linearize(command)
         residual = (wrench - self.target) / self.sigma
@@ -63,10 +79,27 @@ class Problem:
         half = diagonal * share
         half[:, :2] += weights.product / 2 * share[:, 1::-1]
         value = float(residual @ residual + ENERGY_TRADEOFF * (half * share).sum())
+        self._keep(x, value)
         by_command = (
             2 * (residual / self.sigma) @ jacobian + 2 * ENERGY_TRADEOFF * (half / self._scale).ravel()
         )
         return value, (by_command * self.plant.width.ravel())[self.free]
+
+    def minimized(self, solver: Callable[[Problem, Array], Array], start: Array) -> Array:
+        """Positions (n_free,) where a solver ends from a start (n_free,); the best so far if time ends it."""
+        self._best = (np.inf, start)
+        try:
+            return solver(self, start)
+        except OutOfTime:
+            assert self._best[1] is not None
+            return self._best[1]
+
+    def _keep(self, x: Array, value: float) -> None:
+        """Remember the best positions; end the solver when the time is up."""
+        if value < self._best[0]:
+            self._best = (value, np.array(x))
+        if self.limit.over:
+            raise OutOfTime
 
 
 class SingleTarget(ModelBased):
@@ -75,11 +108,19 @@ class SingleTarget(ModelBased):
     Args:
         normalization: sigma scales the error.
         n_starts: uniform random starts per target.
+        time_limit_s: processor time per target after which the best command so far is the answer.
     """
 
-    def __init__(self, normalization: Normalization, *, n_starts: int = DEFAULT_STARTS) -> None:
+    def __init__(
+        self,
+        normalization: Normalization,
+        *,
+        n_starts: int = DEFAULT_STARTS,
+        time_limit_s: float = TIME_LIMIT_S,
+    ) -> None:
         super().__init__(normalization)
         self.n_starts = n_starts
+        self.time_limit_s = check_time_limit(time_limit_s)
 
     @abstractmethod
     def _minimize(self, problem: Problem, start: Array) -> Array:
@@ -89,15 +130,16 @@ class SingleTarget(ModelBased):
         starts = plant.sample(np.random.default_rng(seed), (self.n_starts,))
         result = np.empty((len(targets), plant.n_fins, 3))
         for i, target in enumerate(targets):
-            problem = Problem(plant, target, self.normalization.std)
+            problem = Problem(plant, target, self.normalization.std, TimeLimit(self.time_limit_s))
             if problem.n_free == 0:
                 result[i] = plant.lower
                 continue
-            ends = np.array([self._end(problem, start) for start in starts])
-            result[i] = ends[self._objective(plant, ends, target).argmin()]
+            ends = [self._end(problem, starts[0])]
+            ends += [self._end(problem, start) for start in starts[1:] if not problem.limit.over]
+            result[i] = ends[self._objective(plant, np.array(ends), target).argmin()]
         return result
 
     def _end(self, problem: Problem, start: Array) -> Array:
         """The command (n, 3) a solver ends at, or the start itself where it breaks down."""
-        end = problem.command(self._minimize(problem, problem.position(start)))
+        end = problem.command(problem.minimized(self._minimize, problem.position(start)))
         return problem.plant.feasible(end) if np.isfinite(end).all() else start

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from finlab.allocation.baselines.model_based import TIME_LIMIT_S
 from finlab.allocation.baselines.single_target import DEFAULT_STARTS, Problem, SingleTarget
 from finlab.inference.normalization import Normalization
 
@@ -21,14 +22,20 @@ class Slsqp(SingleTarget):
         normalization: sigma scales the error.
         n_starts: uniform random starts per target.
         max_iterations: most iterations per start.
+        time_limit_s: processor time per target after which the best command so far is the answer.
     """
 
     name = "slsqp"
 
     def __init__(
-        self, normalization: Normalization, *, n_starts: int = DEFAULT_STARTS, max_iterations: int = 200
+        self,
+        normalization: Normalization,
+        *,
+        n_starts: int = DEFAULT_STARTS,
+        max_iterations: int = 200,
+        time_limit_s: float = TIME_LIMIT_S,
     ) -> None:
-        super().__init__(normalization, n_starts=n_starts)
+        super().__init__(normalization, n_starts=n_starts, time_limit_s=time_limit_s)
         self.max_iterations = max_iterations
 
     def _minimize(self, problem: Problem, start: Array) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.baselines.box_least_squares import solve_box_quadratics
-from finlab.allocation.baselines.model_based import ModelBased
+from finlab.allocation.baselines.model_based import TIME_LIMIT_S, ModelBased, TimeLimit, check_time_limit
 from finlab.inference.normalization import Normalization
 from finlab.physics import Plant
 
@@ -16,6 +16,9 @@ CHUNK = 2048
 """Rows stepped together; more would not fit the caches."""
 SOLVED = 1e-8
 """Normalized error at which a row stops."""
+RIDGE = 1e-13
+"""Least weight of a step's length, relative to the squared derivatives: that the quadratic programs have one
+solution must not be lost to rounding where fins are strong."""
 
 
 class Sqp(ModelBased):
@@ -30,6 +33,7 @@ class Sqp(ModelBased):
         n_steps: most steps per start.
         n_starts: starts per target.
         regularization: weight of a step's length, as a share of the squared error at the iterate.
+        time_limit_s: processor time per target after which the best command so far is the answer.
     """
 
     name = "sqp"
@@ -41,13 +45,16 @@ class Sqp(ModelBased):
         n_steps: int = 30,
         n_starts: int = 4,
         regularization: float = 1e-4,
+        time_limit_s: float = TIME_LIMIT_S,
     ) -> None:
         super().__init__(normalization)
         self.n_steps = n_steps
         self.n_starts = n_starts
         self.regularization = regularization
+        self.time_limit_s = check_time_limit(time_limit_s)
 
     def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
+        limit = TimeLimit(self.time_limit_s * len(targets))
         best = np.empty((len(targets), plant.n_fins, 3))
         error = np.full(len(targets), np.inf)
         middle = (plant.lower + plant.upper) / 2
@@ -56,14 +63,14 @@ class Sqp(ModelBased):
             for first in range(0, len(targets), CHUNK):
                 rows = np.arange(first, min(first + CHUNK, len(targets)))
                 rows = rows[error[rows] > SOLVED]
-                if not len(rows):
+                if not len(rows) or (limit.over and start is not middle):
                     continue
-                command, reached = self._descend(plant, start, targets[rows])
+                command, reached = self._descend(plant, start, targets[rows], limit)
                 better = reached < error[rows]
                 best[rows[better]], error[rows[better]] = command[better], reached[better]
         return best
 
-    def _descend(self, plant: Plant, start: Array, targets: Array) -> tuple[Array, Array]:
+    def _descend(self, plant: Plant, start: Array, targets: Array, limit: TimeLimit) -> tuple[Array, Array]:
         """Where one start (n, 3) ends for each target (B, 6), and the normalized error (B,) there."""
         sigma, width = self.normalization.std, plant.width.ravel()
         command = np.tile(start, (len(targets), 1, 1))
@@ -71,7 +78,7 @@ class Sqp(ModelBased):
         error = self.normalization.error(plant.wrench(command), targets)
         for _ in range(self.n_steps):
             busy = busy[error[busy] > SOLVED]
-            if not len(busy):
+            if not len(busy) or limit.over:
                 break
             at = command[busy]
             wrench, jacobian = plant.linearize(at)
@@ -79,11 +86,13 @@ class Sqp(ModelBased):
             slope = jacobian * width / sigma[:, None]
             hessian = slope.transpose(0, 2, 1) @ slope
             diagonal = np.arange(len(width))
-            weight = np.maximum(self.regularization * error[busy] ** 2, 1e-12)
+            least = 1e-12 + RIDGE * np.einsum("bij,bij->b", slope, slope)
+            weight = np.maximum(self.regularization * error[busy] ** 2, least)
             hessian[:, diagonal, diagonal] += weight[:, None]
             gradient = np.einsum("bij,bi->bj", slope, residual)
             low, high = self._room(plant, at)
-            step = solve_box_quadratics(hessian, gradient, low, high).reshape(at.shape) * plant.width
+            step = solve_box_quadratics(hessian, gradient, low, high, is_over=lambda: limit.over)
+            step = step.reshape(at.shape) * plant.width
             moved = self._search(plant, command, error, targets, busy, step)
             busy = busy[moved]
         return command, error

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from finlab.allocation.baselines.model_based import TIME_LIMIT_S
 from finlab.allocation.baselines.single_target import DEFAULT_STARTS, Problem, SingleTarget
 from finlab.inference.normalization import Normalization
 
@@ -24,14 +25,20 @@ class Trf(SingleTarget):
         normalization: sigma scales the error.
         n_starts: uniform random starts per target.
         max_evaluations: most evaluations of the error per start.
+        time_limit_s: processor time per target after which the best command so far is the answer.
     """
 
     name = "trf"
 
     def __init__(
-        self, normalization: Normalization, *, n_starts: int = DEFAULT_STARTS, max_evaluations: int = 100
+        self,
+        normalization: Normalization,
+        *,
+        n_starts: int = DEFAULT_STARTS,
+        max_evaluations: int = 100,
+        time_limit_s: float = TIME_LIMIT_S,
     ) -> None:
-        super().__init__(normalization, n_starts=n_starts)
+        super().__init__(normalization, n_starts=n_starts, time_limit_s=time_limit_s)
         self.max_evaluations = max_evaluations
 
     def _minimize(self, problem: Problem, start: Array) -> Array:

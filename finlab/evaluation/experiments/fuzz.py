@@ -21,9 +21,8 @@ from finlab.errors import FinlabError
 from finlab.evaluation.hostile_cases import hostile_robot, hostile_targets
 from finlab.evaluation.method_specs import is_slow
 from finlab.evaluation.statistics.tables import text_table
-from finlab.layout import Layout
-from finlab.physics import Drag
-from finlab.physics.table import write_table
+from finlab.layout import FinModelSpec, Layout
+from finlab.physics import make_law, write_table
 
 Array = NDArray[np.float64]
 
@@ -203,5 +202,5 @@ def _force_table(folder: Path) -> str:
     """Path of a small table of a drag fin's forces."""
     path = folder / "forces.csv"
     axes = np.linspace(0.0, 0.6, 7), np.linspace(0.0, 2.1, 6), np.linspace(-np.pi, np.pi, 13)
-    write_table(path, Drag(), *axes)
+    write_table(path, make_law(FinModelSpec()), *axes)
     return str(path)

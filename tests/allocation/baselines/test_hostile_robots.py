@@ -1,0 +1,84 @@
+"""The model-based methods on strong fins and long levers, and what they answer when their time is up."""
+
+import time
+import warnings
+
+import numpy as np
+import pytest
+
+from finlab.allocation import Allocator
+from finlab.allocation.baselines.box_least_squares import solve_box_quadratics
+from finlab.allocation.baselines.multistart import Multistart
+from finlab.allocation.baselines.slsqp import Slsqp
+from finlab.allocation.baselines.sqp import Sqp
+from finlab.allocation.baselines.trf import Trf
+from finlab.errors import AllocationError
+from finlab.inference.normalization import Normalization
+from finlab.layout import Fin, FinModelSpec, Layout, Limits
+from finlab.physics import Plant
+
+NORMALIZATION = Normalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35]))
+SLOW = {"sqp": Sqp, "trf": Trf, "slsqp": Slsqp, "multistart": Multistart}
+
+
+def strong(n_fins: int, angle: float = 1.0) -> Layout:
+    """Fins of thousands of newton at one place, 9 m from the centre of gravity."""
+    limits = Limits((0.0, 1.5), (0.0, 20.0))
+    model = FinModelSpec("drag", (("area", 0.2), ("lever", 0.5)))
+    return Layout(
+        "strong", tuple(Fin(f"f{i}", (8.0, 5.0, 1.0), 0.3 + angle * i, limits, model) for i in range(n_fins))
+    )
+
+
+@pytest.mark.parametrize("method", ["sqp", "multistart"])
+@pytest.mark.parametrize("layout", [strong(1), strong(2, 0.0), strong(4)], ids=["one", "twins", "four"])
+def test_strong_fins_on_long_levers_are_no_singular_problem(method: str, layout: Layout) -> None:
+    targets = np.concatenate(
+        [np.random.default_rng(0).normal(size=(4, 6)) * 10.0**k for k in range(-12, 7, 3)]
+    )
+    targets = np.concatenate(
+        [targets, Plant(layout).wrench(Plant(layout).sample(np.random.default_rng(1), (4,)))]
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        command = SLOW[method](NORMALIZATION).allocate_batch(layout, np.clip(targets, -1e6, 1e6)).command
+    assert ((command >= layout.lower) & (command <= layout.upper)).all()
+
+
+def many_fins() -> tuple[Layout, np.ndarray]:
+    """A robot on which every one of the methods takes long, and a wrench out of its reach."""
+    arc = Limits((0.05, 0.6), (0.1, 2.1), (-1.0, 0.5))
+    rng = np.random.default_rng(0)
+    fins = (
+        Fin(f"f{i}", tuple(rng.uniform(-0.3, 0.3, 3).tolist()), float(rng.uniform(-3, 3)), arc)
+        for i in range(16)
+    )
+    return Layout("many", tuple(fins)), np.array([30.0, -20.0, 40.0, 3.0, -4.0, 5.0])
+
+
+@pytest.mark.parametrize("method", list(SLOW))
+def test_when_the_time_is_up_the_best_so_far_is_the_answer(method: str) -> None:
+    layout, target = many_fins()
+    kind: type[Allocator] = SLOW[method]
+    start = time.thread_time()
+    hasty = kind(NORMALIZATION, time_limit_s=1e-6).allocate(layout, target)
+    assert time.thread_time() - start < 0.3
+    assert ((hasty.command >= layout.lower) & (hasty.command <= layout.upper)).all()
+    patient = kind(NORMALIZATION, time_limit_s=60.0).allocate(layout, target)
+    assert patient.err_norm < hasty.err_norm
+
+
+@pytest.mark.parametrize("method", list(SLOW))
+def test_a_time_limit_is_a_time(method: str) -> None:
+    with pytest.raises(AllocationError, match="time_limit_s: expected a number of seconds above 0, got 0"):
+        SLOW[method](NORMALIZATION, time_limit_s=0.0)
+
+
+def test_box_quadratics_stop_where_they_are_told_to() -> None:
+    rng = np.random.default_rng(0)
+    matrix = rng.normal(size=(3, 12, 12))
+    hessian, gradient = matrix @ matrix.swapaxes(1, 2), rng.normal(size=(3, 12))
+    lower, upper = np.full((3, 12), -0.1), np.full((3, 12), 0.1)
+    stopped = solve_box_quadratics(hessian, gradient, lower, upper, is_over=lambda: True)
+    np.testing.assert_array_equal(stopped, np.zeros((3, 12)))
+    assert np.abs(solve_box_quadratics(hessian, gradient, lower, upper)).max() > 0.0
