@@ -7,6 +7,8 @@ import re
 from pathlib import Path
 
 from finlab.allocation.allocator import Allocator
+from finlab.allocation.baselines.model_based import TIME_LIMIT_S
+from finlab.allocation.baselines.single_target import DEFAULT_STARTS
 from finlab.allocation.methods import LEARNED, load_allocator
 from finlab.errors import AllocationError
 from finlab.evaluation.on_board import OnBoard
@@ -62,7 +64,9 @@ def load_method_spec(name: str, checkpoint: str | Path | None = None) -> Allocat
         raise AllocationError(
             f"methods: a number of starts, from 1, goes with {', '.join(SLOW)} only, got {name!r}"
         )
-    return load_allocator(method, checkpoint=checkpoint, n_starts=starts)
+    # Each start has the time that it has in the method's default.
+    limit = TIME_LIMIT_S * max(1.0, starts / DEFAULT_STARTS)
+    return load_allocator(method, checkpoint=checkpoint, n_starts=starts, time_limit_s=limit)
 
 
 def fingerprint(name: str, checkpoint: str | Path | None = None) -> str:
