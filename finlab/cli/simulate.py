@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, UseAppendAction, arg
 
 if TYPE_CHECKING:
-    from finlab.sim import RunLog
+    from finlab.sim import ClosedLoop, RunLog
 
 
 def simulate(
@@ -56,7 +56,7 @@ def simulate(
     robot = open_robot(layout)
     failures = [(name, 0.0) for name in robot.failed] + [_failure(text) for text in fail]
     _check_folder(output)
-    swim = ClosedLoop(
+    loop = ClosedLoop(
         robot.layout,
         load_method_spec(method, checkpoint),
         make_trajectory(trajectory, duration),
@@ -68,11 +68,14 @@ def simulate(
         failures=failures,
         seed=seed,
     )
-    for sentence in _warnings(swim, failures):
+    for sentence in _warnings(loop, failures):
         print(sentence, file=sys.stderr)
-    seconds = round(swim.task.duration_s, 1)
+    seconds = round(loop.task.duration_s, 1)
     with tqdm(total=seconds, unit="s", disable=None, leave=False, file=sys.stderr) as bar:
-        log = swim.run(bar.update)
+        while not loop.done:
+            loop.step()
+            bar.update(loop.period_s)
+    log = loop.log
     print(summary(log))
     if output is not None:
         from finlab.evaluation.plots.closed_loop_run import save_pictures
@@ -125,19 +128,17 @@ def _check_folder(output: Path | None) -> None:
         raise FinlabError(f"{output}: expected a new or empty folder")
 
 
-def _warnings(swim: object, failures: list[tuple[str, float]]) -> list[str]:
+def _warnings(loop: ClosedLoop, failures: list[tuple[str, float]]) -> list[str]:
     """What will not be controllable, said before the run."""
     from finlab.control import Completion
-    from finlab.sim import ClosedLoop
 
-    assert isinstance(swim, ClosedLoop)
     sentences, lost = [], []
     for name, time in [("", 0.0), *sorted(failures, key=lambda failure: failure[1])]:
         lost += [name] if name else []
-        if not Completion(swim.layout, tuple(lost), swim.controller.axes).controllable:
+        if not Completion(loop.layout, tuple(lost), loop.controller.axes).controllable:
             without = f" without {', '.join(lost)}" if lost else ""
             sentences.append(
-                f"finlab: from {time:g} s on, {swim.layout.name}{without} cannot give surge, heave and yaw "
+                f"finlab: from {time:g} s on, {loop.layout.name}{without} cannot give surge, heave and yaw "
                 "independently"
             )
     return sentences

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,11 +30,11 @@ Array = NDArray[np.float64]
 class ClosedLoop:
     """One robot under way. Make it, then call `step` until `done`; `fail` and `mend` fins as you like.
 
-        swim = ClosedLoop(layout, finlab.load_allocator(), make_trajectory("lissajous"))
-        while not swim.done:
-            tick = swim.step()
+        loop = ClosedLoop(layout, finlab.load_allocator(), make_trajectory("lissajous"))
+        while not loop.done:
+            tick = loop.step()
 
-    A step takes one control period, 0.1 s by the shipped gains. Nothing in here waits: whoever shows a swim
+    A step takes one control period, 0.1 s by the shipped gains. Nothing in here waits: whoever shows a run
     steps it at the pace of the clock.
     """
 
@@ -181,16 +181,10 @@ class ClosedLoop:
         self._ticks.append(tick)
         return tick
 
-    def run(self, progress: Callable[[float], object] | None = None) -> RunLog:
-        """Swims to the end of the task.
-
-        Args:
-            progress: called after each step with the time that it took in the simulation [s].
-        """
+    def run(self) -> RunLog:
+        """Swims to the end of the task."""
         while not self.done:
             self.step()
-            if progress is not None:
-                progress(self.period_s)
         return self.log
 
     def _complete(self) -> Completion:

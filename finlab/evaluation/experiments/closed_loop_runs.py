@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 from tqdm import tqdm
 
+from finlab.allocation.allocator import Allocator
 from finlab.evaluation.statistics.trajectory_errors import (
     RTE_DELTA_S,
     absolute_error,
     depth_error,
     relative_error,
 )
-from finlab.sim import ClosedLoop, RunLog
+from finlab.layout import Layout
+from finlab.sim import ClosedLoop, RunLog, Task
 
 Row = dict[str, Any]
 
@@ -55,12 +58,76 @@ def over_seeds(rows: Sequence[Row]) -> Row:
     return means
 
 
-def run_all(swims: Iterable[tuple[Any, Callable[[], ClosedLoop]]], total: int) -> list[tuple[Any, RunLog]]:
-    """Swims one after the other, with a bar on stderr; each comes with a label."""
+class Scenario(NamedTuple):
+    """One case of an experiment, swum by every method."""
+
+    label: Any
+    """What is varied: the layout's name, a fault, a speed."""
+    layout: Layout
+    """The robot."""
+    task: Task
+    """What it swims."""
+    failures: tuple[tuple[str, float], ...] = ()
+    """Fins, each with the time [s] at which it is lost."""
+
+
+Run = tuple[tuple[Any, str], RunLog]
+"""Under (label of the scenario, name of the method)."""
+
+
+def run_all(
+    scenarios: Sequence[Scenario],
+    allocators: Mapping[str, Allocator],
+    seeds: Sequence[int],
+    plant: str = "mean",
+    *,
+    steady: bool = False,
+) -> list[Run]:
+    """Every scenario with every method and seed, one after the other.
+
+    Args:
+        scenarios: what is swum.
+        allocators: methods by name.
+        seeds: of the sensors' noise.
+        plant: how fin forces are simulated.
+        steady: whether the allocators are told their previous command.
+    """
+    every = list(product(scenarios, allocators.items(), seeds))
     done = []
-    for label, make in tqdm(swims, total=total, unit="run", disable=None, leave=False, file=sys.stderr):
-        done.append((label, make().run()))
+    for (label, layout, task, failures), (name, allocator), seed in tqdm(
+        every, unit="run", disable=None, leave=False, file=sys.stderr
+    ):
+        options: dict[str, Any] = {"failures": failures, "plant": plant, "steady": steady, "seed": seed}
+        done.append(((label, name), ClosedLoop(layout, allocator, task, **options).run()))
     return done
+
+
+def group_runs(runs: Sequence[Run], row: Callable[[RunLog], Row]) -> dict[tuple[Any, str], list[Row]]:
+    """Rows of single runs by scenario and method."""
+    groups: dict[tuple[Any, str], list[Row]] = {}
+    for key, log in runs:
+        groups.setdefault(key, []).append(row(log))
+    return groups
+
+
+def rows_and_totals(
+    runs: Sequence[Run], row: Callable[[RunLog], Row], key: str, total: str | None
+) -> list[Row]:
+    """One row per scenario and method, and one per method over all scenarios: mean and spread over runs.
+
+    Args:
+        runs: at least one.
+        row: figures of one run.
+        key: what the scenario's label is called.
+        total: label of the rows over all scenarios.
+    """
+    groups = group_runs(runs, row)
+    for method in dict.fromkeys(method for _, method in groups):
+        groups[total, method] = [one for (_, name), rows in groups.items() if name == method for one in rows]
+    return [
+        {key: label, "method": method, "runs": len(rows), **over_seeds(rows)}
+        for (label, method), rows in groups.items()
+    ]
 
 
 def spread(row: Row, key: str, digits: int = 3) -> str:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import combinations
-from typing import Any
 
 from finlab.allocation.allocator import Allocator
 from finlab.control import Completion, WaypointController
 from finlab.evaluation.experiments.closed_loop_runs import (
     LOST_M,
     Row,
+    Run,
+    Scenario,
     follow_row,
+    group_runs,
     over_seeds,
     run_all,
     spread,
@@ -22,7 +23,7 @@ from finlab.evaluation.experiments.trajectory import LABELS
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.statistics.tables import text_table
 from finlab.layout import Layout
-from finlab.sim import ClosedLoop, RunLog, Trajectory
+from finlab.sim import Trajectory
 
 HEALTHY = "healthy"
 ALLOWED = 1.15
@@ -79,39 +80,22 @@ def run_faults(
     faults: Sequence[Fault],
     seeds: Sequence[int],
     plant: str = "mean",
-    **options: Any,
-) -> list[tuple[tuple[str, str], RunLog]]:
-    """Every controllable fault with every method and seed; each run under (fault's label, method's name)."""
-    swum = [fault for fault in faults if fault.controllable]
-
-    def swims() -> Iterator[tuple[tuple[str, str], Any]]:
-        for fault in swum:
-            failures = [(name, fault.time_s) for name in fault.fins]
-            for name, allocator in allocators.items():
-                for seed in seeds:
-                    yield (
-                        (fault.label, name),
-                        partial(
-                            ClosedLoop,
-                            layout,
-                            allocator,
-                            trajectory,
-                            failures=failures,
-                            plant=plant,
-                            seed=seed,
-                            **options,
-                        ),
-                    )
-
-    return run_all(swims(), len(swum) * len(allocators) * len(seeds))
+    *,
+    steady: bool = False,
+) -> list[Run]:
+    """Every controllable fault with every method and seed, as in `run_all`; runs under (label, method)."""
+    scenarios = [
+        Scenario(fault.label, layout, trajectory, tuple((name, fault.time_s) for name in fault.fins))
+        for fault in faults
+        if fault.controllable
+    ]
+    return run_all(scenarios, allocators, seeds, plant, steady=steady)
 
 
-def fault_rows(faults: Sequence[Fault], runs: Sequence[tuple[tuple[str, str], RunLog]]) -> list[Row]:
+def fault_rows(faults: Sequence[Fault], runs: Sequence[Run]) -> list[Row]:
     """One row per fault and method; `ate_over_healthy` is the ratio of means, `tracked` whether every run
     stayed with its reference. Faults that leave the robot uncontrollable have a row without figures."""
-    groups: dict[tuple[str, str], list[Row]] = {}
-    for key, log in runs:
-        groups.setdefault(key, []).append(follow_row(log))
+    groups = group_runs(runs, follow_row)
     methods = dict.fromkeys(method for _, method in groups)
     rows: list[Row] = []
     for fault in faults:

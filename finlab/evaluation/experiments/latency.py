@@ -56,7 +56,7 @@ def latency_rows(
         budget_s: a slow method stops after this long [s]; its row says how many calls it made.
         seed: passed to the methods.
     """
-    rows = []
+    rows: list[Row] = []
     for name, allocator in tqdm(
         allocators.items(), unit="method", disable=None, leave=False, file=sys.stderr
     ):

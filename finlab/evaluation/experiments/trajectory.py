@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 from finlab.allocation.allocator import Allocator
 from finlab.evaluation.experiments.closed_loop_runs import (
     LOST_M,
     Row,
+    Run,
+    Scenario,
     follow_row,
-    over_seeds,
+    rows_and_totals,
     run_all,
     spread,
 )
@@ -19,7 +19,7 @@ from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.statistics.tables import text_table
 from finlab.evaluation.statistics.trajectory_errors import RTE_DELTA_S
 from finlab.layout import Layout
-from finlab.sim import ClosedLoop, RunLog, Trajectory
+from finlab.sim import Trajectory
 
 
 def run_trajectory(
@@ -28,45 +28,17 @@ def run_trajectory(
     trajectory: Trajectory,
     seeds: Sequence[int],
     plant: str = "mean",
-    **options: Any,
-) -> list[tuple[tuple[str, str], RunLog]]:
-    """Every layout with every method and seed; each run under (layout's name, method's name).
-
-    Args:
-        layouts: robots.
-        allocators: methods by name.
-        trajectory: the same for all.
-        seeds: of the sensors' noise.
-        plant: how fin forces are simulated.
-        options: passed on to `ClosedLoop`.
-    """
-
-    def swims() -> Iterator[tuple[tuple[str, str], Any]]:
-        for layout in layouts:
-            for name, allocator in allocators.items():
-                for seed in seeds:
-                    make = partial(
-                        ClosedLoop, layout, allocator, trajectory, plant=plant, seed=seed, **options
-                    )
-                    yield (layout.name, name), make
-
-    return run_all(swims(), len(layouts) * len(allocators) * len(seeds))
+    *,
+    steady: bool = False,
+) -> list[Run]:
+    """Every layout with every method and seed, as in `run_all`; each run under (layout's name, method)."""
+    scenarios = [Scenario(layout.name, layout, trajectory) for layout in layouts]
+    return run_all(scenarios, allocators, seeds, plant, steady=steady)
 
 
-def trajectory_rows(runs: Sequence[tuple[tuple[str, str], RunLog]]) -> list[Row]:
+def trajectory_rows(runs: Sequence[Run]) -> list[Row]:
     """One row per layout and method, and one over all layouts: mean and spread over seeds."""
-    groups: dict[tuple[str, str], list[Row]] = {}
-    for (layout, method), log in runs:
-        groups.setdefault((layout, method), []).append(follow_row(log))
-    methods = dict.fromkeys(method for _, method in groups)
-    rows = [
-        {"layout": layout, "method": method, "runs": len(found), **over_seeds(found)}
-        for (layout, method), found in groups.items()
-    ]
-    for method in methods:
-        every = [row for (_, name), found in groups.items() if name == method for row in found]
-        rows.append({"layout": "all", "method": method, "runs": len(every), **over_seeds(every)})
-    return rows
+    return rows_and_totals(runs, follow_row, "layout", "all")
 
 
 def trajectory_report(rows: Sequence[Row], trajectory: Trajectory, plant: str) -> str:

@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from finlab.allocation.allocator import Allocator
-from finlab.evaluation.experiments.closed_loop_runs import Row, over_seeds, power_row, run_all, spread
+from finlab.evaluation.experiments.closed_loop_runs import (
+    Row,
+    Run,
+    Scenario,
+    power_row,
+    rows_and_totals,
+    run_all,
+    spread,
+)
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.statistics.tables import text_table
 from finlab.layout import Layout
-from finlab.sim import ClosedLoop, Cruise, RunLog
+from finlab.sim import Cruise, RunLog
 
 SPEEDS = (0.10, 0.15, 0.20)
 """The paper's speeds [m/s]."""
 SETTLED_S = 10.0
 """After this time the start from rest is over [s]."""
-
-Run = tuple[tuple[str, float], RunLog]
 
 
 def run_velocity(
@@ -30,34 +34,17 @@ def run_velocity(
     speeds: Sequence[float] = SPEEDS,
     duration_s: float = 30.0,
     plant: str = "mean",
-    **options: Any,
+    *,
+    steady: bool = False,
 ) -> list[Run]:
-    """Every speed with every method and seed; each run under (method's name, speed)."""
-
-    def swims() -> Iterator[tuple[tuple[str, float], Any]]:
-        for name, allocator in allocators.items():
-            for speed in speeds:
-                task = Cruise(speed, duration_s=duration_s)
-                for seed in seeds:
-                    make = partial(ClosedLoop, layout, allocator, task, plant=plant, seed=seed, **options)
-                    yield (name, speed), make
-
-    return run_all(swims(), len(speeds) * len(allocators) * len(seeds))
+    """Every speed with every method and seed, as in `run_all`; each run under (speed, method)."""
+    scenarios = [Scenario(speed, layout, Cruise(speed, duration_s=duration_s)) for speed in speeds]
+    return run_all(scenarios, allocators, seeds, plant, steady=steady)
 
 
 def velocity_rows(runs: Sequence[Run]) -> list[Row]:
-    """One row per method and speed, and one over all speeds: mean and spread over runs."""
-    groups: dict[tuple[str, float], list[Row]] = {}
-    for key, log in runs:
-        groups.setdefault(key, []).append(_row(log))
-    rows = [
-        {"method": method, "speed": speed, "runs": len(found), **over_seeds(found)}
-        for (method, speed), found in groups.items()
-    ]
-    for method in dict.fromkeys(method for method, _ in groups):
-        every = [row for (name, _), found in groups.items() if name == method for row in found]
-        rows.append({"method": method, "speed": None, "runs": len(every), **over_seeds(every)})
-    return rows
+    """One row per speed and method, and one over all speeds: mean and spread over runs."""
+    return rows_and_totals(runs, _row, "speed", None)
 
 
 def _row(log: RunLog) -> Row:

@@ -8,10 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.evaluation.experiments.closed_loop_runs import Row
+from finlab.evaluation.experiments.closed_loop_runs import Row, Run
 from finlab.evaluation.experiments.faults import ALLOWED, HEALTHY
 from finlab.evaluation.plots.style import BLACK, COLOURS, GREY, Picture, clean, picture
-from finlab.sim import RunLog
 
 Array = NDArray[np.float64]
 
@@ -31,7 +30,7 @@ class Track(NamedTuple):
     """Where it should have been (K, 3) [m]."""
 
 
-def tracks_of(runs: Sequence[tuple[tuple[str, str], RunLog]]) -> list[Track]:
+def tracks_of(runs: Sequence[Run]) -> list[Track]:
     """The tracks of runs under (layout's name, method's name)."""
     return [Track(*key, log.time, log.position, log.reference) for key, log in runs]
 
@@ -98,18 +97,18 @@ def draw_faults(rows: Sequence[Row], printed: Mapping[str, float] | None = None)
         return view
 
 
-def draw_velocity(runs: Sequence[tuple[tuple[str, float], RunLog]]) -> Picture:
-    """Speed over time of every run, under (method's name, speed), and power against its error."""
-    methods = list(dict.fromkeys(method for (method, _), _ in runs))
-    speeds = dict.fromkeys(speed for (_, speed), _ in runs)
+def draw_velocity(runs: Sequence[Run]) -> Picture:
+    """Speed over time of every run, under (speed, method's name), and power against its error."""
+    methods = list(dict.fromkeys(method for (_, method), _ in runs))
+    speeds = dict.fromkeys(speed for (speed, _), _ in runs)
     with picture(1, 2, height=3.4, gridspec_kw={"width_ratios": [1.5, 1]}) as view:
         over_time, trade = view.axes
-        for (method, _), log in runs:
+        for (_, method), log in runs:
             over_time.plot(log.time, log.motion[:, 0], color=COLOURS.get(method, GREY), lw=0.7, alpha=0.7)
             over_time.plot(log.time, log.reference_surge, color=GREY, lw=1.2, ls=(0, (4, 3)))
         for method in methods:
             for speed, marker in zip(speeds, "os^Dv", strict=False):
-                logs = [log for key, log in runs if key == (method, speed)]
+                logs = [log for key, log in runs if key == (speed, method)]
                 error = [np.abs(log.motion[:, 0] - log.reference_surge).mean() for log in logs]
                 power = [log.inertial_power.sum(axis=1).mean() for log in logs]
                 style: dict[str, Any] = {"color": COLOURS.get(method, GREY), "ms": 5, "alpha": 0.8}

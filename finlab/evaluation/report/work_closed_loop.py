@@ -33,11 +33,12 @@ def trajectory(*, methods: str, runs: int, seed: int, checkpoint: str | None) ->
 
 def tracks_of_columns(columns: Columns) -> list[Track]:
     """The paths that `trajectory` kept."""
-    return [
-        Track(*name.removeprefix(TRACK).split(" ", 1), track[:, 0], track[:, 1:4], track[:, 4:])
-        for name, track in columns.items()
-        if name.startswith(TRACK)
-    ]
+    tracks = []
+    for name, track in columns.items():
+        if name.startswith(TRACK):
+            layout, method = name.removeprefix(TRACK).split(" ", 1)
+            tracks.append(Track(layout, method, track[:, 0], track[:, 1:4], track[:, 4:]))
+    return tracks
 
 
 def faults(*, methods: str, runs: int, pairs: bool, seed: int, checkpoint: str | None) -> Columns:

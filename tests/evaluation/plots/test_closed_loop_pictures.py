@@ -109,7 +109,7 @@ def test_faults_stand_in_order_with_the_allowed_growth_and_the_printed_below() -
 
 
 def test_speed_over_time_and_power_against_error(log: RunLog) -> None:
-    over_time, trade = draw_velocity([(("learned", 0.1), log), (("analytic", 0.1), log)]).axes
+    over_time, trade = draw_velocity([((0.1, "learned"), log), ((0.1, "analytic"), log)]).axes
     speed = log.motion[:, 0]
     assert sum(np.array_equal(line.get_ydata(), speed) for line in over_time.lines) == 2
     ((error, power),) = _line(trade, "learned, 0.10 m/s")
