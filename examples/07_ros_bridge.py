@@ -10,7 +10,6 @@ from types import SimpleNamespace as Message
 
 import finlab
 from finlab.deploy import make_bundle
-from finlab.deploy.runtime import load
 from finlab.exchange import flippers
 
 
@@ -18,12 +17,13 @@ class Bridge:
     """On a robot: node.create_subscription(WrenchStamped, "wrench", bridge.on_wrench, 1)."""
 
     def __init__(self, bundle: str, publish: Callable[[Message], None]) -> None:
-        self.robot, self.publish = load(bundle), publish
+        self.robot, self.allocator = finlab.load_layout(bundle), finlab.load_allocator(bundle)
+        self.publish = publish
 
     def on_wrench(self, message: Message) -> None:
         force, torque = message.wrench.force, message.wrench.torque
         wrench = [force.x, force.y, force.z, torque.x, torque.y, torque.z]
-        answer = self.robot.allocate(wrench)
+        answer = self.allocator.allocate(self.robot, wrench)
         self.publish(Message(flippers=[m._asdict() for m in flippers(answer.fins, answer.command)]))
 
 

@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from finlab.allocation.policy import Policy as Policy
     from finlab.errors import FinlabError as FinlabError
     from finlab.layout.body import Body as Body
-    from finlab.layout.file import load_layout as load_layout
     from finlab.layout.file import save_layout as save_layout
     from finlab.layout.fin import Fin as Fin
     from finlab.layout.fin import Limits as Limits
     from finlab.layout.layout import Layout as Layout
+    from finlab.layout.load import load_layout as load_layout
 
 __version__ = "0.1.0"
 
@@ -35,7 +35,7 @@ _HOME = {
     "Policy": "finlab.allocation.policy",
     "load_allocator": "finlab.allocation.methods",
     "FinlabError": "finlab.errors",
-    "load_layout": "finlab.layout.file",
+    "load_layout": "finlab.layout.load",
     "save_layout": "finlab.layout.file",
     "Body": "finlab.layout.body",
     "Fin": "finlab.layout.fin",

@@ -5,13 +5,11 @@ import socket
 import threading
 from pathlib import Path
 
-from finlab.deploy.graph_file import read_graph
 from finlab.errors import FinlabError
 from finlab.layout import Layout, load_layout
 from webapp.app import App
 from webapp.guard import Guard
 from webapp.session.hull_files import cache_folder
-from webapp.session.layout_files import GRAPH_SUFFIX
 from webapp.session.state import State
 from webapp.session.targets import FIRST
 from webapp.tasks.solver import Solver
@@ -56,7 +54,7 @@ def serve(
 
 
 def _first_layout(text: str) -> Layout:
-    return read_graph(text).layout if text.endswith(GRAPH_SUFFIX) else load_layout(text)
+    return load_layout(text)
 
 
 def _check_port(host: str, port: int) -> None:

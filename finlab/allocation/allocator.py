@@ -28,6 +28,7 @@ from finlab.allocation.question import (
 from finlab.allocation.solution import Candidates, Solution
 from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
+from finlab.inference.weights import TrainedWeights
 from finlab.layout import FinModelSpec, Layout
 
 Array = NDArray[np.float64]
@@ -49,6 +50,8 @@ class Allocator(ABC):
     """Yardstick of the error."""
     checkpoint: str | None = None
     """Name of the checkpoint that the networks come from; None for methods without networks."""
+    weights: TrainedWeights | None = None
+    """The trained networks; None for methods without networks."""
     judged_by: Judge = "plant"
     """Who computes what its commands give."""
     fin_model: FinModelSpec | None = None

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Mapping
 from importlib import import_module
-from pathlib import Path
 from typing import Any, Literal
 
 from finlab.allocation.allocator import Allocator
+from finlab.allocation.bundle_settings import METHODS_ON_BOARD, read_about
+from finlab.bundle_files import CHECKPOINT, Files, checkpoint_part, is_bundle, read_bundle_files
 from finlab.errors import AllocationError
-from finlab.inference.checkpoint import read_checkpoint, read_normalization, resolve_checkpoint
+from finlab.inference.checkpoint import (
+    parse_checkpoint,
+    read_checkpoint,
+    read_normalization,
+    resolve_checkpoint,
+)
+from finlab.inference.normalization import Normalization
+from finlab.inference.weights import TrainedWeights
 
 METHODS: dict[str, tuple[str, str]] = {
     "learned": ("finlab.allocation.learned.learned_allocator", "LearnedAllocator"),
@@ -33,29 +43,49 @@ Method = Literal["learned", "fast", "paper", "qp", "sqp", "analytic", "multistar
 
 
 def load_allocator(
-    method: Method | str = "learned",
+    method: Method | str | os.PathLike[str] = "learned",
     *,
-    checkpoint: str | Path | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
     **options: Any,
 ) -> Allocator:
     """The allocator of a method, ready to answer.
 
     Args:
-        method: one of `METHODS`.
-        checkpoint: a checkpoint folder or the name of a shipped one; by default `paper` for the
-            method `paper` and `default` for all others.
-        options: passed to the method's class.
+        method: one of `METHODS`; or a bundle made by `finlab export`, which is short for method `learned`
+            with that bundle as its checkpoint.
+        checkpoint: a checkpoint folder, a bundle, or the name of a shipped checkpoint; by default `paper` for
+            the method `paper` and `default` for all others.
+        options: passed to the method's class; where a bundle holds settings, they stand for those left out.
 
     Raises:
         AllocationError: unknown method.
         CheckpointError: missing, corrupt or foreign checkpoint.
+        DataError: the bundle cannot be read, or was changed.
     """
     if method not in METHODS:
-        raise AllocationError(f"method: expected one of {', '.join(METHODS)}, got {method!r}")
-    path = resolve_checkpoint(checkpoint or ("paper" if method == "paper" else "default"))
+        if checkpoint is not None or not (isinstance(method, os.PathLike) or is_bundle(method)):
+            raise AllocationError(f"method: expected one of {', '.join(METHODS)}, got {str(method)!r}")
+        method, checkpoint = "learned", method
+    name = str(method)
+    if checkpoint is not None and is_bundle(checkpoint):
+        return allocator_from_bundle(read_bundle_files(checkpoint), str(checkpoint), name, **options)
+    path = resolve_checkpoint(checkpoint or ("paper" if name == "paper" else "default"))
+    return _made(name, read_checkpoint(path) if name in LEARNED else read_normalization(path), options)
+
+
+def allocator_from_bundle(
+    files: Files, source: str = "bundle", method: str = "learned", **options: Any
+) -> Allocator:
+    """The allocator of a method with the weights and settings in a bundle's files; see `load_allocator`."""
+    checkpoint, settings = read_about(files, source)
+    weights = parse_checkpoint(checkpoint_part(files), f"{source}/{CHECKPOINT.rstrip('/')}", checkpoint)
+    options = settings | options if method in METHODS_ON_BOARD else options
+    return _made(method, weights if method in LEARNED else weights.normalization, options)
+
+
+def _made(method: str, model: TrainedWeights | Normalization, options: Mapping[str, Any]) -> Allocator:
     module, name = METHODS[method]
     kind = getattr(import_module(module), name)
-    model = read_checkpoint(path) if method in LEARNED else read_normalization(path)
     kind.check_options(options)
     allocator: Allocator = kind(model, **options)
     return allocator

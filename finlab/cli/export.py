@@ -10,27 +10,32 @@ def export(
     layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
     output: Annotated[Path, arg(metavar="DIR|FILE.graph.json", aliases=["-o"])],
     zip: bool = False,
+    onnx: bool = False,
     failed: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = (),
     checkpoint: Annotated[str, arg(metavar="NAME|FOLDER")] = "default",
 ) -> None:
-    """Write the deployment bundle: layout graph, networks in ONNX, README and checksums.
+    """Write the deployment bundle: layout graph, trained weights, README and checksums.
 
     Args:
-        layout: layout file, layout graph file, or the name of a shipped layout.
+        layout: layout file, layout graph file, bundle, or the name of a shipped layout.
         output: folder to write; a name that ends in .graph.json takes the layout graph file alone.
         zip: write one archive, DIR.zip, instead of a folder.
+        onnx: write the networks as ONNX files for other runtimes instead; needs finlab[onnx].
         failed: name of a fin that does not work.
         checkpoint: trained checkpoint the robot shall use.
     """
-    from finlab.cli.inputs import GRAPH_SUFFIX, open_robot
+    from finlab.cli.inputs import open_robot
     from finlab.errors import FinlabError
+    from finlab.layout.graph_layout import SUFFIX
 
-    graph_alone = output.name.endswith(GRAPH_SUFFIX)
-    if zip and graph_alone:
+    graph_alone = output.name.endswith(SUFFIX)
+    if (zip or onnx) and graph_alone:
         raise FinlabError(f"{output}: a graph file alone is not zipped; name a folder, or leave out --zip")
+    if zip and onnx:
+        raise FinlabError("--onnx writes a folder of ONNX files; leave out --zip")
     if output.suffix == ".json" and not graph_alone:
-        raise FinlabError(f"{output}: expected a file name that ends in {GRAPH_SUFFIX}, or a folder")
-    robot = open_robot(layout)  # before the seconds it takes to load the network
+        raise FinlabError(f"{output}: expected a file name that ends in {SUFFIX}, or a folder")
+    robot = open_robot(layout)  # before the network is loaded
     failed = robot.with_failed(failed)
     from finlab.allocation import load_allocator
 
@@ -42,6 +47,12 @@ def export(
         write_graph(graph, output)
         n_tests = len(graph.self_test)
         print(f"{output}: {robot.layout.n_fins} fins, {n_tests} self-tests, checkpoint {checkpoint}")
+        return
+    if onnx:
+        from finlab.deploy.onnx_export import write_onnx
+
+        assert allocator.weights is not None
+        print(f"{output}: {', '.join(write_onnx(allocator.weights, output))}, checkpoint {checkpoint}")
         return
     from finlab.deploy.bundle import make_bundle
 

@@ -8,9 +8,6 @@ if TYPE_CHECKING:
     from finlab.deploy.graph import LayoutGraph
     from finlab.layout import Layout
 
-GRAPH_SUFFIX = ".graph.json"
-"""Ending of the name of a layout graph file."""
-
 
 class Robot(NamedTuple):
     """A layout, the fins of it that do not work, and the graph file that said so, if it was one."""
@@ -33,10 +30,11 @@ def open_robot(text: str) -> Robot:
     Raises:
         LayoutError: neither a readable file nor a shipped layout.
     """
-    from finlab.layout.file import layout_path, load_layout
+    from finlab.layout.graph_layout import SUFFIX
+    from finlab.layout.load import layout_path, load_layout
 
     path = layout_path(text)
-    if path.name.endswith(GRAPH_SUFFIX):
+    if path.name.endswith(SUFFIX):
         from finlab.deploy.graph_file import read_graph
 
         graph = read_graph(path)

@@ -1,6 +1,7 @@
-"""The bundle that a robot takes home: layout graph, networks in ONNX, a README and checksums.
+"""The bundle that a robot takes home: layout graph, trained weights, settings, a README and checksums.
 
-The same layout, checkpoint and settings give the same bytes, as a folder and as a zip archive.
+`finlab.load_layout` and `finlab.load_allocator` read it, so the robot runs the library itself. The same
+layout, checkpoint and settings give the same bytes, as a folder and as a zip archive.
 """
 
 from __future__ import annotations
@@ -10,30 +11,19 @@ import io
 import os
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import finlab
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.bundle_settings import METHODS_ON_BOARD, about_bundle
+from finlab.bundle_files import ABOUT, CHECKPOINT, CHECKSUMS, GRAPH, LARGEST, README, checksums
 from finlab.deploy.graph import build_graph
 from finlab.deploy.graph_file import graph_bytes
-from finlab.deploy.metadata import fast_metadata, network_metadata, surrogate_metadata
-from finlab.deploy.onnx.fast import fast_model
-from finlab.deploy.onnx.model import model_bytes
-from finlab.deploy.onnx.network import network_model
-from finlab.deploy.onnx.surrogate import surrogate_model
 from finlab.deploy.readme import readme_text
 from finlab.errors import AllocationError, DataError
-from finlab.inference.learned_fin import FORCE_UNIT, REFERENCE
+from finlab.inference.checkpoint import WEIGHTS_FILE, checkpoint_files
 from finlab.layout import Layout
-
-if TYPE_CHECKING:
-    from finlab.allocation import Allocator
-
-GRAPH, NETWORK, SURROGATE = "layout.graph.json", "network.onnx", "surrogate.onnx"
-FAST = "fast.onnx"
-README, CHECKSUMS = "README.md", "SHA256SUMS"
-FILES = (GRAPH, NETWORK, SURROGATE, FAST, README, CHECKSUMS)
-"""What a bundle may hold; `fast.onnx` only where the checkpoint has a distilled network."""
 
 
 @dataclass(frozen=True)
@@ -52,14 +42,16 @@ class Bundle:
         path = Path(folder)
         try:
             path.mkdir(parents=True, exist_ok=True)
-            strangers = sorted({file.name for file in path.iterdir()} - set(FILES))
-            if strangers:
+            present = {file.relative_to(path).as_posix() for file in path.rglob("*") if not file.is_dir()}
+            if strangers := sorted(present - set(LARGEST)):
                 raise DataError(
                     f"{path}: holds {strangers[0]!r:.60}, which is no part of a bundle; name an empty folder"
                 )
-            # The checksums come last: until they are there, a half-written bundle is refused.
-            (path / CHECKSUMS).unlink(missing_ok=True)
+            # The checksums go first and come last: a half-written bundle is refused.
+            for name in (CHECKSUMS, *(present - set(self.files))):
+                (path / name).unlink(missing_ok=True)
             for name, content in self.files.items():
+                (path / name).parent.mkdir(parents=True, exist_ok=True)
                 (path / name).write_bytes(content)
         except OSError as error:
             raise DataError(f"{error.filename or path}: cannot be written: {error.strerror}") from None
@@ -91,41 +83,28 @@ class Bundle:
 
 
 def make_bundle(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = ()) -> Bundle:
-    """Prepare a layout for a robot with the trained networks of an allocator of method `learned`.
+    """Prepare a layout for a robot with the trained networks and settings of an allocator.
 
     Args:
         layout: the robot, failed fins included.
-        allocator: with the checkpoint and the settings that the robot shall use.
+        allocator: of method `learned` or `fast`.
         failed: names of fins that do not work.
 
     Raises:
         LayoutError: an unknown failed fin, or none left.
-        AllocationError: the allocator's method cannot run on a robot.
+        AllocationError: the method cannot run on a robot, or its networks do not know the robot's fins.
     """
-    from finlab.allocation.learned.learned_allocator import LearnedAllocator
-
-    if not isinstance(allocator, LearnedAllocator):
+    if allocator.weights is None or allocator.name not in METHODS_ON_BOARD:
         raise AllocationError(
             f"method {allocator.name!r} cannot be exported; a bundle runs method 'learned', choose that"
         )
     graph = build_graph(layout, allocator, failed)
-    weights = allocator.weights
-    about = network_metadata(graph, weights, allocator.settings, allocator.energy_weights)
-    sizes = weights.check_network()
-    network = network_model(weights.network, sizes.heads, sizes.n_components, about)
-    surrogate = surrogate_model(weights.surrogate, REFERENCE, FORCE_UNIT, surrogate_metadata(graph, weights))
+    checkpoint = checkpoint_files(allocator.weights)
+    graph = replace(graph, checkpoint_sha256=hashlib.sha256(checkpoint[WEIGHTS_FILE]).hexdigest())
     files = {
         GRAPH: graph_bytes(graph),
-        NETWORK: model_bytes(network),
-        SURROGATE: model_bytes(surrogate),
+        ABOUT: about_bundle(allocator.options, allocator.weights.name, finlab.__version__),
+        **{CHECKPOINT + name: content for name, content in checkpoint.items()},
+        README: readme_text(graph).encode(),
     }
-    if weights.fast is not None:
-        files[FAST] = model_bytes(fast_model(weights.fast, fast_metadata(graph, weights)))
-    files[README] = readme_text(graph, with_fast=FAST in files).encode()
     return Bundle({**files, CHECKSUMS: checksums(files)})
-
-
-def checksums(files: Mapping[str, bytes]) -> bytes:
-    """The lines of `SHA256SUMS`, which `sha256sum -c` reads as well."""
-    lines = (f"{hashlib.sha256(files[name]).hexdigest()}  {name}\n" for name in sorted(files))
-    return "".join(lines).encode()

@@ -1,4 +1,4 @@
-"""`finlab-runtime check|allocate|serve BUNDLE`: the command that runs on the robot."""
+"""`finlab-runtime check|allocate|serve|speed BUNDLE`: the command that runs on the robot."""
 
 from __future__ import annotations
 
@@ -37,45 +37,47 @@ def main(argv: Sequence[str] | None = None) -> int:
 def check(arguments: argparse.Namespace) -> int:
     """Print each question of the self-test with its answer."""
     start = time.perf_counter()
-    from finlab.deploy.runtime import load
+    from finlab.deploy.robot import load_robot
     from finlab.deploy.self_check import self_check
 
-    runtime = load(arguments.bundle, arguments.engine, arguments.fast)
+    robot = load_robot(arguments.bundle, arguments.fast)
     print(
-        f"{arguments.bundle}: {runtime.layout.name}, {runtime.layout.n_fins} fins, "
-        f"checkpoint {runtime.bundle.graph.checkpoint}, ready in {time.perf_counter() - start:.2f} s"
+        f"{arguments.bundle}: {robot.layout.name}, {robot.layout.n_fins} fins, "
+        f"checkpoint {robot.graph.checkpoint}, ready in {time.perf_counter() - start:.2f} s"
     )
-    findings = self_check(runtime)
+    findings = self_check(robot)
     for finding in findings:
-        word = "skipped" if finding.value != finding.value else "ok" if finding.good else "FAILED"
-        print(f"  {word:7} {finding.question}: {finding.value:.2g}, allowed {finding.limit:.2g}")
+        word = "ok" if finding.good else "FAILED"
+        print(f"  {word:6} {finding.question}: {finding.value:.2g}, allowed {finding.limit:.2g}")
     if all(finding.good for finding in findings):
         print("this computer answers as the one that made the bundle")
         return 0
-    print("do not use this bundle here: the answers differ from those of the computer that made it")
+    print("do not use this bundle here: its answers are wrong, or not those of the computer that made it")
     return 1
 
 
 def allocate(arguments: argparse.Namespace) -> int:
     """Print the commands for one target."""
-    from finlab.deploy.runtime import load
+    from finlab.deploy.robot import load_robot
 
-    runtime = load(arguments.bundle, arguments.engine, arguments.fast)
-    answer = runtime.allocate(
+    robot = load_robot(arguments.bundle, arguments.fast)
+    answer = robot.allocate(
         arguments.wrench, failed=arguments.failed, policy=arguments.policy, seed=arguments.seed
     )
     rows = [None if row[0] != row[0] else row.tolist() for row in answer.command]
     if arguments.json:
         values = {
             "fins": list(answer.fins),
-            "failed": [name for name, row in zip(answer.fins, rows, strict=True) if row is None],
+            "failed": list(answer.failed),
             "command": rows,
             "target": list(arguments.wrench),
-            "wrench_surrogate": answer.wrench.tolist(),
+            "wrench_surrogate": None if answer.wrench_surrogate is None else answer.wrench_surrogate.tolist(),
+            "wrench_plant": answer.wrench.tolist(),
             "unallocated": answer.unallocated.tolist(),
             "err_norm": answer.err_norm,
             "energy": answer.energy,
             "solve_ms": answer.solve_ms,
+            "notes": list(answer.notes),
         }
         print(json.dumps(values, allow_nan=False))
         return 0
@@ -90,13 +92,33 @@ def allocate(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def speed(arguments: argparse.Namespace) -> int:
+    """Print times and memory of single answers, one after the other."""
+    start = time.perf_counter()
+    from finlab.deploy.robot import load_robot
+    from finlab.deploy.speed import answer_times, peak_memory, random_targets
+
+    robot = load_robot(arguments.bundle, arguments.fast)
+    robot.allocate([0.0] * 6)
+    ready = time.perf_counter() - start
+    p50, p99 = answer_times(robot.allocate, random_targets(robot.layout, max(arguments.targets, 1)))
+    print(
+        f"{robot.allocator.name}, {robot.layout.n_fins} fins: p50 {p50:.2f} ms, p99 {p99:.2f} ms, "
+        f"ready after {ready:.2f} s, peak memory {peak_memory():.0f} MB"
+    )
+    return 0
+
+
 def serve(arguments: argparse.Namespace) -> int:
     """Answer requests until they end."""
-    from finlab.deploy.runtime import load
+    from finlab.deploy.robot import load_robot
     from finlab.deploy.serve import Server, Timing, Transport
     from finlab.deploy.transport import LoopbackUdp, StandardStreams
 
-    runtime = load(arguments.bundle, arguments.engine, arguments.fast)
+    robot = load_robot(arguments.bundle, arguments.fast)
+    if unknown := robot.allocator.unknown_fins(robot.layout):
+        names = ", ".join(unknown)
+        print(f"finlab-runtime: warning: commands are wrong: unknown fins {names}", file=sys.stderr)
     deadline = None if arguments.deadline_ms is None else arguments.deadline_ms / 1e3
     timing = Timing(deadline, arguments.watchdog_s or None)
     transport: Transport
@@ -105,7 +127,7 @@ def serve(arguments: argparse.Namespace) -> int:
     else:
         transport = LoopbackUdp(arguments.udp)
         print(f"listening on 127.0.0.1:{transport.port}", file=sys.stderr, flush=True)
-    Server(runtime, timing, arguments.steady).run(transport)
+    Server(robot, timing, arguments.steady).run(transport)
     return 0
 
 
@@ -118,13 +140,12 @@ def _positive(text: str) -> float:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser("finlab-runtime", description="Control allocation on board.")
-    verbs = parser.add_subparsers(required=True, metavar="check|allocate|serve")
+    verbs = parser.add_subparsers(required=True, metavar="check|allocate|serve|speed")
 
     def verb(run: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
         made = verbs.add_parser(run.__name__, help=text, description=text)
         made.set_defaults(run=run)
         made.add_argument("bundle", metavar="BUNDLE", help="folder or zip archive made by `finlab export`")
-        made.add_argument("--engine", choices=("numpy", "onnx"), default="numpy", help="runs the network")
         made.add_argument("--fast", action="store_true", help="let the distilled network answer")
         return made
 
@@ -136,6 +157,8 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--policy", choices=POLICIES, default="closest", help="what to do out of reach")
     one.add_argument("--seed", type=int, default=0, help="seed of the candidates")
     one.add_argument("--json", action="store_true", help="print one JSON object")
+    rate = verb(speed, "How fast this computer answers, how soon, and how much memory it takes.")
+    rate.add_argument("--targets", type=int, default=2000, metavar="N", help="number of single answers")
     loop = verb(serve, "Read targets as JSON lines, write commands as JSON lines.")
     loop.add_argument("--udp", type=int, metavar="PORT", help="UDP on 127.0.0.1, not stdin and stdout")
     loop.add_argument("--deadline-ms", type=_positive, metavar="MS", help="answer no later than this")

@@ -74,15 +74,21 @@ def build_graph(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = 
 
     Raises:
         LayoutError: an unknown failed fin, or none left.
-        AllocationError: the allocator's method has no network.
+        AllocationError: the allocator's method has no network, or its network has not learned the fins.
     """
     from finlab.physics import Plant
 
     healthy = layout.without(failed) if failed else layout
-    checkpoint = getattr(allocator, "weights", None)
+    checkpoint = allocator.weights
     if checkpoint is None:
         raise AllocationError(
             f"method {allocator.name!r} has no trained network to make a graph for; use learned"
+        )
+    if unknown := allocator.unknown_fins(healthy):
+        raise AllocationError(
+            f"checkpoint {checkpoint.name!r} has not learned the fins {', '.join(unknown)} of layout "
+            f"{layout.name!r}, so the robot would answer wrongly; train a surrogate and an allocator for "
+            "them, or give the fins a model that the checkpoint knows"
         )
     features = NodeFeatures(checkpoint.check_network().features, healthy, checkpoint.normalization)
     lower = healthy.lower

@@ -1,19 +1,13 @@
-"""A layout graph as the JSON object that stands in its file, with a checksum over all the rest."""
+"""A layout graph as the JSON object that stands in its file."""
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Mapping
 from typing import Any
 
 from finlab.deploy.graph import SELF_TEST_TOLERANCE, LayoutGraph, Row
 from finlab.layout import layout_to_dict
 from finlab.layout.file import FRAME
-
-FORMAT = "finlab-graph"
-VERSION = 1
-UNITS = {"length": "m", "angle": "rad", "frequency": "Hz", "force": "N", "torque": "N m"}
+from finlab.layout.graph_layout import FORMAT, UNITS, VERSION
 
 
 def document_of(graph: LayoutGraph) -> dict[str, Any]:
@@ -63,13 +57,6 @@ def document_of(graph: LayoutGraph) -> dict[str, Any]:
 def edges_of(graph: LayoutGraph) -> list[dict[str, str]]:
     """Every pair of healthy fins, and each with itself."""
     return [{"source": a, "target": b} for a, b in graph.edges]
-
-
-def checksum_of(document: Mapping[str, Any]) -> str:
-    """SHA-256 of everything but the checksum, independent of white space and the order of keys."""
-    rest = {key: value for key, value in document.items() if key != "checksum"}
-    canonical = json.dumps(rest, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
-    return "sha256:" + hashlib.sha256(canonical.encode("utf-8", "surrogatepass")).hexdigest()
 
 
 def _plain(row: Row | None) -> list[float] | None:

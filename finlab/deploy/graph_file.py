@@ -11,13 +11,11 @@ import os
 from pathlib import Path
 
 from finlab.deploy.graph import LayoutGraph
-from finlab.deploy.graph_document import checksum_of, document_of
+from finlab.deploy.graph_document import document_of
 from finlab.deploy.graph_reading import graph_of
 from finlab.errors import LayoutError
+from finlab.layout.graph_layout import SUFFIX, checksum_of
 from finlab.layout.reading import parse_json, read_text
-
-SUFFIX = ".graph.json"
-"""How the name of a graph file ends."""
 
 
 def write_graph(graph: LayoutGraph, path: str | os.PathLike[str]) -> None:

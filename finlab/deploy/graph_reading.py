@@ -2,35 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from finlab.deploy.graph import LayoutGraph, Row, SelfTest
-from finlab.deploy.graph_document import FORMAT, UNITS, VERSION, checksum_of, edges_of
+from finlab.deploy.graph_document import edges_of
 from finlab.errors import LayoutError
 from finlab.inference.normalization import Normalization
-from finlab.layout import Layout, parse_layout
-from finlab.layout.file import FORMAT as LAYOUT_FORMAT
-from finlab.layout.file import VERSION as LAYOUT_VERSION
-from finlab.layout.rules import mapping, number, numbers, shown, text
-
-_KEYS = (
-    "format",
-    "version",
-    "checksum",
-    "frame",
-    "units",
-    "layout",
-    "graph",
-    "features",
-    "normalization",
-    "checkpoint",
-    "self_test",
-)
+from finlab.layout.graph_layout import check_graph_document, graph_layout, graph_nodes
+from finlab.layout.rules import mapping, numbers, shown, text
 
 
 def graph_of(data: Any, source: str) -> LayoutGraph:
@@ -39,23 +21,9 @@ def graph_of(data: Any, source: str) -> LayoutGraph:
     Raises:
         LayoutError: it is of another format or version, was changed, or holds what no graph file holds.
     """
-    # Format and version first: in a file of another kind or version, unknown keys are not the news.
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        got = shown(data.get("format")) if isinstance(data, dict) else shown(data)
-        raise LayoutError(f"expected {FORMAT}, got {got}", "format")
-    if data.get("version") != VERSION or data["version"] is True:
-        raise LayoutError(f"this finlab reads version {VERSION}, got {shown(data.get('version'))}", "version")
-    data = mapping(data, "", _KEYS, required=_KEYS)
-    if data["checksum"] != checksum_of(data):
-        raise LayoutError("does not fit the contents; the file was changed, export it again", "checksum")
-    if data["units"] != UNITS:
-        raise LayoutError(f"expected {UNITS}, got {shown(data['units'])}", "units")
-    parts = ("directed", "multigraph", "graph", "nodes", "edges")
-    shape = mapping(data["graph"], "graph", parts, required=parts)
-    nodes = shape["nodes"]
-    if not isinstance(nodes, list):
-        raise LayoutError(f"expected a list of fins, got {shown(nodes)}", "graph.nodes")
-    layout = _layout(data, nodes, source)
+    data = check_graph_document(data)
+    nodes = graph_nodes(data)
+    layout = graph_layout(data, source)
     normalization = _section(data, "normalization", "mean", "std")
     checkpoint = _section(data, "checkpoint", "name", "sha256")
     cases = _section(data, "self_test", "tolerance_err_norm", "cases")["cases"]
@@ -74,7 +42,7 @@ def graph_of(data: Any, source: str) -> LayoutGraph:
         checkpoint_sha256=text(checkpoint["sha256"], "checkpoint.sha256", 64),
         self_test=tuple(_case(case, i, layout.n_fins) for i, case in enumerate(cases)),
     )
-    if shape["edges"] != edges_of(graph):
+    if data["graph"]["edges"] != edges_of(graph):
         raise LayoutError("expected every pair of healthy fins, and each with itself", "graph.edges")
     return graph
 
@@ -82,37 +50,6 @@ def graph_of(data: Any, source: str) -> LayoutGraph:
 def _section(data: Mapping[str, Any], name: str, *keys: str) -> Mapping[str, Any]:
     """One part of the file, with exactly these keys."""
     return mapping(data[name], name, keys, required=keys)
-
-
-def _layout(data: Mapping[str, Any], nodes: list[Any], source: str) -> Layout:
-    """The layout, checked by the reader of layout files, with the shafts' angles exactly as they were."""
-    keys = ("id", "position_m", "mounting_angle_rad", "limits", "model", "healthy", "features")
-    about = mapping(data["layout"], "layout", ("name", "description", "body"), ("name",))
-    fins, angles = [], []
-    for i, node in enumerate(nodes):
-        node = mapping(node, f"graph.nodes[{i}]", keys, required=keys)
-        angle = number(
-            node["mounting_angle_rad"], f"graph.nodes[{i}].mounting_angle_rad", -math.tau, math.tau
-        )
-        angles.append(angle)
-        if not isinstance(node["healthy"], bool):
-            got = shown(node["healthy"])
-            raise LayoutError(f"expected true or false, got {got}", f"graph.nodes[{i}].healthy")
-        fins.append(
-            {
-                "name": node["id"],
-                "position_m": node["position_m"],
-                "mounting_angle_deg": math.degrees(angle),
-                "limits": node["limits"],
-                "model": node["model"],
-            }
-        )
-    layout = parse_layout(
-        {"format": LAYOUT_FORMAT, "version": LAYOUT_VERSION, "frame": data["frame"], **about, "fins": fins},
-        source,
-    )
-    pairs = zip(layout.fins, angles, strict=True)
-    return replace(layout, fins=tuple(replace(fin, mounting_angle=angle) for fin, angle in pairs))
 
 
 def _case(data: Any, i: int, n_fins: int) -> SelfTest:

@@ -9,13 +9,13 @@ _TEXT = """\
 # {name}: control allocation on board
 
 Made by finlab {version} with checkpoint `{checkpoint}`. Target wrench in, one command per fin out, in about a
-millisecond, with numpy and onnxruntime alone.
+millisecond; finlab without its extras is enough, no torch.
 
 ## Five lines that run it
 
 ```
 python3 -m venv robot
-robot/bin/pip install numpy onnxruntime
+robot/bin/pip install numpy safetensors
 robot/bin/pip install --no-deps finlab-{version}-py3-none-any.whl
 robot/bin/finlab-runtime check .
 robot/bin/finlab-runtime allocate . --wrench 1 0 0.5 0 0 0.1
@@ -25,10 +25,10 @@ robot/bin/finlab-runtime allocate . --wrench 1 0 0.5 0 0 0.1
 use. `robot/bin/finlab-runtime serve .` reads targets as JSON lines and writes commands. In Python:
 
 ```python
-from finlab.deploy.runtime import load
+import finlab
 
-robot = load(".")
-answer = robot.allocate([1, 0, 0.5, 0, 0, 0.1], failed=[])
+robot, allocator = finlab.load_layout("."), finlab.load_allocator(".")
+answer = allocator.allocate(robot, [1, 0, 0.5, 0, 0, 0.1], failed={failed})
 print(answer.fins, answer.command)
 ```
 
@@ -47,16 +47,14 @@ fin's horizontal axis, pi/2 up).
 | file | what it is |
 |---|---|
 | `layout.graph.json` | fins, node features, normalization, self-tests; networkx reads its part `graph` |
-| `network.onnx` | the allocator network: features and target in, mixture of commands out |
-| `surrogate.onnx` | the learned fin physics: commands in, forces and wrench out |
-{fast}| `SHA256SUMS` | checksums; `sha256sum -c SHA256SUMS` checks them without finlab |
+| `bundle.json` | version of the bundle, and the settings that the allocator is made with |
+| `checkpoint/` | the trained networks: `model.safetensors`, `config.json`; `fast/` for `--fast` |
+| `SHA256SUMS` | checksums; `sha256sum -c SHA256SUMS` checks them without finlab |
 """
 
-_FAST = "| `fast.onnx` | the distilled network of `--fast`: features in, shares of thrust out |\n"
 
-
-def readme_text(graph: LayoutGraph, with_fast: bool) -> str:
-    """The README of a bundle with this graph, and with a distilled network or without."""
+def readme_text(graph: LayoutGraph) -> str:
+    """The README of a bundle with this graph."""
     rows = []
     for fin in graph.layout.fins:
         x, y, z = fin.position
@@ -73,5 +71,5 @@ def readme_text(graph: LayoutGraph, with_fast: bool) -> str:
         version=finlab.__version__,
         checkpoint=graph.checkpoint,
         fins="\n".join(rows),
-        fast=_FAST if with_fast else "",
+        failed=list(graph.failed),
     )

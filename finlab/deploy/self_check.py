@@ -1,33 +1,30 @@
-"""`finlab-runtime check`: does this computer answer as the one that made the bundle?
+"""`finlab-runtime check`: does this computer answer as the desk did, and are the answers true?
 
-To be run on the robot before first use. Four questions for each self-test of the graph file: are the node
-features the same, does the surrogate predict the same wrench, do the ONNX files agree with the arrays taken
-out of them, and is this computer's own answer as good.
+To be run on the robot before first use. For each self-test of the graph file: are the node features the same,
+does the surrogate predict the same wrench, does the fins' own model confirm what the surrogate promises, and
+is this computer's own answer as good as the stored one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.learned.proposal import predict
-from finlab.deploy.bundle import FAST, NETWORK, SURROGATE
-from finlab.deploy.engine import OnnxNetwork, OnnxSession
-from finlab.deploy.graph import SELF_TEST_TOLERANCE, SelfTest
-from finlab.deploy.runtime import Runtime
+from finlab.allocation.judging import REACHED
+from finlab.allocation.learned.learned_allocator import LearnedAllocator
+from finlab.deploy.graph import SELF_TEST_TOLERANCE, NodeFeatures, SelfTest
+from finlab.deploy.robot import Robot
 from finlab.errors import DataError
-from finlab.inference.fast_network import NumpyFastNetwork
-from finlab.inference.features import fin_frame_features
+from finlab.inference.surrogate import surrogate_on
+from finlab.physics.energy import command_energy
 
-Array = NDArray[Any]
+Array = NDArray[np.float64]
 
 FEATURE_TOLERANCE = 1e-6
 """Largest difference of a node feature; they are written with nine digits."""
-ONNX_TOLERANCE = 1e-4
-"""Largest difference between an ONNX file's answer and numpy's, in normalized units."""
 ENERGY_TOLERANCE = 0.01
 """Largest share by which an answer may cost more than the stored one."""
 
@@ -38,101 +35,70 @@ class Finding(NamedTuple):
     question: str
     """What was compared."""
     value: float
-    """Largest difference found; NaN where the question could not be asked."""
+    """Largest difference found; NaN where an answer was no number."""
     limit: float
     """Largest difference allowed."""
 
     @property
     def good(self) -> bool:
-        """Whether the robot may be trusted in this respect."""
-        return not self.value > self.limit
+        """Whether the robot may be trusted in this respect; NaN is never good."""
+        return self.value <= self.limit
 
 
-def self_check(runtime: Runtime) -> list[Finding]:
-    """Ask everything; a question that needs onnxruntime has NaN where that is not installed.
+def self_check(robot: Robot) -> list[Finding]:
+    """Ask everything.
 
-    Own answers are those of the full pipeline, also where the fast path runs: they are what was stored.
+    Own answers are compared with the stored ones by the full pipeline, also where the fast path runs: they
+    are what was stored. The fast path is judged by the fins' own model as well.
+
+    Raises:
+        DataError: the bundle has no self-tests, or no weights.
     """
-    runtime = Runtime(runtime.bundle, runtime.engine)
-    cases = runtime.bundle.graph.self_test
-    alive = [i for i, name in enumerate(runtime.layout.names) if name not in runtime.failed]
-    healthy = runtime.layout.without(runtime.failed) if runtime.failed else runtime.layout
-    prepared = runtime.allocator.pipeline.prepare(healthy)
-    normalization = runtime.bundle.graph.normalization
-    std = normalization.std
+    cases, layout, weights = robot.graph.self_test, robot.layout, robot.allocator.weights
+    if not cases or weights is None:
+        raise DataError("the bundle has no self-tests; export it again")
+    alive = [i for i, name in enumerate(layout.names) if name not in robot.graph.failed]
+    healthy = layout.without(robot.graph.failed) if robot.graph.failed else layout
+    normalization = robot.graph.normalization
+    nodes = NodeFeatures(robot.graph.feature_set, healthy, normalization)
+    full, surrogate = robot, surrogate_on(healthy, weights)
+    if robot.allocator.name != LearnedAllocator.name:
+        full = Robot(robot.graph, LearnedAllocator(weights, **robot.allocator.options))
+    targets = [np.array(case.wrench) for case in cases]
+    answers = [full.allocator.allocate(layout, target, failed=robot.graph.failed) for target in targets]
 
     def features(case: SelfTest) -> float:
-        scaled = (np.array(case.wrench) - normalization.mean) / std
-        seen = fin_frame_features(prepared.geometry, scaled[None])[0]
+        seen = nodes.of(np.array(case.wrench))
         stored = np.array([case.features[i] for i in alive])
         return float(np.abs(seen - stored).max()) if seen.shape == stored.shape else np.inf
 
     def physics(case: SelfTest) -> float:
-        command = np.array([case.command[i] for i in alive])
-        predicted = prepared.commands.wrench(command[None])[0] * std
-        return float(normalization.error(predicted, np.array(case.predicted_wrench)))
+        command = np.array([case.command[i] for i in alive], dtype=np.float64)
+        return float(normalization.error(surrogate.wrench(command), np.array(case.predicted_wrench)))
 
+    missing, dearer = [], []
+    for case, answer in zip(cases, answers, strict=True):
+        assert answer.wrench_surrogate is not None
+        stored_error = normalization.error(np.array(case.predicted_wrench), np.array(case.wrench))
+        missing.append(float(normalization.error(answer.wrench_surrogate, answer.target) - stored_error))
+        stored = np.array([row or (np.nan,) * 3 for row in case.command])
+        dearer.append(answer.energy / max(float(command_energy(stored, layout.upper)), 1e-9) - 1)
+    judged = "own answers, judged by the fins' own model (err_norm)"
     findings = [
-        Finding("node features", _worst(map(features, cases)), FEATURE_TOLERANCE),
-        Finding("wrench of the stored commands (err_norm)", _worst(map(physics, cases)), SELF_TEST_TOLERANCE),
+        Finding("node features", worst(map(features, cases)), FEATURE_TOLERANCE),
+        Finding("wrench of the stored commands (err_norm)", worst(map(physics, cases)), SELF_TEST_TOLERANCE),
+        Finding("fins that the networks have not learned", len(robot.allocator.unknown_fins(healthy)), 0),
+        Finding(judged, worst(answer.err_norm for answer in answers), REACHED),
+        Finding("own answers, more error than stored (err_norm)", worst(missing), SELF_TEST_TOLERANCE),
+        Finding("own answers, more energy than stored (share)", worst(dearer), ENERGY_TOLERANCE),
     ]
-    findings += _onnx_findings(runtime, alive)
-    answers = [runtime.allocate(case.wrench) for case in cases]
-    stored = [np.array([row or (np.nan,) * 3 for row in case.command]) for case in cases]
-    pairs = list(zip(answers, cases, stored, strict=True))
-    missing = _worst(
-        answer.err_norm - float(normalization.error(np.array(case.predicted_wrench), np.array(case.wrench)))
-        for answer, case, _ in pairs
-    )
-    dearer = _worst(answer.energy / max(runtime.energy(command), 1e-9) - 1 for answer, _, command in pairs)
-    return [
-        *findings,
-        Finding("own answers, more error than stored (err_norm)", missing, SELF_TEST_TOLERANCE),
-        Finding("own answers, more energy than stored (share)", dearer, ENERGY_TOLERANCE),
-    ]
-
-
-def _onnx_findings(runtime: Runtime, alive: list[int]) -> list[Finding]:
-    """Whether the two ONNX files answer as numpy does."""
-    questions = ("network.onnx against numpy", "surrogate.onnx against numpy (err_norm)")
-    try:
-        network = OnnxNetwork(runtime.bundle.files[NETWORK])
-        surrogate = OnnxSession(runtime.bundle.files[SURROGATE])
-    except DataError as error:
-        if "not installed" not in str(error):
-            raise
-        why = "onnxruntime is not installed"
-        return [Finding(f"{question} ({why})", np.nan, ONNX_TOLERANCE) for question in questions]
-    fins = [runtime.layout.fins[i] for i in alive]
-    prepared = runtime.allocator.pipeline.prepare(
-        runtime.layout.without(runtime.failed) if runtime.failed else runtime.layout
-    )
-    normalization, files = runtime.bundle.graph.normalization, runtime.bundle.files
-    cases = runtime.bundle.graph.self_test
-    scaled = (np.array([case.wrench for case in cases]) - normalization.mean) / normalization.std
-    by_numpy = predict(runtime.allocator.pipeline.network, prepared, scaled)
-    by_onnx = predict(network, prepared, scaled)
-    parts = [np.abs(a - b) for a, b in zip(by_numpy, by_onnx, strict=True)]
-    parts[1][..., 2] = np.minimum(parts[1][..., 2], np.abs(2.0 - parts[1][..., 2]))  # an angle: -1 is 1
-    command = np.array([[case.command[i] for i in alive] for case in cases], dtype=np.float32)
-    _, wrench = surrogate.run(
-        command=command,
-        position=np.array([fin.position for fin in fins], dtype=np.float32),
-        mounting_angle=np.array([fin.mounting_angle for fin in fins], dtype=np.float32),
-    )
-    truth = prepared.commands.wrench(command.astype(np.float64)) * normalization.std
-    findings = [
-        Finding(questions[0], max(float(a.max()) for a in parts), ONNX_TOLERANCE),
-        Finding(questions[1], float(normalization.error(wrench, truth).max()), ONNX_TOLERANCE),
-    ]
-    fast = runtime.bundle.weights.fast
-    if fast is not None:
-        x = fin_frame_features(prepared.geometry, scaled).astype(np.float32)
-        apart = np.abs(OnnxSession(files[FAST]).run(features=x)[0] - NumpyFastNetwork(fast)(x))
-        findings.append(Finding("fast.onnx against numpy", float(apart.max()), ONNX_TOLERANCE))
+    if full is not robot:
+        quick = [robot.allocator.allocate(layout, target, failed=robot.graph.failed) for target in targets]
+        errors = worst(answer.err_norm for answer in quick)
+        findings.append(Finding(judged.replace("own answers", "answers of the fast path"), errors, REACHED))
     return findings
 
 
-def _worst(values: Iterator[float]) -> float:
-    """The largest value, not below 0."""
-    return max(0.0, *values)
+def worst(values: Iterable[float]) -> float:
+    """The largest value, not below 0; NaN if any value is NaN."""
+    return float(np.max([0.0, *values]))

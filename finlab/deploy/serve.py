@@ -29,7 +29,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.deploy.runtime import Answer, Runtime
+from finlab.allocation.allocation import Allocation
+from finlab.deploy.robot import Robot
 from finlab.errors import CommandError, FinlabError
 
 Array = NDArray[np.float64]
@@ -63,19 +64,19 @@ class Timing:
 class Server:
     """Answers requests until they end."""
 
-    def __init__(self, runtime: Runtime, timing: Timing, steady: bool = False) -> None:
+    def __init__(self, robot: Robot, timing: Timing, steady: bool = False) -> None:
         """Make it.
 
         Args:
-            runtime: the robot.
+            robot: the robot.
             timing: deadline and watchdog.
             steady: whether fins turn slowly from one answer to the next (`previous`).
         """
-        self._runtime, self._timing, self._steady = runtime, timing, steady
+        self._robot, self._timing, self._steady = robot, timing, steady
         self._worker = ThreadPoolExecutor(1)
         self._sent: Array | None = None  # the last commands, None while the fins rest
         self._failed: tuple[str, ...] = ()
-        self._busy: Future[Answer] | None = None
+        self._busy: Future[Allocation] | None = None
 
     def run(self, transport: Transport) -> None:
         """Serve until the requests end; then the fins rest."""
@@ -107,24 +108,25 @@ class Server:
         except TooLate:
             held = self._neutral() if self._sent is None else self._sent.copy()
             held[np.isnan(self._neutral())] = np.nan
-            return _reply(name, "late", self._runtime.layout.names, held)
+            return _reply(name, "late", self._robot.layout.names, held)
         except FinlabError as error:
             return {"id": name, "status": "error", "error": str(error)}
-        self._sent = answer.command
-        return _reply(name, "ok", answer.fins, answer.command) | {
+        reply = _reply(name, "ok", answer.fins, answer.command) | {
             "wrench": answer.wrench.tolist(),
             "unallocated": answer.unallocated.tolist(),
             "err_norm": answer.err_norm,
             "energy": answer.energy,
             "solve_ms": answer.solve_ms,
         }
+        self._sent = answer.command
+        return reply
 
-    def _solve(self, request: Mapping[str, Any], start: float) -> Answer:
-        """The runtime's answer, or `TooLate` when the deadline passes first."""
+    def _solve(self, request: Mapping[str, Any], start: float) -> Allocation:
+        """The robot's answer, or `TooLate` when the deadline passes first."""
         previous = self._sent if self._steady else None
 
-        def work() -> Answer:
-            return self._runtime.allocate(
+        def work() -> Allocation:
+            return self._robot.allocate(
                 request["wrench"],
                 failed=self._failed,
                 previous=previous,
@@ -143,11 +145,11 @@ class Server:
 
     def _rest(self) -> dict[str, Any]:
         self._sent = None
-        return _reply(None, "neutral", self._runtime.layout.names, self._neutral())
+        return _reply(None, "neutral", self._robot.layout.names, self._neutral())
 
     def _neutral(self) -> Array:
-        known = [name for name in self._failed if name in self._runtime.layout.names]
-        return self._runtime.neutral(known)
+        known = [name for name in self._failed if name in self._robot.layout.names]
+        return self._robot.neutral(known)
 
 
 def _request(line: bytes) -> Mapping[str, Any]:

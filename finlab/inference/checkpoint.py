@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -21,6 +22,7 @@ from finlab.errors import CheckpointError
 from finlab.inference.fast_weights import check_state, fast_files, parse_fast
 from finlab.inference.normalization import Normalization
 from finlab.inference.weights import NetworkConfig, State, SurrogateConfig, TrainedWeights
+from finlab.layout import FinModelSpec
 
 FORMAT = "finlab-checkpoint"
 """Value of the key `format`."""
@@ -70,6 +72,7 @@ def parse_checkpoint(files: Mapping[str, bytes], source: str, name: str) -> Trai
         fast = parse_fast(files[FAST_CONFIG], files[FAST_FILE], f"{source}/{FAST_FOLDER}")
     try:
         tensors = load(files[WEIGHTS_FILE])
+        FinModelSpec.from_values(config["fin_model"])
         kind, hidden = config["surrogate"]["kind"], config["surrogate"]["hidden"]
         surrogate_config = SurrogateConfig(kind, tuple(hidden))
         sizes = None if config["network"] is None else NetworkConfig(**config["network"])
@@ -91,7 +94,7 @@ def parse_checkpoint(files: Mapping[str, bytes], source: str, name: str) -> Trai
             metrics=dict(config["metrics"]),
             sha256=sha256,
         )
-    except (KeyError, TypeError, ValueError, SafetensorError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError, SafetensorError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise CheckpointError(
             f"{source}: {CONFIG_FILE} and {WEIGHTS_FILE} do not fit together ({reason})"
@@ -137,7 +140,7 @@ def parse_normalization(files: Mapping[str, bytes], source: str) -> Normalizatio
         raise CheckpointError(f"{source}/{CONFIG_FILE}: normalization is missing or malformed") from error
 
 
-def resolve_checkpoint(checkpoint: str | Path) -> Path:
+def resolve_checkpoint(checkpoint: str | os.PathLike[str]) -> Path:
     """The folder of a checkpoint: a shipped one by its bare name, any other by its path.
 
     A bare name is never looked up in the current folder, so that a folder called `default` there does

@@ -21,6 +21,8 @@ FORMAT, VERSION = "finlab-fast", 1
 WEIGHTS_FILE, CONFIG_FILE = "model.safetensors", "config.json"
 MAX_ROUNDS = 100
 """Most rounds that a distilled network may have."""
+LARGEST_WEIGHT = 1e6
+"""Largest magnitude of a weight; training stays below 100, and far beyond this answers would be NaN."""
 
 
 class FastWeights(NamedTuple):
@@ -74,15 +76,15 @@ def parse_fast(config_file: bytes, weights_file: bytes, source: str) -> FastWeig
 
 
 def check_state(state: Mapping[str, NDArray[Any]], shapes: Mapping[str, tuple[int, ...]]) -> None:
-    """Raise a `ValueError` unless a network has exactly these arrays, in single precision and finite."""
+    """Raise a `ValueError` unless a network has exactly these arrays, in float32 and of sane size."""
     if wrong := sorted(set(shapes) ^ set(state)):
         raise ValueError(f"{wrong[0]!r:.80} is missing or not expected")
     for name, shape in shapes.items():
         array = state[name]
         if array.shape != shape or array.dtype != np.float32:
             raise ValueError(f"{name}: expected float32 of shape {shape}, got {array.dtype} {array.shape}")
-        if not np.isfinite(array).all():
-            raise ValueError(f"{name}: holds a number that is not finite")
+        if not (np.abs(array) <= LARGEST_WEIGHT).all():  # false for NaN as well
+            raise ValueError(f"{name}: holds NaN or a number beyond {LARGEST_WEIGHT:g}")
 
 
 def _shapes(width: int, rounds: int) -> dict[str, tuple[int, ...]]:

@@ -7,7 +7,6 @@ from finlab.layout.arrays import stack_layouts as stack_layouts
 from finlab.layout.body import Body as Body
 from finlab.layout.body import Hull as Hull
 from finlab.layout.file import layout_to_dict as layout_to_dict
-from finlab.layout.file import load_layout as load_layout
 from finlab.layout.file import parse_layout as parse_layout
 from finlab.layout.file import save_layout as save_layout
 from finlab.layout.fin import Fin as Fin
@@ -15,6 +14,7 @@ from finlab.layout.fin import Limits as Limits
 from finlab.layout.fin_model import FinModelSpec as FinModelSpec
 from finlab.layout.layout import MAX_FINS as MAX_FINS
 from finlab.layout.layout import Layout as Layout
+from finlab.layout.load import load_layout as load_layout
 from finlab.layout.random import layout_from_arrays as layout_from_arrays
 from finlab.layout.random import random_layout as random_layout
 from finlab.layout.random import random_layouts as random_layouts

@@ -13,13 +13,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from finlab.assets import shipped_layouts
 from finlab.errors import LayoutError
 from finlab.layout.body import BODY_KEYS, HULL_KEYS, Body, Hull
 from finlab.layout.fin import Fin, Limits
 from finlab.layout.fin_model import FinModelSpec
 from finlab.layout.layout import MAX_FINS, Layout
-from finlab.layout.reading import parse_json, read_text
 from finlab.layout.rules import mapping, number, shown, text
 
 FORMAT = "finlab-layout"
@@ -32,52 +30,6 @@ _LIMIT_FIELDS = {
     "frequency_hz": "frequency",
     "zero_direction_rad": "zero_direction",
 }
-
-
-def load_layout(layout: str | os.PathLike[str]) -> Layout:
-    """Returns a shipped layout by its bare name, such as "A", or the layout in a YAML or JSON file.
-
-    A bare name is never looked up in the current folder while a layout of that name is shipped; write `./A`
-    for a file called `A` there. Relative paths inside a file (a force table, a hull mesh) are taken from the
-    file's own folder.
-
-    Raises:
-        LayoutError: the file cannot be read or is not a valid layout; the message names file and key.
-    """
-    file = layout_path(layout)
-    source = str(layout)
-    content = read_text(file, source)
-    if file.suffix.lower() == ".json":
-        data = parse_json(content, source)
-    else:
-        from finlab.layout.yaml_file import parse_yaml  # a robot's computer reads JSON and may lack PyYAML
-
-        data = parse_yaml(content, source)
-    return parse_layout(data, source=source, folder=file.resolve().parent)
-
-
-def layout_path(layout: str | os.PathLike[str]) -> Path:
-    """The path that a user means: text may be the name of a shipped layout, a `Path` is always a path.
-
-    Raises:
-        LayoutError: there is neither a shipped layout nor anything else of this name.
-    """
-    if not isinstance(layout, str):
-        return Path(layout)
-    shipped = shipped_layouts()
-    if layout in shipped:
-        return shipped[layout]
-    path = Path(layout)
-    try:
-        if path.exists():
-            return path
-    except (OSError, ValueError) as error:  # a name that is too long, or holds a NUL byte
-        reason = getattr(error, "strerror", None) or error
-        raise LayoutError(f"layout {layout[:80]!r} cannot be a path: {reason}") from error
-    raise LayoutError(
-        f"layout {layout!r} is neither a file nor a shipped layout; "
-        f"shipped are {', '.join(shipped) or 'none'}"
-    )
 
 
 def parse_layout(data: Any, source: str = "layout", folder: Path | None = None) -> Layout:
@@ -125,7 +77,7 @@ def save_layout(layout: Layout, path: str | os.PathLike[str]) -> None:
     if file.suffix.lower() == ".json":
         content = json.dumps(data, indent=2) + "\n"
     else:
-        from finlab.layout.yaml_file import yaml_text  # as in `load_layout`
+        from finlab.layout.yaml_file import yaml_text  # a robot's computer writes JSON and may lack PyYAML
 
         content = yaml_text(data)
     # Written beside and renamed, so that a kill or a full disk never leaves half a layout.

@@ -37,6 +37,11 @@ def read_text(path: Path, source: str) -> str:
         raise LayoutError(
             f"is larger than {MAX_BYTES:,} bytes; a layout file has a few thousand", source=source
         )
+    return decode_text(raw, source)
+
+
+def decode_text(raw: bytes, source: str) -> str:
+    """Returns the text in bytes; a `LayoutError` where they are not UTF-8 text."""
     try:
         content = raw.decode("utf-8-sig")
     except UnicodeDecodeError:

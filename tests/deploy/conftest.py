@@ -4,7 +4,6 @@ import pytest
 
 import finlab
 from finlab.allocation import Allocator
-from finlab.assets import shipped_layouts
 from finlab.deploy.bundle import Bundle, make_bundle
 
 
@@ -17,4 +16,4 @@ def shipped_allocator() -> Allocator:
 @pytest.fixture(scope="session")
 def bundle(shipped_allocator: Allocator) -> Bundle:
     """Layout A with the shipped checkpoint."""
-    return make_bundle(finlab.load_layout(shipped_layouts()["A"]), shipped_allocator)
+    return make_bundle(finlab.load_layout("A"), shipped_allocator)

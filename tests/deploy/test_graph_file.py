@@ -16,10 +16,10 @@ from hypothesis import strategies as st
 
 from finlab.assets import shipped_layouts
 from finlab.deploy import LayoutGraph, SelfTest, graph_bytes, parse_graph, read_graph, write_graph
-from finlab.deploy.graph_document import checksum_of
 from finlab.errors import FinlabError, LayoutError
 from finlab.inference.normalization import Normalization
 from finlab.layout import Fin, Layout, load_layout
+from finlab.layout.graph_layout import checksum_of
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "finlab/deploy/graph.schema.json").read_text())
 

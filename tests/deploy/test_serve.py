@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from finlab.allocation import Allocation
 from finlab.deploy.bundle import Bundle
-from finlab.deploy.bundle_file import parse_bundle
-from finlab.deploy.runtime import Answer, Runtime
+from finlab.deploy.robot import Robot, parse_robot
 from finlab.deploy.serve import Server, Timing
 from finlab.deploy.transport import LoopbackUdp, StandardStreams
 from finlab.errors import FinlabError
@@ -23,8 +23,8 @@ GOOD = {"wrench": [1, 0, 0.5, 0, 0, 0.1]}
 
 
 @pytest.fixture(scope="module")
-def runtime(bundle: Bundle) -> Runtime:
-    return Runtime(parse_bundle(bundle.files))
+def robot(bundle: Bundle) -> Robot:
+    return parse_robot(bundle.files)
 
 
 class Script:
@@ -49,15 +49,15 @@ class Script:
         self.sent.append(json.loads(line))
 
 
-def served(runtime: Runtime, *requests: Any, timing: Timing | None = None, steady: bool = False) -> Script:
+def served(robot: Robot, *requests: Any, timing: Timing | None = None, steady: bool = False) -> Script:
     script = Script(*requests)
-    Server(runtime, timing or Timing(), steady).run(script)
+    Server(robot, timing or Timing(), steady).run(script)
     return script
 
 
-def test_answers_like_the_runtime(runtime: Runtime) -> None:
-    first, end = served(runtime, {**GOOD, "id": 7, "failed": ["back_left"]}).sent
-    truth = runtime.allocate(GOOD["wrench"], failed=["back_left"])
+def test_answers_like_the_library(robot: Robot) -> None:
+    first, end = served(robot, {**GOOD, "id": 7, "failed": ["back_left"]}).sent
+    truth = robot.allocate(GOOD["wrench"], failed=["back_left"])
     assert (first["id"], first["status"]) == (7, "ok") and first["fins"] == list(truth.fins)
     assert first["command"][2] is None
     np.testing.assert_allclose(first["command"][0], truth.command[0])
@@ -80,62 +80,62 @@ def test_answers_like_the_runtime(runtime: Runtime) -> None:
         ({"wrench": [float("nan")] * 6}, "Fx must be finite"),
     ],
 )
-def test_bad_requests_get_one_sentence_and_no_commands(request_: Any, message: str, runtime: Runtime) -> None:
-    reply = served(runtime, request_).sent[0]
+def test_bad_requests_get_one_sentence_and_no_commands(request_: Any, message: str, robot: Robot) -> None:
+    reply = served(robot, request_).sent[0]
     assert reply["status"] == "error" and "command" not in reply
     with pytest.raises(FinlabError, match=message):
         raise FinlabError(reply["error"])
 
 
-def test_silence_leads_to_rest_and_nonsense_is_silence(runtime: Runtime) -> None:
-    script = served(runtime, GOOD, b"nonsense", b"nonsense", None, timing=Timing(watchdog=0.2))
+def test_silence_leads_to_rest_and_nonsense_is_silence(robot: Robot) -> None:
+    script = served(robot, GOOD, b"nonsense", b"nonsense", None, timing=Timing(watchdog=0.2))
     assert [reply["status"] for reply in script.sent] == ["ok", "error", "error", "neutral", "neutral"]
     waits = [wait for wait in script.waits[1:4] if wait is not None]
     assert waits == sorted(waits, reverse=True) and waits[0] <= 0.2, "nonsense does not feed the watchdog"
     rest = np.array(script.sent[3]["command"])
-    np.testing.assert_array_equal(rest, runtime.neutral())
+    np.testing.assert_array_equal(rest, robot.neutral())
 
 
-class Slow(Runtime):
+class Slow(Robot):
     """A robot whose computer is busy."""
 
-    def __init__(self, runtime: Runtime, delay: float) -> None:
-        vars(self).update(vars(runtime))
-        self.delay = delay
+    def __init__(self, robot: Robot, delay: float) -> None:
+        super().__init__(robot.graph, robot.allocator)
+        vars(self)["delay"] = delay
 
-    def allocate(self, *args: Any, **options: Any) -> Answer:
-        time.sleep(self.delay)
+    def allocate(self, *args: Any, **options: Any) -> Allocation:
+        time.sleep(vars(self)["delay"])
         return super().allocate(*args, **options)
 
 
-def test_deadline_repeats_what_was_sent_last(runtime: Runtime) -> None:
-    slow = Slow(runtime, 0.0)
+def test_deadline_repeats_what_was_sent_last(robot: Robot) -> None:
+    slow = Slow(robot, 0.0)
     server = Server(slow, Timing(deadline=0.15))
     line = json.dumps(GOOD).encode()
     assert server.answer(line)["status"] == "ok"
     sent = server.answer(line)["command"]
-    slow.delay = 0.4
+    vars(slow)["delay"] = 0.4
     start = time.perf_counter()
     late = server.answer(json.dumps({"wrench": [0, 0, 2, 0, 0, 0], "id": 1}).encode())
     assert time.perf_counter() - start < 0.3
     assert late["status"] == "late" and late["command"] == sent
     assert server.answer(line)["status"] == "late", "the computer is still busy with the other target"
-    slow.delay = 0.0
+    vars(slow)["delay"] = 0.0
     time.sleep(0.6)
     assert server.answer(line)["status"] == "ok"
 
 
-def test_first_answer_too_late_is_neutral(runtime: Runtime) -> None:
-    late = Server(Slow(runtime, 0.3), Timing(deadline=0.01)).answer(json.dumps(GOOD).encode())
+def test_first_answer_too_late_is_neutral(robot: Robot) -> None:
+    late = Server(Slow(robot, 0.3), Timing(deadline=0.01)).answer(json.dumps(GOOD).encode())
     assert late["status"] == "late"
-    np.testing.assert_array_equal(np.array(late["command"]), runtime.neutral())
+    np.testing.assert_array_equal(np.array(late["command"]), robot.neutral())
 
 
-def test_steady_turns_fins_slowly(runtime: Runtime) -> None:
+def test_steady_turns_fins_slowly(robot: Robot) -> None:
     wrenches = [[1, 0, 0.5, 0, 0, 0.1], [0.9, 0.1, 0.5, 0, 0, 0.1]]
-    replies = served(runtime, *({"wrench": w} for w in wrenches), steady=True).sent
+    replies = served(robot, *({"wrench": w} for w in wrenches), steady=True).sent
     before = np.array(replies[0]["command"])
-    truth = runtime.allocate(wrenches[1], previous=before)
+    truth = robot.allocate(wrenches[1], previous=before)
     np.testing.assert_allclose(np.array(replies[1]["command"]), truth.command, atol=1e-9)
 
 

@@ -8,14 +8,11 @@ from pathlib import Path
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
-from finlab.deploy.graph_file import parse_graph
 from finlab.errors import FinlabError, LayoutError
 from finlab.layout import Layout, parse_layout, save_layout
+from finlab.layout.graph_layout import SUFFIX, parse_graph_layout
 from finlab.layout.reading import MAX_BYTES, parse_json
 from finlab.layout.yaml_file import parse_yaml
-
-GRAPH_SUFFIX = ".graph.json"
-"""Ending of the name of a layout graph file."""
 
 
 def file_stem(name: str) -> str:
@@ -38,8 +35,8 @@ def read_layout(name: str, content: bytes) -> Layout:
         raise LayoutError("is not UTF-8 text, expected a YAML or JSON layout file", source=source) from None
     if "\0" in text:
         raise LayoutError("is a binary file, expected a YAML or JSON layout file", source=source)
-    if source.lower().endswith(GRAPH_SUFFIX):
-        return parse_graph(text, source).layout
+    if source.lower().endswith(SUFFIX):
+        return parse_graph_layout(text, source)
     parse = parse_json if source.lower().endswith(".json") else parse_yaml
     return parse_layout(parse(text, source), source=source)
 

@@ -45,6 +45,7 @@ class LearnedAllocator(Allocator):
     """The product's default method."""
 
     name = "learned"
+    weights: TrainedWeights
 
     def __init__(
         self,

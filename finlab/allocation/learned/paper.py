@@ -101,6 +101,7 @@ class PaperAllocator(Allocator):
     """Mixture density network, physics-guided ranking and gradient refinement, as printed."""
 
     name = "paper"
+    weights: TrainedWeights
 
     def __init__(self, weights: TrainedWeights, **settings: Any) -> None:
         """Make it from trained weights of any preset; settings are fields of `PaperSettings`.

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.assets import shipped_layouts
 from finlab.layout.arrays import stack_layouts
-from finlab.layout.file import load_layout
 from finlab.layout.layout import Layout
+from finlab.layout.load import load_layout
 
 POSITION_TOLERANCE = 2e-3
 """Fins closer than this count as the same place [m]."""

@@ -1,0 +1,102 @@
+"""A robot out of its bundle: the layout, the fins that it has lost, and the library's own allocator."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from finlab.allocation.allocation import Allocation
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.methods import allocator_from_bundle
+from finlab.allocation.policy import CLOSEST, Policy
+from finlab.bundle_files import GRAPH, Files, check_bundle_files, read_bundle_files
+from finlab.deploy.graph import LayoutGraph
+from finlab.deploy.graph_file import parse_graph
+from finlab.errors import AllocationError, DataError
+from finlab.layout import Layout
+from finlab.layout.reading import decode_text
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Robot:
+    """What `finlab-runtime` works with."""
+
+    graph: LayoutGraph
+    """The robot, failed fins included, and self-tests."""
+    allocator: Allocator
+    """Made of the bundle's weights and settings."""
+
+    @property
+    def layout(self) -> Layout:
+        """All fins."""
+        return self.graph.layout
+
+    def lost(self, failed: Sequence[str] = ()) -> tuple[str, ...]:
+        """Fins that the bundle names as failed stay failed, whatever `failed` adds."""
+        return tuple(dict.fromkeys([*self.graph.failed, *failed]))
+
+    def allocate(
+        self,
+        wrench: ArrayLike,
+        *,
+        failed: Sequence[str] = (),
+        previous: ArrayLike | None = None,
+        policy: Policy | str = CLOSEST,
+        seed: int = 0,
+    ) -> Allocation:
+        """Commands for one target; arguments and errors as in `finlab.Allocator.allocate`.
+
+        Raises:
+            AllocationError: also where the answer is no number, as broken weights give it.
+        """
+        lost = self.lost(failed)
+        answer = self.allocator.allocate(
+            self.layout, wrench, failed=lost, previous=previous, policy=policy, seed=seed
+        )
+        works = [name not in lost for name in self.layout.names]
+        if not np.isfinite(answer.command[works]).all():
+            raise AllocationError(
+                "the bundle's networks answer with NaN; export it again, and run `finlab-runtime check` on it"
+            )
+        return answer
+
+    def neutral(self, failed: Sequence[str] = ()) -> Array:
+        """Commands (n, 3) that push least: least amplitude and frequency, zero direction nearest to 0."""
+        command = self.layout.lower.copy()
+        command[:, 2] = np.clip(0.0, command[:, 2], self.layout.upper[:, 2])
+        lost = self.lost(failed)
+        command[[name in lost for name in self.layout.names]] = np.nan
+        return command
+
+
+def load_robot(path: str | os.PathLike[str], fast: bool = False) -> Robot:
+    """The robot in a bundle, a folder or a zip archive.
+
+    Args:
+        path: the bundle.
+        fast: whether the distilled network answers where it reaches the target.
+
+    Raises:
+        FinlabError: the bundle is not one, was changed, or cannot be run.
+    """
+    return parse_robot(read_bundle_files(path), str(path), fast)
+
+
+def parse_robot(files: Files, source: str = "bundle", fast: bool = False) -> Robot:
+    """The robot in the contents of a bundle's files; see `load_robot`."""
+    check_bundle_files(files, source)
+    place = f"{source}/{GRAPH}"
+    graph = parse_graph(decode_text(files[GRAPH], place), place)
+    allocator = allocator_from_bundle(files, source, "fast" if fast else "learned")
+    weights = allocator.weights
+    if weights is None or weights.sha256 != graph.checkpoint_sha256:
+        raise DataError(f"{source}: {GRAPH} and the weights are of different checkpoints; export again")
+    if not all(np.array_equal(a, b) for a, b in zip(weights.normalization, graph.normalization, strict=True)):
+        raise DataError(f"{source}: {GRAPH} and the weights differ in normalization; export again")
+    return Robot(graph, allocator)
