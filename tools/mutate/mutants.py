@@ -57,9 +57,11 @@ def _is_used(operator: str) -> bool:
     return any(set(replaced.groups()) <= set(family.split()) for family in FAMILIES)
 
 
-def _annotations(text: str) -> set[tuple[int, int]]:
-    """(line, column) of what can be changed in annotations, which changes nothing that a program does."""
-    found: set[tuple[int, int]] = set()
+def _no_code(text: str) -> set[tuple[int, int]]:
+    """(line, column) of what can be changed in annotations, and of a bare `*` among parameters: no program
+    does anything else for it."""
+    stars = (n for n in ast_nodes(get_ast(text)) if n.type == "operator" and n.parent.type == "parameters")
+    found: set[tuple[int, int]] = {star.start_pos for star in stars}
     for node in ast.walk(ast.parse(text)):
         for name in ("annotation", "returns"):
             for part in ast.walk(getattr(node, name, None) or ast.Pass()):
@@ -74,7 +76,7 @@ def _annotations(text: str) -> set[tuple[int, int]]:
 def find_places(file: str) -> list[list[Mutant]]:
     """All mutants of a file, those of one place together, so that a `+` weighs no more than a number."""
     text = (ROOT / file).read_text()
-    nodes, skipped = list(ast_nodes(get_ast(text))), _annotations(text)
+    nodes, skipped = list(ast_nodes(get_ast(text))), _no_code(text)
     places: dict[tuple[int, int], list[Mutant]] = {}
     for name in filter(_is_used, operator_names()):
         operator, occurrence = get_operator(name)(), 0

@@ -11,7 +11,16 @@ import pytest
 from finlab.allocation.learned import pipeline
 from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.allocation.learned.prepared import Prepared
-from finlab.allocation.learned.receding_horizon import HORIZON, HorizonSettings, Plan, plan_ahead
+from finlab.allocation.learned.receding_horizon import (
+    HORIZON,
+    HorizonSettings,
+    Plan,
+    _changes,
+    _detours,
+    _drifts,
+    _evaluate,
+    plan_ahead,
+)
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
 
@@ -147,3 +156,158 @@ def test_dear_turns_are_slow(calls: list[Call]) -> None:
         return total
 
     assert first_turns(10.0) < first_turns(0.0)
+
+
+# What the arrays say, one trajectory, tick and fin after the other.
+
+
+def cost_by_loops(
+    prepared: Prepared, previous: np.ndarray, force: np.ndarray, settings: HorizonSettings = HORIZON
+) -> tuple[float, float]:
+    """Cost and too fast turns of one trajectory of planar forces (H, n, 2)."""
+    planar, wraps = prepared.planar, prepared.commands.wraps
+    spent, too_fast, turned = np.zeros(settings.ticks), 0.0, 0.0
+    for i, top in enumerate(planar.curves.maximum):
+        points, since = previous[i, 2], 0
+        for k in range(settings.ticks):
+            thrust, direction = np.hypot(*force[k, i]), math.atan2(force[k, i, 1], force[k, i, 0])
+            spent[k] += planar.curves.table[i, -1, 2] * math.sqrt(thrust / top)
+            spent[k] += settings.overload_cost * max(thrust / top - 1.0, 0.0)
+            if thrust <= max(settings.working_share * top, 1.5 * planar.curves.minimum[i]):
+                continue
+            spent[k] += planar.direction_cost[i] * direction**2
+            here, there = (
+                math.remainder(angle - planar.middle[i], math.tau) for angle in (points, direction)
+            )
+            turned_by = abs(math.remainder(there - here, math.tau) if wraps[i] else there - here)
+            beyond_arc = 0.0 if wraps[i] else max(abs(there) - planar.half[i], 0.0)
+            sooner = 1.0 - k / settings.ticks
+            ticks = k + 1 - since
+            too_fast += sooner * (max(turned_by - settings.max_turn * ticks, 0.0) + beyond_arc)
+            turned += sooner * max(turned_by - settings.free_turn * ticks, 0.0)
+            points, since = direction, k + 1
+    lasting = settings.last_tick_weight
+    mean = (spent.sum() + lasting * spent[-1]) / (settings.ticks + lasting)
+    return mean + settings.turn_cost * turned + 1000.0 * too_fast, too_fast
+
+
+def plan_by_loops(call: Call, settings: HorizonSettings = HORIZON) -> Plan | None:
+    planar = call.prepared.planar
+    before, now = (planar_force(call.prepared, command) for command in (call.previous, call.near))
+    slow, working = _drifts(planar, now, call.target - wrench(call.prepared, before))
+    ticks = range(settings.ticks)
+    kept = np.array([before + (k + 1) * working for k in ticks])
+
+    def along(start: np.ndarray, drift: np.ndarray, first: int = 0) -> np.ndarray:
+        return np.array([start + (k + first) * drift for k in ticks])
+
+    paths = [along(now, slow), along(now, working), along(before, slow, 1), kept]
+    for goal in (planar_force(call.prepared, command) for command in call.far):
+        paths += list(_changes(kept, along(goal, slow)[None], settings.changes))
+    costs = [cost_by_loops(call.prepared, call.previous, path, settings) for path in paths]
+    if min(costs)[1] > 0.0:
+        for goal in _detours(planar, now, working, settings):
+            paths += list(_changes(kept, along(goal, slow)[None], settings.detours))
+        costs = [cost_by_loops(call.prepared, call.previous, path, settings) for path in paths]
+    weighed = [cost * (1.0 - settings.stay_gain if k < 2 else 1.0) for k, (cost, _) in enumerate(costs)]
+    best = int(np.argmin(weighed))
+    if best < 2:
+        return None
+    ready = call.previous[:, 2].copy()
+    least = np.maximum(settings.working_share * planar.curves.maximum, 1.5 * planar.curves.minimum)
+    for i in range(len(ready)):
+        for force in paths[best][:, i]:
+            if np.hypot(*force) > least[i]:
+                ready[i] = math.atan2(force[1], force[0])
+                break
+    first = np.minimum(np.linalg.norm(paths[best][0], axis=-1), planar.curves.maximum)
+    command = planar.curves.lookup(first)
+    command[:, 2] = ready
+    return Plan(command, ready)
+
+
+def planar_force(prepared: Prepared, command: np.ndarray) -> np.ndarray:
+    return np.asarray(prepared.commands.fin.force(prepared.commands.clamp(command))[..., 1:])
+
+
+def wrench(prepared: Prepared, force: np.ndarray) -> np.ndarray:
+    """Normalized wrench (6,) of planar forces (n, 2)."""
+    return np.einsum("nd,ndi->i", force, prepared.planar.columns)
+
+
+@pytest.mark.parametrize("name", ["A", "penta", "restricted"])
+def test_costs_are_those_of_plain_loops(name: str, learned: LearnedAllocator) -> None:
+    prepared = learned.pipeline.prepare(load_layout(shipped_layouts()[name]))
+    n, top = len(prepared.lower), prepared.planar.curves.maximum
+    rng = np.random.default_rng(5)
+    previous = rng.uniform(prepared.lower, prepared.upper)
+    force = (
+        rng.standard_normal((12, HORIZON.ticks, n, 2))
+        * top[:, None]
+        * rng.choice([0.0, 0.1, 1.0], (12, 1, n, 1))
+    )
+    force[6:, 1:] = force[6:, :1]  # some go on as they began
+    found = _evaluate(prepared, previous, force, HORIZON)
+    for k in range(12):
+        cost, too_fast = cost_by_loops(prepared, previous, force[k])
+        assert found.cost[k] == pytest.approx(cost, rel=1e-9)
+        assert found.too_fast[k] == pytest.approx(too_fast, rel=1e-9, abs=1e-9)
+
+
+def test_plans_are_those_of_plain_loops(calls: list[Call]) -> None:
+    planned_ticks = [call for call in calls if call.plan is not None]
+    for call in planned_ticks[::2] + calls[::17]:
+        before = planar_force(call.prepared, call.previous)
+        if np.linalg.norm(call.target - wrench(call.prepared, before)) > HORIZON.sudden_change:
+            continue
+        expected = plan_by_loops(call)
+        assert (call.plan is None) == (expected is None)
+        if call.plan is not None and expected is not None:
+            np.testing.assert_allclose(call.plan.command, expected.command, atol=1e-6)
+            np.testing.assert_allclose(call.plan.ready, expected.ready, atol=1e-6)
+
+
+def test_changes_wait_and_then_go_evenly() -> None:
+    start, goal = np.zeros((10, 1, 2)), np.ones((2, 10, 1, 2)) * [[[[1.0, 2.0]]], [[[3.0, 4.0]]]]
+    found = _changes(start, goal, ((0, 1), (4, 3)))
+    assert found.shape == (4, 10, 1, 2)
+    at_once, later = np.ones(10), np.array([0, 0, 0, 0, 1 / 3, 2 / 3, 1, 1, 1, 1])
+    for path, share, end in zip(found, (at_once, at_once, later, later), (1.0, 3.0, 1.0, 3.0), strict=True):
+        np.testing.assert_allclose(path[:, 0, 0], end * share)
+
+
+def test_drifts_change_the_wrench_with_the_least_effort(calls: list[Call]) -> None:
+    for call in calls[::20]:
+        planar, now = call.prepared.planar, planar_force(call.prepared, call.near)
+        top = planar.curves.maximum
+        change = np.array([0.02, -0.01, 0.03, 0.01, 0.0, -0.02])
+        weights = (top, np.maximum(np.linalg.norm(now, axis=-1), 1e-4 * top) ** 1.5)
+        for drift, weight in zip(_drifts(planar, now, change), weights, strict=True):
+            root = np.repeat(np.sqrt(weight), 2)
+            least = root * (np.linalg.pinv(planar.columns.reshape(-1, 6).T * root) @ change)
+            np.testing.assert_allclose(drift.ravel(), least, atol=1e-6)
+
+
+def test_detours_keep_the_wrench(calls: list[Call]) -> None:
+    call = calls[0]
+    planar, now = call.prepared.planar, planar_force(call.prepared, call.near)
+    drift = np.random.default_rng(0).standard_normal(now.shape)
+    steps = _detours(planar, now, drift, HORIZON) - now
+    n, sizes = len(now), HORIZON.detour_sizes
+    assert steps.shape == (len(sizes) * n + HORIZON.random_detours, n, 2)
+    for step in steps:
+        assert np.abs(wrench(call.prepared, step)).max() < 1e-9
+    by_fin = steps[: len(sizes) * n].reshape(len(sizes), n, n, 2)
+    for i in range(n):
+        across = np.array([-drift[i, 1], drift[i, 0]])
+        shares = np.array([by_fin[k, i] / size for k, size in enumerate(sizes)])
+        np.testing.assert_allclose(shares, np.broadcast_to(shares[0], shares.shape), atol=1e-9)
+        assert shares[0, i] @ across > 0.5 * np.linalg.norm(shares[0, i]) * np.linalg.norm(across)
+    length = np.linalg.norm(steps[len(sizes) * n :].reshape(-1, 2 * n), axis=1) / planar.curves.maximum.mean()
+    np.testing.assert_allclose(length, np.resize([size for size in sizes if size > 0.0], len(length)))
+
+
+def test_where_nothing_can_be_given_up_there_are_no_detours(learned: LearnedAllocator) -> None:
+    prepared = learned.pipeline.prepare(load_layout(shipped_layouts()["A"]))
+    planar = prepared.planar._replace(columns=np.random.default_rng(0).standard_normal((3, 2, 6)))
+    assert _detours(planar, np.ones((3, 2)), np.ones((3, 2)), HORIZON).shape == (0, 3, 2)
