@@ -30,16 +30,23 @@ class Changes:
     Objects count by identity (comparing their arrays would cost more than it saves), plain values by value.
     """
 
+    faults = 0
+    """Grows with every fault of the app: then nothing is trusted that was made before, whole or half."""
+
     def __init__(self) -> None:
         """Nothing has been made yet."""
         self._parts: tuple[Any, ...] | None = None
 
     def __call__(self, *parts: Any) -> bool:
         """True unless it was asked about the same parts last."""
-        old, self._parts = self._parts, parts
-        return old is None or not all(
-            a is b or (isinstance(a, PLAIN) and isinstance(b, PLAIN) and a == b)
-            for a, b in zip(old, parts, strict=True)
+        old, self._parts = self._parts, (Changes.faults, *parts)
+        return (
+            old is None
+            or len(old) != len(self._parts)
+            or not all(
+                a is b or (isinstance(a, PLAIN) and isinstance(b, PLAIN) and a == b)
+                for a, b in zip(old, self._parts, strict=False)
+            )
         )
 
 

@@ -12,19 +12,20 @@ import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
+from finlab.forces.axis_ranges import Ranges
+from webapp.handles import Changes
 from webapp.panels.commands import add_commands
-from webapp.panels.header import Header
 from webapp.panels.host import Panel
-from webapp.panels.swim_tab import SwimTab
 from webapp.panels.tabs import PANEL_WIDTH, build_panels
 from webapp.scene.scenery import Scenery
 from webapp.session import Session
-from webapp.tasks.analyst import Question, find
+from webapp.tasks.analyst import Findings, Question, find
 from webapp.tasks.answering import Answering
 from webapp.tasks.comparison import Comparison
-from webapp.tasks.debounce import Debounced
+from webapp.tasks.event_loop import EventLoop
 from webapp.tasks.exports import Exports
 from webapp.tasks.improving import Improver
+from webapp.tasks.newest import Newest
 from webapp.tasks.playback import Playback
 from webapp.tasks.ranging import REST_S, Beside, find_ranges
 from webapp.tasks.solver import Solver
@@ -59,25 +60,23 @@ class View:
         """
         self.client = client
         self.session = session
-        self._loop = loop
-        self._closed = False
+        self._loop = page = EventLoop(loop, self.fault)
+        self._robot = _robot(session)
         self._panels: list[Panel] = []
-        answers, post, changed = workers.answers, self._post, self._refresh
+        answers, changed = workers.answers, self._refresh
         refused = partial(self.notify, "Not possible")
         self.answering = Answering(
-            session, solver, answers, loop, post, self._answered, partial(self.notify, "No answer")
+            session, solver, page, answers, self._answered, partial(self.notify, "No answer")
         )
-        self.playback = Playback(session, self.answering, solver, answers, loop, post, changed, refused)
-        self.ranging = Debounced(find_ranges, REST_S, workers.marks, loop, post, changed)
-        self.analyst = Debounced(find, CARD_REST_S, workers.cards, loop, post, changed)
-        self.improver = Improver(workers.searches, post, changed)
-        self.comparison = Comparison(solver, answers, post, changed)
-        self.swimming = Swimming(solver.aside, workers.swims, post, self._swam, refused)
-        self.sweep = Sweep(session, loop, self.do)
-        self.exports = Exports(client, session, solver, answers, post, self.notify)
+        self.playback = Playback(session, self.answering, solver, page, answers, changed, refused)
+        self.ranging: Newest[Beside, Ranges] = Newest(page, workers.marks, find_ranges, changed, REST_S)
+        self.analyst: Newest[Question, Findings] = Newest(page, workers.cards, find, changed, CARD_REST_S)
+        self.improver = Improver(page, workers.searches, changed)
+        self.comparison = Comparison(solver, page, answers, changed)
+        self.swimming = Swimming(solver.aside, page, workers.swims, self._swam, refused)
+        self.sweep = Sweep(session, page, self.do)
+        self.exports = Exports(client, session, solver, page, answers, self.notify)
         self._build()
-        self.scenery.follow_tour()
-        self.scenery.apply_theme()
         self._refresh()
         self._ask()
 
@@ -87,7 +86,7 @@ class View:
         gui.main_panel.set_width(PANEL_WIDTH)
         gui.set_panel_label("finlab")
         self.scenery = Scenery(self.client, self.session, self.swimming, self.do)
-        self._panels = build_panels(gui, self)
+        self._panels, self._swim_panels = build_panels(gui, self)
         add_commands(gui, self)
 
     # What panels and scene may ask for.
@@ -109,12 +108,9 @@ class View:
         except FinlabError as error:
             self.notify("Not possible", str(error))
         except Exception as error:  # the page must go on, whatever we have got wrong
-            traceback.print_exc()
-            self.notify("A fault of the app", f"{type(error).__name__}: {error}")
-        self.scenery.follow_tour()
-        self.scenery.apply_theme()
-        self._refresh()
+            self.fault(error)
         self._ask()
+        self._refresh()
 
     def notify(self, title: str, body: str, *, good: bool = False) -> None:
         """Show a note to the user."""
@@ -129,7 +125,11 @@ class View:
     def _refresh(self) -> None:
         with self.client.atomic():
             # First: it settles the scale that the legend tells.
-            self.scenery.refresh(self.answering, self.comparison, self.improver, self.analyst.findings)
+            try:
+                self.scenery.refresh(self.answering, self.comparison, self.improver, self.analyst.findings)
+            except Exception as error:
+                self.scenery.hide()
+                self.fault(error)
             for panel in self._panels:
                 panel.refresh()
 
@@ -139,6 +139,11 @@ class View:
         """Have the workers answer the present state, unless they were asked already."""
         session = self.session
         display, state = session.display, session.state
+        if self._robot != _robot(session):
+            # What is known of another robot must not stand under this one's name.
+            self._robot = _robot(session)
+            for task in (self.answering, self.analyst, self.ranging):
+                task.forget()
         self.analyst.ask(Question(state.able, state.failed, session.reference, display.drawn, display.alone))
         self.ranging.ask(Beside(state.able, state.failed, state.target))
         self.answering.ask()
@@ -150,27 +155,30 @@ class View:
             return
         with self.client.atomic():
             self.scenery.refresh_swim()
-            for panel in self._panels:
-                if isinstance(panel, (Header, SwimTab)):
-                    panel.refresh()
+            for panel in self._swim_panels:
+                panel.refresh()
 
     def _answered(self) -> None:
         self.sweep.note(self.answering)
         self._refresh()
 
-    def _post(self, act: Callable[[], object]) -> None:
-        """Run `act` on the event loop, unless the browser has gone."""
-        if not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(lambda: None if self._closed else act())
+    def fault(self, error: Exception) -> None:
+        """Something that we have got wrong: it is told, and nothing that was drawn before is trusted."""
+        traceback.print_exception(error)
+        Changes.faults += 1
+        self.notify("A fault of the app", f"{type(error).__name__}: {error}")
 
     def close(self) -> None:
         """The browser has gone."""
-        self._closed = True
+        self._loop.close()
         self.sweep.stop()
         self.swimming.stop()
-        self.answering.frames = ()
         self.comparison.cancel()
-        self.analyst.close()
-        self.ranging.close()
-        self.improver.close()
-        self.answering.close()
+        self.improver.forget()
+        for task in (self.answering, self.analyst, self.ranging):
+            task.forget()
+
+
+def _robot(session: Session) -> tuple[str, tuple[str, ...]]:
+    """What tells one robot from another, however its fins are moved."""
+    return session.state.layout.name, session.state.layout.names

@@ -10,6 +10,7 @@ from finlab.allocation.methods import load_allocator
 from finlab.assets import shipped_checkpoints, shipped_layouts
 from finlab.errors import AllocationError
 from finlab.layout import load_layout
+from tests.webapp.loops import AtOnce
 from tests.webapp.stand_in import StandIn, load_stand_in
 from webapp.markup.comparison import comparison_table
 from webapp.session.state import COMPARED, State
@@ -26,7 +27,7 @@ UCAT = load_layout(shipped_layouts()["ucat"])
 def test_all_methods_answer_one_after_the_other() -> None:
     worker, done = Worker(), threading.Event()
     comparison = Comparison(
-        Solver(load=load_stand_in), worker, lambda act: act(), lambda: comparison.running or done.set()
+        Solver(load=load_stand_in), AtOnce(), worker, lambda: comparison.running or done.set()
     )
     assert "side by side" in comparison_table(comparison, None, False, "here")
     comparison.start(State(UCAT, target=PRESETS["Turn"]))
@@ -43,9 +44,7 @@ def test_a_method_that_fails_keeps_nobody_else_waiting() -> None:
         return load_stand_in("slsqp" if method == "paper" else method)
 
     worker, done = Worker(), threading.Event()
-    comparison = Comparison(
-        Solver(load=load), worker, lambda act: act(), lambda: comparison.running or done.set()
-    )
+    comparison = Comparison(Solver(load=load), AtOnce(), worker, lambda: comparison.running or done.set())
     comparison.start(State(UCAT, target=PRESETS["Turn"]))
     assert done.wait(60)
     worker.stop()

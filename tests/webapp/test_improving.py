@@ -10,11 +10,12 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
+from tests.webapp.loops import AtOnce, running
 from webapp.session import Session
 from webapp.session.search_request import SearchRequest, parsed_mission
 from webapp.tasks.analyst import Findings, Question, find
-from webapp.tasks.debounce import Debounced
 from webapp.tasks.improving import Improver
+from webapp.tasks.newest import Newest
 from webapp.tasks.worker import Worker
 
 NO_YAW = load_layout(shipped_layouts()["no_yaw"])
@@ -29,7 +30,7 @@ def until(condition: Callable[[], bool]) -> None:
 
 def test_search_is_cancelled_and_what_it_found_is_offered() -> None:
     worker = Worker()
-    improver: Improver = Improver(worker, lambda act: act(), lambda: None)
+    improver: Improver = Improver(AtOnce(), worker, lambda: None)
     request = SearchRequest("weakest direction", NO_YAW.names)
     improver.start(NO_YAW, request)
     with pytest.raises(FinlabError, match="running already"):
@@ -66,7 +67,7 @@ def test_bad_searches_are_refused() -> None:
 
 def test_each_fin_has_its_bounds_and_the_mission_is_the_users() -> None:
     worker = Worker()
-    improver: Improver = Improver(worker, lambda act: act(), lambda: None)
+    improver: Improver = Improver(AtOnce(), worker, lambda: None)
     mission = parsed_mission("0.5, 0 0 0 0 0.1\n\n0 0 1 0 0 0")
     assert mission == ((0.5, 0.0, 0.0, 0.0, 0.0, 0.1), (0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
     first, second = NO_YAW.names[:2]
@@ -91,9 +92,8 @@ def test_analyst_answers_only_the_question_that_stays() -> None:
     worker, asked = Worker(), threading.Event()
     layout = load_layout(shipped_layouts()["pair"])
 
-    async def run() -> Debounced[Question, Findings]:
-        loop = asyncio.get_running_loop()
-        analyst = Debounced(find, 0.1, worker, loop, loop.call_soon_threadsafe, asked.set)
+    async def run() -> Newest[Question, Findings]:
+        analyst: Newest[Question, Findings] = Newest(running(), worker, find, asked.set, 0.1)
         for k in range(20):
             moved = layout.replace_fin(layout.names[0], position=(0.01 * k, 0.2, 0.0))
             analyst.ask(Question(moved, (), layout, "none", True))

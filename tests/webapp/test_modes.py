@@ -1,7 +1,6 @@
 """Candidates that do the same are one mode, and no two modes share a name."""
 
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ from finlab.allocation.modes import find_modes
 from finlab.allocation.solution import Candidates
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
+from tests.webapp.loops import AtOnce
 from tests.webapp.stand_in import StandIn, load_stand_in
 from webapp.markup.figures import small, three_digits
 from webapp.markup.mode_plot import DOT, LEFT, WIDTH, _apart, mode_plot
@@ -17,17 +17,17 @@ from webapp.markup.mode_table import mode_table
 from webapp.session import Session
 from webapp.session.targets import PRESETS
 from webapp.tasks.answering import Answering
-from webapp.tasks.mode_names import MAX_SHOWN, NamedMode, known_modes, named_modes, nearest_modes, same_mode
+from webapp.tasks.mode_names import (
+    MAX_SHOWN,
+    NO_MODES,
+    NamedMode,
+    known_modes,
+    listed_modes,
+    named_modes,
+    nearest_modes,
+    same_mode,
+)
 from webapp.tasks.solver import Solver
-
-
-class Timers:
-    """An event loop whose timers ring by hand."""
-
-    def call_later(self, _seconds: float, call: Any, *arguments: Any) -> Any:
-        self.ring = partial(call, *arguments)
-        return type("Timer", (), {"cancel": lambda _: None})()
-
 
 PUSH, REST = (0.3, 1.1, 0.0), (0.05, 0.1, 0.0)
 
@@ -87,20 +87,21 @@ def test_real_candidates_are_drawn_and_listed() -> None:
     modes = named_modes(found)
     assert answer.candidates is not None and answer.samples is not None
     assert sum(len(mode.members) for mode in found) == len(answer.candidates.energy)
-    nearest = nearest_modes(answer.samples, modes)
+    listed = listed_modes(found, answer.samples)
+    nearest = listed.of_samples
     assert nearest is not None and len(nearest) == len(answer.samples.energy)
     raw = replace(answer.samples, command=np.array([mode.command for mode, _ in modes]))
     again = nearest_modes(raw, modes)
     assert again is not None and list(again) == list(range(len(modes))), "each mode is nearest to itself"
-    plot = mode_plot(answer, modes, nearest, 0, None, 200, "here")
+    plot = mode_plot(answer, listed, 0, None, 200, "here")
     assert plot.count("onclick") == len(modes) + 1, "one for all samples together"
     assert plot.count("data-k") == len(answer.samples.energy)
-    assert mode_plot(answer, modes, nearest, None, 3, 200, "here").count("class='ring'") == 2
-    table = mode_table(modes, len(modes), False, 0, "here")
+    assert mode_plot(answer, listed, None, 3, 200, "here").count("class='ring'") == 2
+    table = mode_table(listed, False, 0, "here")
     assert table.count("onclick") == len(modes) and "0.0000" not in table and "more are" not in table
-    assert "2 more are" in mode_table(modes, len(modes) + 2, False, 0, "here")
-    assert "no candidates" in mode_table((), 0, False, 0, "here")
-    assert "looking for more" in mode_table(modes, len(modes), True, 0, "here")
+    assert "2 more are" in mode_table(replace(listed, count=listed.count + 2), False, 0, "here")
+    assert "no candidates" in mode_table(NO_MODES, False, 0, "here")
+    assert "looking for more" in mode_table(listed, True, 0, "here")
 
 
 def test_figures_keep_their_width() -> None:
@@ -114,11 +115,9 @@ def test_another_sample_of_another_answer_is_shown() -> None:
     layout = load_layout(shipped_layouts()["ucat"])
     session = Session(layout)
     jobs: list[Any] = []
-    worker: Any = type("AtOnce", (), {"submit": lambda _, key, job, failed: jobs.append(job)})()
-    loop = Timers()
-    answering = Answering(
-        session, Solver(load=load_stand_in), worker, loop, lambda act: act(), lambda: None, lambda _: None
-    )
+    worker: Any = type("Ready", (), {"submit": lambda _, key, job, failed: jobs.append(job)})()
+    loop = AtOnce()
+    answering = Answering(session, Solver(load=load_stand_in), loop, worker, lambda: None, lambda _: None)
     shown = []
     for value in (0.5, 0.8):
         session.set_target(1, value)
@@ -131,11 +130,11 @@ def test_another_sample_of_another_answer_is_shown() -> None:
         assert answering.shown is not shown[-1]
     assert shown[0].target[1] == 0.5 and shown[1].target[1] == 0.8
     session.show_mode(1)
-    wanted = answering.modes[1].mode
+    wanted = answering.modes.shown[1].mode
     loop.ring()
     jobs.pop()()
-    assert answering.n_modes >= len(answering.modes) > 0
-    place = same_mode(wanted, answering.modes)
+    assert answering.modes.count >= len(answering.modes.shown) > 0
+    place = same_mode(wanted, answering.modes.shown)
     assert session.mode == place, "what is on the robot stays there when all modes are known"
 
 

@@ -9,6 +9,7 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
+from tests.webapp.loops import AtOnce, running
 from tests.webapp.stand_in import load_stand_in
 from webapp.session import Session
 from webapp.tasks import sweeping
@@ -59,10 +60,10 @@ def test_a_sweep_is_one_step_and_ends_when_someone_else_steers(
     solver = Solver(load=load_stand_in)
 
     async def run() -> Sweep:
-        loop = asyncio.get_running_loop()
+        loop = running()
         answering: Any = None
 
-        class AtOnce:
+        class Ready:
             """A worker that is never busy."""
 
             def submit(self, key: object, job: Any, failed: Any) -> None:
@@ -75,8 +76,8 @@ def test_a_sweep_is_one_step_and_ends_when_someone_else_steers(
             act()
             answering.ask()
 
-        worker: Any = AtOnce()
-        answering = Answering(session, solver, worker, loop, lambda act: act(), changed, lambda _: None)
+        worker: Any = Ready()
+        answering = Answering(session, solver, AtOnce(), worker, changed, lambda _: None)
         sweep = Sweep(session, loop, do)
         with pytest.raises(FinlabError, match="smaller end first"):
             sweep.start(0, 2.0, -2.0)

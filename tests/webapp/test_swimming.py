@@ -10,6 +10,7 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
+from tests.webapp.loops import AtOnce
 from tests.webapp.stand_in import load_stand_in
 from webapp.markup.corner import swim_corner
 from webapp.markup.swim_card import swim_card
@@ -36,7 +37,7 @@ def until(condition: Callable[[], bool]) -> None:
 def swimming() -> Iterator[Swimming]:
     worker = Worker()
     notes: list[str] = []
-    swim = Swimming(Solver(load=load_stand_in), worker, lambda act: act(), lambda: None, notes.append)
+    swim = Swimming(Solver(load=load_stand_in), AtOnce(), worker, lambda: None, notes.append)
     swim.notes = notes  # type: ignore[attr-defined]
     yield swim
     swim.stop()
@@ -71,7 +72,7 @@ def test_a_slow_machine_drops_time_instead_of_piling_it_up(swimming: Swimming) -
     begin(swimming, path="circle")
     for _ in range(100):
         swimming.tick(1.0)  # a hundred seconds pass while the first stretch is swum
-    until(lambda: not swimming._busy)
+    until(lambda: not swimming._stretch.busy)
     assert swimming.pace._owed <= LAG_S and swimming.time <= 3 * LAG_S
 
 

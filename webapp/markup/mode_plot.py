@@ -3,12 +3,11 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
 from webapp.markup.picking import pick
 from webapp.panels.channel import send
-from webapp.tasks.mode_names import NamedMode
+from webapp.tasks.mode_names import Modes
 from webapp.theme import css, mode_color
 
 WIDTH = 388
@@ -29,8 +28,7 @@ Scale = Callable[[float], float]
 
 def mode_plot(
     answer: Allocation,
-    modes: tuple[NamedMode, ...],
-    nearest: NDArray[np.intp] | None,
+    modes: Modes,
     shown: int | None,
     sample: int | None,
     height: int,
@@ -40,18 +38,17 @@ def mode_plot(
 
     Args:
         answer: what the dots are of.
-        modes: its modes.
-        nearest: mode (K,) that gives each sample its colour.
+        modes: its modes, which give the samples their colours.
         shown: mode on the robot, None while it is another command.
         sample: sample on the robot.
         height: of the plot [px].
         picker: class of the marker before the buttons that choose a mode, and of the channel for samples.
     """
     samples = answer.samples
-    if not modes:
+    if not modes.shown:
         return ""
-    energy = np.array([mode.energy for mode, _ in modes])
-    error = np.array([mode.err_norm for mode, _ in modes])
+    energy = np.array([mode.energy for mode, _ in modes.shown])
+    error = np.array([mode.err_norm for mode, _ in modes.shown])
     if samples is not None:
         energy, error = np.append(energy, samples.energy), np.append(error, samples.err_norm)
     if not np.isfinite(energy).all() or not np.isfinite(error).all():
@@ -72,7 +69,7 @@ def mode_plot(
     parts = [_axes(x, y, (low, high), (int(bottom), int(top)), height)]
     if samples is not None:
         pick_sample = send(f"{picker}-{SAMPLES}", "event.target.dataset.k + ',' + Date.now()")
-        kinds = np.zeros(len(samples.energy), dtype=int) if nearest is None else nearest
+        kinds = modes.of_samples if modes.of_samples is not None else [0] * len(samples.energy)
         dots = [
             f"<circle data-k='{k}' cx='{x(e):.1f}' cy='{y(r):.1f}' r='3' "
             f"fill='{css(mode_color(kind), 0.6)}'/>"
@@ -82,7 +79,7 @@ def mode_plot(
         parts.append(f'<g class="pick samples" onclick="{click}">{"".join(dots)}</g>')
         if sample is not None and sample < len(dots):
             parts.append(_ring(x(float(samples.energy[sample])), y(float(samples.err_norm[sample])), 6.5))
-    places = _apart([(x(mode.energy), y(mode.err_norm)) for mode, _ in modes])
+    places = _apart([(x(mode.energy), y(mode.err_norm)) for mode, _ in modes.shown])
     for k, (cx, cy) in reversed(list(enumerate(places))):  # the best one on top
         parts.append(
             f"<g class='pick' {pick(picker, k)}>"

@@ -4,26 +4,23 @@ from html import escape
 
 from webapp.markup.figures import small, three_digits
 from webapp.markup.picking import pick
-from webapp.tasks.mode_names import NamedMode
+from webapp.tasks.mode_names import Modes
 from webapp.theme import css, mode_color
 
 
-def mode_table(
-    modes: tuple[NamedMode, ...], n_modes: int, searching: bool, shown: int | None, picker: str
-) -> str:
+def mode_table(modes: Modes, searching: bool, shown: int | None, picker: str) -> str:
     """Error, energy, use of the limits and a name for each mode.
 
     Args:
         modes: an answer's modes.
-        n_modes: how many it has; perhaps more than are shown.
         searching: whether more may be found.
         shown: which mode moves the fins, None while another command does.
         picker: class of the marker before the buttons that a click on a row presses.
     """
-    if not modes:
+    if not modes.shown:
         return "<div class='fl dim'>This method gives one answer and no candidates.</div>"
     rows = []
-    for k, (mode, name) in enumerate(modes):
+    for k, (mode, name) in enumerate(modes.shown):
         kind = "chosen" if k == shown else ""
         rows.append(
             f"<tr class='{kind} pick' {pick(picker, k)}><td>{_swatch(k)}</td>"
@@ -34,7 +31,7 @@ def mode_table(
         "<tr><th>#</th><th class='words'>mode</th><th>error [σ]</th><th>energy</th>"
         "<th title='largest share of a range of amplitude or frequency that is used'>used</th></tr>"
     )
-    left = n_modes - len(modes)
+    left = modes.count - len(modes.shown)
     told = "looking for more …" if searching else f"{left} more are known; they come after these."
     more = f"<div class='said dim'>{told}</div>" if searching or left > 0 else ""
     return f"<div class='fl'><table class='modes'>{header}{''.join(rows)}</table>{more}</div>"

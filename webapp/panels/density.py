@@ -5,7 +5,7 @@ import viser
 from viser import uplot
 
 from finlab.layout.layout import MAX_FINS
-from webapp.handles import put
+from webapp.handles import Changes, put
 from webapp.tasks.density import Densities
 from webapp.theme import css, fin_color
 
@@ -18,7 +18,7 @@ class DensityPanel:
 
     def __init__(self, gui: viser.GuiApi) -> None:
         """Build the plots, empty. The number of lines is fixed: lines without a fin hold no numbers."""
-        self._shows: Densities | None = None
+        self._changes = Changes()
         series = (
             uplot.Series(label="x"),
             # Fins that do the same have the same curve: each next line is thinner, so that all are seen.
@@ -52,9 +52,8 @@ class DensityPanel:
     def refresh(self, densities: Densities | None) -> None:
         """Draw densities, or hide the plots where the method has none."""
         put(self._folder, visible=densities is not None)
-        if densities is None or densities is self._shows:
+        if densities is None or not self._changes(densities):
             return
-        self._shows = densities
         n, _, points = densities.curves.shape
         for k, plot in enumerate(self._plots):
             lines = np.full((MAX_FINS, points), np.nan)

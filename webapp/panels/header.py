@@ -1,19 +1,12 @@
 """Always visible: undo and redo, and the corner of the 3D view with status and legend."""
 
-from importlib.resources import files
-
 import viser
 
 from webapp.handles import on_user_change, put
 from webapp.markup.corner import corner, swim_corner
-from webapp.markup.style import STYLE
 from webapp.markup.tour_card import tour_card
 from webapp.panels.host import Host
 from webapp.scene.swim_scene import ARROWS_N
-from webapp.viser_internals import run_script
-
-NUMBER_FIELDS = files("webapp.panels").joinpath("number_fields.js").read_text("utf-8")
-"""Script that keeps number fields to the user while he types."""
 
 
 class Header:
@@ -22,8 +15,6 @@ class Header:
     def __init__(self, gui: viser.GuiApi, host: Host) -> None:
         """Build the widgets."""
         self._host = host
-        gui.add_html(STYLE)
-        run_script(gui, NUMBER_FIELDS)
         self._corner = gui.add_html("")
         self._history = gui.add_button_group(
             "Session", ("Undo", "Redo", "Tour"), hint="Ctrl+Z, Ctrl+Shift+Z, T."

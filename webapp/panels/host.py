@@ -12,9 +12,9 @@ from webapp.session import Session
 from webapp.tasks.analyst import Findings, Question
 from webapp.tasks.answering import Answering
 from webapp.tasks.comparison import Comparison
-from webapp.tasks.debounce import Debounced
 from webapp.tasks.exports import Exports
 from webapp.tasks.improving import Improver
+from webapp.tasks.newest import Newest
 from webapp.tasks.playback import Playback
 from webapp.tasks.ranging import Beside
 from webapp.tasks.sweeping import Sweep
@@ -33,9 +33,9 @@ class Host(Protocol):
     """The newest answer, its modes and what of it is on the robot."""
     playback: Playback
     """The refinement, step by step."""
-    analyst: Debounced[Question, Findings]
+    analyst: Newest[Question, Findings]
     """What the layout can do."""
-    ranging: Debounced[Beside, Ranges]
+    ranging: Newest[Beside, Ranges]
     """How far each component of the target can go."""
     improver: Improver
     """The search for a better layout."""
@@ -57,6 +57,9 @@ class Host(Protocol):
     @property
     def busy(self) -> bool:
         """True while a newer answer is being computed."""
+
+    def fault(self, error: Exception) -> None:
+        """Tell of something that we have got wrong."""
 
     def do(self, act: Callable[[], object]) -> None:
         """Carry out an intent: show what changed, or tell the user why not."""

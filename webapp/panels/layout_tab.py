@@ -8,8 +8,7 @@ from html import escape
 import viser
 
 from finlab.analysis.quick import quick_check
-from finlab.layout import Layout
-from webapp.handles import hold_kind, on_user_change, on_user_click, put
+from webapp.handles import Changes, hold_kind, on_user_change, on_user_click, put
 from webapp.markup.check_card import check_card
 from webapp.panels.host import Host
 from webapp.panels.hull import HullPanel
@@ -79,7 +78,7 @@ class LayoutTab:
         on_user_click(self._add, lambda: host.do(host.session.add_fin))
         self._card = gui.add_html("")
         self._hull = HullPanel(gui, host)
-        self._checked: tuple[Layout, tuple[str, ...]] | None = None
+        self._changes = Changes()
 
     def _open(self, name: str) -> None:
         if name in shipped():
@@ -141,7 +140,6 @@ class LayoutTab:
         )
         put(self._about, content=f"<div class='fl'><div class='dim'>{escape(first)}</div>{pairs}</div>")
         state = session.state
-        if (state.able, state.failed) != self._checked:
-            self._checked = (state.able, state.failed)
+        if self._changes(state.layout, state.weak, state.stuck, state.failed):
             quick = quick_check(state.able, state.failed)
             put(self._card, content=check_card(quick, len(state.healthy) > 1, warnings(layout)))

@@ -31,7 +31,7 @@ class ModePicker:
         on_user_change(self._choice, self._choose)
 
     def _choose(self, entry: str) -> None:
-        index = numbered(entry, len(self._host.answering.modes))
+        index = numbered(entry, len(self._host.answering.modes.shown))
         if index is not None:
             self._host.do(partial(self._host.session.show_mode, index))
 
@@ -44,7 +44,7 @@ class ModePicker:
     @property
     def shown(self) -> int | None:
         """The mode on the robot; None while a raw sample is."""
-        session, modes = self._host.session, self._host.answering.modes
+        session, modes = self._host.session, self._host.answering.modes.shown
         return None if session.sample is not None else min(session.mode, max(len(modes) - 1, 0))
 
     def refresh(self) -> None:
@@ -53,10 +53,9 @@ class ModePicker:
         best, modes = answering.best, answering.modes
         if not self._changes(best, modes, self.shown, sample):
             return
-        put(self._choice, options=tuple(str(k + 1) for k in range(len(modes))) or ("1",))
+        put(self._choice, options=tuple(str(k + 1) for k in range(len(modes.shown))) or ("1",))
         put(self._chosen, content=chosen_button(self.name, self.shown))
         plot = ""
         if best is not None:
-            nearest = answering.sample_modes
-            plot = mode_plot(best, modes, nearest, self.shown, sample, self._height, self.name)
+            plot = mode_plot(best, modes, self.shown, sample, self._height, self.name)
         put(self._plot, content=plot)

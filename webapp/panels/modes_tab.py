@@ -65,12 +65,10 @@ class ModesTab:
         self._picker.refresh()
         answering, picker = host.answering, self._picker
         if self._changes(answering.modes, answering.searching, picker.shown):
-            table = mode_table(
-                answering.modes, answering.n_modes, answering.searching, picker.shown, picker.name
-            )
+            table = mode_table(answering.modes, answering.searching, picker.shown, picker.name)
             put(self._table, content=table)
         put(self._step, content=_step_words(host))
-        self._density.refresh(host.answering.densities)
+        self._density.refresh(None if answering.reply is None else answering.reply.densities)
 
 
 def _step_words(host: Host) -> str:
@@ -83,7 +81,7 @@ def _step_words(host: Host) -> str:
         text = words.get(frame, f"Step {frame} of {STEPS}")
     else:
         text = f"Raw sample {sample}"
-        nearest = host.answering.sample_modes
+        nearest = host.answering.modes.of_samples
         if nearest is not None and sample is not None and sample < len(nearest):
             text += f", nearest to mode {nearest[sample] + 1}"
     error, energy = small(shown.err_norm), three_digits(shown.energy)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from viser import uplot
 
 from finlab.layout.layout import MAX_FINS
-from webapp.handles import hold_kind, put
+from webapp.handles import Changes, hold_kind, put
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS
 from webapp.session.targets import nice_limit
 from webapp.tasks.swimmer import ASKED as ASKED_COLUMN
@@ -31,7 +31,7 @@ class SwimPlots:
     def __init__(self, gui: viser.GuiApi) -> None:
         """Build them, empty."""
         self._drawn = 0.0
-        self._shows: object = None
+        self._changes = Changes()
         self._error = _plot(gui, (css(DELIVERED), css(OTHER)), "off path [cm]")
         self._wrench = _plot(gui, (css(ASKED), css(DELIVERED)), "surge [N]")
         self._force = _plot(gui, tuple(css(fin_color(i)) for i in range(MAX_FINS)), "fins [N]", "time [s]")
@@ -54,11 +54,10 @@ class SwimPlots:
         axis = 0
         if self._axis is not None and self._axis.value in AXIS_WORDS:
             axis = AXIS_WORDS.index(self._axis.value)
-        key = (axis, *(id(moment) for moment in moments))
         soon = time.monotonic() - self._drawn < EVERY_S and swimming.running
-        if not moments or soon or key == self._shows or not len(moments[0].record):
+        if not moments or soon or not len(moments[0].record) or not self._changes(axis, *moments):
             return
-        self._drawn, self._shows = time.monotonic(), key
+        self._drawn = time.monotonic()
         record = moments[0].record
         seconds = np.ascontiguousarray(record[:, TIME])
         lines = [

@@ -4,10 +4,10 @@ from functools import partial
 
 import numpy as np
 import viser
+from numpy.typing import NDArray
 
 from finlab.allocation.policy import AXES
-from finlab.layout import Layout
-from webapp.handles import on_user_change, put
+from webapp.handles import Changes, on_user_change, put
 from webapp.markup.figures import three_digits
 from webapp.markup.picking import marker
 from webapp.panels.host import Host
@@ -45,10 +45,7 @@ class TargetPanel:
         gui.add_html(marker("fl-reach-end"))
         for k, slider in enumerate(self._sliders):
             on_user_change(slider, partial(self._set_target, k))
-        self._ends_for: tuple[Layout, tuple[str, ...]] | None = None
-        self._marked: object = None
-        self.reach = np.ones(6)
-        """Largest size of each component with the others free (6,) [N, N m]."""
+        self._changes = Changes()
 
     def _set_only(self, axis: str) -> None:
         if axis in AXES:
@@ -57,21 +54,27 @@ class TargetPanel:
     def _set_target(self, axis: int, value: float) -> None:
         self._host.do(partial(self._host.session.set_target, axis, value))
 
+    @property
+    def reach(self) -> NDArray[np.float64]:
+        """Largest size of each component with the others free (6,) [N, N m]."""
+        state = self._host.session.state
+        return axis_reach(state.able, state.failed)
+
     def refresh(self) -> None:
         """Write the target, the sliders' ends and the marks on them."""
         state = self._host.session.state
-        if self._ends_for != (state.able, state.failed):
-            self._ends_for = (state.able, state.failed)
-            self.reach = axis_reach(state.able, state.failed)
         for slider, value, reach in zip(self._sliders, state.target, self.reach, strict=True):
             end = slider_end(float(reach))
             put(slider, min=min(-end, value), max=max(end, value))
             put(slider, value=value)
         ranges = self._host.ranging.findings
-        if ranges is None or ranges is self._marked:
+        if not self._changes(ranges):
             return
-        self._marked = ranges
         for k, slider in enumerate(self._sliders):
+            if ranges is None:
+                put_marks(slider, ())
+                put(slider, hint=AXIS_WORDS[k].capitalize())
+                continue
             low, high = float(ranges.low[k]), float(ranges.high[k])
             put_marks(slider, _marks(low, high))
             put(slider, hint=_hint(k, low, high, float(self.reach[k])))

@@ -3,10 +3,8 @@
 from functools import partial
 from html import escape
 
-import numpy as np
 import viser
 
-from finlab.layout import Layout
 from webapp.handles import numbered, on_user_change, put
 from webapp.markup.bars import wrench_bars
 from webapp.markup.fins import fin_table
@@ -42,8 +40,6 @@ class WrenchTab:
         self._damage = DamagePanel(gui, host)
         self._pilot = PilotPanel(gui, host, self._target)
         self._sweep = SweepPanel(gui, host)
-        self._full_for: Layout | None = None
-        self._full = np.ones(1)
 
     def _toggle_failure(self, button: str) -> None:
         names = self._host.session.state.layout.names
@@ -64,9 +60,7 @@ class WrenchTab:
         given = None if answer is None else answer.wrench
         put(self._bars, content=wrench_bars(state.target, given, self._sentence()))
         fitting = answer if answer is not None and answer.layout.names == state.layout.names else None
-        if self._full_for != state.able:
-            self._full_for, self._full = state.able, full_thrust(state.able)
-        put(self._table, content=fin_table(state, fitting, self._full, host.session.selected))
+        put(self._table, content=fin_table(state, fitting, full_thrust(state.able), host.session.selected))
 
     def _refresh_failures(self) -> None:
         state = self._host.session.state

@@ -128,9 +128,9 @@ class RobotScene:
             selected = fin.name == self._session.selected
             label = _label(state, i, selected) if display.labels else None
             self._fins[i].place(fin, hull, selected, label, i == self._dragged)
-            if fin.name in state.failed:
+            if fin.name in state.failed or allocation is None:
                 self._fins[i].command(None, np.zeros(3), 0.0, False)
-            elif fits and allocation is not None and np.isfinite(allocation.command[i, 0]):
+            elif fits and np.isfinite(allocation.command[i, 0]):
                 force = allocation.fin_forces[i]
                 # The force belongs to the answer's own mounting angle, which a drag may have left behind.
                 angle = allocation.layout.fins[i].mounting_angle
@@ -143,7 +143,7 @@ class RobotScene:
         self._overlay.refresh(other, scale, display.dark)
         target = np.array(state.target)
         self._attainable.refresh(findings if display.drawn != "none" else None, target)
-        given = allocation.wrench if allocation is not None else None
+        given = None if allocation is None else allocation.wrench
         missing = np.zeros(6) if allocation is None else missing_part(allocation)
         top = hull.center[2] + hull.half[2]
         self._wrench.refresh(target, given, missing, top, scale)

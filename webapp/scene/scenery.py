@@ -42,6 +42,7 @@ class Scenery:
         self._client, self._session, self._swimming = client, session, swimming
         self._dark: bool | None = None
         self._stop: int | None = None
+        self._swims = False
         dragging = Dragging(session, do)
         self.robot = RobotScene(
             client, session, lambda name: do(partial(session.select, name)), dragging.fin, dragging.wrench
@@ -53,18 +54,21 @@ class Scenery:
     @property
     def swims(self) -> bool:
         """Whether the robots that swim are on the screen."""
-        return not self.robot.shown
+        return self._swims
 
     def refresh(
         self, answering: Answering, comparison: Comparison, improver: Improver, findings: Findings | None
     ) -> None:
         """Show what has been found for the session's state."""
+        self._follow_tour()
+        self._apply_theme()
         found, reply = improver.found, answering.reply
         offered = found.layout if found is not None and found.improved else None
         attention = None if reply is None else reply.attention
         other, display = self._overlaid(comparison), self._session.display
         self.robot.refresh(answering.shown, other, findings, offered, attention)
-        self.robot.show(not self._swimming.swimmers)
+        self._swims = bool(self._swimming.swimmers)
+        self.robot.show(not self._swims)
         self.legend = legend(
             self.robot.newtons,
             (
@@ -74,6 +78,11 @@ class Scenery:
             ),
         )
         self.refresh_swim()
+
+    def hide(self) -> None:
+        """Nothing is shown of the robot that is designed: what stands there may be another one's."""
+        self.robot.show(False)
+        self.legend = ""
 
     def refresh_swim(self) -> None:
         """Show where the robots that swim are."""
@@ -102,7 +111,7 @@ class Scenery:
             self._swimming.stop()
             self.look_from("3D")
 
-    def follow_tour(self) -> None:
+    def _follow_tour(self) -> None:
         """At some stops of the tour the robot swims; to come to a stop, or to leave the tour, ends a swim."""
         stop = self._session.stop
         if stop != self._stop:
@@ -111,7 +120,7 @@ class Scenery:
             if stop is not None and STEPS[stop].swims:
                 self._swimming.start(SwimSettings().plan(self._session.state, None))
 
-    def apply_theme(self) -> None:
+    def _apply_theme(self) -> None:
         """Light or dark."""
         if self._session.display.dark != self._dark:
             self._dark = self._session.display.dark

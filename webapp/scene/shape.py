@@ -22,8 +22,8 @@ class Shape:
         key = tuple(a.tobytes() if isinstance(a, np.ndarray) else a for a in arguments)
         if key == self._made_from:
             return
-        self._made_from = key
         mesh = make(*arguments)
         self.node.vertices = mesh.vertices.astype(np.float32)
         if not np.array_equal(self.node.faces, mesh.faces):
             self.node.faces = mesh.faces.astype(np.uint32)
+        self._made_from = key

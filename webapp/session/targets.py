@@ -1,6 +1,7 @@
 """Target wrenches to start from, and how much of each axis a layout can give."""
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ FIRST = PRESETS["Turn"]
 """What a new session asks for: gently forward, turning left."""
 
 
+@lru_cache(maxsize=64)
 def axis_reach(layout: Layout, failed: tuple[str, ...] = ()) -> NDArray[np.float64]:
     """Largest size of each wrench component (6,) [N, N m] that the working fins give with the others free."""
     sets = fin_sets(layout, failed)
@@ -28,6 +30,7 @@ def axis_reach(layout: Layout, failed: tuple[str, ...] = ()) -> NDArray[np.float
     return np.asarray(both.reshape(2, 6).max(axis=0) * SCALE)
 
 
+@lru_cache(maxsize=64)
 def full_thrust(layout: Layout) -> NDArray[np.float64]:
     """Mean thrust (n,) of each fin at its largest amplitude and frequency [N]."""
     return fin_sets(layout).radius[0]

@@ -2,10 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
 from finlab.allocation.allocation import Allocation
 from webapp.session.state import COMPARED, State
+from webapp.tasks.event_loop import EventLoop
+from webapp.tasks.newest import Newest
 from webapp.tasks.solver import Solver
 from webapp.tasks.worker import Worker
 
@@ -18,24 +19,13 @@ Answer = Allocation | str
 
 
 class Comparison:
-    """The answers of one run; its owner is told on the event loop whenever there is one more."""
+    """The answers of one run."""
 
-    def __init__(
-        self,
-        solver: Solver,
-        worker: Worker,
-        post: Callable[[Callable[[], object]], None],
-        changed: Callable[[], None],
-    ) -> None:
-        """Prepare to compare.
-
-        Args:
-            solver: answers.
-            worker: whose thread computes.
-            post: brings a call to the event loop.
-            changed: called there after every answer.
-        """
-        self._solver, self._worker, self._post, self._changed = solver, worker, post, changed
+    def __init__(self, solver: Solver, loop: EventLoop, worker: Worker, changed: Callable[[], None]) -> None:
+        """`changed` is called on the event loop after every answer of the solver on the worker's thread."""
+        self._solver, self._changed = solver, changed
+        # One question per method: those of this and other pages are answered in between.
+        self._asked: Newest[State, Allocation] = Newest(loop, worker, self._quickest, self._take)
         self.state: State | None = None
         """The question, None before the first run."""
         self.answers: dict[str, Answer] = {}
@@ -48,34 +38,29 @@ class Comparison:
 
     def start(self, state: State) -> None:
         """Ask all methods about a state; a run that is still going on is given up."""
-        self.state, self.answers = state, {}
+        self.cancel()
+        self.state = state
         self._next(state)
 
     def cancel(self) -> None:
         """Give up and forget."""
+        self._asked.forget()
         self.state, self.answers = None, {}
 
     def _next(self, state: State) -> None:
         waiting = [method for method in COMPARED if method not in self.answers]
-        if not waiting:
-            return
-        method = waiting[0]
+        if waiting:
+            self._asked.ask(replace(state, method=waiting[0]))
 
-        # One job per method: questions of this and other pages are answered in between.
-        def job() -> None:
-            question = replace(state, method=method)
-            answers = [self._solver.solve(question) for _ in range(TRIES)]
-            answer = min(answers, key=lambda answer: answer.solve_ms)
-            self._post(partial(self._take, state, method, answer))
+    def _quickest(self, state: State) -> Allocation:
+        answers = [self._solver.solve(state) for _ in range(TRIES)]
+        answer = min(answers, key=lambda answer: answer.solve_ms)
+        return answer
 
-        def failed(text: str) -> None:
-            self._post(partial(self._take, state, method, text))
-
-        self._worker.submit((id(self), "comparison"), job, failed)
-
-    def _take(self, state: State, method: str, answer: Answer) -> None:
-        if state is not self.state:
-            return
-        self.answers[method] = answer
-        self._changed()
-        self._next(state)
+    def _take(self) -> None:
+        asked = self._asked
+        if self.state is not None and asked.answered is not None:
+            answer = asked.error if asked.findings is None else asked.findings
+            self.answers[asked.answered.method] = answer or "no answer"
+            self._changed()
+            self._next(self.state)

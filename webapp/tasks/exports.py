@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable
 from functools import partial
+from typing import NamedTuple
 
 import imageio.v3 as iio
 import viser
@@ -11,12 +12,23 @@ from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
 from webapp.session import Session
 from webapp.session.layout_files import bundle_bytes, file_stem, graph_bytes
+from webapp.tasks.event_loop import EventLoop
+from webapp.tasks.newest import Newest
 from webapp.tasks.recording import recorded_html
 from webapp.tasks.solver import Solver
 from webapp.tasks.worker import Worker
 
 PICTURE_SIZE = (1080, 1620)
 """Height and width of an exported picture [px]."""
+
+
+class Wanted(NamedTuple):
+    """One file."""
+
+    name: str
+    """What it is called."""
+    make: Callable[[], bytes]
+    """Makes its content."""
 
 
 class Exports:
@@ -27,8 +39,8 @@ class Exports:
         client: viser.ClientHandle,
         session: Session,
         solver: Solver,
+        loop: EventLoop,
         worker: Worker,
-        post: Callable[[Callable[[], object]], None],
         failed: Callable[[str, str], None],
     ) -> None:
         """Prepare.
@@ -37,12 +49,13 @@ class Exports:
             client: the browser.
             session: what is exported.
             solver: whose networks go into files.
+            loop: where everything else runs.
             worker: on whose thread files are made.
-            post: brings a call to the event loop.
-            failed: called there with a title and a sentence when there is no file.
+            failed: called on the loop with a title and a sentence when there is no file.
         """
         self._client, self._session, self._solver = client, session, solver
-        self._worker, self._post, self._failed = worker, post, failed
+        self._loop, self._worker, self._failed = loop, worker, failed
+        self._files: dict[str, Newest[Wanted, bytes]] = {}
 
     def graph(self) -> None:
         """Send the layout graph file."""
@@ -74,23 +87,28 @@ class Exports:
         threading.Thread(target=self._take_picture, args=(name,), daemon=True).start()
 
     def _send(self, suffix: str, make: Callable[[], bytes]) -> None:
-        """Have the worker make a file, and send it."""
-        name = f"{file_stem(self._session.state.layout.name)}{suffix}"
+        """Have the worker make a file, and send it; of each kind only the newest that is asked for."""
+        if suffix not in self._files:
+            self._files[suffix] = Newest(
+                self._loop, self._worker, lambda wanted: wanted.make(), partial(self._made, suffix)
+            )
+        self._files[suffix].ask(Wanted(f"{file_stem(self._session.state.layout.name)}{suffix}", make))
 
-        def job() -> None:
-            content = make()
-            self._post(partial(self._client.send_file_download, name, content, save_immediately=True))
+    def _made(self, suffix: str) -> None:
+        file = self._files[suffix]
+        if file.answered is not None and file.findings is not None:
+            self._download(file.answered.name, file.findings)
+        else:
+            self._failed("Not exported", file.error or "")
 
-        def failed(text: str) -> None:
-            self._post(partial(self._failed, "Not exported", text))
-
-        self._worker.submit((suffix, id(self)), job, failed)
+    def _download(self, name: str, content: bytes) -> None:
+        self._client.send_file_download(name, content, save_immediately=True)
 
     def _take_picture(self, name: str) -> None:
         try:
             picture = self._client.get_render(*PICTURE_SIZE, transport_format="png", timeout=30.0)
         except (RuntimeError, TimeoutError) as error:
-            self._post(partial(self._failed, "No picture", str(error)))
+            self._loop.post(partial(self._failed, "No picture", str(error)))
             return
         content = iio.imwrite("<bytes>", picture, extension=".png")
-        self._post(partial(self._client.send_file_download, name, content, save_immediately=True))
+        self._loop.post(partial(self._download, name, content))

@@ -1,5 +1,6 @@
 """Names that tell an answer's modes apart; what counts as one is for `finlab.allocation.modes` to say."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +33,28 @@ class NamedMode(NamedTuple):
     """The way itself."""
     name: str
     """What makes it different from the others that are shown."""
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """The modes of an answer, as the page lists them."""
+
+    shown: tuple[NamedMode, ...]
+    """The first `MAX_SHOWN` of them, the best one first, no two of the same name."""
+    count: int
+    """How many there are."""
+    of_samples: NDArray[np.intp] | None
+    """For each raw sample (K,) the shown mode that is nearest to it; None where there are none."""
+
+
+NO_MODES = Modes((), 0, None)
+"""Of no answer."""
+
+
+def listed_modes(modes: tuple[Mode, ...], samples: Candidates | None) -> Modes:
+    """Modes with names, and which of them each raw sample is nearest to."""
+    shown = named_modes(modes)
+    return Modes(shown, len(modes), nearest_modes(samples, shown))
 
 
 def known_modes(answer: Allocation) -> tuple[Mode, ...]:

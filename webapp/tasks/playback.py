@@ -1,19 +1,34 @@
 """Plays the refinement of an answer step by step on the robot."""
 
-import asyncio
 from collections.abc import Callable
-from functools import partial
+from typing import NamedTuple
 
 from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
 from webapp.session import Session
+from webapp.session.state import State
 from webapp.tasks.answering import Answering
+from webapp.tasks.event_loop import EventLoop
+from webapp.tasks.newest import Newest
 from webapp.tasks.refinement import STEPS
 from webapp.tasks.solver import Solver
 from webapp.tasks.worker import Worker
 
 FRAME_S = 0.9
 """How long each step of a refinement is shown [s]."""
+
+Frames = tuple[Allocation, ...]
+
+
+class Wanted(NamedTuple):
+    """Whose refinement is to be played."""
+
+    revision: int
+    """Revision of the session."""
+    state: State
+    """Its state then."""
+    answer: Allocation
+    """The answer to it."""
 
 
 class Playback:
@@ -24,16 +39,15 @@ class Playback:
         session: Session,
         answering: Answering,
         solver: Solver,
+        loop: EventLoop,
         worker: Worker,
-        loop: asyncio.AbstractEventLoop,
-        post: Callable[[Callable[[], object]], None],
         changed: Callable[[], None],
         failed: Callable[[str], None],
     ) -> None:
         """Prepare; `changed` and `failed` are called on the event loop."""
         self._session, self._answering, self._solver = session, answering, solver
-        self._worker, self._loop, self._post = worker, loop, post
-        self._changed, self._failed = changed, failed
+        self._loop, self._changed, self._failed = loop, changed, failed
+        self._steps: Newest[Wanted, Frames] = Newest(loop, worker, self._refine, self._begin)
 
     @property
     def frame(self) -> int | None:
@@ -47,27 +61,31 @@ class Playback:
         Raises:
             FinlabError: there is no answer to the present state yet.
         """
-        best, state, revision = self._answering.best, self._session.state, self._session.revision
+        best = self._answering.best
         if best is None or self._answering.busy:
             raise FinlabError("there is no answer yet; wait for one")
+        self._steps.forget()
+        self._steps.ask(Wanted(self._session.revision, self._session.state, best))
 
-        def job() -> None:
-            frames = self._solver.refinement(state, best)
-            for frame in frames:
-                _ = frame.wrench
-            self._post(partial(self._play, revision, frames))
+    def _refine(self, wanted: Wanted) -> Frames:
+        frames = self._solver.refinement(wanted.state, wanted.answer)
+        for frame in frames:
+            _ = frame.wrench
+        return frames
 
-        def failed(text: str) -> None:
-            self._post(partial(self._failed, text))
+    def _begin(self) -> None:
+        steps = self._steps
+        if steps.error is not None:
+            self._failed(steps.error)
+        elif steps.answered is not None and steps.answered.revision == self._session.revision:
+            self._play(steps.findings or ())
 
-        self._worker.submit((id(self), "refinement"), job, failed)
-
-    def _play(self, revision: int, frames: tuple[Allocation, ...]) -> None:
-        self._answering.frames = frames if revision == self._session.revision else ()
+    def _play(self, frames: Frames) -> None:
+        self._answering.frames = frames
         self._changed()
-        if self._answering.frames:
-            self._loop.call_later(FRAME_S, self._next, revision, frames)
+        if frames:
+            self._loop.later(FRAME_S, lambda: self._next(frames))
 
-    def _next(self, revision: int, frames: tuple[Allocation, ...]) -> None:
+    def _next(self, frames: Frames) -> None:
         if self._answering.frames is frames:  # else it was ended, or started again
-            self._play(revision, frames[1:])
+            self._play(frames[1:])

@@ -10,10 +10,10 @@ import numpy as np
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import load_allocator
-from finlab.allocation.modes import Mode
 from webapp.session.state import State
 from webapp.tasks.attention import Attention, attention
 from webapp.tasks.density import Densities, densities
+from webapp.tasks.mode_names import Modes, known_modes, listed_modes
 from webapp.tasks.refinement import refinement
 
 Load = Callable[..., Allocator]
@@ -32,6 +32,8 @@ class Reply:
     """What the network proposed, for methods with one."""
     attention: Attention | None
     """How much its fins look at each other, for methods with a network."""
+    modes: Modes
+    """Those of its modes that are known anyway: a few."""
 
 
 class Solver:
@@ -81,11 +83,12 @@ class Solver:
             answer,
             densities(allocator, answer.layout, state.failed, target, state.temperature),
             attention(allocator, answer.layout, state.failed, target),
+            listed_modes(known_modes(answer), answer.samples),
         )
 
-    def modes(self, reply: Reply) -> tuple[Mode, ...]:
+    def modes(self, reply: Reply) -> Modes:
         """All distinct ways to do what an answer does: a search of its own, tens of milliseconds."""
-        return reply.answer.explore()
+        return listed_modes(reply.answer.explore(), reply.answer.samples)
 
     def refinement(self, state: State, answer: Allocation) -> tuple[Allocation, ...]:
         """The steps of the refinement behind an answer to a state.

@@ -11,6 +11,7 @@ from finlab.errors import FinlabError
 from webapp.session import Session
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_TARGET, number
 from webapp.tasks.answering import Answering
+from webapp.tasks.event_loop import EventLoop
 
 POINTS = 61
 """Values of a range, ends included."""
@@ -24,14 +25,14 @@ class Sweep:
     def __init__(
         self,
         session: Session,
-        loop: asyncio.AbstractEventLoop,
+        loop: EventLoop,
         do: Callable[[Callable[[], object]], None],
     ) -> None:
         """Prepare.
 
         Args:
             session: whose target is moved.
-            loop: the event loop that everything here runs on.
+            loop: where everything here runs.
             do: carries out an intent on the page.
         """
         self._session, self._loop, self._do = session, loop, do
@@ -70,7 +71,7 @@ class Sweep:
         self.error = np.full(POINTS, np.nan)
         self._place, self._step = 0, 1
         self._session.history.end_merge()
-        self._timer = self._loop.call_later(0.0, self._go)
+        self._timer = self._loop.later(0.0, self._go)
 
     def stop(self) -> None:
         """Leave the target where it is."""
@@ -89,7 +90,7 @@ class Sweep:
             self.stop()
             self._do(lambda: None)
             return
-        self._timer = self._loop.call_later(STEP_S, self._go)
+        self._timer = self._loop.later(STEP_S, self._go)
         self._do(partial(self._session.sweep_target, self.axis, float(self.values[self._place])))
         self._revision = self._session.revision
         if not 0 <= self._place + self._step < POINTS:

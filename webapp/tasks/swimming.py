@@ -1,32 +1,43 @@
 """A robot that swims on the page: steps it at the pace of the clock, never further behind than a moment."""
 
-import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from functools import partial
+from dataclasses import dataclass
 
 from finlab.errors import FinlabError
 from finlab.sim import ClosedLoop, make_trajectory
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan
+from webapp.tasks.event_loop import EventLoop
+from webapp.tasks.newest import Newest
 from webapp.tasks.pace import Pace
 from webapp.tasks.solver import Solver
-from webapp.tasks.swimmer import Swimmer
+from webapp.tasks.swimmer import Moment, Swimmer
 from webapp.tasks.worker import Worker
 
 BUDGET_S = 0.06
 """Longest time on the worker before the others have their turn [s]."""
 
 
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Some steps of a swim."""
+
+    n_steps: int
+    """How many are due."""
+    swimmers: tuple[Swimmer, ...]
+    """Who swims."""
+
+
 class Swimming:
-    """The swim of one page. All methods but `_advance` run on the event loop."""
+    """The swim of one page. All methods but `_made` and `_advance` run on the event loop."""
 
     def __init__(
         self,
         solver: Solver,
+        loop: EventLoop,
         worker: Worker,
-        post: Callable[[Callable[[], object]], None],
         changed: Callable[[], None],
         failed: Callable[[str], None],
     ) -> None:
@@ -34,24 +45,28 @@ class Swimming:
 
         Args:
             solver: whose allocators are used, on the worker's thread alone.
+            loop: where everything else runs.
             worker: whose thread swims.
-            post: brings a call to the event loop.
-            changed: called there when the state of the run has changed.
+            changed: called on the loop when the state of the run has changed.
             failed: called there with a sentence when it cannot go on.
         """
-        self._solver, self._worker, self._post = solver, worker, post
-        self._changed, self._failed = changed, failed
-        self.plan: Plan | None = None
-        """What is being swum, None while nothing is."""
+        self._solver, self._changed, self._failed = solver, changed, failed
+        self._start: Newest[Plan, tuple[Swimmer, ...]] = Newest(loop, worker, self._made, self._begin)
+        self._stretch: Newest[Stretch, tuple[int, tuple[Moment, ...]]] = Newest(
+            loop, worker, self._advance, self._take
+        )
         self.swimmers: tuple[Swimmer, ...] = ()
         """The robots; none while they are being made."""
         self.running = False
         """Whether the clock runs."""
         self.pace = Pace()
         """At what speed it is to go, and goes."""
-        self._busy = False
-        self._stop = threading.Event()
         self._acts: deque[Callable[[ClosedLoop], None]] = deque()
+
+    @property
+    def plan(self) -> Plan | None:
+        """What is being swum, None while nothing is."""
+        return self._start.question
 
     @property
     def active(self) -> bool:
@@ -71,14 +86,11 @@ class Swimming:
     def start(self, plan: Plan) -> None:
         """Begin at the beginning; a swim that is under way is given up."""
         self.stop()
-        self.plan, self.running, self._busy = plan, True, True
-        stop = self._stop
+        self.running = True
+        self._start.ask(plan)
 
-        def job() -> None:
-            swimmers = tuple(self._swimmer(plan, method) for method in plan.methods)
-            self._post(partial(self._begin, stop, swimmers))
-
-        self._worker.submit(id(self), job, partial(self._fault, stop))
+    def _made(self, plan: Plan) -> tuple[Swimmer, ...]:
+        return tuple(self._swimmer(plan, method) for method in plan.methods)
 
     def _swimmer(self, plan: Plan, method: str) -> Swimmer:
         path = make_trajectory(plan.path) if isinstance(plan.path, str) else plan.path
@@ -86,27 +98,22 @@ class Swimming:
         failures = [(name, 0.0) for name in plan.failed]
         return Swimmer(method, ClosedLoop(plan.layout, allocator, path, plant=plan.plant, failures=failures))
 
-    def _begin(self, stop: threading.Event, swimmers: tuple[Swimmer, ...]) -> None:
-        if stop is self._stop:
-            self.swimmers, self._busy = swimmers, False
-            self._changed()
+    def _begin(self) -> None:
+        if self._start.error is not None:
+            self._give_up(self._start.error)
+            return
+        self.swimmers = self._start.findings or ()
+        self._changed()
 
-    def _fault(self, stop: threading.Event, text: str) -> None:
-        """On the worker's thread: it cannot go on."""
-        self._post(partial(self._give_up, stop, f"the swim cannot go on: {text}"))
-
-    def _give_up(self, stop: threading.Event, text: str) -> None:
-        if stop is self._stop:
-            self.stop()
-            self._failed(text)
+    def _give_up(self, text: str) -> None:
+        self.stop()
+        self._failed(f"the swim cannot go on: {text}")
 
     def stop(self) -> None:
         """Give up and forget."""
-        self._stop.set()
-        self._stop = threading.Event()  # what is still under way belongs to the old one
-        self._worker.forget(id(self))
-        self.plan, self.swimmers, self.running = None, (), False
-        self._busy = False
+        self._start.forget()
+        self._stretch.forget()
+        self.swimmers, self.running = (), False
         self._acts.clear()
         self.pace.start_anew()
 
@@ -141,34 +148,29 @@ class Swimming:
             self._submit(n_steps)
 
     def _submit(self, n_steps: int) -> None:
-        if self._busy or not self.swimmers:
-            return
-        self._busy = True
-        stop = self._stop
-        self._worker.submit(
-            id(self), partial(self._advance, n_steps, stop, self.swimmers), partial(self._fault, stop)
-        )
+        if self.swimmers and not self._stretch.busy:
+            self._stretch.ask(Stretch(n_steps, self.swimmers))
 
-    def _advance(self, n_steps: int, stop: threading.Event, swimmers: tuple[Swimmer, ...]) -> None:
+    def _advance(self, stretch: Stretch) -> tuple[int, tuple[Moment, ...]]:
         """On the worker's thread: some steps, but no longer than the others can wait."""
-        end, done = time.monotonic() + BUDGET_S, 0
-        while self._acts and not stop.is_set():
+        end, done, swimmers = time.monotonic() + BUDGET_S, 0, stretch.swimmers
+        while self._acts:
             act = self._acts.popleft()
             for swimmer in swimmers:
                 act(swimmer.swim)
-        while done < n_steps and not swimmers[0].swim.done and not stop.is_set():
+        while done < stretch.n_steps and not swimmers[0].swim.done:
             for swimmer in swimmers:
                 swimmer.step()
             done += 1
             if time.monotonic() > end:
                 break
-        moments = tuple(swimmer.moment() for swimmer in swimmers)
-        self._post(partial(self._take, stop, done, moments))
+        return done, tuple(swimmer.moment() for swimmer in swimmers)
 
-    def _take(self, stop: threading.Event, done: int, moments: tuple) -> None:
-        if stop is not self._stop:
+    def _take(self) -> None:
+        if self._stretch.findings is None:
+            self._give_up(self._stretch.error or "")
             return
-        self._busy = False
+        done, moments = self._stretch.findings
         for swimmer, moment in zip(self.swimmers, moments, strict=True):
             swimmer.take(moment)
         self.pace.paid(done * self.swimmers[0].period_s, self.time)
