@@ -62,6 +62,7 @@ class View:
         self.session = session
         self._loop = page = EventLoop(loop, self.fault)
         self._robot = _robot(session)
+        self._faults: set[str] = set()
         self._panels: list[Panel] = []
         answers, changed = workers.answers, self._refresh
         refused = partial(self.notify, "Not possible")
@@ -103,6 +104,7 @@ class View:
 
     def do(self, act: Callable[[], object]) -> None:
         """Carry out an intent; a refusal becomes a note, and the page goes back to what the session holds."""
+        self._faults.clear()
         try:
             act()
         except FinlabError as error:
@@ -164,9 +166,12 @@ class View:
 
     def fault(self, error: Exception) -> None:
         """Something that we have got wrong: it is told, and nothing that was drawn before is trusted."""
-        traceback.print_exception(error)
         Changes.faults += 1
-        self.notify("A fault of the app", f"{type(error).__name__}: {error}")
+        text = f"{type(error).__name__}: {error}"
+        if text not in self._faults:  # once is enough, however often the page is written
+            self._faults.add(text)
+            traceback.print_exception(error)
+            self.notify("A fault of the app", text)
 
     def close(self) -> None:
         """The browser has gone."""

@@ -9,13 +9,33 @@ from webapp.panels.host import Host
 from webapp.scene.swim_scene import ARROWS_N
 
 
+class Corner:
+    """What lies over the 3D view."""
+
+    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+        """Build it, empty."""
+        self._host = host
+        self._content = gui.add_html("")
+
+    def refresh(self) -> None:
+        """Write the status line and the legend."""
+        host, answering = self._host, self._host.answering
+        raw = host.session.sample is not None or host.playback.frame is not None
+        if host.swimming.swimmers:
+            content = swim_corner(host.swimming, ARROWS_N)
+        else:
+            content = corner(
+                host.session.state, host.scenery.legend, host.shown, host.busy, answering.error, raw
+            )
+        put(self._content, content=content)
+
+
 class Header:
     """The top of the panel."""
 
     def __init__(self, gui: viser.GuiApi, host: Host) -> None:
         """Build the widgets."""
         self._host = host
-        self._corner = gui.add_html("")
         self._history = gui.add_button_group(
             "Session", ("Undo", "Redo", "Tour"), hint="Ctrl+Z, Ctrl+Shift+Z, T."
         )
@@ -39,19 +59,10 @@ class Header:
             self._host.do(acts[button])
 
     def refresh(self) -> None:
-        """Write the status line."""
-        host, history = self._host, self._host.session.history
-        raw = host.session.sample is not None or host.playback.frame is not None
-        if host.swimming.swimmers:
-            content = swim_corner(host.swimming, ARROWS_N)
-        else:
-            answering = host.answering
-            content = corner(
-                host.session.state, host.scenery.legend, host.shown, host.busy, answering.error, raw
-            )
-        put(self._corner, content=content)
+        """Write what can be undone, and where the tour is."""
+        history = self._host.session.history
         undo, redo = history.undo_name or "nothing", history.redo_name or "nothing"
         put(self._history, hint=f"Undo: {undo} (Ctrl+Z). Redo: {redo} (Ctrl+Shift+Z). T starts a tour.")
-        stop = host.session.stop
+        stop = self._host.session.stop
         put(self._card, visible=stop is not None, content="" if stop is None else tour_card(stop))
         put(self._stops, visible=stop is not None)

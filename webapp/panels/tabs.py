@@ -10,7 +10,7 @@ from webapp.handles import put
 from webapp.markup.style import STYLE
 from webapp.panels.compare_tab import CompareTab
 from webapp.panels.files_tab import FilesTab
-from webapp.panels.header import Header
+from webapp.panels.header import Corner, Header
 from webapp.panels.host import Host, Panel
 from webapp.panels.layout_tab import LayoutTab
 from webapp.panels.limits_tab import LimitsTab
@@ -66,9 +66,9 @@ def build_panels(gui: viser.GuiApi, host: Host) -> tuple[list[Panel], list[Panel
     """Build everything in the panel beside the view: all panels, and of these the ones that show a swim."""
     gui.add_html(STYLE)
     run_script(gui, NUMBER_FIELDS)
-    panels = {"Header": Guarded(gui, host, Header)}
+    panels = {"Corner": Guarded(gui, host, Corner), "Header": Guarded(gui, host, Header)}
     tabs = gui.add_tab_group()
     for label, make in TABS.items():
         with tabs.add_tab(label):
             panels[label] = Guarded(gui, host, make)
-    return list(panels.values()), [panels["Header"], panels["Swim"]]
+    return list(panels.values()), [panels["Corner"], panels["Swim"]]

@@ -1,6 +1,7 @@
 """The wrench that is asked for: presets, and a slider for each axis with its reachable range marked."""
 
 from functools import partial
+from html import escape
 
 import numpy as np
 import viser
@@ -42,7 +43,7 @@ class TargetPanel:
             )
             for k in range(6)
         ]
-        gui.add_html(marker("fl-reach-end"))
+        self._end = gui.add_html(marker("fl-reach-end"))
         for k, slider in enumerate(self._sliders):
             on_user_change(slider, partial(self._set_target, k))
         self._changes = Changes()
@@ -67,9 +68,11 @@ class TargetPanel:
             end = slider_end(float(reach))
             put(slider, min=min(-end, value), max=max(end, value))
             put(slider, value=value)
-        ranges = self._host.ranging.findings
-        if not self._changes(ranges):
+        ranges, error = self._host.ranging.findings, self._host.ranging.error
+        if not self._changes(ranges, error):
             return
+        sentence = "" if error is None else f"<div class='fl missing'>What is in reach: {escape(error)}</div>"
+        put(self._end, content=marker("fl-reach-end") + sentence)
         for k, slider in enumerate(self._sliders):
             if ranges is None:
                 put_marks(slider, ())

@@ -1,0 +1,171 @@
+"""Faults are put wherever an answer is made while a layout is opened: no figure of the robot before stays.
+
+What a page shows then is compared with a page that has never seen another robot.
+"""
+
+import asyncio
+import hashlib
+import re
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+import viser
+
+from finlab.assets import shipped_layouts
+from finlab.errors import FinlabError
+from finlab.layout import load_layout
+from tests.webapp.stand_in import load_stand_in
+from webapp.bench import SilentClient
+from webapp.session import Display, Session
+from webapp.tasks.solver import Solver
+from webapp.tasks.workers import Workers
+from webapp.view import View
+from webapp.viser_internals import start_server, stop_server
+
+BEFORE, OPENED, AFTER = (load_layout(shipped_layouts()[name]) for name in ("A", "B", "ucat"))
+DISPLAY = Display(frozen=True, graph=True, drawn="forces", ghost=False)
+WORDS = "out of order"
+
+COMPUTED = (
+    "webapp.tasks.solver.Solver.solve",
+    "webapp.tasks.solver.densities",
+    "webapp.tasks.solver.attention",
+    "webapp.tasks.solver.known_modes",
+    "webapp.tasks.analyst.score_card",
+    "webapp.tasks.analyst.attainable_set",
+    "webapp.tasks.ranging.axis_ranges",
+)
+"""Where a fault meets a worker's thread."""
+DRAWN = (
+    "webapp.markup.corner.reach_sentence",
+    "webapp.panels.header.corner",
+    "webapp.panels.target.axis_reach",
+    "webapp.panels.target.slider_end",
+    "webapp.panels.wrench_tab.wrench_bars",
+    "webapp.panels.wrench_tab.full_thrust",
+    "webapp.panels.wrench_tab.fin_table",
+    "webapp.panels.layout_tab.quick_check",
+    "webapp.panels.layout_tab.warnings",
+    "webapp.panels.mode_picker.mode_plot",
+    "webapp.panels.modes_tab.mode_table",
+    "webapp.panels.limits_tab.score_table",
+    "webapp.panels.compare_tab.comparison_table",
+    "webapp.panels.files_tab.command_line",
+    "webapp.scene.stage.Stage.refresh",
+    "webapp.scene.robot_scene.fitting_newtons",
+    "webapp.scene.robot_scene.missing_part",
+    "webapp.scene.scenery.legend",
+)
+"""Where it meets the writing of the page."""
+
+
+class Tab:
+    """One page on a server of its own."""
+
+    def __init__(self, workers: Workers, layout: Any) -> None:
+        self.server = start_server("127.0.0.1", 0)
+        self.client: Any = SilentClient(self.server)
+        session = Session(layout, DISPLAY)
+        solver = Solver(load=load_stand_in)
+        loop = self.server.get_event_loop()
+        self.view: View = self.on_loop(lambda: View(self.client, session, solver, workers, loop))
+        self.settle()
+
+    def on_loop(self, act: Callable[[], Any]) -> Any:
+        async def run() -> Any:
+            return act()
+
+        return asyncio.run_coroutine_threadsafe(run(), self.server.get_event_loop()).result(30)
+
+    def open(self, layout: Any) -> None:
+        self.on_loop(lambda: self.view.do(lambda: self.view.session.open_layout(layout)))
+        self.settle()
+
+    def settle(self) -> None:
+        view, end = self.view, time.monotonic() + 60
+        while view.busy or view.answering.searching or view.analyst.busy or view.ranging.busy:
+            assert time.monotonic() < end
+            time.sleep(0.01)
+        self.on_loop(lambda: None)
+
+    def figures(self) -> list[str]:
+        """The markup that can be seen, in order, without what no two runs have in common."""
+        markup = _html(self.server.gui._container_handle_from_uuid["root"])
+        return [re.sub(r"[\d.]+(e.?\d+)? ms", "ms", text) for text in markup]
+
+    def nodes(self) -> dict[str, str]:
+        """The meshes that can be seen, and marks of their shapes."""
+        nodes = self.server.scene._handle_from_node_name
+        hidden = [name for name, node in nodes.items() if not node.visible]
+        meshes = {name: node for name, node in nodes.items() if hasattr(node, "vertices")}
+        return {
+            name: hashlib.sha256(node.vertices.tobytes()).hexdigest()
+            for name, node in meshes.items()
+            if not any(name == other or name.startswith(f"{other}/") for other in hidden)
+        }
+
+    def close(self) -> None:
+        self.on_loop(self.view.close)
+        stop_server(self.server)
+
+
+def _html(container: Any) -> Iterator[str]:
+    for child in container._children.values():
+        if isinstance(child, viser.GuiTabGroupHandle):
+            for tab in child._tab_handles:
+                yield from _html(tab)
+        elif getattr(child, "visible", True):
+            if hasattr(child, "_children"):
+                yield from _html(child)
+            elif isinstance(child, viser.GuiHtmlHandle):
+                yield child.content
+
+
+@pytest.fixture(scope="module")
+def workers() -> Iterator[Workers]:
+    workers = Workers()
+    with pytest.MonkeyPatch.context() as patch:  # nobody types here, so nothing need come to rest first
+        for name in ("webapp.view.CARD_REST_S", "webapp.view.REST_S", "webapp.tasks.answering.SEARCH_REST_S"):
+            patch.setattr(name, 0.01)
+        yield workers
+    workers.stop()
+
+
+@pytest.fixture(scope="module")
+def tab(workers: Workers) -> Iterator[Tab]:
+    """One page that meets one fault after the other."""
+    tab = Tab(workers, BEFORE)
+    yield tab
+    tab.close()
+
+
+@pytest.mark.parametrize(
+    ("place", "fault"),
+    [(place, RuntimeError(WORDS)) for place in COMPUTED + DRAWN]
+    + [(place, FinlabError(WORDS)) for place in (COMPUTED[0], DRAWN[2])],
+)
+def test_no_figure_of_the_robot_before_stays(
+    workers: Workers, tab: Tab, place: str, fault: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: Any, **__: Any) -> Any:
+        raise fault
+
+    tab.open(BEFORE)
+    tab.client.notes.clear()
+    whole = tab.figures()
+    with monkeypatch.context() as patch:
+        patch.setattr(place, broken)
+        tab.open(OPENED)
+        shown = tab.figures()
+        told = " ".join([*shown, *tab.client.notes])
+        assert WORDS in told or "cannot be analysed" in told
+        assert "<b>B</b>" in told or "shown of B" in told
+        fresh = Tab(workers, OPENED)
+        assert shown == fresh.figures()
+        assert tab.nodes() == fresh.nodes()
+        fresh.close()
+    tab.open(AFTER)
+    tab.open(BEFORE)
+    assert tab.figures() == whole, "the page goes on as if nothing had been"
