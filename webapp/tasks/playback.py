@@ -68,10 +68,7 @@ class Playback:
         self._steps.ask(Wanted(self._session.revision, self._session.state, best))
 
     def _refine(self, wanted: Wanted) -> Frames:
-        frames = self._solver.refinement(wanted.state, wanted.answer)
-        for frame in frames:
-            _ = frame.wrench
-        return frames
+        return self._solver.refinement(wanted.state, wanted.answer)
 
     def _begin(self) -> None:
         steps = self._steps
