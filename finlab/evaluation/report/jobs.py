@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from multiprocessing import get_context
@@ -15,8 +15,7 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from finlab.evaluation.report.work import WORK
-from finlab.evaluation.statistics.store import Result, Store
+from finlab.evaluation.statistics.store import Columns, Result, Store
 
 
 @dataclass(frozen=True)
@@ -25,8 +24,8 @@ class Job:
 
     name: str
     """What it is, for people; leads the name of its file."""
-    work: str
-    """Key of `WORK`."""
+    work: Callable[..., Columns]
+    """What is done; a function of a module, so that other processes find it."""
     settings: dict[str, Any]
     """Arguments of the work that decide the result, plain values."""
     prints: str
@@ -39,7 +38,7 @@ class Job:
     @property
     def key(self) -> dict[str, Any]:
         """What the result depends on."""
-        return {"work": self.work, "prints": self.prints, **self.settings}
+        return {"work": self.work.__name__, "prints": self.prints, **self.settings}
 
     def done(self, store: Store) -> bool:
         """Whether its result is there."""
@@ -52,7 +51,7 @@ class Job:
     def run(self, store: Store, commit: str) -> None:
         """Do the work, unless it is done."""
         arguments = {**self.settings, **self.context}
-        store.keep(self.name, self.key, lambda: WORK[self.work](**arguments), commit=commit)
+        store.keep(self.name, self.key, lambda: self.work(**arguments), commit=commit)
 
 
 def run_jobs(jobs: Sequence[Job], store: Store, *, commit: str, processes: int | None = None) -> None:

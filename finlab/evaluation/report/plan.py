@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -20,10 +20,13 @@ from finlab.evaluation.method_specs import (
     surrogate_fingerprint,
 )
 from finlab.evaluation.paper_figures import paper_figures
+from finlab.evaluation.report import work
 from finlab.evaluation.report.jobs import Job
 from finlab.evaluation.report.sizes import Sizes
 from finlab.evaluation.splits import SPLITS
-from finlab.evaluation.statistics.store import Store
+from finlab.evaluation.statistics.store import Columns, Store
+
+Size = tuple[int, int]
 
 REFERENCE = "ipopt-32"
 """Whose energies the others are measured by."""
@@ -112,98 +115,92 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
         runs: folder for the small trainings.
     """
     casadi = importlib.util.find_spec("casadi") is not None
-    slow = [name for name in SLOW if casadi or name != "ipopt"]
-    distilled = has_distilled(checkpoints.learned)
-    quick = [name for name in QUICK if distilled or name != "fast"]
-    names = [*quick, *slow, *([REFERENCE] if casadi else [])]
+    names = [name for name in QUICK if name != "fast" or has_distilled(checkpoints.learned)]
+    names += [name for name in (*SLOW, REFERENCE) if casadi or "ipopt" not in name]
     prints = {name: fingerprint(name, checkpoints.of(name)) for name in names}
-    plan = Plan()
 
-    def job(name: str, work: str, spec: str, **settings: Any) -> Job:
-        context = {"checkpoint": checkpoints.of(spec)}
-        return Job(name, work, {"seed": seed, **settings}, prints[spec], context)
+    def job(
+        name: str, do: Callable[..., Columns], spec: str, size: Size | None = None, **settings: Any
+    ) -> Job:
+        settings |= {"seed": seed} | ({} if size is None else {"layouts": size[0], "targets": size[1]})
+        return Job(name, do, settings, prints[spec], {"checkpoint": checkpoints.of(spec)})
 
-    layouts, targets = sizes.energy
-    for method in (REFERENCE, *ENERGY_METHODS):
-        if method in prints:
-            few = is_slow(method) and method != REFERENCE
-            plan.energy[method] = job(
-                f"energy-{method}",
-                "energy",
-                method,
-                method=method,
-                layouts=layouts,
-                targets=sizes.energy_slow if few else targets,
-            )
-    for method in sorted(names, key=lambda name: name != "paper"):
+    energy = {
+        name: job(f"energy-{name}", work.energy, name, _energy_size(sizes, name), method=name)
+        for name in (REFERENCE, *ENERGY_METHODS)
+        if name in prints
+    }
+    wrench = {}
+    for name in sorted(names, key=lambda name: name != "paper"):
         for split in SPLITS:
-            if is_slow(method) and split == "id":
-                plan.wrench[split, method] = plan.energy[method]  # the same targets, and more of them
-                continue
-            layouts, targets = _size(sizes, split, method)
-            plan.wrench[split, method] = job(
-                f"wrench-{split}-{method}",
-                "wrench",
-                method,
-                split=split,
-                method=method,
-                layouts=layouts,
-                targets=targets,
-            )
-    layouts, targets = sizes.ablation
-    for refinement in REFINEMENTS:
-        for variant in VARIANTS:
-            plan.ablation[variant, refinement] = job(
-                f"ablation-{variant}-{refinement}",
-                "ablation",
-                "paper",
-                variant=variant,
-                refinement=refinement,
-                layouts=layouts,
-                targets=targets,
-                candidates=N_CANDIDATES,
-                temperature=PAPER_TEMPERATURE,
-            )
-    layouts, targets = sizes.temperature
-    for value in TEMPERATURES:
-        plan.temperature[value] = job(
-            f"temperature-{value:.3g}",
-            "temperature",
+            if is_slow(name) and split == "id":
+                wrench[split, name] = energy[name]  # the same targets, and more of them
+            else:
+                size = _size(sizes, split, name)
+                wrench[split, name] = job(
+                    f"wrench-{split}-{name}", work.wrench, name, size, split=split, method=name
+                )
+    drawn = {"candidates": N_CANDIDATES, "temperature": PAPER_TEMPERATURE}
+    ablation = {
+        (variant, by): job(
+            f"ablation-{variant}-{by}",
+            work.ablation,
             "paper",
-            temperature=value,
-            layouts=layouts,
-            targets=targets,
+            sizes.ablation,
+            variant=variant,
+            refinement=by,
+            **drawn,
         )
-    plan.scatter["paper"] = job("scatter", "scatter", "paper", fins=SCATTER_FINS, targets=SCATTER_TARGETS)
-    layouts, targets = sizes.seeds
-    plan.seeds["id"] = job("seeds", "seeds", "learned", layouts=layouts, targets=targets, candidates=N_SEEDS)
+        for by in REFINEMENTS
+        for variant in VARIANTS
+    }
+    temperature = {
+        value: job(
+            f"temperature-{value:.3g}", work.temperature, "paper", sizes.temperature, temperature=value
+        )
+        for value in TEMPERATURES
+    }
+    scatter = job("scatter", work.scatter, "paper", fins=SCATTER_FINS, targets=SCATTER_TARGETS)
     preset, steps, batch_size = sizes.training
-    settings = {"preset": preset, "steps": steps, "batch_size": batch_size}
-    plan.training.update(
-        training_jobs({**settings, "layouts": layouts, "targets": targets, "seed": seed}, runs)
-    )
-    for experiment, runs_each in zip(SWIM_METHODS, sizes.swims, strict=True):
-        if runs_each:
-            more: dict[str, Any] = {"pairs": sizes.lost_pairs} if experiment == "faults" else {}
-            plan.swims[experiment] = job(
-                f"swim-{experiment}",
-                experiment,
-                "learned",
-                methods=SWIM_METHODS[experiment],
-                runs=runs_each,
-                **more,
-            )
+    study = {"preset": preset, "steps": steps, "batch_size": batch_size, "seed": seed}
+    study |= {"layouts": sizes.seeds[0], "targets": sizes.seeds[1]}
+    loops: dict[str, tuple[Callable[..., Columns], int, dict[str, Any]]] = {
+        "trajectory": (work.trajectory, sizes.swims[0], {}),
+        "faults": (work.faults, sizes.swims[1], {"pairs": sizes.lost_pairs}),
+        "velocity": (work.velocity, sizes.swims[2], {}),
+    }
+    swims = {
+        name: job(f"swim-{name}", do, "learned", None, methods=SWIM_METHODS[name], runs=n, **more)
+        for name, (do, n, more) in loops.items()
+        if n
+    }
     calls, budget_s = sizes.latency
     methods = [name for name in LATENCY_METHODS if name in prints]
-    plan.latency["calls"] = Job(
+    latency = Job(
         "latency",
-        "latency",
+        work.latency,
         {"seed": seed, "methods": methods, "calls": calls, "budget_s": budget_s},
         prints["learned"] + prints["paper"],
         {"checkpoint": checkpoints.learned, "paper_checkpoint": checkpoints.paper},
         alone=True,
     )
-    return plan
+    return Plan(
+        energy=energy,
+        wrench=wrench,
+        ablation=ablation,
+        temperature=temperature,
+        scatter={"paper": scatter},
+        seeds={"id": job("seeds", work.seeds, "learned", sizes.seeds, candidates=N_SEEDS)},
+        training=training_jobs(study, runs),
+        swims=swims,
+        latency={"calls": latency},
+    )
+
+
+def _energy_size(sizes: Sizes, method: str) -> Size:
+    """Layouts and targets on which energies are compared; few for methods of 8 starts."""
+    layouts, targets = sizes.energy
+    return layouts, sizes.energy_slow if is_slow(method) and method != REFERENCE else targets
 
 
 def _size(sizes: Sizes, split: str, method: str) -> tuple[int, int]:
@@ -225,7 +222,7 @@ def training_jobs(settings: dict[str, Any], folder: Path) -> dict[str, Job]:
     return {
         change: Job(
             f"training-{change}",
-            "training",
+            work.training,
             {"change": change, **settings},
             prints,
             {"folder": str(folder / f"{change}-{size}-{prints[:8]}")},

@@ -1,40 +1,48 @@
-"""What a job does: plain settings in, arrays out. Each function loads what it needs, so that it can run in a
-process of its own."""
+"""What a job does: plain settings in, arrays out, so that it can run in a process of its own."""
 
 from __future__ import annotations
 
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 
-from finlab.evaluation.report.work_closed_loop import faults, trajectory, velocity
+from finlab.evaluation.experiments.ablation import ablation_method, run_variant
+from finlab.evaluation.experiments.faults import all_faults, fault_rows, run_faults
+from finlab.evaluation.experiments.latency import latency_cases, latency_rows
+from finlab.evaluation.experiments.seeds import learned_allocator, seed_rows
+from finlab.evaluation.experiments.temperature import refinement_columns, temperature_columns
+from finlab.evaluation.experiments.training_study import train_and_run
+from finlab.evaluation.experiments.trajectory import run_trajectory, trajectory_rows
+from finlab.evaluation.experiments.velocity import run_velocity, velocity_rows
+from finlab.evaluation.experiments.wrench_tracking import run_method, score
+from finlab.evaluation.method_specs import load_method_spec, load_method_specs
+from finlab.evaluation.plots.closed_loop_experiments import Track
 from finlab.evaluation.splits import make_split
-from finlab.evaluation.statistics.records import columns_of_records
+from finlab.evaluation.statistics.records import columns_of_records, join_records
 from finlab.evaluation.statistics.store import Columns, columns_of_rows
+from finlab.layout import load_layout
+from finlab.sim import make_trajectory
 
 MOST_FINS = 8
 """Commands are padded to so many fins, those that are not there hold NaN."""
 LATENCY_FINS = 4
-"""Their fins."""
+"""Fins of the layouts whose calls are timed."""
+PAPER_LAYOUTS = ("A", "B", "C", "D")
+"""The paper's robots."""
+TRACK = "track "
+"""Leads the name of a column of time, position and reference (K, 7); layout and method follow."""
 
 
 def wrench(
     *, split: str, layouts: int, targets: int, method: str, seed: int, checkpoint: str | None
 ) -> Columns:
     """Records of a method on a split."""
-    from finlab.evaluation.experiments.wrench_tracking import run_method
-    from finlab.evaluation.method_specs import load_method_spec
-
     cases = make_split(split, layouts, targets, seed)
     return columns_of_records(run_method(load_method_spec(method, checkpoint), cases))
 
 
 def energy(*, layouts: int, targets: int, method: str, seed: int, checkpoint: str | None) -> Columns:
     """Records of a method on split `id`, with its commands (N, 8, 3), so that each can be checked again."""
-    from finlab.evaluation.experiments.wrench_tracking import score
-    from finlab.evaluation.method_specs import load_method_spec
-    from finlab.evaluation.statistics.records import join_records
-
     allocator, parts, commands = load_method_spec(method, checkpoint), [], []
     for k, case in enumerate(make_split("id", layouts, targets, seed)):
         answer = allocator.allocate_batch(case.layout, case.targets)
@@ -59,8 +67,6 @@ def ablation(
     checkpoint: str | None,
 ) -> Columns:
     """Records of one variant, scored by plant and surrogate, and the time of single calls."""
-    from finlab.evaluation.experiments.ablation import ablation_method, run_variant
-
     method = ablation_method(
         variant, refinement, checkpoint=checkpoint, n_candidates=candidates, temperature=temperature
     )
@@ -76,16 +82,12 @@ def temperature(
     *, temperature: float, layouts: int, targets: int, seed: int, checkpoint: str | None
 ) -> Columns:
     """Diversity and best J at one temperature."""
-    from finlab.evaluation.experiments.temperature import temperature_columns
-
     cases = make_split("id", layouts, targets, seed)
     return temperature_columns(cases, temperature, checkpoint=checkpoint, seed=seed)
 
 
 def scatter(*, fins: int, targets: int, seed: int, checkpoint: str | None) -> Columns:
     """Candidates before and after refinement, on the first layout of so many fins."""
-    from finlab.evaluation.experiments.temperature import refinement_columns
-
     cases = make_split("id", 40, targets, seed)
     case = next(case for case in cases if case.layout.n_fins == fins)
     return refinement_columns(case, checkpoint=checkpoint, seed=seed)
@@ -93,8 +95,6 @@ def scatter(*, fins: int, targets: int, seed: int, checkpoint: str | None) -> Co
 
 def seeds(*, layouts: int, targets: int, candidates: int, seed: int, checkpoint: str | None) -> Columns:
     """Rows of the comparison of the network's seeds with random ones."""
-    from finlab.evaluation.experiments.seeds import learned_allocator, seed_rows
-
     cases = make_split("id", layouts, targets, seed)
     return columns_of_rows(seed_rows(learned_allocator(checkpoint), cases, n_seeds=candidates, seed=seed))
 
@@ -109,9 +109,6 @@ def latency(
     paper_checkpoint: str | None,
 ) -> Columns:
     """Rows of the comparison of times; to be run with nothing beside it."""
-    from finlab.evaluation.experiments.latency import latency_cases, latency_rows
-    from finlab.evaluation.method_specs import load_method_spec
-
     cases = latency_cases(LATENCY_FINS, seed)
     allocators = {
         name: load_method_spec(name, paper_checkpoint if name == "paper" else checkpoint) for name in methods
@@ -131,9 +128,6 @@ def training(
     folder: str,
 ) -> Columns:
     """Train with one thing changed and try the network."""
-    from pathlib import Path
-
-    from finlab.evaluation.experiments.training_study import train_and_run
 
     return train_and_run(
         change,
@@ -146,20 +140,39 @@ def training(
     )
 
 
-WORK: dict[str, Any] = {
-    function.__name__: function
-    for function in (
-        wrench,
-        energy,
-        ablation,
-        temperature,
-        scatter,
-        seeds,
-        latency,
-        training,
-        trajectory,
-        faults,
-        velocity,
-    )
-}
-"""Name of the work -> what does it."""
+def trajectory(*, methods: str, runs: int, seed: int, checkpoint: str | None) -> Columns:
+    """Rows of the trajectory experiment, and one path on each layout, five points a second."""
+    robots = [load_layout(name) for name in PAPER_LAYOUTS]
+    allocators = load_method_specs(methods, checkpoint)
+    found = run_trajectory(robots, allocators, make_trajectory("lissajous"), range(seed, seed + runs), "mean")
+    columns = columns_of_rows(trajectory_rows(found))
+    for (layout, method), log in found:
+        step = max(1, round(0.2 / float(log.time[1] - log.time[0])))
+        track = np.column_stack([log.time, log.position, log.reference])
+        columns.setdefault(f"{TRACK}{layout} {method}", track[::step])
+    return columns
+
+
+def tracks_of_columns(columns: Columns) -> list[Track]:
+    """The paths that `trajectory` kept."""
+    tracks = []
+    for name, track in columns.items():
+        if name.startswith(TRACK):
+            layout, method = name.removeprefix(TRACK).split(" ", 1)
+            tracks.append(Track(layout, method, track[:, 0], track[:, 1:4], track[:, 4:]))
+    return tracks
+
+
+def faults(*, methods: str, runs: int, pairs: bool, seed: int, checkpoint: str | None) -> Columns:
+    """Rows of the fault experiment on layout A."""
+    robot, path = load_layout("A"), make_trajectory("circle")
+    cases = [c for c in all_faults(robot, path.duration_s / 2) if pairs or len(c.fins) < 2]
+    seeds = range(seed, seed + runs)
+    found = run_faults(robot, load_method_specs(methods, checkpoint), path, cases, seeds, "mean")
+    return columns_of_rows(fault_rows(cases, found))
+
+
+def velocity(*, methods: str, runs: int, seed: int, checkpoint: str | None) -> Columns:
+    """Rows of the velocity experiment on layout A."""
+    robot, seeds = load_layout("A"), range(seed, seed + runs)
+    return columns_of_rows(velocity_rows(run_velocity(robot, load_method_specs(methods, checkpoint), seeds)))

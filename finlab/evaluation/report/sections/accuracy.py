@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from finlab.evaluation.method_specs import is_slow
-from finlab.evaluation.paper_figures import paper_figures
+from finlab.evaluation.paper_figures import PAPER_METHODS, paper_figures
 from finlab.evaluation.plots.error_distribution import error_by_fins, error_distribution
 from finlab.evaluation.report.document import Block, Column, Figure, Fold, Heading, Row, Table, Text
 from finlab.evaluation.report.results import Results
@@ -102,13 +102,12 @@ def accuracy_blocks(results: Results) -> list[Block]:
 def wrench_table(rows: Sequence[Row], split: str) -> list[Row]:
     """Rows in fixed order, the paper's after the method that each belongs to."""
     printed = paper_figures()["wrench_tracking"].get(split, {})
-    places = {"paper": "ours", "qp": "qp", "sqp": "sqp"}
     shown: list[Row] = []
     for row in sorted(rows, key=lambda row: ORDER.index(row["method"])):
         name = row["method"]
         kind = {"_kind": "ours"} if name == "learned" else {}
         shown.append({**row, "method": f"`{name}`", **kind})
-        if (theirs := places.get(name, "")) in printed:
+        if (theirs := PAPER_METHODS.get(name, "")) in printed:
             shown.append({"method": PRINTED[theirs], "_kind": "printed", **printed[theirs]})
     return shown
 

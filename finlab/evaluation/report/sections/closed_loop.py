@@ -9,7 +9,7 @@ from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.plots.closed_loop_experiments import draw_faults, draw_layouts
 from finlab.evaluation.report.document import Block, Bullets, Column, Figure, Heading, Row, Table, Text
 from finlab.evaluation.report.results import Results
-from finlab.evaluation.report.work_closed_loop import tracks_of_columns
+from finlab.evaluation.report.work import tracks_of_columns
 
 ERRORS = (
     Column("ate", "ATE [m]", "metres"),
