@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from finlab.forces.extent import RANK_TOLERANCE, Extent, singular_values, strongest, weakest
 from finlab.forces.fin_sets import SCALE, fin_sets
 from finlab.forces.reach import max_wrench_along_exactly
-from finlab.forces.thrust_law import thrust_laws
+from finlab.forces.thrust_curve import plant_curves
 from finlab.layout import Layout
 
 Array = NDArray[np.float64]
@@ -177,7 +177,8 @@ def model_error(layout: Layout, failed: Collection[str] = ()) -> Array:
     directions than in its strongest one.
     """
     sets = fin_sets(layout, failed)
-    off = np.array([law.minimum + law.spread for law in thrust_laws(layout)]) * (sets.radius[0] > 0.0)
+    curves = plant_curves(layout)
+    off = (curves.minimum + curves.spread) * (sets.radius[0] > 0.0)
     lever = np.linalg.norm(sets.columns[0], axis=1)
     return np.asarray((lever * off[:, None]).sum(axis=0) * SCALE)
 

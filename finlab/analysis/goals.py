@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from finlab.errors import LayoutError
 from finlab.forces.extent import weakest
 from finlab.forces.fin_sets import SCALE, FinSets
-from finlab.forces.least_energy import descend, planar_energy, starts
+from finlab.forces.least_energy import cheapest, plant_problem, starts
 from finlab.forces.reach import COARSE, FINE, max_wrench_along
 from finlab.layout import Layout
 
@@ -94,22 +94,18 @@ def _after_worst_failure(of_rest: Goal) -> Goal:
 def _mission_energy(layout: Layout, mission: Array, fine: bool) -> Goal:
     """Energy from starts in which a few fins rest; a wrench out of reach costs by what is missing."""
     wanted = mission / SCALE
+    problem = plant_problem(layout)
     tolerance, most_resting = (FINE, 2) if fine else (COARSE, 1)
+    seeds = starts(problem.curves.maximum, n_random=0, most_resting=most_resting)
 
     def goal(sets: FinSets) -> Array:
-        robots = len(sets.radius)
+        targets = np.tile(wanted, (len(sets.radius), 1, 1))
         rows = sets.repeat(len(wanted))
-        target = np.tile(wanted, (robots, 1))
-        missing = _missing(rows, target, tolerance)
-        cost = UNREACHED * (1.0 + missing)
-        able = np.flatnonzero(missing < ALL_THERE)
-        if len(able):
-            seeds = starts(sets.radius[0], n_random=0, most_resting=most_resting)
-            each = np.repeat(able, len(seeds))
-            force, good = descend(rows.take(each), target[each], np.tile(seeds, (len(able), 1)))
-            energy = np.where(good, planar_energy(layout, (), force), UNREACHED)
-            cost[able] = energy.reshape(len(able), len(seeds)).min(axis=1)
-        return np.asarray(-cost.reshape(robots, len(wanted)).mean(axis=1))
+        missing = _missing(rows, targets.reshape(-1, 6), tolerance).reshape(-1, len(wanted))
+        energy = cheapest(problem, sets, targets, seeds)
+        cost = np.where(np.isnan(energy), UNREACHED, energy)
+        cost = np.where(missing < ALL_THERE, cost, UNREACHED * (1.0 + missing))
+        return np.asarray(-cost.mean(axis=1))
 
     return goal
 

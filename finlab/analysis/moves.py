@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from finlab.errors import LayoutError
 from finlab.forces.fin_sets import SCALE, FinSets, fin_sets
-from finlab.layout import Fin, Layout, planar_effectiveness
+from finlab.layout import Fin, Layout
+from finlab.layout.arrays import force_columns
 
 Array = NDArray[np.float64]
 
@@ -140,9 +141,8 @@ class Moves:
 
     def sets(self, vectors: Array) -> FinSets:
         """Returns what the fins can push once moved by vectors (P, D)."""
-        blocks = planar_effectiveness(*self.geometry(vectors)) / SCALE[:, None]
-        still = self._sets.tile(len(vectors))
-        return still._replace(columns=np.ascontiguousarray(np.swapaxes(blocks, -1, -2)))
+        columns = force_columns(*self.geometry(vectors))[..., 1:, :] / SCALE
+        return self._sets.tile(len(vectors))._replace(columns=np.ascontiguousarray(columns))
 
     def moved(self, vector: Array) -> Layout:
         """Returns the layout with its fins moved by a vector (D,)."""

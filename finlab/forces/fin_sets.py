@@ -17,9 +17,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.forces.thrust_law import thrust_laws
-from finlab.layout import Layout, planar_effectiveness
+from finlab.forces.thrust_curve import plant_curves
+from finlab.layout import Layout
 from finlab.layout.angles import is_full_turn, wrapped
+from finlab.layout.arrays import force_columns
 
 Array = NDArray[np.float64]
 
@@ -106,12 +107,12 @@ def fin_sets(layout: Layout, failed: Collection[str] = ()) -> FinSets:
         LayoutError: there is no fin of a name in `failed`.
     """
     lost = layout.indices(tuple(failed))
-    blocks = planar_effectiveness(layout.position, layout.mounting_angle)  # (n, 6, 2)
-    radius = np.array([law.maximum for law in thrust_laws(layout)])
+    columns = force_columns(layout.position, layout.mounting_angle)[:, 1:] / SCALE
+    radius = plant_curves(layout).maximum
     radius[list(lost)] = 0.0
     lower, upper = layout.lower[:, 2], layout.upper[:, 2]
     return FinSets(
-        np.ascontiguousarray(np.swapaxes(blocks / SCALE[:, None], -1, -2))[None],
+        np.ascontiguousarray(columns)[None],
         radius[None],
         0.5 * (upper + lower)[None],
         half_arcs(lower, upper)[None],

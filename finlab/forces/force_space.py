@@ -20,9 +20,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.forces.fin_sets import FinSets
+from finlab.forces.fin_sets import FinSets, half_arcs
 from finlab.forces.small_systems import solve
 from finlab.forces.thrust_curve import ThrustCurves
+from finlab.layout import Layout
+from finlab.layout.arrays import force_columns
+from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyWeights, energy_scale
 
 Array = NDArray[Any]
 
@@ -80,6 +83,17 @@ class PlanarProblem(NamedTuple):
         """What the fins can push, as one robot of a batch."""
         return FinSets(self.columns[None], self.curves.maximum[None], self.middle[None], self.half[None])
 
+    def like(self, columns: Array, middle: Array, half: Array) -> PlanarProblem:
+        """The same fins elsewhere on the robot, or in parts of their arcs."""
+        return self._replace(
+            columns=columns,
+            products=_products(columns),
+            middle=middle,
+            half=half,
+            turns_fully=bool((half >= np.pi).all()),
+            free=free_terms(columns, self.curves.maximum),
+        )
+
 
 class Planar(NamedTuple):
     """Planar forces of R rows."""
@@ -90,6 +104,38 @@ class Planar(NamedTuple):
     """Zero direction (R, n) [rad], inside its arc."""
     residual: Array
     """Target minus wrench, normalized (R, 6)."""
+
+
+def planar_problem(
+    layout: Layout, curves: ThrustCurves, scale: Array, weights: EnergyWeights = DEFAULT_WEIGHTS
+) -> PlanarProblem:
+    """One layout as the planar search sees it.
+
+    Args:
+        layout: n fins, all of them healthy.
+        curves: what their thrusts cost by the same weights.
+        scale: what a wrench is divided by (6,).
+        weights: of the energy.
+    """
+    lower, upper = layout.lower[:, 2], layout.upper[:, 2]
+    half = half_arcs(lower, upper)
+    columns = np.ascontiguousarray(force_columns(layout.position, layout.mounting_angle)[:, 1:] / scale)
+    return PlanarProblem(
+        columns=columns,
+        products=_products(columns),
+        curves=curves,
+        middle=0.5 * (lower + upper),
+        half=half,
+        direction_cost=weights.zero_direction / energy_scale(layout.upper)[:, 2] ** 2,
+        idle_direction=np.clip(0.0, lower, upper),
+        turns_fully=bool((half >= np.pi).all()),
+        free=free_terms(columns, curves.maximum),
+        growth=1.5 if weights.inertial else 0.5,
+    )
+
+
+def _products(columns: Array) -> Array:
+    return np.asarray(np.einsum("nci,ndj->ncdij", columns, columns))
 
 
 def mobility(problem: PlanarProblem, thrust: Array) -> Array:

@@ -38,9 +38,9 @@ RIDGE = 1e-15
 KEPT = 0.99
 """Share of the way to the nearest limit that a step goes at most."""
 SLACK, WEIGHT = 3.0, 10.0
-"""Slack and multiplier of each limit at the outset."""
+"""Slack and multiplier of each limit at the outset; the latter for a wanted wrench that is not far away."""
 NARROWEST = 1e-6
-"""Half of a sector's angle [rad] at least, so that it has an inside."""
+"""Half of a sector's angle [rad] below which it has no inside: such a fin only pushes ahead."""
 
 
 class Optimum(NamedTuple):
@@ -111,7 +111,7 @@ def minimize(
         if 2 * done.sum() > len(done):  # the few that are left need not drag all others along
             busy, state = busy[~done], _State(*(field[~done] for field in state))
     # Should a row not be done, its forces are at least such that the fins can give.
-    force = np.nan_to_num(point).swapaxes(1, 2)
+    force = _ahead(sets, np.nan_to_num(point).swapaxes(1, 2)[..., None])[..., 0]
     force /= np.maximum(np.sqrt((force * force).sum(-1, keepdims=True)), 1.0)
     return Optimum(force * sets.radius[..., None], multiplier * _unit(sets)[:, None])
 
@@ -120,20 +120,22 @@ def _outset(sets: FinSets, wanted: Array, c: Array, bend: Array | float) -> _Sta
     rows, n = sets.radius.shape
     m = sets.columns.shape[-1]
     unit = _unit(sets)
-    full = sets.columns * (sets.radius / unit[:, None])[..., None, None]
+    full = _ahead(sets, sets.columns * (sets.radius / unit[:, None])[..., None, None])
     sides, beyond = _sides(sets)
     limits = 1 + sides.shape[1]
+    wanted, c = wanted / unit[:, None], np.broadcast_to(np.asarray(c, np.float64), (rows, m))
+    pulled = 1.0 + (np.abs(wanted) / np.maximum(c, 1.0)).max(-1)
     return _State(
         full.swapaxes(1, 2).reshape(rows, 2 * n, m),
         sides,
         beyond,
-        wanted / unit[:, None],
-        np.broadcast_to(np.asarray(c, np.float64), (rows, m)),
+        wanted,
+        c,
         np.broadcast_to(bend * (sets.radius / unit[:, None]) ** 2, (rows, n)),
         np.zeros((rows, 2, n)),
         np.zeros((rows, m)),
         np.full((rows, limits, n), SLACK),
-        np.full((rows, limits, n), WEIGHT),
+        np.tile(WEIGHT * pulled[:, None, None], (1, limits, n)),
         np.ones(rows),
     )
 
@@ -142,6 +144,15 @@ def _unit(sets: FinSets) -> Array:
     """Wrench (R,) of each robot's strongest fin, by which all are divided."""
     size: Array = (np.sqrt((sets.columns**2).sum((-1, -2))) * sets.radius).max(-1)
     return np.where(size > 0.0, size, 1.0)
+
+
+def _ahead(sets: FinSets, vectors: Array) -> Array:
+    """Vectors (R, n, 2, k) in the fins' planes, of fins that cannot turn only their parts ahead."""
+    fixed = sets.half < NARROWEST
+    if not fixed.any():
+        return vectors
+    ahead = np.stack([np.cos(sets.middle), np.sin(sets.middle)], axis=-1)[..., None]
+    return np.where(fixed[..., None, None], ahead * (ahead * vectors).sum(-2, keepdims=True), vectors)
 
 
 def _sides(sets: FinSets) -> tuple[Array, Array]:
@@ -155,7 +166,7 @@ def _sides(sets: FinSets) -> tuple[Array, Array]:
     if circle.all():
         return np.zeros((rows, 0, 2, n)), np.zeros((rows, 0, n))
     wide = sets.half > np.pi / 2
-    half = np.maximum(sets.half, NARROWEST)
+    half = np.where(sets.half < NARROWEST, np.pi / 2, sets.half)
     ends = np.stack([sets.middle + half - np.pi / 2, sets.middle - half + np.pi / 2], axis=1)
     ends = np.where(wide[:, None], sets.middle[:, None], ends)
     none = np.stack([circle, circle | wide], axis=1)

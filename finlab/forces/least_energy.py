@@ -2,40 +2,45 @@
 
 Energy is the paper's proxy `J_en`. Each fin gives its thrust by the cheapest pair of amplitude and frequency.
 That cost grows about like the square root of thrust: it is concave, so it pays to let some fins rest, and
-there are many local optima. From each of many starts the search goes downhill by touching the cost from above
-with a quadratic, solving the convex problem that results exactly, and touching again. Starts rest every fin
-and every pair of fins in turn, and some are random. Where a fin's arc is wider than half a turn, each half is
-tried. The small cost of the zero direction is left out of the search and counted in the result.
+there are many local optima. From each of many starts the search in force space goes downhill; what it finds
+is then made exact by touching the cost from above with a quadratic and solving the convex problem that
+results. Starts rest every fin and every pair of fins in turn, and some are random. Where a fin's arc is wider
+than half a turn, each half is tried. The small cost of the zero direction is left out of the search and
+counted in the result.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finlab.forces.answers import cheap
-from finlab.forces.dual import Dual, minimize_dual
-from finlab.forces.fin_sets import SCALE, FinSets, convex_parts, fin_sets
-from finlab.forces.reach import max_wrench_along
-from finlab.forces.thrust_law import thrust_laws
-from finlab.layout import Layout, stack_layouts
-from finlab.physics.energy import DEFAULT_WEIGHTS, energy_scale
+from finlab.forces.fin_sets import SCALE, FinSets, convex_parts
+from finlab.forces.force_space import PlanarProblem, descend, mobility, planar_problem, polar, realize
+from finlab.forces.interior_point import minimize
+from finlab.forces.reach import FINE, HELD, max_wrench_along
+from finlab.forces.thrust_curve import plant_curves
+from finlab.layout import Layout
 
 Array = NDArray[np.float64]
 
-REST = 1e-4
-"""Share of its largest thrust below which a fin counts as resting: it may still come back."""
-N_RANDOM = 8
+RESTING = 1e-4
+"""Share of its largest thrust that a fin starts with when it rests: it may still come back."""
+N_RANDOM = 16
 """Random starts."""
-N_TOUCHES = 12
-"""Times that the cost is touched anew."""
-MAX_ROWS = 2048
-"""Most searches that are run side by side; more would not fit the caches."""
+STEPS = 16
+"""Steps of the search from each start."""
+KEPT = 6
+"""Starts of each wrench whose results are made exact."""
+N_TOUCHES = 3
+"""Times that the cost is then touched anew."""
 OFF = 1e-6
 """Scaled wrench [N] by which an answer may miss."""
+MISSED = 5.0
+"""What a newton of missing wrench counts when results are compared that are not exact yet."""
 
 
 def least_energy(
@@ -47,19 +52,20 @@ def least_energy(
         LayoutError: there is no fin of a name in `failed`.
     """
     wanted = np.asarray(wrenches, dtype=np.float64).reshape(-1, 6) / SCALE
-    sets = fin_sets(layout, failed)
-    robots = convex_parts(sets).repeat(len(wanted))
-    target = np.tile(wanted, (len(robots.radius) // max(len(wanted), 1), 1))
-    seeds = starts(sets.radius[0], n_random)
-    energy = np.full(len(target), np.nan)
-    able = np.flatnonzero(within_reach(robots, target))
-    for some in np.array_split(able, -(-len(able) * len(seeds) // MAX_ROWS)) if len(able) else ():
-        each = np.repeat(some, len(seeds))
-        force, good = descend(robots.take(each), target[each], np.tile(seeds, (len(some), 1)))
-        cost = np.where(good, planar_energy(layout, failed, force), np.inf)
-        best = cost.reshape(len(some), len(seeds)).min(axis=1)
-        energy[some] = np.where(np.isfinite(best), best, np.nan)
-    return np.asarray(np.fmin.reduce(energy.reshape(-1, len(wanted)), axis=0))
+    if len(set(layout.indices(tuple(failed)))) == layout.n_fins:
+        return np.where((wanted == 0.0).all(-1), 0.0, np.nan)
+    problem = plant_problem(layout.without(failed))
+    energy = np.full(len(wanted), np.nan)
+    able = np.flatnonzero(within_reach(problem.sets.tile(len(wanted)), wanted))
+    if len(able):
+        seeds = starts(problem.curves.maximum, n_random)
+        energy[able] = cheapest(problem, problem.sets, wanted[None, able], seeds)[0]
+    return energy
+
+
+def plant_problem(layout: Layout) -> PlanarProblem:
+    """Returns the search in force space over the fins' own laws, in scaled wrenches."""
+    return planar_problem(layout, plant_curves(layout), SCALE)
 
 
 def within_reach(sets: FinSets, target: Array) -> NDArray[np.bool_]:
@@ -75,41 +81,49 @@ def starts(radius: Array, n_random: int, most_resting: int = 2) -> Array:
     resting = [fins for k in range(most_resting + 1) for fins in combinations(range(n), k)]
     share = np.ones((len(resting), n))
     for row, fins in enumerate(resting):
-        share[row, list(fins)] = REST
+        share[row, list(fins)] = RESTING
     drawn = np.random.default_rng(0).uniform(size=(n_random, n)) ** 2
     return np.concatenate([share, drawn]) * radius
 
 
-def descend(rows: FinSets, target: Array, thrust: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Returns the local optima (S, n, 2) [N] next to thrusts (S, n) [N], and which give the target (S, 6)."""
-    basis = np.broadcast_to(np.eye(6), (len(target), 6, 6))
-    origin, x = np.zeros_like(target), np.zeros_like(target)
-    top = np.maximum(rows.radius, 1e-9)
+def cheapest(problem: PlanarProblem, robots: FinSets, targets: Array, seeds: Array) -> Array:
+    """Returns the least energies (P, N) found for wrenches, NaN where none of the answers is exact.
+
+    Args:
+        problem: the fins' curves; their places do not count.
+        robots: P robots of these fins.
+        targets: scaled wrenches (P, N, 6).
+        seeds: thrusts (S, n) [N] to start from.
+    """
+    n_targets, n_seeds = targets.shape[1], len(seeds)
+    thrust = np.tile(seeds, (n_targets, 1))
+    # Every fin may rest, as in the sets.
+    free = replace(problem.curves, minimum=np.zeros_like(problem.curves.minimum))
+    found = []  # of each convex part of each robot
+    parts = convex_parts(robots)
+    wanted = np.tile(targets, (len(parts.radius) // len(robots.radius), 1, 1))
+    for columns, middle, half, target in zip(parts.columns, parts.middle, parts.half, wanted, strict=True):
+        part = problem.like(columns, middle, half)
+        planar = descend(part._replace(curves=free), np.repeat(target, n_seeds, axis=0), thrust, STEPS)
+        score = realize(part, planar)[1] + MISSED * np.linalg.norm(planar.residual, axis=-1)
+        best = score.reshape(n_targets, n_seeds).argsort(axis=1)[:, :KEPT]
+        found.append(planar.thrust.reshape(n_targets, n_seeds, -1)[np.arange(n_targets)[:, None], best])
+    kept = found[0].shape[1]
+    rows = parts.repeat(n_targets * kept)
+    goal = np.repeat(wanted.reshape(-1, 6), kept, axis=0)
+    force = _exact(problem, rows, goal, np.concatenate(found).reshape(len(goal), -1))
+    energy = realize(problem, polar(problem, force))[1]
+    missed = np.abs(rows.wrench(force) - goal).max(-1) > OFF
+    energy = (
+        np.where(missed, np.inf, energy).reshape(-1, len(robots.radius), n_targets, kept).min(axis=(0, 3))
+    )
+    return np.where(np.isfinite(energy), energy, np.nan)
+
+
+def _exact(problem: PlanarProblem, rows: FinSets, target: Array, thrust: Array) -> Array:
+    """The local optima (S, n, 2) [N] next to thrusts (S, n) [N] that give targets (S, 6)."""
     for _ in range(N_TOUCHES):
-        held = np.clip(thrust, REST * top, top)
-        # The slope of sqrt(T) over T, which is what a quadratic that touches there bends by.
-        bend = held**-1.5 * top**-0.5
-        x = minimize_dual(Dual(cheap, rows, bend, origin, basis, target), x)
-        force = cheap(rows, rows.pull(x), bend)[1]
+        bend = 1.0 / np.maximum(mobility(problem, np.minimum(thrust, rows.radius)), 1e-300)
+        force = minimize(rows, target, np.full(6, HELD), bend, FINE).force
         thrust = np.linalg.norm(force, axis=-1)
-    return force, np.abs(rows.wrench(force) - target).max(-1) <= OFF
-
-
-def planar_energy(layout: Layout, failed: Collection[str], force: Array) -> Array:
-    """Returns `J_en` (S,) of planar forces (S, n, 2) [N], each given by its fin's cheapest command."""
-    limits = stack_layouts([layout])
-    lower, upper = limits.lower[0], limits.upper[0]
-    thrust = np.linalg.norm(force, axis=-1)
-    angle = np.arctan2(force[..., 1], force[..., 0])
-    middle = 0.5 * (lower[:, 2] + upper[:, 2])
-    angle = middle + (angle - middle + np.pi) % (2 * np.pi) - np.pi
-    total = np.zeros(len(force))
-    for i, (name, law) in enumerate(zip(layout.names, thrust_laws(layout), strict=True)):
-        if name in failed:
-            continue
-        # A fin at rest points where that costs least.
-        rests = thrust[:, i] <= law.minimum
-        direction = np.where(rests, np.clip(0.0, lower[i, 2], upper[i, 2]), angle[:, i])
-        scaled = direction / energy_scale(upper[i])[2]
-        total += law.energy_at(thrust[:, i]) + DEFAULT_WEIGHTS.zero_direction * scaled**2
-    return total
+    return force

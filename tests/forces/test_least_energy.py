@@ -7,7 +7,7 @@ import pytest
 
 from finlab.allocation.baselines.multistart import Multistart
 from finlab.forces.least_energy import least_energy
-from finlab.forces.thrust_law import thrust_laws
+from finlab.forces.thrust_curve import plant_curves
 from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
 
@@ -17,10 +17,10 @@ WRENCHES = np.concatenate([np.diag([1, 1, 1, 0.1, 0.1, 0.1]), [[1.2, 0, 0.5, 0, 
 
 def test_a_pair_shares_heave_evenly(shipped: Layouts) -> None:
     layout = shipped("pair")
-    law = thrust_laws(layout)[0]
+    curves = plant_curves(layout)
     up = 0.1 * 0.25  # the zero direction's cost at a quarter turn
     energy = least_energy(layout, [[0, 0, 4.0, 0, 0, 0], [0, 0, 0, 0, 0.5, 0], [0, 0, 40.0, 0, 0, 0]])
-    assert energy[0] == pytest.approx(2 * (law.energy_at(np.array(2.0)) + up), rel=1e-3)
+    assert energy[0] == pytest.approx(2 * (curves.lookup(np.full((1, 2), 2.0))[0, 0, 2] + up), rel=1e-3)
     assert np.isnan(energy[1:]).all()  # a torque it has not, a force beyond its reach
 
 

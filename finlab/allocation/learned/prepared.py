@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.learned.levenberg_marquardt import CommandProblem
-from finlab.forces.force_space import PlanarProblem, free_terms
+from finlab.forces.force_space import PlanarProblem, planar_problem
 from finlab.forces.thrust_curve import thrust_curves
 from finlab.inference.features import Geometry, geometry
 from finlab.inference.learned_fin import LearnedFin
 from finlab.layout import Layout
 from finlab.layout.angles import is_full_turn
 from finlab.layout.arrays import force_columns
-from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyMeter, EnergyWeights, energy_scale
+from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyMeter, EnergyWeights
 
 Array = NDArray[Any]
 
@@ -52,28 +52,12 @@ def prepare(
     position, angle, lower, upper = layout.position, layout.mounting_angle, layout.lower, layout.upper
     columns: Array = force_columns(position, angle) / std
     curves = thrust_curves(fin, lower, upper, weights)
-    arc = upper[:, 2] - lower[:, 2]
-    wraps: NDArray[np.bool_] = is_full_turn(arc)
-    half = np.where(wraps, np.pi, 0.5 * arc)
-    cost = weights.zero_direction / energy_scale(upper)[:, 2] ** 2
-    in_plane = np.ascontiguousarray(columns[:, 1:])
-    planar = PlanarProblem(
-        columns=in_plane,
-        products=np.einsum("nci,ndj->ncdij", in_plane, in_plane),
-        curves=curves,
-        middle=0.5 * (lower[:, 2] + upper[:, 2]),
-        half=half,
-        direction_cost=cost,
-        idle_direction=np.clip(0.0, lower[:, 2], upper[:, 2]),
-        turns_fully=bool(wraps.all()),
-        free=free_terms(in_plane, curves.maximum),
-        growth=1.5 if weights.inertial else 0.5,
-    )
+    wraps: NDArray[np.bool_] = is_full_turn(upper[:, 2] - lower[:, 2])
     return Prepared(
         lower,
         upper,
         geometry(position[None], angle[None], lower[None], upper[None], std),
-        planar,
+        planar_problem(layout, curves, std, weights),
         CommandProblem(fin, columns, lower, upper, wraps),
         _subset_seeds(curves.maximum),
         EnergyMeter(upper, weights),

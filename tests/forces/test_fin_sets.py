@@ -1,0 +1,77 @@
+"""What single fins can push: the farthest point of a sector, and sectors cut into convex parts."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from finlab.forces.fin_sets import MAX_CUT, FinSets, convex_parts
+
+Array = NDArray[np.float64]
+HALVES = [0.0, 0.4, np.pi / 2, 1.9, 2.9, np.pi]
+
+
+def fins(half: float, rows: int = 200) -> FinSets:
+    """Robots of one fin that pushes along x and y alone."""
+    rng = np.random.default_rng(0)
+    columns = np.zeros((rows, 1, 2, 6))
+    columns[:, 0, 0, 0] = columns[:, 0, 1, 1] = 1.0
+    middle = rng.uniform(-np.pi, np.pi, (rows, 1))
+    return FinSets(columns, np.full((rows, 1), 3.0), middle, np.full((rows, 1), half))
+
+
+def pulls(rows: int = 200) -> Array:
+    return np.random.default_rng(1).standard_normal((rows, 1, 2)) * 2.0
+
+
+def sector(sets: FinSets, row: int) -> Array:
+    """Points (S, 2) all over one fin's sector, its rim and its tip included."""
+    angle = sets.middle[row, 0] + np.linspace(-1.0, 1.0, 721) * sets.half[row, 0]
+    rim = sets.radius[row, 0] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    return np.concatenate([rim * share for share in np.linspace(0.0, 1.0, 60)])
+
+
+@pytest.mark.parametrize("half", HALVES)
+def test_farthest_is_the_farthest_point_of_the_sector(half: float) -> None:
+    sets, pull = fins(half), pulls()
+    normal = np.pad(pull[:, 0], ((0, 0), (0, 4)))
+    reach, force = sets.farthest(normal)
+    assert np.allclose((force * pull).sum((-1, -2)), reach)
+    for row in range(0, 200, 20):
+        best = (sector(sets, row) @ pull[row, 0]).max()
+        assert best - 1e-9 <= reach[row] <= best + 1e-3
+
+
+def five_fins(half: float) -> FinSets:
+    """Two robots of five fins with the same arcs."""
+    columns = np.random.default_rng(2).standard_normal((2, 5, 2, 6))
+    middle = np.tile(np.linspace(-2.0, 2.0, 5), (2, 1))
+    return FinSets(columns, np.ones((2, 5)), middle, np.full((2, 5), half))
+
+
+@pytest.mark.parametrize(("half", "parts"), [(np.pi / 2, 1), (np.pi, 1), (2.0, 2**MAX_CUT)])
+def test_only_wide_sectors_are_cut(half: float, parts: int) -> None:
+    sets = five_fins(half)
+    assert len(convex_parts(sets).radius) == 2 * parts
+    # The same directions reach as far in the best part as in all of the sectors that were cut.
+    cut = sets._replace(radius=np.where(np.arange(5) < MAX_CUT, sets.radius, 0.0))
+    normal = np.random.default_rng(3).standard_normal((2, 6))
+    in_parts = convex_parts(cut).farthest(np.tile(normal, (parts, 1)))[0].reshape(parts, 2)
+    assert in_parts.max(axis=0) == pytest.approx(cut.farthest(normal)[0])
+
+
+def test_forces_choose_the_halves_of_fins_beyond_the_first_few() -> None:
+    sets = five_fins(2.0)
+    assert (convex_parts(sets).half[:, MAX_CUT:] == 2.0).all()
+    angle = sets.middle + np.array([[0.5], [-0.5]])
+    parts = convex_parts(sets, np.stack([np.cos(angle), np.sin(angle)], axis=-1))
+    assert (parts.half == 1.0).all()
+    kept = parts.middle.reshape(-1, 2, 5) - sets.middle
+    assert (kept[:, 0, MAX_CUT:] == 1.0).all() and (kept[:, 1, MAX_CUT:] == -1.0).all()
+
+
+def test_a_fin_whose_stops_coincide_has_one_column() -> None:
+    sets = five_fins(0.0)
+    full = sets.full_columns().reshape(2, 5, 2, 6)
+    unit = np.stack([np.cos(sets.middle), np.sin(sets.middle)], axis=-1)
+    assert full[:, :, 0] == pytest.approx((unit[..., None] * sets.columns).sum(2))
+    assert (full[:, :, 1] == 0.0).all()

@@ -1,0 +1,68 @@
+"""The convex solver: its forces lie within the fins' sets and satisfy the conditions of an optimum."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from finlab.forces.fin_sets import FinSets
+from finlab.forces.interior_point import minimize
+from tests.forces.test_fin_sets import HALVES, fins, sector
+
+Array = NDArray[np.float64]
+
+
+def robots(half: float, rows: int = 40, n: int = 5, scale: float = 1.0) -> FinSets:
+    rng = np.random.default_rng(5)
+    columns = scale * rng.standard_normal((rows, n, 2, 6))
+    middle = rng.uniform(-np.pi, np.pi, (rows, n))
+    return FinSets(columns, rng.uniform(0.5, 3.0, (rows, n)), middle, np.full((rows, n), half))
+
+
+@pytest.mark.parametrize("half", HALVES)
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("far", [0.2, 5.0, 1e4])
+def test_no_force_within_the_sets_gains_more(half: float, scale: float, far: float) -> None:
+    """At the optimum each fin's force, less its own cost, is the farthest that its set has along the pull."""
+    sets = robots(half, scale=scale)
+    rng = np.random.default_rng(6)
+    size = far * scale * 10.0
+    wanted = rng.standard_normal((40, 6)) * size
+    c, bend = rng.uniform(0.1, 10.0, (40, 6)), rng.uniform(0.0, 0.3, (40, 5)) * scale**2
+    force, multiplier = minimize(sets, wanted, c, bend)
+    assert multiplier == pytest.approx((wanted - sets.wrench(force)) / c, abs=1e-5 * (scale + size))
+    gain = sets.pull(multiplier) - bend[..., None] * force
+    alone = FinSets(
+        np.tile(np.eye(2), (40, 5, 1, 1)).reshape(200, 1, 2, 2), *(f.reshape(200, 1) for f in sets[1:])
+    )
+    reach, _ = alone.farthest(gain.reshape(200, 2))
+    used = (gain * force).sum(-1).reshape(200)
+    assert reach == pytest.approx(used, abs=1e-6 * scale * (scale + size))
+
+
+@pytest.mark.parametrize("half", HALVES)
+def test_with_a_cost_of_its_own_the_answer_is_the_nearest_point_of_the_sector(half: float) -> None:
+    sets = fins(half)
+    wanted = np.pad(np.random.default_rng(1).standard_normal((200, 2)) * 4.0, ((0, 0), (0, 4)))
+    force = minimize(sets, wanted, np.ones(6)).force[:, 0]
+    for row in range(0, 200, 40):
+        distance = np.linalg.norm(sector(sets, row) - wanted[row, :2], axis=-1).min()
+        mine = np.linalg.norm(force[row] - wanted[row, :2])
+        assert mine <= distance + 1e-6
+        if half <= np.pi / 2 or half == np.pi:  # a wide sector counts with its hull
+            assert mine >= distance - 0.03  # how far apart the points are
+
+
+@pytest.mark.filterwarnings("error")
+def test_robots_without_anything_to_push_with() -> None:
+    sets = robots(1.0)
+    wanted = np.random.default_rng(7).standard_normal((40, 6))
+    for dead in (
+        sets._replace(radius=np.zeros((40, 5))),
+        sets._replace(columns=np.zeros((40, 5, 2, 6))),
+        sets._replace(columns=np.repeat(sets.columns[:, :1], 5, axis=1)),
+        sets._replace(half=np.zeros((40, 5)), middle=np.zeros((40, 5))),
+    ):
+        for c in (np.ones(6), np.array([1.0, *(1e-9,) * 5])):
+            force, multiplier = minimize(dead, wanted, c)
+            assert np.isfinite(force).all() and np.isfinite(multiplier).all()
+            assert (np.linalg.norm(force, axis=-1) <= dead.radius * (1 + 1e-9)).all()
