@@ -258,7 +258,8 @@ def _gram(problem: PlanarProblem, weight: Array, slope: Array | None = None) -> 
     # Every seventh entry of the flattened matrix is on the diagonal.
     diagonal = gram[:, ::7]
     diagonal += RIDGE * diagonal.sum(1, keepdims=True) + LEAST
-    return gram.reshape(-1, 6, 6)
+    regularized: Array = gram.reshape(-1, 6, 6)
+    return regularized
 
 
 def _project(problem: PlanarProblem, wanted: Array, target: Array) -> tuple[Planar, Array]:

@@ -74,7 +74,8 @@ def thrust_curves(
 ) -> ThrustCurves:
     """Curves of fins of one law with limits (n, 3), cheapest by these weights, where they point ahead."""
     limits = zip(lower.tolist(), upper.tolist(), strict=True)
-    return _stacked([_curve(fin, weights, tuple(lo), tuple(hi), 1) for lo, hi in limits])
+    law: Any = fin  # hashable, by which its curves are kept
+    return _stacked([_curve(law, weights, tuple(lo), tuple(hi), 1) for lo, hi in limits])
 
 
 def plant_curves(layout: Layout) -> ThrustCurves:
@@ -97,7 +98,8 @@ def _stacked(curves: list[Curve]) -> ThrustCurves:
 
 @lru_cache(maxsize=256)
 def _plant_curve(limits: Limits, model: FinModelSpec, stamp: tuple[int, int] | None) -> Curve:
-    return _curve(make_law(model), DEFAULT_WEIGHTS, limits.lower, limits.upper, DIRECTIONS)
+    law: Any = make_law(model)
+    return _curve(law, DEFAULT_WEIGHTS, limits.lower, limits.upper, DIRECTIONS)
 
 
 @lru_cache(maxsize=1024)
