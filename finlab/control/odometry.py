@@ -10,13 +10,9 @@ from numpy.typing import NDArray
 
 from finlab.control.controller import Measurement
 from finlab.control.low_pass import LowPass
+from finlab.layout.angles import wrapped
 
 Array = NDArray[np.float64]
-
-
-def wrap(angle: float) -> float:
-    """The same angle in [-pi, pi) [rad]."""
-    return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
 class Pose(NamedTuple):
@@ -56,11 +52,11 @@ class Odometry:
             position, yaw = seen, measurement.yaw
         else:
             turned = self._pose.yaw + float(measurement.rates[2]) * self.period_s
-            yaw = turned + self._share * wrap(measurement.yaw - turned)
+            yaw = turned + self._share * float(wrapped(measurement.yaw - turned))
             moved = self._pose.position + _to_world(measurement, yaw) * self.period_s
             position = moved + self._share * (seen - moved)
         climb = self._climb.step(float(_to_world(measurement, yaw)[2]))
-        self._pose = Pose(position, wrap(yaw), climb)
+        self._pose = Pose(position, float(wrapped(yaw)), climb)
         return self._pose
 
 

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from finlab.control.controller import Measurement, Setpoint
 from finlab.control.gains import WaypointGains, load_gains
-from finlab.control.odometry import Odometry, wrap
+from finlab.control.odometry import Odometry
+from finlab.layout.angles import wrapped
 
 Array = NDArray[np.float64]
 
@@ -41,7 +42,7 @@ class WaypointController:
         position, heading, climb = self._odometry.step(measurement)
         dx, dy, dz = (setpoint.position - position).tolist()
         distance = math.hypot(dx, dy)
-        yaw_error = wrap(math.atan2(dy, dx) - heading)
+        yaw_error = float(wrapped(math.atan2(dy, dx) - heading))
         nearness = min(1.0, distance / g.near_m) if g.near_m > 0.0 else 1.0
         surge = g.surge * distance * max(0.0, math.cos(yaw_error))
         heave = g.heave * dz - g.heave_damping * climb

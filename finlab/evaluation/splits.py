@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from finlab.errors import DataError
 from finlab.layout import Layout, random_layout
+from finlab.layout.angles import wrapped
 from finlab.layout.random import TRAINING_BOX
 from finlab.physics import Plant
 
@@ -108,19 +109,14 @@ def _near_singular(rng: np.random.Generator, name: str) -> Drawn:
         turns = rng.uniform(-NEAR_ANGLE, NEAR_ANGLE, len(others)) / 2
         turns += math.pi * rng.integers(0, 2, len(others))
         fins = [
-            replace(fin, mounting_angle=_wrap(first.mounting_angle + float(turn)))
+            replace(fin, mounting_angle=float(wrapped(first.mounting_angle + turn)))
             for fin, turn in zip(others, turns, strict=True)
         ]
     else:
         x, y, z = (np.array(first.position) + rng.uniform(-NEAR_POSITION, NEAR_POSITION, 3)).tolist()
-        turned = _wrap(first.mounting_angle + float(rng.uniform(-NEAR_ANGLE, NEAR_ANGLE)))
+        turned = float(wrapped(first.mounting_angle + rng.uniform(-NEAR_ANGLE, NEAR_ANGLE)))
         fins = [replace(others[0], position=(x, y, z), mounting_angle=turned), *others[1:]]
     return replace(layout, fins=(first, *fins)), ()
-
-
-def _wrap(angle: float) -> float:
-    """The same angle in [-pi, pi)."""
-    return (angle + math.pi) % (2 * math.pi) - math.pi
 
 
 SPLITS: dict[str, Callable[[np.random.Generator, str], Drawn]] = {

@@ -18,9 +18,10 @@ from finlab.control import (
     load_gains,
 )
 from finlab.control.gains import PidGains
-from finlab.control.odometry import Odometry, wrap
+from finlab.control.odometry import Odometry
 from finlab.control.pid import Pid
 from finlab.errors import DataError
+from finlab.layout.angles import wrapped
 
 STILL = Measurement(0.0, np.array([0.0, 0.0, -1.0]), 0.0, np.zeros(3), 1.0, np.zeros(3), 0.0, 0.0)
 
@@ -50,7 +51,7 @@ def test_behind_means_turn_and_do_not_push() -> None:
 
 def test_the_yaw_error_is_wrapped() -> None:
     wrench = towards(-1.0, 0.1, -1.0, STILL._replace(yaw=-3.0))
-    assert -0.5 < wrap(math.atan2(0.1, -1.0) + 3.0) < 0.0 and wrench[5] < 0.0
+    assert -0.5 < wrapped(math.atan2(0.1, -1.0) + 3.0) < 0.0 and wrench[5] < 0.0
 
 
 def test_too_deep_means_up() -> None:
@@ -76,7 +77,7 @@ def test_odometry_follows_steady_motion_without_lag_and_averages_noise() -> None
     errors = []
     for k in range(600):
         time = 0.1 * k
-        yaw = wrap(0.1 * time)
+        yaw = wrapped(0.1 * time)
         place = np.array([1.5 * math.sin(0.1 * time), -1.5 * math.cos(0.1 * time), -1.0 + 0.01 * time])
         seen = Measurement(
             time,
@@ -89,7 +90,7 @@ def test_odometry_follows_steady_motion_without_lag_and_averages_noise() -> None
             0.0,
         )
         pose = odometry.step(seen)
-        errors.append([*(pose.position - place), wrap(pose.yaw - yaw)])
+        errors.append([*(pose.position - place), wrapped(pose.yaw - yaw)])
     late = np.array(errors[100:])
     assert np.abs(late.mean(axis=0)).max() < 3e-3
     assert (late.std(axis=0) < [0.008, 0.008, 0.003, 0.008]).all()

@@ -18,6 +18,7 @@ from tqdm import tqdm
 from finlab.allocation.allocator import Allocator
 from finlab.evaluation.statistics.tables import text_table
 from finlab.layout import Layout
+from finlab.layout.angles import wrapped
 from finlab.layout.arrays import layout_effectiveness
 from finlab.physics import Plant
 from finlab.physics.energy import command_energy
@@ -186,6 +187,4 @@ def _largest_thrust(layout: Layout) -> Array:
 
 def _turns(direction: Array) -> Array:
     """Turns (T - 1, n) between directions (T, n), the shorter way round."""
-    turn = np.diff(direction, axis=0)
-    shorter: Array = np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi)
-    return shorter
+    return np.abs(wrapped(np.diff(direction, axis=0)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from finlab.evaluation.plots.style import (
     clean,
     picture,
 )
+from finlab.layout.angles import wrapped
 from finlab.sim import RunLog
 from finlab.sim.attitude import euler
 
@@ -148,8 +149,8 @@ def _mark(axis: Axes, log: RunLog) -> None:
             axis.axvline(time, color=SOFT, lw=1.0, ls=(0, (4, 3)), label=f"{name} lost")
 
 
-def _broken(angle: Any) -> Array:
+def _broken(angle: Array) -> Array:
     """Angles wrapped to [-pi, pi) with a gap where they pass the seam, so that no line crosses the plot."""
-    wrapped = np.mod(np.asarray(angle) + np.pi, 2 * np.pi) - np.pi
-    jump = np.abs(np.diff(wrapped, prepend=wrapped[:1])) > np.pi
-    return np.where(jump, np.nan, wrapped)
+    shown = wrapped(angle)
+    jump = np.abs(np.diff(shown, prepend=shown[:1])) > np.pi
+    return np.where(jump, np.nan, shown)
