@@ -98,6 +98,23 @@ def test_a_sweep_is_one_step_and_ends_when_someone_else_steers(
     assert session.state.target[0] == 1.2
 
 
+def test_a_sweep_goes_to_and_fro(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sweeping, "POINTS", 4)
+    loop, seen = AtOnce(), []
+
+    def do(act: Any) -> None:
+        act()
+        seen.append(session.state.target[5])
+
+    sweep = Sweep(session, loop, do)
+    sweep.start(5, -0.1, 0.2)
+    for _ in range(11):
+        loop.ring()
+    assert seen == pytest.approx([-0.1, 0.0, 0.1, 0.2, 0.1, 0.0, -0.1, 0.0, 0.1, 0.2, 0.1], abs=1e-12)
+    sweep.stop()
+    assert session.history.undo_name == "Sweep Tz" and not sweep.running
+
+
 def test_landing_tells_where_a_held_fin_would_go(session: Session) -> None:
     name = session.state.layout.names[0]
     assert session.landing(name, (0.3, -0.2, 0.0), 0.1) is None

@@ -1,14 +1,20 @@
 """What the app says about an answer, and what it writes into files."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 
 from finlab.analysis import score_card
 from finlab.analysis.quick import quick_check
 from finlab.assets import shipped_layouts
 from finlab.errors import LayoutError
-from finlab.layout import load_layout
+from finlab.layout import FinModelSpec, load_layout
 from tests.webapp.stand_in import StandIn
 from webapp.markup.check_card import check_card
+from webapp.markup.comparison import comparison_table
+from webapp.markup.corner import corner
 from webapp.markup.score_card import score_table
 from webapp.markup.words import authority_sentence, reach_sentence, rest_sentence
 from webapp.scene.arrow_scale import LENGTH, LONGEST, fitting_newtons
@@ -18,6 +24,7 @@ from webapp.session.state import State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust
 from webapp.session.tour import STEPS
 from webapp.tasks.analyst import Question, find
+from webapp.theme import DELIVERED, MISSING, css
 
 
 def test_reachable_and_not() -> None:
@@ -29,6 +36,23 @@ def test_reachable_and_not() -> None:
     assert not hard.reachable
     assert "of the heave force" in reach_sentence(hard) and "at the limit" in reach_sentence(hard)
     assert "N of heave" in rest_sentence(hard) and rest_sentence(hard).endswith("left undone.")
+
+
+def test_fins_that_were_not_learned_are_told_in_words_of_their_own() -> None:
+    layout, allocator = load_layout("ucat"), StandIn()
+    allocator.fin_model = layout.fins[0].model
+    other = replace(layout.fins[2], model=FinModelSpec("lighthill"))
+    strange = replace(layout, fins=(*layout.fins[:2], other, layout.fins[3]))
+    for wrench in (PRESETS["Turn"], [0, 0, 60, 0, 0, 0]):  # even where the numbers happen to fit
+        answer = allocator.allocate(strange, wrench)
+        assert reach_sentence(answer) == "Not learned: fin 3. Choose another method"
+        shown = corner(State(strange), "", answer, False, None)
+        assert css(MISSING) in shown and css(DELIVERED) not in shown and "reach" not in shown
+        comparison: Any = SimpleNamespace(state=State(strange), answers={"learned": answer})
+        assert "Not learned: fin 3" in comparison_table(comparison, None, False, "here")
+    assert "Not learned" not in reach_sentence(
+        allocator.allocate(strange, PRESETS["Turn"], failed=[other.name])
+    )
 
 
 def test_robot_without_yaw_says_so() -> None:

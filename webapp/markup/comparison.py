@@ -7,6 +7,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.judging import REACHED
 from webapp.markup.figures import small, three_digits
 from webapp.markup.picking import pick
+from webapp.markup.words import unlearned_sentence
 from webapp.session.state import COMPARED
 from webapp.tasks.comparison import Comparison
 
@@ -25,7 +26,10 @@ def comparison_table(comparison: Comparison, shown: str | None, stale: bool, pic
     rows = []
     for k, method in enumerate(COMPARED):
         answer = comparison.answers.get(method)
-        if isinstance(answer, Allocation):
+        if isinstance(answer, Allocation) and answer.unknown_fins:
+            words = unlearned_sentence(answer.layout, answer.unknown_fins)
+            cells = f"<td colspan='3' class='words missing'>{words}</td>"
+        elif isinstance(answer, Allocation):
             color = "var(--fl-delivered)" if answer.reachable else "var(--fl-missing)"
             cells = (
                 f"<td>{small(answer.err_norm)}{_bar(answer.err_norm, ERRORS, color)}</td>"

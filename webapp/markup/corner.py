@@ -71,7 +71,9 @@ def _status(state: State, allocation: Allocation | None, busy: bool, error: str 
     elif allocation is None:
         parts.append("<span class='dim'>computing …</span>")
     else:
-        color = DEAD if raw else DELIVERED if allocation.reachable else MISSING
+        color = (
+            DEAD if raw else DELIVERED if allocation.reachable and not allocation.unknown_fins else MISSING
+        )
         verdict = "Raw, not refined" if raw else reach_sentence(allocation)
         energy, time = three_digits(allocation.energy), three_digits(allocation.solve_ms)
         parts += [

@@ -3,6 +3,7 @@
 from html import escape
 
 from webapp.markup.figures import listed
+from webapp.markup.words import unlearned_sentence
 from webapp.tasks.swimming import Swimming
 from webapp.theme import DELIVERED, OTHER, css
 
@@ -39,10 +40,14 @@ def swim_card(swimming: Swimming) -> str:
         )
         dot = f"<span class='swatch' style='background:{css(color)};min-width:10px'>&nbsp;</span>"
         rows.append(f"<tr><td>{dot}{escape(swimmer.method)}</td>{cells}</tr>")
-    warning = ""
+    warning = "".join(
+        f"<div class='missing'>{escape(s.method)}: {unlearned_sentence(s.swim.layout, s.unknown_fins)}.</div>"
+        for s in swimming.swimmers
+        if s.unknown_fins
+    )
     if not first.shown.controllable:
         numbers = listed([str(first.fins.index(name) + 1) for name in first.failed])
-        warning = (
+        warning += (
             f"<div class='missing'>Without fin {numbers} surge, heave and yaw are not free of each other: "
             "expect it to drift off.</div>"
         )

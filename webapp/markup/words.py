@@ -1,6 +1,7 @@
 """Sentences about an answer, for people."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +23,19 @@ def missing_part(allocation: Allocation) -> NDArray[np.float64]:
     return np.where(np.abs(rest / allocation.sigma) > 2 * SMALL, rest, 0.0)
 
 
+def unlearned_sentence(layout: Layout, fins: Sequence[str]) -> str:
+    """Which fins the method's networks have not learned, so that its commands for them are wrong."""
+    numbers = [str(layout.index(name) + 1) for name in fins]
+    return f"Not learned: fin{'s' if len(numbers) > 1 else ''} {listed(numbers)}. Choose another method"
+
+
 def reach_sentence(allocation: Allocation) -> str:
-    """One sentence: reachable, or what is missing most and which fins are at their limits."""
+    """One sentence: reachable, or what is missing most and which fins are at their limits.
+
+    Where the method does not know the fins, that: limits are not what keeps it.
+    """
+    if allocation.unknown_fins:
+        return unlearned_sentence(allocation.layout, allocation.unknown_fins)
     if allocation.reachable:
         return "Reachable"
     axis = int(np.argmax(np.abs(allocation.unallocated / allocation.sigma)))

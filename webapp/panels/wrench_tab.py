@@ -76,7 +76,9 @@ class WrenchTab:
         """What is left undone, and why."""
         answer, state = self._host.shown, self._host.session.state
         sentence = "" if answer is None else rest_sentence(answer)
-        if answer is not None and not answer.reachable:
+        if answer is not None and answer.unknown_fins:
+            sentence = f"<span class='missing'>{escape('; '.join(answer.notes))}.</span> {sentence}"
+        elif answer is not None and not answer.reachable:
             told = escape("; ".join((*answer.binding, *answer.notes)))
             sentence = f"{sentence} {100 * answer.scale:.0f} % of what is asked, {told}."
         blind = authority_sentence(state.layout, state.failed, self._target.reach)

@@ -61,6 +61,8 @@ class Swimmer:
         self.path: Array = np.array([swim.task.setpoint(float(t)).position for t in times])
         """The way to go (POINTS, 3) [m]."""
         self.duration_s = swim.task.duration_s
+        self.unknown_fins = swim.allocator.unknown_fins(swim.layout)
+        """Fins that its method has not learned."""
         self._rows: list[Array] = []
         self._last: Tick | None = None
         self.shown = self.moment()
