@@ -1,12 +1,27 @@
 """`finlab train surrogate|allocator`: a few steps, then an allocation with the result."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from finlab.cli import main
 
+WITHOUT_TORCH = """
+import sys
+
+class Nowhere:
+    def find_spec(self, name, *_):
+        if name == "torch":
+            raise ModuleNotFoundError("No module named 'torch'")
+
+sys.meta_path.insert(0, Nowhere())
+from finlab.cli import main
+sys.exit(main(sys.argv[1:]))
+"""
+"""A command line on a machine where PyTorch is not installed."""
 SMOKE = ["--preset", "smoke", "--steps", "3"]
 
 
@@ -39,3 +54,12 @@ def test_refuses_in_one_sentence(
     assert main(["train", argv[0], "-o", str(tmp_path / "out"), *argv[1:]]) == 2
     err = capsys.readouterr().err
     assert message in err and len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("verb", ["surrogate", "allocator --surrogate default", "fast"])
+def test_says_what_to_install_where_torch_is_missing(verb: str, tmp_path: Path) -> None:
+    command = [sys.executable, "-c", WITHOUT_TORCH, "train", *verb.split(), "-o", str(tmp_path / "out")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2 and done.stdout == ""
+    assert done.stderr.startswith("finlab: error: training needs PyTorch")
+    assert done.stderr.endswith("run: pip install 'finlab[train]'\n")
