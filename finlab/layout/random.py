@@ -35,14 +35,14 @@ def random_layouts(
     n: int,
     n_fins: int | tuple[int, int] = TRAINING_FINS,
     box: tuple[float, float, float] = TRAINING_BOX,
-    limits: LimitsKind = "nominal",
+    limits: LimitsKind | float = "nominal",
     outside: tuple[float, float, float] | None = None,
     pad_to: int | None = None,
 ) -> LayoutArrays:
     """Returns n random layouts as one padded batch.
 
     Positions are uniform in the box and angles in [-pi, pi). With `limits="varied"` every fin gets its own
-    limits as in split `limits`; with `"mixed"` every layout is varied or nominal with equal chance.
+    limits as in split `limits`; with a number, this share of the layouts; `"mixed"` is half of them.
 
     Args:
         rng: source of randomness.
@@ -72,7 +72,9 @@ def random_layouts(
     arrays.position[~arrays.mask] = 0.0
     arrays.mounting_angle[:] = np.where(arrays.mask, rng.uniform(-math.pi, math.pi, arrays.mask.shape), 0.0)
     if limits != "nominal":
-        varied = arrays.mask & ((rng.uniform(size=(n, 1)) < 0.5) if limits == "mixed" else True)
+        varied = arrays.mask
+        if limits != "varied":
+            varied = varied & (rng.uniform(size=(n, 1)) < (0.5 if limits == "mixed" else limits))
         _vary_limits(rng, arrays, varied)
     return arrays
 

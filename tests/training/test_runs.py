@@ -4,6 +4,7 @@ import csv
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 from safetensors.torch import load_file
@@ -76,7 +77,8 @@ def test_the_allocator_learns(tmp_path: Path) -> None:
     assert held_out_guidance(base, run.network) < 0.6 * fresh
     with (tmp_path / "log.csv").open(newline="") as file:
         loss = [float(row["loss"]) for row in csv.DictReader(file)]
-    assert loss[-1] < 0.7 * loss[0]
+    # A batch with an arc that ends near zero, by which energies are divided, may cost thrice as much.
+    assert np.median(loss[-3:]) < 0.7 * loss[0]
 
 
 def test_the_log_has_a_column_for_each_term(smoke_surrogate, smoke_run) -> None:

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import torch
 
-from finlab.layout import FinModelSpec, LayoutArrays, Limits, layout_from_arrays, random_layouts
+from finlab.layout import FinModelSpec, LayoutArrays, Limits, layout_from_arrays
 from finlab.layout.random import TRAINING_BOX
 from finlab.physics import Plant, make_law
-from finlab.training.data.sampling import ForwardSampler, sample_layouts, seeded_generator
+from finlab.training.data.sampling import ForwardSampler
 
 BATCH = ForwardSampler(seed=1, batch_size=20_000).batch(0)
 
@@ -71,19 +71,6 @@ def test_half_of_the_layouts_have_limits_of_their_own():
     assert nominal.float().mean().item() == pytest.approx(0.5, abs=0.02)
     never = ForwardSampler(0, 500, varied_limits=0.0).batch(0)
     assert (never.upper == torch.tensor(Limits().upper)).all()
-
-
-def test_the_torch_and_the_numpy_sampler_draw_from_the_same_distribution():
-    """Two implementations of one definition: one for streams on any device, one for layouts without torch."""
-    streamed = layouts_of(sample_layouts(seeded_generator(0, 0), 40_000))
-    drawn = random_layouts(np.random.default_rng(0), 40_000, limits="mixed")
-    for name in ("position", "mounting_angle", "lower", "upper"):
-        a, b = getattr(streamed, name)[streamed.mask], getattr(drawn, name)[drawn.mask]
-        for q in (0.001, 0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95, 0.999):
-            spread = np.abs(b).max(0)
-            difference = np.abs(np.quantile(a, q, axis=0) - np.quantile(b, q, axis=0)) / spread
-            assert difference.max() < 0.02, (name, q)
-    assert np.abs(streamed.mask.mean(0) - drawn.mask.mean(0)).max() < 0.01
 
 
 def test_the_plant_confirms_the_wrenches():

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from finlab.inference.features import SIZES, fin_frame_features, geometry, raw_features
 from finlab.inference.weights import NetworkConfig
-from finlab.training.data.sampling import sample_layouts, seeded_generator
+from finlab.training.data.sampling import ForwardSampler, seeded_generator
 from finlab.training.networks.allocator_network import AllocatorNetwork
 
 STD = torch.tensor([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
@@ -41,9 +41,8 @@ class Robots(NamedTuple):
 @pytest.fixture
 def robots() -> Robots:
     """12 robots of 2-5 fins, half of them with limits of their own; every count comes up."""
-    generator = seeded_generator(5, 0)
-    layouts = sample_layouts(generator, 12, (2, 5), varied_limits=0.5)
-    robots = Robots(*layouts, torch.randn(12, 6, generator=generator))
+    layouts = ForwardSampler(5, 12, (2, 5)).batch(0)[:5]
+    robots = Robots(*layouts, torch.randn(12, 6, generator=seeded_generator(5, 0)))
     assert set(robots.mask.sum(1).tolist()) == {2, 3, 4, 5}
     arcs = robots.upper[..., 2] - robots.lower[..., 2] < 2 * math.pi - 0.1
     assert arcs.any() and not arcs.all()
