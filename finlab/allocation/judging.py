@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.layout import Layout
-from finlab.physics.energy import command_energy
+from finlab.physics.energy import EnergyMeter
 from finlab.physics.plant import plant_of
-from finlab.physics.wrench import body_force, wrench_of_forces
+from finlab.physics.wrench import wrench_of_forces
 
 Array = NDArray[np.float64]
 
@@ -41,9 +42,10 @@ def judge(layout: Layout, command: Array, target: Array, sigma: Array) -> Verdic
         sigma: per-axis standard deviation (6,) of the error measure.
     """
     plant = plant_of(layout)
-    force = plant.forces(command)
-    in_body_frame = body_force(force, layout.mounting_angle)
-    return verdict_of(layout, command, in_body_frame, wrench_of_forces(force, plant.columns), target, sigma)
+    force, columns = plant.forces(command), plant.columns
+    # The first half of a column is its fin's axis in the body frame.
+    in_body_frame = np.matmul(force[..., None, :], columns[..., :3])[..., 0, :]
+    return verdict_of(layout, command, in_body_frame, wrench_of_forces(force, columns), target, sigma)
 
 
 def verdict_of(
@@ -52,4 +54,12 @@ def verdict_of(
     """The verdict where forces (N, n, 3) and wrenches (N, 6) are known."""
     missing = (target - wrench) / sigma
     err_norm = np.sqrt(np.einsum("ri,ri->r", missing, missing))
-    return Verdict(fin_forces, wrench, err_norm, command_energy(command, layout.upper))
+    energy = _meter(layout)(command)
+    if np.isnan(energy).any():  # a failed fin costs nothing
+        energy = _meter(layout)(np.where(np.isnan(command), 0.0, command))
+    return Verdict(fin_forces, wrench, err_norm, energy)
+
+
+@lru_cache(maxsize=256)
+def _meter(layout: Layout) -> EnergyMeter:
+    return EnergyMeter(layout.upper)

@@ -51,14 +51,14 @@ def usable_fins(layout: Layout, failed: Sequence[str], health: Health | None = N
         if not isinstance(health, Health):
             raise AllocationError(f"health: expected a Health, got {health!r}; make one with Health.of")
         layout = health.applied_to(layout)
+    if failed == () or failed == []:
+        return Fins(layout, (), layout, np.ones(layout.n_fins, dtype=bool))
     if isinstance(failed, str):
         raise AllocationError(
             f"failed: expected a list of fin names, got the text {failed!r}; write [{failed!r}]"
         )
     if not isinstance(failed, Sequence) or not all(isinstance(name, str) for name in failed):
         raise AllocationError(f"failed: expected a list of fin names, got {failed!r}")
-    if not failed:
-        return Fins(layout, (), layout, np.ones(layout.n_fins, dtype=bool))
     alive = np.array([name not in set(failed) for name in layout.names])
     return Fins(layout, tuple(failed), layout.without(failed), alive)
 
@@ -67,15 +67,17 @@ def check_wrenches(wrench: ArrayLike, *, single: bool) -> Array:
     """One wrench (6,) or many (N, 6) as finite float64, or a `CommandError` that says what is wrong."""
     expected = "six numbers [Fx, Fy, Fz, Tx, Ty, Tz]" if single else "an array of shape (N, 6)"
     try:
-        if np.iscomplexobj(wrench):
+        given = np.asarray(wrench)
+        if given.dtype.kind == "c":
             raise TypeError("complex")
-        array = np.array(wrench, dtype=np.float64)
+        array = np.array(given, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise CommandError(f"wrench: expected {expected} in N and N m, got {wrench!r}") from error
     if array.shape != (6,) if single else (array.ndim != 2 or array.shape[1] != 6):
         raise CommandError(f"wrench: expected {expected} in N and N m, got an array of shape {array.shape}")
-    bad = ~(np.abs(array) <= MAX_WRENCH)
-    if bad.any():
+    fine = np.abs(array) <= MAX_WRENCH
+    if not fine.all():
+        bad = ~fine
         axis = AXES[int(np.argwhere(bad)[0][-1])]
         value = array[bad][0]
         raise CommandError(f"wrench: {axis} must be finite and at most {MAX_WRENCH:g} in size, got {value}")

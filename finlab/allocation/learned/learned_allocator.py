@@ -10,6 +10,7 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import fields
+from functools import cache
 from typing import Any, Self
 
 import numpy as np
@@ -172,13 +173,19 @@ def _alternatives(refined: RefinedCandidates, std: Array) -> Candidates:
 
 def _samples(proposal: Proposal, prepared: Prepared, std: Array) -> Candidates:
     """The raw candidates for a single target."""
-    order = np.argsort(proposal.error[0])
-    names = tuple(f"mode {k + 1}" for k in proposal.component[0][order])
-    command = proposal.command[0][order].astype(np.float64)
+    order = proposal.error[0].argsort()
+    command, _, wrench, error, _, energy = (values[0].take(order, axis=0) for values in proposal)
     return Candidates(
-        np.clip(command, prepared.lower, prepared.upper),
-        proposal.wrench[0][order] * std,
-        proposal.error[0][order].astype(np.float64),
-        proposal.energy[0][order].astype(np.float64),
-        names,
+        # Rounded to single precision, limits may be a bit wider.
+        np.minimum(np.maximum(command, prepared.lower), prepared.upper),
+        wrench * std,
+        error.astype(np.float64),
+        energy.astype(np.float64),
+        tuple(map(_component_name, proposal.component[0][order].tolist())),
     )
+
+
+@cache
+def _component_name(k: int) -> str:
+    """What a sample is called that was drawn from a component of the mixture."""
+    return f"mode {k + 1}"
