@@ -55,6 +55,12 @@ class PlanarLaw(ABC):
         amplitude, frequency, zero_direction = command[..., 0], command[..., 1], command[..., 2]
         thrust = self.thrust(amplitude, frequency, zero_direction)
         direction = zero_direction + self.offset
+        if xp is np:
+            # Half the time of `stack`, which counts: every answer of an allocator is judged by this.
+            force = np.zeros((*thrust.shape, 3), thrust.dtype)
+            np.multiply(thrust, np.cos(direction), out=force[..., 1])
+            np.multiply(thrust, np.sin(direction), out=force[..., 2])
+            return force
         # Nothing acts along the shaft.
         planar = [xp.zeros_like(thrust), thrust * xp.cos(direction), thrust * xp.sin(direction)]
         return xp.stack(planar, axis=-1)
