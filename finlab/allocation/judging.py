@@ -54,6 +54,8 @@ def verdict_of(
     """The verdict where forces (N, n, 3) and wrenches (N, 6) are known."""
     missing = (target - wrench) / sigma
     err_norm = np.sqrt(np.einsum("ri,ri->r", missing, missing))
+    if len(command) == 0:
+        return Verdict(fin_forces, wrench, err_norm, np.empty(0))
     energy = _meter(layout)(command)
     if np.isnan(energy).any():  # a failed fin costs nothing
         energy = _meter(layout)(np.where(np.isnan(command), 0.0, command))
