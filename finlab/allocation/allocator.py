@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from finlab.allocation.allocation import Allocation, Judge
 from finlab.allocation.batch import BatchAllocation
 from finlab.allocation.health import Health
+from finlab.allocation.insight import Insight
 from finlab.allocation.judging import REACHED, Verdict, judge
 from finlab.allocation.policy import CLOSEST, Policy, as_policy, largest_share
 from finlab.allocation.question import (
@@ -212,6 +213,21 @@ class Allocator(ABC):
                 f"policy: method {self.name!r} minimizes the plain error and knows neither axis weights nor "
                 "priorities; use method 'learned', or policy 'closest' or 'direction'"
             )
+
+    def insight(self, layout: Layout, wrench: ArrayLike) -> Insight | None:
+        """What the networks make of a target (6,) [N, N m] for a layout whose fins all work.
+
+        None for methods without networks, or whose networks see one fin at a time.
+        """
+        return None
+
+    def refined(self, layout: Layout, wrench: ArrayLike, command: Array, n_steps: int) -> Array:
+        """A command (n, 3) of fins that all work after some steps of the method's own refinement.
+
+        Raises:
+            AllocationError: the method refines no candidates.
+        """
+        raise AllocationError(f"method {self.name!r} refines no candidates; use method 'learned'")
 
     def _solve_by(
         self, policy: Policy, layout: Layout, target: Array, *, seed: int, previous: Array | None

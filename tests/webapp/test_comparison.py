@@ -54,16 +54,17 @@ def test_a_method_that_fails_keeps_nobody_else_waiting() -> None:
 
 @pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
 def test_densities_of_the_shipped_network() -> None:
-    allocator = load_allocator()
-    found = densities(allocator, UCAT, ("front_left",), np.array(PRESETS["Turn"]), 0.02)
-    assert found is not None
+    allocator, failed = load_allocator(), ("front_left",)
+    insight = allocator.insight(UCAT.without(failed), PRESETS["Turn"])
+    assert insight is not None and insight.attention.sum(axis=1) == pytest.approx(np.ones(3))
+    found = densities(insight, UCAT, failed, 0.02)
     assert found.places[0, -1] == pytest.approx(np.degrees(0.6)) and found.places[2, 0] == pytest.approx(-180)
     assert np.isnan(found.curves[1]).all()
     assert found.curves[[0, 2, 3]].max(axis=-1) == pytest.approx(1.0)
-    wide = densities(allocator, UCAT, (), np.array(PRESETS["Turn"]), 1.0)
-    narrow = densities(allocator, UCAT, (), np.array(PRESETS["Turn"]), 0.0)
-    assert wide is not None and narrow is not None and wide.curves.mean() > narrow.curves.mean()
-    assert densities(StandIn(), UCAT, (), np.zeros(6), 0.02) is None
+    insight = allocator.insight(UCAT, PRESETS["Turn"])
+    assert insight is not None
+    assert densities(insight, UCAT, (), 1.0).curves.mean() > densities(insight, UCAT, (), 0.0).curves.mean()
+    assert StandIn().insight(UCAT, PRESETS["Turn"]) is None
 
 
 @pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")

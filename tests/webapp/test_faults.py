@@ -30,8 +30,7 @@ WORDS = "out of order"
 
 COMPUTED = (
     "webapp.tasks.solver.Solver.solve",
-    "webapp.tasks.solver.densities",
-    "webapp.tasks.solver.attention",
+    "finlab.allocation.allocator.Allocator.insight",
     "webapp.tasks.solver.known_modes",
     "webapp.tasks.analyst.score_card",
     "webapp.tasks.analyst.attainable_set",

@@ -11,7 +11,7 @@ from webapp.handles import put
 from webapp.scene.meshes.arrows import NOTHING
 from webapp.scene.meshes.mesh import Mesh, joined, tube
 from webapp.scene.shape import Shape
-from webapp.tasks.attention import Attention
+from webapp.tasks.solver import Attention
 from webapp.theme import LIGHT
 
 NO_LINE = np.zeros((1, 2, 3), dtype=np.float32)

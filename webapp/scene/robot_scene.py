@@ -24,7 +24,7 @@ from webapp.scene.wrench_nodes import WrenchNodes
 from webapp.session import Session
 from webapp.session.state import State
 from webapp.tasks.analyst import Findings
-from webapp.tasks.attention import Attention
+from webapp.tasks.solver import Attention
 from webapp.theme import ASKED
 
 CAMERAS = {

@@ -51,14 +51,9 @@ def layout_bytes(layout: Layout) -> bytes:
 
 def graph_bytes(layout: Layout, failed: tuple[str, ...], allocator: Allocator) -> bytes:
     """The layout graph file for deployment with the allocator's checkpoint."""
-    from finlab.allocation.learned.learned_allocator import LearnedAllocator
     from finlab.deploy.graph import build_graph
     from finlab.deploy.graph_file import write_graph
 
-    if not isinstance(allocator, LearnedAllocator):
-        raise FinlabError(
-            f"the graph file needs a trained network, and {allocator.name} has none; choose learned"
-        )
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "layout.graph.json"
         write_graph(build_graph(layout, allocator, failed), path)

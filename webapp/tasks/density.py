@@ -5,8 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.allocator import Allocator
-from finlab.allocation.learned.proposal import predict
+from finlab.allocation.insight import Insight
 from finlab.layout import Layout
 
 Array = NDArray[np.float64]
@@ -26,30 +25,17 @@ class Densities(NamedTuple):
     """Densities (n, 3, POINTS) of all fins in the layout's order; NaN for failed ones."""
 
 
-def densities(
-    allocator: Allocator, layout: Layout, failed: tuple[str, ...], target: Array, temperature: float
-) -> Densities | None:
+def densities(insight: Insight, layout: Layout, failed: tuple[str, ...], temperature: float) -> Densities:
     """The mixture for a target, with its variances times the temperature as the sampling has them.
 
     Args:
-        allocator: a method; only the learned one has a mixture of all fins together.
+        insight: what the network makes of the target and the fins that work.
         layout: the robot.
         failed: names of failed fins.
-        target: desired wrench (6,) [N, N m].
         temperature: T of the sampling.
-
-    Returns:
-        None for methods that draw no candidates.
     """
-    from finlab.allocation.learned.learned_allocator import LearnedAllocator
-
-    if not isinstance(allocator, LearnedAllocator):
-        return None
     healthy = layout.without(failed) if failed else layout
-    normalization = allocator.normalization
-    centred = (np.asarray(target)[None] - normalization.mean) / normalization.std
-    mixture = predict(allocator.pipeline.network, allocator.pipeline.prepare(healthy), centred)
-    weight, mean, std = (np.asarray(v[0], dtype=float) for v in (mixture.weight, mixture.mean, mixture.std))
+    weight, mean, std = insight.weight, insight.mean, insight.std
     std = np.maximum(std * np.sqrt(temperature), NARROWEST)
     lower = healthy.lower
     upper = healthy.upper

@@ -4,14 +4,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import load_allocator
 from webapp.session.state import State
-from webapp.tasks.attention import Attention, attention
 from webapp.tasks.density import Densities, densities
 from webapp.tasks.mode_names import Modes, known_modes, listed_modes
 from webapp.tasks.refinement import refinement
@@ -20,6 +21,15 @@ Load = Callable[..., Allocator]
 
 SAMPLING = ("n_candidates", "temperature", "gamma")
 """Fields of a state that are settings of the methods which draw candidates."""
+
+
+class Attention(NamedTuple):
+    """How much the fins look at each other in the network: the graph that it sees."""
+
+    fins: tuple[str, ...]
+    """The fins in the graph, n of them: those that work."""
+    weight: NDArray[np.float64]
+    """How much each fin (rows) looks at each (columns), (n, n); rows sum to 1, itself included."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,13 +88,14 @@ class Solver:
         Raises:
             FinlabError: the method cannot be loaded or cannot answer.
         """
-        answer, allocator, target = self.solve(state), self.allocator(state), np.array(state.target)
-        return Reply(
-            answer,
-            densities(allocator, answer.layout, state.failed, target, state.temperature),
-            attention(allocator, answer.layout, state.failed, target),
-            listed_modes(known_modes(answer), answer.samples),
-        )
+        answer, failed = self.solve(state), state.failed
+        healthy = answer.layout.without(failed) if failed else answer.layout
+        insight = self.allocator(state).insight(healthy, state.target)
+        modes = listed_modes(known_modes(answer), answer.samples)
+        if insight is None:
+            return Reply(answer, None, None, modes)
+        shown = densities(insight, answer.layout, failed, state.temperature)
+        return Reply(answer, shown, Attention(healthy.names, insight.attention), modes)
 
     def modes(self, reply: Reply) -> Modes:
         """All distinct ways to do what an answer does: a search of its own, tens of milliseconds."""

@@ -14,12 +14,14 @@ from functools import cache
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.allocator import Allocator
+from finlab.allocation.insight import Insight
+from finlab.allocation.learned.levenberg_marquardt import refine
 from finlab.allocation.learned.pipeline import Pipeline
 from finlab.allocation.learned.prepared import Prepared
-from finlab.allocation.learned.proposal import Proposal
+from finlab.allocation.learned.proposal import Proposal, predict
 from finlab.allocation.learned.refine_missed import FallbackForces, nearest_forces
 from finlab.allocation.learned.refined_candidates import RefinedCandidates
 from finlab.allocation.learned.settings import Settings
@@ -27,6 +29,7 @@ from finlab.allocation.learned.unreachable import project_target
 from finlab.allocation.policy import Policy
 from finlab.allocation.solution import Candidates, Solution
 from finlab.errors import CheckpointError
+from finlab.inference.features import fin_frame_features
 from finlab.inference.threads import single_threaded_products
 from finlab.inference.weights import TrainedWeights
 from finlab.layout import FinModelSpec, Layout
@@ -128,6 +131,20 @@ class LearnedAllocator(Allocator):
         command = np.concatenate([part.command[:, 0] for part in parts])
         wrench = np.concatenate([part.wrench[:, 0] for part in parts]) * self.normalization.std
         return Solution(command, wrench)
+
+    def insight(self, layout: Layout, wrench: ArrayLike) -> Insight:
+        """What the network makes of a target (6,) [N, N m] for a layout whose fins all work."""
+        prepared, network = self.pipeline.prepare(layout), self.pipeline.network
+        centred = (np.asarray(wrench, dtype=float)[None] - self.normalization.mean) / self.normalization.std
+        mixture = predict(network, prepared, centred)
+        features = fin_frame_features(prepared.geometry, centred).astype(np.float32)
+        arrays = (mixture.weight, mixture.mean, mixture.std, network.attention(features))
+        return Insight(*(np.asarray(values[0], dtype=float) for values in arrays))
+
+    def refined(self, layout: Layout, wrench: ArrayLike, command: Array, n_steps: int) -> Array:
+        """A command (n, 3) of fins that all work after some Levenberg-Marquardt steps."""
+        target = np.asarray(wrench, dtype=float)[None] / self.normalization.std
+        return refine(self.pipeline.prepare(layout).commands, target, command[None], n_steps).command[0]
 
     def _check_policy(self, policy: Policy) -> None:
         """All policies are known."""
