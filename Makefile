@@ -20,7 +20,7 @@ help:
 	@echo "make format       let ruff mend what it can"
 	@echo "make checkpoint   train what is shipped, PRESET=default or PRESET=paper (hours)"
 	@echo "make bench        print data throughput, accuracy and latency"
-	@echo "make bench-runtime  bundles in an environment of numpy and onnxruntime alone: parity, speed, memory"
+	@echo "make bench-runtime  bundles in an environment of numpy and safetensors alone: self-check, speed, memory"
 	@echo "make wheel-check  build the wheel, install it in an empty environment and try it there"
 
 setup: $(STAMP)
@@ -28,7 +28,7 @@ setup: $(STAMP)
 $(STAMP): pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "finlab needs Python 3.11 or newer: apt-get install python3"; exit 1; }
 	test -x $(BIN)/pip || $(PYTHON) -m venv .venv || { tools/apt-install python3-venv && $(PYTHON) -m venv .venv; }
-	$(BIN)/pip install --disable-pip-version-check -c constraints.txt -e '.[app,ipopt,test,dev]'
+	$(BIN)/pip install --disable-pip-version-check -c constraints.txt -e '.[train,app,ipopt,onnx,urdf,test,dev]'
 	@touch $@
 
 app: setup

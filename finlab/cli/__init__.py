@@ -18,6 +18,9 @@ _INTERRUPTED = 130
 _BROKEN_PIPE = 141
 """128 + SIGPIPE, as shells report it."""
 
+_EXTRAS = {"torch": "train", "viser": "app", "trimesh": "app", "yourdfpy": "urdf", "matplotlib": "plot"}
+"""Packages that some verbs need beside the base install, and the extra that brings each."""
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 0, or 2 after one plain sentence on stderr.
@@ -30,6 +33,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
     except FinlabError as error:
         return _fail(str(error))
+    except ModuleNotFoundError as error:
+        package = str(error.name).split(".")[0]
+        if package not in _EXTRAS:
+            raise
+        return _fail(f"{package} is not installed; pip install 'finlab[{_EXTRAS[package]}]'")
     except KeyboardInterrupt:
         return _INTERRUPTED
     except OSError as error:

@@ -20,13 +20,6 @@ class Workers:
     searches: Worker = field(default_factory=Worker)
     """Better layouts: up to minutes."""
 
-    def __post_init__(self) -> None:
-        import torch  # takes seconds; the app's other parts do without
-
-        # Networks this small gain nothing from more threads, and on a busy machine those wait for each other:
-        # an answer of the paper's method then takes a hundred times longer.
-        torch.set_num_threads(1)
-
     def stop(self) -> None:
         """End all threads."""
         for worker in (self.answers, self.marks, self.cards, self.swims, self.searches):
