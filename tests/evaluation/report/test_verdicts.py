@@ -1,9 +1,11 @@
 """Who leads, from tables made by hand: intervals apart, overlapping, and not known."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from finlab.evaluation.report.sections.summary import comparisons
 from finlab.evaluation.report.verdicts import (
     LEADS,
     LEVEL,
@@ -106,3 +108,67 @@ def test_nothing_known_nothing_listed() -> None:
     assert standings(_compare([])) == []
     alone = [{"method": name, "err": 1.0, "err_std": 0.0, "runs": 1} for name in ("learned", "qp")]
     assert standings(_compare(alone)) == []
+
+
+def test_the_summary_compares_every_table_it_has() -> None:
+    """One row of each table, the learned allocator ahead in all but the time of a call."""
+    closed_loop = {"ate_std": 0.001, "runs": 4}
+    speed = {"speed": 0.1, "inertial_w_std": 0.01, "mae_std": 1e-4, "runs": 5}
+    ratio = {"fins": 4, "energy_ratio_low": 0.99, "energy_ratio_high": 1.01}
+    results: Any = SimpleNamespace(
+        wrench_rows={
+            "id": [
+                {"method": m, "err_norm_mean": e, "err_norm_mean_interval": (0.9 * e, 1.1 * e)}
+                for m, e in (("learned", 3e-4), ("qp", 0.5))
+            ]
+        },
+        energy_rows=[
+            {**ratio, "method": "learned", "energy_ratio": 1.0},
+            {
+                "method": "qp",
+                "fins": 4,
+                "energy_ratio": 1.5,
+                "energy_ratio_low": 1.4,
+                "energy_ratio_high": 1.6,
+            },
+            {"method": "sqp", "fins": 4, "energy_ratio": None},
+        ],
+        latency_rows=[
+            {"method": m, "p50_ms": t, "p50_ms_interval": (t, t)} for m, t in (("learned", 2.0), ("qp", 0.1))
+        ],
+        ablation_rows=[
+            {
+                "variant": "ours",
+                "refinement": "adam",
+                "scored_by": "surrogate",
+                "err_norm_mean": 0.04,
+                "err_norm_mean_interval": (0.03, 0.05),
+            }
+        ],
+        swim_rows={
+            "trajectory": [
+                {**closed_loop, "layout": "A", "method": m, "ate": a}
+                for m, a in (("learned", 0.03), ("on-board", 0.06))
+            ],
+            "velocity": [
+                {**speed, "method": m, "inertial_w": w, "mae": w / 100}
+                for m, w in (("learned-power", 1.0), ("analytic", 2.0))
+            ],
+        },
+        seed_rows=[
+            {"seeds": k, "steps": 1, "fins": 3, "err_norm_mean": e, "err_norm_mean_interval": (e, e)}
+            for k, e in (("network", 0.01), ("random", 0.5))
+        ],
+    )
+    found = [(one.measure, one.case, one.against, one.verdict) for one in comparisons(results)]
+    assert found == [
+        ("mean error", "id", "qp", LEADS),
+        ("mean error", "id", "paper (printed)", LEADS),
+        ("mean error", "ablation by the surrogate", "paper (printed)", TRAILS),
+        ("energy", "4 fins", "qp", LEADS),
+        ("time per call", "4 fins", "qp", TRAILS),
+        ("ATE", "layouts A", "on-board", LEADS),
+        ("inertial power", "0.10 m/s", "analytic", LEADS),
+        ("speed error", "0.10 m/s", "analytic", LEADS),
+        ("mean error of seeds, 1 steps", "3 fins", "random", LEADS),
+    ]

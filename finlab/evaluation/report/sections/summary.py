@@ -62,7 +62,7 @@ def comparisons(results: Results) -> list[Comparison]:
         theirs = printed["wrench_tracking"].get(split, {})
         means = {"paper (printed)": theirs["ours"]["err_norm_mean"]} if theirs else {}
         beside = with_printed(rows, "err_norm_mean", means)
-        accuracy += compare("mean error", beside, "err_norm_mean", f"split {split}")
+        accuracy += compare("mean error", beside, "err_norm_mean", split)
     energy = [
         {**row, "energy_ratio_interval": (row["energy_ratio_low"], row["energy_ratio_high"])}
         for row in results.energy_rows
@@ -72,19 +72,31 @@ def comparisons(results: Results) -> list[Comparison]:
         if (row["variant"], row["refinement"]) == ("ours", "adam"):
             means = {"paper (printed)": printed["ablation"]["ours"]["err_norm_mean"]}
             beside = with_printed([{**row, "method": "paper"}], "err_norm_mean", means)
-            where = f"ablation, by the {row['scored_by']}"
+            where = f"ablation by the {row['scored_by']}"
             accuracy += compare("mean error", beside, "err_norm_mean", where, ("paper",))
+    seeds = [
+        one
+        for steps in dict.fromkeys(row["steps"] for row in results.seed_rows)
+        for one in compare(
+            f"mean error of seeds, {steps} steps",
+            [row for row in results.seed_rows if row["steps"] == steps],
+            "err_norm_mean",
+            _fins,
+            ("network",),
+            "seeds",
+        )
+    ]
     swims, power = results.swim_rows, ("learned-power", OURS)
     faults = [row for row in swims.get("faults", ()) if row["controllable"]]
     return [
         *accuracy,
-        *compare("energy", energy, "energy_ratio", lambda row: f"{row['fins']} fins"),
+        *compare("energy", energy, "energy_ratio", _fins),
         *compare("time per call", results.latency_rows, "p50_ms", "4 fins"),
         *compare("ATE", swims.get("trajectory", ()), "ate", lambda row: f"layouts {row['layout']}"),
         *compare("ATE, fins lost", faults, "ate", lambda row: row["fault"]),
         *compare("inertial power", swims.get("velocity", ()), "inertial_w", _speed, power),
         *compare("speed error", swims.get("velocity", ()), "mae", _speed, power),
-        *compare("error of seeds", results.seed_rows, "err_norm_mean", _seeds, ("network",), "seeds"),
+        *seeds,
     ]
 
 
@@ -92,8 +104,8 @@ def _speed(row: Row) -> str:
     return "all speeds" if row["speed"] is None else f"{row['speed']:.2f} m/s"
 
 
-def _seeds(row: Row) -> str:
-    return f"{row['fins']} fins, {row['steps']} steps"
+def _fins(row: Row) -> str:
+    return f"{row['fins']} fins"
 
 
 def _cards(results: Results, tables: dict[str, list[Row]]) -> list[Card]:
