@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -41,12 +40,21 @@ def test_wrong_usage_exits_with_2(argv: list[str], capsys: pytest.CaptureFixture
     assert capsys.readouterr().err.strip()
 
 
-def test_help_is_fast_and_needs_no_torch() -> None:
-    start = time.perf_counter()
-    done = subprocess.run([*FINLAB, "--help"], capture_output=True, text=True, timeout=30)
-    seconds = time.perf_counter() - start
-    assert done.returncode == 0
-    assert seconds < 1.5, "0.2 s on a quiet machine; torch alone takes 1.5 s"
+def test_help_is_fast_and_loads_nothing_heavy() -> None:
+    code = (
+        "import sys, time\n"
+        "from finlab.cli import main\n"
+        "assert main(['--help']) == 0\n"
+        "print(sorted({'torch', 'numpy', 'scipy', 'matplotlib', 'yaml'} & set(sys.modules)))\n"
+        "print(time.process_time())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
+    )
+    heavy, seconds = done.stdout.splitlines()[-2:]
+    assert heavy == "[]"
+    # Of this process alone, so that a busy machine does not count: 0.25 s; numpy alone takes 0.15 s more.
+    assert float(seconds) < 1.0
 
 
 def test_interrupt_exits_with_130(monkeypatch: pytest.MonkeyPatch) -> None:
