@@ -171,6 +171,8 @@ def make_terms(
 def node_features(network: NetworkConfig, batch: Batch, target: Tensor, std: Tensor) -> Tensor:
     """Node features (B, n, F) of a training batch, as the network's configuration wants them."""
     layout = (batch.position, batch.mounting_angle, batch.lower, batch.upper)
-    if network.features == "raw":
-        return raw_features(*layout)
-    return fin_frame_features(geometry(*layout, std, batch.mask), target)
+    raw = network.features == "raw"
+    features: Tensor = (
+        raw_features(*layout) if raw else fin_frame_features(geometry(*layout, std, batch.mask), target)
+    )
+    return features

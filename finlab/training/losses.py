@@ -33,7 +33,8 @@ def tracking_error(
 ) -> Tensor:
     """Normalized wrench residual (B, K, 6) of commands (B, K, n, 3), by the surrogate."""
     one = (t[:, None] for t in (batch.position, batch.mounting_angle, batch.lower, batch.upper, batch.mask))
-    return surrogate(command, *one) / std - target[:, None]
+    wrench: Tensor = surrogate(command, *one)
+    return wrench / std - target[:, None]
 
 
 def energy(command: Tensor, batch: Batch) -> Tensor:

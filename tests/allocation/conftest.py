@@ -9,7 +9,7 @@ import pytest
 
 from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.inference.checkpoint import resolve_checkpoint
-from finlab.training.networks.checkpoint import Checkpoint, load_allocator_checkpoint
+from finlab.training.networks.checkpoint import Checkpoint, load_checkpoint
 
 
 @pytest.fixture
@@ -31,7 +31,7 @@ def force_table(tmp_path: Path) -> str:
 @pytest.fixture(scope="session")
 def default_checkpoint() -> Checkpoint:
     """The shipped checkpoint `default`."""
-    return load_allocator_checkpoint(resolve_checkpoint("default"))
+    return load_checkpoint(resolve_checkpoint("default"))
 
 
 @pytest.fixture(scope="session")

@@ -19,7 +19,6 @@ from finlab.training.allocator import make_terms
 from finlab.training.networks.allocator_network import AllocatorNetwork
 from finlab.training.networks.checkpoint import (
     Checkpoint,
-    load_allocator_checkpoint,
     load_checkpoint,
 )
 from finlab.training.networks.surrogate import make_surrogate
@@ -103,7 +102,7 @@ def test_the_curves_are_drawn(smoke_surrogate, smoke_run) -> None:
 
 
 def test_the_checkpoint_says_how_it_was_made(smoke_surrogate, smoke_run) -> None:
-    checkpoint = load_allocator_checkpoint(smoke_run.folder)
+    checkpoint = load_checkpoint(smoke_run.folder)
     made = checkpoint.training["allocator"]
     assert (made["preset"], made["seed"], made["steps_done"], made["samples"]) == ("smoke", 0, 40, 40 * 128)
     assert made["surrogate_sha256"] == smoke_surrogate.checkpoint.sha256

@@ -58,7 +58,7 @@ def decode(share: Tensor, columns: Tensor, maximum: Tensor, mask: Tensor, target
 def energy(forces: Forces, mask: Tensor) -> Tensor:
     """Energy proxy (B,), with what is asked beyond a fin's largest thrust punished."""
     size = forces.size
-    beat = FULL_ENERGY * (size + 1e-6).sqrt().clamp_max(1.0)
+    beat: Tensor = FULL_ENERGY * (size + 1e-6).sqrt().clamp_max(1.0)
     # A fin at rest points where it costs nothing.
     turned = DIRECTION * forces.direction.square() * (size / 0.01).clamp_max(1.0)
     return ((beat + turned + OVERLOAD * (size - 1.0).clamp_min(0.0)) * mask).sum(-1)

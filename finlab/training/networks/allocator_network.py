@@ -56,11 +56,13 @@ class AllocatorNetwork(nn.Module):
         wrench = self.wrench(target)[:, None].expand(-1, x.shape[1], -1)
         hidden = self.join(torch.cat([hidden, wrench], dim=-1))
         padding = None if mask is None else ~mask
-        return self.norm(self.transformer(hidden, src_key_padding_mask=padding))
+        embedded: Tensor = self.norm(self.transformer(hidden, src_key_padding_mask=padding))
+        return embedded
 
     def attention(self, x: Tensor, mask: Tensor | None = None) -> Tensor:
         """Attention weights (B, n, n) of the first GATv2 layer, averaged over heads: what it looks at."""
-        return self.graph[0](x, mask)[1].mean(-1)
+        weights: Tensor = self.graph[0](x, mask)[1]
+        return weights.mean(-1)
 
     def forward(
         self, x: Tensor, target: Tensor, lower: Tensor, upper: Tensor, mask: Tensor | None = None

@@ -9,7 +9,6 @@ from typing import Any, TypeVar
 import torch
 from torch import nn
 
-from finlab.errors import CheckpointError
 from finlab.inference.checkpoint import checkpoint_files, read_checkpoint
 from finlab.inference.fast_weights import FastWeights
 from finlab.inference.features import SIZES
@@ -96,16 +95,6 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
 def load_checkpoint(folder: Path) -> Checkpoint:
     """Read a checkpoint folder; errors as in `read_checkpoint`."""
     return Checkpoint.of(read_checkpoint(folder))
-
-
-def load_allocator_checkpoint(folder: Path) -> Checkpoint:
-    """Like `load_checkpoint`, but the allocator network must be there."""
-    checkpoint = load_checkpoint(folder)
-    if checkpoint.network is None:
-        raise CheckpointError(
-            f"{folder}: holds a surrogate only; train the allocator with `finlab train allocator`"
-        )
-    return checkpoint
 
 
 def _filled(network: Network, state: State) -> Network:

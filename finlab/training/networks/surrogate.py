@@ -113,14 +113,11 @@ class MlpSurrogate(nn.Module):
             force = force * mask[..., None]
         # The perceptron speaks in the body frame, that of a fin whose shaft points forward.
         wrench = wrench_of_forces(force, force_columns(position, torch.zeros_like(mounting_angle)))
-        described = self.descriptor(x)
-        if mask is not None:
-            described = described * mask[..., None]
-            count = mask.sum(-1, keepdim=True).to(described.dtype)
-        else:
-            count = torch.tensor(float(command.shape[-2]), dtype=described.dtype, device=described.device)
-        scale, bias = self.affine(described.sum(-2) / count).chunk(2, dim=-1)
-        return wrench * (1.0 + scale) + bias
+        here = x.new_ones(x.shape[:-1]) if mask is None else mask.to(x.dtype).expand(x.shape[:-1])
+        described = self.descriptor(x) * here[..., None]
+        scale, bias = self.affine(described.sum(-2) / here.sum(-1, keepdim=True)).chunk(2, dim=-1)
+        corrected: Tensor = wrench * (1.0 + scale) + bias
+        return corrected
 
 
 Surrogate = CoefficientSurrogate | MlpSurrogate
