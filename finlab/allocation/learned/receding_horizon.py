@@ -107,14 +107,13 @@ def plan_ahead(
             _changes(kept, others[:, None] + tick * slow, settings.changes),
         ]
     )
-    found = _evaluate(prepared, previous, forces, settings)
+    found = evaluate(prepared, previous, forces, settings)
     if found.too_fast[int(np.argmin(found.cost))] > 0.0:
         # Detours are many: they are tried only where all else turns too fast.
         goals = _detours(planar, now, working, settings)[:, None] + tick * slow
-        more = _evaluate(prepared, previous, _changes(kept, goals, settings.detours), settings)
+        more = evaluate(prepared, previous, _changes(kept, goals, settings.detours), settings)
         found = Trajectories(*map(np.concatenate, zip(found, more, strict=True)))
-    found.cost[: len(straight)] *= 1.0 - settings.stay_gain
-    best = int(np.argmin(found.cost))
+    best = choose(found.cost, len(straight), settings)
     if best < len(straight):
         return None
     thrust, direction, works = found.thrust[best], found.direction[best], found.works[best]
@@ -123,6 +122,13 @@ def plan_ahead(
     command = planar.curves.lookup(np.minimum(thrust[0], planar.curves.maximum))
     command[:, 2] = ready
     return Plan(command, ready)
+
+
+def choose(cost: Array, n_straight: int, settings: HorizonSettings = HORIZON) -> int:
+    """The cheapest of M trajectories (M,); the first ones go straight on and are left only for a gain."""
+    weighed = cost.copy()
+    weighed[:n_straight] *= 1.0 - settings.stay_gain
+    return int(np.argmin(weighed))
 
 
 class Trajectories(NamedTuple):
@@ -140,7 +146,9 @@ class Trajectories(NamedTuple):
     """Whether a fin has to point where it does (M, H, n)."""
 
 
-def _evaluate(prepared: Prepared, previous: Array, force: Array, settings: HorizonSettings) -> Trajectories:
+def evaluate(
+    prepared: Prepared, previous: Array, force: Array, settings: HorizonSettings = HORIZON
+) -> Trajectories:
     """Turns and energy of trajectories of planar forces (M, H, n, 2) [N]."""
     planar, ticks = prepared.planar, settings.ticks
     top = planar.curves.maximum
@@ -148,7 +156,7 @@ def _evaluate(prepared: Prepared, previous: Array, force: Array, settings: Horiz
     thrust, direction = np.sqrt(x * x + y * y), np.arctan2(y, x)
     works = thrust > np.maximum(settings.working_share * top, 1.5 * planar.curves.minimum)
     sooner = 1.0 - np.arange(ticks) / ticks  # what comes late may be avoided yet
-    beyond = _turns(prepared, previous[:, 2], direction, works, settings)
+    beyond = turns_beyond(prepared, previous[:, 2], direction, works, settings)
     too_fast, turned = (turn.sum(-1) @ sooner for turn in beyond)
     # The energy of a thrust grows about like its square root; what a fin cannot give counts dearly, but a
     # drift that leaves its limits is no reason to avoid going straight on at any price.
@@ -214,12 +222,12 @@ def _detours(planar: PlanarProblem, force: Array, drift: Array, settings: Horizo
     return forces
 
 
-def _turns(
+def turns_beyond(
     prepared: Prepared,
     before: Array,
     direction: Array,
     works: NDArray[np.bool_],
-    settings: HorizonSettings,
+    settings: HorizonSettings = HORIZON,
 ) -> tuple[Array, Array]:
     """By how much [rad] fins turn beyond `max_turn` and beyond `free_turn`, (M, H, n).
 
