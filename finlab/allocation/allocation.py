@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.judging import REACHED, judge
+from finlab.allocation.judging import REACHED, Judge, judge
 from finlab.allocation.modes import Mode, find_modes
 from finlab.allocation.plain_data import PlainData
 from finlab.allocation.policy import CLOSEST, Policy, describe_binding
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from finlab.allocation.allocator import Allocator
 
 Array = NDArray[np.float64]
-Judge = Literal["plant", "surrogate"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -13,11 +13,11 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finlab.allocation.allocation import Allocation, Judge
+from finlab.allocation.allocation import Allocation
 from finlab.allocation.batch import BatchAllocation
 from finlab.allocation.health import Health
 from finlab.allocation.insight import Insight
-from finlab.allocation.judging import REACHED, Verdict, judge
+from finlab.allocation.judging import REACHED, Verdict, judge, verdict_of
 from finlab.allocation.policy import CLOSEST, Policy, as_policy, largest_share
 from finlab.allocation.question import (
     Fins,
@@ -27,7 +27,7 @@ from finlab.allocation.question import (
     usable_fins,
 )
 from finlab.allocation.solution import Candidates, Solution
-from finlab.errors import AllocationError
+from finlab.errors import AllocationError, DataError
 from finlab.inference.normalization import Normalization
 from finlab.inference.weights import TrainedWeights
 from finlab.layout import FinModelSpec, Layout
@@ -53,8 +53,6 @@ class Allocator(ABC):
     """Name of the checkpoint that the networks come from; None for methods without networks."""
     weights: TrainedWeights | None = None
     """The trained networks; None for methods without networks."""
-    judged_by: Judge = "plant"
-    """Who computes what its commands give."""
     fin_model: FinModelSpec | None = None
     """Fin model that the networks have learned; None for methods that ask every fin's own model."""
 
@@ -143,7 +141,7 @@ class Allocator(ABC):
         solution = self._solve_by(policy, fins.healthy, target[None], seed=seed, previous=before)
         solve_ms = (time.perf_counter() - start) * 1e3
         command = fins.among_all(solution.command)
-        verdict = self._judge(fins, solution, command, target[None])
+        verdict, notes = self._judge(fins, solution, command, target[None])
         return Allocation(
             layout=fins.layout,
             failed=fins.failed,
@@ -154,7 +152,7 @@ class Allocator(ABC):
             err_norm=float(verdict.err_norm[0]),
             energy=float(verdict.energy[0]),
             sigma=self.normalization.std,
-            judged_by=self.judged_by,
+            judged_by=verdict.judged_by,
             method=self.name,
             solve_ms=solve_ms,
             checkpoint=self.checkpoint,
@@ -164,7 +162,7 @@ class Allocator(ABC):
             previous=None if before is None else fins.among_all(before),
             wrench_surrogate=None if solution.wrench_surrogate is None else solution.wrench_surrogate[0],
             unknown_fins=self.unknown_fins(fins.healthy),
-            notes=self._notes(fins.healthy),
+            notes=(*self._notes(fins.healthy), *notes),
             candidates=_made(solution.candidates, fins),
             samples=_made(solution.samples, fins),
             _allocator=self,
@@ -191,9 +189,26 @@ class Allocator(ABC):
             )
         return _made(solution.alternatives or solution.candidates, fins)
 
-    def _judge(self, fins: Fins, solution: Solution, command: Array, targets: Array) -> Verdict:
-        """What commands (N, n, 3) give, by the plant; methods that cannot ask it override this."""
-        return judge(fins.layout, command, targets, self.normalization.std)
+    def _judge(
+        self, fins: Fins, solution: Solution, command: Array, targets: Array
+    ) -> tuple[Verdict, tuple[str, ...]]:
+        """What commands (N, n, 3) give, and a note where it is not the plant that says so."""
+        sigma = self.normalization.std
+        try:
+            return judge(fins.layout, command, targets, sigma), ()
+        except DataError as error:  # a force table that is not here, as on a robot
+            forces = self._surrogate_forces(fins.healthy, solution.command)
+            if forces is None:
+                raise
+            forces = np.nan_to_num(fins.among_all(forces))
+            torques = np.cross(fins.layout.position, forces)
+            wrench = np.concatenate([forces.sum(1), torques.sum(1)], axis=-1)
+            verdict = verdict_of(fins.layout, command, forces, wrench, targets, sigma)
+            return verdict._replace(judged_by="surrogate"), (f"judged by the surrogate: {error}",)
+
+    def _surrogate_forces(self, layout: Layout, command: Array) -> Array | None:
+        """Forces (N, n, 3) [N] in the body frame by the method's own model, for methods that have one."""
+        return None
 
     def _notes(self, layout: Layout) -> tuple[str, ...]:
         """Sentences that the user should read before trusting an answer for this layout."""
@@ -279,7 +294,7 @@ class Allocator(ABC):
         solution = self._solve_many(policy, fins.healthy, targets, seed=seed)
         elapsed_ms = (time.perf_counter() - start) * 1e3
         command = fins.among_all(solution.command)
-        verdict = self._judge(fins, solution, command, targets)
+        verdict, notes = self._judge(fins, solution, command, targets)
         return BatchAllocation(
             layout=fins.layout,
             failed=fins.failed,
@@ -290,7 +305,7 @@ class Allocator(ABC):
             err_norm=verdict.err_norm,
             energy=verdict.energy,
             sigma=self.normalization.std,
-            judged_by=self.judged_by,
+            judged_by=verdict.judged_by,
             method=self.name,
             solve_ms=np.full(len(targets), elapsed_ms / max(len(targets), 1)),
             checkpoint=self.checkpoint,
@@ -298,7 +313,7 @@ class Allocator(ABC):
             seed=seed,
             wrench_surrogate=solution.wrench_surrogate,
             unknown_fins=self.unknown_fins(fins.healthy),
-            notes=self._notes(fins.healthy),
+            notes=(*self._notes(fins.healthy), *notes),
         )
 
     def _solve_many(self, policy: Policy, layout: Layout, targets: Array, *, seed: int) -> Solution:

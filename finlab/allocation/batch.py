@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.allocation import Judge
-from finlab.allocation.judging import REACHED
+from finlab.allocation.judging import REACHED, Judge
 from finlab.allocation.plain_data import PlainData
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.layout import Layout

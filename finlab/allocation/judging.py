@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,10 @@ REACHED = 0.01
 """Normalized error up to which a wrench counts as delivered."""
 
 
+Judge = Literal["plant", "surrogate"]
+"""Who says what commands give: the analytic fin models, or the learned surrogate where those are missing."""
+
+
 class Verdict(NamedTuple):
     """What N commands give."""
 
@@ -30,6 +34,8 @@ class Verdict(NamedTuple):
     """(N,)."""
     energy: Array
     """(N,)."""
+    judged_by: Judge = "plant"
+    """Whose forces these are."""
 
 
 def judge(layout: Layout, command: Array, target: Array, sigma: Array) -> Verdict:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from importlib import import_module
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.bundle_settings import METHODS_ON_BOARD, read_about
@@ -19,6 +19,11 @@ from finlab.inference.checkpoint import (
 )
 from finlab.inference.normalization import Normalization
 from finlab.inference.weights import TrainedWeights
+
+if TYPE_CHECKING:
+    from finlab.allocation.learned.learned_allocator import LearnedAllocator
+    from finlab.allocation.learned.paper import PaperAllocator
+    from finlab.allocation.options import LearnedOptions, PaperOptions
 
 METHODS: dict[str, tuple[str, str]] = {
     "learned": ("finlab.allocation.learned.learned_allocator", "LearnedAllocator"),
@@ -42,6 +47,27 @@ Method = Literal["learned", "fast", "paper", "qp", "sqp", "analytic", "multistar
 """The names again, for type checkers and editors."""
 
 
+@overload
+def load_allocator(
+    method: Literal["learned", "fast"] = "learned",
+    *,
+    checkpoint: str | os.PathLike[str] | None = None,
+    **options: Unpack[LearnedOptions],
+) -> LearnedAllocator: ...
+@overload
+def load_allocator(
+    method: Literal["paper"],
+    *,
+    checkpoint: str | os.PathLike[str] | None = None,
+    **options: Unpack[PaperOptions],
+) -> PaperAllocator: ...
+@overload
+def load_allocator(
+    method: str | os.PathLike[str],
+    *,
+    checkpoint: str | os.PathLike[str] | None = None,
+    **options: Any,
+) -> Allocator: ...
 def load_allocator(
     method: Method | str | os.PathLike[str] = "learned",
     *,

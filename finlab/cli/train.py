@@ -111,14 +111,12 @@ def fast(
         stop_after: stop after so many steps; call again to go on.
     """
     from finlab.allocation import load_allocator
-    from finlab.allocation.learned.learned_allocator import LearnedAllocator
     from finlab.training.distill.answers import AnswerSettings
     from finlab.training.distill.train import FastSettings, train_fast
     from finlab.training.networks.fast_network import FastConfig
 
     _check_counts(shards=shards, steps=steps, stop_after=stop_after)
     allocator = load_allocator(checkpoint=checkpoint)
-    assert isinstance(allocator, LearnedAllocator)
     metrics = train_fast(
         allocator,
         output,

@@ -4,6 +4,7 @@ import copy
 import pickle
 from dataclasses import fields, replace
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from finlab.allocation import METHODS, Allocation, Allocator, Health, load_alloc
 from finlab.allocation.modes import mode_signature, same_signature
 from finlab.allocation.plain_data import equal
 from finlab.assets import shipped_checkpoints
-from finlab.errors import AllocationError, CheckpointError
+from finlab.errors import AllocationError, CheckpointError, DataError
 from finlab.layout import Fin, FinModelSpec, Layout, load_layout, random_layout
 from finlab.physics import Plant
 from tests.allocation.quick import quick_allocator
@@ -70,7 +71,7 @@ def test_every_field_counts_but_the_time(learned: Allocator) -> None:
         {"samples": None},
         {"seed": 1},
     ):
-        assert replace(result, **changed) != result, changed  # type: ignore[arg-type]
+        assert replace(result, **changed) != result, changed
     assert result != "an answer" and result is not None
     with pytest.raises(TypeError, match="unhashable"):
         hash(result)
@@ -217,3 +218,24 @@ def test_random_robots_too(k: int, learned: Allocator) -> None:
     result = learned.allocate(layout, rng.normal(size=6), failed=[layout.names[0]], seed=k)
     assert all(twin == result for twin in round_trips(result))
     assert len(repr(result)) <= 400
+
+
+@pytest.mark.parametrize("method", ["learned", "fast"])
+def test_where_a_force_table_is_missing_the_surrogate_judges_and_says_so(method: str, tmp_path: Path) -> None:
+    allocator, layout = quick_allocator(method), load_layout("A")
+    table = FinModelSpec("table", (("path", str(tmp_path / "gone.csv")),))
+    tables = replace(layout, fins=tuple(replace(fin, model=table) for fin in layout.fins))
+    result = allocator.allocate(tables, SURGE, failed=["front_left"])
+    whole = allocator.allocate(layout, SURGE, failed=["front_left"])
+    np.testing.assert_array_equal(result.command, whole.command)
+    assert result.judged_by == "surrogate" and whole.judged_by == "plant"
+    np.testing.assert_allclose(result.wrench, result.wrench_surrogate, atol=1e-4)  # type: ignore[arg-type]
+    np.testing.assert_allclose(result.fin_forces, whole.fin_forces, atol=2e-3)
+    np.testing.assert_allclose(result.fin_forces.sum(0), result.wrench[:3], atol=1e-9)
+    np.testing.assert_allclose(result.wrench, whole.wrench, atol=2e-3)
+    assert "gone.csv" in result.notes[-1] and "judged by the surrogate" in str(result)
+    batch = allocator.allocate_batch(tables, [SURGE], failed=["front_left"])
+    np.testing.assert_allclose(batch.fin_forces[0], result.fin_forces, atol=1e-3)
+    assert batch.judged_by == "surrogate" and batch.notes == result.notes
+    with pytest.raises(DataError, match=r"gone\.csv"):
+        load_allocator("analytic").allocate(tables, SURGE)

@@ -1,15 +1,19 @@
 """Settings belong to an allocator; another one with other settings leaves it as it was."""
 
-from typing import Any
+from dataclasses import fields
+from typing import Any, get_type_hints
 
 import numpy as np
 import pytest
 
 from finlab.allocation import METHODS, load_allocator
+from finlab.allocation.learned.paper import PaperSettings
+from finlab.allocation.learned.settings import Settings
+from finlab.allocation.options import LearnedOptions, PaperOptions
 from finlab.assets import shipped_checkpoints, shipped_layouts
 from finlab.errors import AllocationError
 from finlab.layout import load_layout
-from finlab.physics.energy import POWER_WEIGHTS
+from finlab.physics.energy import POWER_WEIGHTS, EnergyWeights
 
 SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
 OTHER: dict[str, dict[str, Any]] = {
@@ -71,3 +75,13 @@ def test_impossible_settings_are_refused() -> None:
         allocator.with_settings(n_candidates=0)
     with pytest.raises(AllocationError, match="energy of squares"):
         allocator.with_settings(energy_weights=POWER_WEIGHTS).with_settings(energy_tradeoff=0.1)
+
+
+def test_editors_complete_the_settings_that_there_are() -> None:
+    for options, settings, others in (
+        (LearnedOptions, Settings, {"energy_weights": EnergyWeights}),
+        (PaperOptions, PaperSettings, {}),
+    ):
+        kinds = get_type_hints(settings)
+        assert get_type_hints(options) == others | {f.name: kinds[f.name] for f in fields(settings)}
+    assert list(get_type_hints(LearnedOptions)) == load_allocator("fast").option_names()

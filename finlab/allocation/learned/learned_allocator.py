@@ -146,6 +146,12 @@ class LearnedAllocator(Allocator):
         target = np.asarray(wrench, dtype=float)[None] / self.normalization.std
         return refine(self.pipeline.prepare(layout).commands, target, command[None], n_steps).command[0]
 
+    def _surrogate_forces(self, layout: Layout, command: Array) -> Array:
+        fins = self.pipeline.prepare(layout).commands
+        axes = fins.columns[..., :3] * self.normalization.std[:3]  # of each fin, in the body frame
+        forces: Array = np.matmul(fins.fin.force(command)[..., None, :], axes)[..., 0, :]
+        return forces
+
     def _check_policy(self, policy: Policy) -> None:
         """All policies are known."""
 
