@@ -149,6 +149,7 @@ def test_a_circle_of_imports_is_found(tmp_path: Path) -> None:
     [
         ("finlab", ("viser", "trimesh", "webapp", "onnx", "playwright")),
         ("finlab/layout", ("torch", "scipy", "matplotlib")),
+        *((f"finlab/{room}", ("torch",)) for room in ("evaluation", "sim", "control", "exchange")),
         ("webapp", ("finlab.cli",)),
         ("finlab/training/networks", ("finlab.layout.layout", "finlab.layout.fin")),
     ],

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -106,7 +106,7 @@ class Checkpoints:
 
 
 def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) -> Plan:
-    """The jobs of a report.
+    """The jobs of a report; what needs CasADi or PyTorch is left out where it is not installed.
 
     Args:
         sizes: how much of everything.
@@ -114,7 +114,7 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
         checkpoints: under test.
         runs: folder for the small trainings.
     """
-    casadi = importlib.util.find_spec("casadi") is not None
+    casadi, torch = (find_spec(package) is not None for package in ("casadi", "torch"))
     names = [name for name in QUICK if name != "fast" or has_distilled(checkpoints.learned)]
     names += [name for name in (*SLOW, REFERENCE) if casadi or "ipopt" not in name]
     prints = {name: fingerprint(name, checkpoints.of(name)) for name in names}
@@ -191,7 +191,7 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
         temperature=temperature,
         scatter={"paper": scatter},
         seeds={"id": job("seeds", work.seeds, "learned", sizes.seeds, candidates=N_SEEDS)},
-        training=training_jobs(study, runs),
+        training=training_jobs(study, runs) if torch else {},
         swims=swims,
         latency={"calls": latency},
     )

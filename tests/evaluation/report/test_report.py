@@ -9,7 +9,8 @@ from finlab.evaluation.experiments.training_study import CHANGES
 from finlab.evaluation.report import plan as planning
 from finlab.evaluation.report.jobs import Job
 from finlab.evaluation.report.make import PAGE, PICTURES, TABLES, TWIN, make_report
-from finlab.evaluation.report.plan import Checkpoints
+from finlab.evaluation.report.plan import Checkpoints, make_plan
+from finlab.evaluation.report.sizes import SIZES
 
 pytest.importorskip("matplotlib")
 pytest.importorskip("casadi")
@@ -80,3 +81,14 @@ def test_the_second_time_nothing_is_done_again(
     rows = (folder / TABLES).read_text("utf-8")
     _make(folder, untrained_checkpoint)
     assert (folder / TABLES).read_text("utf-8") == rows
+
+
+def test_without_casadi_and_torch_the_rest_is_planned(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    whole = make_plan(SIZES["tiny"], seed=0, checkpoints=Checkpoints(), runs=tmp_path)
+    monkeypatch.setattr(planning, "find_spec", lambda _: None)
+    bare = make_plan(SIZES["tiny"], seed=0, checkpoints=Checkpoints(), runs=tmp_path)
+    assert whole.training and not bare.training
+    assert {name for name in whole.energy if name not in bare.energy} == {"ipopt", "ipopt-32"}
+    assert bare.ablation == whole.ablation and bare.wrench["id", "learned"] == whole.wrench["id", "learned"]
