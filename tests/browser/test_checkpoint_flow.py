@@ -53,10 +53,12 @@ def test_learned_answers_a_slider_and_a_failure(trained: Page) -> None:
 def test_its_modes_are_distinct_and_its_densities_are_drawn(trained: Page) -> None:
     page = trained
     page.tab("Modes")
-    page.until(lambda: page.page.locator("table.modes tr.pick").count() == len(page.view.answering.modes) > 0)
-    names = [mode.name for mode in page.view.answering.modes]
+    page.until(
+        lambda: page.page.locator("table.modes tr.pick").count() == len(page.view.answering.modes.shown) > 0
+    )
+    names = [mode.name for mode in page.view.answering.modes.shown]
     assert len(set(names)) == len(names)
-    assert page.view.answering.densities is not None
+    assert page.view.answering.reply.densities is not None
     page.press("Play the refinement")
     page.page.locator(".step", has_text="Best raw candidate").wait_for()
     page.page.locator(".step", has_text="Answer").wait_for()
