@@ -6,13 +6,13 @@ from functools import partial
 import viser
 
 from finlab.analysis import Improvement
-from webapp.handles import numbered, on_user_change, on_user_click, put
+from webapp.handles import on_user_change, on_user_click, put
 from webapp.markup.figures import listed, three_digits
-from webapp.markup.picking import button_colors, chosen_button
+from webapp.markup.picking import chosen_button
 from webapp.markup.score_card import score_table
+from webapp.panels.fin_buttons import FinButtons
 from webapp.panels.host import Host
 from webapp.session.search_request import ALL, GOAL_WORDS, WAY, Draft
-from webapp.theme import css, fin_color
 
 
 class ImprovePanel:
@@ -24,13 +24,13 @@ class ImprovePanel:
         with gui.add_folder("Improve this layout"):
             self._goal = gui.add_dropdown("Goal", tuple(GOAL_WORDS), hint="What to raise.")
             on_user_change(self._goal, lambda goal: self._draft(lambda draft: draft.with_goal(goal)))
-            self._paint = gui.add_html("")
-            self._fins = gui.add_button_group(
+            self._fins = FinButtons(
+                gui,
                 "May move",
-                ("1",),
-                hint="Press a number to hold a fin, or to let it move. Pairs stay pairs.",
+                "Press a number to hold a fin, or to let it move. Pairs stay pairs.",
+                "fl-movers",
+                lambda name: self._draft(lambda draft: draft.with_held_toggled(name)),
             )
-            on_user_change(self._fins, self._hold)
             self._whose = gui.add_dropdown(
                 "Bounds of", (ALL,), hint="All fins, or one that gets bounds of its own."
             )
@@ -70,12 +70,6 @@ class ImprovePanel:
                 "Result", ("Accept", "Leave"), visible=False, hint="Accepting can be undone."
             )
             on_user_change(self._verdict, self._decide)
-
-    def _hold(self, button: str) -> None:
-        names = self._host.session.state.layout.names
-        index = numbered(button, len(names))
-        if index is not None:
-            self._draft(lambda draft: draft.with_held_toggled(names[index]))
 
     def _bound(self, way: tuple[float, ...]) -> None:
         whose = self._whose.value if self._whose.value in self._host.session.state.layout.names else ALL
@@ -130,12 +124,7 @@ class ImprovePanel:
         """Write which fins may move, and how far."""
         names, draft = self._host.session.state.layout.names, self._host.session.draft
         put(self._goal, value=draft.goal)
-        put(self._fins, options=tuple(str(i + 1) for i in range(len(names))))
-        colors = [
-            ("transparent", "inherit") if n in draft.held else (css(fin_color(i)), "#111")
-            for i, n in enumerate(names)
-        ]
-        put(self._paint, content=button_colors("fl-movers", colors))
+        self._fins.refresh(names, held=draft.held)
         put(self._whose, options=(ALL, *names))
         way = draft.way(self._whose.value)
         put(self._reach, value=way[:3])

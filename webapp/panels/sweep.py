@@ -4,18 +4,17 @@ import time
 
 import numpy as np
 import viser
-from viser import uplot
 
 from finlab.layout.layout import MAX_FINS
 from webapp.handles import hold_kind, on_user_change, on_user_click, put
 from webapp.markup.figures import small
 from webapp.panels.host import Host
+from webapp.panels.line_plot import LinePlot
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS
 from webapp.session.targets import nice_limit
-from webapp.tasks.sweeping import POINTS, Sweep
+from webapp.tasks.sweeping import Sweep
 from webapp.theme import css, fin_color
 
-FONT = "11px sans-serif"
 ROOM = 1.08
 """Room above the last tick, so that its number is not cut off."""
 EXACT = 0.01
@@ -44,23 +43,8 @@ class SweepPanel:
                 "Play the sweep", icon=viser.Icon.PLAYER_PLAY, hint="To and fro until you stop it."
             )
             on_user_click(self._play, self._toggle)
-            empty = np.zeros(2) * np.nan
-            self._plot = gui.add_uplot(
-                (np.array([0.0, 1.0]), *(empty for _ in range(MAX_FINS))),
-                (
-                    uplot.Series(label="x"),
-                    *(
-                        uplot.Series(label=str(i + 1), stroke=css(fin_color(i)), width=2, spanGaps=True)
-                        for i in range(MAX_FINS)
-                    ),
-                ),
-                scales={"x": uplot.Scale(time=False), "y": uplot.Scale(auto=False, range=(0.0, 1.0))},
-                axes=_axes(""),
-                legend=uplot.Legend(show=False),
-                cursor=uplot.Cursor(show=False),
-                height=170,
-                visible=False,
-            )
+            colors = [css(fin_color(i)) for i in range(MAX_FINS)]
+            self._plot = LinePlot(gui, colors, "force of each fin [N]", height=170, widths=(2.0,))
             self._said = gui.add_html("")
 
     def _toggle(self) -> None:
@@ -90,14 +74,10 @@ class SweepPanel:
         if not sweep.fins or time.monotonic() - self._drawn < EVERY_S:
             return
         self._drawn = time.monotonic()
-        lines = np.full((MAX_FINS, POINTS), np.nan)
-        lines[: len(sweep.force)] = sweep.force
         top = nice_limit(float(np.nanmax(sweep.force, initial=0.0)) / 1.2)
-        # A scale of its own: the lines of fins that are not there would spoil an automatic one.
-        scales = {"x": uplot.Scale(time=False), "y": uplot.Scale(auto=False, range=(0.0, ROOM * top))}
-        name = f"{AXIS_WORDS[sweep.axis]} asked [{AXIS_UNITS[sweep.axis]}]"
-        put(self._plot, visible=True, scales=scales, axes=_axes(name))
-        put(self._plot, data=(sweep.values, *np.ascontiguousarray(lines)))
+        self._plot.show(True)
+        self._plot.name("force of each fin [N]", f"{AXIS_WORDS[sweep.axis]} asked [{AXIS_UNITS[sweep.axis]}]")
+        self._plot.draw(sweep.values, list(sweep.force), (0.0, ROOM * top))
         put(self._said, content=f"<div class='fl'>{_sentence(sweep)}</div>")
 
 
@@ -114,10 +94,3 @@ def _sentence(sweep: Sweep) -> str:
     low, high = (f"{value:.3g}".replace("-", "−") for value in sweep.values[exact][[0, -1]])
     beyond = "<span class='missing'>beyond, something is missing.</span>"
     return f"Exact from {low} to {high} {AXIS_UNITS[sweep.axis]}; {beyond}"
-
-
-def _axes(below: str) -> tuple[uplot.Axis, uplot.Axis]:
-    return (
-        uplot.Axis(label=below, labelSize=18, size=32, labelFont=FONT, font=FONT),
-        uplot.Axis(label="force of each fin [N]", labelSize=18, size=40, labelFont=FONT, font=FONT),
-    )

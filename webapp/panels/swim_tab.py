@@ -6,15 +6,14 @@ from typing import Any
 import viser
 
 from finlab.sim import PLANTS, SHIPPED, Trajectory
-from webapp.handles import numbered, on_user_change, put
-from webapp.markup.picking import button_colors
+from webapp.handles import on_user_change, put
 from webapp.markup.swim_card import swim_card
+from webapp.panels.fin_buttons import FinButtons
 from webapp.panels.host import Host
 from webapp.panels.swim_plots import SwimPlots
 from webapp.session.state import COMPARED
 from webapp.session.swim_plan import ALONE, OWN, SPEEDS
 from webapp.session.trajectory_file import read_path
-from webapp.theme import DEAD, css, fin_color
 
 
 class SwimTab:
@@ -53,11 +52,13 @@ class SwimTab:
         on_user_change(self._speed, partial(self._set, "speed"))
         self._follow = gui.add_checkbox("Follow", False, hint="The camera goes along with the first robot.")
         on_user_change(self._follow, host.scenery.look_after_swim)
-        self._paint = gui.add_html("")
-        self._fins = gui.add_button_group(
-            "Break a fin", ("1",), hint="Press a fin's number: break or mend it while it swims."
+        self._fins = FinButtons(
+            gui,
+            "Break a fin",
+            "Press a fin's number: break or mend it while it swims.",
+            "fl-breaks",
+            lambda name: host.do(partial(host.swimming.toggle, name)),
         )
-        on_user_change(self._fins, self._toggle)
         self._card = gui.add_html("")
         self._plots = SwimPlots(gui)
         with gui.add_folder("More", expand_by_default=False):
@@ -96,13 +97,6 @@ class SwimTab:
         session = self._host.session
         self._host.swimming.start(session.swim.plan(session.state, self._own))
 
-    def _toggle(self, button: str) -> None:
-        swimming = self._host.swimming
-        names = swimming.swimmers[0].fins if swimming.swimmers else self._host.session.state.layout.names
-        index = numbered(button, len(names))
-        if index is not None:
-            self._host.do(partial(swimming.toggle, names[index]))
-
     def refresh(self) -> None:
         """Write how the swim goes."""
         swimming, settings = self._host.swimming, self._host.session.swim
@@ -119,13 +113,6 @@ class SwimTab:
         failed = swimmers[0].failed if swimmers else self._host.session.state.failed
         paused = swimming.active and not swimming.running and not swimming.done
         put(self._run, options=("Start", "Go on" if paused else "Pause", "Step", "End"))
-        put(
-            self._fins,
-            options=tuple(f"{i + 1} ✕" if n in failed else str(i + 1) for i, n in enumerate(names)),
-        )
-        colors = [
-            (css(DEAD), "#fff") if n in failed else (css(fin_color(i)), "#111") for i, n in enumerate(names)
-        ]
-        put(self._paint, content=button_colors("fl-breaks", colors))
+        self._fins.refresh(names, failed)
         put(self._card, content=swim_card(swimming))
         self._plots.refresh(swimming)

@@ -5,19 +5,18 @@ from html import escape
 
 import viser
 
-from webapp.handles import numbered, on_user_change, put
+from webapp.handles import put
 from webapp.markup.bars import wrench_bars
 from webapp.markup.fins import fin_table
-from webapp.markup.picking import button_colors
 from webapp.markup.words import authority_sentence, rest_sentence
 from webapp.panels.damage import DamagePanel
+from webapp.panels.fin_buttons import FinButtons
 from webapp.panels.host import Host
 from webapp.panels.mode_picker import ModePicker
 from webapp.panels.pilot import PilotPanel
 from webapp.panels.sweep import SweepPanel
 from webapp.panels.target import TargetPanel
 from webapp.session.targets import full_thrust
-from webapp.theme import DEAD, css, fin_color
 
 
 class WrenchTab:
@@ -27,13 +26,13 @@ class WrenchTab:
         """Build the widgets."""
         self._host = host
         self._target = TargetPanel(gui, host)
-        self._paint = gui.add_html("")
-        self._failures = gui.add_button_group(
+        self._failures = FinButtons(
+            gui,
             "Fail a fin",
-            ("1",),
-            hint="Press a number to fail or repair a fin; F does it to the selected one.",
+            "Press a number to fail or repair a fin; F does it to the selected one.",
+            "fl-fails",
+            lambda name: host.do(partial(host.session.toggle_failure, name)),
         )
-        on_user_change(self._failures, self._toggle_failure)
         self._bars = gui.add_html("")
         self._table = gui.add_html("")
         self._picker = ModePicker(gui, host, 150, "fl-wrench-modes")
@@ -41,17 +40,11 @@ class WrenchTab:
         self._pilot = PilotPanel(gui, host, self._target)
         self._sweep = SweepPanel(gui, host)
 
-    def _toggle_failure(self, button: str) -> None:
-        names = self._host.session.state.layout.names
-        index = numbered(button, len(names))
-        if index is not None:
-            self._host.do(partial(self._host.session.toggle_failure, names[index]))
-
     def refresh(self) -> None:
         """Write target, failures and answer."""
         host, state = self._host, self._host.session.state
         self._target.refresh()
-        self._refresh_failures()
+        self._failures.refresh(state.layout.names, state.failed)
         self._picker.refresh()
         self._damage.refresh()
         self._pilot.refresh()
@@ -61,16 +54,6 @@ class WrenchTab:
         put(self._bars, content=wrench_bars(state.target, given, self._sentence()))
         fitting = answer if answer is not None and answer.layout.names == state.layout.names else None
         put(self._table, content=fin_table(state, fitting, full_thrust(state.able), host.session.selected))
-
-    def _refresh_failures(self) -> None:
-        state = self._host.session.state
-        names, failed = state.layout.names, state.failed
-        options = tuple(f"{i + 1} ✕" if n in failed else str(i + 1) for i, n in enumerate(names))
-        put(self._failures, options=options)
-        colors = [
-            (css(DEAD), "#fff") if n in failed else (css(fin_color(i)), "#111") for i, n in enumerate(names)
-        ]
-        put(self._paint, content=button_colors("fl-fails", colors))
 
     def _sentence(self) -> str:
         """What is left undone, and why."""

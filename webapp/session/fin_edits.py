@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from finlab.errors import FinlabError
 from finlab.layout import Fin, Layout
+from finlab.layout.angles import wrapped
 from webapp.scene.meshes.hull import hull_of
-from webapp.session.angles import wrapped
 from webapp.session.links import existing_image, image
 from webapp.session.state import MAX_FINS, number
 
@@ -38,7 +38,7 @@ def moved(layout: Layout, name: str, position: tuple[float, float, float], step:
 def turned(layout: Layout, name: str, angle: float, step: float = 0.0) -> Layout:
     """A fin with another mounting angle [rad], snapped to multiples of `step` [rad]."""
     checked = number(angle, f"mounting angle of {name} [rad]", -100.0, 100.0)
-    return layout.replace_fin(name, mounting_angle=wrapped(snapped(checked, step)))
+    return layout.replace_fin(name, mounting_angle=float(wrapped(snapped(checked, step))))
 
 
 def mirrored(layout: Layout, name: str) -> tuple[Layout, str]:
@@ -71,7 +71,7 @@ def ring(layout: Layout, name: str, count: int, axis: str = "z") -> Layout:
         x, y, z = (round(float(v), 9) for v in turn @ place)
         ahead, left, _ = turn @ shaft
         azimuth = fin.mounting_angle if math.hypot(ahead, left) < 0.2 else math.atan2(left, ahead)
-        copy = replace(fin, position=(x, y, z), mounting_angle=wrapped(azimuth))
+        copy = replace(fin, position=(x, y, z), mounting_angle=float(wrapped(azimuth)))
         layout, _ = _added(layout, copy, name)
     return layout
 
@@ -95,7 +95,7 @@ def stuck(layout: Layout, name: str) -> Layout:
     point, normal = hull_of(layout).nearest(np.array(fin.position))
     azimuth = fin.mounting_angle if np.hypot(*normal[:2]) < 0.2 else math.atan2(normal[1], normal[0])
     x, y, z = (round(float(v), 4) for v in point + STAND_OFF * normal)
-    return layout.replace_fin(name, position=(x, y, z), mounting_angle=wrapped(azimuth))
+    return layout.replace_fin(name, position=(x, y, z), mounting_angle=float(wrapped(azimuth)))
 
 
 def duplicated(layout: Layout, name: str) -> tuple[Layout, str]:

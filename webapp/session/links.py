@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 from finlab.layout import Fin, Layout
-from webapp.session.angles import wrapped
+from finlab.layout.angles import wrapped
 
 Links = tuple[tuple[str, str], ...]
 """Pairs of names; a fin is in at most one of them."""
@@ -19,7 +19,7 @@ def image(fin: Fin) -> Fin:
     y and the shaft's azimuth change sign.
     """
     x, y, z = fin.position
-    return replace(fin, position=(x, -y, z), mounting_angle=wrapped(-fin.mounting_angle))
+    return replace(fin, position=(x, -y, z), mounting_angle=float(wrapped(-fin.mounting_angle)))
 
 
 def partner(links: Links, name: str) -> str | None:
@@ -58,7 +58,7 @@ def existing_image(layout: Layout, name: str) -> str | None:
     """The fin that already stands where the mirror image of `name` would."""
     wanted = image(layout.fins[layout.index(name)])
     for fin in layout.fins:
-        turn = abs(wrapped(fin.mounting_angle - wanted.mounting_angle))
+        turn = abs(float(wrapped(fin.mounting_angle - wanted.mounting_angle)))
         if fin.name != name and math.dist(fin.position, wanted.position) < CLOSE_M and turn < CLOSE_RAD:
             return fin.name
     return None

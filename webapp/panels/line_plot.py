@@ -1,0 +1,88 @@
+"""A small plot of several lines over one axis, as all tabs draw it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+from viser import uplot
+
+from webapp.handles import put
+
+FONT = "11px sans-serif"
+Array = NDArray[np.float64]
+
+
+class LinePlot:
+    """A fixed number of lines; those that are not needed hold no numbers."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        colors: Sequence[str],
+        title: str,
+        below: str = "",
+        *,
+        height: int = 100,
+        widths: Sequence[float] = (1.5,),
+        visible: bool = False,
+    ) -> None:
+        """Build it, empty.
+
+        Args:
+            gui: the panel.
+            colors: of the lines, as CSS.
+            title: beside the vertical axis; where it is empty there is no such axis.
+            below: below the horizontal axis.
+            height: of the plot [px].
+            widths: of the lines [px], the last one for all that follow.
+            visible: whether it is shown from the start.
+        """
+        self._title, self._n_lines = title, len(colors)
+        thick = [widths[min(k, len(widths) - 1)] for k in range(len(colors))]
+        self._plot = gui.add_uplot(
+            (np.array([0.0, 1.0]), *(np.full(2, np.nan) for _ in colors)),
+            (
+                uplot.Series(label="x"),
+                *(
+                    uplot.Series(label="", stroke=color, width=width, spanGaps=True)
+                    for color, width in zip(colors, thick, strict=True)
+                ),
+            ),
+            scales=_scales((0.0, 1.0)),
+            axes=_axes(title, below),
+            legend=uplot.Legend(show=False),
+            cursor=uplot.Cursor(show=False),
+            height=height,
+            visible=visible,
+        )
+
+    def show(self, visible: bool) -> None:
+        """Show it, or hide it."""
+        put(self._plot, visible=visible)
+
+    def name(self, title: str, below: str) -> None:
+        """Other words at the axes."""
+        put(self._plot, axes=_axes(title, below))
+
+    def draw(self, x: Array, lines: Sequence[Array], ends: tuple[float, float]) -> None:
+        """Draw lines over `x`, between two ends of the vertical axis.
+
+        The scale is fixed: lines that hold no numbers would spoil an automatic one.
+        """
+        rest = [np.full(len(x), np.nan)] * (self._n_lines - len(lines))
+        put(self._plot, scales=_scales(ends))
+        put(self._plot, data=tuple(np.ascontiguousarray(line) for line in (x, *lines, *rest)))
+
+
+def _scales(ends: tuple[float, float]) -> dict[str, uplot.Scale]:
+    return {"x": uplot.Scale(time=False), "y": uplot.Scale(auto=False, range=ends)}
+
+
+def _axes(title: str, below: str) -> tuple[uplot.Axis, uplot.Axis]:
+    across = uplot.Axis(
+        label=below, labelSize=18 if below else 0, size=30 if below else 24, labelFont=FONT, font=FONT
+    )
+    if not title:
+        return across, uplot.Axis(show=False)
+    return across, uplot.Axis(label=title, labelSize=16, size=42, labelFont=FONT, font=FONT)
