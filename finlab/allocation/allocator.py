@@ -77,7 +77,10 @@ class Allocator(ABC):
             AllocationError: the method knows no such setting, or cannot work with its value.
         """
         self.check_options(changes)
-        return self._made_with({**self.options, **changes})
+        try:
+            return self._made_with({**self.options, **changes})
+        except (TypeError, AttributeError) as error:  # what a value of the wrong type meets first
+            raise AllocationError(f"method {self.name!r}: a setting has the wrong type ({error})") from error
 
     @classmethod
     def check_options(cls, names: Iterable[str]) -> None:

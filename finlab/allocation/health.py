@@ -56,8 +56,15 @@ class Health:
         Raises:
             AllocationError: a share out of range, an angle that is no number.
         """
-        kept = {name: (float(a), float(f), float(d)) for name, (a, f, d) in (running or {}).items()}
-        return cls(tuple((weak or {}).items()), tuple((stuck or {}).items()), tuple(kept.items()))
+        try:
+            shares, angles = ({k: float(v) for k, v in (d or {}).items()} for d in (weak, stuck))
+            kept = {name: (float(a), float(f), float(d)) for name, (a, f, d) in (running or {}).items()}
+        except (TypeError, ValueError, AttributeError) as error:
+            raise AllocationError(
+                "health: expected dictionaries by fin name, of shares, of angles and of commands "
+                f"(amplitude, frequency, zero direction), got weak={weak}, stuck={stuck}, running={running}"
+            ) from error
+        return cls(tuple(shares.items()), tuple(angles.items()), tuple(kept.items()))
 
     def applied_to(self, layout: Layout) -> Layout:
         """The layout with the limits that are left.

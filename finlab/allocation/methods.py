@@ -113,5 +113,8 @@ def _made(method: str, model: TrainedWeights | Normalization, options: Mapping[s
     module, name = METHODS[method]
     kind = getattr(import_module(module), name)
     kind.check_options(options)
-    allocator: Allocator = kind(model, **options)
+    try:
+        allocator: Allocator = kind(model, **options)
+    except (TypeError, AttributeError) as error:  # what a value of the wrong type meets first
+        raise AllocationError(f"method {method!r}: a setting has the wrong type ({error})") from error
     return allocator

@@ -35,12 +35,19 @@ class Policy:
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise CommandError(f"policy: expected one of {', '.join(KINDS)}, got {self.kind!r}")
-        weights = np.asarray(self.axis_weights, dtype=np.float64)
+        try:
+            weights = np.asarray(self.axis_weights, dtype=np.float64)
+        except (TypeError, ValueError):
+            weights = np.empty(0)
         if weights.shape != (6,) or not (
             np.isfinite(weights).all() and (weights >= 0).all() and weights.any()
         ):
             raise CommandError(
                 f"axis weights: expected six numbers from 0, not all 0, got {self.axis_weights}"
+            )
+        if not isinstance(self.order, Sequence) or any(isinstance(g, str) for g in self.order):
+            raise CommandError(
+                f"priority: expected groups of axes such as (('Fz',), ('Tx', 'Ty')), got {self.order}"
             )
         named = [axis for group in self.order for axis in group]
         if unknown := [axis for axis in named if axis not in AXES]:

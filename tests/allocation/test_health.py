@@ -85,3 +85,11 @@ def test_the_command_line_tells_what_is_left(capsys: pytest.CaptureFixture[str])
     for wrong in (["--health", "front_left"], ["--stuck", "front_left=up"], ["--running", "back_left=1,2"]):
         assert main(["allocate", "A", *wrench, *wrong]) == 2
         assert f"{wrong[0][2:]}: expected NAME=" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"weak": {"bow": "x"}}, {"stuck": {"bow": None}}, {"running": {"bow": (1.0, 2.0)}}, {"weak": 3}]
+)
+def test_health_of_the_wrong_type_is_refused_in_a_sentence(wrong: dict[str, object]) -> None:
+    with pytest.raises(AllocationError, match="health: expected dictionaries by fin name"):
+        Health.of(**wrong)  # type: ignore[arg-type]

@@ -290,3 +290,11 @@ def test_a_fin_without_freedom_still_gets_an_answer(learned: LearnedAllocator) -
         result = learned.allocate(layout, FAR, policy=policy)
         np.testing.assert_array_equal(result.command[0], [0.3, 1.0, 0.5])
         assert np.isfinite(result.command).all()
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"axis_weights": "abc"}, {"axis_weights": None}, {"order": 5}, {"order": ("Fz",)}]
+)
+def test_policies_of_the_wrong_type_are_refused_in_a_sentence(wrong: dict[str, object]) -> None:
+    with pytest.raises(CommandError, match=r"axis weights|groups of axes"):
+        Policy("priority", **wrong)  # type: ignore[arg-type]

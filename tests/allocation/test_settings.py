@@ -85,3 +85,11 @@ def test_editors_complete_the_settings_that_there_are() -> None:
         kinds = get_type_hints(settings)
         assert get_type_hints(options) == others | {f.name: kinds[f.name] for f in fields(settings)}
     assert list(get_type_hints(LearnedOptions)) == load_allocator("fast").option_names()
+
+
+@pytest.mark.parametrize("wrong", [{"n_candidates": "5"}, {"temperature": None}, {"energy_weights": 3}])
+def test_settings_of_the_wrong_type_are_refused_in_a_sentence(wrong: dict[str, Any]) -> None:
+    with pytest.raises(AllocationError, match="'learned': a setting has the wrong type"):
+        load_allocator("learned", **wrong)
+    with pytest.raises(AllocationError, match="'learned': a setting has the wrong type"):
+        load_allocator().with_settings(**wrong)

@@ -70,6 +70,8 @@ class LearnedAllocator(Allocator):
             CheckpointError: the checkpoint's networks are of another kind.
         """
         _check_kind(weights)
+        if not isinstance(energy_weights, EnergyWeights):
+            raise TypeError(f"energy_weights: expected EnergyWeights, got {energy_weights!r}")
         self.settings = Settings(**settings)
         self.weights, self.checkpoint = weights, weights.name
         self.normalization = weights.normalization
