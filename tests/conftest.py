@@ -24,8 +24,9 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     from finlab.inference.features import SIZES
     from finlab.inference.normalization import Normalization
+    from finlab.inference.weights import TrainedWeights
     from finlab.training.networks.allocator_network import AllocatorNetwork
-    from finlab.training.networks.checkpoint import Checkpoint, save_checkpoint
+    from finlab.training.networks.checkpoint import save_checkpoint, state_of
     from finlab.training.networks.surrogate import make_surrogate
     from finlab.training.presets import get_preset
 
@@ -33,12 +34,14 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("checkpoints") / "untrained"
     with torch.random.fork_rng():
         torch.manual_seed(0)
-        checkpoint = Checkpoint(
+        checkpoint = TrainedWeights(
             name=folder.name,
-            surrogate=make_surrogate(preset.surrogate),
+            surrogate_config=preset.surrogate,
+            surrogate=state_of(make_surrogate(preset.surrogate).state_dict()),
             normalization=Normalization(np.zeros(6), np.array([1.0, 1.0, 1.0, 0.1, 0.2, 0.3])),
             fin_model={"type": "drag"},
-            network=AllocatorNetwork(preset.network, SIZES[preset.network.features]),
+            network_config=preset.network,
+            network=state_of(AllocatorNetwork(preset.network, SIZES[preset.network.features]).state_dict()),
             preset=preset.name,
         )
     save_checkpoint(folder, checkpoint)

@@ -11,8 +11,8 @@ from tyro.conf import arg
 from tyro.extras import SubcommandApp
 
 if TYPE_CHECKING:
+    from finlab.inference.weights import TrainedWeights
     from finlab.layout import FinModelSpec
-    from finlab.training.networks.checkpoint import Checkpoint
 
 verbs = SubcommandApp()
 
@@ -147,7 +147,7 @@ def _check_counts(**counts: int | None) -> None:
             raise CommandError(f"--{name.replace('_', '-')}: expected a number from 1, got {value}")
 
 
-def _report(output: Path, checkpoint: "Checkpoint") -> None:
+def _report(output: Path, checkpoint: "TrainedWeights") -> None:
     """Say where the result lies and what was measured."""
     print(f"{output}: checkpoint {checkpoint.name}, preset {checkpoint.preset}, sha256 {checkpoint.sha256}")
     for group, values in checkpoint.metrics.items():

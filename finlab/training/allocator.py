@@ -10,9 +10,9 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from finlab.inference.checkpoint import resolve_checkpoint
+from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.inference.features import SIZES, fin_frame_features, geometry, raw_features
-from finlab.inference.weights import NetworkConfig
+from finlab.inference.weights import NetworkConfig, TrainedWeights
 from finlab.layout import FinModelSpec
 from finlab.physics import make_law
 from finlab.training import losses
@@ -27,11 +27,7 @@ from finlab.training.device import (
 )
 from finlab.training.loop import LoopSettings, train
 from finlab.training.networks.allocator_network import AllocatorNetwork
-from finlab.training.networks.checkpoint import (
-    Checkpoint,
-    load_checkpoint,
-    save_checkpoint,
-)
+from finlab.training.networks.checkpoint import save_checkpoint, state_of, surrogate_of
 from finlab.training.presets import AllocatorTraining, get_preset
 from finlab.training.surrogate import TRAIN_SEED
 
@@ -48,7 +44,7 @@ def train_allocator(
     stop_after: int | None = None,
     overrides: dict[str, Any] | None = None,
     network_overrides: dict[str, Any] | None = None,
-) -> Checkpoint:
+) -> TrainedWeights:
     """Train a preset's allocator network and write a whole checkpoint folder.
 
     A run that was stopped goes on where it was when called again with the same arguments. Under
@@ -68,14 +64,13 @@ def train_allocator(
     """
     recipe = get_preset(preset)
     recipe = replace(recipe, network=replace(recipe.network, **(network_overrides or {})))
-    base = load_checkpoint(resolve_checkpoint(surrogate))
+    base = read_checkpoint(resolve_checkpoint(surrogate))
     changes = {"steps": steps, "batch_size": batch_size, "learning_rate": learning_rate, **(overrides or {})}
     training = replace(recipe.allocator_training, **{k: v for k, v in changes.items() if v is not None})
     rank, world = join_processes()
     device = training_device()
     torch.manual_seed(seed)
     network = AllocatorNetwork(recipe.network, SIZES[recipe.network.features]).to(device)
-    base.surrogate.to(device)
     terms = make_terms(base, recipe.network, training, seed, device, rank, world)
     identity: dict[str, Any] = {
         "preset": preset,
@@ -86,12 +81,11 @@ def train_allocator(
     }
 
     def save(weights: dict[str, Tensor], step: int) -> None:
-        shipped = AllocatorNetwork(recipe.network, SIZES[recipe.network.features])
-        shipped.load_state_dict(weights, strict=True)
         done = {"steps_done": step, "samples": step * training.batch_size}
-        base.name, base.preset, base.network = out.name, preset, shipped
-        base.training["allocator"] = identity | done
-        save_checkpoint(out, base)
+        made = {**base.training, "allocator": identity | done}
+        config, state = recipe.network, state_of(weights)
+        whole = replace(base, preset=preset, network_config=config, network=state, training=made)
+        save_checkpoint(out, whole)
         plot_log(out)
 
     settings = LoopSettings(
@@ -104,11 +98,11 @@ def train_allocator(
     )
     train(network, terms, settings, out, identity, stop_after=stop_after, on_save=save)
     leave_processes()
-    return load_checkpoint(out) if rank == 0 else base
+    return read_checkpoint(out) if rank == 0 else base
 
 
 def make_terms(
-    base: Checkpoint,
+    base: TrainedWeights,
     network: NetworkConfig,
     training: AllocatorTraining,
     seed: int,
@@ -117,7 +111,7 @@ def make_terms(
     world: int = 1,
 ) -> Callable[[nn.Module, int], dict[str, Tensor]]:
     """The loss terms of a step, for this process's share of the batch."""
-    model = make_law(FinModelSpec.from_values(base.fin_model))
+    model, surrogate = make_law(FinModelSpec.from_values(base.fin_model)), surrogate_of(base).to(device)
     sampler = ForwardSampler(
         TRAIN_SEED + seed, training.batch_size, fin_model=model, varied_limits=training.varied_limits
     )
@@ -142,13 +136,11 @@ def make_terms(
         if training.guide == "samples":
             noise = seeded_generator(TRAIN_SEED + seed, step, device)
             whole = (share, training.batch_size)
-            guidance = losses.sample_guidance(
-                mixture, base.surrogate, batch, shifted, std, noise, whole
-            ).mean()
+            guidance = losses.sample_guidance(mixture, surrogate, batch, shifted, std, noise, whole).mean()
         else:
             soft, best = losses.mode_guidance(
                 mixture,
-                base.surrogate,
+                surrogate,
                 batch,
                 shifted,
                 std,

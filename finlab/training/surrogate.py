@@ -13,13 +13,14 @@ from torch import Tensor, nn
 
 from finlab.inference.learned_fin import REFERENCE
 from finlab.inference.normalization import Normalization
+from finlab.inference.weights import TrainedWeights
 from finlab.layout import FinModelSpec
 from finlab.physics import FinLaw, make_law
 from finlab.training.curves import plot_log
 from finlab.training.data.sampling import Batch, ForwardSampler
 from finlab.training.device import join_processes, leave_processes, share_of_batch, training_device
 from finlab.training.loop import LoopSettings, train
-from finlab.training.networks.checkpoint import Checkpoint, save_checkpoint
+from finlab.training.networks.checkpoint import save_checkpoint, state_of
 from finlab.training.networks.surrogate import CoefficientSurrogate, Surrogate, make_surrogate
 from finlab.training.presets import get_preset
 
@@ -42,7 +43,7 @@ def train_surrogate(
     steps: int | None = None,
     stop_after: int | None = None,
     fin_model: FinModelSpec | None = None,
-) -> Checkpoint:
+) -> TrainedWeights:
     """Train a preset's surrogate and write a checkpoint folder without an allocator network.
 
     Args:
@@ -82,17 +83,18 @@ def train_surrogate(
     weights = train(surrogate, terms, settings, out, identity, stop_after=stop_after)
     surrogate.load_state_dict(weights, strict=True)
     surrogate.cpu().eval().requires_grad_(False)
-    checkpoint = Checkpoint(
+    checkpoint = TrainedWeights(
         name=out.name,
-        surrogate=surrogate,
         normalization=normalization,
         fin_model=spec_to_dict(spec),
+        surrogate_config=recipe.surrogate,
+        surrogate=state_of(surrogate.state_dict()),
         preset=preset,
         training={"surrogate": identity | {"samples": total * training.batch_size}},
         metrics={"surrogate": surrogate_metrics(surrogate, model, seed + 1)},
     )
     if rank == 0:
-        save_checkpoint(out, checkpoint)
+        checkpoint = save_checkpoint(out, checkpoint)
         plot_log(out)
     leave_processes()
     return checkpoint

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from finlab.allocation.learned.learned_allocator import LearnedAllocator
-from finlab.inference.checkpoint import resolve_checkpoint
-from finlab.training.networks.checkpoint import Checkpoint, load_checkpoint
+from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
+from finlab.inference.weights import TrainedWeights
 
 
 @pytest.fixture
@@ -29,12 +29,12 @@ def force_table(tmp_path: Path) -> str:
 
 
 @pytest.fixture(scope="session")
-def default_checkpoint() -> Checkpoint:
+def default_checkpoint() -> TrainedWeights:
     """The shipped checkpoint `default`."""
-    return load_checkpoint(resolve_checkpoint("default"))
+    return read_checkpoint(resolve_checkpoint("default"))
 
 
 @pytest.fixture(scope="session")
-def learned(default_checkpoint: Checkpoint) -> LearnedAllocator:
+def learned(default_checkpoint: TrainedWeights) -> LearnedAllocator:
     """The product's default method with the shipped checkpoint."""
-    return LearnedAllocator(default_checkpoint.weights())
+    return LearnedAllocator(default_checkpoint)

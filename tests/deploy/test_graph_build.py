@@ -14,9 +14,10 @@ from finlab.assets import shipped_layouts
 from finlab.cli import main
 from finlab.deploy import build_graph, graph_bytes
 from finlab.errors import FinlabError
+from finlab.inference.checkpoint import read_checkpoint
 from finlab.inference.features import fin_frame_features, geometry
 from finlab.layout import stack_layouts
-from finlab.training.networks.checkpoint import load_checkpoint
+from finlab.training.networks.checkpoint import surrogate_of
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "finlab/deploy/graph.schema.json").read_text())
 WRENCH = ["--wrench", "0.5", "0", "0.5", "0", "0", "0"]
@@ -35,14 +36,14 @@ def test_graph_of_an_allocator(
     graph = build_graph(layout, allocator, failed)
     jsonschema.validate(json.loads(graph_bytes(graph)), SCHEMA)
     assert graph.layout == layout and graph.failed == failed
-    assert graph.checkpoint_sha256 == load_checkpoint(untrained_checkpoint).sha256
+    assert graph.checkpoint_sha256 == read_checkpoint(untrained_checkpoint).sha256
     assert [row is None for row in graph.features] == [name in failed for name in layout.names]
 
 
 def test_self_test_holds_on_the_surrogate(allocator: Allocator, untrained_checkpoint: Path) -> None:
     layout = finlab.load_layout(shipped_layouts()["penta"])
     graph = build_graph(layout, allocator)
-    surrogate = load_checkpoint(untrained_checkpoint).surrogate
+    surrogate = surrogate_of(read_checkpoint(untrained_checkpoint))
     arrays = [torch.tensor(a, dtype=torch.float32) for a in stack_layouts([layout])[:4]]
     for case in graph.self_test:
         command = torch.tensor([case.command])

@@ -11,7 +11,7 @@ from finlab.inference.learned_fin import LearnedFin
 from finlab.inference.weights import SurrogateConfig, TrainedWeights
 from finlab.layout import FinModelSpec
 from finlab.physics import make_law
-from finlab.training.networks.checkpoint import Checkpoint
+from finlab.training.networks.checkpoint import surrogate_of
 from finlab.training.networks.surrogate import CoefficientSurrogate
 
 
@@ -51,7 +51,7 @@ def test_shipped_fin_equals_the_shipped_surrogate(
     shipped: TrainedWeights,
 ) -> None:
     command = commands(500)
-    surrogate = Checkpoint.of(shipped).surrogate
+    surrogate = surrogate_of(shipped)
     assert isinstance(surrogate, CoefficientSurrogate)
     expected = surrogate.fin_force(torch.from_numpy(command).float()).numpy()
     np.testing.assert_allclose(LearnedFin(shipped.surrogate).force(command), expected, atol=1e-5)

@@ -12,7 +12,7 @@ from finlab.inference.network import NumpyNetwork
 from finlab.inference.weights import NetworkConfig
 from finlab.layout import random_layouts
 from finlab.training.networks.allocator_network import AllocatorNetwork
-from finlab.training.networks.checkpoint import Checkpoint
+from finlab.training.networks.checkpoint import network_of
 
 RANDOM = NetworkConfig(width=32, heads=4, transformer_layers=2, feedforward=40, n_components=6)
 
@@ -31,9 +31,7 @@ def random_network(joint: bool) -> AllocatorNetwork:
 def network(request: pytest.FixtureRequest) -> AllocatorNetwork:
     if request.param.startswith("random"):
         return random_network(joint=request.param.endswith("joint"))
-    trained = Checkpoint.of(read_checkpoint(resolve_checkpoint(request.param))).network
-    assert trained is not None
-    return trained
+    return network_of(read_checkpoint(resolve_checkpoint(request.param)))
 
 
 def copy_of(network: AllocatorNetwork) -> NumpyNetwork:

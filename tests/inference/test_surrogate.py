@@ -7,7 +7,7 @@ import torch
 from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.inference.surrogate import surrogate_on
 from finlab.layout import random_layout
-from finlab.training.networks.checkpoint import Checkpoint
+from finlab.training.networks.checkpoint import surrogate_of
 
 
 @pytest.mark.parametrize("name", ["default", "paper"])
@@ -20,7 +20,7 @@ def test_wrenches_are_those_of_the_trained_one(name: str, seed: int) -> None:
     command = (robot.lower + share * (robot.upper - robot.lower)).astype(np.float32)
     layout = (robot.position, robot.mounting_angle, robot.lower, robot.upper)
     tensors = [torch.tensor(part, dtype=torch.float32) for part in layout]
-    expected = Checkpoint.of(weights).surrogate(torch.from_numpy(command), *tensors).numpy()
+    expected = surrogate_of(weights)(torch.from_numpy(command), *tensors).numpy()
     surrogate = surrogate_on(robot, weights)
     np.testing.assert_allclose(surrogate.wrench(command[0]), expected[0], atol=2e-5)
     force, slopes = surrogate.fins.force_and_slopes(command[1])

@@ -8,16 +8,16 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from finlab.inference.weights import TrainedWeights
 from finlab.training import train_allocator, train_surrogate
 from finlab.training.loop import LOG_FILE, LoopSettings
-from finlab.training.networks.checkpoint import Checkpoint
 
 
 class Run(NamedTuple):
     """A finished run."""
 
     folder: Path
-    checkpoint: Checkpoint
+    checkpoint: TrainedWeights
 
     @property
     def log(self) -> list[dict[str, float]]:

@@ -10,17 +10,15 @@ import torch
 from safetensors.torch import load_file
 
 from finlab.errors import CheckpointError, DataError
-from finlab.inference.checkpoint import resolve_checkpoint
+from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.inference.features import SIZES
+from finlab.inference.weights import TrainedWeights
 from finlab.layout import FinModelSpec
 from finlab.physics import make_law
 from finlab.training import train_allocator, train_surrogate
 from finlab.training.allocator import make_terms
 from finlab.training.networks.allocator_network import AllocatorNetwork
-from finlab.training.networks.checkpoint import (
-    Checkpoint,
-    load_checkpoint,
-)
+from finlab.training.networks.checkpoint import network_of
 from finlab.training.networks.surrogate import make_surrogate
 from finlab.training.presets import get_preset
 from finlab.training.surrogate import surrogate_metrics
@@ -47,7 +45,7 @@ def same_weights(folder: Path, expected: Path) -> bool:
     return mine.keys() == theirs.keys() and all(torch.equal(mine[key], theirs[key]) for key in mine)
 
 
-def held_out_guidance(base: Checkpoint, network: AllocatorNetwork) -> float:
+def held_out_guidance(base: TrainedWeights, network: AllocatorNetwork) -> float:
     """Physics guidance on samples that no smoke run comes to see."""
     recipe = get_preset("smoke")
     training = replace(recipe.allocator_training, batch_size=1024)
@@ -63,17 +61,16 @@ def test_the_surrogate_learns(smoke_surrogate) -> None:
     learned = smoke_surrogate.checkpoint.metrics["surrogate"]
     assert learned["relative_force_error"] < 0.95 * fresh["relative_force_error"]
     assert learned["wrench_error_norm"] < 0.95 * fresh["wrench_error_norm"]
-    assert smoke_surrogate.checkpoint.network is None
+    assert smoke_surrogate.checkpoint.network_config is None
 
 
 def test_the_allocator_learns(tmp_path: Path) -> None:
-    base = load_checkpoint(resolve_checkpoint("default"))  # its surrogate knows what a fin can do
+    base = read_checkpoint(resolve_checkpoint("default"))  # its surrogate knows what a fin can do
     network = get_preset("smoke").network
     torch.manual_seed(0)
     fresh = held_out_guidance(base, AllocatorNetwork(network, SIZES[network.features]))
     run = train_allocator("smoke", tmp_path, surrogate=Path("default"), steps=100, learning_rate=3e-3)
-    assert run.network is not None
-    assert held_out_guidance(base, run.network) < 0.6 * fresh
+    assert held_out_guidance(base, network_of(run)) < 0.6 * fresh
     with (tmp_path / "log.csv").open(newline="") as file:
         loss = [float(row["loss"]) for row in csv.DictReader(file)]
     # A batch with an arc that ends near zero, by which energies are divided, may cost thrice as much.
@@ -102,7 +99,7 @@ def test_the_curves_are_drawn(smoke_surrogate, smoke_run) -> None:
 
 
 def test_the_checkpoint_says_how_it_was_made(smoke_surrogate, smoke_run) -> None:
-    checkpoint = load_checkpoint(smoke_run.folder)
+    checkpoint = read_checkpoint(smoke_run.folder)
     made = checkpoint.training["allocator"]
     assert (made["preset"], made["seed"], made["steps_done"], made["samples"]) == ("smoke", 0, 40, 40 * 128)
     assert made["surrogate_sha256"] == smoke_surrogate.checkpoint.sha256
@@ -203,5 +200,5 @@ def test_the_paper_s_recipe_runs(fewer_samples: None, tmp_path: Path) -> None:
     paper = train_allocator(
         "paper", tmp_path / "paper", surrogate=tmp_path / "surrogate", steps=2, batch_size=32
     )
-    assert paper.network is not None and not paper.network.config.joint
+    assert not paper.check_network().joint
     assert (tmp_path / "paper" / "curves.png").exists()

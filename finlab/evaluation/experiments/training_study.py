@@ -112,9 +112,7 @@ def train_and_run(
     )
     train_s = time.perf_counter() - start
     physics = read_checkpoint(resolve_checkpoint("default"))
-    weights = replace(
-        trained.weights(), surrogate=physics.surrogate, surrogate_config=physics.surrogate_config
-    )
+    weights = replace(trained, surrogate=physics.surrogate, surrogate_config=physics.surrogate_config)
     raw = run_method(PaperAllocator(weights, refinement="none"), cases, seed=seed)
     few_steps = PaperAllocator(weights, refinement="levenberg-marquardt", n_steps=LM_STEPS)
     refined = run_method(few_steps, cases, seed=seed)

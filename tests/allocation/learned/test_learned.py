@@ -1,6 +1,7 @@
 """The product's default method with the shipped checkpoint: exact by the plant, inside limits, never NaN."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +11,10 @@ from finlab.allocation import Allocator, load_allocator
 from finlab.allocation.learned.learned_allocator import CHUNK, LearnedAllocator
 from finlab.assets import shipped_layouts
 from finlab.errors import CheckpointError
-from finlab.inference.features import SIZES
-from finlab.inference.weights import NetworkConfig, SurrogateConfig
+from finlab.inference.checkpoint import read_checkpoint
+from finlab.inference.weights import NetworkConfig, SurrogateConfig, TrainedWeights
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout, random_layout
 from finlab.physics import Plant
-from finlab.training.networks.allocator_network import AllocatorNetwork
-from finlab.training.networks.checkpoint import Checkpoint, load_checkpoint
-from finlab.training.networks.surrogate import make_surrogate
 
 GOOD = 5e-3
 """Normalized error below which an answer counts as exact here."""
@@ -139,13 +137,13 @@ def test_what_cannot_be_done_is_done_as_far_as_possible(learned: LearnedAllocato
 
 
 def test_the_same_question_gets_the_same_answer(
-    learned: LearnedAllocator, default_checkpoint: Checkpoint
+    learned: LearnedAllocator, default_checkpoint: TrainedWeights
 ) -> None:
     layout = load_layout(shipped_layouts()["A"])
     target = reachable(layout, 1)[0]
     first = learned.allocate(layout, target, seed=3)
     learned.allocate(layout, -target, seed=9)  # what was asked in between leaves no trace
-    for other in (learned, LearnedAllocator(default_checkpoint.weights())):
+    for other in (learned, LearnedAllocator(default_checkpoint)):
         again = other.allocate(layout, target, seed=3)
         np.testing.assert_array_equal(again.command, first.command)
         assert again.candidates is not None and first.candidates is not None
@@ -202,9 +200,9 @@ def test_candidates_are_offered_best_first(learned: LearnedAllocator) -> None:
     ],
 )
 def test_every_option_still_answers_exactly(
-    options: dict[str, float], default_checkpoint: Checkpoint
+    options: dict[str, float], default_checkpoint: TrainedWeights
 ) -> None:
-    method = LearnedAllocator(default_checkpoint.weights(), **options)  # type: ignore[arg-type]
+    method = LearnedAllocator(default_checkpoint, **options)  # type: ignore[arg-type]
     layout = load_layout(shipped_layouts()["A"])
     result = method.allocate(layout, reachable(layout, 1)[0])
     assert result.err_norm < GOOD and keeps_limits(layout, result.command)
@@ -219,18 +217,14 @@ def test_a_network_that_learned_nothing_still_keeps_the_limits(untrained_checkpo
 
 
 def test_refuses_checkpoints_of_the_other_kind(untrained_checkpoint: Path) -> None:
-    checkpoint = load_checkpoint(untrained_checkpoint)
-    whole = checkpoint.network
-    checkpoint.network = None
+    whole = read_checkpoint(untrained_checkpoint)
     with pytest.raises(CheckpointError, match="'untrained'.* holds a surrogate only"):
-        LearnedAllocator(checkpoint.weights())
-    sizes = NetworkConfig(features="raw", joint=False, width=8, heads=2, feedforward=8, n_components=2)
-    checkpoint.network = AllocatorNetwork(sizes, SIZES["raw"])
+        LearnedAllocator(replace(whole, network_config=None, network={}))
+    per_fin = NetworkConfig(features="raw", joint=False, width=8, heads=2, feedforward=8, n_components=2)
     with pytest.raises(CheckpointError, match="needs a joint-mixture network"):
-        LearnedAllocator(checkpoint.weights())
-    checkpoint.network, checkpoint.surrogate = whole, make_surrogate(SurrogateConfig("mlp", (8,)))
+        LearnedAllocator(replace(whole, network_config=per_fin))
     with pytest.raises(CheckpointError, match="kind `coefficient`, got 'mlp'; use method `paper`"):
-        LearnedAllocator(checkpoint.weights())
+        LearnedAllocator(replace(whole, surrogate_config=SurrogateConfig("mlp", (8,))))
 
 
 def test_turning_the_robot_does_not_make_it_worse(learned: LearnedAllocator) -> None:

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,18 +14,18 @@ from finlab.errors import AllocationError, CheckpointError
 from finlab.inference.coordinates import to_command, to_normalized
 from finlab.inference.features import SIZES
 from finlab.inference.normalization import Normalization
-from finlab.inference.weights import NetworkConfig, SurrogateConfig
+from finlab.inference.weights import NetworkConfig, SurrogateConfig, TrainedWeights
 from finlab.layout import Fin, Layout, Limits, load_layout
 from finlab.physics import Plant
 from finlab.training.networks.allocator_network import AllocatorNetwork
-from finlab.training.networks.checkpoint import Checkpoint
+from finlab.training.networks.checkpoint import state_of, surrogate_of
 from finlab.training.networks.surrogate import make_surrogate
 
 TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]
 
 
 @pytest.fixture(scope="module")
-def checkpoint() -> Checkpoint:
+def checkpoint() -> TrainedWeights:
     """A small network and surrogate of the paper's kind, with random weights."""
     with torch.random.fork_rng():
         torch.manual_seed(0)
@@ -37,12 +38,15 @@ def checkpoint() -> Checkpoint:
             feedforward=16,
             n_components=4,
         )
-        return Checkpoint(
+        surrogate = SurrogateConfig("mlp", (32,))
+        return TrainedWeights(
             name="tiny",
-            surrogate=make_surrogate(SurrogateConfig("mlp", (32,))).requires_grad_(False),
+            surrogate_config=surrogate,
+            surrogate=state_of(make_surrogate(surrogate).state_dict()),
             normalization=Normalization(np.full(6, 0.01), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])),
             fin_model={"type": "drag"},
-            network=AllocatorNetwork(sizes, SIZES["raw"]).eval().requires_grad_(False),
+            network_config=sizes,
+            network=state_of(AllocatorNetwork(sizes, SIZES["raw"]).state_dict()),
         )
 
 
@@ -76,9 +80,9 @@ ABLATIONS: list[dict[str, object]] = [
 
 @pytest.mark.parametrize("options", ABLATIONS)
 def test_every_variant_keeps_the_limits_bit_for_bit(
-    options: dict[str, object], checkpoint: Checkpoint, robot: Layout
+    options: dict[str, object], checkpoint: TrainedWeights, robot: Layout
 ) -> None:
-    method = PaperAllocator(checkpoint.weights(), n_steps=5, **options)  # type: ignore[arg-type]
+    method = PaperAllocator(checkpoint, n_steps=5, **options)  # type: ignore[arg-type]
     targets = np.random.default_rng(0).normal(size=(6, 6)) * np.array([[1.0], [1], [1], [50], [0], [1e5]])
     assert keeps_limits(robot, method.allocate_batch(robot, targets).command)
     result = method.allocate(robot, TARGET, seed=1)
@@ -89,18 +93,18 @@ def test_every_variant_keeps_the_limits_bit_for_bit(
 
 @pytest.mark.parametrize("options", ABLATIONS)
 def test_the_same_seed_gives_the_same_answer(
-    options: dict[str, object], checkpoint: Checkpoint, robot: Layout
+    options: dict[str, object], checkpoint: TrainedWeights, robot: Layout
 ) -> None:
-    method = PaperAllocator(checkpoint.weights(), n_steps=5, **options)  # type: ignore[arg-type]
+    method = PaperAllocator(checkpoint, n_steps=5, **options)  # type: ignore[arg-type]
     first, second, other = (method.allocate(robot, TARGET, seed=seed).command for seed in (4, 4, 5))
     np.testing.assert_array_equal(first, second)
     if not options.get("mean_only"):
         assert not np.array_equal(first, other)
 
 
-def test_refinement_lowers_what_the_surrogate_sees(checkpoint: Checkpoint, robot: Layout) -> None:
+def test_refinement_lowers_what_the_surrogate_sees(checkpoint: TrainedWeights, robot: Layout) -> None:
     def believed(**options: object) -> float:
-        method = PaperAllocator(checkpoint.weights(), **options)  # type: ignore[arg-type]
+        method = PaperAllocator(checkpoint, **options)  # type: ignore[arg-type]
         wrench = method.allocate_batch(robot, targets).wrench_surrogate
         return float(method.normalization.error(wrench, targets).mean())
 
@@ -109,16 +113,16 @@ def test_refinement_lowers_what_the_surrogate_sees(checkpoint: Checkpoint, robot
     assert refined < 0.9 * ranked < 0.9 * mean
 
 
-def test_answers_believe_what_the_surrogate_says(checkpoint: Checkpoint, robot: Layout) -> None:
-    result = PaperAllocator(checkpoint.weights(), n_steps=5).allocate(robot, TARGET)
+def test_answers_believe_what_the_surrogate_says(checkpoint: TrainedWeights, robot: Layout) -> None:
+    result = PaperAllocator(checkpoint, n_steps=5).allocate(robot, TARGET)
     layout = [(fin.position, fin.mounting_angle, fin.limits.lower, fin.limits.upper) for fin in robot.fins]
     rest = [torch.tensor(np.array(value), dtype=torch.float32) for value in zip(*layout, strict=True)]
-    wrench = checkpoint.surrogate(torch.tensor(result.command, dtype=torch.float32), *rest)
+    wrench = surrogate_of(checkpoint)(torch.tensor(result.command, dtype=torch.float32), *rest)
     np.testing.assert_allclose(result.wrench_surrogate, wrench.numpy(), atol=1e-4)
 
 
-def test_candidates_come_best_first(checkpoint: Checkpoint, robot: Layout) -> None:
-    method = PaperAllocator(checkpoint.weights(), n_candidates=20, n_refined=3, n_steps=5)
+def test_candidates_come_best_first(checkpoint: TrainedWeights, robot: Layout) -> None:
+    method = PaperAllocator(checkpoint, n_candidates=20, n_refined=3, n_steps=5)
     result = method.allocate(robot, TARGET)
     assert result.candidates is not None and result.samples is not None
     assert result.candidates.source == ("refined",) * 3 and result.samples.source == ("sample",) * 20
@@ -128,8 +132,8 @@ def test_candidates_come_best_first(checkpoint: Checkpoint, robot: Layout) -> No
         np.testing.assert_allclose(offered.err_norm, error, atol=1e-3)
 
 
-def test_failed_fins_are_left_out(checkpoint: Checkpoint, robot: Layout) -> None:
-    method = PaperAllocator(checkpoint.weights(), n_steps=5)
+def test_failed_fins_are_left_out(checkpoint: TrainedWeights, robot: Layout) -> None:
+    method = PaperAllocator(checkpoint, n_steps=5)
     lost = robot.names[2]
     result = method.allocate(robot, TARGET, failed=[lost])
     assert np.isnan(result.command[2]).all()
@@ -137,8 +141,8 @@ def test_failed_fins_are_left_out(checkpoint: Checkpoint, robot: Layout) -> None
     np.testing.assert_array_equal(np.delete(result.command, 2, axis=0), expected)
 
 
-def test_targets_beyond_one_chunk_get_their_answers(checkpoint: Checkpoint) -> None:
-    method = PaperAllocator(checkpoint.weights(), n_candidates=2, refinement="none")
+def test_targets_beyond_one_chunk_get_their_answers(checkpoint: TrainedWeights) -> None:
+    method = PaperAllocator(checkpoint, n_candidates=2, refinement="none")
     layout = Layout("pair", (Fin("a", (0.1, 0.0, 0.0), 0.0), Fin("b", (-0.1, 0.0, 0.0), 2.0)))
     targets = np.random.default_rng(0).normal(size=(CHUNK + 1, 6))
     batch = method.allocate_batch(layout, targets)
@@ -147,8 +151,8 @@ def test_targets_beyond_one_chunk_get_their_answers(checkpoint: Checkpoint) -> N
     np.testing.assert_allclose(batch.command[CHUNK], last.command[0], atol=1e-6)
 
 
-def test_on_our_networks_it_reaches_the_target(default_checkpoint: Checkpoint) -> None:
-    method = PaperAllocator(default_checkpoint.weights())
+def test_on_our_networks_it_reaches_the_target(default_checkpoint: TrainedWeights) -> None:
+    method = PaperAllocator(default_checkpoint)
     layout = load_layout(shipped_layouts()["A"])
     lower = layout.lower
     upper = layout.upper
@@ -158,17 +162,17 @@ def test_on_our_networks_it_reaches_the_target(default_checkpoint: Checkpoint) -
     assert np.median(method.normalization.error(Plant(layout).wrench(command), targets)) < 0.02
 
 
-def test_refuses_options_nobody_knows(checkpoint: Checkpoint) -> None:
+def test_refuses_options_nobody_knows(checkpoint: TrainedWeights) -> None:
     with pytest.raises(AllocationError, match="warm_start: expected one of mdn, random, got 'magic'"):
-        PaperAllocator(checkpoint.weights(), warm_start="magic")
+        PaperAllocator(checkpoint, warm_start="magic")
     with pytest.raises(AllocationError, match="ranking: expected one of physics, nll, got 'magic'"):
-        PaperAllocator(checkpoint.weights(), ranking="magic")
+        PaperAllocator(checkpoint, ranking="magic")
 
 
-def test_refuses_a_checkpoint_without_network(checkpoint: Checkpoint) -> None:
-    alone = Checkpoint("alone", checkpoint.surrogate, checkpoint.normalization, {"type": "drag"})
+def test_refuses_a_checkpoint_without_network(checkpoint: TrainedWeights) -> None:
+    alone = replace(checkpoint, name="alone", network_config=None, network={})
     with pytest.raises(CheckpointError, match="checkpoint 'alone' holds a surrogate only"):
-        PaperAllocator(alone.weights())
+        PaperAllocator(alone)
 
 
 def tensors_of(robot: Layout) -> list[torch.Tensor]:
@@ -176,10 +180,10 @@ def tensors_of(robot: Layout) -> list[torch.Tensor]:
     return [torch.tensor(part, dtype=torch.float32) for part in layout]
 
 
-def test_adam_goes_where_torch_goes(checkpoint: Checkpoint, robot: Layout) -> None:
+def test_adam_goes_where_torch_goes(checkpoint: TrainedWeights, robot: Layout) -> None:
     """The whole refinement in PyTorch, from the raw candidates that the method drew."""
-    method = PaperAllocator(checkpoint.weights(), n_candidates=3, n_refined=3, gamma=0.05, n_steps=25)
-    before = PaperAllocator(checkpoint.weights(), n_candidates=3, n_refined=3, gamma=0.05, refinement="none")
+    method = PaperAllocator(checkpoint, n_candidates=3, n_refined=3, gamma=0.05, n_steps=25)
+    before = PaperAllocator(checkpoint, n_candidates=3, n_refined=3, gamma=0.05, refinement="none")
     target = np.array(TARGET) * 0.3
     start = before.allocate(robot, target).candidates
     assert start is not None
@@ -191,7 +195,7 @@ def test_adam_goes_where_torch_goes(checkpoint: Checkpoint, robot: Layout) -> No
     for step in range(25):
         optimizer.param_groups[0]["lr"] = ADAM_RATE * (1.0 - 0.95 * step / 25)
         command = to_command(x, lower, upper)
-        error = (checkpoint.surrogate(command, *layout) - wanted) / std
+        error = (surrogate_of(checkpoint)(command, *layout) - wanted) / std
         a, f, d = (command / upper.abs()).unbind(-1)
         energy = (a * a + f * f + 0.1 * d * d + a * f).sum(-1)
         optimizer.zero_grad()
@@ -210,15 +214,15 @@ def test_adam_goes_where_torch_goes(checkpoint: Checkpoint, robot: Layout) -> No
 
 
 def test_levenberg_marquardt_reaches_what_the_surrogate_can_give(
-    checkpoint: Checkpoint, robot: Layout
+    checkpoint: TrainedWeights, robot: Layout
 ) -> None:
     """A target that the surrogate itself gives is met to rounding, correction included."""
-    method = PaperAllocator(checkpoint.weights(), refinement="levenberg-marquardt", n_refined=8)
+    method = PaperAllocator(checkpoint, refinement="levenberg-marquardt", n_refined=8)
     share = np.random.default_rng(3).random((8, robot.n_fins, 3))
     command = torch.tensor(robot.lower + share * (robot.upper - robot.lower), dtype=torch.float32)
-    targets = checkpoint.surrogate(command, *tensors_of(robot)).numpy().astype(np.float64)
+    targets = surrogate_of(checkpoint)(command, *tensors_of(robot)).numpy().astype(np.float64)
     error = method.normalization.error(method.allocate_batch(robot, targets).wrench_surrogate, targets)
-    raw = PaperAllocator(checkpoint.weights(), refinement="none").allocate_batch(robot, targets)
+    raw = PaperAllocator(checkpoint, refinement="none").allocate_batch(robot, targets)
     assert np.median(error) < 0.05 * np.median(method.normalization.error(raw.wrench_surrogate, targets))
 
 
@@ -247,7 +251,7 @@ def test_the_shipped_checkpoint_answers_without_torch() -> None:
     ],
 )
 def test_refuses_settings_that_leave_nothing_to_answer_with(
-    options: dict[str, object], message: str, checkpoint: Checkpoint
+    options: dict[str, object], message: str, checkpoint: TrainedWeights
 ) -> None:
     with pytest.raises(AllocationError, match=message):
-        PaperAllocator(checkpoint.weights(), **options)
+        PaperAllocator(checkpoint, **options)
