@@ -225,4 +225,6 @@ def test_fins_that_the_networks_do_not_know_are_refused(
 def test_export_refuses_names_that_are_neither(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", "A", "-o", "A.graph.json", "--zip"]) == 2
     assert "a graph file alone is not zipped" in capsys.readouterr().err
+    assert main(["export", "A", "-o", "A", "--zip", "--onnx"]) == 2
+    assert "leave out --zip" in capsys.readouterr().err
     assert checkpoint_path().is_dir()

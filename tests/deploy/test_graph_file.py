@@ -175,3 +175,13 @@ def test_wrong_name_and_missing_folder_are_refused(tmp_path: Path) -> None:
         write_graph(graph, tmp_path / "A.json")
     with pytest.raises(LayoutError, match="cannot be written: No such file or directory"):
         write_graph(graph, tmp_path / "nowhere" / "A.graph.json")
+
+
+def test_stands_in_for_a_layout_file_everywhere(tmp_path: Path) -> None:
+    layout = load_layout("ucat")
+    write_graph(make_graph(layout, failed=layout.names[:1]), tmp_path / "x.graph.json")
+    assert load_layout(tmp_path / "x.graph.json") == load_layout(str(tmp_path / "x.graph.json")) == layout
+    text = (tmp_path / "x.graph.json").read_text()
+    (tmp_path / "x.graph.json").write_text(text.replace("0.", "1.", 1))
+    with pytest.raises(LayoutError, match="checksum: does not fit the contents"):
+        load_layout(tmp_path / "x.graph.json")

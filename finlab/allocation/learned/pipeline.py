@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.learned.prepared import Prepared, prepare
-from finlab.allocation.learned.proposal import Proposal, Proposer, propose
+from finlab.allocation.learned.proposal import Proposal, propose
 from finlab.allocation.learned.receding_horizon import plan_ahead
 from finlab.allocation.learned.refine_missed import MISSED, FallbackForces, nearest_forces, refine_missed
 from finlab.allocation.learned.refined_candidates import RANKING, RefinedCandidates, rank, refine_candidates
@@ -70,7 +70,6 @@ class Pipeline:
         self.energy_weights = energy_weights
         self.settings, self.normalization = self._checked(settings), weights.normalization
         self.network = NumpyNetwork(weights.network, sizes.heads, sizes.n_components)
-        self.propose: Proposer = partial(propose, self.network)
         fin = LearnedFin(weights.surrogate)
         std = self.normalization.std
         self.prepare = lru_cache(maxsize=128)(lambda layout: prepare(layout, fin, std, energy_weights))
@@ -110,7 +109,8 @@ class Pipeline:
         std, settings = self.normalization.std, self.settings
         target = targets / std
         centred = target - self.normalization.mean / std
-        proposal = self.propose(prepared, centred, target, settings.n_candidates, settings.temperature, seed)
+        drawn = settings.n_candidates, settings.temperature, seed
+        proposal = propose(self.network, prepared, centred, target, *drawn)
         if previous is None:
             seeds = self._seeds(prepared, proposal)
             candidates = self._descend(prepared, target, proposal, seeds, fallback)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from finlab.allocation.learned.prepared import Prepared
 from finlab.inference.features import fin_frame_features
 from finlab.inference.mixture import MixtureArrays
+from finlab.inference.network import NumpyNetwork
 
 Array = NDArray[Any]
 
@@ -33,34 +34,7 @@ class Proposal(NamedTuple):
     """Energy proxy (N, K)."""
 
 
-class Network(Protocol):
-    """The allocator network, whatever runs it."""
-
-    def __call__(
-        self, x: Array, target: Array, lower: NDArray[np.floating], upper: NDArray[np.floating]
-    ) -> MixtureArrays:
-        """The mixture; arguments as in `NumpyNetwork`."""
-        ...
-
-
-class Proposer(Protocol):
-    """`propose` with its network, or an engine that does the whole of it by itself."""
-
-    def __call__(
-        self,
-        prepared: Prepared,
-        centred: Array,
-        target: Array,
-        n_candidates: int,
-        temperature: float,
-        seed: int,
-        /,
-    ) -> Proposal:
-        """K candidates for each target; arguments as in `propose`."""
-        ...
-
-
-def predict(network: Network, prepared: Prepared, centred: Array) -> MixtureArrays:
+def predict(network: NumpyNetwork, prepared: Prepared, centred: Array) -> MixtureArrays:
     """The network's mixture for normalized, centred targets (N, 6)."""
     x = fin_frame_features(prepared.geometry, centred).astype(np.float32)
     return network(x, centred.astype(np.float32), prepared.lower, prepared.upper)
@@ -114,7 +88,7 @@ def draws_of_one(seed: int, extra: int, n: int) -> tuple[Array, Array]:
 
 
 def propose(
-    network: Network,
+    network: NumpyNetwork,
     prepared: Prepared,
     centred: Array,
     target: Array,
