@@ -102,7 +102,8 @@ def numbered(button: str, count: int) -> int | None:
 def on_user_click(handle: Any, act: Callable[[], None]) -> None:
     """Call `act()` on viser's event loop when the user presses a button."""
 
-    @handle.on_click
-    async def _clicked(event: Any) -> None:
+    async def clicked(event: Any) -> None:
         if event.client is not None:
             act()
+
+    handle.on_click(clicked)

@@ -55,7 +55,7 @@ def _guarded(guard: Guard) -> Iterator[None]:
         yield
 
 
-def put_marks(slider: viser.GuiSliderHandle, marks: tuple[tuple[float, str], ...]) -> None:
+def put_marks(slider: viser.GuiSliderHandle[float], marks: tuple[tuple[float, str], ...]) -> None:
     """Other marks (value and text) on a slider that stands already; viser takes them only when it is made."""
     wanted = tuple(_messages.GuiSliderMark(value=value, label=text) for value, text in marks)
     if slider._marks != wanted:

@@ -50,12 +50,12 @@ def check_graph_document(data: Any) -> Mapping[str, Any]:
         raise LayoutError(f"expected {FORMAT}, got {got}", "format")
     if data.get("version") != VERSION or data["version"] is True:
         raise LayoutError(f"this finlab reads version {VERSION}, got {shown(data.get('version'))}", "version")
-    data = mapping(data, "", KEYS, required=KEYS)
-    if data["checksum"] != checksum_of(data):
+    document: Mapping[str, Any] = mapping(data, "", KEYS, required=KEYS)
+    if document["checksum"] != checksum_of(document):
         raise LayoutError("does not fit the contents; the file was changed, export it again", "checksum")
-    if data["units"] != UNITS:
-        raise LayoutError(f"expected {UNITS}, got {shown(data['units'])}", "units")
-    return data
+    if document["units"] != UNITS:
+        raise LayoutError(f"expected {UNITS}, got {shown(document['units'])}", "units")
+    return document
 
 
 def checksum_of(document: Mapping[str, Any]) -> str:

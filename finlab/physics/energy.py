@@ -66,7 +66,7 @@ def command_energy(
 ) -> NDArray[Any]:
     """`J_en` of whole robots: commands (..., n, 3) to energies (...,). Failed fins (NaN) count nothing."""
     energy = fin_energy(command, upper, weights)
-    return np.where(np.isnan(energy), 0.0, energy).sum(-1)
+    return np.asarray(np.where(np.isnan(energy), 0.0, energy).sum(-1))
 
 
 class EnergyMeter:
@@ -84,7 +84,7 @@ class EnergyMeter:
         scale, squares = self._rough if command.dtype == np.float32 else self._exact
         scaled = command / scale
         a, f = scaled[..., 0], scaled[..., 1]
-        beats = np.einsum("rn,rn->r", a, f)
+        beats: NDArray[Any] = np.einsum("rn,rn->r", a, f)
         beats *= self.weights.product
         if self.weights.inertial:
             beats += self.weights.inertial * ((a * f) ** 2 * f).sum(-1)
@@ -97,7 +97,7 @@ class EnergyMeter:
         scale, squares = self._rough if command.dtype == np.float32 else self._exact
         scaled = command / scale
         a, f, w = scaled[..., 0], scaled[..., 1], self.weights
-        slopes = 2 * squares.reshape(scale.shape) * scaled
+        slopes: NDArray[Any] = 2 * squares.reshape(scale.shape) * scaled
         slopes[..., 0] += w.product * f + w.inertial * 2 * a * f**3
         slopes[..., 1] += w.product * a + w.inertial * 3 * (a * f) ** 2
         slopes /= scale

@@ -101,7 +101,7 @@ def train(
             group["lr"] = learning_rate(settings, step)
         optimizer.zero_grad(set_to_none=True)
         terms = terms_of_step(wrapped, step)
-        terms["loss"].backward()  # type: ignore[no-untyped-call]
+        terms["loss"].backward()
         nn.utils.clip_grad_norm_(model.parameters(), settings.clip)
         optimizer.step()
         if average:

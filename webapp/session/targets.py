@@ -33,7 +33,7 @@ def axis_reach(layout: Layout, failed: tuple[str, ...] = ()) -> NDArray[np.float
 @lru_cache(maxsize=64)
 def full_thrust(layout: Layout) -> NDArray[np.float64]:
     """Mean thrust (n,) of each fin at its largest amplitude and frequency [N]."""
-    return fin_sets(layout).radius[0]
+    return np.asarray(fin_sets(layout).radius[0])
 
 
 def slider_end(reach: float) -> float:

@@ -136,7 +136,7 @@ class _EnergyForm:
         result = self.diagonal * value
         result[..., 0] += self.product * value[..., 1]
         result[..., 1] += self.product * value[..., 0]
-        return result * self.slope
+        return np.asarray(result * self.slope)
 
     def inverse(self, damping: Array, held: Mask) -> tuple[Array, Array]:
         """Inverse of damping plus energy: diagonal (B, n, 3) and amplitude-frequency entry (B, n).
@@ -208,7 +208,7 @@ def _damped_step(
     matrix[:, np.arange(6), np.arange(6)] += 1.0
     missing = residual + np.einsum("bij,bj->bi", slope, rest.reshape(n_rows, -1))
     multiplier = np.linalg.solve(matrix, missing[..., None])[..., 0]
-    return rest - np.einsum("bij,bi->bj", weighted, multiplier).reshape(pull.shape)
+    return np.asarray(rest - np.einsum("bij,bi->bj", weighted, multiplier).reshape(pull.shape))
 
 
 def _objective(
@@ -219,7 +219,8 @@ def _objective(
     sigma: Array,
     options: DescentOptions,
 ) -> Array:
-    error = (((wrench - target) / sigma) ** 2).sum(axis=-1)
+    error: Array = (((wrench - target) / sigma) ** 2).sum(axis=-1)
     if options.energy_tradeoff == 0:
         return error
-    return error + options.energy_tradeoff * command_energy(command, plant.upper, options.energy_weights)
+    error += options.energy_tradeoff * command_energy(command, plant.upper, options.energy_weights)
+    return error

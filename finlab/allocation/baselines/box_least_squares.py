@@ -86,7 +86,7 @@ def _search(
     which always falls.
     """
     lipschitz = np.abs(h).sum(axis=2).max(axis=1, keepdims=True)
-    best = np.clip(at - slope / lipschitz, low, high)
+    best: Array = np.clip(at - slope / lipschitz, low, high)
     pending = np.arange(len(at))
     length = 1.0
     for _ in range(settings.halvings):

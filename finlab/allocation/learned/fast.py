@@ -79,7 +79,7 @@ class FastAllocator(LearnedAllocator):
             return super()._solve(layout, targets, seed=seed, previous=None, fallback=fallback)
         command, _ = force_space.realize(prepared.planar, planar)
         # Fins that turn fully may have their arc anywhere, such as from 0 to a whole turn.
-        command = prepared.commands.clamp_in_place(command)
+        prepared.commands.clamp_in_place(command)
         wrench = targets - planar.residual * self.normalization.std
         if missed.any():
             slow = super()._solve(layout, targets[missed], seed=seed, previous=None, fallback=fallback)

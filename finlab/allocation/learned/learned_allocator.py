@@ -146,7 +146,8 @@ class LearnedAllocator(Allocator):
     def refined(self, layout: Layout, wrench: ArrayLike, command: Array, n_steps: int) -> Array:
         """A command (n, 3) of fins that all work after some Levenberg-Marquardt steps."""
         target = np.asarray(wrench, dtype=float)[None] / self.normalization.std
-        return refine(self.pipeline.prepare(layout).commands, target, command[None], n_steps).command[0]
+        found = refine(self.pipeline.prepare(layout).commands, target, command[None], n_steps)
+        return np.asarray(found.command[0])
 
     def _surrogate_forces(self, layout: Layout, command: Array) -> Array:
         fins = self.pipeline.prepare(layout).commands

@@ -112,7 +112,8 @@ class CommandProblem:
         np.mod(direction, limits.turn, out=direction)
         direction += limits.seam
         np.maximum(command, limits.lower, out=command)
-        return np.minimum(command, limits.upper, out=command)
+        np.minimum(command, limits.upper, out=command)
+        return command
 
 
 class Refined(NamedTuple):

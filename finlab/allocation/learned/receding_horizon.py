@@ -196,7 +196,7 @@ def _changes(start: Array, goal: Array, shapes: tuple[tuple[int, int], ...]) -> 
     """From a trajectory (H, n, 2) to each of G others (G, H, n, 2), in each of S shapes: (S G, H, n, 2)."""
     tick = np.arange(1.0, len(start) + 1.0)
     share = np.array([np.clip((tick - wait) / ramp, 0.0, 1.0) for wait, ramp in shapes])
-    mixed = start + share[:, None, :, None, None] * (goal - start)
+    mixed: Array = start + share[:, None, :, None, None] * (goal - start)
     return mixed.reshape(-1, *start.shape)
 
 

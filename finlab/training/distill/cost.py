@@ -61,4 +61,5 @@ def energy(forces: Forces, mask: Tensor) -> Tensor:
     beat: Tensor = FULL_ENERGY * (size + 1e-6).sqrt().clamp_max(1.0)
     # A fin at rest points where it costs nothing.
     turned = DIRECTION * forces.direction.square() * (size / 0.01).clamp_max(1.0)
-    return ((beat + turned + OVERLOAD * (size - 1.0).clamp_min(0.0)) * mask).sum(-1)
+    spent: Tensor = (beat + turned + OVERLOAD * (size - 1.0).clamp_min(0.0)) * mask
+    return spent.sum(-1)
