@@ -74,7 +74,7 @@ class EnergyMeter:
 
     def __init__(self, upper: NDArray[np.float64], weights: EnergyWeights = DEFAULT_WEIGHTS) -> None:
         """Make it for upper limits (n, 3)."""
-        self.weights = weights
+        self.upper, self.weights = upper, weights
         squares = np.tile([weights.amplitude, weights.frequency, weights.zero_direction], len(upper))
         self._exact = energy_scale(upper), squares
         self._rough = energy_scale(upper).astype(np.float32), squares.astype(np.float32)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from finlab.allocation.baselines.actuation_descent import DescentOptions, descend
+from finlab.allocation.weighted_descent import DescentOptions, descend
 from finlab.errors import DataError
 from finlab.evaluation.splits import NEAR_ANGLE, NEAR_POSITION, SPLITS, Case, make_split
 from finlab.layout import Limits

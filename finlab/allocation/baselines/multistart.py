@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.baselines.actuation_descent import DescentOptions, descend
 from finlab.allocation.baselines.model_based import (
     ENERGY_TRADEOFF,
     TIME_LIMIT_S,
@@ -13,6 +12,7 @@ from finlab.allocation.baselines.model_based import (
     TimeLimit,
     check_time_limit,
 )
+from finlab.allocation.weighted_descent import DescentOptions, descend
 from finlab.inference.normalization import Normalization
 from finlab.physics import Plant
 

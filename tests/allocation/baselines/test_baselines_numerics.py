@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from finlab.allocation.baselines.actuation_descent import DescentOptions, descend
 from finlab.allocation.baselines.box_least_squares import solve_box_quadratics
 from finlab.allocation.baselines.single_target import Problem
+from finlab.allocation.weighted_descent import DescentOptions, descend
 from finlab.layout import Fin, FinModelSpec, Layout, random_layout
 from finlab.physics import plant_of
 from finlab.physics.energy import command_energy

@@ -1,31 +1,64 @@
-"""Levenberg-Marquardt within limits for many commands at once, on the analytic actuation map.
+"""The weighted sum of error and energy, by Levenberg-Marquardt within limits for many commands at once.
 
 Each row minimizes `J = ||(w - target) / sigma||^2 + energy_tradeoff * J_en`. The energy is a quadratic form
 that couples only the amplitude and frequency of one fin, so a damped step costs one 6 x 6 solve however many
 fins there are (the matrix inversion lemma on the 2 x 2 blocks). A limit that a step would cross fixes its
 variable there and the rest of the step is solved anew.
+
+It serves the plant and the learned surrogate. The last steps of method `learned`, on the error alone, have a
+leaner Levenberg-Marquardt of their own (`learned.levenberg_marquardt`): they run in every call of about a
+millisecond, always for as many steps, and need neither energy nor a record of which rows are done.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.physics import Plant
 from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyWeights, command_energy, energy_scale
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 Mask = NDArray[np.bool_]
 
 HELD = 1e30
 """Damping that keeps a variable where it is."""
 
 
-@dataclass(frozen=True)
+class Robot(Protocol):
+    """Commands to wrenches within limits, such as a `Plant`."""
+
+    @property
+    def n_fins(self) -> int:
+        """How many fins there are."""
+
+    @property
+    def lower(self) -> Array:
+        """Lower limits (n, 3)."""
+
+    @property
+    def upper(self) -> Array:
+        """Upper limits (n, 3)."""
+
+    @property
+    def width(self) -> Array:
+        """Ranges of the limits (n, 3)."""
+
+    @property
+    def full_turn(self) -> Mask:
+        """Fins (n,) whose zero direction may turn freely."""
+
+    def linearize(self, command: Array) -> tuple[Array, Array]:
+        """Wrenches (B, 6) of commands (B, n, 3) and their derivatives (B, 6, 3 n)."""
+
+    def feasible(self, command: Array) -> Array:
+        """Commands (B, n, 3) brought within the limits."""
+
+
+@dataclass(frozen=True, eq=False)
 class DescentOptions:
     """How long and how carefully to descend."""
 
@@ -38,7 +71,9 @@ class DescentOptions:
     tolerance: float = 1e-9
     """A row whose objective is below, or whose step lowers it by less than this share of itself, is done."""
     energy_weights: EnergyWeights = DEFAULT_WEIGHTS
-    """Weights within the energy proxy."""
+    """Weights within the energy proxy; without inertial power, since a quadratic form is needed."""
+    energy_upper: Array | None = None
+    """Upper limits (n, 3) that the energy divides by; the robot's own where None."""
     least_damping: float = 1e-12
     """Least damping, absolute."""
     least_relative_damping: float = 1e-13
@@ -64,7 +99,7 @@ class Descent(NamedTuple):
 
 
 def descend(
-    plant: Plant,
+    plant: Robot,
     start: Array,
     target: Array,
     sigma: Array,
@@ -120,10 +155,10 @@ def _least(slope: Array, options: DescentOptions) -> Array:
 class _EnergyForm:
     """The energy as a quadratic form in positions between the limits (0 at the lower, 1 at the upper one)."""
 
-    def __init__(self, plant: Plant, options: DescentOptions) -> None:
+    def __init__(self, plant: Robot, options: DescentOptions) -> None:
         self.width = plant.width.ravel()
         self.safe_width = np.where(plant.width > 0, plant.width, 1.0)
-        scale = energy_scale(plant.upper)
+        scale = energy_scale(_energy_upper(plant, options))
         self.slope = plant.width / scale
         self.offset = plant.lower / scale
         weights, gamma = options.energy_weights, options.energy_tradeoff
@@ -167,7 +202,7 @@ def _clamped_step(
     slope: Array,
     damping: Array,
     energy: _EnergyForm,
-    plant: Plant,
+    plant: Robot,
     passes: int,
 ) -> Array:
     """The damped step (B, 3 n) in positions, with variables fixed at the limits that it would cross."""
@@ -212,15 +247,19 @@ def _damped_step(
 
 
 def _objective(
-    plant: Plant,
+    plant: Robot,
     command: Array,
     wrench: Array,
     target: Array,
     sigma: Array,
     options: DescentOptions,
 ) -> Array:
-    error: Array = (((wrench - target) / sigma) ** 2).sum(axis=-1)
-    if options.energy_tradeoff == 0:
-        return error
-    error += options.energy_tradeoff * command_energy(command, plant.upper, options.energy_weights)
-    return error
+    total: Array = (((wrench - target) / sigma) ** 2).sum(axis=-1)
+    if options.energy_tradeoff != 0:
+        energy = command_energy(command, _energy_upper(plant, options), options.energy_weights)
+        total = total + options.energy_tradeoff * energy
+    return total
+
+
+def _energy_upper(plant: Robot, options: DescentOptions) -> Array:
+    return plant.upper if options.energy_upper is None else options.energy_upper
