@@ -200,14 +200,14 @@ def _alternatives(refined: RefinedCandidates, std: Array) -> Candidates:
 def _samples(proposal: Proposal, prepared: Prepared, std: Array) -> Candidates:
     """The raw candidates for a single target."""
     order = proposal.error[0].argsort()
-    command, _, wrench, error, _, energy = (values[0].take(order, axis=0) for values in proposal)
+    command = proposal.command[0].take(order, axis=0)
     return Candidates(
         # Rounded to single precision, limits may be a bit wider.
         np.minimum(np.maximum(command, prepared.lower), prepared.upper),
-        wrench * std,
-        error.astype(np.float64),
-        energy.astype(np.float64),
-        tuple(map(_component_name, proposal.component[0][order].tolist())),
+        proposal.wrench[0].take(order, axis=0) * std,
+        proposal.error[0].take(order).astype(np.float64),
+        proposal.energy[0].take(order).astype(np.float64),
+        tuple(map(_component_name, proposal.component[0].take(order).tolist())),
     )
 
 
