@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from finlab.forces.fin_sets import SCALE, FinSets, convex_parts
 from finlab.forces.force_space import PlanarProblem, descend, mobility, planar_problem, polar, realize
 from finlab.forces.interior_point import minimize
-from finlab.forces.reach import FINE, HELD, max_wrench_along
+from finlab.forces.reach import COARSE, FINE, HELD, max_wrench_along
 from finlab.forces.thrust_curve import plant_curves
 from finlab.layout import Layout
 
@@ -31,14 +31,14 @@ RESTING = 1e-4
 """Share of its largest thrust that a fin starts with when it rests: it may still come back."""
 N_RANDOM = 16
 """Random starts."""
-STEPS = 16
+STEPS = 6
 """Steps of the search from each start."""
-KEPT = 6
+KEPT = 20
 """Starts of each wrench whose results are made exact."""
 N_TOUCHES = 3
 """Times that the cost is then touched anew."""
-OFF = 1e-6
-"""Scaled wrench [N] by which an answer may miss."""
+OFF = 1e-7
+"""Scaled wrench by which an answer may miss, as a share of the strongest fin's."""
 MISSED = 5.0
 """What a newton of missing wrench counts when results are compared that are not exact yet."""
 
@@ -113,7 +113,8 @@ def cheapest(problem: PlanarProblem, robots: FinSets, targets: Array, seeds: Arr
     goal = np.repeat(wanted.reshape(-1, 6), kept, axis=0)
     force = _exact(problem, rows, goal, np.concatenate(found).reshape(len(goal), -1))
     energy = realize(problem, polar(problem, force))[1]
-    missed = np.abs(rows.wrench(force) - goal).max(-1) > OFF
+    strongest = np.linalg.norm(rows.full_columns(), axis=-1).max(-1)
+    missed = np.abs(rows.wrench(force) - goal).max(-1) > OFF * strongest
     energy = (
         np.where(missed, np.inf, energy).reshape(-1, len(robots.radius), n_targets, kept).min(axis=(0, 3))
     )
@@ -122,8 +123,9 @@ def cheapest(problem: PlanarProblem, robots: FinSets, targets: Array, seeds: Arr
 
 def _exact(problem: PlanarProblem, rows: FinSets, target: Array, thrust: Array) -> Array:
     """The local optima (S, n, 2) [N] next to thrusts (S, n) [N] that give targets (S, 6)."""
-    for _ in range(N_TOUCHES):
+    for touch in range(N_TOUCHES):
+        last = touch == N_TOUCHES - 1
         bend = 1.0 / np.maximum(mobility(problem, np.minimum(thrust, rows.radius)), 1e-300)
-        force = minimize(rows, target, np.full(6, HELD), bend, FINE).force
+        force = minimize(rows, target, np.full(6, HELD), bend, FINE if last else COARSE).force
         thrust = np.linalg.norm(force, axis=-1)
     return force

@@ -17,10 +17,12 @@ from numpy.typing import NDArray
 
 from finlab.forces.fin_sets import MAX_CUT, FinSets, convex_parts, wide_fins
 from finlab.forces.interior_point import Optimum, minimize
-from finlab.forces.reach import HELD, orthogonal_complement
+from finlab.forces.reach import orthogonal_complement
 
 Array = NDArray[Any]
 
+HELD = 1e-9
+"""c of an axis that must be met."""
 MISSED = 1e-5
 """Normalized error from which a group of axes counts as not served whole."""
 SPOILED = 1e-3

@@ -12,14 +12,14 @@ from finlab.forces.interior_point import minimize
 
 Array = NDArray[np.float64]
 
-HELD = 1e-9
+HELD = 1e-12
 """What the squared error of an entry that must be met is divided by, beside one that is free to grow."""
 BEYOND = 2.0
 """How much more than all fins could give along a direction alone is asked for."""
 FINE, COARSE = 1e-9, 1e-4
 """Where the solver stops: for results to be shown, and for searches that ask thousands of times."""
 BESIDE = 1e-6
-"""Scaled wrench [N, as a share of the size plus 1 N] that may be left beside the one asked for."""
+"""Scaled wrench that may be left beside the one asked for, as a share of the strongest fin's."""
 SPAN_TOLERANCE = 1e-9
 """Share of the largest singular value below which the fins do not act along a direction at all."""
 
@@ -59,15 +59,21 @@ def largest(
     seen = sets._replace(columns=sets.columns @ frame[:, None])
     wanted = np.empty((rows, 1 + k))
     wanted[:, 1:] = held
-    full = np.sqrt((seen.full_columns() ** 2).sum(-1)).sum(-1)
-    wanted[:, 0] = np.maximum(BEYOND * full, 1e-9)
+    full = np.sqrt((seen.full_columns() ** 2).sum(-1))
+    wanted[:, 0] = np.maximum(BEYOND * full.sum(-1), 1e-9)
     found = minimize(seen, wanted, np.array([1.0, *(HELD,) * k]), gap=tolerance)
-    normal = found.multiplier / found.multiplier[:, :1]
+    lead = found.multiplier[:, :1]
+    across = np.tile(np.eye(1 + k)[0], (rows, 1))
+    normal = np.where(lead > 0.0, found.multiplier, across) / np.where(lead > 0.0, lead, 1.0)
     size = seen.farthest(normal)[0] - (wanted[:, 1:] * normal[:, 1:]).sum(-1)
+    # The plane across the direction itself proves something, too, should the solver's prove less.
+    free = seen.farthest(across)[0]
+    normal = np.where((free < size)[:, None], across, normal)
+    size = np.minimum(size, free)
     given = seen.wrench(found.force)
     # A wrench that is not where it was asked for proves nothing.
     beside = np.abs(given - wanted)[:, 1:].max(-1, initial=0.0)
-    proven = np.where(beside <= BESIDE * (1.0 + np.abs(size)), given[:, 0], 0.0)
+    proven = np.where(beside <= BESIDE * full.max(-1), given[:, 0], 0.0)
     return Largest(
         size, np.maximum(size - proven, 0.0), found.force, sets.wrench(found.force), _apply(frame, normal)
     )

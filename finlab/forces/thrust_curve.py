@@ -122,20 +122,21 @@ def _curve(
     """
     scale = energy_scale(np.array(upper))
     nearest = min(max(0.0, lower[2]), upper[2])
-    direction = np.linspace(lower[2], upper[2], n_directions) if n_directions > 1 else np.array([nearest])
+    command = np.empty((n_directions, KNOTS, 3))
+    command[..., 2] = np.linspace(lower[2], upper[2], n_directions)[:, None] if n_directions > 1 else nearest
     ratio = np.full(KNOTS, AMPLITUDE_FIRST if w.inertial else 1.0)
     for sweep in range(3):
         # s runs along the ray until both commands are at their upper limits.
         s = np.linspace(0.0, max(upper[0] / scale[0], upper[1] / (scale[1] * ratio.min())), KNOTS)
         amplitude = np.clip(s * scale[0], lower[0], upper[0])
         frequency = np.clip(s * ratio * scale[1], lower[1], upper[1])
-        command = np.stack(np.broadcast_arrays(amplitude, frequency, direction[:, None]), axis=-1)
+        command[..., 0], command[..., 1] = amplitude, frequency
         force, slope = fin.force_and_slopes(command)
         thrusts = np.sqrt((force[..., 1:] ** 2).sum(-1)) + 1e-15
-        strongest = int(thrusts.max(axis=1).argmax())
+        strongest = int(thrusts.argmax()) // KNOTS
         thrust = thrusts[strongest]
         if sweep < 2 and not w.inertial:
-            by = (slope[strongest, :, :2, 1:] @ force[strongest, :, 1:, None])[..., 0] / thrust[:, None]
+            by = (slope[strongest, :, :2, 1:] * force[strongest, :, None, 1:]).sum(-1) / thrust[:, None]
             kappa = np.clip(by[:, 0] * amplitude / np.maximum(by[:, 1] * frequency, 1e-12), 0.1, 10.0)
             kappa = np.where(by.max(axis=1) > 0.0, kappa, 1.0)
             # 2 w_g kappa r^2 + w (kappa - 1) r - 2 w_a = 0
