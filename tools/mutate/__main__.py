@@ -18,7 +18,7 @@ from pathlib import Path
 
 import yaml
 from mutants import ROOT, Mutant, find_places
-from suite import STORE, Suite, copy_tree, measure, start_tests
+from suite import STORE, Suite, all_tests, copy_tree, measure, start_tests
 from tqdm import tqdm
 
 ROOMS = ("allocation", "forces", "physics", "deploy")
@@ -112,6 +112,7 @@ def main() -> int:
     parser.add_argument(
         "--only", nargs="+", default=[f"finlab/{room}" for room in ROOMS], help="files, folders"
     )
+    parser.add_argument("--tests", nargs="+", default=all_tests(), help="files, folders of tests that judge")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--reuse", action="store_true", help="keep what the last run measured of the tests")
     parser.add_argument("--again", action="store_true", help="judge only the last run's survivors")
@@ -124,7 +125,7 @@ def main() -> int:
         else:
             mutants = draw(given.only, given.mutants, given.seed)
         if not given.reuse:
-            measure(copies[0], given.jobs)
+            measure(copies[0], given.jobs, given.tests)
         judged = list(tqdm(judge(mutants, copies), total=len(mutants), disable=None, unit="mutant"))
     return int(report(judged) < given.at_least)
 

@@ -65,11 +65,14 @@ def _environment(copy: Path) -> dict[str, str]:
     return {**os.environ, **threads, "PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1"}
 
 
-def measure(copy: Path, jobs: int) -> None:
-    """Run all tests once without a mutant; store what passed, how long it took and which lines it touched."""
-    folders = [
-        f"tests/{p.name}" for p in sorted((ROOT / "tests").iterdir()) if p.is_dir() and p.name not in IGNORED
-    ]
+def all_tests() -> list[str]:
+    """The folders of tests that judge mutants where nothing else is said."""
+    folders = sorted(path for path in (ROOT / "tests").iterdir() if path.is_dir())
+    return [f"tests/{path.name}" for path in folders if path.name not in IGNORED]
+
+
+def measure(copy: Path, jobs: int, tests: list[str]) -> None:
+    """Run tests once without a mutant; store what passed, how long it took and which lines it touched."""
     command = [
         sys.executable,
         "-m",
@@ -77,12 +80,10 @@ def measure(copy: Path, jobs: int) -> None:
         "-vv",
         "-rpfE",
         "--durations=0",
-        "-n",
-        str(jobs),
-        "--dist",
-        "loadfile",
+        f"-n{jobs}",
+        "--dist=loadfile",
     ]
-    command += ["--cov=finlab", "--cov-context=test", "--cov-report=", *folders]
+    command += ["--cov=finlab", "--cov-context=test", "--cov-report=", *tests]
     output = subprocess.run(command, cwd=copy, env=_environment(copy), capture_output=True, text=True).stdout
     STORE.mkdir(exist_ok=True)
     (STORE / "measured.log").write_text(output)
