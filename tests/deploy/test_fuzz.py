@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -115,7 +114,8 @@ def test_bundles(small: Bundle) -> None:
 def test_archives(small: Bundle, tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     path, content = tmp_path / "x.zip", small.zip_bytes()
+    good = 0
     for _ in range(ARCHIVES):
         path.write_bytes(mutated(rng, content))
-        survive(lambda: load_robot(path))
-    assert zipfile.is_zipfile(path) or path.stat().st_size > 0
+        good += survive(lambda: load_robot(path))
+    assert 0 < good < ARCHIVES
