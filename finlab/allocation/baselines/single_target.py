@@ -22,7 +22,7 @@ from finlab.physics.energy import DEFAULT_WEIGHTS, energy_scale
 Array = NDArray[np.float64]
 
 DEFAULT_STARTS = 8
-"""Random starts per target unless told otherwise."""
+"""Random starts per target unless set otherwise."""
 
 
 class OutOfTime(Exception):

@@ -13,7 +13,7 @@ from finlab.inference.normalization import Normalization
 Array = NDArray[np.float64]
 
 INSIDE = 1e-6
-"""The solver wants a start strictly within the limits."""
+"""How far within the limits the solver starts, which it requires."""
 
 
 class Trf(SingleTarget):

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.insight import Insight
 from finlab.allocation.learned.levenberg_marquardt import refine
-from finlab.allocation.learned.pipeline import Pipeline
+from finlab.allocation.learned.pipeline import SEARCH, Pipeline
 from finlab.allocation.learned.prepared import Prepared
 from finlab.allocation.learned.proposal import Proposal, predict
 from finlab.allocation.learned.refine_missed import FallbackForces, nearest_forces
@@ -39,10 +39,6 @@ Array = NDArray[Any]
 
 CHUNK = 256
 """Targets that are solved together; keeps memory flat for any number of targets."""
-
-
-ALTERNATIVE = 1e-3
-"""Normalized error, by the surrogate, up to which another answer is an alternative."""
 
 
 class LearnedAllocator(Allocator):
@@ -193,7 +189,7 @@ def _candidates(refined: RefinedCandidates, std: Array) -> Candidates:
 
 def _alternatives(refined: RefinedCandidates, std: Array) -> Candidates:
     """The exact answers to a single target, the chosen one first; all where none is exact."""
-    exact = refined.error[0] <= max(ALTERNATIVE, 1.01 * refined.error[0, 0])
+    exact = refined.error[0] <= max(SEARCH.alternative_error, 1.01 * refined.error[0, 0])
     return _candidates(RefinedCandidates(*(values[:, exact] for values in refined)), std)
 
 

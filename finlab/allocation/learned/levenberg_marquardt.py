@@ -203,7 +203,7 @@ def _step(problem: CommandProblem, at: _Evaluated, jacobian: Array, damping: Arr
     free = jacobian.reshape(rows, 3 * n, 6)
     right = at.residual[..., None]
     change = _smallest_change(free, right, damping + problem.ridge)
-    # Hold what is at a limit and wants out, then solve again with the rest.
+    # Hold what is at a limit and would leave it, then solve again with the rest.
     low, high = problem.edges
     moved = change.reshape(rows, n, 3)
     out = (at.command <= low) & (moved < 0)

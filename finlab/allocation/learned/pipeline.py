@@ -49,6 +49,8 @@ class SearchSettings:
     wide_steps: int = 40
     """Reweighting steps of that search, enough to converge: alternatives are counted by their local
     minima."""
+    alternative_error: float = 1e-3
+    """Normalized error, by the surrogate, up to which another answer is an alternative."""
     plan_lm_steps: int = 4
     """Levenberg-Marquardt steps on a command of the receding horizon."""
     passing_error: float = 5e-3
