@@ -1,4 +1,4 @@
-"""What a user may name at the command line: a layout file, a layout graph file or a shipped layout."""
+"""What a user may name at the command line: a layout file, a graph file, a bundle or a shipped layout."""
 
 from __future__ import annotations
 
@@ -30,10 +30,16 @@ def open_robot(text: str) -> Robot:
     Raises:
         LayoutError: neither a readable file nor a shipped layout.
     """
+    from finlab.bundle_files import is_bundle
     from finlab.layout.graph_layout import SUFFIX
     from finlab.layout.load import layout_path, load_layout
 
     path = layout_path(text)
+    if is_bundle(path):
+        from finlab.deploy.robot import read_bundle_graph
+
+        graph = read_bundle_graph(path)
+        return Robot(graph.layout, graph.failed, graph)
     if path.name.endswith(SUFFIX):
         from finlab.deploy.graph_file import read_graph
 

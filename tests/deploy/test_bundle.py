@@ -63,6 +63,17 @@ def test_the_library_reads_it(bundle: Bundle, shipped_allocator: Allocator, tmp_
         finlab.load_allocator("nowhere")
 
 
+def test_the_command_line_takes_a_bundle_with_its_lost_fins(
+    shipped_allocator: Allocator, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    make_bundle(finlab.load_layout("A"), shipped_allocator, ("back_left",)).write_zip(tmp_path / "A.zip")
+    robot = str(tmp_path / "A.zip")
+    line = ["allocate", robot, "--checkpoint", robot, "--wrench", "1", "0", "0.5", "0", "0", "0", "--json"]
+    assert main(line) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert values["failed"] == ["back_left"] and values["checkpoint"] == "default"
+
+
 def test_settings_travel_and_can_be_changed(tmp_path: Path) -> None:
     desk = finlab.load_allocator(n_candidates=32, temperature=0.5, energy_weights=POWER_WEIGHTS)
     make_bundle(finlab.load_layout("octo"), desk).write(tmp_path)
