@@ -1,0 +1,77 @@
+"""The energy proxy `J_en`: by hand, over fins, and its slopes."""
+
+import numpy as np
+import pytest
+
+import finlab
+from finlab.physics import Plant
+from finlab.physics.energy import (
+    DEFAULT_WEIGHTS,
+    POWER_WEIGHTS,
+    EnergyMeter,
+    EnergyWeights,
+    command_energy,
+    energy_scale,
+    fin_energy,
+)
+
+UPPER = np.array([[0.6, 2.1, np.pi], [0.4, 3.0, -0.5], [0.5, 1.0, 0.0]])
+MIXED = EnergyWeights(0.7, 1.3, 0.2, 0.4, 0.9)
+
+
+def commands(rows: int) -> np.ndarray:
+    return np.random.default_rng(0).uniform(0.05, 0.9, (rows, 3, 3)) * [1.0, 2.0, 3.0]
+
+
+def test_each_term_by_hand() -> None:
+    half = np.array([0.3, 0.7, np.pi / 4])  # 1/2, 1/3 and 1/4 of the first fin's limits
+    assert fin_energy(half, UPPER[0]) == pytest.approx(1 / 4 + 1 / 9 + 0.1 / 16 + 1 / 6)
+    assert fin_energy(half, UPPER[0], POWER_WEIGHTS) == pytest.approx(1 / 4 / 27)
+    assert fin_energy(half, UPPER[0], MIXED) == pytest.approx(
+        0.7 / 4 + 1.3 / 9 + 0.2 / 16 + 0.4 / 6 + 0.9 / 4 / 27
+    )
+
+
+def test_limits_below_zero_count_by_their_size_and_none_is_divided_by_zero() -> None:
+    np.testing.assert_allclose(energy_scale(UPPER)[:, 2], [np.pi, 0.5, 1e-3])
+
+
+@pytest.mark.parametrize("weights", [DEFAULT_WEIGHTS, POWER_WEIGHTS, MIXED])
+def test_a_robots_energy_is_the_sum_over_fins(weights: EnergyWeights) -> None:
+    command = commands(5)
+    fins = np.stack([fin_energy(command[:, i], UPPER[i], weights) for i in range(3)], axis=1)
+    np.testing.assert_allclose(EnergyMeter(UPPER, weights)(command), fins.sum(1))
+    np.testing.assert_allclose(command_energy(command, UPPER, weights), fins.sum(1))
+    command[2, 1] = np.nan  # a failed fin costs nothing
+    fins[2, 1] = 0.0
+    np.testing.assert_allclose(command_energy(command, UPPER, weights), fins.sum(1))
+
+
+def test_single_precision_says_the_same() -> None:
+    command = commands(5)
+    rough = EnergyMeter(UPPER, MIXED)(command.astype(np.float32))
+    np.testing.assert_allclose(rough, EnergyMeter(UPPER, MIXED)(command), rtol=1e-5)
+
+
+@pytest.mark.parametrize("weights", [DEFAULT_WEIGHTS, POWER_WEIGHTS, MIXED])
+def test_slopes_are_those_of_differences(weights: EnergyWeights) -> None:
+    upper = np.where(UPPER == 0.0, 1.0, UPPER)  # differences of huge energies are not exact
+    command, meter = commands(4), EnergyMeter(upper, weights)
+    slopes = meter.slopes(command)
+    for i in range(3):
+        for k in range(3):
+            step = np.zeros((3, 3))
+            step[i, k] = 1e-6 * energy_scale(upper)[i, k]
+            difference = (meter(command + step) - meter(command - step)) / (2.0 * step[i, k])
+            np.testing.assert_allclose(slopes[:, i, k], difference, rtol=1e-5, atol=1e-6)
+
+
+def test_planar_columns_are_what_a_newton_of_each_fin_does() -> None:
+    layout = finlab.load_layout("penta")
+    plant = Plant(layout)
+    command = plant.sample(np.random.default_rng(1), (4,))
+    force = plant.fin_forces(command)
+    across = np.stack([(-np.sin(fin.mounting_angle), np.cos(fin.mounting_angle), 0.0) for fin in layout.fins])
+    planar = np.stack([(force * across).sum(-1), force[..., 2]], axis=-1)
+    assert plant.planar.shape == (6, 2 * plant.n_fins)
+    np.testing.assert_allclose(planar.reshape(4, -1) @ plant.planar.T, plant.wrench(command), atol=1e-9)
