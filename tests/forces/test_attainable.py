@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from finlab.analysis import AttainableSet, attainable_set
 from finlab.analysis.authority import model_error
 from finlab.errors import LayoutError
+from finlab.forces.attainable import _sphere
 from finlab.forces.fin_sets import SCALE, fin_sets
 from finlab.layout import Layout
 from finlab.physics import Plant
@@ -139,3 +140,13 @@ def test_faces_are_seen_from_outside(shipped: Layouts) -> None:
 def test_an_unknown_failed_fin_is_an_error(shipped: Layouts) -> None:
     with pytest.raises(LayoutError, match="has no fin 'nobody'"):
         attainable_set(shipped("A"), "force", failed=("nobody",))
+
+
+def test_directions_are_spread_evenly() -> None:
+    """As far apart as the same number of circles that tile the sphere, or nearly."""
+    for n in (50, 400):
+        points = _sphere(n)
+        np.testing.assert_allclose(np.linalg.norm(points, axis=1), 1.0)
+        near = np.sort(points @ points.T, axis=1)[:, -2]
+        gap = np.arccos(near) / np.sqrt(4.0 * np.pi / n)
+        assert gap.min() > 0.75 and gap.max() < 1.1

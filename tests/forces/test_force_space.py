@@ -5,7 +5,7 @@ import pytest
 
 from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.allocation.learned.prepared import Prepared
-from finlab.forces.force_space import Planar, descend, realize
+from finlab.forces.force_space import Planar, _gram, _project, descend, realize
 from finlab.layout import Layout, random_layout
 
 
@@ -96,3 +96,51 @@ def test_resting_fins_point_where_it_costs_least(learned: LearnedAllocator) -> N
     command, _ = realize(prepared.planar, Planar(low, np.full_like(low, 1.0), np.zeros((1, 6))))
     expected = np.clip(0.0, prepared.lower[:, 2], prepared.upper[:, 2])
     np.testing.assert_allclose(command[0, :, 2], expected)
+
+
+@pytest.mark.parametrize("limits", ["nominal", "varied"])
+def test_the_projection_is_the_nearest_force_and_knows_its_slope(
+    limits: str, learned: LearnedAllocator
+) -> None:
+    rng = np.random.default_rng(1)
+    for layout in robots(limits)[:6]:
+        planar = learned.pipeline.prepare(layout).planar
+        low, high = planar.curves.minimum, planar.curves.maximum
+        wanted = rng.standard_normal((30, len(high), 2)) * high[:, None]
+        target = rng.standard_normal((30, 6))
+        found, slope = _project(planar, wanted, target)
+        unit = np.stack([np.cos(found.direction), np.sin(found.direction)], axis=-1)
+        force = unit * found.thrust[..., None]
+        given = np.einsum("rnd,ndi->ri", force, planar.columns)
+        np.testing.assert_allclose(found.residual, target - given, atol=1e-9)
+        # No force that the fin can give is nearer; where the arc is not convex, none along its ends and rays.
+        share = np.linspace(0.0, 1.0, 21)
+        angle = planar.middle + (2 * share[:, None] - 1) * np.minimum(planar.half, np.pi)
+        size = low + share[:, None] * (high - low)
+        for i in range(len(high)):
+            grid = np.array([[s * np.cos(a), s * np.sin(a)] for s in size[:, i] for a in angle[:, i]])
+            least = np.linalg.norm(wanted[:, i, None] - grid, axis=-1).min(axis=1)
+            assert (np.linalg.norm(wanted[:, i] - force[:, i], axis=-1) <= least + 1e-6 + low[i]).all()
+        for k in range(2):
+            step = np.zeros(2)
+            step[k] = 1e-6
+            ahead, behind = (_project(planar, wanted + sign * step, target)[0] for sign in (1.0, -1.0))
+            moved = [
+                f.thrust[..., None] * np.stack([np.cos(f.direction), np.sin(f.direction)], axis=-1)
+                for f in (ahead, behind)
+            ]
+            difference = (moved[0] - moved[1]) / 2e-6
+            close = np.isclose(slope[..., k], difference, atol=1e-3).all(axis=-1)
+            assert close.mean() > 0.98  # but for the few that stand at a kink
+
+
+def test_systems_are_sums_over_fins(learned: LearnedAllocator) -> None:
+    planar = learned.pipeline.prepare(robots("varied", 4)[0]).planar
+    rng = np.random.default_rng(2)
+    weight, slope = rng.random((5, 4)), rng.standard_normal((5, 4, 2, 2))
+    whole, bent = _gram(planar, weight), _gram(planar, weight, slope)
+    for row in range(5):
+        parts = [weight[row, i] * planar.columns[i].T @ planar.columns[i] for i in range(4)]
+        np.testing.assert_allclose(whole[row], sum(parts), rtol=1e-6, atol=1e-7)
+        parts = [weight[row, i] * planar.columns[i].T @ slope[row, i] @ planar.columns[i] for i in range(4)]
+        np.testing.assert_allclose(bent[row], sum(parts), rtol=1e-6, atol=1e-7)
