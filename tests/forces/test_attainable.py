@@ -149,4 +149,4 @@ def test_directions_are_spread_evenly() -> None:
         np.testing.assert_allclose(np.linalg.norm(points, axis=1), 1.0)
         near = np.sort(points @ points.T, axis=1)[:, -2]
         gap = np.arccos(near) / np.sqrt(4.0 * np.pi / n)
-        assert gap.min() > 0.75 and gap.max() < 1.1
+        assert gap.min() > 0.86 and gap.max() < 1.0  # the golden angle leaves no near pair
