@@ -26,9 +26,9 @@ def untrained_checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from finlab.inference.normalization import Normalization
     from finlab.inference.weights import TrainedWeights
     from finlab.training.networks.allocator_network import AllocatorNetwork
-    from finlab.training.networks.checkpoint import save_checkpoint, state_of
     from finlab.training.networks.surrogate import make_surrogate
     from finlab.training.presets import get_preset
+    from finlab.training.saving import save_checkpoint, state_of
 
     preset = get_preset("smoke")
     folder = tmp_path_factory.mktemp("checkpoints") / "untrained"

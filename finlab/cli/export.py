@@ -26,7 +26,7 @@ def export(
     """
     from finlab.cli.inputs import open_robot
     from finlab.errors import FinlabError
-    from finlab.layout.graph_layout import SUFFIX
+    from finlab.layout.load import SUFFIX
 
     graph_alone = output.name.endswith(SUFFIX)
     if (zip or onnx) and graph_alone:

@@ -31,8 +31,7 @@ def open_robot(text: str) -> Robot:
         LayoutError: neither a readable file nor a shipped layout.
     """
     from finlab.bundle_files import is_bundle
-    from finlab.layout.graph_layout import SUFFIX
-    from finlab.layout.load import layout_path, load_layout
+    from finlab.layout.load import SUFFIX, layout_path, load_layout
 
     path = layout_path(text)
     if is_bundle(path):

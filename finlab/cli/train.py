@@ -112,8 +112,8 @@ def fast(
     """
     from finlab.allocation import load_allocator
     from finlab.training.distill.answers import AnswerSettings
+    from finlab.training.distill.network import FastConfig
     from finlab.training.distill.train import FastSettings, train_fast
-    from finlab.training.networks.fast_network import FastConfig
 
     _check_counts(shards=shards, steps=steps, stop_after=stop_after)
     allocator = load_allocator(checkpoint=checkpoint)

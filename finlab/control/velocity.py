@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.control.controller import Measurement, Setpoint
+from finlab.control.filters import LowPass, Pid
 from finlab.control.gains import VelocityGains, load_gains
-from finlab.control.low_pass import LowPass
-from finlab.control.pid import Pid
 
 Array = NDArray[np.float64]
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.control.controller import Measurement, Setpoint
+from finlab.control.filters import LowPass
 from finlab.control.gains import WaypointGains, load_gains
-from finlab.control.odometry import Odometry
 from finlab.layout.angles import wrapped
 
 Array = NDArray[np.float64]
@@ -57,3 +58,59 @@ class WaypointController:
                 min(max(yaw, -g.max_yaw), g.max_yaw),
             ]
         )
+
+
+class Pose(NamedTuple):
+    """The estimate."""
+
+    position: Array
+    """Position (3,) in the world [m]."""
+    yaw: float
+    """Heading [rad], wrapped."""
+    climb: float
+    """Speed along the world's z [m/s], low-passed."""
+
+
+class Odometry:
+    """Complementary filter: the DVL and the gyro carry the pose on, markers and pressure correct it.
+
+    The correction has one time constant; what is faster comes from the velocities, so steady motion is
+    followed without lag.
+    """
+
+    def __init__(self, correction_s: float, climb_filter_s: float, period_s: float) -> None:
+        """Takes the time constants of correction and climb filter, and the time between calls [s]."""
+        self.period_s = period_s
+        self._share = LowPass(correction_s, period_s).share
+        self._climb = LowPass(climb_filter_s, period_s)
+        self._pose: Pose | None = None
+
+    def reset(self) -> None:
+        """Forget the pose; the next measurement is taken as it is."""
+        self._climb.reset()
+        self._pose = None
+
+    def step(self, measurement: Measurement) -> Pose:
+        """Takes a measurement and returns the pose."""
+        seen = np.array([measurement.position[0], measurement.position[1], -measurement.depth])
+        if self._pose is None:
+            position, yaw = seen, measurement.yaw
+        else:
+            turned = self._pose.yaw + float(measurement.rates[2]) * self.period_s
+            yaw = turned + self._share * float(wrapped(measurement.yaw - turned))
+            moved = self._pose.position + _to_world(measurement, yaw) * self.period_s
+            position = moved + self._share * (seen - moved)
+        climb = self._climb.step(float(_to_world(measurement, yaw)[2]))
+        self._pose = Pose(position, float(wrapped(yaw)), climb)
+        return self._pose
+
+
+def _to_world(measurement: Measurement, yaw: float) -> Array:
+    """The measured velocity (3,) in the world [m/s], turned by roll, pitch and a heading."""
+    u, v, w = measurement.velocity.tolist()
+    cr, sr = math.cos(measurement.roll), math.sin(measurement.roll)
+    cp, sp = math.cos(measurement.pitch), math.sin(measurement.pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    v, w = cr * v - sr * w, sr * v + cr * w
+    u, w = cp * u + sp * w, -sp * u + cp * w
+    return np.array([cy * u - sy * v, sy * u + cy * v, w])

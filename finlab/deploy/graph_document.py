@@ -7,7 +7,7 @@ from typing import Any
 from finlab.deploy.graph import SELF_TEST_TOLERANCE, LayoutGraph, Row
 from finlab.layout import layout_to_dict
 from finlab.layout.file import FRAME
-from finlab.layout.graph_layout import FORMAT, UNITS, VERSION
+from finlab.layout.load import FORMAT, UNITS, VERSION
 
 
 def document_of(graph: LayoutGraph) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from finlab.deploy.graph import LayoutGraph
 from finlab.deploy.graph_document import document_of
 from finlab.deploy.graph_reading import graph_of
 from finlab.errors import LayoutError
-from finlab.layout.graph_layout import SUFFIX, checksum_of
+from finlab.layout.load import SUFFIX, checksum_of
 from finlab.layout.reading import parse_json, read_text
 
 

@@ -11,7 +11,7 @@ from finlab.deploy.graph import LayoutGraph, Row, SelfTest
 from finlab.deploy.graph_document import edges_of
 from finlab.errors import LayoutError
 from finlab.inference.normalization import Normalization
-from finlab.layout.graph_layout import check_graph_document, graph_layout, graph_nodes
+from finlab.layout.load import check_graph_document, graph_layout, graph_nodes
 from finlab.layout.rules import mapping, numbers, shown, text
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 import finlab
 from finlab.errors import CheckpointError, DataError
-from finlab.inference.fast_weights import FastWeights
+from finlab.inference.fast_network import FastWeights
 from finlab.inference.learned_fin import FORCE_UNIT, REFERENCE
 from finlab.inference.mixture import LOG_STD_BOUND
 from finlab.inference.weights import NetworkConfig, State, TrainedWeights

@@ -19,7 +19,7 @@ import numpy as np
 
 from finlab.assets import checkpoint_path, shipped_checkpoints
 from finlab.errors import CheckpointError
-from finlab.inference.fast_weights import check_state, fast_files, parse_fast
+from finlab.inference.fast_network import check_state, fast_files, parse_fast
 from finlab.inference.normalization import Normalization
 from finlab.inference.weights import NetworkConfig, State, SurrogateConfig, TrainedWeights
 from finlab.layout import FinModelSpec

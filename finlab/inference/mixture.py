@@ -1,6 +1,6 @@
 """Mixtures of Gaussians over fin commands, in coordinates where every limit range is [-1, 1]. numpy only.
 
-Training has the same in PyTorch, `finlab.training.networks.mixture`; a test holds the two against each other.
+Training has the same in PyTorch, `Mixture`; a test holds the two against each other.
 """
 
 from __future__ import annotations

@@ -1,19 +1,110 @@
-"""A trained surrogate on one layout: what the learned methods believe of a robot's fins. numpy only."""
+"""Trained surrogates in numpy, on one layout: what the learned methods believe of a robot's fins."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.inference.learned_fin import LearnedFin
-from finlab.inference.mlp_surrogate import MlpFins
+from finlab.inference.activations import silu, silu_and_slope
+from finlab.inference.features import RAW_SIZE, raw_features
+from finlab.inference.learned_fin import FORCE_UNIT, LearnedFin
 from finlab.inference.weights import TrainedWeights
 from finlab.layout import Layout
 from finlab.layout.arrays import force_columns
 
 Array = NDArray[Any]
+
+BLOCK = 64
+"""Robots whose fins are worked on at once: some hundred rows of the hidden layers, half a megabyte."""
+
+
+class MlpFins:
+    """The fins of one layout by the paper's perceptron: commands in, forces in the body frame out.
+
+    It works in single precision, whatever the commands are in.
+    """
+
+    def __init__(
+        self,
+        weights: Mapping[str, Array],
+        position: Array,
+        mounting_angle: Array,
+        lower: Array,
+        upper: Array,
+    ) -> None:
+        """Take over a trained surrogate for fins at `position` (n, 3) with shafts at `mounting_angle` (n,).
+
+        Args:
+            weights: its state by PyTorch's names.
+            position: [m].
+            mounting_angle: [rad].
+            lower: lower limits (n, 3), which are features as well.
+            upper: upper limits (n, 3).
+        """
+        state = {name: np.asarray(value, dtype=np.float32) for name, value in weights.items()}
+        features = raw_features(position, mounting_angle, lower, upper).astype(np.float32)
+        indices = sorted({int(name.split(".")[1]) for name in state if name.startswith("net.")})
+        layers = [(state[f"net.{i}.weight"].T.copy(), state[f"net.{i}.bias"]) for i in indices]
+        layers[-1] = FORCE_UNIT * layers[-1][0], FORCE_UNIT * layers[-1][1]
+        (first, bias), self._layers = layers[0], layers[1:]
+        half = (0.5 * (upper - lower)).astype(np.float32)
+        self._middle, self._half = lower.astype(np.float32) + half, np.maximum(half, np.float32(1e-9))
+        # The features of a fin never change, and what follows the first layer is linear in its slopes.
+        self._by_fin, self._by_command = features @ first[:RAW_SIZE] + bias, first[RAW_SIZE:]
+        second = layers[1][0]
+        self._slopes = (self._by_command.T[:, :, None] * second[:, None]).reshape(len(second), -1)
+        pooled = np.tanh(features @ state["descriptor.0.weight"].T + state["descriptor.0.bias"]).mean(0)
+        self.scale, self.bias = np.split(state["affine.weight"] @ pooled + state["affine.bias"], 2)
+        """By how much the sum of the fins' wrenches is stretched, and what is added to it, (6,) each."""
+
+    def force(self, command: Array) -> Array:
+        """Forces (R, n, 3) [N] of commands (R, n, 3)."""
+        result = np.empty(command.shape, dtype=np.float32)
+        for rows in _blocks(len(command)):
+            z = self._first(command[rows])
+            for weight, bias in self._layers:
+                z = silu(z).dot(weight)
+                z += bias
+            result[rows] = z.reshape(result[rows].shape)
+        return result
+
+    def force_and_slopes(self, command: Array) -> tuple[Array, Array]:
+        """Forces (R, n, 3) and, for each of the three commands in turn, their derivatives (R, n, 3, 3)."""
+        parts = [self._force_and_slopes(command[rows]) for rows in _blocks(len(command))]
+        force, slopes = map(np.concatenate, zip(*parts, strict=True))
+        return force, slopes
+
+    def _force_and_slopes(self, command: Array) -> tuple[Array, Array]:
+        z = self._first(command)
+        slopes = None
+        for weight, bias in self._layers:
+            value, slope = silu_and_slope(z)
+            z = value.dot(weight)
+            z += bias
+            if slopes is None:
+                slopes = slope.dot(self._slopes).reshape(len(z), 3, -1)
+            else:
+                slopes = (slopes * slope[:, None]).reshape(3 * len(z), -1).dot(weight).reshape(len(z), 3, -1)
+        assert slopes is not None
+        slopes = slopes.reshape(*command.shape, 3)
+        slopes /= self._half[..., None]
+        return z.reshape(command.shape), slopes
+
+    def _first(self, command: Array) -> Array:
+        """What the first hidden layer adds up (R n, width)."""
+        # Rounded first: where a range has no width, any remainder would be blown up.
+        x = (command.astype(np.float32) - self._middle) / self._half
+        z = x.reshape(-1, 3).dot(self._by_command).reshape(*x.shape[:-1], -1)
+        z += self._by_fin
+        return np.asarray(z.reshape(-1, z.shape[-1]))
+
+
+def _blocks(rows: int) -> list[slice]:
+    """Slices of so many rows that a hidden layer of theirs stays in the processor's cache."""
+    return [slice(k, k + BLOCK) for k in range(0, rows, BLOCK)]
 
 
 class FinForces(Protocol):

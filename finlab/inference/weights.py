@@ -10,7 +10,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from finlab.errors import CheckpointError
-from finlab.inference.fast_weights import FastWeights
+from finlab.inference.fast_network import FastWeights
 from finlab.inference.features import RAW_SIZE, SIZES
 from finlab.inference.normalization import Normalization
 

@@ -10,8 +10,8 @@ from finlab.layout.file import layout_to_dict as layout_to_dict
 from finlab.layout.file import parse_layout as parse_layout
 from finlab.layout.file import save_layout as save_layout
 from finlab.layout.fin import Fin as Fin
+from finlab.layout.fin import FinModelSpec as FinModelSpec
 from finlab.layout.fin import Limits as Limits
-from finlab.layout.fin_model import FinModelSpec as FinModelSpec
 from finlab.layout.layout import MAX_FINS as MAX_FINS
 from finlab.layout.layout import Layout as Layout
 from finlab.layout.load import load_layout as load_layout

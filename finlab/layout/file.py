@@ -15,8 +15,7 @@ from typing import Any
 
 from finlab.errors import LayoutError
 from finlab.layout.body import BODY_KEYS, HULL_KEYS, Body, Hull
-from finlab.layout.fin import Fin, Limits
-from finlab.layout.fin_model import FinModelSpec
+from finlab.layout.fin import Fin, FinModelSpec, Limits
 from finlab.layout.layout import MAX_FINS, Layout
 from finlab.layout.rules import mapping, number, shown, text
 

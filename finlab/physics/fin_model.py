@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.layout.fin_model import FinModelSpec
+from finlab.layout.fin import FinModelSpec
 from finlab.physics.drag import Drag
 from finlab.physics.fin_law import FinLaw, PlanarLaw
 from finlab.physics.lighthill import Lighthill

@@ -6,31 +6,17 @@
 World: z up. Body: x forward, y left, z up. SI and radians.
 """
 
-from finlab.sim.closed_loop import ClosedLoop
-from finlab.sim.fin_motion import Servo
-from finlab.sim.log import RunLog, Tick, load_log
-from finlab.sim.parameters import VehicleParameters, vehicle_parameters
-from finlab.sim.plants import PLANTS
-from finlab.sim.sensors import NO_NOISE, SensorSettings
-from finlab.sim.task import Cruise, Task
-from finlab.sim.trajectory import SHIPPED, Trajectory, make_trajectory
-from finlab.sim.vehicle import Vehicle
-
-__all__ = [
-    "NO_NOISE",
-    "PLANTS",
-    "SHIPPED",
-    "Cruise",
-    "SensorSettings",
-    "Servo",
-    "ClosedLoop",
-    "RunLog",
-    "Task",
-    "Tick",
-    "Trajectory",
-    "Vehicle",
-    "VehicleParameters",
-    "load_log",
-    "make_trajectory",
-    "vehicle_parameters",
-]
+from finlab.sim.closed_loop import ClosedLoop as ClosedLoop
+from finlab.sim.fin_force import PLANTS as PLANTS
+from finlab.sim.fin_motion import Servo as Servo
+from finlab.sim.log import RunLog as RunLog
+from finlab.sim.log import Tick as Tick
+from finlab.sim.log import load_log as load_log
+from finlab.sim.sensors import NO_NOISE as NO_NOISE
+from finlab.sim.sensors import SensorSettings as SensorSettings
+from finlab.sim.task import SHIPPED as SHIPPED
+from finlab.sim.task import Cruise as Cruise
+from finlab.sim.task import Task as Task
+from finlab.sim.task import Trajectory as Trajectory
+from finlab.sim.task import make_trajectory as make_trajectory
+from finlab.sim.vehicle import Vehicle as Vehicle

@@ -12,17 +12,14 @@ from finlab.allocation.allocator import Allocator
 from finlab.control import Completion, Controller, Measurement, VelocityController, WaypointController
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from finlab.layout.arrays import stack_layouts
+from finlab.layout.arrays import force_columns
 from finlab.physics import plant_of
-from finlab.sim.attitude import euler, quaternion_of_yaw
-from finlab.sim.fin_motion import FinMotion, Servo
-from finlab.sim.fin_power import fin_power
+from finlab.sim.fin_force import make_plant
+from finlab.sim.fin_motion import FinMotion, Servo, fin_power
 from finlab.sim.log import RunLog, Tick, log_of_ticks
-from finlab.sim.parameters import vehicle_parameters
-from finlab.sim.plants import make_plant
 from finlab.sim.sensors import Sensors, SensorSettings
 from finlab.sim.task import Cruise, Task
-from finlab.sim.vehicle import STATE_SIZE, Vehicle
+from finlab.sim.vehicle import STATE_SIZE, Vehicle, complete_body, euler, quaternion_of_yaw
 
 Array = NDArray[np.float64]
 
@@ -79,16 +76,17 @@ class ClosedLoop:
         self.layout = layout
         self.allocator = allocator
         self.task = task
-        self.controller = _usual_controller(task) if controller is None else controller
+        usual = VelocityController if isinstance(task, Cruise) else WaypointController
+        self.controller = usual() if controller is None else controller
         self.plant = plant
         self.steady = steady
         self.seed = seed
-        self.vehicle = Vehicle(vehicle_parameters(layout), current)
+        self.vehicle = Vehicle(complete_body(layout), current)
         self.fins = FinMotion(layout, servo)
         """The fins' motion: amplitude, frequency, zero direction and phase of each."""
         self._fin_force = make_plant(plant, layout)
         self._plant = plant_of(layout)
-        self._axes, self._position = _geometry(layout)
+        self._columns = force_columns(layout.position, layout.mounting_angle)
         self._sensors = Sensors(SensorSettings() if sensors is None else sensors, np.random.default_rng(seed))
         self._pending = sorted(failures, key=lambda failure: failure[1])
         self.failed: tuple[str, ...] = ()
@@ -199,23 +197,20 @@ class ClosedLoop:
         n_steps = max(1, math.ceil(self.period_s / self._fin_force.step_s - 1e-9))
         dt = self.period_s / n_steps
         alive = np.isfinite(command[:, 0])
-        total, wrench_sum = np.zeros((self.layout.n_fins, 3)), np.zeros(6)
+        mean = np.zeros((self.layout.n_fins, 6))
         inertial, torque = np.zeros(self.layout.n_fins), np.zeros(self.layout.n_fins)
         for k in range(n_steps):
             self.fins.step(command, dt)
-            force = np.einsum("nij,nj->ni", self._axes, self._fin_force.step(self.fins, dt))
-            force[~alive] = 0.0
-            wrench = _wrench(force, self._position)
+            wrenches = np.einsum("nk,nkw->nw", self._fin_force.step(self.fins, dt), self._columns)
+            wrenches[~alive] = 0.0
+            wrench = wrenches.sum(axis=0)
             self.state = self.vehicle.step(self.state, wrench.tolist(), dt)
             if k + 1 < n_steps:  # the sample at the end belongs to the next period
                 self._sensors.measure(time + (k + 1) * dt, self.state)
             power = fin_power(self.fins)
-            total += force / n_steps
-            wrench_sum += wrench / n_steps
+            mean += wrenches / n_steps
             inertial += power.inertial / n_steps
             torque += power.torque / n_steps
-        idle = np.where(alive[:, None], command, 0.0)
-        planned = self._plant.wrench(idle)
         return Tick(
             time=time,
             position=before[:3].copy(),
@@ -224,37 +219,14 @@ class ClosedLoop:
             reference=setpoint.position,
             reference_surge=setpoint.surge,
             asked=asked,
-            allocated=planned,
-            delivered=wrench_sum,
+            allocated=self._plant.wrench(np.where(alive[:, None], command, 0.0)),
+            delivered=mean.sum(axis=0),
             command=command,
             fin_motion=self.fins.command,
             fin_angle=self.fins.angle,
-            fin_force=total,
+            fin_force=mean[:, :3],
             inertial_power=inertial,
             torque_power=torque,
             alive=alive,
             solve_ms=solve_ms,
         )
-
-
-def _usual_controller(task: Task) -> Controller:
-    """Velocity and depth for a cruise, waypoints for all else."""
-    return VelocityController() if isinstance(task, Cruise) else WaypointController()
-
-
-def _wrench(force: Array, position: Array) -> Array:
-    """The wrench (6,) of forces (n, 3) [N] at positions (n, 3) [m]."""
-    x, y, z = position.T
-    fx, fy, fz = force.T
-    return np.array([*force.sum(axis=0), y @ fz - z @ fy, z @ fx - x @ fz, x @ fy - y @ fx])
-
-
-def _geometry(layout: Layout) -> tuple[Array, Array]:
-    """Axes of the fins' frames as columns (n, 3, 3) in the body frame, and their positions (n, 3) [m]."""
-    arrays = stack_layouts([layout])
-    angle = arrays.mounting_angle[0]
-    axes = np.zeros((layout.n_fins, 3, 3))
-    axes[:, 0, 0], axes[:, 1, 0] = np.cos(angle), np.sin(angle)
-    axes[:, 0, 1], axes[:, 1, 1] = -np.sin(angle), np.cos(angle)
-    axes[:, 2, 2] = 1.0
-    return axes, arrays.position[0]

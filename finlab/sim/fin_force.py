@@ -1,4 +1,4 @@
-"""Forces of moving fins on the hull: the cycle mean, or resolved within the cycle.
+"""Forces of moving fins on the hull: the cycle mean, resolved within the cycle, or of fins with soft tips.
 
 A fin force model keeps the momentum that it needs from step to step; `step` gives each fin's planar force.
 """
@@ -6,40 +6,20 @@ A fin force model keeps the momentum that it needs from step to step; `step` giv
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Protocol
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
 from finlab.physics import plant_of
-from finlab.sim.fin_motion import FinMotion
+from finlab.sim.fin_motion import FinMotion, FinShape
 
 Array = NDArray[np.float64]
-
-
-class FinShape(NamedTuple):
-    """A fin as a plate; U-CAT's where nothing else is said."""
-
-    length: float = 0.20
-    """From the shaft to the tip [m]; U-CAT's robot description has 0.22, its simulator 0.18."""
-    width: float = 0.10
-    """Along the shaft [m]."""
-    density: float = 1000.0
-    """Of water [kg/m^3]."""
-    drag_coefficient: float = 2.0
-    """Of a plate broadside to the flow."""
-
-    @property
-    def virtual_mass(self) -> float:
-        """Water moved per metre of length [kg/m]: pi/4 rho W^2."""
-        return 0.25 * math.pi * self.density * self.width**2
-
-    @property
-    def drag_per_length(self) -> float:
-        """Normal force per metre of length and squared speed [N s^2/m^3]: 1/2 rho Cd W."""
-        return 0.5 * self.density * self.drag_coefficient * self.width
 
 
 class FinForce(Protocol):
@@ -95,3 +75,115 @@ class RippleForce:
         force[:, 1:] -= (momentum - self._momentum) / dt + drag[:, None] * normal
         self._momentum = momentum
         return force
+
+
+SUBSTEP_S = 0.0025
+"""Longest step of the tip's equation [s]; a stiff tip swings at 4 Hz."""
+
+
+@dataclass(frozen=True)
+class SoftFin:
+    """Dimensions and stiffness of a fin with a soft tip."""
+
+    root: float = 0.08
+    """Length of the driven part [m]."""
+    stiffness: float = 3.0
+    """Of the tip's spring [N m/rad]. The fins' stiffness is not published; at 3 the mean thrust at 1.5 Hz is
+    near the fin law's."""
+    damping: float = 0.02
+    """Of the tip's spring [N m s/rad]."""
+    shape: FinShape = field(default_factory=FinShape)
+    """The whole fin."""
+
+
+class FlexibleForce:
+    """Forces of the fins of one layout; all fins are alike. Its `step` is that of `FinForce`."""
+
+    step_s = 0.01
+
+    def __init__(self, layout: Layout, fin: SoftFin | None = None) -> None:
+        self.fin = SoftFin() if fin is None else fin
+        n = layout.n_fins
+        self._tip_angle: Array | None = None
+        self._tip_speed = np.zeros(n)
+        self._root_angle, self._root_speed = np.zeros(n), np.zeros(n)
+        self._momentum = np.zeros((n, 2))
+        tip = self.fin.shape.length - self.fin.root
+        nodes, weights = np.polynomial.legendre.leggauss(4)
+        self._arm, self._weight = 0.5 * tip * (nodes + 1.0), 0.5 * tip * weights
+
+    def step(self, motion: FinMotion, dt: float) -> Array:
+        angle, speed = motion.angle + math.pi, motion.speed  # the fin points away from its thrust
+        if self._tip_angle is None:
+            self._tip_angle, self._root_angle = angle.copy(), angle
+        n_steps = max(1, math.ceil(dt / SUBSTEP_S - 1e-9))
+        h = dt / n_steps
+        acceleration = (speed - self._root_speed) / dt
+        impulse = np.zeros_like(self._momentum)
+        start = self._momentum
+        root_angle, root_speed = self._root_angle, self._root_speed
+        for _ in range(n_steps):
+            root_speed = root_speed + acceleration * h
+            root_angle = root_angle + root_speed * h
+            impulse += self._substep(root_angle, root_speed, acceleration, h) * h
+        self._root_angle, self._root_speed = angle, speed
+        result = np.zeros((len(angle), 3))
+        result[:, 1:] = (impulse - (self._momentum - start)) / dt
+        return result
+
+    def _substep(self, angle: Array, speed: Array, acceleration: Array, h: float) -> Array:
+        """Moves the tips by `h` [s]; forces (n, 2) [N] along (e_h, e_z) but for the change of momentum."""
+        assert self._tip_angle is not None
+        fin, shape = self.fin, self.fin.shape
+        a, b = fin.root, shape.length - fin.root
+        mass, drag = shape.virtual_mass, shape.drag_per_length
+        bend = self._tip_angle - angle
+        cosine, sine = np.cos(bend), np.sin(bend)
+        across = a * speed * cosine
+        strips = across[:, None] + self._arm * self._tip_speed[:, None]
+        strip_drag = drag * strips * np.abs(strips) * self._weight
+        moved = a * (acceleration * cosine - speed * sine * (2 * self._tip_speed - speed))
+        torque = (
+            -fin.stiffness * bend
+            - fin.damping * (self._tip_speed - speed)
+            - 0.5 * mass * b**2 * moved
+            - strip_drag @ self._arm
+        )
+        self._tip_speed = self._tip_speed + torque / (mass * b**3 / 3) * h
+        self._tip_angle = self._tip_angle + self._tip_speed * h
+        tangent = np.stack([np.cos(self._tip_angle), np.sin(self._tip_angle)], axis=-1)
+        normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=-1)
+        root_normal = np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
+        end = across + b * self._tip_speed
+        slip = a * speed * sine
+        root_drag = drag * speed * np.abs(speed) * a**3 / 3
+        self._momentum = mass * (
+            (0.5 * a**2 * speed)[:, None] * root_normal
+            + (b * across + 0.5 * b**2 * self._tip_speed)[:, None] * normal
+        )
+        force: Array = (
+            (mass * end * slip - strip_drag.sum(axis=1))[:, None] * normal
+            - (0.5 * mass * end**2)[:, None] * tangent
+            - root_drag[:, None] * root_normal
+        )
+        return force
+
+
+PLANTS: dict[str, Callable[[Layout], FinForce]] = {
+    "mean": MeanForce,
+    "ripple": RippleForce,
+    "flexible": FlexibleForce,
+}
+"""`mean`: the layout's fin law. `ripple`: the same within the cycle. `flexible`: fins with soft tips, other
+physics than any method knows."""
+
+
+def make_plant(name: str, layout: Layout) -> FinForce:
+    """The fin force model called `name`.
+
+    Raises:
+        FinlabError: there is none of that name.
+    """
+    if name not in PLANTS:
+        raise FinlabError(f"plant: expected one of {', '.join(PLANTS)}, got {name!r:.60}")
+    return PLANTS[name](layout)

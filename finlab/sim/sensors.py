@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.control import Measurement
-from finlab.sim.attitude import euler
+from finlab.sim.vehicle import euler
 
 Array = NDArray[np.float64]
 

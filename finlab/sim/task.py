@@ -1,14 +1,19 @@
-"""What the robot is to do over time: a trajectory to follow, or a speed and a depth to keep."""
+"""What a robot is to do: follow a path over time (circle, lissajous, square, or from a file) or cruise."""
 
 from __future__ import annotations
 
+import csv
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.control import Setpoint
+from finlab.errors import DataError
 
 Array = NDArray[np.float64]
 
@@ -58,3 +63,165 @@ class Cruise:
     def start(self) -> tuple[Array, float]:
         """At depth, heading along x."""
         return np.array([0.0, 0.0, -self.depth]), 0.0
+
+
+RAMP_S = 6.0
+"""Time in which a shipped trajectory picks up its speed from rest [s]."""
+STEP_S = 0.05
+"""Spacing of the samples of a shipped trajectory [s]."""
+SHORTEST_S = 1.0
+"""Least duration [s]; ten control periods."""
+MAX_BYTES = 20_000_000
+"""Largest file that is read."""
+COLUMNS = ("t", "x", "y", "z")
+"""Columns of a trajectory file: time [s], position in the world [m]."""
+
+
+class Trajectory:
+    """Positions at times, with straight lines between them. A `Task` for the waypoint controller."""
+
+    def __init__(self, name: str, time: Array, position: Array) -> None:
+        """Takes a name, rising times (N,) [s] from 0 and positions (N, 3) in the world [m].
+
+        Raises:
+            DataError: fewer than two samples, less than a second, times that do not rise from 0, or values
+                that are not finite.
+        """
+        time, position = np.asarray(time, np.float64), np.asarray(position, np.float64)
+        if len(time) < 2 or position.shape != (len(time), 3):
+            raise DataError(
+                f"trajectory {name}: expected at least two samples of t, x, y, z, got {len(time)} times and "
+                f"positions of shape {position.shape}"
+            )
+        if not (np.isfinite(time).all() and np.isfinite(position).all()):
+            raise DataError(f"trajectory {name}: expected finite numbers, got NaN or infinity")
+        if time[0] != 0.0 or not (np.diff(time) > 0.0).all():
+            raise DataError(f"trajectory {name}: expected times that rise from 0, got {time[0]:g} first")
+        if time[-1] < SHORTEST_S:
+            raise DataError(f"trajectory {name}: expected at least {SHORTEST_S:g} s, got {time[-1]:g}")
+        self.name = name
+        self.time = time
+        self.samples = position
+        self.duration_s = float(time[-1])
+
+    def position(self, time: float | Array) -> Array:
+        """Position (..., 3) [m] at times (...,) [s]; beyond the ends as at the ends."""
+        return np.stack([np.interp(time, self.time, axis) for axis in self.samples.T], axis=-1)
+
+    def setpoint(self, time: float) -> Setpoint:
+        """The position at `time` [s] and the speed there."""
+        ahead, behind = self.position(time + STEP_S / 2), self.position(time - STEP_S / 2)
+        return Setpoint(self.position(time), float(np.linalg.norm(ahead - behind)) / STEP_S)
+
+    def start(self) -> tuple[Array, float]:
+        """The first position, and the heading of the first horizontal metre or of what there is."""
+        away = np.hypot(*(self.samples[:, :2] - self.samples[0, :2]).T)
+        first = int(np.argmax(away > min(0.05, 0.5 * float(away.max()))))
+        dx, dy = self.samples[first, :2] - self.samples[0, :2]
+        return self.samples[0].copy(), math.atan2(dy, dx)
+
+    @property
+    def length_m(self) -> float:
+        """Length of the path [m]."""
+        return float(np.linalg.norm(np.diff(self.samples, axis=0), axis=1).sum())
+
+
+def _eased(duration_s: float) -> tuple[Array, Array]:
+    """Times, and the share of the path done by then: from rest to a steady speed within `RAMP_S`."""
+    time = np.arange(0.0, duration_s + STEP_S / 2, STEP_S)
+    ramp = np.clip(time / RAMP_S, 0.0, 1.0)
+    # Integral of a smoothstep from 0 to 1, then straight on.
+    done = np.where(time < RAMP_S, RAMP_S * (ramp**3 - 0.5 * ramp**4), time - 0.5 * RAMP_S)
+    return time, done / done[-1]
+
+
+def circle(duration_s: float = 60.0) -> Trajectory:
+    """One round of 1.2 m radius at 1 m depth, 0.13 m/s."""
+    time, share = _eased(duration_s)
+    angle = 2 * math.pi * share
+    path = np.stack([1.2 * np.sin(angle), 1.2 * (1.0 - np.cos(angle)), np.full_like(angle, -1.0)], axis=-1)
+    return Trajectory("circle", time, path)
+
+
+def lissajous(duration_s: float = 90.0) -> Trajectory:
+    """An eight of 3 m by 1.5 m whose depth swings by 0.25 m about 1 m twice in a round."""
+    time, share = _eased(duration_s)
+    angle = 2 * math.pi * share
+    path = np.stack(
+        [1.5 * np.sin(angle), 0.75 * np.sin(2 * angle), -1.0 + 0.25 * (np.cos(2 * angle) - 1.0) / 2], axis=-1
+    )
+    return Trajectory("lissajous", time, path)
+
+
+def square(duration_s: float = 90.0) -> Trajectory:
+    """A square of 2 m a side; the reference rests at each corner while the robot turns."""
+    rest = 0.08 * duration_s
+    leg = (duration_s - 4 * rest) / 4
+    corners = np.array([[0, 0], [2, 0], [2, 2], [0, 2], [0, 0]], dtype=np.float64)
+    time, points = [0.0], [corners[0]]
+    for corner, following in zip(corners[:-1], corners[1:], strict=True):
+        for share in np.linspace(0.0, 1.0, 41)[1:]:
+            time.append(time[-1] + leg / 40)
+            points.append(corner + share * share * (3.0 - 2.0 * share) * (following - corner))
+        time.append(time[-1] + rest)
+        points.append(following)
+    path = np.column_stack([np.array(points), np.full(len(points), -1.0)])
+    return Trajectory("square", np.array(time), path)
+
+
+SHIPPED: dict[str, Callable[..., Trajectory]] = {"circle": circle, "lissajous": lissajous, "square": square}
+"""Trajectories by name; each takes its duration [s]."""
+
+
+def make_trajectory(source: str | Path, duration_s: float | None = None) -> Trajectory:
+    """A shipped trajectory by name, or one from a file.
+
+    Args:
+        source: circle, lissajous, square, or a CSV file with the columns t, x, y, z.
+        duration_s: time for a shipped one [s]; a file brings its own.
+
+    Raises:
+        DataError: unknown name, unreadable file, or a duration that does not fit.
+    """
+    name = str(source)
+    if name in SHIPPED:
+        if duration_s is None:
+            return SHIPPED[name]()
+        if not 2 * RAMP_S <= duration_s <= 3600.0:
+            raise DataError(f"duration: expected {2 * RAMP_S:g} to 3600 s, got {duration_s:g}")
+        return SHIPPED[name](duration_s)
+    if not Path(source).is_file():
+        raise DataError(f"trajectory: expected {', '.join(SHIPPED)} or a CSV file, got {name!r}")
+    if duration_s is not None:
+        raise DataError(f"duration: {name} brings its own times; leave it out")
+    return read_trajectory(Path(source))
+
+
+def read_trajectory(path: Path) -> Trajectory:
+    """Reads a CSV file with a header and the columns t [s], x, y, z [m], in any order.
+
+    Raises:
+        DataError: it cannot be read, lacks a column, or holds something that is no number.
+    """
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise DataError(f"{path}: is larger than {MAX_BYTES:,} bytes")
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.DictReader(file)
+            names = [name.strip() for name in reader.fieldnames or ()]
+            if missing := [name for name in COLUMNS if name not in names]:
+                raise DataError(f"{path}: column {missing[0]!r} is missing; expected {', '.join(COLUMNS)}")
+            reader.fieldnames = names
+            rows = [_numbers(row, f"{path}: line {reader.line_num}") for row in reader]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise DataError(f"{path}: cannot be read: {error}") from None
+    table = np.array(rows, dtype=np.float64).reshape(-1, 4)
+    return Trajectory(path.stem, table[:, 0], table[:, 1:])
+
+
+def _numbers(row: dict[str, str], where: str) -> list[float]:
+    """The four numbers of a row, by column."""
+    try:
+        return [float(row[name]) for name in COLUMNS]
+    except (TypeError, ValueError):
+        raise DataError(f"{where}: expected four numbers for {', '.join(COLUMNS)}") from None

@@ -15,30 +15,76 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import fields, replace
+from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from finlab.sim.parameters import VehicleParameters
+from finlab.assets import layouts_dir
+from finlab.errors import LayoutError
+from finlab.layout import Body, Layout, load_layout
 
 Array = NDArray[np.float64]
 
 STATE_SIZE = 13
+GRAVITY = 9.81
+"""Acceleration of gravity [m/s^2]."""
+
+
+@cache
+def ucat_body() -> Body:
+    """The body of the shipped layout `ucat`, where U-CAT's numbers stand, each with its source."""
+    body = load_layout(layouts_dir() / "ucat.yaml").body
+    assert body is not None
+    return body
+
+
+def complete_body(layout: Layout) -> Body:
+    """The body of a robot; what its layout leaves out is U-CAT's, but for buoyancy, which is then neutral."""
+    if layout.body is None:
+        return ucat_body()
+    said = {field.name: getattr(layout.body, field.name) for field in fields(Body)}
+    given = {name: value for name, value in said.items() if value is not None}
+    return replace(ucat_body(), **{"buoyancy_n": None, **given})
+
+
+def quaternion_of_yaw(yaw: float) -> tuple[float, float, float, float]:
+    """The attitude of a level robot that heads `yaw` [rad] from the world's x, counter-clockwise."""
+    return (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
+
+
+def euler(quaternion: ArrayLike) -> Array:
+    """Roll, pitch, yaw (..., 3) [rad], turned about z, then y, then x; pitch is positive nose down."""
+    w, x, y, z = np.moveaxis(np.asarray(quaternion, dtype=np.float64), -1, 0)
+    roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
+    yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    return np.stack([roll, pitch, yaw], axis=-1)
 
 
 class Vehicle:
     """The dynamics of one vehicle; it holds no state."""
 
-    def __init__(self, parameters: VehicleParameters, current: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
-        """Takes the parameters and the water's velocity (3,) in the world [m/s]."""
-        self.parameters = parameters
+    def __init__(self, body: Body, current: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
+        """Takes a body and the water's velocity (3,) in the world [m/s]; what the body does not say is zero.
+
+        Raises:
+            LayoutError: the body has no mass or no inertia.
+        """
+        if body.mass_kg is None or body.inertia_kgm2 is None:
+            raise LayoutError("a vehicle needs a body with mass_kg and inertia_kgm2")
         self.current = tuple(float(value) for value in current)
-        added = parameters.added_mass
-        self.inertia = (
-            *(parameters.mass + value for value in added[:3]),
-            *(own + more for own, more in zip(parameters.inertia, added[3:], strict=True)),
-        )
+        zeros = (0.0,) * 6
+        own = (*(body.mass_kg,) * 3, *body.inertia_kgm2)
+        self.inertia = tuple(a + b for a, b in zip(own, body.added_mass or zeros, strict=True))
         """Diagonal of M (6,) [kg, kg m^2]."""
+        self.weight = body.mass_kg * GRAVITY
+        """Weight [N]."""
+        self.lift = self.weight if body.buoyancy_n is None else body.buoyancy_n
+        """Buoyant force [N]."""
+        self._linear, self._quadratic = body.linear_damping or zeros, body.quadratic_damping or zeros
+        self._center = body.center_of_buoyancy_m or (0.0, 0.0, 0.0)
 
     def derivative(self, state: Sequence[float], wrench: Sequence[float]) -> list[float]:
         """Rate of change (13,) of a state under a wrench (6,) in the body frame [N, N m]."""
@@ -54,10 +100,9 @@ class Vehicle:
         ur, vr, wr = u - cu, v - cv, w - cw
         mx, my, mz, ix, iy, iz = self.inertia
         px, py, pz, hx, hy, hz = mx * ur, my * vr, mz * wr, ix * p, iy * q, iz * r
-        lin, quad = self.parameters.linear_damping, self.parameters.quadratic_damping
-        lift = self.parameters.lift
-        net = lift - self.parameters.weight
-        bx, by, bz = self.parameters.center_of_buoyancy
+        lin, quad, lift = self._linear, self._quadratic, self.lift
+        net = lift - self.weight
+        bx, by, bz = self._center
         fx = wrench[0] - (q * pz - r * py) - (lin[0] + quad[0] * abs(ur)) * ur + net * r31
         fy = wrench[1] - (r * px - p * pz) - (lin[1] + quad[1] * abs(vr)) * vr + net * r32
         fz = wrench[2] - (p * py - q * px) - (lin[2] + quad[2] * abs(wr)) * wr + net * r33
@@ -92,8 +137,8 @@ class Vehicle:
         kinetic = 0.5 * float(np.dot(np.asarray(self.inertia), motion**2))
         _, _, z, qw, qx, qy, qz = state[:7]
         up = (2 * (qx * qz - qw * qy), 2 * (qy * qz + qw * qx), 1 - 2 * (qx * qx + qy * qy))
-        height = z + sum(a * b for a, b in zip(up, self.parameters.center_of_buoyancy, strict=True))
-        return kinetic + self.parameters.weight * z - self.parameters.lift * height
+        height = z + sum(a * b for a, b in zip(up, self._center, strict=True))
+        return kinetic + self.weight * z - self.lift * height
 
     def step(self, state: Array, wrench: Sequence[float], dt: float) -> Array:
         """The state (13,) after `dt` [s] under a wrench that the body carries along: Runge-Kutta, order 4."""

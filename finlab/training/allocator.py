@@ -16,8 +16,6 @@ from finlab.inference.weights import NetworkConfig, TrainedWeights
 from finlab.layout import FinModelSpec
 from finlab.physics import make_law
 from finlab.training import losses
-from finlab.training.curves import plot_log
-from finlab.training.data.sampling import Batch, ForwardSampler, seeded_generator
 from finlab.training.device import (
     autocast_dtype,
     join_processes,
@@ -25,10 +23,11 @@ from finlab.training.device import (
     share_of_batch,
     training_device,
 )
-from finlab.training.loop import LoopSettings, train
+from finlab.training.loop import LoopSettings, plot_log, train
 from finlab.training.networks.allocator_network import AllocatorNetwork
-from finlab.training.networks.checkpoint import save_checkpoint, state_of, surrogate_of
 from finlab.training.presets import AllocatorTraining, get_preset
+from finlab.training.sampling import Batch, ForwardSampler, seeded_generator
+from finlab.training.saving import save_checkpoint, state_of, surrogate_of
 from finlab.training.surrogate import TRAIN_SEED
 
 

@@ -6,11 +6,11 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from finlab.inference.coordinates import clamp_to_limits, to_command, to_normalized
+from finlab.inference.normalization import clamp_to_limits, to_command, to_normalized
 from finlab.physics.energy import fin_energy
-from finlab.training.data.sampling import Batch
-from finlab.training.networks.mixture import Mixture
+from finlab.training.networks.allocator_network import Mixture
 from finlab.training.networks.surrogate import Surrogate
+from finlab.training.sampling import Batch
 
 HUBER = 0.02
 """Normalized wrench error below which the guidance is quadratic and above which it is linear: linear

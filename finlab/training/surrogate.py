@@ -16,13 +16,12 @@ from finlab.inference.normalization import Normalization
 from finlab.inference.weights import TrainedWeights
 from finlab.layout import FinModelSpec
 from finlab.physics import FinLaw, make_law
-from finlab.training.curves import plot_log
-from finlab.training.data.sampling import Batch, ForwardSampler
 from finlab.training.device import join_processes, leave_processes, share_of_batch, training_device
-from finlab.training.loop import LoopSettings, train
-from finlab.training.networks.checkpoint import save_checkpoint, state_of
+from finlab.training.loop import LoopSettings, plot_log, train
 from finlab.training.networks.surrogate import CoefficientSurrogate, Surrogate, make_surrogate
 from finlab.training.presets import get_preset
+from finlab.training.sampling import Batch, ForwardSampler
+from finlab.training.saving import save_checkpoint, state_of
 
 Terms = Callable[[nn.Module, int], dict[str, Tensor]]
 """Loss terms of a step of training."""

@@ -16,7 +16,7 @@ from finlab.deploy.graph_file import parse_graph
 from finlab.deploy.robot import load_robot, parse_robot
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from finlab.layout.graph_layout import checksum_of
+from finlab.layout.load import checksum_of
 
 WEIGHTS, CONFIG = "checkpoint/model.safetensors", "checkpoint/config.json"
 LAYOUTS, GRAPHS, BUNDLES, ARCHIVES = 3000, 3000, 3500, 500

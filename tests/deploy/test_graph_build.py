@@ -17,7 +17,7 @@ from finlab.errors import FinlabError
 from finlab.inference.checkpoint import read_checkpoint
 from finlab.inference.features import fin_frame_features, geometry
 from finlab.layout import stack_layouts
-from finlab.training.networks.checkpoint import surrogate_of
+from finlab.training.saving import surrogate_of
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "finlab/deploy/graph.schema.json").read_text())
 WRENCH = ["--wrench", "0.5", "0", "0.5", "0", "0", "0"]

@@ -19,7 +19,7 @@ from finlab.deploy import LayoutGraph, SelfTest, graph_bytes, parse_graph, read_
 from finlab.errors import FinlabError, LayoutError
 from finlab.inference.normalization import Normalization
 from finlab.layout import Fin, Layout, load_layout
-from finlab.layout.graph_layout import checksum_of
+from finlab.layout.load import checksum_of
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "finlab/deploy/graph.schema.json").read_text())
 

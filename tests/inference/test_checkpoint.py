@@ -25,7 +25,7 @@ from finlab.inference.checkpoint import (
     read_normalization,
     resolve_checkpoint,
 )
-from finlab.training.networks.checkpoint import network_of, save_checkpoint, state_of, surrogate_of
+from finlab.training.saving import network_of, save_checkpoint, state_of, surrogate_of
 
 
 def file_sha256(path: Path) -> str:

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 import torch
 
-from finlab.inference.fast_network import NumpyFastNetwork
-from finlab.inference.fast_weights import FastWeights
-from finlab.training.networks.fast_network import FastConfig, FastNetwork
+from finlab.inference.fast_network import FastWeights, NumpyFastNetwork
+from finlab.training.distill.network import FastConfig, FastNetwork
 
 
 @pytest.mark.parametrize("n_fins", [1, 4, 7])

@@ -11,8 +11,8 @@ from finlab.inference.learned_fin import LearnedFin
 from finlab.inference.weights import SurrogateConfig, TrainedWeights
 from finlab.layout import FinModelSpec
 from finlab.physics import make_law
-from finlab.training.networks.checkpoint import surrogate_of
 from finlab.training.networks.surrogate import CoefficientSurrogate
+from finlab.training.saving import surrogate_of
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from finlab.inference.mixture import MixtureArrays
-from finlab.training.networks.mixture import Mixture
+from finlab.training.networks.allocator_network import Mixture
 
 N, K, FINS, M = 4, 9, 3, 5
 WRAPS = np.array([True, False, True])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from finlab.inference.mlp_surrogate import BLOCK, MlpFins
+from finlab.inference.surrogate import BLOCK, MlpFins
 from finlab.inference.weights import SurrogateConfig
 from finlab.layout import Layout, Limits, random_layout
 from finlab.training.networks.surrogate import MlpSurrogate, make_surrogate

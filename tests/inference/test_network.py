@@ -12,7 +12,7 @@ from finlab.inference.network import NumpyNetwork
 from finlab.inference.weights import NetworkConfig
 from finlab.layout import random_layouts
 from finlab.training.networks.allocator_network import AllocatorNetwork
-from finlab.training.networks.checkpoint import network_of
+from finlab.training.saving import network_of
 
 RANDOM = NetworkConfig(width=32, heads=4, transformer_layers=2, feedforward=40, n_components=6)
 

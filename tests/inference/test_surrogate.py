@@ -7,7 +7,7 @@ import torch
 from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.inference.surrogate import surrogate_on
 from finlab.layout import random_layout
-from finlab.training.networks.checkpoint import surrogate_of
+from finlab.training.saving import surrogate_of
 
 
 @pytest.mark.parametrize("name", ["default", "paper"])

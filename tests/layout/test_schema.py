@@ -11,7 +11,7 @@ import yaml
 from finlab import layout as layout_package
 from finlab.assets import shipped_layouts
 from finlab.layout.body import BODY_KEYS, HULL_KEYS, HULL_SHAPES
-from finlab.layout.fin_model import FIN_MODELS
+from finlab.layout.fin import FIN_MODELS
 
 SCHEMA = json.loads((Path(layout_package.__file__).parent / "layout.schema.json").read_text())
 VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)

@@ -9,7 +9,7 @@ import torch
 from scipy.special import j0, j1
 
 from finlab.layout import FinModelSpec
-from finlab.layout.fin_model import FIN_MODELS
+from finlab.layout.fin import FIN_MODELS
 from finlab.physics import make_law, stack_laws
 from finlab.physics.fin_model import PLANAR_LAWS
 from finlab.physics.lighthill import bessel_j0, bessel_j1

@@ -9,10 +9,8 @@ from scipy.integrate import solve_ivp
 from finlab.assets import shipped_layouts
 from finlab.layout import Layout, load_layout
 from finlab.physics import Plant
-from finlab.sim.fin_force import FinForce, FinShape, MeanForce, RippleForce
-from finlab.sim.fin_motion import FinMotion, Servo
-from finlab.sim.fin_power import FIN_INERTIA, fin_power
-from finlab.sim.flexible_fin import FlexibleForce, SoftFin
+from finlab.sim.fin_force import FinForce, FinShape, FlexibleForce, MeanForce, RippleForce, SoftFin
+from finlab.sim.fin_motion import FIN_INERTIA, FinMotion, Servo, fin_power
 
 DT = 0.01
 

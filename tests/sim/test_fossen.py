@@ -4,16 +4,18 @@ T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control: rotatio
 Coriolis matrix from a mass matrix (3.46), restoring forces of a submerged body (4.6), relative motion (8).
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from finlab.layout import Layout
-from finlab.sim.attitude import rotation
-from finlab.sim.frames import flip_matrix, flip_vector
-from finlab.sim.parameters import VehicleParameters, vehicle_parameters
-from finlab.sim.vehicle import Vehicle
+from finlab.layout import Body, Layout
+from finlab.sim.vehicle import Vehicle, complete_body
 
-FLIP = np.diag([1.0, -1.0, -1.0])
+SIGNS = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
+"""Of surge, sway, heave, roll, pitch, yaw under half a turn about x, from NED to FLU or back."""
+FLIP = np.diag(SIGNS[:3])
 
 
 def skew(a: np.ndarray) -> np.ndarray:
@@ -39,10 +41,10 @@ def rotation_of(phi: float, theta: float, psi: float) -> np.ndarray:
     return rz @ ry @ rx
 
 
-def fossen(p: VehicleParameters, eta: np.ndarray, nu: np.ndarray, current: np.ndarray, tau: np.ndarray):
+def fossen(p: Body, eta: np.ndarray, nu: np.ndarray, current: np.ndarray, tau: np.ndarray):
     """(eta', nu') in NED for eta = (position, Euler angles), nu, the current in the world and tau."""
-    mass_rigid = np.diag([p.mass] * 3 + list(p.inertia))
-    mass_added = flip_matrix(np.diag(p.added_mass))
+    mass_rigid = np.diag([p.mass_kg] * 3 + list(p.inertia_kgm2))
+    mass_added = np.diag(p.added_mass)
     phi, theta, psi = eta[3:]
     r = rotation_of(phi, theta, psi)
     rates = np.array(
@@ -55,9 +57,9 @@ def fossen(p: VehicleParameters, eta: np.ndarray, nu: np.ndarray, current: np.nd
     water = np.concatenate([r.T @ current, np.zeros(3)])
     relative = nu - water
     water_rate = np.concatenate([-skew(nu[3:]) @ water[:3], np.zeros(3)])
-    damping = flip_matrix(np.diag(np.array(p.linear_damping) + np.array(p.quadratic_damping) * abs(relative)))
-    xb, yb, zb = flip_vector(p.center_of_buoyancy)
-    w, b = p.mass * 9.81, p.mass * 9.81 if p.buoyancy is None else p.buoyancy
+    damping = np.diag(np.array(p.linear_damping) + np.array(p.quadratic_damping) * abs(relative))
+    xb, yb, zb = FLIP @ p.center_of_buoyancy_m
+    w, b = p.mass_kg * 9.81, p.mass_kg * 9.81 if p.buoyancy_n is None else p.buoyancy_n
     sp, cp, st, ct = np.sin(phi), np.cos(phi), np.sin(theta), np.cos(theta)
     restoring = np.array(
         [
@@ -84,18 +86,10 @@ def fossen(p: VehicleParameters, eta: np.ndarray, nu: np.ndarray, current: np.nd
 @pytest.mark.parametrize("buoyancy", [None, 200.0])
 def test_derivatives_agree_on_random_states(buoyancy: float | None, layout_a: Layout) -> None:
     rng = np.random.default_rng(1)
-    base = vehicle_parameters(layout_a)
+    base = complete_body(layout_a)
     for _ in range(50):
         offset = tuple(rng.uniform(-0.05, 0.05, 3))
-        p = VehicleParameters(
-            base.mass,
-            base.inertia,
-            base.added_mass,
-            base.linear_damping,
-            base.quadratic_damping,
-            offset,
-            buoyancy,
-        )
+        p = replace(base, center_of_buoyancy_m=offset, buoyancy_n=buoyancy)
         current = rng.uniform(-0.3, 0.3, 3)
         quaternion = rng.standard_normal(4)
         quaternion /= np.linalg.norm(quaternion)
@@ -103,14 +97,14 @@ def test_derivatives_agree_on_random_states(buoyancy: float | None, layout_a: La
         tau = rng.uniform(-10, 10, 6)
         ours = np.array(Vehicle(p, current).derivative(state.tolist(), tau.tolist()))
 
-        r_ned = FLIP @ rotation(quaternion) @ FLIP
+        r_ned = FLIP @ Rotation.from_quat(np.roll(quaternion, -1)).as_matrix() @ FLIP
         eta = np.concatenate([FLIP @ state[:3], euler_of(r_ned)])
-        eta_rate, nu_rate = fossen(p, eta, flip_vector(state[7:]), FLIP @ current, flip_vector(tau))
+        eta_rate, nu_rate = fossen(p, eta, SIGNS * state[7:], FLIP @ current, SIGNS * tau)
 
-        np.testing.assert_allclose(flip_vector(ours[7:]), nu_rate, atol=1e-10)
+        np.testing.assert_allclose(SIGNS * ours[7:], nu_rate, atol=1e-10)
         np.testing.assert_allclose(FLIP @ ours[:3], eta_rate[:3], atol=1e-12)
         # Attitude: the rotation a moment later, from the quaternion's rate and from the Euler angles' rates.
         h = 1e-6
         later = quaternion + h * ours[3:7]
-        ours_later = FLIP @ rotation(later / np.linalg.norm(later)) @ FLIP
+        ours_later = FLIP @ Rotation.from_quat(np.roll(later, -1)).as_matrix() @ FLIP
         np.testing.assert_allclose(ours_later, rotation_of(*(eta[3:] + h * eta_rate[3:])), atol=1e-9)

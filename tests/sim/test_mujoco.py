@@ -7,9 +7,9 @@ gyroscopic terms, the attitude, and the integration.
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from finlab.sim.attitude import rotation
-from finlab.sim.parameters import VehicleParameters
+from finlab.layout import Body
 from finlab.sim.vehicle import STATE_SIZE, Vehicle
 
 MASS, INERTIA = 19.0, (0.1574, 0.4646, 0.51151)
@@ -32,11 +32,16 @@ MODEL = f"""
 """
 
 
+def matrix_of(quaternion: np.ndarray) -> np.ndarray:
+    """The rotation of a quaternion (w, x, y, z)."""
+    return Rotation.from_quat(np.roll(quaternion, -1)).as_matrix()
+
+
 def test_a_minute_under_changing_wrenches_agrees() -> None:
     rng = np.random.default_rng(0)
     model = mujoco.MjModel.from_xml_string(MODEL)
     data = mujoco.MjData(model)
-    vehicle = Vehicle(VehicleParameters(MASS, INERTIA, buoyancy=MASS * 9.81))
+    vehicle = Vehicle(Body(mass_kg=MASS, inertia_kgm2=INERTIA, buoyancy_n=MASS * 9.81))
     state = np.zeros(STATE_SIZE)
     state[3] = 1.0
     wrench = np.zeros(6)
@@ -47,7 +52,7 @@ def test_a_minute_under_changing_wrenches_agrees() -> None:
         data.ctrl[:] = wrench
         mujoco.mj_step(model, data)
         state = vehicle.step(state, wrench.tolist(), DT)
-        turn = rotation(state[3:7]).T @ rotation(data.qpos[3:7])
+        turn = matrix_of(state[3:7]).T @ matrix_of(data.qpos[3:7])
         angle = (
             np.linalg.norm([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / 2
         )

@@ -6,18 +6,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finlab.layout import Layout
-from finlab.sim.attitude import euler, quaternion_of_yaw
-from finlab.sim.parameters import VehicleParameters, vehicle_parameters
-from finlab.sim.vehicle import STATE_SIZE, Vehicle
+from finlab.layout import Body, Layout
+from finlab.sim.vehicle import (
+    STATE_SIZE,
+    Vehicle,
+    complete_body,
+    euler,
+    quaternion_of_yaw,
+)
 
 STILL = (0.0,) * 6
 
 
 @pytest.fixture
-def ucat(layout_a: Layout) -> VehicleParameters:
+def ucat(layout_a: Layout) -> Body:
     """Layout A says nothing of its body, so U-CAT's parameters are used."""
-    return vehicle_parameters(layout_a)
+    return complete_body(layout_a)
 
 
 def at_rest() -> np.ndarray:
@@ -34,7 +38,7 @@ def swim(
     return state
 
 
-def test_surge_under_quadratic_drag_is_a_hyperbolic_tangent(ucat: VehicleParameters) -> None:
+def test_surge_under_quadratic_drag_is_a_hyperbolic_tangent(ucat: Body) -> None:
     """m u' = F - q u |u|: u = sqrt(F / q) tanh(sqrt(F q) t / m)."""
     force, time = 6.0, 8.0
     vehicle = Vehicle(replace(ucat, linear_damping=(0.0,) * 6))
@@ -45,7 +49,7 @@ def test_surge_under_quadratic_drag_is_a_hyperbolic_tangent(ucat: VehicleParamet
     assert state[0] == pytest.approx(mass / drag * math.log(math.cosh(rate * time)), abs=1e-8)
 
 
-def test_yaw_under_linear_drag_is_exponential(ucat: VehicleParameters) -> None:
+def test_yaw_under_linear_drag_is_exponential(ucat: Body) -> None:
     vehicle = Vehicle(replace(ucat, quadratic_damping=(0.0,) * 6))
     torque, time = 0.2, 5.0
     inertia, drag = vehicle.inertia[5], ucat.linear_damping[5]
@@ -56,7 +60,7 @@ def test_yaw_under_linear_drag_is_exponential(ucat: VehicleParameters) -> None:
     assert euler(state[3:7])[2] == pytest.approx(yaw, abs=1e-8)
 
 
-def test_a_robot_without_thrust_ends_up_drifting_with_the_water(ucat: VehicleParameters) -> None:
+def test_a_robot_without_thrust_ends_up_drifting_with_the_water(ucat: Body) -> None:
     current = (0.15, -0.1, 0.0)
     state = at_rest()
     state[3:7] = quaternion_of_yaw(0.7)
@@ -66,7 +70,7 @@ def test_a_robot_without_thrust_ends_up_drifting_with_the_water(ucat: VehiclePar
     np.testing.assert_allclose((after[:3] - state[:3]) / 0.1, current, atol=2e-3)
 
 
-def test_energy_never_grows_without_thrust(ucat: VehicleParameters) -> None:
+def test_energy_never_grows_without_thrust(ucat: Body) -> None:
     rng = np.random.default_rng(3)
     vehicle = Vehicle(ucat)
     for _ in range(5):
@@ -82,7 +86,7 @@ def test_energy_never_grows_without_thrust(ucat: VehicleParameters) -> None:
         assert energy[-1] < energy[0]
 
 
-def test_without_drag_the_energy_is_kept(ucat: VehicleParameters) -> None:
+def test_without_drag_the_energy_is_kept(ucat: Body) -> None:
     vehicle = Vehicle(replace(ucat, linear_damping=(0.0,) * 6, quadratic_damping=(0.0,) * 6))
     state = at_rest()
     state[7:] = (0.3, 0.1, -0.2, 0.4, 0.3, 0.5)
@@ -90,7 +94,7 @@ def test_without_drag_the_energy_is_kept(ucat: VehicleParameters) -> None:
     assert vehicle.energy(swim(vehicle, state, STILL, 10.0, 0.01)) == pytest.approx(before, abs=1e-5)
 
 
-def test_runge_kutta_is_of_fourth_order(ucat: VehicleParameters) -> None:
+def test_runge_kutta_is_of_fourth_order(ucat: Body) -> None:
     """Half the step, a sixteenth of the error, for a robot that tumbles under a wrench."""
     vehicle = Vehicle(ucat, (0.1, 0.05, 0.0))
     start = at_rest()
@@ -103,8 +107,8 @@ def test_runge_kutta_is_of_fourth_order(ucat: VehicleParameters) -> None:
     assert np.abs(swim(vehicle, start, wrench, 2.0, 0.01) - fine).max() < 1e-7, "the step that is used"
 
 
-def test_a_heavy_robot_sinks_and_a_tilted_one_rights_itself(ucat: VehicleParameters) -> None:
-    heavy = Vehicle(replace(ucat, buoyancy=ucat.weight - 3.0))
+def test_a_heavy_robot_sinks_and_a_tilted_one_rights_itself(ucat: Body) -> None:
+    heavy = Vehicle(replace(ucat, buoyancy_n=Vehicle(ucat).weight - 3.0))
     assert swim(heavy, at_rest(), STILL, 5.0, 0.05)[2] < -0.1
     tilted = at_rest()
     tilted[3:7] = (math.cos(0.3), math.sin(0.3), 0.0, 0.0)
@@ -113,9 +117,7 @@ def test_a_heavy_robot_sinks_and_a_tilted_one_rights_itself(ucat: VehicleParamet
 
 
 def test_a_layout_with_its_own_mass_keeps_ucats_drag(layout_a: Layout) -> None:
-    from finlab.layout import Body
-
-    own = vehicle_parameters(replace(layout_a, body=Body(mass_kg=7.0)))
-    assert own.mass == 7.0
-    assert own.linear_damping == vehicle_parameters(layout_a).linear_damping
-    assert own.lift == own.weight
+    own = complete_body(replace(layout_a, body=Body(mass_kg=7.0)))
+    assert own.mass_kg == 7.0
+    assert own.linear_damping == complete_body(layout_a).linear_damping
+    assert Vehicle(own).lift == Vehicle(own).weight

@@ -7,14 +7,14 @@ import pytest
 import torch
 from torch import Tensor
 
-from finlab.inference.coordinates import to_normalized
+from finlab.inference.normalization import to_normalized
 from finlab.layout import FinModelSpec
 from finlab.layout.angles import is_full_turn
 from finlab.physics import assemble_wrench, make_law
 from finlab.physics.energy import command_energy
 from finlab.training import losses
-from finlab.training.data.sampling import Batch, ForwardSampler
-from finlab.training.networks.mixture import Mixture
+from finlab.training.networks.allocator_network import Mixture
+from finlab.training.sampling import Batch, ForwardSampler
 
 DRAG = make_law(FinModelSpec())
 

@@ -18,9 +18,9 @@ from finlab.physics import make_law
 from finlab.training import train_allocator, train_surrogate
 from finlab.training.allocator import make_terms
 from finlab.training.networks.allocator_network import AllocatorNetwork
-from finlab.training.networks.checkpoint import network_of
 from finlab.training.networks.surrogate import make_surrogate
 from finlab.training.presets import get_preset
+from finlab.training.saving import network_of
 from finlab.training.surrogate import surrogate_metrics
 
 DRAG = make_law(FinModelSpec())

@@ -10,7 +10,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.errors import FinlabError, LayoutError
 from finlab.layout import Layout, parse_layout, save_layout
-from finlab.layout.graph_layout import SUFFIX, parse_graph_layout
+from finlab.layout.load import SUFFIX, parse_graph_layout
 from finlab.layout.reading import MAX_BYTES, parse_json
 from finlab.layout.yaml_file import parse_yaml
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from finlab.errors import DataError
 from finlab.sim import Trajectory
-from finlab.sim.trajectory import read_trajectory
+from finlab.sim.task import read_trajectory
 
 MAX_BYTES = 2_000_000
 """Largest file that is taken."""

@@ -13,10 +13,10 @@ from finlab.allocation.allocator import Allocator
 from finlab.allocation.learned.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.learned.paper_settings import STEPS, PaperSettings
 from finlab.allocation.solution import Candidates, Solution
-from finlab.inference.coordinates import clamp_to_limits, to_command, to_normalized
 from finlab.inference.features import Geometry, fin_frame_features, geometry, raw_features
 from finlab.inference.mixture import MixtureArrays
 from finlab.inference.network import NumpyNetwork
+from finlab.inference.normalization import clamp_to_limits, to_command, to_normalized
 from finlab.inference.surrogate import LayoutSurrogate, surrogate_on
 from finlab.inference.threads import single_threaded_products
 from finlab.inference.weights import TrainedWeights

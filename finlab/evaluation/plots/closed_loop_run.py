@@ -25,7 +25,7 @@ from finlab.evaluation.plots.style import (
 )
 from finlab.layout.angles import wrapped
 from finlab.sim import RunLog
-from finlab.sim.attitude import euler
+from finlab.sim.vehicle import euler
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

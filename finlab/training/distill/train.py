@@ -7,7 +7,7 @@ first points to the right mode, the second settles what the mean of two modes wo
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +15,17 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from finlab.allocation.learned.fast import FastAllocator
 from finlab.allocation.learned.learned_allocator import LearnedAllocator
-from finlab.inference.fast_weights import FastWeights, save_fast
+from finlab.inference.fast_network import FastWeights, save_fast
 from finlab.inference.features import FIN_FRAME_SIZE, fin_frame_features, geometry
 from finlab.inference.normalization import Normalization
+from finlab.layout import random_layout
+from finlab.physics import Plant
+from finlab.physics.energy import command_energy
 from finlab.training.distill.answers import Answers, AnswerSettings, read_answers, write_answers
-from finlab.training.distill.cost import decode, energy
-from finlab.training.distill.measure import fast_metrics
+from finlab.training.distill.network import FastConfig, FastNetwork, decode, energy
 from finlab.training.loop import LoopSettings, train
-from finlab.training.networks.fast_network import FastConfig, FastNetwork
 
 SEED = 80_000
 """Added to the user's seed."""
@@ -161,3 +163,36 @@ class Batches:
             a.energy[row, place],
         )
         return Batch(*(torch.from_numpy(np.asarray(array, dtype=np.float32)) for array in arrays))
+
+
+JUDGE_SEED = 90_000
+"""Of the layouts and targets measured here."""
+
+
+def fast_metrics(
+    allocator: LearnedAllocator, weights: FastWeights, n_layouts: int = 60, n_targets: int = 50
+) -> dict[str, float]:
+    """Error by the analytic fin model, and energy over that of the full pipeline, on nominal limits.
+
+    `energy_ratio` is the mean over targets of the one energy over the other.
+    """
+    fast = FastAllocator(replace(allocator.weights, fast=weights))
+    rng = np.random.default_rng(JUDGE_SEED)
+    errors, ratios = [], []
+    for _ in range(n_layouts):
+        layout = random_layout(rng)
+        plant = Plant(layout)
+        lower = layout.lower
+        upper = layout.upper
+        targets = plant.wrench(lower + rng.random((n_targets, layout.n_fins, 3)) * (upper - lower))
+        quick = fast.allocate_batch(layout, targets).command
+        whole = allocator.allocate_batch(layout, targets).command
+        errors.append(allocator.normalization.error(plant.wrench(quick), targets))
+        ratios.append(command_energy(quick, upper) / command_energy(whole, upper))
+    error, ratio = np.concatenate(errors), np.concatenate(ratios)
+    return {
+        "err_norm_mean": float(error.mean()),
+        "err_norm_max": float(error.max()),
+        "energy_ratio": float(ratio.mean()),
+        "energy_ratio_p95": float(np.percentile(ratio, 95)),
+    }

@@ -1,12 +1,14 @@
-"""The allocator network: GATv2 and Transformer over the graph of fins, then a mixture density head.
+"""Dense GATv2 attention over fully connected graphs of up to a few dozen fins.
 
-Paper, "Layout-independent allocation" and "Implementation details". The network sees tensors only;
-`finlab.inference.features` makes them from a layout and a target.
+Brody, Alon, Yahav, "How Attentive are Graph Attention Networks?", ICLR 2022. Graphs here are small
+and complete, so a padded dense form with a mask is simpler and faster than edge lists; a test holds
+it against `torch_geometric.nn.GATv2Conv`.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -14,8 +16,119 @@ from torch import Tensor, nn
 from finlab.inference.mixture import LOG_STD_BOUND
 from finlab.inference.weights import NetworkConfig
 from finlab.layout.angles import is_full_turn
-from finlab.training.networks.gatv2 import DenseGATv2
-from finlab.training.networks.mixture import Mixture
+
+
+class DenseGATv2(nn.Module):
+    """One GATv2 layer on complete graphs with self loops; heads are concatenated."""
+
+    def __init__(self, in_features: int, out_features: int, heads: int) -> None:
+        """Make the layer.
+
+        Args:
+            in_features: width of the node features.
+            out_features: width of the result, all heads together.
+            heads: number of attention heads; must divide `out_features`.
+        """
+        super().__init__()
+        if out_features % heads:
+            raise ValueError(f"out_features {out_features} must be a multiple of heads {heads}")
+        self.heads = heads
+        self.source = nn.Linear(in_features, out_features)
+        self.target = nn.Linear(in_features, out_features)
+        self.attention = nn.Parameter(torch.empty(heads, out_features // heads))
+        self.bias = nn.Parameter(torch.zeros(out_features))
+        nn.init.xavier_uniform_(self.attention)
+
+    def forward(self, x: Tensor, mask: Tensor | None = None) -> tuple[Tensor, Tensor]:
+        """Attend over all nodes of each graph.
+
+        Args:
+            x: node features (B, n, in_features).
+            mask: True where a node exists (B, n); None where all do.
+
+        Returns:
+            New features (B, n, out_features) and the attention weights (B, n, n, heads), from the
+            third axis (source) to the second (target).
+        """
+        batch, n, _ = x.shape
+        source = self.source(x).view(batch, 1, n, self.heads, -1)
+        target = self.target(x).view(batch, n, 1, self.heads, -1)
+        hidden = nn.functional.leaky_relu(source + target, 0.2)  # (B, n, n, heads, c)
+        score = (hidden * self.attention).sum(-1)  # (B, n, n, heads)
+        if mask is not None:
+            score = score.masked_fill(~mask[:, None, :, None], float("-inf"))
+        weight = score.softmax(dim=2)
+        out = torch.einsum("bijh,bjhc->bihc", weight, source[:, 0]).reshape(batch, n, -1)
+        return out + self.bias, weight
+
+
+class Mixture(NamedTuple):
+    """A mixture of M diagonal Gaussians per fin, for B robots of n fins."""
+
+    logits: Tensor
+    """Unnormalized log weights: (B, M) for a joint mixture, (B, n, M) for one mixture per fin."""
+    mean: Tensor
+    """Means (B, n, M, 3) in normalized coordinates."""
+    log_std: Tensor
+    """Log standard deviations (B, n, M, 3) in normalized coordinates."""
+    wraps: Tensor
+    """True (B, n) where the zero direction is a full circle and is treated as an angle of period 2."""
+
+    @property
+    def joint(self) -> bool:
+        """Whether one component is chosen for all fins together."""
+        return self.logits.dim() == 2
+
+    def deviation(self, x: Tensor) -> Tensor:
+        """Difference x - mean (B, n, M, 3) of normalized commands x (B, n, 3), wrapped where angles wrap."""
+        delta = x[:, :, None] - self.mean
+        wrapped = torch.remainder(delta[..., 2] + 1.0, 2.0) - 1.0
+        last = torch.where(self.wraps[:, :, None], wrapped, delta[..., 2])
+        return torch.cat([delta[..., :2], last[..., None]], dim=-1)
+
+    def log_prob(self, x: Tensor, mask: Tensor) -> Tensor:
+        """Log likelihood (B,) of normalized commands x (B, n, 3); padded fins (mask False) count nothing."""
+        z = self.deviation(x) * torch.exp(-self.log_std)
+        log_normal = (-0.5 * z.square() - self.log_std - 0.5 * math.log(2 * math.pi)).sum(-1)  # (B, n, M)
+        log_weight = self.logits.log_softmax(-1)
+        if self.joint:
+            return torch.logsumexp(log_weight + (log_normal * mask[..., None]).sum(1), dim=-1)
+        return (torch.logsumexp(log_weight + log_normal, dim=-1) * mask).sum(1)
+
+    def sample(
+        self,
+        n_samples: int,
+        temperature: float,
+        generator: torch.Generator | None = None,
+        *,
+        share: tuple[slice, int] | None = None,
+    ) -> Tensor:
+        """Draw normalized commands (B, n_samples, n, 3).
+
+        Temperature T sharpens the choice of component (weights to the power 1/T) and scales the
+        variance of each Gaussian by T, as usual for mixture density networks; T = 1 samples the
+        density itself.
+
+        Args:
+            n_samples: how many.
+            temperature: T, from 0.
+            generator: source of randomness.
+            share: which rows of a larger batch these are, and its size; the noise is that of the larger
+                batch, however it is shared among processes.
+        """
+        batch, n, m, _ = self.mean.shape
+        rows, total = share or (slice(0, batch), batch)
+        size = (total, n_samples) if self.joint else (total, n, n_samples)
+        dtype, device = self.mean.dtype, self.mean.device
+        draw = torch.rand(size, generator=generator, dtype=dtype, device=device)[rows]
+        noise = torch.randn((total, n, n_samples, 3), generator=generator, dtype=dtype, device=device)[rows]
+        cumulative = (self.logits / max(temperature, 1e-6)).softmax(-1).cumsum(-1)
+        choice = (draw[..., None] > cumulative[..., None, :]).sum(-1).clamp(max=m - 1)
+        if self.joint:
+            choice = choice[:, None].expand(batch, n, n_samples)
+        index = choice[..., None].expand(-1, -1, -1, 3)
+        mean, std = self.mean.gather(2, index), self.log_std.gather(2, index).exp()
+        return (mean + math.sqrt(temperature) * std * noise).transpose(1, 2)
 
 
 class AllocatorNetwork(nn.Module):

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor, nn
 
-from finlab.inference.coordinates import to_normalized
 from finlab.inference.features import raw_features
 from finlab.inference.learned_fin import FORCE_UNIT, REFERENCE
+from finlab.inference.normalization import to_normalized
 from finlab.inference.weights import DESCRIPTOR, SurrogateConfig
 from finlab.layout.arrays import force_columns
 from finlab.physics.wrench import wrench_of_forces

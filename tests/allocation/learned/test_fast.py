@@ -17,7 +17,7 @@ from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.assets import checkpoint_path, shipped_layouts
 from finlab.errors import AllocationError, CheckpointError
 from finlab.inference.checkpoint import read_checkpoint
-from finlab.inference.fast_weights import save_fast
+from finlab.inference.fast_network import save_fast
 from finlab.layout import Limits, random_layout
 from finlab.physics import Plant
 from finlab.physics.energy import command_energy

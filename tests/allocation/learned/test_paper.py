@@ -11,15 +11,14 @@ import torch
 from finlab.allocation.learned.paper import ADAM_RATE, CHUNK, PaperAllocator
 from finlab.assets import shipped_layouts
 from finlab.errors import AllocationError, CheckpointError
-from finlab.inference.coordinates import to_command, to_normalized
 from finlab.inference.features import SIZES
-from finlab.inference.normalization import Normalization
+from finlab.inference.normalization import Normalization, to_command, to_normalized
 from finlab.inference.weights import NetworkConfig, SurrogateConfig, TrainedWeights
 from finlab.layout import Fin, Layout, Limits, load_layout
 from finlab.physics import Plant
 from finlab.training.networks.allocator_network import AllocatorNetwork
-from finlab.training.networks.checkpoint import state_of, surrogate_of
 from finlab.training.networks.surrogate import make_surrogate
+from finlab.training.saving import state_of, surrogate_of
 
 TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]
 

@@ -14,9 +14,8 @@ from finlab.forces.force_space import descend
 from finlab.layout import layout_from_arrays
 from finlab.layout.arrays import LayoutArrays
 from finlab.training.distill.answers import AnswerSettings, make_answers, read_answers, write_answers
-from finlab.training.distill.cost import decode, energy
+from finlab.training.distill.network import FastConfig, decode, energy
 from finlab.training.distill.train import FastSettings, train_fast
-from finlab.training.networks.fast_network import FastConfig
 
 SMALL = AnswerSettings(n_shards=2, layouts_per_shard=4, targets_per_layout=5)
 

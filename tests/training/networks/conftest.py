@@ -9,8 +9,8 @@ from torch import Tensor
 
 from finlab.inference.features import SIZES, fin_frame_features, geometry, raw_features
 from finlab.inference.weights import NetworkConfig
-from finlab.training.data.sampling import ForwardSampler, seeded_generator
 from finlab.training.networks.allocator_network import AllocatorNetwork
+from finlab.training.sampling import ForwardSampler, seeded_generator
 
 STD = torch.tensor([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 

@@ -7,8 +7,7 @@ import torch
 from torch import Tensor
 
 from finlab.inference.mixture import LOG_STD_BOUND
-from finlab.training.networks.allocator_network import AllocatorNetwork
-from finlab.training.networks.mixture import Mixture
+from finlab.training.networks.allocator_network import AllocatorNetwork, Mixture
 
 
 def predict(network: AllocatorNetwork, robots, mask: Tensor | None) -> Mixture:

@@ -5,7 +5,7 @@ import torch
 from torch import Tensor
 from torch_geometric.nn import GATv2Conv
 
-from finlab.training.networks.gatv2 import DenseGATv2
+from finlab.training.networks.allocator_network import DenseGATv2
 
 HEADS, WIDTH, FEATURES = 4, 32, 10
 

@@ -5,7 +5,7 @@ import torch
 from torch import Tensor
 from torch.distributions import Categorical, Independent, MixtureSameFamily, Normal
 
-from finlab.training.networks.mixture import Mixture
+from finlab.training.networks.allocator_network import Mixture
 
 B, N, M = 4, 3, 5
 

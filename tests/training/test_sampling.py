@@ -9,7 +9,7 @@ import torch
 from finlab.layout import FinModelSpec, LayoutArrays, Limits, layout_from_arrays
 from finlab.layout.random import TRAINING_BOX
 from finlab.physics import Plant, make_law
-from finlab.training.data.sampling import ForwardSampler
+from finlab.training.sampling import ForwardSampler
 
 BATCH = ForwardSampler(seed=1, batch_size=20_000).batch(0)
 

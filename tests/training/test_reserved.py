@@ -8,9 +8,8 @@ import torch
 
 from finlab.assets import shipped_layouts
 from finlab.layout import LayoutArrays, layout_from_arrays, load_layout, random_layouts, stack_layouts
-from finlab.training.data import sampling
-from finlab.training.data.reserved import find_reserved, shipped_reserved
-from finlab.training.data.sampling import Batch, ForwardSampler
+from finlab.training import sampling
+from finlab.training.sampling import Batch, ForwardSampler, find_reserved, shipped_reserved
 
 SHIPPED = [load_layout(path) for path in shipped_layouts().values()]
 

@@ -1,0 +1,73 @@
+"""Filters in discrete time: low-pass, rate of a noisy signal, PID."""
+
+from __future__ import annotations
+
+import math
+
+from finlab.control.gains import PidGains
+
+
+class LowPass:
+    """Follows its input with one time constant; the first sample is taken as it is."""
+
+    def __init__(self, time_constant_s: float, period_s: float) -> None:
+        """Takes the time constant [s] (0 passes everything) and the time between samples [s]."""
+        self.share = 1.0 if time_constant_s <= 0.0 else 1.0 - math.exp(-period_s / time_constant_s)
+        """Share of the difference that is closed per sample."""
+        self.value: float | None = None
+        """Output after the last sample; None before the first."""
+
+    def reset(self) -> None:
+        """Forget all samples."""
+        self.value = None
+
+    def step(self, sample: float) -> float:
+        """Takes a sample and returns the filtered value."""
+        self.value = sample if self.value is None else self.value + self.share * (sample - self.value)
+        return self.value
+
+
+class Rate:
+    """Derivative after a first-order filter: never steeper than noise over the time constant."""
+
+    def __init__(self, time_constant_s: float, period_s: float) -> None:
+        """Takes the filter's time constant [s] and the time between samples [s]."""
+        self.period_s = period_s
+        self._filter = LowPass(time_constant_s, period_s)
+
+    def reset(self) -> None:
+        """Forget all samples."""
+        self._filter.reset()
+
+    def step(self, sample: float) -> float:
+        """Takes a sample and returns its filtered rate [1/s]; 0 at the first one."""
+        before = self._filter.value
+        after = self._filter.step(sample)
+        return 0.0 if before is None else (after - before) / self.period_s
+
+
+class Pid:
+    """u = kp e + ki integral(e) + kd de/dt, limited to +-limit, anti-windup by conditional integration."""
+
+    def __init__(self, gains: PidGains, limit: float, period_s: float) -> None:
+        """Takes gains, the largest output [N] and the time between calls [s]."""
+        self.gains = gains
+        self.limit = limit
+        self.period_s = period_s
+        self.integral = 0.0
+        """Integral part of the output [N]."""
+        self._rate = Rate(gains.rate_filter_s, period_s)
+
+    def reset(self) -> None:
+        """Forget the integral and the last error."""
+        self.integral = 0.0
+        self._rate.reset()
+
+    def step(self, error: float, forward: float = 0.0) -> float:
+        """Returns the output for an error, with `forward` added before the limit."""
+        direct = self.gains.kp * error + self.gains.kd * self._rate.step(error) + forward
+        integral = self.integral + self.gains.ki * error * self.period_s
+        output = direct + integral
+        if abs(output) <= self.limit or output * error <= 0.0:
+            self.integral = integral  # within the limit, or on the way back to it
+        return min(max(direct + self.integral, -self.limit), self.limit)

@@ -1,1 +1,0 @@
-"""Training data: seeded sampling and what is kept out of it."""
