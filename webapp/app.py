@@ -13,8 +13,8 @@ from finlab.layout import Layout
 from webapp.session import Display, Session
 from webapp.session.session_files import SessionFiles
 from webapp.session.store import SessionStore
+from webapp.tasks.background import Workers
 from webapp.tasks.solver import Solver
-from webapp.tasks.workers import Workers
 from webapp.view import View
 from webapp.viser_internals import disable_sharing
 

@@ -20,8 +20,8 @@ import viser
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
 from webapp.session import Session
+from webapp.tasks.background import Workers
 from webapp.tasks.solver import Solver
-from webapp.tasks.workers import Workers
 from webapp.view import View
 from webapp.viser_internals import start_server, stop_server
 

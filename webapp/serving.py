@@ -9,7 +9,7 @@ from finlab.errors import FinlabError
 from finlab.layout import Layout, load_layout
 from webapp.app import App
 from webapp.guard import Guard
-from webapp.session.hull_files import cache_folder
+from webapp.session.files import cache_folder
 from webapp.session.state import State
 from webapp.session.targets import FIRST
 from webapp.tasks.solver import Solver

@@ -19,19 +19,16 @@ from webapp.panels.host import Panel
 from webapp.panels.tabs import PANEL_WIDTH, build_panels
 from webapp.scene.scenery import Scenery
 from webapp.session import Session
-from webapp.tasks.analyst import Findings, Question, find
+from webapp.tasks.analyst import REST_S, Beside, Findings, Question, find, find_ranges
 from webapp.tasks.answering import Answering
+from webapp.tasks.background import EventLoop, Newest, Workers
 from webapp.tasks.comparison import Comparison
-from webapp.tasks.event_loop import EventLoop
 from webapp.tasks.exports import Exports
 from webapp.tasks.improving import Improver
-from webapp.tasks.newest import Newest
 from webapp.tasks.playback import Playback
-from webapp.tasks.ranging import REST_S, Beside, find_ranges
 from webapp.tasks.solver import Solver
 from webapp.tasks.sweeping import Sweep
 from webapp.tasks.swimming import Swimming
-from webapp.tasks.workers import Workers
 from webapp.theme import GREEN, VERMILLION
 
 CARD_REST_S = 0.35

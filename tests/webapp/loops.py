@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
-from webapp.tasks.event_loop import EventLoop
+from webapp.tasks.background import EventLoop
 
 
 class AtOnce(EventLoop):

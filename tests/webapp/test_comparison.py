@@ -15,11 +15,9 @@ from tests.webapp.stand_in import StandIn, load_stand_in
 from webapp.markup.comparison import comparison_table
 from webapp.session.state import COMPARED, State
 from webapp.session.targets import PRESETS
+from webapp.tasks.background import Worker
 from webapp.tasks.comparison import Comparison
-from webapp.tasks.density import densities
-from webapp.tasks.refinement import STEPS
-from webapp.tasks.solver import Solver
-from webapp.tasks.worker import Worker
+from webapp.tasks.solver import STEPS, Solver, densities
 
 UCAT = load_layout(shipped_layouts()["ucat"])
 

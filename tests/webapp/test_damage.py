@@ -11,7 +11,7 @@ from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from finlab.sim import SHIPPED
 from tests.webapp.stand_in import load_stand_in
-from webapp.markup.fins import fin_table
+from webapp.markup.answer import fin_table
 from webapp.markup.snippets import command_line, python_lines
 from webapp.markup.words import damage_words
 from webapp.session import Session

@@ -13,8 +13,8 @@ from finlab.layout import load_layout
 from finlab.layout.body import Hull
 from webapp.scene.meshes.hull import hull_of
 from webapp.scene.meshes.mesh_hull import MAX_BYTES, read_mesh
-from webapp.session import Session, hull_edits
-from webapp.session.hull_files import stored_hull
+from webapp.session import Session, layout_edits
+from webapp.session.files import stored_hull
 from webapp.session.targets import axis_reach
 
 
@@ -82,7 +82,7 @@ def test_hull_by_numbers_and_centre_of_gravity(session: Session) -> None:
     reach = axis_reach(layout)
     session.set_center_of_gravity((0.05, 0.0, -0.02))
     moved = session.state.layout
-    assert hull_edits.center_of_gravity(moved) == pytest.approx((0.05, 0.0, -0.02))
+    assert layout_edits.center_of_gravity(moved) == pytest.approx((0.05, 0.0, -0.02))
     assert moved.fins[0].position == pytest.approx((0.20753, -0.1502, 0.02))
     assert axis_reach(moved)[:3] == pytest.approx(reach[:3]) and axis_reach(moved)[3] > reach[3]
     for bad in ((math.nan, 0.1, 0.1), (0.0, 0.1, 0.1)):

@@ -19,8 +19,8 @@ from finlab.layout import load_layout
 from tests.webapp.stand_in import load_stand_in
 from webapp.bench import SilentClient
 from webapp.session import Display, Session
+from webapp.tasks.background import Workers
 from webapp.tasks.solver import Solver
-from webapp.tasks.workers import Workers
 from webapp.view import View
 from webapp.viser_internals import start_server, stop_server
 
@@ -34,20 +34,20 @@ COMPUTED = (
     "webapp.tasks.solver.known_modes",
     "webapp.tasks.analyst.score_card",
     "webapp.tasks.analyst.attainable_set",
-    "webapp.tasks.ranging.axis_ranges",
+    "webapp.tasks.analyst.axis_ranges",
 )
 """Where a fault meets a worker's thread."""
 DRAWN = (
     "webapp.markup.corner.reach_sentence",
-    "webapp.panels.header.corner",
-    "webapp.panels.target.axis_reach",
-    "webapp.panels.target.slider_end",
+    "webapp.panels.tabs.corner",
+    "webapp.panels.wrench_tab.axis_reach",
+    "webapp.panels.wrench_tab.slider_end",
     "webapp.panels.wrench_tab.wrench_bars",
     "webapp.panels.wrench_tab.full_thrust",
     "webapp.panels.wrench_tab.fin_table",
     "webapp.panels.layout_tab.quick_check",
     "webapp.panels.layout_tab.warnings",
-    "webapp.panels.mode_picker.mode_plot",
+    "webapp.panels.modes_tab.mode_plot",
     "webapp.panels.modes_tab.mode_table",
     "webapp.panels.limits_tab.score_table",
     "webapp.panels.compare_tab.comparison_table",

@@ -14,9 +14,8 @@ from tests.webapp.loops import AtOnce, running
 from webapp.session import Session
 from webapp.session.search_request import SearchRequest, parsed_mission
 from webapp.tasks.analyst import Findings, Question, find
+from webapp.tasks.background import Newest, Worker
 from webapp.tasks.improving import Improver
-from webapp.tasks.newest import Newest
-from webapp.tasks.worker import Worker
 
 NO_YAW = load_layout(shipped_layouts()["no_yaw"])
 

@@ -6,9 +6,9 @@ import trimesh
 
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
-from webapp.scene.meshes import arrows, fin
+from webapp.scene.meshes import fin
 from webapp.scene.meshes.hull import Hull, hull_of
-from webapp.scene.meshes.mesh import Mesh
+from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, torque_ring
 
 
 def solid(mesh: Mesh) -> trimesh.Trimesh:
@@ -20,8 +20,8 @@ def solid(mesh: Mesh) -> trimesh.Trimesh:
     [
         fin.blade(),
         fin.shaft(),
-        arrows.force_arrow(np.array([0.1, -0.2, 0.05]), np.zeros(3), 0.01),
-        arrows.torque_ring(np.array([0.0, 0.1, 0.3]), np.zeros(3), 0.01),
+        force_arrow(np.array([0.1, -0.2, 0.05]), np.zeros(3), 0.01),
+        torque_ring(np.array([0.0, 0.1, 0.3]), np.zeros(3), 0.01),
     ],
     ids=["blade", "shaft", "arrow", "ring"],
 )
@@ -61,6 +61,6 @@ def test_every_shipped_layout_has_a_hull_near_its_fins() -> None:
 
 def test_arrows_scale_and_vanish() -> None:
     way = np.array([0.3, 0.0, 0.0])
-    assert arrows.force_arrow(way, np.zeros(3), 0.01).vertices[:, 0].max() == pytest.approx(0.3)
-    assert arrows.force_arrow(0 * way, np.zeros(3), 0.01) is arrows.NOTHING
-    assert arrows.torque_ring(np.zeros(3), np.zeros(3), 0.01) is arrows.NOTHING
+    assert force_arrow(way, np.zeros(3), 0.01).vertices[:, 0].max() == pytest.approx(0.3)
+    assert force_arrow(0 * way, np.zeros(3), 0.01) is NOTHING
+    assert torque_ring(np.zeros(3), np.zeros(3), 0.01) is NOTHING

@@ -14,13 +14,12 @@ from tests.webapp.loops import AtOnce
 from tests.webapp.stand_in import load_stand_in
 from webapp.markup.corner import swim_corner
 from webapp.markup.swim_card import swim_card
+from webapp.session.files import read_path
 from webapp.session.swim_plan import Plan
-from webapp.session.trajectory_file import read_path
-from webapp.tasks.pace import LAG_S
+from webapp.tasks.background import Worker
 from webapp.tasks.solver import Solver
-from webapp.tasks.swimmer import ERROR, FORCES, POINTS, TIME
+from webapp.tasks.swimmer import ERROR, FORCES, LAG_S, POINTS, TIME
 from webapp.tasks.swimming import Swimming
-from webapp.tasks.worker import Worker
 
 UCAT = load_layout(shipped_layouts()["ucat"])
 SHORT = read_path("short.csv", b"t,x,y,z\n0,0,0,-1\n2,0.2,0,-1\n")

@@ -12,14 +12,12 @@ from finlab.assets import shipped_layouts
 from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, load_layout
 from tests.webapp.stand_in import StandIn
-from webapp.markup.check_card import check_card
 from webapp.markup.comparison import comparison_table
 from webapp.markup.corner import corner
-from webapp.markup.score_card import score_table
+from webapp.markup.score_card import check_card, score_table, warnings
 from webapp.markup.words import authority_sentence, reach_sentence, rest_sentence
-from webapp.scene.arrow_scale import LENGTH, LONGEST, fitting_newtons
-from webapp.scene.clearance import warnings
-from webapp.session import Session, layout_files
+from webapp.scene.wrench_nodes import LENGTH, LONGEST, fitting_newtons
+from webapp.session import Session, files
 from webapp.session.state import State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust
 from webapp.session.tour import STEPS
@@ -78,7 +76,7 @@ def test_arrow_scale_fits_and_rests() -> None:
 
 def test_layout_files_go_out_and_come_back() -> None:
     layout = load_layout(shipped_layouts()["ucat"])
-    assert layout_files.read_layout("x.yaml", layout_files.layout_bytes(layout)) == layout
+    assert files.read_layout("x.yaml", files.layout_bytes(layout)) == layout
 
 
 @pytest.mark.parametrize(
@@ -94,17 +92,17 @@ def test_layout_files_go_out_and_come_back() -> None:
 )
 def test_bad_uploads_are_refused_by_name(name: str, content: bytes, said: str) -> None:
     with pytest.raises(LayoutError, match=said):
-        layout_files.read_layout(name, content)
+        files.read_layout(name, content)
 
 
 def test_candidates_as_csv() -> None:
     answer = StandIn().allocate(load_layout(shipped_layouts()["ucat"]), PRESETS["Turn"])
-    lines = layout_files.candidates_csv(answer).decode().splitlines()
+    lines = files.candidates_csv(answer).decode().splitlines()
     assert answer.candidates is not None
     assert len(lines) == 1 + len(answer.candidates.energy)
     assert lines[0].startswith("err_norm,energy,source,front_right.amplitude_rad")
     with pytest.raises(Exception, match="no candidates"):
-        layout_files.candidates_csv(None)
+        files.candidates_csv(None)
 
 
 def test_fins_in_the_way_are_told() -> None:

@@ -5,7 +5,7 @@ import threading
 import pytest
 
 from finlab.errors import FinlabError
-from webapp.tasks.worker import Worker
+from webapp.tasks.background import Worker
 
 
 def shout(text: str) -> None:

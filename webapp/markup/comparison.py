@@ -5,9 +5,8 @@ from html import escape
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.judging import REACHED
-from webapp.markup.figures import small, three_digits
 from webapp.markup.picking import pick
-from webapp.markup.words import unlearned_sentence
+from webapp.markup.words import small, three_digits, unlearned_sentence
 from webapp.session.state import COMPARED
 from webapp.tasks.comparison import Comparison
 

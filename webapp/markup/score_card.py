@@ -1,12 +1,17 @@
-"""What a layout can do, as one card; with the saved layout beside it where the two differ."""
+"""What a layout can do, as one card, and the quick checks below its editor."""
 
 from html import escape
+from itertools import combinations
+
+import numpy as np
 
 from finlab.analysis import AXES, Authority, ScoreCard
 from finlab.analysis.quick import QuickCheck
 from finlab.layout import Layout
-from webapp.markup.figures import listed, three_digits
-from webapp.markup.fins import swatch
+from webapp.markup.answer import swatch
+from webapp.markup.words import listed, three_digits
+from webapp.scene.meshes.fin import SPAN
+from webapp.scene.meshes.hull import hull_of
 from webapp.session.state import AXIS_UNITS
 
 
@@ -114,3 +119,34 @@ def _losses(layout: Layout, card: ScoreCard) -> str:
         weakest = f"<td>{three_digits(loss.weakest)} N</td>"
         rows.append(f"<tr><td>without {name}</td>{weakest}<td class='words'>{cost}</td></tr>")
     return f"<table><tr><th>one fin lost</th><th>weakest</th><th></th></tr>{''.join(rows)}</table>"
+
+
+def check_card(quick: QuickCheck, several: bool, warnings: tuple[str, ...]) -> str:
+    """What there is to watch while a layout is edited.
+
+    Args:
+        quick: axes, and what single failures cost.
+        several: whether more than one fin works.
+        warnings: sentences about fins in the way.
+    """
+    texts = "".join(f"<div class='missing'>{escape(text)}</div>" for text in warnings)
+    costs = "No single failure costs an axis." if several else ""
+    if quick.lost:
+        lost = "; ".join(f"{name}: {', '.join(axes)}" for name, axes in quick.lost)
+        costs = f"<span class='missing'>A failure costs axes: {escape(lost)}.</span>"
+    return f"<div class='fl check'>{texts}<div class='said'>{rank_sentence(quick)} {costs}</div></div>"
+
+
+def warnings(layout: Layout) -> tuple[str, ...]:
+    """Sentences about fins that cannot beat where they stand; cheap enough for every step of a drag."""
+    hull = hull_of(layout)
+    sentences = []
+    for a, b in combinations(layout.fins, 2):
+        gap = float(np.linalg.norm(np.subtract(a.position, b.position)))
+        if gap < SPAN:
+            sentences.append(f"{a.name} and {b.name} are {100 * gap:.0f} cm apart and may touch.")
+    for fin in layout.fins:
+        shaft = np.array([np.cos(fin.mounting_angle), np.sin(fin.mounting_angle), 0.0])
+        if hull.contains(np.array(fin.position) + 0.05 * shaft):
+            sentences.append(f"{fin.name} beats inside the hull.")
+    return tuple(sentences)

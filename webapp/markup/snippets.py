@@ -3,8 +3,7 @@
 import math
 import shlex
 
-from webapp.session.layout_files import file_stem
-from webapp.session.shipped import shipped_name
+from webapp.session.files import file_stem, shipped_name
 from webapp.session.state import State
 
 

@@ -2,8 +2,7 @@
 
 from html import escape
 
-from webapp.markup.figures import listed
-from webapp.markup.words import unlearned_sentence
+from webapp.markup.words import listed, unlearned_sentence
 from webapp.tasks.swimming import Swimming
 from webapp.theme import DELIVERED, OTHER, css
 

@@ -9,7 +9,7 @@ import viser
 from webapp.handles import Changes, on_user_change, put
 from webapp.markup.snippets import command_line, export_line, python_lines
 from webapp.panels.host import Host
-from webapp.session import layout_files
+from webapp.session import files
 
 
 class FilesTab:
@@ -42,7 +42,7 @@ class FilesTab:
         @self._open.on_upload
         async def _opened(event: Any) -> None:
             upload = event.target.value
-            host.do(lambda: host.session.open_layout(layout_files.read_layout(upload.name, upload.content)))
+            host.do(lambda: host.session.open_layout(files.read_layout(upload.name, upload.content)))
 
     def _press(self, button: str) -> None:
         host = self._host
@@ -60,15 +60,15 @@ class FilesTab:
     def _send_layout(self) -> None:
         layout = self._host.session.state.layout
         self._host.client.send_file_download(
-            f"{layout_files.file_stem(layout.name)}.yaml",
-            layout_files.layout_bytes(layout),
+            f"{files.file_stem(layout.name)}.yaml",
+            files.layout_bytes(layout),
             save_immediately=True,
         )
         self._host.session.note_saved()
 
     def _send_candidates(self) -> None:
         self._host.client.send_file_download(
-            "candidates.csv", layout_files.candidates_csv(self._host.answering.best), save_immediately=True
+            "candidates.csv", files.candidates_csv(self._host.answering.best), save_immediately=True
         )
 
     def refresh(self) -> None:

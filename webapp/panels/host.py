@@ -9,14 +9,13 @@ from finlab.allocation.allocation import Allocation
 from finlab.forces.axis_ranges import Ranges
 from webapp.scene.scenery import Scenery
 from webapp.session import Session
-from webapp.tasks.analyst import Findings, Question
+from webapp.tasks.analyst import Beside, Findings, Question
 from webapp.tasks.answering import Answering
+from webapp.tasks.background import Newest
 from webapp.tasks.comparison import Comparison
 from webapp.tasks.exports import Exports
 from webapp.tasks.improving import Improver
-from webapp.tasks.newest import Newest
 from webapp.tasks.playback import Playback
-from webapp.tasks.ranging import Beside
 from webapp.tasks.sweeping import Sweep
 from webapp.tasks.swimming import Swimming
 

@@ -1,18 +1,21 @@
-"""What this layout can do: attainable sets in the view, and the score card."""
+"""What this layout can do (attainable sets, the score card), and a search for a better one."""
 
+from collections.abc import Callable
 from functools import partial
 
 import viser
 
-from webapp.handles import Changes, on_user_change, put
-from webapp.markup.figures import three_digits
+from finlab.analysis import Improvement
+from webapp.handles import Changes, on_user_change, on_user_click, put
 from webapp.markup.picking import chosen_button, marker
 from webapp.markup.score_card import score_table
+from webapp.markup.words import listed, three_digits
+from webapp.panels.damage import FinButtons
 from webapp.panels.host import Host
-from webapp.panels.improve import ImprovePanel
 from webapp.session.display import DRAWN
+from webapp.session.files import shipped
 from webapp.session.looking import PINNED
-from webapp.session.shipped import shipped
+from webapp.session.search_request import ALL, GOAL_WORDS, WAY, Draft
 
 PICKER = "fl-drawn"
 """Marks the buttons for the set that is drawn."""
@@ -79,3 +82,135 @@ class LimitsTab:
             name = "before" if session.beside is None else session.beside
             table = score_table(found.question.layout, found.card, found.before, name)
             put(self._card, content=f"<div class='fl'>{note}</div>{table}")
+
+
+class ImprovePanel:
+    """Widgets of one folder."""
+
+    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+        """Build the widgets."""
+        self._host = host
+        with gui.add_folder("Improve this layout"):
+            self._goal = gui.add_dropdown("Goal", tuple(GOAL_WORDS), hint="What to raise.")
+            on_user_change(self._goal, lambda goal: self._draft(lambda draft: draft.with_goal(goal)))
+            self._fins = FinButtons(
+                gui,
+                "May move",
+                "Press a number to hold a fin, or to let it move. Pairs stay pairs.",
+                "fl-movers",
+                lambda name: self._draft(lambda draft: draft.with_held_toggled(name)),
+            )
+            self._whose = gui.add_dropdown(
+                "Bounds of", (ALL,), hint="All fins, or one that gets bounds of its own."
+            )
+            on_user_change(self._whose, lambda _: self.refresh())
+            self._reach = gui.add_vector3(
+                "Reach ± [m]", WAY[:3], min=(0.0,) * 3, max=(0.5,) * 3, step=0.01, hint="Along x, y and z."
+            )
+            on_user_change(self._reach, lambda reach: self._bound((*reach, self._turn.value)))
+            self._turn = gui.add_slider(
+                "Turn ± [°]", 0.0, 180.0, 5.0, WAY[3], hint="How far its shaft may turn either way."
+            )
+            on_user_change(self._turn, lambda turn: self._bound((*self._reach.value, turn)))
+            self._mission = gui.add_text(
+                "Mission",
+                "",
+                multiline=True,
+                hint="Wrenches, one line each: Fx Fy Fz Tx Ty Tz [N, N m]. Empty: the common ones.",
+                visible=False,
+            )
+            on_user_change(self._mission, lambda text: self._draft(lambda draft: draft.with_mission(text)))
+            self._take = gui.add_button_group(
+                " ", ("Add the present wrench",), hint="To the mission.", visible=False
+            )
+            on_user_change(self._take, lambda _: self._add_wrench())
+            self._start = gui.add_button(
+                "Search", icon=viser.Icon.SPARKLES, hint="Takes up to a minute; it can be stopped any time."
+            )
+            on_user_click(self._start, lambda: host.do(self._search))
+            self._bar = gui.add_progress_bar(0.0, visible=False)
+            self._cancel = gui.add_button(
+                "Cancel", icon=viser.Icon.X, visible=False, hint="What was found so far is offered."
+            )
+            on_user_click(self._cancel, host.improver.cancel)
+            self._card = gui.add_html("")
+            gui.add_html(chosen_button("fl-verdict", 0))
+            self._verdict = gui.add_button_group(
+                "Result", ("Accept", "Leave"), visible=False, hint="Accepting can be undone."
+            )
+            on_user_change(self._verdict, self._decide)
+
+    def _bound(self, way: tuple[float, ...]) -> None:
+        whose = self._whose.value if self._whose.value in self._host.session.state.layout.names else ALL
+        self._draft(lambda draft: draft.with_way(whose, way))
+
+    def _draft(self, change: Callable[[Draft], Draft]) -> None:
+        session = self._host.session
+        self._host.do(lambda: session.set_draft(change(session.draft)))
+
+    def _add_wrench(self) -> None:
+        line = " ".join(f"{value:g}" for value in self._host.session.state.target)
+        self._draft(lambda draft: draft.with_mission(f"{draft.mission.rstrip()}\n{line}".lstrip()))
+
+    def _search(self) -> None:
+        session = self._host.session
+        layout = session.state.layout
+        self._host.improver.start(layout, session.draft.request(layout))
+
+    def _decide(self, button: str) -> None:
+        improver = self._host.improver
+        found = improver.found
+        improver.forget()
+        if button == "Accept" and found is not None:
+            self._host.do(partial(self._host.session.accept_layout, found.layout))
+        else:
+            self.refresh()
+
+    def refresh(self) -> None:
+        """Write how far the search is."""
+        self._refresh_request()
+        improver = self._host.improver
+        running, progress, found = improver.running, improver.progress, improver.found
+        put(self._start, disabled=running)
+        put(self._bar, visible=running)
+        put(self._cancel, visible=running)
+        if progress is not None:
+            put(self._bar, value=100.0 * progress.round / progress.n_rounds)
+        put(self._verdict, visible=found is not None)
+        text = ""
+        if improver.error is not None:
+            text = f"<div class='missing'>{improver.error}</div>"
+        elif found is not None:
+            text = _before_and_after(found)
+        elif progress is not None:
+            best, before = (three_digits(abs(v)) for v in (progress.best, progress.before))
+            text = f"Best so far <b>{best}</b>, {before} before, round {progress.round}."
+        elif running:
+            text = "Searching …"
+        put(self._card, content=f"<div class='fl'>{text}</div>")
+
+    def _refresh_request(self) -> None:
+        """Write which fins may move, and how far."""
+        names, draft = self._host.session.state.layout.names, self._host.session.draft
+        put(self._goal, value=draft.goal)
+        self._fins.refresh(names, held=draft.held)
+        put(self._whose, options=(ALL, *names))
+        way = draft.way(self._whose.value)
+        put(self._reach, value=way[:3])
+        put(self._turn, value=way[3])
+        mission = draft.goal == "energy of a mission"
+        put(self._mission, visible=mission, value=draft.mission)
+        put(self._take, visible=mission)
+
+
+def _before_and_after(found: Improvement) -> str:
+    if not found.improved:
+        return "Nothing better was found within reach."
+    before, after = (three_digits(abs(v)) for v in (found.value_before, found.value_after))
+    goal = next(words for words, name in GOAL_WORDS.items() if name == found.goal)
+    stopped = " The search was stopped early." if found.cancelled else ""
+    unit = "" if found.goal == "mission_energy" else " N"
+    heading = f"<b>{goal.capitalize()}: {before}{unit} before, {after}{unit} after.</b>{stopped}"
+    numbers = listed([str(found.layout.index(name) + 1) for name in found.moved])
+    table = score_table(found.layout, found.card_after, found.card_before)
+    return f"{heading} Fins {numbers} moved; the view shows them as ghosts.{table}"

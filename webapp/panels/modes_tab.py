@@ -1,18 +1,22 @@
-"""Why one wrench has many answers: the mixture's candidates, and the settings that draw them."""
+"""Why one wrench has many answers: its modes, the mixture's candidates, and the settings that draw them."""
 
 from functools import partial
 
 import viser
 
 from finlab.allocation.methods import METHODS
-from webapp.handles import Changes, on_user_change, on_user_click, put
-from webapp.markup.figures import small, three_digits
-from webapp.markup.mode_table import mode_table
-from webapp.panels.density import DensityPanel
+from finlab.layout.layout import MAX_FINS
+from webapp.handles import Changes, numbered, on_user_change, on_user_click, put
+from webapp.markup.modes import SAMPLES, mode_plot, mode_table
+from webapp.markup.picking import Channel, chosen_button, marker
+from webapp.markup.words import small, three_digits
 from webapp.panels.host import Host
-from webapp.panels.mode_picker import ModePicker
+from webapp.panels.line_plot import LinePlot
 from webapp.session.state import CANDIDATE_RANGE, GAMMA_RANGE, TEMPERATURE_RANGE
-from webapp.tasks.refinement import STEPS
+from webapp.tasks.solver import STEPS, Densities
+from webapp.theme import css, fin_color
+
+TITLES = ("amplitude [°]", "frequency [Hz]", "zero direction [°]")
 
 
 class ModesTab:
@@ -86,3 +90,80 @@ def _step_words(host: Host) -> str:
             text += f", nearest to mode {nearest[sample] + 1}"
     error, energy = small(shown.err_norm), three_digits(shown.energy)
     return f"<div class='fl step'><b>{text}</b>: error {error} σ, energy {energy}</div>"
+
+
+class ModePicker:
+    """Plot and buttons."""
+
+    def __init__(self, gui: viser.GuiApi, host: Host, height: int, name: str) -> None:
+        """Build them; `height` of the plot in pixels, `name` marks the buttons on the page."""
+        self._host = host
+        self._height = height
+        self.name = name
+        self._changes = Changes()
+        self._plot = gui.add_html("")
+        Channel(gui, f"{name}-{SAMPLES}", self._choose_sample)
+        self._chosen = gui.add_html(marker(name))
+        self._choice = gui.add_button_group(
+            "Mode",
+            ("1",),
+            hint="Which mode moves the fins. A click on a dot does it too, on a small one for a raw sample.",
+        )
+        on_user_change(self._choice, self._choose)
+
+    def _choose(self, entry: str) -> None:
+        index = numbered(entry, len(self._host.answering.modes.shown))
+        if index is not None:
+            self._host.do(partial(self._host.session.show_mode, index))
+
+    def _choose_sample(self, word: list[str]) -> None:
+        best = self._host.answering.best
+        count = 0 if best is None or best.samples is None else len(best.samples.energy)
+        if word[0].isdecimal() and int(word[0]) < count:
+            self._host.do(partial(self._host.session.show_sample, int(word[0])))
+
+    @property
+    def shown(self) -> int | None:
+        """The mode on the robot; None while a raw sample is."""
+        session, modes = self._host.session, self._host.answering.modes.shown
+        return None if session.sample is not None else min(session.mode, max(len(modes) - 1, 0))
+
+    def refresh(self) -> None:
+        """Write the modes of the newest answer."""
+        answering, sample = self._host.answering, self._host.session.sample
+        best, modes = answering.best, answering.modes
+        if not self._changes(best, modes, self.shown, sample):
+            return
+        put(self._choice, options=tuple(str(k + 1) for k in range(len(modes.shown))) or ("1",))
+        put(self._chosen, content=chosen_button(self.name, self.shown))
+        plot = ""
+        if best is not None:
+            plot = mode_plot(best, modes, self.shown, sample, self._height, self.name)
+        put(self._plot, content=plot)
+
+
+class DensityPanel:
+    """Widgets of one folder."""
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        """Build the plots, empty. The number of lines is fixed: lines without a fin hold no numbers."""
+        self._changes = Changes()
+        with gui.add_folder("What the network proposes", expand_by_default=False) as self._folder:
+            gui.add_html(
+                "<div class='fl dim'>How likely each command is, in the fin's colour; every curve has its "
+                "highest point at the top.</div>"
+            )
+            colors = [css(fin_color(i)) for i in range(MAX_FINS)]
+            # Fins that do the same have the same curve: each next line is thinner, so that all are seen.
+            self._plots = [
+                LinePlot(gui, colors, "", title, height=112, widths=(6.0, 4.5, 3.0, 1.5), visible=True)
+                for title in TITLES
+            ]
+
+    def refresh(self, densities: Densities | None) -> None:
+        """Draw densities, or hide the plots where the method has none."""
+        put(self._folder, visible=densities is not None)
+        if densities is None or not self._changes(densities):
+            return
+        for k, plot in enumerate(self._plots):
+            plot.draw(densities.places[k], list(densities.curves[:, k]), (0.0, 1.08))

@@ -7,7 +7,7 @@ import viser
 
 from finlab.layout.layout import MAX_FINS
 from webapp.handles import hold_kind, on_user_change, on_user_click, put
-from webapp.markup.figures import small
+from webapp.markup.words import small
 from webapp.panels.host import Host
 from webapp.panels.line_plot import LinePlot
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS

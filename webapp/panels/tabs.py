@@ -6,11 +6,10 @@ from importlib.resources import files
 
 import viser
 
-from webapp.handles import put
-from webapp.markup.style import STYLE
+from webapp.handles import on_user_change, put
+from webapp.markup.corner import corner, swim_corner
 from webapp.panels.compare_tab import CompareTab
 from webapp.panels.files_tab import FilesTab
-from webapp.panels.header import Corner, Header
 from webapp.panels.host import Host, Panel
 from webapp.panels.layout_tab import LayoutTab
 from webapp.panels.limits_tab import LimitsTab
@@ -18,6 +17,9 @@ from webapp.panels.modes_tab import ModesTab
 from webapp.panels.swim_tab import SwimTab
 from webapp.panels.view_tab import ViewTab
 from webapp.panels.wrench_tab import WrenchTab
+from webapp.scene.swim_scene import ARROWS_N
+from webapp.session.tour import STEPS
+from webapp.theme import ASKED, DELIVERED, MISSING, css
 from webapp.viser_internals import run_script
 
 NUMBER_FIELDS = files("webapp.panels").joinpath("number_fields.js").read_text("utf-8")
@@ -35,6 +37,12 @@ TABS: dict[str, Callable[[viser.GuiApi, Host], Panel]] = {
     "Files": FilesTab,
 }
 """Tabs by their labels."""
+
+_VARIABLES = (
+    f":root {{ --fl-asked: {css(ASKED)}; --fl-delivered: {css(DELIVERED)}; --fl-missing: {css(MISSING)}; }}"
+)
+STYLE = f"<style>{_VARIABLES}{files('webapp.markup').joinpath('style.css').read_text('utf-8')}</style>"
+"""A style element, to be put into the page once."""
 
 
 class Guarded:
@@ -72,3 +80,71 @@ def build_panels(gui: viser.GuiApi, host: Host) -> tuple[list[Panel], list[Panel
         with tabs.add_tab(label):
             panels[label] = Guarded(gui, host, make)
     return list(panels.values()), [panels["Corner"], panels["Swim"]]
+
+
+class Corner:
+    """What lies over the 3D view."""
+
+    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+        """Build it, empty."""
+        self._host = host
+        self._content = gui.add_html("")
+
+    def refresh(self) -> None:
+        """Write the status line and the legend."""
+        host, answering = self._host, self._host.answering
+        raw = host.session.sample is not None or host.playback.frame is not None
+        if host.swimming.swimmers:
+            content = swim_corner(host.swimming, ARROWS_N)
+        else:
+            content = corner(
+                host.session.state, host.scenery.legend, host.shown, host.busy, answering.error, raw
+            )
+        put(self._content, content=content)
+
+
+class Header:
+    """The top of the panel."""
+
+    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+        """Build the widgets."""
+        self._host = host
+        self._history = gui.add_button_group(
+            "Session", ("Undo", "Redo", "Tour"), hint="Ctrl+Z, Ctrl+Shift+Z, T."
+        )
+        on_user_change(self._history, self._step)
+        self._card = gui.add_html("", visible=False)
+        self._stops = gui.add_button_group(
+            "Tour", ("Back", "Next", "End"), hint="T is next; ending brings your work back.", visible=False
+        )
+        on_user_change(self._stops, self._walk)
+
+    def _step(self, button: str) -> None:
+        session = self._host.session
+        acts = {"Undo": session.undo, "Redo": session.redo, "Tour": session.next_stop}
+        if button in acts:
+            self._host.do(acts[button])
+
+    def _walk(self, button: str) -> None:
+        session = self._host.session
+        acts = {"Back": session.previous_stop, "Next": session.next_stop, "End": session.end_tour}
+        if button in acts:
+            self._host.do(acts[button])
+
+    def refresh(self) -> None:
+        """Write what can be undone, and where the tour is."""
+        history = self._host.session.history
+        undo, redo = history.undo_name or "nothing", history.redo_name or "nothing"
+        put(self._history, hint=f"Undo: {undo} (Ctrl+Z). Redo: {redo} (Ctrl+Shift+Z). T starts a tour.")
+        stop = self._host.session.stop
+        put(self._card, visible=stop is not None, content="" if stop is None else tour_card(stop))
+        put(self._stops, visible=stop is not None)
+
+
+def tour_card(index: int) -> str:
+    """Title and text of a stop."""
+    step = STEPS[index]
+    return (
+        f"<div class='fl tour'><b>{index + 1} of {len(STEPS)} · {escape(step.title)}</b>"
+        f"<div class='said'>{escape(step.text)}</div></div>"
+    )

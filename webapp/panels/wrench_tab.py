@@ -3,20 +3,23 @@
 from functools import partial
 from html import escape
 
+import numpy as np
 import viser
+from numpy.typing import NDArray
 
-from webapp.handles import put
-from webapp.markup.bars import wrench_bars
-from webapp.markup.fins import fin_table
-from webapp.markup.words import authority_sentence, rest_sentence
-from webapp.panels.damage import DamagePanel
-from webapp.panels.fin_buttons import FinButtons
+from finlab.allocation.policy import AXES
+from webapp.handles import Changes, on_user_change, put
+from webapp.markup.answer import fin_table, wrench_bars
+from webapp.markup.picking import marker
+from webapp.markup.words import authority_sentence, rest_sentence, three_digits
+from webapp.panels.damage import DamagePanel, FinButtons
 from webapp.panels.host import Host
-from webapp.panels.mode_picker import ModePicker
+from webapp.panels.modes_tab import ModePicker
 from webapp.panels.pilot import PilotPanel
 from webapp.panels.sweep import SweepPanel
-from webapp.panels.target import TargetPanel
-from webapp.session.targets import full_thrust
+from webapp.session.state import AXIS_UNITS, AXIS_WORDS
+from webapp.session.targets import PRESETS, axis_reach, full_thrust, slider_end
+from webapp.viser_internals import put_marks
 
 
 class WrenchTab:
@@ -37,7 +40,7 @@ class WrenchTab:
         self._table = gui.add_html("")
         self._picker = ModePicker(gui, host, 150, "fl-wrench-modes")
         self._damage = DamagePanel(gui, host)
-        self._pilot = PilotPanel(gui, host, self._target)
+        self._pilot = PilotPanel(gui, host)
         self._sweep = SweepPanel(gui, host)
 
     def refresh(self) -> None:
@@ -66,3 +69,92 @@ class WrenchTab:
             sentence = f"{sentence} {100 * answer.scale:.0f} % of what is asked, {told}."
         blind = authority_sentence(state.layout, state.failed, self._target.reach)
         return sentence if blind is None else f"<span class='missing'>{blind}</span> {sentence}"
+
+
+class TargetPanel:
+    """Buttons and sliders."""
+
+    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+        """Build the widgets."""
+        self._host = host
+        self._presets = gui.add_button_group("Preset", tuple(PRESETS), hint="Target wrenches to start from.")
+        on_user_change(self._presets, lambda name: host.do(partial(host.session.set_preset, name)))
+        self._only = gui.add_button_group(
+            "One axis",
+            AXES,
+            hint="This axis alone, at a quarter of what the fins can give; press again to reverse it.",
+        )
+        on_user_change(self._only, self._set_only)
+        gui.add_html(marker("fl-reach"))
+        self._sliders = [
+            gui.add_slider(
+                f"{AXES[k]} [{AXIS_UNITS[k]}]",
+                -10.0,
+                10.0,
+                0.01 if k < 3 else 0.001,
+                0.0,
+                hint=AXIS_WORDS[k].capitalize(),
+            )
+            for k in range(6)
+        ]
+        self._end = gui.add_html(marker("fl-reach-end"))
+        for k, slider in enumerate(self._sliders):
+            on_user_change(slider, partial(self._set_target, k))
+        self._changes = Changes()
+
+    def _set_only(self, axis: str) -> None:
+        if axis in AXES:
+            self._host.do(partial(self._host.session.set_only_axis, AXES.index(axis)))
+
+    def _set_target(self, axis: int, value: float) -> None:
+        self._host.do(partial(self._host.session.set_target, axis, value))
+
+    @property
+    def reach(self) -> NDArray[np.float64]:
+        """Largest size of each component with the others free (6,) [N, N m]."""
+        state = self._host.session.state
+        return axis_reach(state.able, state.failed)
+
+    def refresh(self) -> None:
+        """Write the target, the sliders' ends and the marks on them."""
+        state = self._host.session.state
+        for slider, value, reach in zip(self._sliders, state.target, self.reach, strict=True):
+            end = slider_end(float(reach))
+            put(slider, min=min(-end, value), max=max(end, value))
+            put(slider, value=value)
+        ranges, error = self._host.ranging.findings, self._host.ranging.error
+        if not self._changes(ranges, error):
+            return
+        sentence = "" if error is None else f"<div class='fl missing'>What is in reach: {escape(error)}</div>"
+        put(self._end, content=marker("fl-reach-end") + sentence)
+        for k, slider in enumerate(self._sliders):
+            if ranges is None:
+                put_marks(slider, ())
+                put(slider, hint=AXIS_WORDS[k].capitalize())
+                continue
+            low, high = float(ranges.low[k]), float(ranges.high[k])
+            put_marks(slider, _marks(low, high))
+            put(slider, hint=_hint(k, low, high, float(self.reach[k])))
+
+
+def _marks(low: float, high: float) -> tuple[tuple[float, str], ...]:
+    """Both ends of a range; one mark where it is a point, none where there is no range."""
+    if not np.isfinite(low):
+        return ()
+    marks = ((round(low, 3), _short(low)), (round(high, 3), _short(high)))
+    return marks if high - low > 1e-3 else marks[:1]
+
+
+def _short(value: float) -> str:
+    digits = 0 if abs(value) >= 9.95 else 1
+    rounded = round(value, digits)
+    return f"{rounded:.{digits}f}".replace("-", "−") if rounded else "0"
+
+
+def _hint(axis: int, low: float, high: float, reach: float) -> str:
+    word, unit = AXIS_WORDS[axis].capitalize(), AXIS_UNITS[axis]
+    at_most = f"±{three_digits(reach)} {unit} if nothing else is asked to stay"
+    if not np.isfinite(low):
+        return f"{word}: the other five are out of reach as they are. {at_most.capitalize()}."
+    ends = f"{three_digits(low)} to {three_digits(high)} {unit}"
+    return f"{word}: the marks show {ends}, what is within reach with the others as they are; {at_most}."

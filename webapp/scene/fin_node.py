@@ -1,4 +1,4 @@
-"""One fin in the scene: its gizmos, and under them blade, sweep and force, so that all follow a drag."""
+"""One fin in the scene: its gizmos, and under them blade, sweep and force; and how all fins flap."""
 
 import math
 from collections.abc import Callable
@@ -11,15 +11,82 @@ from numpy.typing import NDArray
 from finlab.layout import Fin
 from webapp.handles import put
 from webapp.scene.meshes import fin as fin_mesh
-from webapp.scene.meshes.arrows import NOTHING, force_arrow
 from webapp.scene.meshes.hull import AnyHull
-from webapp.scene.meshes.mesh import Mesh, tube
-from webapp.scene.shape import Shape
-from webapp.theme import DEAD, LIGHT, Rgb, fin_color
+from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, tube
+from webapp.scene.shape import UNLIT, Shape
+from webapp.theme import DEAD, LIGHT, fin_color
 
 Array = NDArray[np.float64]
+
+APART = 1.9
+"""Between the phases of one fin and the next [rad]: different phases look alive, and the mean force does not
+depend on them."""
+LIMP = math.pi / 2
+"""Where the blade of a failed fin hangs [rad]: down."""
 GIZMO_SIZE = 0.24
 RING_SIZE = 0.20
+
+
+class Flapping:
+    """Where each blade is at the moment."""
+
+    def __init__(self) -> None:
+        """No fins yet."""
+        self._phase: NDArray[np.floating] = np.zeros(0)
+        self._command: Array = np.zeros((0, 3))
+
+    def take(self, command: Array) -> None:
+        """Other commands (n, 3), NaN for failed fins; the fins go on from where they are."""
+        if len(command) != len(self._command):
+            self._phase = np.arange(len(command)) * APART
+        self._command = command
+
+    def angles(self, elapsed: float, frozen: bool) -> list[float]:
+        """Angle of each blade [rad] after some more time [s]; at its zero direction if `frozen`."""
+        amplitude, frequency, direction = self._command.T
+        alive = np.isfinite(amplitude)
+        if frozen:
+            return [float(a) for a in np.where(alive, direction, LIMP)]
+        turned = self._phase + 2 * np.pi * np.where(alive, frequency, 0.0) * elapsed
+        self._phase = turned % (2 * np.pi)
+        swung = direction + amplitude * np.sin(self._phase)
+        return [float(a) for a in np.where(alive, swung, LIMP)]
+
+
+class FinShapes:
+    """Blade, shaft and force of one fin, in the frame of its mounting."""
+
+    def __init__(
+        self, scene: viser.SceneApi, parent: str, index: int, opacity: float | None = None, **arrow: Any
+    ) -> None:
+        """Add the nodes under `parent`, for the fin at this place of the layout; `arrow`: options of that."""
+        self.color, self._angle = fin_color(index), math.nan
+        blade, shaft = fin_mesh.blade(), fin_mesh.shaft()
+        self.blade = Shape(scene, f"{parent}/blade", self.color, blade, opacity=opacity).node
+        self.shaft = Shape(scene, f"{parent}/shaft", LIGHT.metal, shaft, opacity=opacity).node
+        self.force = Shape(scene, f"{parent}/force", self.color, opacity=opacity, **arrow)
+
+    def paint(self, alive: bool) -> None:
+        """In its own colour, or that of a failed fin."""
+        put(self.blade, color=self.color if alive else DEAD)
+
+    def push(self, arrow: Array, mounting_angle: float, thickness: float) -> None:
+        """Show the force as an arrow (3,) [m] of the body frame."""
+        root = np.array([fin_mesh.ROOT + fin_mesh.SPAN / 2, 0.0, 0.0])
+        self.force.show(force_arrow, fin_mesh.mounting(mounting_angle).T @ arrow, root, thickness)
+
+    def pose(self, angle: float) -> None:
+        """Turn the blade about its shaft to an angle [rad]; one that rests is not sent again."""
+        if angle != self._angle:
+            self._angle = angle
+            self.blade.wxyz = quaternion(angle, 0)
+
+
+def quaternion(angle: float, axis: int) -> Array:
+    """A turn [rad] about a body axis as w, x, y, z (4,)."""
+    turn = np.zeros(4)
+    turn[0], turn[1 + axis] = math.cos(angle / 2), math.sin(angle / 2)
+    return turn
 
 
 class FinNode:
@@ -40,8 +107,6 @@ class FinNode:
             on_click: called with the index when the fin is clicked.
             on_drag: called with index, phase (`start`, `update`, `end`), position [m] and angle [rad].
         """
-        self._color = fin_color(index)
-        self._angle: float | None = None
         name = f"/robot/fins/{index}"
         # Only the ring turns; the arrows stay along the body's axes, like the numbers beside them.
         self._move = scene.add_transform_controls(
@@ -62,41 +127,15 @@ class FinNode:
             disable_sliders=True,
             active_axes=(False,) * 3,
         )
-        blade, shaft = fin_mesh.blade(), fin_mesh.shaft()
-        self._blade = scene.add_mesh_simple(
-            f"{name}/turn/blade", blade.vertices, blade.faces, color=self._color
-        )
-        self._shaft = scene.add_mesh_simple(
-            f"{name}/turn/shaft", shaft.vertices, shaft.faces, color=LIGHT.metal
-        )
+        self._fin = fin = FinShapes(scene, f"{name}/turn", index, cast_shadow=False)
         fan = fin_mesh.sweep(0.1)
-        self._fan = Shape(
-            scene.add_mesh_simple(
-                f"{name}/turn/fan",
-                fan.vertices,
-                fan.faces,
-                color=self._color,
-                opacity=0.3,
-                side="double",
-                cast_shadow=False,
-                receive_shadow=False,
-            )
-        )
-        self._force = Shape(
-            scene.add_mesh_simple(
-                f"{name}/turn/force", NOTHING.vertices, NOTHING.faces, color=self._color, cast_shadow=False
-            )
-        )
+        self._fan = Shape(scene, f"{name}/turn/fan", fin.color, fan, opacity=0.3, side="double", **UNLIT)
         self._label = scene.add_label(
             f"{name}/label", str(index + 1), anchor="center-center", font_screen_scale=0.85
         )
-        self._strut = Shape(
-            scene.add_mesh_simple(
-                f"/robot/struts/{index}", NOTHING.vertices, NOTHING.faces, color=LIGHT.metal
-            )
-        )
+        self._strut = Shape(scene, f"/robot/struts/{index}", LIGHT.metal)
 
-        for node in (self._blade, self._shaft):
+        for node in (fin.blade, fin.shaft):
 
             @node.on_click
             async def _clicked(event: Any) -> None:
@@ -134,9 +173,8 @@ class FinNode:
         put(self._move, visible=True, active_axes=(selected,) * 3)
         put(self._turn, active_axes=(selected, selected, False))
         if not owned_by_user:
-            half = fin.mounting_angle / 2
             put(self._move, position=np.array(fin.position))
-            put(self._turn, wxyz=np.array([math.cos(half), 0.0, 0.0, math.sin(half)]))
+            put(self._turn, wxyz=quaternion(fin.mounting_angle, 2))
         put(self._label, visible=label is not None, text=label or "")
         put(self._label, position=np.array([0.0, 0.0, 0.04]))
         shaft = np.array([math.cos(fin.mounting_angle), math.sin(fin.mounting_angle), 0.0])
@@ -147,26 +185,18 @@ class FinNode:
     def command(self, command: Array | None, arrow: Array, mounting_angle: float, fans: bool) -> None:
         """Show a command (3,), None for a failed fin, and its force as a body-frame arrow (3,) [m]."""
         alive = command is not None
-        color: Rgb = self._color if alive else DEAD
-        put(self._blade, color=color)
+        self._fin.paint(alive)
         put(self._fan.node, visible=fans and alive)
-        put(self._force.node, visible=alive)
+        put(self._fin.force.node, visible=alive)
         if command is None:
             return
         self._fan.show(fin_mesh.sweep, float(command[0]))
-        half = command[2] / 2
-        put(self._fan.node, wxyz=np.array([math.cos(half), math.sin(half), 0.0, 0.0]))
-        cos, sin = math.cos(mounting_angle), math.sin(mounting_angle)
-        in_fin_frame = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ arrow
-        root = np.array([fin_mesh.ROOT + fin_mesh.SPAN / 2, 0.0, 0.0])
-        self._force.show(force_arrow, in_fin_frame, root, 0.007)
+        put(self._fan.node, wxyz=quaternion(float(command[2]), 0))
+        self._fin.push(arrow, mounting_angle, 0.007)
 
     def pose_blade(self, angle: float) -> None:
-        """Turn the blade about its shaft to an angle [rad]; one that rests is not sent again."""
-        if angle == self._angle:
-            return
-        self._angle = angle
-        self._blade.wxyz = (math.cos(angle / 2), math.sin(angle / 2), 0.0, 0.0)
+        """Turn the blade about its shaft to an angle [rad]."""
+        self._fin.pose(angle)
 
 
 def _strut(servo: Array, hull: AnyHull) -> Mesh:

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 
 from finlab.layout import Layout
 from webapp.handles import put
-from webapp.scene.meshes.arrows import NOTHING
-from webapp.scene.meshes.mesh import Mesh, joined, tube
-from webapp.scene.shape import Shape
+from webapp.scene.meshes.mesh import NOTHING, Mesh, joined, tube
+from webapp.scene.shape import UNLIT, Shape
 from webapp.tasks.solver import Attention
 from webapp.theme import LIGHT
 
@@ -26,17 +25,7 @@ class Lines:
 
     def __init__(self, scene: viser.SceneApi) -> None:
         """Build the nodes."""
-        self.graph = Shape(
-            scene.add_mesh_simple(
-                "/robot/graph",
-                NOTHING.vertices,
-                NOTHING.faces,
-                color=LIGHT.line,
-                visible=False,
-                cast_shadow=False,
-                receive_shadow=False,
-            )
-        )
+        self.graph = Shape(scene, "/robot/graph", LIGHT.line, visible=False, **UNLIT)
         self._steps = scene.add_line_segments(
             "/robot/dimension", NO_LINE, LIGHT.line, thickness=2.0, thickness_units="screen"
         )

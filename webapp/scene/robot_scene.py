@@ -10,17 +10,13 @@ from finlab.allocation.allocation import Allocation
 from finlab.layout import Fin, Layout
 from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
-from webapp.scene.arrow_scale import LENGTH, fitting_newtons
-from webapp.scene.attainable_nodes import AttainableNodes
-from webapp.scene.fin_node import FinNode
-from webapp.scene.flapping import Flapping
-from webapp.scene.ghost import Ghost, moved_fins
-from webapp.scene.grips import Grips
+from webapp.scene.dragging import Grips
+from webapp.scene.fin_node import FinNode, Flapping
+from webapp.scene.ghosts import Ghost, Overlay, moved_fins
 from webapp.scene.lines import Lines
 from webapp.scene.meshes.hull import hull_of
-from webapp.scene.overlay import Overlay
 from webapp.scene.stage import Stage
-from webapp.scene.wrench_nodes import WrenchNodes
+from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, WrenchNodes, fitting_newtons
 from webapp.session import Session
 from webapp.session.state import State
 from webapp.tasks.analyst import Findings

@@ -6,7 +6,7 @@ from functools import partial
 import viser
 
 from finlab.allocation.allocation import Allocation
-from webapp.markup.legend import graph_row, legend, overlay_row, set_rows
+from webapp.markup.corner import graph_row, legend, overlay_row, set_rows
 from webapp.scene.dragging import Dragging
 from webapp.scene.robot_scene import RobotScene
 from webapp.scene.swim_scene import SwimScene

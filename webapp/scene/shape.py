@@ -6,15 +6,22 @@ from typing import Any
 import numpy as np
 import viser
 
-from webapp.scene.meshes.mesh import Mesh
+from webapp.handles import put
+from webapp.scene.meshes.mesh import NOTHING, Mesh
+from webapp.theme import Rgb
+
+UNLIT: dict[str, Any] = {"cast_shadow": False, "receive_shadow": False}
+"""Options of a node that has nothing to do with shadows."""
 
 
 class Shape:
     """A node and the arguments that its present shape was made from."""
 
-    def __init__(self, node: viser.MeshHandle) -> None:
-        """Take over a mesh node."""
-        self.node = node
+    def __init__(
+        self, scene: viser.SceneApi, name: str, color: Rgb, mesh: Mesh = NOTHING, **options: Any
+    ) -> None:
+        """Add the node; `options` as viser's `add_mesh_simple` takes them."""
+        self.node = scene.add_mesh_simple(name, mesh.vertices, mesh.faces, color=color, **options)
         self._made_from: tuple[Any, ...] | None = None
 
     def show(self, make: Callable[..., Mesh], *arguments: Any) -> None:
@@ -22,8 +29,10 @@ class Shape:
         key = tuple(a.tobytes() if isinstance(a, np.ndarray) else a for a in arguments)
         if key == self._made_from:
             return
-        mesh = make(*arguments)
-        self.node.vertices = mesh.vertices.astype(np.float32)
-        if not np.array_equal(self.node.faces, mesh.faces):
-            self.node.faces = mesh.faces.astype(np.uint32)
+        self.become(make(*arguments))
         self._made_from = key
+
+    def become(self, mesh: Mesh) -> None:
+        """Give the node another shape."""
+        self.node.vertices = mesh.vertices.astype(np.float32)
+        put(self.node, faces=mesh.faces.astype(np.uint32))

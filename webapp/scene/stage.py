@@ -5,7 +5,8 @@ import viser
 
 from webapp.handles import put
 from webapp.scene.meshes.hull import AnyHull
-from webapp.theme import Look, look
+from webapp.scene.shape import Shape
+from webapp.theme import LIGHT, Look, look
 
 FLOOR_SIZE = 6.0
 """Side of the floor's grid [m]."""
@@ -21,10 +22,8 @@ class Stage:
         self._shadows: bool | None = None
         self._hull = hull
         mesh, bow = hull.mesh(), hull.bow()
-        self._body = scene.add_mesh_simple("/robot/hull", mesh.vertices, mesh.faces, side="double")
-        self._bow = scene.add_mesh_simple(
-            "/robot/hull/bow", bow.vertices, bow.faces, side="double", cast_shadow=False
-        )
+        self._body = Shape(scene, "/robot/hull", LIGHT.hull, mesh, side="double")
+        self._bow = Shape(scene, "/robot/hull/bow", LIGHT.glass, bow, side="double", cast_shadow=False)
         self._center = scene.add_label(
             "/robot/axes/center",
             "⊕ centre of gravity",
@@ -50,15 +49,14 @@ class Stage:
 
     def refresh(self, hull: AnyHull, dark: bool, shadows: bool, glass: bool, center: bool, net: bool) -> None:
         """Show another hull, theme or quality; a hull of glass, or a mere net, lets one look inside."""
-        put(self._body, opacity=0.35 if glass else None)
-        put(self._bow, opacity=0.35 if glass else None)
-        put(self._body, wireframe=net)
-        put(self._bow, visible=not net)
+        opacity = 0.35 if glass else None
+        put(self._body.node, opacity=opacity, wireframe=net)
+        put(self._bow.node, opacity=opacity, visible=not net)
         put(self._center, visible=center)
         if hull != self._hull:
             self._hull = hull
-            for node, mesh in ((self._body, hull.mesh()), (self._bow, hull.bow())):
-                put(node, vertices=mesh.vertices.astype(np.float32), faces=mesh.faces.astype(np.uint32))
+            self._body.become(hull.mesh())
+            self._bow.become(hull.bow())
         put(self._grid, position=np.array([0.0, 0.0, self.floor_height(hull)]))
         if shadows != self._shadows:
             self._shadows = shadows
@@ -81,5 +79,5 @@ class Stage:
         water = (1 - fade) * np.array(colors.water_top) + fade * np.array(colors.water_bottom)
         self._scene.set_background_image(np.repeat(water, 8, axis=1).astype(np.uint8), format="png")
         put(self._grid, cell_color=colors.grid, section_color=colors.grid_section)
-        put(self._body, color=colors.hull)
-        put(self._bow, color=colors.glass)
+        put(self._body.node, color=colors.hull)
+        put(self._bow.node, color=colors.glass)

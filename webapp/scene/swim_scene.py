@@ -4,9 +4,9 @@ import numpy as np
 import viser
 
 from webapp.handles import put
-from webapp.scene.meshes.arrows import NOTHING
-from webapp.scene.shape import Shape
-from webapp.scene.swim_robot import SwimRobot, arrow_scale, goal
+from webapp.scene.shape import UNLIT, Shape
+from webapp.scene.swim_robot import SwimRobot, goal
+from webapp.scene.wrench_nodes import LENGTH
 from webapp.tasks.swimming import Swimming
 from webapp.theme import ASKED, DELIVERED, OTHER, look
 
@@ -23,18 +23,7 @@ class SwimScene:
         """Build the nodes, hidden."""
         self._client, self._swimming = client, swimming
         scene = client.scene
-        self._goal = Shape(
-            scene.add_mesh_simple(
-                "/swim/goal",
-                NOTHING.vertices,
-                NOTHING.faces,
-                color=ASKED,
-                opacity=0.45,
-                visible=False,
-                cast_shadow=False,
-                receive_shadow=False,
-            )
-        )
+        self._goal = Shape(scene, "/swim/goal", ASKED, opacity=0.45, visible=False, **UNLIT)
         self._reference = scene.add_icosphere(
             "/swim/reference", 0.035, color=ASKED, visible=False, cast_shadow=False
         )
@@ -57,8 +46,7 @@ class SwimScene:
 
     def refresh(self, dark: bool) -> None:
         """Show the newest moment."""
-        swimming = self._swimming
-        swimmers = swimming.swimmers
+        swimmers = self._swimming.swimmers
         visible = bool(swimmers)
         put(self._goal.node, visible=visible)
         put(self._reference, visible=visible)
@@ -73,7 +61,7 @@ class SwimScene:
             self._begin()
         put(self._reference, position=swimmers[0].shown.reference)
         for robot, swimmer in zip(self._robots, swimmers, strict=False):
-            robot.take(swimmer.shown, arrow_scale(ARROWS_N))
+            robot.take(swimmer.shown, LENGTH / ARROWS_N)
 
     def _begin(self) -> None:
         """Another swim: its robots, its way, and the camera where all of it can be seen."""
@@ -123,11 +111,9 @@ class SwimScene:
         swimming = self._swimming
         if not swimming.swimmers or swimming.swimmers != self._shown:
             return
-        names = swimming.swimmers[0].fins
         rate = swimming.pace.rate or swimming.pace.speed
-        for robot, swimmer in zip(self._robots, swimming.swimmers, strict=False):
-            lost = tuple(names.index(name) for name in swimmer.failed)
-            robot.animate(elapsed * rate, lost)
+        for robot in self._robots[: len(swimming.swimmers)]:
+            robot.animate(elapsed * rate)
         if self._followed is not None:
             step = self._robots[0].place - self._followed
             if np.linalg.norm(step) > 0.004:

@@ -1,18 +1,35 @@
-"""The whole robot's wrench above the hull: asked, delivered, and what is missing."""
+"""The robot's wrench above the hull (asked, delivered, missing), and the sets that it can attain."""
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
 
+from finlab.analysis import AttainableSet
 from webapp.handles import put
-from webapp.scene.meshes.arrows import NOTHING, RING_RADIUS, force_arrow, torque_ring
-from webapp.scene.meshes.mesh import tube
-from webapp.scene.shape import Shape
-from webapp.theme import ASKED, DELIVERED, LIGHT, MISSING
+from webapp.scene.meshes.mesh import NOTHING, RING_RADIUS, Mesh, force_arrow, torque_ring, tube
+from webapp.scene.shape import UNLIT, Shape
+from webapp.session.display import NEWTONS
+from webapp.tasks.analyst import Findings
+from webapp.theme import ASKED, DEAD, DELIVERED, LIGHT, MISSING
+
+LENGTH = 0.1
+"""Length that the legend speaks of [m]."""
+LONGEST, SHORTEST = 0.42, 0.14
+"""The longest arrow stays within these [m]; between them the scale is left alone, so it seldom jumps."""
 
 Array = NDArray[np.float64]
 HEIGHT = 0.16
 """How far above the hull the arrows begin [m]; inside it they could not be seen."""
+LARGEST = 0.42
+"""How far the drawn set may reach from the centre of gravity [m]."""
+
+
+def fitting_newtons(largest: float, current: float) -> float:
+    """Force per 0.1 m [N] for arrows up to `largest` [N]; `current` while that is good enough."""
+    length = LENGTH * largest / current
+    if largest < 1e-6 or SHORTEST <= length <= LONGEST:
+        return current
+    return next((step for step in NEWTONS if LENGTH * largest / step <= LONGEST), NEWTONS[-1])
 
 
 class WrenchNodes:
@@ -22,22 +39,11 @@ class WrenchNodes:
         """Build the nodes, showing nothing."""
         self._root = scene.add_frame("/robot/wrench", show_axes=False)
         stalk = tube(np.array([[0, 0, -HEIGHT - 0.2], [0, 0, 0.0]]), 0.0025, 10)
-        scene.add_mesh_simple(
-            "/robot/wrench/stalk", stalk.vertices, stalk.faces, color=LIGHT.line, cast_shadow=False
-        )
+        Shape(scene, "/robot/wrench/stalk", LIGHT.line, stalk, cast_shadow=False)
         self._hub = scene.add_icosphere("/robot/wrench/hub", 0.012, color=(70, 78, 86), cast_shadow=False)
 
         def node(name: str, color: tuple[int, int, int], opacity: float | None) -> Shape:
-            node = scene.add_mesh_simple(
-                f"/robot/wrench/{name}",
-                NOTHING.vertices,
-                NOTHING.faces,
-                color=color,
-                opacity=opacity,
-                cast_shadow=False,
-                receive_shadow=False,
-            )
-            return Shape(node)
+            return Shape(scene, f"/robot/wrench/{name}", color, opacity=opacity, **UNLIT)
 
         self._asked = node("asked_force", ASKED, 0.4), node("asked_torque", ASKED, 0.4)
         self._given = node("delivered_force", DELIVERED, None), node("delivered_torque", DELIVERED, None)
@@ -67,3 +73,53 @@ class WrenchNodes:
         self._given[1].show(torque_ring, given[3:], zero, 0.005)
         self._missing[0].show(force_arrow, missing[:3] * scale, given[:3] * scale, 0.006)
         self._missing[1].show(torque_ring, missing[3:], zero, 0.005, 1.35 * RING_RADIUS)
+
+
+class AttainableNodes:
+    """Green for the working fins, grey for all fins where one has failed, a blue ball for what is asked."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        """Build the nodes, showing nothing."""
+
+        def glass(name: str, color: tuple[int, int, int], opacity: float) -> Shape:
+            return Shape(scene, name, color, opacity=opacity, side="double", visible=False, **UNLIT)
+
+        self._now = glass("/robot/attainable/now", DELIVERED, 0.34)
+        self._whole = glass("/robot/attainable/whole", DEAD, 0.16)
+        self._asked = scene.add_icosphere(
+            "/robot/attainable/asked", 0.018, color=ASKED, visible=False, cast_shadow=False
+        )
+
+    def refresh(self, findings: Findings | None, target: Array) -> None:
+        """Show the sets of findings, nothing for None; the ball marks what `target` (6,) asks in them."""
+        now = None if findings is None else findings.now
+        whole = None if findings is None else findings.whole
+        for shape, body in ((self._now, now), (self._whole, whole)):
+            put(shape.node, visible=body is not None)
+        put(self._asked, visible=now is not None)
+        if findings is None or now is None:
+            return
+        scale = set_scale(findings)
+        for shape, body in ((self._now, now), (self._whole, whole)):
+            if body is not None:
+                shape.show(_body, body.vertices * scale, body.faces, body.outline)
+        part = target[:3] if now.kind == "force" else target[3:]
+        put(self._asked, position=np.asarray(part * scale))
+
+
+def set_scale(findings: Findings) -> float:
+    """Metres per newton, or per newton metre, of the drawn sets."""
+    bodies: list[AttainableSet] = [s for s in (findings.now, findings.whole) if s is not None]
+    reach = max((float(np.linalg.norm(s.vertices, axis=-1).max()) for s in bodies), default=1.0)
+    return LARGEST / reach if reach > 1e-9 else 1.0
+
+
+def _body(vertices: Array, faces: NDArray[np.intp], outline: NDArray[np.intp]) -> Mesh:
+    if len(faces):
+        return Mesh(vertices, faces.astype(np.int32))
+    if len(outline) == 2:
+        return tube(vertices[outline], 0.006)
+    if len(outline) > 2:  # a fan; the node shows both sides
+        fan = [(outline[0], outline[k], outline[k + 1]) for k in range(1, len(outline) - 1)]
+        return Mesh(vertices, np.array(fan, dtype=np.int32))
+    return NOTHING

@@ -6,9 +6,9 @@ with a sentence for the user and changes nothing. One file per kind of intent.
 
 from webapp.session.display import ANGLE_STEPS, POSITION_STEPS, Display
 from webapp.session.editing import Editing
-from webapp.session.guiding import Guiding
 from webapp.session.looking import Looking
 from webapp.session.questions import Questions
+from webapp.session.tour import Guiding
 
 
 class Session(Questions, Editing, Looking, Guiding):

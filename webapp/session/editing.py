@@ -6,7 +6,7 @@ from dataclasses import replace
 from finlab.errors import FinlabError
 from finlab.layout import Fin, Layout
 from finlab.layout.body import Hull
-from webapp.session import fin_edits, hull_edits
+from webapp.session import layout_edits
 from webapp.session.core import Core
 from webapp.session.display import ANGLE_STEPS, POSITION_STEPS
 from webapp.session.links import followed, partner, unlinked
@@ -33,19 +33,19 @@ class Editing(Core):
 
     def move_fin(self, name: str, position: Vector) -> None:
         """A fin at another place [m], snapped."""
-        layout = fin_edits.moved(self.state.layout, name, position, self._step_m)
+        layout = layout_edits.moved(self.state.layout, name, position, self._step_m)
         if self.display.stick:
-            layout = fin_edits.stuck(layout, name)
+            layout = layout_edits.stuck(layout, name)
         self._edit(f"Move {name}", followed(layout, self.state.links, name), f"move {name}")
 
     def turn_fin(self, name: str, angle: float) -> None:
         """A fin with another mounting angle [rad], snapped."""
-        layout = fin_edits.turned(self.state.layout, name, angle, self._step_rad)
+        layout = layout_edits.turned(self.state.layout, name, angle, self._step_rad)
         self._edit(f"Turn {name}", followed(layout, self.state.links, name), f"turn {name}")
 
     def drag_fin(self, name: str, position: Vector, angle: float) -> None:
         """A fin on its way in the user's hand: not snapped yet, and one step of undo for the whole drag."""
-        layout = fin_edits.turned(fin_edits.moved(self.state.layout, name, position), name, angle)
+        layout = layout_edits.turned(layout_edits.moved(self.state.layout, name, position), name, angle)
         self._drag(name, layout)
 
     def end_drag(self, name: str, position: Vector, angle: float) -> None:
@@ -59,16 +59,16 @@ class Editing(Core):
             return None
         layout = self._snapped(name, position, angle)
         if self.display.stick:
-            layout = fin_edits.stuck(layout, name)
+            layout = layout_edits.stuck(layout, name)
         return layout.fins[layout.index(name)]
 
     def _snapped(self, name: str, position: Vector, angle: float) -> Layout:
-        layout = fin_edits.moved(self.state.layout, name, position, self._step_m)
-        return fin_edits.turned(layout, name, angle, self._step_rad)
+        layout = layout_edits.moved(self.state.layout, name, position, self._step_m)
+        return layout_edits.turned(layout, name, angle, self._step_rad)
 
     def _drag(self, name: str, layout: Layout) -> None:
         if self.display.stick:
-            layout = fin_edits.stuck(layout, name)
+            layout = layout_edits.stuck(layout, name)
         state = self.state.with_layout(followed(layout, self.state.links, name))
         self._commit(f"Move {name}", state, f"drag {name}", timed=False)
 
@@ -82,21 +82,21 @@ class Editing(Core):
 
     def add_fin(self) -> None:
         """One more fin; it is selected."""
-        layout, name = fin_edits.added(self.state.layout)
+        layout, name = layout_edits.added(self.state.layout)
         self._edit(f"Add {name}", layout)
         self.selected = name
 
     def duplicate_fin(self) -> None:
         """A copy of the selected fin; it is selected."""
         source = self._selected_name()
-        layout, name = fin_edits.duplicated(self.state.layout, source)
+        layout, name = layout_edits.duplicated(self.state.layout, source)
         self._edit(f"Duplicate {source}", layout)
         self.selected = name
 
     def mirror_fin(self, linked: bool = True) -> None:
         """The selected fin's image on the other side; the image is selected. Linked ones move together."""
         source = self._selected_name()
-        layout, name = fin_edits.mirrored(self.state.layout, source)
+        layout, name = layout_edits.mirrored(self.state.layout, source)
         state = self.state.with_layout(layout)
         self._commit(f"Mirror {source}", state.with_link(source, name) if linked else state)
         self.selected = name
@@ -111,30 +111,30 @@ class Editing(Core):
     def ring_of_fins(self, count: int, axis: str = "z") -> None:
         """Copies of the selected fin, so that `count` stand evenly around a body axis."""
         name = self._selected_name()
-        self._edit(f"{count} around {axis}", fin_edits.ring(self.state.layout, name, count, axis))
+        self._edit(f"{count} around {axis}", layout_edits.ring(self.state.layout, name, count, axis))
 
     def stick_fin(self) -> None:
         """The selected fin onto the hull."""
         name = self._selected_name()
-        layout = fin_edits.stuck(self.state.layout, name)
+        layout = layout_edits.stuck(self.state.layout, name)
         self._edit(f"Stick {name} to the hull", followed(layout, self.state.links, name))
 
     def delete_fin(self) -> None:
         """The selected fin goes."""
         name = self._selected_name()
-        self._edit(f"Delete {name}", fin_edits.deleted(self.state.layout, name))
+        self._edit(f"Delete {name}", layout_edits.deleted(self.state.layout, name))
 
     def set_hull(self, shape: str, size: Vector) -> None:
         """A parametric hull of a size [m]."""
-        self._edit(f"Hull {shape}", hull_edits.shaped(self.state.layout, shape, size), f"hull {shape}")
+        self._edit(f"Hull {shape}", layout_edits.shaped(self.state.layout, shape, size), f"hull {shape}")
 
     def import_hull(self, hull: Hull) -> None:
         """A hull from a mesh file."""
-        self._edit("Import hull", hull_edits.with_hull(self.state.layout, hull))
+        self._edit("Import hull", layout_edits.with_hull(self.state.layout, hull))
 
     def set_center_of_gravity(self, center: Vector) -> None:
         """The centre of gravity at another place in the hull [m]."""
-        self._edit("Move the centre of gravity", hull_edits.balanced(self.state.layout, center), "center")
+        self._edit("Move the centre of gravity", layout_edits.balanced(self.state.layout, center), "center")
 
     def _edit(self, name: str, layout: Layout, merge_key: str | None = None) -> None:
         self._commit(name, self.state.with_layout(layout), merge_key)

@@ -5,8 +5,8 @@ from typing import Any
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.session.core import Core
+from webapp.session.files import shipped
 from webapp.session.search_request import Draft
-from webapp.session.shipped import shipped
 
 PINNED = "pinned"
 """Name of the layout that was put aside, among those to compare with."""

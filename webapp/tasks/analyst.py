@@ -1,10 +1,14 @@
-"""What a layout can do, and the set that is drawn of it: about a second of work."""
+"""What a layout can do, the set that is drawn of it, and how far each component of a target can go."""
 
 from dataclasses import dataclass
 
 from finlab.analysis import AttainableSet, ScoreCard, attainable_set, score_card
+from finlab.forces.axis_ranges import Ranges, axis_ranges
 from finlab.layout import Layout
 from webapp.session.display import DRAWN
+
+REST_S = 0.12
+"""How long the target may not change before the marks are worked out again [s]."""
 
 
 @dataclass(frozen=True)
@@ -60,3 +64,20 @@ def find(question: Question) -> Findings:
     card = score_card(layout, failed)
     before = score_card(beside, lost) if other and len(lost) < beside.n_fins else None
     return Findings(question, card, before, now, whole)
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A robot and what is asked of it."""
+
+    layout: Layout
+    """The robot."""
+    failed: tuple[str, ...]
+    """Names of failed fins."""
+    target: tuple[float, float, float, float, float, float]
+    """Wrench [N, N m]."""
+
+
+def find_ranges(question: Beside) -> Ranges:
+    """The range of each component."""
+    return axis_ranges(question.layout, question.target, question.failed)

@@ -9,11 +9,9 @@ from numpy.typing import NDArray
 from finlab.allocation.allocation import Allocation
 from webapp.session import Session
 from webapp.session.state import State
-from webapp.tasks.event_loop import EventLoop
+from webapp.tasks.background import EventLoop, Newest, Worker
 from webapp.tasks.mode_names import NO_MODES, Modes, same_mode
-from webapp.tasks.newest import Newest
 from webapp.tasks.solver import Reply, Solver
-from webapp.tasks.worker import Worker
 
 SEARCH_REST_S = 0.2
 """How long there must be no newer answer before all its modes are searched for [s]: that takes a while."""

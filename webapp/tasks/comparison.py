@@ -5,10 +5,8 @@ from dataclasses import replace
 
 from finlab.allocation.allocation import Allocation
 from webapp.session.state import COMPARED, State
-from webapp.tasks.event_loop import EventLoop
-from webapp.tasks.newest import Newest
+from webapp.tasks.background import EventLoop, Newest, Worker
 from webapp.tasks.solver import Solver
-from webapp.tasks.worker import Worker
 
 TRIES = 3
 """Answers of each method, of whose times the shortest counts: the first one may have to load a network, and

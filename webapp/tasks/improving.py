@@ -9,9 +9,7 @@ from finlab.analysis import Improvement, Progress, optimize_layout
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.session.search_request import GOAL_WORDS, SearchRequest
-from webapp.tasks.event_loop import EventLoop
-from webapp.tasks.newest import Newest
-from webapp.tasks.worker import Worker
+from webapp.tasks.background import EventLoop, Newest, Worker
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ from finlab.allocation.modes import (
     signature_difference,
 )
 from finlab.allocation.solution import Candidates
-from webapp.markup.figures import listed
+from webapp.markup.words import listed
 from webapp.theme import MODE_COLORS
 
 Array = NDArray[np.float64]

@@ -8,11 +8,8 @@ from finlab.errors import FinlabError
 from webapp.session import Session
 from webapp.session.state import State
 from webapp.tasks.answering import Answering
-from webapp.tasks.event_loop import EventLoop
-from webapp.tasks.newest import Newest
-from webapp.tasks.refinement import STEPS
-from webapp.tasks.solver import Solver
-from webapp.tasks.worker import Worker
+from webapp.tasks.background import EventLoop, Newest, Worker
+from webapp.tasks.solver import STEPS, Solver
 
 FRAME_S = 0.9
 """How long each step of a refinement is shown [s]."""

@@ -1,4 +1,4 @@
-"""From a state to an answer: picks the allocator for the state's settings and keeps it."""
+"""From a state to an answer with all that a page shows of it: picks the allocator and keeps it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,16 +11,82 @@ from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
+from finlab.allocation.insight import Insight
 from finlab.allocation.methods import load_allocator
+from finlab.errors import AllocationError
+from finlab.layout import Layout
 from webapp.session.state import State
-from webapp.tasks.density import Densities, densities
 from webapp.tasks.mode_names import Modes, known_modes, listed_modes
-from webapp.tasks.refinement import refinement
+
+Array = NDArray[np.float64]
+
+POINTS = 161
+"""Places at which a density is drawn."""
+NARROWEST = 0.006
+"""Least standard deviation drawn, in normalized commands; a narrower peak would fall between places."""
+
+STEPS = 6
+"""Steps of Levenberg-Marquardt that are shown; the error has long vanished by then."""
 
 Load = Callable[..., Allocator]
 
 SAMPLING = ("n_candidates", "temperature", "gamma")
 """Fields of a state that are settings of the methods which draw candidates."""
+
+
+class Densities(NamedTuple):
+    """Curves of one layout, each with its highest point at 1."""
+
+    places: Array
+    """Amplitude [deg], frequency [Hz] and zero direction [deg] at which the curves are known (3, POINTS)."""
+    curves: Array
+    """Densities (n, 3, POINTS) of all fins in the layout's order; NaN for failed ones."""
+
+
+def densities(insight: Insight, layout: Layout, failed: tuple[str, ...], temperature: float) -> Densities:
+    """The mixture for a target, with its variances times the temperature as the sampling has them.
+
+    Args:
+        insight: what the network makes of the target and the fins that work.
+        layout: the robot.
+        failed: names of failed fins.
+        temperature: T of the sampling.
+    """
+    healthy = layout.without(failed) if failed else layout
+    weight, mean, std = insight.weight, insight.mean, insight.std
+    std = np.maximum(std * np.sqrt(temperature), NARROWEST)
+    lower = healthy.lower
+    upper = healthy.upper
+    places = np.linspace(lower.min(axis=0), upper.max(axis=0), POINTS, axis=1)  # (3, P)
+    width = np.maximum(upper - lower, 1e-9)
+    at = 2 * (places[None] - lower[:, :, None]) / width[:, :, None] - 1  # (n, 3, P), normalized
+    distance = (at[:, None] - mean[..., None]) / std[..., None]  # (n, M, 3, P)
+    peaks = np.exp(-0.5 * distance**2) / std[..., None]
+    inside = np.einsum("m,nmcp->ncp", weight, peaks) * (np.abs(at) <= 1 + 1e-9)
+    curves = np.full((layout.n_fins, 3, POINTS), np.nan)
+    rows = [i for i, name in enumerate(layout.names) if name not in failed]
+    curves[rows] = inside / np.maximum(inside.max(axis=-1, keepdims=True), 1e-12)
+    degrees = np.array([180 / np.pi, 1.0, 180 / np.pi])
+    return Densities(places * degrees[:, None], curves)
+
+
+def refinement(allocator: Allocator, answer: Allocation) -> tuple[Allocation, ...]:
+    """The best raw candidate of an answer, then what each step makes of it, and the answer itself at the end.
+
+    Raises:
+        AllocationError: the method draws no candidates and refines none.
+    """
+    if answer.samples is None:
+        raise AllocationError(f"method {allocator.name!r} draws no candidates; use method 'learned'")
+    layout = answer.layout.without(answer.failed) if answer.failed else answer.layout
+    alive = np.isfinite(answer.command[:, 0])
+    raw = answer.samples.command[0][alive]
+    frames = []
+    for steps in range(STEPS + 1):
+        command = np.full_like(answer.command, np.nan)
+        command[alive] = allocator.refined(layout, answer.target, raw, steps)
+        frames.append(answer.with_command(command))
+    return (*frames, answer)
 
 
 class Attention(NamedTuple):

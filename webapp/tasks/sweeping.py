@@ -11,7 +11,7 @@ from finlab.errors import FinlabError
 from webapp.session import Session
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_TARGET, number
 from webapp.tasks.answering import Answering
-from webapp.tasks.event_loop import EventLoop
+from webapp.tasks.background import EventLoop
 
 POINTS = 61
 """Values of a range, ends included."""

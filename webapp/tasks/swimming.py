@@ -9,12 +9,9 @@ from finlab.errors import FinlabError
 from finlab.sim import ClosedLoop, make_trajectory
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan
-from webapp.tasks.event_loop import EventLoop
-from webapp.tasks.newest import Newest
-from webapp.tasks.pace import Pace
+from webapp.tasks.background import EventLoop, Newest, Worker
 from webapp.tasks.solver import Solver
-from webapp.tasks.swimmer import Moment, Swimmer
-from webapp.tasks.worker import Worker
+from webapp.tasks.swimmer import Moment, Pace, Swimmer
 
 BUDGET_S = 0.06
 """Longest time on the worker before the others have their turn [s]."""

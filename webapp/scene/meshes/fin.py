@@ -64,6 +64,12 @@ def shaft() -> Mesh:
     )
 
 
+def mounting(angle: float) -> NDArray[np.float64]:
+    """The matrix (3, 3) from the frame of a fin under a mounting angle [rad] to the body frame."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+
+
 def sweep(amplitude: float) -> Mesh:
     """The fan that the blade sweeps: +- `amplitude` [rad] about the shaft, across the blade's middle."""
     angle = np.linspace(-amplitude, amplitude, 17)

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.scene.meshes.mesh import Mesh, revolved
-from webapp.scene.meshes.mesh_hull import MeshHull
-from webapp.scene.meshes.triangles import Triangles
+from webapp.scene.meshes.mesh_hull import MeshHull, Triangles
 
 Array = NDArray[np.float64]
 

@@ -1,12 +1,13 @@
-"""The plot of an answer's modes: energy against error, every mode a dot that can be picked."""
+"""The modes of an answer: energy against error, every mode a dot that can be picked, and a table."""
 
 from collections.abc import Callable
+from html import escape
 
 import numpy as np
 
 from finlab.allocation.allocation import Allocation
-from webapp.markup.picking import pick
-from webapp.panels.channel import send
+from webapp.markup.picking import pick, send
+from webapp.markup.words import small, three_digits
 from webapp.tasks.mode_names import Modes
 from webapp.theme import css, mode_color
 
@@ -133,3 +134,36 @@ def _axes(x: Scale, y: Scale, energies: tuple[float, float], powers: tuple[int, 
     turned = f"translate(10 {(TOP + floor) / 2}) rotate(-90)"
     parts.append(f"<text transform='{turned}' text-anchor='middle'>error [σ]</text>")
     return "".join(parts)
+
+
+def mode_table(modes: Modes, searching: bool, shown: int | None, picker: str) -> str:
+    """Error, energy, use of the limits and a name for each mode.
+
+    Args:
+        modes: an answer's modes.
+        searching: whether more may be found.
+        shown: which mode moves the fins, None while another command does.
+        picker: class of the marker before the buttons that a click on a row presses.
+    """
+    if not modes.shown:
+        return "<div class='fl dim'>This method gives one answer and no candidates.</div>"
+    rows = []
+    for k, (mode, name) in enumerate(modes.shown):
+        kind = "chosen" if k == shown else ""
+        rows.append(
+            f"<tr class='{kind} pick' {pick(picker, k)}><td>{_swatch(k)}</td>"
+            f"<td class='words'>{escape(name)}</td><td>{small(mode.err_norm)}</td>"
+            f"<td>{three_digits(mode.energy)}</td><td>{100 * mode.saturation:.0f} %</td></tr>"
+        )
+    header = (
+        "<tr><th>#</th><th class='words'>mode</th><th>error [σ]</th><th>energy</th>"
+        "<th title='largest share of a range of amplitude or frequency that is used'>used</th></tr>"
+    )
+    left = modes.count - len(modes.shown)
+    told = "looking for more …" if searching else f"{left} more are known; they come after these."
+    more = f"<div class='said dim'>{told}</div>" if searching or left > 0 else ""
+    return f"<div class='fl'><table class='modes'>{header}{''.join(rows)}</table>{more}</div>"
+
+
+def _swatch(k: int) -> str:
+    return f"<span class='swatch mode' style='background:{css(mode_color(k))}'>{k + 1}</span>"

@@ -1,18 +1,40 @@
-"""Layouts, candidates and graphs as files that a browser sends and takes."""
+"""Layouts, hulls, paths and bundles as files that a browser sends and takes; the layouts that are shipped."""
 
 import csv
+import hashlib
 import io
+import os
 import re
 import tempfile
+from functools import cache
 from pathlib import Path
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
-from finlab.errors import FinlabError, LayoutError
-from finlab.layout import Layout, parse_layout, save_layout
+from finlab.assets import shipped_layouts
+from finlab.errors import DataError, FinlabError, LayoutError
+from finlab.layout import Layout, load_layout, parse_layout, save_layout
+from finlab.layout.body import Hull
 from finlab.layout.load import SUFFIX, parse_graph_layout
 from finlab.layout.reading import MAX_BYTES, parse_json
 from finlab.layout.yaml_file import parse_yaml
+from finlab.sim import Trajectory
+from finlab.sim.task import read_trajectory
+from webapp.scene.meshes.mesh_hull import UNITS, read_mesh
+
+MAX_PATH_BYTES = 2_000_000
+"""Largest file of a way to swim that is taken."""
+
+
+@cache
+def shipped() -> dict[str, Layout]:
+    """Shipped layouts by the name that the command line knows them by."""
+    return {name: load_layout(path) for name, path in shipped_layouts().items()}
+
+
+def shipped_name(layout: Layout) -> str | None:
+    """The name of the shipped layout that this one equals, None if it is none of them."""
+    return next((name for name, known in shipped().items() if known == layout), None)
 
 
 def file_stem(name: str) -> str:
@@ -90,3 +112,48 @@ def candidates_csv(allocation: Allocation | None) -> bytes:
             [f"{candidates.err_norm[k]:.6g}", f"{candidates.energy[k]:.6g}", candidates.source[k], *values]
         )
     return text.getvalue().encode()
+
+
+def cache_folder() -> Path:
+    """Where the app keeps files of its own: `$XDG_CACHE_HOME/finlab`, or `~/.cache/finlab`."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "finlab"
+
+
+def stored_hull(name: str, content: bytes, unit: str) -> Hull:
+    """The hull in an uploaded mesh file, which is checked and kept under a name made from its content.
+
+    Raises:
+        FinlabError: it is no mesh, too large, or cannot be kept.
+    """
+    if unit not in UNITS:
+        raise FinlabError(f"unit: expected one of {', '.join(UNITS)}, got {unit!r:.40}")
+    short = Path(str(name)).name[-80:] or "upload"
+    read_mesh(short, content, UNITS[unit])
+    path = (
+        cache_folder() / "hulls" / f"{hashlib.sha256(content).hexdigest()[:16]}{Path(short).suffix.lower()}"
+    )
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if not path.exists():
+            path.write_bytes(content)
+    except OSError as error:
+        raise FinlabError(f"{short}: cannot be kept in {path.parent}: {error.strerror}") from None
+    return Hull(mesh=str(path), scale=UNITS[unit])
+
+
+def read_path(name: str, content: bytes) -> Trajectory:
+    """The way in a CSV file with the columns t, x, y, z.
+
+    Raises:
+        DataError: it is too large or no such table; the message names the file.
+    """
+    short = Path(str(name)).name[-60:] or "upload.csv"
+    if len(content) > MAX_PATH_BYTES:
+        raise DataError(f"{short}: is {len(content):,} bytes long, expected at most {MAX_PATH_BYTES:,}")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "way.csv"
+        path.write_bytes(content)
+        try:
+            return read_trajectory(path)
+        except DataError as error:
+            raise DataError(str(error).replace(str(path), short)) from None

@@ -1,0 +1,199 @@
+"""What takes time: threads that compute, viser's event loop, and questions of which the newest wins."""
+
+import asyncio
+import threading
+import traceback
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Generic, TypeVar
+
+from finlab.errors import FinlabError
+
+Job = Callable[[], None]
+Failed = Callable[[str], None]
+
+Question = TypeVar("Question")
+Found = TypeVar("Found")
+
+
+class EventLoop:
+    """Brings calls to the event loop that all sessions and widgets belong to."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, fault: Callable[[Exception], None]) -> None:
+        """`fault` is called there with what a call has raised: the page must go on."""
+        self._loop, self._fault = loop, fault
+        self._closed = False
+
+    def post(self, act: Callable[[], object]) -> None:
+        """Run `act` on the loop soon; called from any thread."""
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._run, act)
+
+    def later(self, seconds: float, act: Callable[[], object]) -> asyncio.TimerHandle:
+        """Run `act` after some time; called on the loop."""
+        return self._loop.call_later(seconds, self._run, act)
+
+    def close(self) -> None:
+        """The page has gone."""
+        self._closed = True
+
+    def _run(self, act: Callable[[], object]) -> None:
+        if self._closed:
+            return
+        try:
+            act()
+        except Exception as error:
+            self._fault(error)
+
+
+class Worker:
+    """Runs jobs on a thread of its own. A job that waits is replaced by a newer one with the same key.
+
+    Askers take turns in the order in which they began to wait, so that nobody starves and nothing queues up.
+    """
+
+    def __init__(self) -> None:
+        """Start the thread."""
+        self._jobs: dict[Hashable, tuple[Job, Failed]] = {}
+        self._wake = threading.Condition()
+        self._stopped = False
+        self._thread = threading.Thread(target=self._run, name="finlab-solver", daemon=True)
+        self._thread.start()
+
+    def submit(self, key: Hashable, job: Job, failed: Failed) -> None:
+        """Run `job` soon, instead of a job with the same key that has not begun yet.
+
+        Args:
+            key: who asks, and what for.
+            job: what to do, on the worker's thread.
+            failed: told there, in a sentence, why the job came to nothing.
+        """
+        with self._wake:
+            self._jobs[key] = (job, failed)
+            self._wake.notify()
+
+    def forget(self, key: Hashable) -> None:
+        """Drop the waiting job of an asker that has gone."""
+        with self._wake:
+            self._jobs.pop(key, None)
+
+    def stop(self) -> None:
+        """Finish the running job, drop the others, end the thread."""
+        with self._wake:
+            self._stopped = True
+            self._jobs.clear()
+            self._wake.notify()
+        self._thread.join(timeout=5.0)
+
+    def _run(self) -> None:
+        while True:
+            with self._wake:
+                self._wake.wait_for(lambda: self._jobs or self._stopped)
+                if self._stopped:
+                    return
+                job, failed = self._jobs.pop(next(iter(self._jobs)))
+            try:
+                job()
+            except FinlabError as error:
+                failed(str(error))
+            except Exception as error:  # one asker's fault must not silence all the others
+                traceback.print_exc()
+                failed(f"it failed: {error or type(error).__name__}")
+
+
+@dataclass(frozen=True)
+class Workers:
+    """One thread for each kind of work; all pages share them."""
+
+    answers: Worker = field(default_factory=Worker)
+    """Allocations: milliseconds."""
+    marks: Worker = field(default_factory=Worker)
+    """Reachable ranges: tens of milliseconds, after the answer."""
+    cards: Worker = field(default_factory=Worker)
+    """What a layout can do: about a second."""
+    swims: Worker = field(default_factory=Worker)
+    """Robots that swim: all the time, in short turns."""
+    searches: Worker = field(default_factory=Worker)
+    """Better layouts: up to minutes."""
+
+    def stop(self) -> None:
+        """End all threads."""
+        for worker in (self.answers, self.marks, self.cards, self.swims, self.searches):
+            worker.stop()
+
+
+class Newest(Generic[Question, Found]):
+    """Answers one kind of question for one page; one that waits gives way to a newer one.
+
+    All methods are called on the event loop; only `work` runs on the worker's thread.
+    """
+
+    def __init__(
+        self,
+        loop: EventLoop,
+        worker: Worker,
+        work: Callable[[Question], Found],
+        changed: Callable[[], None],
+        rest_s: float = 0.0,
+    ) -> None:
+        """Prepare.
+
+        Args:
+            loop: where everything else runs.
+            worker: whose thread computes.
+            work: answers a question there.
+            changed: called on the loop when there are findings, or an error.
+            rest_s: how long the question may not change before work begins [s].
+        """
+        self._loop, self._worker, self._work, self._changed = loop, worker, work, changed
+        self._rest_s = rest_s
+        self._timer: asyncio.TimerHandle | None = None
+        self._round = object()
+        self.question: Question | None = None
+        """What was asked last."""
+        self.answered: Question | None = None
+        """The question that findings and error belong to; it may be an earlier one."""
+        self.findings: Found | None = None
+        """What came of it; None where nothing did."""
+        self.error: str | None = None
+        """Why nothing came of it."""
+
+    @property
+    def busy(self) -> bool:
+        """True while the newest question has no answer."""
+        return self.answered is not self.question
+
+    def ask(self, question: Question) -> None:
+        """Have a question answered, unless it is the one that was asked last."""
+        if self.question is not None and question == self.question:
+            return
+        self.question = question
+        if self._rest_s == 0.0:
+            self._start(question)
+            return
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = self._loop.later(self._rest_s, partial(self._start, question))
+
+    def forget(self) -> None:
+        """Drop question and findings; what is still under way counts no more."""
+        if self._timer is not None:
+            self._timer.cancel()
+        self._worker.forget(id(self))
+        self._round = object()
+        self.question = self.answered = self.findings = self.error = None
+
+    def _start(self, question: Question) -> None:
+        take = partial(self._take, self._round, question)
+
+        def job() -> None:
+            found = self._work(question)
+            self._loop.post(partial(take, found, None))
+
+        self._worker.submit(id(self), job, lambda text: self._loop.post(partial(take, None, text)))
+
+    def _take(self, begun: object, question: Question, found: Found | None, error: str | None) -> None:
+        if begun is self._round:
+            self.answered, self.findings, self.error = question, found, error
+            self._changed()
