@@ -134,18 +134,15 @@ def _authority(
     k: int,
     gap: float,
 ) -> Authority:
-    kept = values > RANK_TOLERANCE * max(values[0], 1e-9)
-    # How much of each axis lies in the span of all wrenches: one that is held whole can be pushed alone.
-    held = np.linalg.norm(vectors[:, kept], axis=1)
-    pushed, alone = held > RANK_TOLERANCE, held > 1.0 - RANK_TOLERANCE
+    rank, pushed, alone = span(values, vectors)
     least, most = extremes
     near, far = float(least.size[k]), float(most.size[k])
     return Authority(
-        rank=int(kept.sum()),
+        rank=rank,
         singular_values=_floats(values),
-        condition=float(values[0] / values[5]) if kept.all() else None,
-        without_authority=tuple(name for name, p in zip(AXES, pushed, strict=True) if not p),
-        coupled=tuple(name for name, p, a in zip(AXES, pushed, alone, strict=True) if p and not a),
+        condition=float(values[0] / values[5]) if rank == 6 else None,
+        without_authority=axes_where(~pushed),
+        coupled=axes_where(pushed & ~alone),
         largest=_floats(size[:6] * SCALE),
         most_negative=_floats(size[6:] * SCALE),
         beside_others=_floats(free * SCALE),
@@ -154,6 +151,20 @@ def _authority(
         isotropy=near / far if far > 0.0 else 0.0,
         gap=gap,
     )
+
+
+def span(values: Array, vectors: Array) -> tuple[int, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Returns the rank that singular values (6,) and left vectors (6, 6) hold, which axes (6,) are pushed at
+    all, and which can be pushed alone."""
+    kept = values > RANK_TOLERANCE * max(values[0], 1e-9)
+    # How much of each axis lies in the span of all wrenches: one that is held whole can be pushed alone.
+    held = np.linalg.norm(vectors[:, kept], axis=1)
+    return int(kept.sum()), held > RANK_TOLERANCE, held > 1.0 - RANK_TOLERANCE
+
+
+def axes_where(chosen: NDArray[np.bool_]) -> tuple[str, ...]:
+    """Returns the names of the axes (6,) that are true."""
+    return tuple(np.array(AXES)[chosen].tolist())
 
 
 def _loss(before: Authority, name: str, after: Authority) -> Loss:

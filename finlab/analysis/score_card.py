@@ -1,4 +1,4 @@
-"""Everything that a layout can do, for one glance."""
+"""Everything that a layout can do, for one glance, and what can be told in a millisecond while it changes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from finlab.analysis.authority import AXES, Authority, Loss, authority, losses, model_error
+from finlab.analysis.authority import AXES, Authority, Loss, authority, axes_where, losses, model_error, span
+from finlab.forces.extent import singular_values
 from finlab.forces.fin_sets import MAX_CUT, fin_sets, wide_fins
 from finlab.forces.least_energy import least_energy
 from finlab.layout import Layout
@@ -106,3 +107,43 @@ def _notes(layout: Layout, failed: Collection[str]) -> tuple[str, ...]:
     if any(fin.model.type == "table" for fin in layout.fins if fin.name not in failed):
         notes.append("Fins that follow a table count with the largest thrust that was sampled from it.")
     return tuple(notes)
+
+
+@dataclass(frozen=True)
+class QuickCheck:
+    """Axes that the working fins hold, before any limit. Torques are scaled by the lever 0.2 m."""
+
+    rank: int
+    """How many of the six axes the fins act on independently."""
+    condition: float | None
+    """Largest over smallest singular value; None below rank 6."""
+    without_authority: tuple[str, ...]
+    """Axes that no fin pushes at all."""
+    coupled: tuple[str, ...]
+    """Axes that are pushed, but never without pushing others too."""
+    lost: tuple[tuple[str, tuple[str, ...]], ...]
+    """Working fins with the axes that the loss of each costs; fins that cost none are left out."""
+
+
+def quick_check(layout: Layout, failed: Collection[str] = ()) -> QuickCheck:
+    """Returns what the working fins hold, from singular values alone.
+
+    Raises:
+        LayoutError: there is no fin of a name in `failed`.
+    """
+    working = [name for name in layout.names if name not in failed]
+    single = working if len(working) > 1 else []
+    sets = fin_sets(layout, failed).tile(1 + len(single))
+    for row, name in enumerate(single, start=1):
+        sets.radius[row, layout.index(name)] = 0.0
+    values, vectors = singular_values(sets)
+    rank, pushed, alone = span(values[0], vectors[0])
+    left = [span(*pair)[2] for pair in zip(values[1:], vectors[1:], strict=True)]
+    lost = [(name, axes_where(alone & ~after)) for name, after in zip(single, left, strict=True)]
+    return QuickCheck(
+        rank=rank,
+        condition=float(values[0, 0] / values[0, 5]) if rank == 6 else None,
+        without_authority=axes_where(~pushed),
+        coupled=axes_where(pushed & ~alone),
+        lost=tuple(pair for pair in lost if pair[1]),
+    )

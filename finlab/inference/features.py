@@ -31,6 +31,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finlab.array_library import library_of
+from finlab.layout.arrays import force_columns
 
 RAW_SIZE = 10
 """Number of raw node features (paper: x_i in R^10)."""
@@ -88,14 +89,9 @@ def geometry(
     full = full * full
     if mask is not None:
         full = full * mask
-    c, s, (x, y, z) = xp.cos(mounting_angle), xp.sin(mounting_angle), _unbind(position)
-    zero, one = xp.zeros_like(x), xp.ones_like(x)
-    horizontal = xp.stack([-s, c, zero, -z * c, -z * s, x * c + y * s], axis=-1)  # e_h, r x e_h
-    vertical = xp.stack([zero, zero, one, y, -x, zero], axis=-1)  # e_z, r x e_z
-    scale = (FULL_FORCE * full)[..., None]
-    h, v = horizontal / std * scale, vertical / std * scale  # (B, n, 6)
+    scale = (FULL_FORCE * full)[..., None, None]
+    pairs = force_columns(position, mounting_angle)[..., 1:, :] / std * scale  # (B, n, 2, 6)
     batch, n = position.shape[0], position.shape[1]
-    pairs = xp.stack([h, v], axis=-2)  # (B, n, 2, 6)
     rows = pairs.reshape(batch, 2 * n, 6)
     columns = xp.swapaxes(rows, -1, -2)  # (B, 6, 2n)
     identity = xp.eye(6, dtype=position.dtype)
@@ -105,9 +101,7 @@ def geometry(
     solver = rows @ inverse  # (B, 2n, 6)
     solved = solver.reshape(batch, n, 2, 6)
     hat = [(solved[:, :, i] * pairs[:, :, j]).sum(-1) for i, j in ((0, 0), (1, 1), (0, 1))]
-    shape = xp.stack(
-        [h[..., 0], h[..., 1], h[..., 3], h[..., 4], h[..., 5], v[..., 2], v[..., 3], v[..., 4]], axis=-1
-    )
+    shape = xp.concatenate([pairs[..., 0, [0, 1, 3, 4, 5]], pairs[..., 1, [2, 3, 4]]], axis=-1)
     limits = _scaled_limits(xp, lower, upper)
     static = xp.concatenate([shape * 0.25, xp.stack([*hat, full], axis=-1), limits], axis=-1)
     return Geometry(static, columns, solver)
@@ -130,7 +124,3 @@ def fin_frame_features(layout: Geometry, target: Array) -> Array:
 def _scaled_limits(xp: Any, lower: Array, upper: Array) -> Array:
     scales = (NOMINAL_AMPLITUDE, NOMINAL_FREQUENCY, math.pi)
     return xp.stack([limit[..., i] / scales[i] for i in range(3) for limit in (lower, upper)], axis=-1)
-
-
-def _unbind(position: Array) -> tuple[Array, Array, Array]:
-    return position[..., 0], position[..., 1], position[..., 2]

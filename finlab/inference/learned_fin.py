@@ -59,11 +59,6 @@ class LearnedFin:
         k *= scale
         return _turned(k, c, s).reshape(command.shape)
 
-    def force_and_jacobian(self, command: Array) -> tuple[Array, Array]:
-        """Forces (..., 3) and their derivatives (..., 3, 3) by amplitude, frequency and zero direction."""
-        force, by_command = self.force_and_slopes(command)
-        return force, by_command.swapaxes(-1, -2)
-
     def force_and_slopes(self, command: Array) -> tuple[Array, Array]:
         """Forces (..., 3) and, for each of the three commands in turn, their derivative by it (..., 3, 3).
 

@@ -19,7 +19,7 @@ from finlab.sim.fin_motion import FinMotion, Servo, fin_power
 from finlab.sim.log import RunLog, Tick, log_of_ticks
 from finlab.sim.sensors import Sensors, SensorSettings
 from finlab.sim.task import Cruise, Task
-from finlab.sim.vehicle import STATE_SIZE, Vehicle, complete_body, euler, quaternion_of_yaw
+from finlab.sim.vehicle import STATE_SIZE, Vehicle, complete_body, quaternion_of_yaw
 
 Array = NDArray[np.float64]
 
@@ -111,16 +111,6 @@ class ClosedLoop:
     def done(self) -> bool:
         """Whether the task is over."""
         return self.time >= self.task.duration_s - 1e-9
-
-    @property
-    def position(self) -> Array:
-        """Position (3,) in the world [m]."""
-        return self.state[:3]
-
-    @property
-    def attitude(self) -> Array:
-        """Roll, pitch, yaw (3,) [rad]."""
-        return euler(self.state[3:7])
 
     @property
     def controllable(self) -> bool:

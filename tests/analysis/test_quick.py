@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from finlab.analysis import authority, losses
-from finlab.analysis.quick import quick_check
+from finlab.analysis.score_card import quick_check
 from finlab.layout import Layout
 
 Layouts = Callable[[str], Layout]

@@ -17,9 +17,9 @@ from finlab.control import (
     WaypointGains,
     load_gains,
 )
+from finlab.control.controllers import Odometry
 from finlab.control.filters import Pid
 from finlab.control.gains import PidGains
-from finlab.control.waypoint import Odometry
 from finlab.errors import DataError
 from finlab.layout.angles import wrapped
 

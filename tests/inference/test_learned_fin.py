@@ -66,13 +66,13 @@ def test_shipped_fin_knows_the_physics_to_a_thousandth(shipped: TrainedWeights) 
 
 def test_jacobian_agrees_with_differences() -> None:
     fin, command = fin_of(random_surrogate(16, 12)), commands(9, 2)
-    force, jacobian = fin.force_and_jacobian(command)
+    force, slopes = fin.force_and_slopes(command)
     np.testing.assert_allclose(force, fin.force(command), atol=1e-12)
     step = 1e-6
     for i in range(3):
         moved = step * np.eye(3)[i]
         difference = (fin.force(command + moved) - fin.force(command - moved)) / (2 * step)
-        np.testing.assert_allclose(jacobian[..., i], difference, atol=1e-6)
+        np.testing.assert_allclose(slopes[..., i, :], difference, atol=1e-6)
 
 
 def test_single_precision_stays_single_and_near(shipped: TrainedWeights) -> None:

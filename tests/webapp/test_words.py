@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from finlab.analysis import score_card
-from finlab.analysis.quick import quick_check
+from finlab.analysis.score_card import quick_check
 from finlab.assets import shipped_layouts
 from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, load_layout

@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 
 from finlab.analysis import AXES, Authority, ScoreCard
-from finlab.analysis.quick import QuickCheck
+from finlab.analysis.score_card import QuickCheck
 from finlab.layout import Layout
 from webapp.markup.answer import swatch
 from webapp.markup.words import listed, three_digits

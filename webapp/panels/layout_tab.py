@@ -8,7 +8,7 @@ from typing import Any
 
 import viser
 
-from finlab.analysis.quick import quick_check
+from finlab.analysis.score_card import quick_check
 from finlab.layout.body import HULL_SHAPES
 from webapp.handles import Changes, hold_kind, on_user_change, on_user_click, put
 from webapp.markup.score_card import check_card, warnings

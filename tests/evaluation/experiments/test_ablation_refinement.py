@@ -30,5 +30,7 @@ def test_it_starts_where_adam_starts_and_never_makes_worse(untrained_checkpoint:
 
 
 def test_unknown_refinement() -> None:
-    with pytest.raises(AllocationError, match="refinement: expected one of none, adam, levenberg-marquardt, got 'newton'"):
+    with pytest.raises(
+        AllocationError, match="refinement: expected one of none, adam, levenberg-marquardt, got 'newton'"
+    ):
         ablation_method("ours", "newton")

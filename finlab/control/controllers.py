@@ -1,19 +1,97 @@
-"""Waypoint tracking after the paper's section on the trajectory tracking controller: surge, heave, yaw."""
+"""Controllers: measurements and a setpoint in, a wrench out; the paper's two, and odometry."""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.control.controller import Measurement, Setpoint
-from finlab.control.filters import LowPass
-from finlab.control.gains import WaypointGains, load_gains
+from finlab.control.filters import LowPass, Pid
+from finlab.control.gains import VelocityGains, WaypointGains, load_gains
 from finlab.layout.angles import wrapped
 
 Array = NDArray[np.float64]
+
+
+class Measurement(NamedTuple):
+    """The newest sample of every sensor. World: z up; body: x forward, y left, z up."""
+
+    time: float
+    """Now [s]; a slow sensor's sample may be older."""
+    position: Array
+    """Position (3,) in the world [m], from the markers that a camera sees."""
+    yaw: float
+    """Heading from the world's x, counter-clockwise [rad], from the same markers."""
+    velocity: Array
+    """Velocity (3,) over ground in the body frame [m/s], from the DVL."""
+    depth: float
+    """Depth below the world's origin, -z [m], from the pressure."""
+    rates: Array
+    """Angular rates (3,) in the body frame [rad/s], from the IMU."""
+    roll: float
+    """Roll [rad], from the IMU."""
+    pitch: float
+    """Pitch [rad], positive with the nose down, from the IMU."""
+
+
+class Setpoint(NamedTuple):
+    """What the robot should do now; a controller takes what it needs."""
+
+    position: Array
+    """Waypoint (3,) in the world [m]; x and y may be NaN where only depth counts."""
+    surge: float
+    """Speed along x [m/s]."""
+
+
+class Controller(Protocol):
+    """Turns measurements into a wrench; called at a fixed rate."""
+
+    name: str
+    """What it is called in logs and tables."""
+    axes: tuple[str, ...]
+    """Axes of the wrench that it commands; the others are to stay as near zero as the fins can hold them."""
+    lead_s: float
+    """How far ahead of now [s] the waypoint should be taken from a trajectory."""
+    period_s: float
+    """Time between calls [s]."""
+
+    def reset(self) -> None:
+        """Forget everything, as before the first call."""
+
+    def wrench(self, measurement: Measurement, setpoint: Setpoint) -> Array:
+        """Returns the wrench (6,) [N, N m] in the body frame."""
+        ...
+
+
+class VelocityController:
+    """Surge PID on the filtered DVL speed, depth PID on pressure, damping of the yaw rate, saturation."""
+
+    name = "velocity"
+    axes: tuple[str, ...] = ("Fx", "Fz", "Tz")
+    lead_s = 0.0
+
+    def __init__(self, gains: VelocityGains | None = None) -> None:
+        """Takes gains; the shipped file `velocity` by default."""
+        self.gains = load_gains(VelocityGains, "velocity") if gains is None else gains
+        self.period_s = self.gains.period_s
+        self._speed = LowPass(self.gains.velocity_filter_s, self.period_s)
+        self._surge = Pid(self.gains.surge, self.gains.max_surge, self.period_s)
+        self._depth = Pid(self.gains.depth, self.gains.max_heave, self.period_s)
+
+    def reset(self) -> None:
+        """Forget filters and integrals."""
+        for part in (self._speed, self._surge, self._depth):
+            part.reset()
+
+    def wrench(self, measurement: Measurement, setpoint: Setpoint) -> Array:
+        """Returns the wrench (6,) towards the speed and depth asked for [N, N m]."""
+        g = self.gains
+        surge = self._surge.step(setpoint.surge - self._speed.step(float(measurement.velocity[0])))
+        heave = self._depth.step(float(setpoint.position[2]) + measurement.depth)
+        yaw = min(max(-g.yaw_damping * float(measurement.rates[2]), -g.max_yaw), g.max_yaw)
+        return np.array([surge, 0.0, heave, 0.0, 0.0, yaw])
 
 
 class WaypointController:
