@@ -1,6 +1,6 @@
-"""A document as a list of blocks: written once, turned into HTML and into Markdown by two small writers.
+"""A document as a list of blocks: written once, turned into HTML and into Markdown by `pages`.
 
-Texts may hold `code`, **bold** and [links](address), as in Markdown, and nothing else.
+A heading, a paragraph or a list is a string of Markdown; a paragraph *all in italics* is a remark in small.
 """
 
 from __future__ import annotations
@@ -13,34 +13,6 @@ from finlab.evaluation.plots.style import Picture
 from finlab.evaluation.report.numbers import FORMATS
 
 Row = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Heading:
-    """A title; those of level 2 make the list of contents."""
-
-    text: str
-    """Its words."""
-    level: int = 2
-    """2 or 3."""
-
-
-@dataclass(frozen=True)
-class Text:
-    """A paragraph."""
-
-    text: str
-    """Its words."""
-    small: bool = False
-    """Whether it is a remark under a table."""
-
-
-@dataclass(frozen=True)
-class Bullets:
-    """A list."""
-
-    items: tuple[str, ...]
-    """Its entries."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +95,8 @@ class Fold:
     """What is inside."""
 
 
-Block = Heading | Text | Bullets | Cards | Table | Figure | Fold
+Block = str | Cards | Table | Figure | Fold
+"""A string is Markdown."""
 
 
 @dataclass(frozen=True)
@@ -147,3 +120,9 @@ def figures_of(blocks: Sequence[Block]) -> list[Figure]:
         elif isinstance(block, Fold):
             found += figures_of(block.blocks)
     return found
+
+
+def method_row(row: Row) -> Row:
+    """A row with its method's name as code, which stands out where it is the learned one."""
+    kind = {"_kind": "ours"} if row["method"].startswith("learned") else {}
+    return {**row, "method": f"`{row['method']}`", **kind}

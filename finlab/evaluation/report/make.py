@@ -8,15 +8,13 @@ from typing import Any
 
 from finlab.evaluation.report.document import Block, Document, figures_of
 from finlab.evaluation.report.jobs import run_jobs
-from finlab.evaluation.report.page_html import to_html
-from finlab.evaluation.report.page_markdown import to_markdown
+from finlab.evaluation.report.pages import to_html, to_markdown
 from finlab.evaluation.report.plan import Checkpoints, make_plan
-from finlab.evaluation.report.provenance import Provenance, make_provenance, source_commit
+from finlab.evaluation.report.provenance import Provenance, how_made_blocks, make_provenance, source_commit
 from finlab.evaluation.report.results import Results
 from finlab.evaluation.report.sections.accuracy import accuracy_blocks
 from finlab.evaluation.report.sections.closed_loop import closed_loop_blocks
 from finlab.evaluation.report.sections.energy import energy_blocks
-from finlab.evaluation.report.sections.how_made import how_made_blocks
 from finlab.evaluation.report.sections.studies import (
     ablation_blocks,
     latency_blocks,

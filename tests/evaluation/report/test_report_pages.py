@@ -2,22 +2,9 @@
 
 import pytest
 
-from finlab.evaluation.report.document import (
-    Bullets,
-    Card,
-    Cards,
-    Column,
-    Document,
-    Figure,
-    Fold,
-    Heading,
-    Table,
-    Text,
-    figures_of,
-)
+from finlab.evaluation.report.document import Card, Cards, Column, Document, Figure, Fold, Table, figures_of
 from finlab.evaluation.report.numbers import FORMATS
-from finlab.evaluation.report.page_html import to_html
-from finlab.evaluation.report.page_markdown import to_markdown
+from finlab.evaluation.report.pages import to_html, to_markdown
 
 COLUMNS = (Column("name", "method"), Column("value", "error <", "error", "ends"))
 ROWS = [
@@ -30,10 +17,10 @@ DOCUMENT = Document(
     "One **line**.",
     (
         Cards((Card("1.8 ms", "a call", "others 90"),)),
-        Heading("First section"),
-        Text("See [the docs](docs/x.md), `code` and 1 < 2."),
+        "## First section",
+        "See [the docs](docs/x.md), `code` and 1 < 2.",
         Table(COLUMNS, ROWS),
-        Fold("More", (PICTURE, Bullets(("one", "two")))),
+        Fold("More", (PICTURE, "- one\n- two")),
     ),
 )
 

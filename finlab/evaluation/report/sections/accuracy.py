@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from finlab.evaluation.method_specs import is_slow
 from finlab.evaluation.paper_figures import PAPER_METHODS, paper_figures
 from finlab.evaluation.plots.error_distribution import error_by_fins, error_distribution
-from finlab.evaluation.report.document import Block, Column, Figure, Fold, Heading, Row, Table, Text
+from finlab.evaluation.report.document import Block, Column, Figure, Fold, Row, Table, method_row
 from finlab.evaluation.report.results import Results
 from finlab.evaluation.statistics.records import Records, join_records
 
-ORDER = (
+ORDER = [
     "learned",
     "fast",
     "paper",
@@ -23,7 +23,7 @@ ORDER = (
     "slsqp",
     "ipopt",
     "ipopt-32",
-)
+]
 """Methods from top to bottom."""
 SPLIT_WORDS = {
     "id": "2 to 5 fins within 0.30 m, nominal limits, as in training",
@@ -53,48 +53,41 @@ COLUMNS = (
 
 def accuracy_blocks(results: Results) -> list[Block]:
     """The whole section."""
+    if not results.wrench:
+        return []
     printed = paper_figures()["wrench_tracking"]
+    shown = {split: _quick(results.wrench[split]) for split in printed if split in results.wrench}
     blocks: list[Block] = [
-        Heading("Wrench tracking"),
-        Text(
+        "## Wrench tracking",
+        (
             "Every method answers wrenches that the robot can deliver, on layouts that no training has seen. "
             "The error is the distance between asked and delivered wrench in standard deviations of the "
             "training wrenches; the analytic fin model scores every method, whatever the method believed. "
             "`learned`, `fast` (its distilled form) and `paper` know only networks trained on forward "
             "samples; all others know the analytic fin model that scores them."
         ),
-    ]
-    if not results.wrench:
-        return []
-    shown = {split: _quick(results.wrench[split]) for split in printed if split in results.wrench}
-    blocks.append(
         Figure.drawn(
             "error-distribution",
             error_distribution(shown, {split: printed[split]["ours"]["err_norm_mean"] for split in shown}),
             "How large errors are: the further left and the steeper a curve falls, the better. Errors of "
             "1e-8 are rounding. Dashes: the mean error that the paper prints for its method.",
-        )
-    )
-    blocks.append(
+        ),
         Figure.drawn(
             "error-by-fins",
             error_by_fins(_by_fins(results), ORDER),
             "Figure B of the paper: the error by number of working fins, splits `id` (2 to 5) and `ood-fins` "
             "(6 to 8). Dots are means, bars reach from median to 95th percentile.",
-        )
-    )
+        ),
+    ]
     for split, rows in results.wrench_rows.items():
         table = Table(COLUMNS, wrench_table(rows, split))
         title = f"Split {split}: {SPLIT_WORDS[split]}"
-        blocks += [Heading(title, 3), table] if split in printed else [Fold(title, (table,))]
+        blocks += [f"### {title}", table] if split in printed else [Fold(title, (table,))]
     blocks.append(
-        Text(
-            "Small print below a number: where a rerun with another seed lands, 95 times of 100 (bootstrap "
-            "over layouts). ms per target: all targets of a layout are solved together; "
-            "methods with a few hundred targets or fewer solve them one by one, from 8 starts (`ipopt-32`: "
-            "32), on the first targets of each layout.",
-            small=True,
-        )
+        "*Small print below a number: where a rerun with another seed lands, 95 times of 100 (bootstrap over "
+        "layouts). ms per target: all targets of a layout are solved together; methods with a few hundred "
+        "targets or fewer solve them one by one, from 8 starts (`ipopt-32`: 32), on the first targets of each "
+        "layout.*"
     )
     return blocks
 
@@ -104,10 +97,8 @@ def wrench_table(rows: Sequence[Row], split: str) -> list[Row]:
     printed = paper_figures()["wrench_tracking"].get(split, {})
     shown: list[Row] = []
     for row in sorted(rows, key=lambda row: ORDER.index(row["method"])):
-        name = row["method"]
-        kind = {"_kind": "ours"} if name == "learned" else {}
-        shown.append({**row, "method": f"`{name}`", **kind})
-        if (theirs := PAPER_METHODS.get(name, "")) in printed:
+        shown.append(method_row(row))
+        if (theirs := PAPER_METHODS.get(row["method"], "")) in printed:
             shown.append({"method": PRINTED[theirs], "_kind": "printed", **printed[theirs]})
     return shown
 

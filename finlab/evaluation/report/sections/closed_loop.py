@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from finlab.evaluation.experiments.faults import fault_verdict
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.plots.closed_loop_experiments import draw_faults, draw_layouts
-from finlab.evaluation.report.document import Block, Bullets, Column, Figure, Heading, Row, Table, Text
+from finlab.evaluation.report.document import Block, Column, Figure, Row, Table, method_row
 from finlab.evaluation.report.results import Results
 from finlab.evaluation.report.work import tracks_of_columns
 
@@ -17,6 +17,8 @@ ERRORS = (
     Column("rte", "RTE [m]", "metres"),
     Column("depth_rmse", "depth RMSE [m]", "metres"),
 )
+PRINTED = {"ours": "paper's method, printed", "baseline": "paper's baseline, printed"}
+WHAT = (Column("method", "method"), Column("runs", "runs", "count"))
 FAULT_WORDS = {"healthy": "healthy", "one_fin": "one fin lost", "two_fins": "two fins lost"}
 
 
@@ -33,8 +35,8 @@ def closed_loop_blocks(results: Results) -> list[Block]:
     if not blocks:
         return []
     return [
-        Heading("Closed loop"),
-        Text(
+        "## Closed loop",
+        (
             "A robot with six degrees of freedom swims in simulation, sensor noise and servo lag included; "
             "the controllers are the paper's. The paper's runs took place in another simulator "
             "(trajectories) and in a pool (faults, speeds), on paths that it does not describe: its "
@@ -49,17 +51,12 @@ def _trajectory(rows: Sequence[Row], results: Results) -> list[Block]:
     printed = paper_figures()["trajectory"]
     shown: list[Row] = []
     for layout in dict.fromkeys(row["layout"] for row in rows):
-        shown += [_ours(row) for row in rows if row["layout"] == layout]
-        theirs = {"layout": layout, "method": "paper's method, printed", **printed[layout]}
+        shown += [method_row(row) for row in rows if row["layout"] == layout]
+        theirs = {"layout": layout, "method": PRINTED["ours"], **printed[layout]}
         shown.append({**theirs, "_kind": "printed"})
-    columns = (
-        Column("layout", "layout"),
-        Column("method", "method"),
-        Column("runs", "runs", "count"),
-        *ERRORS,
-    )
+    columns = (Column("layout", "layout"), *WHAT, *ERRORS)
     return [
-        Heading("Trajectories", 3),
+        "### Trajectories",
         Figure.drawn(
             "paths",
             draw_layouts(tracks_of_columns(results.columns(results.plan.swims["trajectory"])), rows),
@@ -71,48 +68,44 @@ def _trajectory(rows: Sequence[Row], results: Results) -> list[Block]:
 
 def _faults(rows: Sequence[Row]) -> list[Block]:
     printed = paper_figures()["fault_tolerance"]
-    swum = [{**_ours(row), "verdict": fault_verdict(row)} for row in rows if row["controllable"]]
-    names = {"ours": "paper's method, printed", "baseline": "paper's baseline, printed"}
+    swum = [{**method_row(row), "verdict": fault_verdict(row)} for row in rows if row["controllable"]]
     theirs = [
-        {"fault": FAULT_WORDS[fault], "method": names[method], "_kind": "printed", **values}
+        {"fault": FAULT_WORDS[fault], "method": PRINTED[method], "_kind": "printed", **values}
         for fault, methods in printed.items()
         for method, values in methods.items()
     ]
     columns = (
         Column("fault", "lost fins"),
-        Column("method", "method"),
-        Column("runs", "runs", "count"),
+        *WHAT,
         *ERRORS,
         Column("ate_over_healthy", "over healthy", "ratio"),
         Column("verdict", "verdict"),
     )
-    hopeless = tuple(row["fault"] for row in rows if not row["controllable"])
+    hopeless = [row["fault"] for row in rows if not row["controllable"]]
     beside = {f"{FAULT_WORDS[k]} (printed)": v["ours"]["ate"] for k, v in printed.items()}
     blocks: list[Block] = [
-        Heading("Lost fins", 3),
+        "### Lost fins",
         Figure.drawn("faults", draw_faults(rows, beside), "Layout A. Diamonds: the paper's pool."),
         Table(columns, [*swum, *theirs]),
     ]
     if hopeless:
         blocks += [
-            Text("Not swum, since the fins that are left cannot give surge, heave and yaw independently:"),
-            Bullets(hopeless),
+            "Not swum, since the fins that are left cannot give surge, heave and yaw independently:",
+            "\n".join(f"- {fault}" for fault in hopeless),
         ]
     return blocks
 
 
 def _velocity(rows: Sequence[Row]) -> list[Block]:
     printed = paper_figures()["velocity"]
-    shown = [{**_ours(row), "speed": row["speed"] or "all"} for row in rows]
-    names = {"ours": "paper's method, printed", "baseline": "paper's baseline, printed"}
+    shown = [{**method_row(row), "speed": row["speed"] or "all"} for row in rows]
     shown += [
-        {"speed": "all", "method": names[method], "_kind": "printed", **values}
+        {"speed": "all", "method": PRINTED[method], "_kind": "printed", **values}
         for method, values in printed.items()
     ]
     columns = (
         Column("speed", "speed [m/s]"),
-        Column("method", "method"),
-        Column("runs", "runs", "count"),
+        *WHAT,
         Column("inertial_w", "inertial power [W]", "three"),
         Column("inertial_w_std", "spread", "error"),
         Column("torque_w", "torque power [W]", "three"),
@@ -120,9 +113,4 @@ def _velocity(rows: Sequence[Row]) -> list[Block]:
         Column("mae_std", "spread", "error"),
         Column("depth_rmse", "depth RMSE [m]", "metres"),
     )
-    return [Heading("Speed and power", 3), Table(columns, shown)]
-
-
-def _ours(row: Row) -> Row:
-    kind = {"_kind": "ours"} if row["method"].startswith("learned") else {}
-    return {**row, "method": f"`{row['method']}`", **kind}
+    return ["### Speed and power", Table(columns, shown)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from finlab.evaluation.plots.energy_by_fins import energy_by_fins
-from finlab.evaluation.report.document import Block, Column, Figure, Fold, Heading, Row, Table, Text
+from finlab.evaluation.report.document import Block, Column, Figure, Fold, Row, Table, method_row
 from finlab.evaluation.report.plan import REFERENCE
 from finlab.evaluation.report.results import Results
 
@@ -33,8 +33,8 @@ def energy_blocks(results: Results) -> list[Block]:
     whole = [_shown(row) for row in rows if row["fins"] == "all"]
     by_fins = [_shown(row) for row in rows if row["fins"] != "all"]
     return [
-        Heading("Energy"),
-        Text(
+        "## Energy",
+        (
             f"The best of 32 IPOPT starts (`{REFERENCE}`) is the yardstick: reachable targets of split `id`, "
             "the first ones of each layout, compared where both methods come within 0.05. The energy is "
             "concave in a fin's force, so the cheapest answer often lets some fins rest."
@@ -47,8 +47,8 @@ def energy_blocks(results: Results) -> list[Block]:
         ),
         Table(COLUMNS, whole),
         Fold("The same by number of fins", (Table(COLUMNS, by_fins),)),
-        Heading("Every win checked again", 3),
-        Text(
+        "### Every win checked again",
+        (
             f"Each answer that is cheaper than `{REFERENCE}`'s was computed once more in double precision, "
             "by the fin law written out apart from the plant, and held against the limits bit for bit."
         ),
@@ -59,5 +59,4 @@ def energy_blocks(results: Results) -> list[Block]:
 def _shown(row: Row) -> Row:
     known = row["method"] != REFERENCE and "energy_ratio_low" in row
     ends = [row["energy_ratio_low"], row["energy_ratio_high"]] if known else None
-    kind = {"_kind": "ours"} if row["method"] == "learned" else {}
-    return {**row, "method": f"`{row['method']}`", "energy_ratio_interval": ends, **kind}
+    return method_row({**row, "energy_ratio_interval": ends})

@@ -9,7 +9,7 @@ from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.plots.ablation_dots import ablation_dots
 from finlab.evaluation.plots.studies import latency_dots, seed_lines, training_bars
 from finlab.evaluation.plots.temperature_panels import figure_a
-from finlab.evaluation.report.document import Block, Column, Figure, Fold, Heading, Row, Table, Text
+from finlab.evaluation.report.document import Block, Column, Figure, Fold, Row, Table, method_row
 from finlab.evaluation.report.numbers import three
 from finlab.evaluation.report.results import Results
 
@@ -29,14 +29,6 @@ def latency_blocks(results: Results) -> list[Block]:
     if not results.latency_rows:
         return []
     paper_ms = paper_figures()["inference"]["cycle_s"] * 1e3
-    rows = [
-        {
-            **row,
-            "method": f"`{row['method']}`",
-            **({"_kind": "ours"} if row["method"] == "learned" else {}),
-        }
-        for row in results.latency_rows
-    ]
     printed: Row = {"method": "paper's cycle, printed (Jetson Orin Nano)", "p50_ms": paper_ms}
     columns = (
         Column("method", "method"),
@@ -46,8 +38,8 @@ def latency_blocks(results: Results) -> list[Block]:
         Column("p50_over_learned", "times that of learned", "three"),
     )
     return [
-        Heading("Time per call"),
-        Text(
+        "## Time per call",
+        (
             "Whole calls of `allocate`, one target each, four fins, one after the other in one run with "
             "nothing beside it. `trf`, `slsqp` and `ipopt` start from 8 points."
         ),
@@ -56,7 +48,7 @@ def latency_blocks(results: Results) -> list[Block]:
             latency_dots(results.latency_rows, paper_ms),
             "Dots are medians, bars end at the 99th percentile.",
         ),
-        Table(columns, [*rows, {**printed, "_kind": "printed"}]),
+        Table(columns, [*map(method_row, results.latency_rows), {**printed, "_kind": "printed"}]),
     ]
 
 
@@ -67,8 +59,8 @@ def ablation_blocks(results: Results) -> list[Block]:
     printed = paper_figures()["ablation"]
     rows = results.ablation_rows
     blocks: list[Block] = [
-        Heading("Ablation"),
-        Text(
+        "## Ablation",
+        (
             "The paper's five rows with the network of the checkpoint `paper`: the same cases, 64 "
             f"candidates, temperature {PAPER_TEMPERATURE} and refinement budget, one stage changed in each "
             "row. The paper does not say which model scored its table; its 0.0003 here and 0.0857 above "
@@ -105,9 +97,11 @@ def ablation_blocks(results: Results) -> list[Block]:
             theirs = printed[variant]
             line |= {"printed": theirs["err_norm_mean"], "printed_std": theirs["err_norm_std"]}
             lines.append(line | {"printed_time_s": theirs["time_s"]})
-        blocks += [Heading(f"Refined by {words}", 3), Table(columns, lines)]
-    note = "s per call: single calls, timed while another part of the report ran on the other core."
-    return [*blocks, Text(note, small=True)]
+        blocks += [f"### Refined by {words}", Table(columns, lines)]
+    return [
+        *blocks,
+        "*s per call: single calls, timed while another part of the report ran on another core.*",
+    ]
 
 
 def temperature_blocks(results: Results) -> list[Block]:
@@ -124,8 +118,8 @@ def temperature_blocks(results: Results) -> list[Block]:
         Column("best_j_median", "median", "error"),
     )
     return [
-        Heading("Temperature"),
-        Text(
+        "## Temperature",
+        (
             "Figure A of the paper, for the network of the checkpoint `paper`. Diversity grows with the "
             "temperature of the draw; the best cost among 64 candidates is lowest at T = "
             f"{three(best['temperature'])} here (the paper uses {PAPER_TEMPERATURE}). Diversity is the mean "
@@ -159,8 +153,8 @@ def seed_blocks(results: Results) -> list[Block]:
     )
     rows = [{**r, "_kind": "ours"} if r["seeds"] == "network" else r for r in results.seed_rows]
     return [
-        Heading("What learning buys"),
-        Text(
+        "## What learning buys",
+        (
             "The network's best 16 candidates against 16 random and 16 quasi-random ones, refined by the "
             "same number of Levenberg-Marquardt steps on the surrogate, scored by the plant."
         ),
@@ -185,8 +179,8 @@ def training_blocks(results: Results) -> list[Block]:
     )
     titles = {name: change.title for name, change in CHANGES.items()}
     return [
-        Heading("What the parts of the training bring"),
-        Text(
+        "## What the parts of the training bring",
+        (
             f"Trainings of {settings['steps']} steps of {settings['batch_size']} samples each (preset "
             f"`{settings['preset']}`), one thing changed at a time. Such budgets are far below those of the "
             "shipped networks: read the order, not the size. The same surrogate ranks and refines in all "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from finlab.evaluation.paper_figures import paper_figures
-from finlab.evaluation.report.document import Block, Card, Cards, Column, Fold, Heading, Row, Table, Text
+from finlab.evaluation.report.document import Block, Card, Cards, Column, Fold, Row, Table
 from finlab.evaluation.report.numbers import error, factor, share, three
 from finlab.evaluation.report.results import Results
 from finlab.evaluation.report.verdicts import (
@@ -42,8 +42,8 @@ def summary_blocks(results: Results) -> list[Block]:
     found = comparisons(results)
     return [
         Cards(tuple(_cards(results, results.wrench_rows))),
-        Heading("Who leads"),
-        Text(
+        "## Who leads",
+        (
             "The learned allocator against every other method. One leads where the intervals in which reruns "
             "would land do not overlap; a single run has none and no verdict. Figures that the paper prints "
             "count as exact. `analytic`, `sqp`, `qp`, `multistart`, `trf`, `slsqp` and `ipopt` know the fin "

@@ -1,0 +1,124 @@
+"""A document as one self-contained HTML page, and as Markdown with its pictures in files beside it."""
+
+from __future__ import annotations
+
+import html
+import re
+from collections.abc import Sequence
+from importlib.resources import files
+from itertools import pairwise
+
+from markdown_it import MarkdownIt
+
+from finlab.evaluation.report.document import Block, Cards, Document, Figure, Fold, Table
+
+MARKDOWN = MarkdownIt("commonmark", {"html": False})
+
+
+def to_html(document: Document) -> str:
+    """The page: no script, no font and no picture from elsewhere."""
+    style = files("finlab.evaluation.report").joinpath("page.css").read_text("utf-8")
+    title = html.escape(document.title)
+    sections = [b.removeprefix("## ") for b in document.blocks if isinstance(b, str) and b.startswith("## ")]
+    links = "".join(f'<a href="#{_anchor(section)}">{html.escape(section)}</a>' for section in sections)
+    return f"""<!doctype html>
+<html lang="en"><head><meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>
+{style}</style></head><body>
+<header><h1>{title}</h1><p>{_inline(document.subtitle)}</p></header>
+<nav>{links}</nav>
+<main>{_html_blocks(document.blocks)}</main>
+</body></html>
+"""
+
+
+def _html_blocks(blocks: Sequence[Block]) -> str:
+    return "\n".join(map(_html_block, blocks))
+
+
+def _html_block(block: Block) -> str:
+    match block:
+        case str():
+            tokens = MARKDOWN.parse(block)
+            for token, inside in pairwise(tokens):
+                if token.type == "heading_open":
+                    token.attrSet("id", _anchor(inside.content))
+            rendered: str = MARKDOWN.renderer.render(tokens, MARKDOWN.options, {})
+            return rendered
+        case Cards(cards):
+            parts = ("label", "value", "detail")
+            texts = ["".join(_div(part, _inline(getattr(card, part))) for part in parts) for card in cards]
+            return _div("cards", "".join(_div("card", text) for text in texts))
+        case Table():
+            return _div("table", _html_table(block))
+        case Figure(_, svg, caption):
+            # The picture without what only a file of its own needs.
+            return f"<figure>{svg[svg.index('<svg') :]}<figcaption>{_inline(caption)}</figcaption></figure>"
+        case Fold(title, hidden):
+            return f"<details><summary>{_inline(title)}</summary>{_html_blocks(hidden)}</details>"
+
+
+def _html_table(table: Table) -> str:
+    kinds = [' class="name"' if column.format == "text" else "" for column in table.columns]
+    titles = zip(table.columns, kinds, strict=True)
+    lines = ["".join(f"<th{kind}>{_inline(column.title)}</th>" for column, kind in titles)]
+    for row in table.rows:
+        cells = []
+        for column, kind in zip(table.columns, kinds, strict=True):
+            big, small = table.cell(row, column)
+            cells.append(f"<td{kind}>{_inline(big)}{f'<small>{small}</small>' if small else ''}</td>")
+        lines.append("".join(cells))
+    marks = [f' class="{row["_kind"]}"' if "_kind" in row else "" for row in table.rows]
+    body = "".join(f"<tr{mark}>{line}</tr>" for mark, line in zip(marks, lines[1:], strict=True))
+    return f"<table><thead><tr>{lines[0]}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _inline(text: str) -> str:
+    rendered: str = MARKDOWN.renderInline(text)
+    return rendered
+
+
+def _div(kind: str, inside: str) -> str:
+    return f'<div class="{kind}">{inside}</div>'
+
+
+def _anchor(text: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
+
+
+def to_markdown(document: Document, pictures: str) -> str:
+    """The text; `pictures` is the folder of the pictures as seen from its file."""
+    return f"# {document.title}\n\n{document.subtitle}\n\n{_text_blocks(document.blocks, pictures)}\n"
+
+
+def _text_blocks(blocks: Sequence[Block], pictures: str) -> str:
+    return "\n\n".join(_text_block(block, pictures) for block in blocks)
+
+
+def _text_block(block: Block, pictures: str) -> str:
+    match block:
+        case str():
+            return block
+        case Cards(cards):
+            return "\n".join(f"- **{card.value}** {card.label}: {card.detail}" for card in cards)
+        case Table():
+            return _text_table(block)
+        case Figure(name, _, caption):
+            return f"![{caption}]({pictures}/{name}.svg)\n\n*{caption}*"
+        case Fold(title, hidden):
+            inside = _text_blocks(hidden, pictures)
+            return f"<details><summary>{title}</summary>\n\n{inside}\n\n</details>"
+
+
+def _text_table(table: Table) -> str:
+    lines = [[column.title for column in table.columns]]
+    lines.append(["---" if column.format == "text" else "---:" for column in table.columns])
+    for row in table.rows:
+        shown = [table.cell(row, column) for column in table.columns]
+        cells = [f"{big} ({small})" if small else big for big, small in shown]
+        if row.get("_kind") == "ours":
+            cells[0] = f"**{cells[0]}**"
+        lines.append(cells)
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
