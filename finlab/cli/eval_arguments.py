@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json as json_text
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,6 +14,8 @@ from finlab.errors import DataError
 
 if TYPE_CHECKING:
     from finlab.allocation import Allocator
+    from finlab.evaluation.experiments.closed_loop_runs import Run as LoggedRun
+    from finlab.evaluation.experiments.closed_loop_runs import Scenario
     from finlab.evaluation.plots.style import Picture
     from finlab.evaluation.splits import Case
     from finlab.layout import Layout
@@ -113,10 +115,12 @@ class ClosedLoopRuns:
         if self.figures is not None and not self.figures.is_dir():
             raise DataError(f"figures: expected a folder that exists, got {self.figures}")
 
-    @property
-    def seeds(self) -> range:
-        """Of every run."""
-        return range(self.seed, self.seed + self.runs)
+    def swim(self, scenarios: Sequence[Scenario], run: Run) -> list[LoggedRun]:
+        """Every scenario with every method and seed."""
+        from finlab.evaluation.experiments.closed_loop_runs import run_all
+
+        methods, seeds = run.methods(self.methods), range(self.seed, self.seed + self.runs)
+        return run_all(scenarios, methods, seeds, self.plant, steady=self.steady)
 
     def save(self, name: str, draw: Callable[[], Picture]) -> None:
         """Draw into the folder, where one was named, and say so."""

@@ -26,15 +26,14 @@ def trajectory(
         layouts: names or files with commas between.
         trajectory: circle, lissajous, square, or a CSV file with the columns t, x, y, z.
     """
-    from finlab.evaluation.experiments.trajectory import run_trajectory, trajectory_report, trajectory_rows
+    from finlab.evaluation.experiments import trajectory_and_velocity as experiment
     from finlab.evaluation.plots.closed_loop_experiments import draw_layouts, tracks_of
     from finlab.sim import make_trajectory
 
     robots, path = open_layouts(layouts), make_trajectory(trajectory)
-    methods = run.methods(loop.methods)
-    found = run_trajectory(robots, methods, path, loop.seeds, loop.plant, steady=loop.steady)
-    rows = trajectory_rows(found)
-    run.show(trajectory_report(rows, path, loop.plant), rows=rows)
+    found = loop.swim(experiment.trajectory_scenarios(robots, path), run)
+    rows = experiment.trajectory_rows(found)
+    run.show(experiment.trajectory_report(rows, path, loop.plant), rows=rows)
     loop.save("trajectory", lambda: draw_layouts(tracks_of(found), rows))
 
 
@@ -51,14 +50,13 @@ def faults(
         trajectory: circle, lissajous, square, or a CSV file with the columns t, x, y, z.
     """
     from finlab.cli.inputs import open_robot
-    from finlab.evaluation.experiments.faults import all_faults, fault_report, fault_rows, run_faults
+    from finlab.evaluation.experiments.faults import all_faults, fault_report, fault_rows, fault_scenarios
     from finlab.evaluation.plots.closed_loop_experiments import draw_faults
     from finlab.sim import make_trajectory
 
     robot, path = open_robot(layout).layout, make_trajectory(trajectory)
-    methods, cases = run.methods(loop.methods), all_faults(robot, path.duration_s / 2)
-    found = run_faults(robot, methods, path, cases, loop.seeds, loop.plant, steady=loop.steady)
-    rows = fault_rows(cases, found)
+    cases = all_faults(robot, path.duration_s / 2)
+    rows = fault_rows(cases, loop.swim(fault_scenarios(robot, path, cases), run))
     run.show(fault_report(rows, robot, path, loop.plant), rows=rows)
     loop.save("faults", lambda: draw_faults(rows))
 
@@ -79,19 +77,14 @@ def velocity(
     """
     from finlab.cli.inputs import open_robot
     from finlab.errors import DataError
-    from finlab.evaluation.experiments.velocity import (
-        SETTLED_S,
-        SPEEDS,
-        run_velocity,
-        velocity_report,
-        velocity_rows,
-    )
+    from finlab.evaluation.experiments import trajectory_and_velocity as experiment
     from finlab.evaluation.plots.closed_loop_experiments import draw_velocity
 
-    if not SETTLED_S < duration <= 3600.0:
-        raise DataError(f"duration: expected more than {SETTLED_S:g} s and at most 3600 s, got {duration:g}")
-    robot, methods = open_robot(layout).layout, run.methods(loop.methods)
-    found = run_velocity(robot, methods, loop.seeds, SPEEDS, duration, loop.plant, steady=loop.steady)
-    rows = velocity_rows(found)
-    run.show(velocity_report(rows, baseline, robot, loop.plant), rows=rows)
+    least = experiment.SETTLED_S
+    if not least < duration <= 3600.0:
+        raise DataError(f"duration: expected more than {least:g} s and at most 3600 s, got {duration:g}")
+    robot = open_robot(layout).layout
+    found = loop.swim(experiment.velocity_scenarios(robot, duration_s=duration), run)
+    rows = experiment.velocity_rows(found)
+    run.show(experiment.velocity_report(rows, baseline, robot, loop.plant), rows=rows)
     loop.save("velocity", lambda: draw_velocity(found))

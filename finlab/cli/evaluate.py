@@ -1,8 +1,114 @@
-"""`finlab eval ...`: every verb that measures methods against the analytic fin model."""
+"""`finlab eval ...`: every verb that measures methods against the analytic fin model.
 
+Here are `training` and `report`, which are made of many jobs that are kept in a folder.
+"""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import arg
 from tyro.extras import SubcommandApp
 
-from finlab.cli import eval_allocation, eval_closed_loop, eval_report
+from finlab.cli import eval_allocation, eval_closed_loop
+from finlab.cli.eval_arguments import Checkpoint, Count, Folder, Name, Output, check_folder, check_positive
+
+OUTPUT = Output()
+
+
+def training(
+    out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")] = Path("runs/training-study"),
+    preset: Name = "default",
+    steps: Count = 600,
+    batch_size: Count = 256,
+    layouts: Count = 40,
+    targets: Count = 25,
+    seed: Count = 0,
+    output: Annotated[Output, arg(name="")] = OUTPUT,
+) -> None:
+    """What each part of the training brings: small trainings on equal budgets, one thing changed at a time.
+
+    What is done is kept in the folder; a study that was stopped goes on where it was.
+
+    Args:
+        out: folder for trainings and records.
+        preset: recipe that is changed: default, paper or smoke.
+        steps: optimizer steps of each training.
+        batch_size: samples per step.
+        layouts: layouts of split id on which the networks are tried.
+        targets: targets on each layout.
+        seed: draws data, weights, layouts and targets.
+    """
+    from finlab.evaluation.experiments.training_study import training_report, training_row
+    from finlab.evaluation.report.jobs import Store, run_jobs
+    from finlab.evaluation.report.plan import training_jobs
+    from finlab.evaluation.report.provenance import source_commit
+    from finlab.evaluation.splits import make_split
+    from finlab.training.presets import get_preset
+
+    for name, value in (("steps", steps), ("batch-size", batch_size)):
+        check_positive(name, value)
+    check_folder("out", out)
+    get_preset(preset)
+    make_split("id", layouts, targets, seed)
+    settings = {"preset": preset, "steps": steps, "batch_size": batch_size}
+    settings |= {"layouts": layouts, "targets": targets, "seed": seed}
+    jobs = training_jobs(settings, out)
+    store = Store(out)
+    run_jobs(list(jobs.values()), store, commit=source_commit(), processes=0)
+    rows = [training_row(name, job.result(store).columns) for name, job in jobs.items()]
+    output.show(training_report(rows, preset, steps, batch_size), rows=rows)
+
+
+def report(
+    out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
+    quick: bool = False,
+    seed: Count = 0,
+    checkpoint: Checkpoint = None,
+    paper_checkpoint: Checkpoint = None,
+    records: Folder = None,
+    processes: Annotated[int | None, arg(metavar="N")] = None,
+    as_is: bool = False,
+) -> None:
+    """Make the whole evaluation: one HTML page, its Markdown twin, pictures and rows.
+
+    A report that was stopped goes on where it was: each part is kept with its settings and the fingerprint of
+    the weights.
+
+    Args:
+        out: folder for the page.
+        quick: a look on few cases, about 3 minutes on two cores; the full size takes up to an hour.
+        seed: draws layouts, targets and candidates.
+        checkpoint: trained checkpoint of method learned; the shipped one by default.
+        paper_checkpoint: trained checkpoint of method paper; the shipped one by default.
+        records: folder for the records; DIR/records by default.
+        processes: parts that run at once; the number of cores by default.
+        as_is: do no work; make the page from what is there.
+    """
+    from finlab.evaluation.report.make import make_report
+    from finlab.evaluation.report.plan import Checkpoints
+
+    check_positive("processes", processes)
+    check_folder("out", out)
+    check_folder("records", records)
+    words = ["finlab", "eval", "report", "-o", str(out), *(["--quick"] if quick else [])]
+    words += ["--seed", str(seed)] if seed else []
+    words += ["--checkpoint", checkpoint] if checkpoint else []
+    words += ["--paper-checkpoint", paper_checkpoint] if paper_checkpoint else []
+    page = make_report(
+        out,
+        size="quick" if quick else "full",
+        seed=seed,
+        checkpoints=Checkpoints(checkpoint, paper_checkpoint),
+        records=records or out / "records",
+        command=shlex.join(words),
+        processes=processes,
+        as_is=as_is,
+    )
+    print(page)
+
 
 verbs = SubcommandApp()
 
@@ -19,7 +125,7 @@ for verb in (
     eval_closed_loop.trajectory,
     eval_closed_loop.faults,
     eval_closed_loop.velocity,
-    eval_report.training,
-    eval_report.report,
+    training,
+    report,
 ):
     verbs.command(verb)

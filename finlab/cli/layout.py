@@ -1,19 +1,17 @@
-"""`finlab layout check|show|optimize|import|export`: look at layout files, improve and exchange them.
-
-Torch is loaded only where a fin follows a table of forces.
-"""
+"""`finlab layout check|show|optimize|import|export`: look at layout files, improve and exchange them."""
 
 from __future__ import annotations
 
 import json as json_format
 import math
 import sys
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 from tyro.extras import SubcommandApp
 
-from finlab.cli.exchange import export_layout, import_layout
 from finlab.cli.optimize import optimize
 
 if TYPE_CHECKING:
@@ -21,8 +19,6 @@ if TYPE_CHECKING:
 
 verbs = SubcommandApp()
 verbs.command(optimize)
-verbs.command(name="import")(import_layout)
-verbs.command(name="export")(export_layout)
 
 
 @verbs.command
@@ -92,3 +88,59 @@ def layout_text(layout: Layout) -> str:
             f"  {fin.model.type}"
         )
     return "\n".join(lines)
+
+
+@verbs.command(name="import")
+def import_layout(
+    file: Annotated[Positional[Path], arg(metavar="FILE.urdf|FILE.csv")],
+    output: Annotated[Path, arg(metavar="LAYOUT.yaml", aliases=["-o"])],
+    fins: Annotated[tuple[str, ...], arg(metavar="LINK...")] = (),
+    origin: Literal["gravity", "base"] = "gravity",
+    name: Annotated[str | None, arg(metavar="TEXT")] = None,
+) -> None:
+    """Make a layout file from a robot description (URDF) or a table (CSV).
+
+    Args:
+        file: a URDF file, or a CSV file with the columns x_m, y_m, z_m and, if wanted, name,
+            mounting_angle_deg and limits.
+        output: layout file to write.
+        fins: links of the URDF file that are fins; a joint's origin gives the position, its axis the shaft.
+        origin: where the layout's origin goes: the centre of gravity of all links, or the root link's frame.
+        name: what to call the layout.
+    """
+    from finlab.errors import CommandError
+    from finlab.exchange import read_csv, read_urdf
+    from finlab.layout import save_layout
+
+    kind = file.suffix.lower()
+    if kind not in (".urdf", ".xml", ".csv"):
+        raise CommandError(f"{file}: expected a file that ends in .urdf or .csv")
+    layout = read_csv(file) if kind == ".csv" else read_urdf(file, fins, origin)
+    if name is not None:
+        layout = replace(layout, name=name)
+    save_layout(layout, output)
+    print(f"{output}: layout {layout.name} with {layout.n_fins} fins; look at it with")
+    print(f"finlab layout show {output}")
+
+
+@verbs.command(name="export")
+def export_layout(
+    layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
+    output: Annotated[Path, arg(metavar="FILE.urdf|FILE.csv", aliases=["-o"])],
+) -> None:
+    """Write a layout as a robot description (URDF) or a table (CSV).
+
+    Args:
+        layout: layout file, layout graph file, or the name of a shipped layout.
+        output: file to write; its ending says in which format.
+    """
+    from finlab.cli.inputs import open_robot
+    from finlab.errors import CommandError
+    from finlab.exchange import write_csv, write_urdf
+
+    writers = {".urdf": write_urdf, ".csv": write_csv}
+    if output.suffix.lower() not in writers:
+        raise CommandError(f"{output}: expected a file that ends in .urdf or .csv")
+    robot = open_robot(layout)
+    writers[output.suffix.lower()](robot.layout, output)
+    print(f"{output}: {robot.layout.n_fins} fins")

@@ -88,8 +88,7 @@ def simulate(
 
 def summary(log: RunLog) -> str:
     """The run in a few lines."""
-    from finlab.evaluation.experiments.closed_loop_runs import LOST_M, follow_row
-    from finlab.evaluation.statistics.trajectory_errors import RTE_DELTA_S
+    from finlab.evaluation.experiments.closed_loop_runs import LOST_M, RTE_DELTA_S, follow_row
 
     row = follow_row(log)
     lost = [name for name, works in zip(log.fins, log.alive[-1], strict=True) if not works]

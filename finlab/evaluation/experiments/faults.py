@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-from finlab.allocation.allocator import Allocator
 from finlab.control import Completion, WaypointController
 from finlab.evaluation.experiments.closed_loop_runs import (
     LOST_M,
@@ -16,10 +15,9 @@ from finlab.evaluation.experiments.closed_loop_runs import (
     follow_row,
     group_runs,
     over_seeds,
-    run_all,
     spread,
 )
-from finlab.evaluation.experiments.trajectory import LABELS
+from finlab.evaluation.experiments.trajectory_and_velocity import LABELS
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.statistics.tables import text_table
 from finlab.layout import Layout
@@ -73,23 +71,13 @@ def all_faults(layout: Layout, half_way_s: float) -> list[Fault]:
     ]
 
 
-def run_faults(
-    layout: Layout,
-    allocators: Mapping[str, Allocator],
-    trajectory: Trajectory,
-    faults: Sequence[Fault],
-    seeds: Sequence[int],
-    plant: str = "mean",
-    *,
-    steady: bool = False,
-) -> list[Run]:
-    """Every controllable fault with every method and seed, as in `run_all`; runs under (label, method)."""
-    scenarios = [
+def fault_scenarios(layout: Layout, trajectory: Trajectory, faults: Sequence[Fault]) -> list[Scenario]:
+    """Every controllable fault, under its label."""
+    return [
         Scenario(fault.label, layout, trajectory, tuple((name, fault.time_s) for name in fault.fins))
         for fault in faults
         if fault.controllable
     ]
-    return run_all(scenarios, allocators, seeds, plant, steady=steady)
 
 
 def fault_rows(faults: Sequence[Fault], runs: Sequence[Run]) -> list[Row]:

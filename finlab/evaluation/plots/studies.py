@@ -1,11 +1,27 @@
-"""Times side by side, what the network's seeds buy, and the small trainings."""
+"""Times of calls, the ablation, what the network's seeds buy, the small trainings, and the temperature."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from finlab.evaluation.plots.style import BLUE, COLOURS, GREEN, GREY, INK, ORANGE, Picture, clean, picture
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.evaluation.plots.style import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    SOFT,
+    VERMILION,
+    Picture,
+    clean,
+    picture,
+)
 
 SEEDS = {"network": BLUE, "random": GREY, "quasi-random": ORANGE}
 
@@ -64,4 +80,83 @@ def training_bars(rows: Sequence[dict[str, Any]], titles: Mapping[str, str]) -> 
         axis.invert_yaxis()
         clean(axis)
         view.legend()
+        return view
+
+
+COLOUR = {"adam": ORANGE, "levenberg-marquardt": BLUE}
+
+
+def ablation_dots(
+    rows: Sequence[dict[str, Any]], printed: Mapping[str, float], titles: Mapping[str, str]
+) -> Picture:
+    """Mean normalized error of each row; rows of `ablation_row`, `printed` by variant."""
+    variants = list(titles)
+    with picture(height=3.1) as view:
+        (axis,) = view.axes
+        for k, (refinement, colour) in enumerate(COLOUR.items()):
+            for scored_by, filled in (("plant", True), ("surrogate", False)):
+                mine = [r for r in rows if (r["refinement"], r["scored_by"]) == (refinement, scored_by)]
+                axis.plot(
+                    [row["err_norm_mean"] for row in mine],
+                    [variants.index(row["variant"]) + 0.16 * (2 * k - 1) for row in mine],
+                    "o",
+                    color=colour,
+                    markerfacecolor=colour if filled else "white",
+                    markersize=7,
+                    label=f"{refinement}, scored by the {scored_by}",
+                )
+        axis.plot(
+            [printed[name] for name in variants],
+            range(len(variants)),
+            "D",
+            color=BLACK,
+            markerfacecolor="none",
+            markersize=7,
+            label="printed in the paper",
+        )
+        axis.set(xscale="log", xlabel="mean normalized error")
+        axis.set_yticks(range(len(variants)), [titles[name] for name in variants])
+        axis.invert_yaxis()
+        clean(axis)
+        view.legend(ncols=3)
+        return view
+
+
+FLOOR = 1e-5
+"""Errors below are drawn here."""
+
+
+def figure_a(
+    rows: Sequence[dict[str, Any]], scatter: Mapping[str, NDArray[Any]], paper_temperature: float
+) -> Picture:
+    """Left: diversity and best J against T, rows of `temperature_row`. Right: columns of
+    `refinement_columns`, one target's candidates, energy against error."""
+    temperature = [row["temperature"] for row in rows]
+    with picture(1, 3, height=3.2, width_ratios=(1, 1, 1.25)) as view:
+        spread, best, right = view.axes
+        spread.plot(temperature, [row["diversity"] for row in rows], "o-", color=BLUE, markersize=4)
+        spread.set_title("diversity of 64 candidates")
+        ends = np.array([row["best_j_mean_interval"] for row in rows])
+        best.fill_between(temperature, *ends.T, color=VERMILION, alpha=0.15, linewidth=0)
+        mean = [row["best_j_mean"] for row in rows]
+        median = [row["best_j_median"] for row in rows]
+        best.plot(temperature, mean, "o-", color=VERMILION, markersize=4, label="mean")
+        best.plot(temperature, median, "o--", color=ORANGE, markersize=3, linewidth=1.2, label="median")
+        best.set(yscale="log")
+        best.set_title("best J among them")
+        best.legend(frameon=False)
+        for axis in (spread, best):
+            axis.axvline(paper_temperature, color=GREY, linestyle=(0, (2, 2)), linewidth=1.2)
+            axis.set(xscale="log", xlabel="temperature T")
+        for refined, colour, name in ((0, GREY, "drawn"), (1, BLUE, "refined")):
+            keep = scatter["refined"] == refined
+            error = np.maximum(scatter["err_norm"][keep], FLOOR)
+            right.plot(
+                scatter["energy"][keep], error, "o", color=colour, markersize=3.5, alpha=0.6, label=name
+            )
+        right.set(yscale="log", xlabel="energy J_en", ylabel="normalized error, by the surrogate")
+        right.set_title("candidates, energy and error")
+        right.legend(frameon=False, labelcolor=SOFT)
+        for axis in view.axes:
+            clean(axis)
         return view

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from finlab.evaluation.report.document import Block, Document, figures_of
-from finlab.evaluation.report.jobs import run_jobs
+from finlab.evaluation.report.jobs import Store, run_jobs
 from finlab.evaluation.report.pages import to_html, to_markdown
 from finlab.evaluation.report.plan import Checkpoints, make_plan
 from finlab.evaluation.report.provenance import Provenance, how_made_blocks, make_provenance, source_commit
@@ -24,7 +24,6 @@ from finlab.evaluation.report.sections.studies import (
 )
 from finlab.evaluation.report.sections.summary import summary_blocks
 from finlab.evaluation.report.sizes import SIZES, Sizes
-from finlab.evaluation.statistics.store import Store
 from finlab.inference.checkpoint import read_checkpoint, read_normalization, resolve_checkpoint
 
 PAGE, TWIN, TABLES, PICTURES = "index.html", "report.md", "tables.json", "pictures"

@@ -21,10 +21,9 @@ from finlab.evaluation.method_specs import (
 )
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.report import work
-from finlab.evaluation.report.jobs import Job
+from finlab.evaluation.report.jobs import Columns, Job, Store
 from finlab.evaluation.report.sizes import Sizes
 from finlab.evaluation.splits import SPLITS
-from finlab.evaluation.statistics.store import Columns, Store
 
 Size = tuple[int, int]
 

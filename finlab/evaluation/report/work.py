@@ -7,19 +7,24 @@ from pathlib import Path
 import numpy as np
 
 from finlab.evaluation.experiments.ablation import ablation_method, run_variant
-from finlab.evaluation.experiments.faults import all_faults, fault_rows, run_faults
+from finlab.evaluation.experiments.closed_loop_runs import run_all
+from finlab.evaluation.experiments.faults import all_faults, fault_rows, fault_scenarios
 from finlab.evaluation.experiments.latency import latency_cases, latency_rows
 from finlab.evaluation.experiments.seeds import learned_allocator, seed_rows
 from finlab.evaluation.experiments.temperature import refinement_columns, temperature_columns
 from finlab.evaluation.experiments.training_study import train_and_run
-from finlab.evaluation.experiments.trajectory import run_trajectory, trajectory_rows
-from finlab.evaluation.experiments.velocity import run_velocity, velocity_rows
+from finlab.evaluation.experiments.trajectory_and_velocity import (
+    trajectory_rows,
+    trajectory_scenarios,
+    velocity_rows,
+    velocity_scenarios,
+)
 from finlab.evaluation.experiments.wrench_tracking import run_method, score
 from finlab.evaluation.method_specs import load_method_spec, load_method_specs
 from finlab.evaluation.plots.closed_loop_experiments import Track
+from finlab.evaluation.report.jobs import Columns, columns_of_rows
 from finlab.evaluation.splits import make_split
 from finlab.evaluation.statistics.records import columns_of_records, join_records
-from finlab.evaluation.statistics.store import Columns, columns_of_rows
 from finlab.layout import load_layout
 from finlab.sim import make_trajectory
 
@@ -143,8 +148,9 @@ def training(
 def trajectory(*, methods: str, runs: int, seed: int, checkpoint: str | None) -> Columns:
     """Rows of the trajectory experiment, and one path on each layout, five points a second."""
     robots = [load_layout(name) for name in PAPER_LAYOUTS]
+    scenarios = trajectory_scenarios(robots, make_trajectory("lissajous"))
     allocators = load_method_specs(methods, checkpoint)
-    found = run_trajectory(robots, allocators, make_trajectory("lissajous"), range(seed, seed + runs), "mean")
+    found = run_all(scenarios, allocators, range(seed, seed + runs))
     columns = columns_of_rows(trajectory_rows(found))
     for (layout, method), log in found:
         step = max(1, round(0.2 / float(log.time[1] - log.time[0])))
@@ -167,12 +173,12 @@ def faults(*, methods: str, runs: int, pairs: bool, seed: int, checkpoint: str |
     """Rows of the fault experiment on layout A."""
     robot, path = load_layout("A"), make_trajectory("circle")
     cases = [c for c in all_faults(robot, path.duration_s / 2) if pairs or len(c.fins) < 2]
-    seeds = range(seed, seed + runs)
-    found = run_faults(robot, load_method_specs(methods, checkpoint), path, cases, seeds, "mean")
+    scenarios = fault_scenarios(robot, path, cases)
+    found = run_all(scenarios, load_method_specs(methods, checkpoint), range(seed, seed + runs))
     return columns_of_rows(fault_rows(cases, found))
 
 
 def velocity(*, methods: str, runs: int, seed: int, checkpoint: str | None) -> Columns:
     """Rows of the velocity experiment on layout A."""
-    robot, seeds = load_layout("A"), range(seed, seed + runs)
-    return columns_of_rows(velocity_rows(run_velocity(robot, load_method_specs(methods, checkpoint), seeds)))
+    allocators, seeds = load_method_specs(methods, checkpoint), range(seed, seed + runs)
+    return columns_of_rows(velocity_rows(run_all(velocity_scenarios(load_layout("A")), allocators, seeds)))

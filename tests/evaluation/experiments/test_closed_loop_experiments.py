@@ -8,15 +8,22 @@ import pytest
 
 from finlab.allocation.allocator import Allocator
 from finlab.cli import main
+from finlab.evaluation.experiments.closed_loop_runs import run_all
 from finlab.evaluation.experiments.faults import (
     all_faults,
     fault_report,
     fault_rows,
+    fault_scenarios,
     fault_verdict,
-    run_faults,
 )
-from finlab.evaluation.experiments.trajectory import run_trajectory, trajectory_report, trajectory_rows
-from finlab.evaluation.experiments.velocity import run_velocity, velocity_report, velocity_rows
+from finlab.evaluation.experiments.trajectory_and_velocity import (
+    trajectory_report,
+    trajectory_rows,
+    trajectory_scenarios,
+    velocity_report,
+    velocity_rows,
+    velocity_scenarios,
+)
 from finlab.evaluation.on_board import OnBoard
 from finlab.layout import Layout
 from finlab.sim import Trajectory, load_log
@@ -36,7 +43,7 @@ def is_small_png(path: Path) -> bool:
 
 
 def test_trajectory(layout_a: Layout, analytic: Allocator, line: Trajectory) -> None:
-    runs = run_trajectory([layout_a], {"analytic": analytic}, line, range(2))
+    runs = run_all(trajectory_scenarios([layout_a], line), {"analytic": analytic}, range(2))
     one, every = trajectory_rows(runs)
     assert (one["layout"], one["runs"], every["layout"]) == ("A", 2, "all")
     assert 0.0 < one["ate"] < 0.3 and one["ate_std"] > 0.0
@@ -49,7 +56,7 @@ def test_faults(layout_a: Layout, analytic: Allocator, line: Trajectory) -> None
     assert len(faults) == 1 + 4 + 6 + 4
     assert sum(not fault.controllable for fault in faults) == 2
     chosen = [fault for fault in faults if "back_right" in fault.fins or not fault.fins]
-    rows = fault_rows(chosen, run_faults(layout_a, {"analytic": analytic}, line, chosen, [0]))
+    rows = fault_rows(chosen, run_all(fault_scenarios(layout_a, line, chosen), {"analytic": analytic}, [0]))
     assert rows[0]["ate_over_healthy"] == 1.0
     hopeless = next(row for row in rows if not row["controllable"])
     report = fault_report(rows, layout_a, line, "mean")
@@ -68,7 +75,7 @@ def test_a_lost_fin_may_let_the_error_grow_a_little(growth: float, tracked: bool
 
 def test_velocity(layout_a: Layout, analytic: Allocator) -> None:
     methods = {"analytic": analytic, "on-board": OnBoard(analytic.normalization)}
-    runs = run_velocity(layout_a, methods, [0], (0.1,), duration_s=12.0)
+    runs = run_all(velocity_scenarios(layout_a, (0.1,), duration_s=12.0), methods, [0])
     rows = velocity_rows(runs)
     assert [row["speed"] for row in rows] == [0.1, 0.1, None, None]
     assert rows[0]["inertial_w"] < rows[1]["inertial_w"], "a fixed fast beat costs more"

@@ -12,12 +12,19 @@ pytest.importorskip("matplotlib")
 
 from matplotlib.axes import Axes  # noqa: E402
 
-from finlab.evaluation.plots.ablation_dots import ablation_dots  # noqa: E402
-from finlab.evaluation.plots.energy_by_fins import energy_by_fins  # noqa: E402
-from finlab.evaluation.plots.error_distribution import error_by_fins, error_distribution  # noqa: E402
-from finlab.evaluation.plots.studies import latency_dots, seed_lines, training_bars  # noqa: E402
+from finlab.evaluation.plots.studies import (  # noqa: E402
+    ablation_dots,  # noqa: E402
+    figure_a,  # noqa: E402
+    latency_dots,
+    seed_lines,
+    training_bars,
+)
 from finlab.evaluation.plots.style import COLOURS, Picture, picture  # noqa: E402
-from finlab.evaluation.plots.temperature_panels import figure_a  # noqa: E402
+from finlab.evaluation.plots.wrench_tracking import (  # noqa: E402
+    energy_by_fins,  # noqa: E402
+    error_by_fins,
+    error_distribution,
+)
 
 
 def _line(axis: Axes, label: str) -> np.ndarray:

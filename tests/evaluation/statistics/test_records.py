@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from finlab.errors import DataError
+from finlab.evaluation.report.jobs import Store, columns_of_rows, rows_of_columns
 from finlab.evaluation.statistics.records import (
     Records,
     columns_of_records,
@@ -15,7 +16,6 @@ from finlab.evaluation.statistics.records import (
     same_targets,
     save_columns,
 )
-from finlab.evaluation.statistics.store import Store, columns_of_rows, rows_of_columns
 
 
 def _records(layout: list[int], target: list[int], error: list[float]) -> Records:

@@ -6,24 +6,13 @@ from collections.abc import Sequence
 
 from finlab.evaluation.method_specs import is_slow
 from finlab.evaluation.paper_figures import PAPER_METHODS, paper_figures
-from finlab.evaluation.plots.error_distribution import error_by_fins, error_distribution
+from finlab.evaluation.plots.style import COLOURS
+from finlab.evaluation.plots.wrench_tracking import error_by_fins, error_distribution
 from finlab.evaluation.report.document import Block, Column, Figure, Fold, Row, Table, method_row
 from finlab.evaluation.report.results import Results
 from finlab.evaluation.statistics.records import Records, join_records
 
-ORDER = [
-    "learned",
-    "fast",
-    "paper",
-    "analytic",
-    "sqp",
-    "qp",
-    "multistart",
-    "trf",
-    "slsqp",
-    "ipopt",
-    "ipopt-32",
-]
+ORDER = tuple(COLOURS)
 """Methods from top to bottom."""
 SPLIT_WORDS = {
     "id": "2 to 5 fins within 0.30 m, nominal limits, as in training",
@@ -86,8 +75,8 @@ def accuracy_blocks(results: Results) -> list[Block]:
     blocks.append(
         "*Small print below a number: where a rerun with another seed lands, 95 times of 100 (bootstrap over "
         "layouts). ms per target: all targets of a layout are solved together; methods with a few hundred "
-        "targets or fewer solve them one by one, from 8 starts (`ipopt-32`: 32), on the first targets of each "
-        "layout.*"
+        "targets or fewer solve them one by one, from 8 starts (`ipopt-32`: 32), on the first targets of "
+        "each layout.*"
     )
     return blocks
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from finlab.evaluation.plots.energy_by_fins import energy_by_fins
+from finlab.evaluation.plots.wrench_tracking import energy_by_fins
 from finlab.evaluation.report.document import Block, Column, Figure, Fold, Row, Table, method_row
 from finlab.evaluation.report.plan import REFERENCE
 from finlab.evaluation.report.results import Results

@@ -6,9 +6,7 @@ from finlab.evaluation.experiments.ablation import VARIANTS
 from finlab.evaluation.experiments.temperature import PAPER_TEMPERATURE
 from finlab.evaluation.experiments.training_study import CHANGES
 from finlab.evaluation.paper_figures import paper_figures
-from finlab.evaluation.plots.ablation_dots import ablation_dots
-from finlab.evaluation.plots.studies import latency_dots, seed_lines, training_bars
-from finlab.evaluation.plots.temperature_panels import figure_a
+from finlab.evaluation.plots.studies import ablation_dots, figure_a, latency_dots, seed_lines, training_bars
 from finlab.evaluation.report.document import Block, Column, Figure, Fold, Row, Table, method_row
 from finlab.evaluation.report.numbers import three
 from finlab.evaluation.report.results import Results
@@ -100,7 +98,7 @@ def ablation_blocks(results: Results) -> list[Block]:
         blocks += [f"### Refined by {words}", Table(columns, lines)]
     return [
         *blocks,
-        "*s per call: single calls, timed while another part of the report ran on another core.*",
+        "*s per call: single calls, timed while another part of the report ran on the other core.*",
     ]
 
 

@@ -1,12 +1,13 @@
-"""Wrench tracking: how errors are distributed, and the error by number of fins (the paper's figure B)."""
+"""Wrench tracking: how errors are distributed, error and energy by number of fins (the paper's figure B)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from finlab.evaluation.plots.style import COLOURS, GREY, SOFT, Picture, clean, picture
+from finlab.evaluation.plots.style import COLOURS, GREY, INK, SOFT, Picture, clean, picture
 from finlab.evaluation.statistics.records import Records
 
 QUANTILES = np.concatenate([np.linspace(0, 0.9, 91), 1 - np.logspace(-1, -5, 60)])
@@ -67,5 +68,36 @@ def error_by_fins(records: Mapping[str, Records], order: Sequence[str]) -> Pictu
                 axis.plot(n + offset, error.mean(), "o", color=colour, markersize=5.5, label=label)
         axis.set(yscale="log", xlabel="working fins", ylabel="normalized error", xticks=fins)
         clean(axis, grid="y")
+        view.legend()
+        return view
+
+
+def energy_by_fins(rows: Sequence[dict[str, Any]], reference: str) -> Picture:
+    """Energy over the reference's, and resting fins, for each number of fins; rows of `energy_rows`."""
+    methods = list(dict.fromkeys(row["method"] for row in rows))
+    fins = sorted({row["fins"] for row in rows if row["fins"] != "all"})
+    with picture(1, 2, height=3.3) as view:
+        left, right = view.axes
+        for k, method in enumerate(methods):
+            offset = (k - (len(methods) - 1) / 2) * 0.7 / len(methods)
+            mine = [row for row in rows if row["method"] == method and row["fins"] != "all"]
+            known = [row for row in mine if row["energy_ratio"] is not None]
+            place = [row["fins"] + offset for row in known]
+            colour = COLOURS[method]
+            inside = "white" if method == reference else colour
+            style: dict[str, Any] = {"color": colour, "markerfacecolor": inside, "markersize": 5}
+            if method != reference:
+                low = [row["energy_ratio"] - row["energy_ratio_low"] for row in known]
+                high = [row["energy_ratio_high"] - row["energy_ratio"] for row in known]
+                ratio = [row["energy_ratio"] for row in known]
+                left.errorbar(place, ratio, [low, high], fmt="o", elinewidth=1.2, label=method, **style)
+            resting = [row["resting"] for row in known]
+            right.plot(place, resting, "o", label=method, **style)
+        left.axhline(1.0, color=INK, linewidth=0.9)
+        left.set(ylabel=f"energy over {reference}'s", title="energy, below 1 is cheaper")
+        right.set(ylabel="fins at rest, mean", title="fins at rest")
+        for axis in view.axes:
+            axis.set(xlabel="fins", xticks=fins)
+            clean(axis, grid="y")
         view.legend()
         return view
