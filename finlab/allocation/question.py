@@ -67,17 +67,16 @@ def check_wrenches(wrench: ArrayLike, *, single: bool) -> Array:
     """One wrench (6,) or many (N, 6) as finite float64, or a `CommandError` that says what is wrong."""
     expected = "six numbers [Fx, Fy, Fz, Tx, Ty, Tz]" if single else "an array of shape (N, 6)"
     try:
-        given = np.asarray(wrench)
-        if given.dtype.kind == "c":
+        array = np.array(wrench)
+        if array.dtype.kind == "c":
             raise TypeError("complex")
-        array = np.array(given, dtype=np.float64)
+        array = array.astype(np.float64, copy=False)
     except (TypeError, ValueError) as error:
         raise CommandError(f"wrench: expected {expected} in N and N m, got {wrench!r}") from error
     if array.shape != (6,) if single else (array.ndim != 2 or array.shape[1] != 6):
         raise CommandError(f"wrench: expected {expected} in N and N m, got an array of shape {array.shape}")
-    fine = np.abs(array) <= MAX_WRENCH
-    if not fine.all():
-        bad = ~fine
+    if not (np.abs(array) <= MAX_WRENCH).all():
+        bad = ~(np.abs(array) <= MAX_WRENCH)
         axis = AXES[int(np.argwhere(bad)[0][-1])]
         value = array[bad][0]
         raise CommandError(f"wrench: {axis} must be finite and at most {MAX_WRENCH:g} in size, got {value}")

@@ -196,12 +196,12 @@ def _alternatives(refined: RefinedCandidates, std: Array) -> Candidates:
 def _samples(proposal: Proposal, prepared: Prepared, std: Array) -> Candidates:
     """The raw candidates for a single target."""
     order = proposal.error[0].argsort()
-    command = proposal.command[0].take(order, axis=0)
+    command = np.maximum(proposal.command[0].take(order, axis=0), prepared.lower)
     return Candidates(
         # Rounded to single precision, limits may be a bit wider.
-        np.minimum(np.maximum(command, prepared.lower), prepared.upper),
+        np.minimum(command, prepared.upper, out=command),
         proposal.wrench[0].take(order, axis=0) * std,
-        proposal.error[0].take(order).astype(np.float64),
+        proposal.error[0].take(order),
         proposal.energy[0].take(order).astype(np.float64),
         tuple(map(_component_name, proposal.component[0].take(order).tolist())),
     )

@@ -214,11 +214,10 @@ class Pipeline:
         """Thrust seeds (N, S, n): the best candidate of each component, and sub-layouts."""
         score = proposal.error * proposal.error + self.settings.gamma * proposal.energy
         chosen = _best_of_each_component(proposal.component, score, self.settings.n_seeds)
-        rows, k = score.shape
-        count = chosen.shape[1]
-        seeds = np.empty((rows, count + len(prepared.subsets) * self.settings.subsets, len(prepared.lower)))
-        chosen += np.arange(0, rows * k, k)[:, None]
-        seeds[:, :count] = proposal.thrust.reshape(rows * k, -1).take(chosen, axis=0)
+        rows, count = chosen.shape
+        n = len(prepared.lower)
+        seeds = np.empty((rows, count + len(prepared.subsets) * self.settings.subsets, n))
+        seeds[:, :count] = proposal.thrust.reshape(-1, n).take(chosen, axis=0)
         if self.settings.subsets:
             seeds[:, count:] = prepared.subsets
         return seeds
@@ -254,15 +253,20 @@ class Pipeline:
 
 
 def _best_of_each_component(component: NDArray[np.int64], score: Array, n_seeds: int) -> NDArray[np.int64]:
-    """Indices (N, n_seeds) of the best candidates, at most one from each mixture component.
+    """The best candidates (N, n_seeds) of N rows of K, at most one from each mixture component; counted
+    through all rows.
 
     At low temperature the samples of one component lie close together and would all descend to the
     same allocation.
     """
-    rows = np.arange(len(score))[:, None]
-    worst_first = np.argsort(-score, axis=1)
-    best = np.zeros((len(score), int(component.max()) + 1), dtype=np.int64)
+    rows, k = score.shape
+    m = int(component.max()) + 1
+    place = np.arange(rows)[:, None]
+    worst_first = (-score).argsort(axis=1)
+    worst_first += place * k
+    best = np.zeros(rows * m, dtype=np.int64)
     # Later assignments win, so the best candidate of each component is what stays.
-    best[rows, component[rows, worst_first]] = worst_first
-    order = np.argsort(score[rows, best], axis=1)[:, :n_seeds]
-    return best[rows, order]
+    best[component.take(worst_first) + place * m] = worst_first
+    order = score.take(best.reshape(rows, m)).argsort(axis=1)[:, :n_seeds]
+    order += place * m
+    return best.take(order)

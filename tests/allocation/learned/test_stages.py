@@ -151,7 +151,7 @@ def test_seeds_are_the_best_of_each_component(n_seeds: int) -> None:
     for row in range(5):
         best = {int(component[row, k]): int(k) for k in np.argsort(-score[row])}
         expected = sorted(best.values(), key=lambda k: score[row, k])[:n_seeds]
-        assert found[row].tolist() == expected
+        assert (found[row] - 30 * row).tolist() == expected
 
 
 def test_the_search_is_longer_with_more_fins(
