@@ -1,8 +1,8 @@
 """Control allocation: a target wrench in, one command per fin out."""
 
 from finlab.allocation.allocation import Allocation as Allocation
+from finlab.allocation.allocation import BatchAllocation as BatchAllocation
 from finlab.allocation.allocator import Allocator as Allocator
-from finlab.allocation.batch import BatchAllocation as BatchAllocation
 from finlab.allocation.health import Health as Health
 from finlab.allocation.methods import METHODS as METHODS
 from finlab.allocation.methods import load_allocator as load_allocator

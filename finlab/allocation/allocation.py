@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from finlab.allocation.judging import REACHED, Judge, judge
 from finlab.allocation.modes import Mode, find_modes
-from finlab.allocation.plain_data import PlainData
 from finlab.allocation.policy import CLOSEST, Policy, describe_binding
-from finlab.allocation.solution import Candidates
+from finlab.allocation.solution import Candidates, PlainData
 from finlab.layout import Layout
 from finlab.layout.arrays import layout_effectiveness
 
@@ -23,59 +22,41 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Allocation(PlainData):
-    """The answer to one allocation problem, as plain data: it can be compared, copied, pickled and printed.
-
-    `print(result)` shows it as a table.
-    """
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Answer(PlainData):
+    """What answers to one target and to many have in common, as plain data; many have N rows of each array."""
 
     layout: Layout
     """The whole layout, failed fins included, with the limits that damage has left."""
     failed: tuple[str, ...]
     """Names of the fins that were left out."""
     target: Array
-    """Desired wrench (6,), [N, N m], body frame."""
+    """Desired wrench (6,) or (N, 6), [N, N m], body frame."""
     command: Array
-    """Command (n, 3) of every fin: amplitude [rad], frequency [Hz], zero direction [rad]; NaN if failed."""
+    """Command (n, 3) or (N, n, 3) of every fin: amplitude [rad], frequency [Hz], zero direction [rad]; NaN if
+    failed."""
     fin_forces: Array
-    """Force (n, 3) that the judge finds for each fin [N], body frame; zero if failed."""
+    """Force (n, 3) or (N, n, 3) that the judge finds for each fin [N], body frame; zero if failed."""
     wrench: Array
-    """Delivered wrench (6,) as the judge finds it [N, N m]."""
-    err_norm: float
-    """Size of what is missing from the target, each axis over its `sigma`."""
-    energy: float
-    """Energy proxy `J_en` of the command."""
+    """Delivered wrench (6,) or (N, 6) as the judge finds it [N, N m]."""
     sigma: Array
     """Per-axis standard deviation (6,) of the error measure."""
     judged_by: Judge
     """Who computed `fin_forces` and `wrench`: the analytic fin models, or the learned surrogate."""
     method: str
     """Name of the method that answered."""
-    solve_ms: float = field(compare=False)
-    """Time spent solving [ms], judging not included."""
     checkpoint: str | None = None
     """Name of the checkpoint that was used, if any."""
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    """Settings of the method, by name."""
     policy: Policy = CLOSEST
-    """What was to be done if the target was out of reach."""
+    """What was to be done if a target was out of reach."""
     seed: int = 0
     """Seed that makes the answer repeatable."""
-    previous: Array | None = None
-    """Command (n, 3) of the previous tick, if it was told."""
     wrench_surrogate: Array | None = None
-    """Wrench (6,) that the method itself expected, if it used a learned model."""
+    """Wrench (6,) or (N, 6) that the method itself expected, if it used a learned model."""
     unknown_fins: tuple[str, ...] = ()
     """Names of fins whose model the method's networks have not learned; answers for them are wrong."""
     notes: tuple[str, ...] = ()
     """Sentences that the user should read, such as a fin model that the checkpoint never saw."""
-    candidates: Candidates | None = None
-    """Refined candidates, best first; None for methods that have a single answer."""
-    samples: Candidates | None = None
-    """Raw candidates before refinement, best first; None for methods that draw none."""
-    _allocator: Allocator | None = field(default=None, compare=False)
-    """Who answered; forgotten by copies and pickles."""
 
     @property
     def fins(self) -> tuple[str, ...]:
@@ -84,8 +65,61 @@ class Allocation(PlainData):
 
     @property
     def unallocated(self) -> Array:
-        """What the robot does not deliver: target minus delivered wrench (6,)."""
+        """What the robot does not deliver: target minus delivered wrench (6,) or (N, 6)."""
         return self.target - self.wrench
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class BatchAllocation(Answer):
+    """Answers to N targets on one layout: plain data, as an `Allocation` is."""
+
+    err_norm: Array
+    """Sizes (N,) of what is missing from the targets, each axis over its `sigma`."""
+    energy: Array
+    """Energy proxy `J_en` (N,) of the commands."""
+    solve_ms: Array = field(compare=False)
+    """Time per target (N,) [ms]; the whole time divided by N where targets were solved together."""
+
+    @property
+    def reachable(self) -> NDArray[np.bool_]:
+        """Which targets are delivered (N,): an `err_norm` of at most 0.01."""
+        return self.err_norm <= REACHED
+
+    def __len__(self) -> int:
+        return len(self.target)
+
+    def __repr__(self) -> str:
+        worst = f"{self.err_norm.max():.2e}" if len(self) else "none"
+        return (
+            f"BatchAllocation({len(self)} targets, layout={self.layout.name!r:.60}, fins={len(self.fins)}, "
+            f"method={self.method!r}, delivered={int(self.reachable.sum())}, "
+            f"largest err_norm={worst} by the {self.judged_by})"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Allocation(Answer):
+    """The answer to one allocation problem, as plain data: it can be compared, copied, pickled and printed.
+
+    `print(result)` shows it as a table.
+    """
+
+    err_norm: float
+    """Size of what is missing from the target, each axis over its `sigma`."""
+    energy: float
+    """Energy proxy `J_en` of the command."""
+    solve_ms: float = field(compare=False)
+    """Time spent solving [ms], judging not included."""
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    """Settings of the method, by name."""
+    previous: Array | None = None
+    """Command (n, 3) of the previous tick, if it was told."""
+    candidates: Candidates | None = None
+    """Refined candidates, best first; None for methods that have a single answer."""
+    samples: Candidates | None = None
+    """Raw candidates before refinement, best first; None for methods that draw none."""
+    _allocator: Allocator | None = field(default=None, compare=False)
+    """Who answered; forgotten by copies and pickles."""
 
     @property
     def reachable(self) -> bool:

@@ -23,7 +23,7 @@ from finlab.inference.weights import TrainedWeights
 if TYPE_CHECKING:
     from finlab.allocation.learned.learned_allocator import LearnedAllocator
     from finlab.allocation.learned.paper import PaperAllocator
-    from finlab.allocation.options import LearnedOptions, PaperOptions
+    from finlab.allocation.learned.settings import LearnedOptions, PaperOptions
 
 METHODS: dict[str, tuple[str, str]] = {
     "learned": ("finlab.allocation.learned.learned_allocator", "LearnedAllocator"),
@@ -33,8 +33,8 @@ METHODS: dict[str, tuple[str, str]] = {
     "sqp": ("finlab.allocation.baselines.sqp", "Sqp"),
     "analytic": ("finlab.allocation.baselines.analytic", "Analytic"),
     "multistart": ("finlab.allocation.baselines.multistart", "Multistart"),
-    "trf": ("finlab.allocation.baselines.trf", "Trf"),
-    "slsqp": ("finlab.allocation.baselines.slsqp", "Slsqp"),
+    "trf": ("finlab.allocation.baselines.scipy_solvers", "Trf"),
+    "slsqp": ("finlab.allocation.baselines.scipy_solvers", "Slsqp"),
     "ipopt": ("finlab.allocation.baselines.ipopt", "Ipopt"),
 }
 """Name -> module and class; modules are loaded only when their method is asked for."""

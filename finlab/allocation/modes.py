@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.plain_data import PlainData
+from finlab.allocation.solution import PlainData
 
 if TYPE_CHECKING:
     from finlab.allocation.solution import Candidates

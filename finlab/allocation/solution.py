@@ -1,15 +1,39 @@
-"""What a method's solver hands over, before anybody has judged it."""
+"""What a method hands over before anybody has judged it, and what makes a result plain data."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.plain_data import PlainData
+
+class PlainData:
+    """Base of frozen dataclasses with arrays. NaN equals NaN; fields with `compare=False` do not count."""
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        names = [field.name for field in fields(self) if field.compare]  # type: ignore[arg-type]
+        return all(equal(getattr(self, name), getattr(other, name)) for name in names)
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def equal(a: Any, b: Any) -> bool:
+    """Whether two values are equal: arrays element by element, tuples part by part, NaN to NaN."""
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        if not (isinstance(a, np.ndarray) and isinstance(b, np.ndarray)):
+            return False
+        return np.array_equal(a, b, equal_nan=a.dtype.kind == b.dtype.kind == "f")
+    if isinstance(a, tuple) and isinstance(b, tuple):
+        return len(a) == len(b) and all(equal(x, y) for x, y in zip(a, b, strict=True))
+    if isinstance(a, float) and isinstance(b, float):
+        return a == b or (a != a and b != b)
+    return bool(a == b)
+
 
 Array = NDArray[np.float64]
 
@@ -46,3 +70,16 @@ class Solution(NamedTuple):
     """Gives the raw candidates before refinement, for a single target."""
     alternatives: Callable[[], Candidates] | None = None
     """Gives many refined answers to a single target, the chosen one first, by a wider search."""
+
+
+class Insight(NamedTuple):
+    """One target on a layout of n fins that all work; the mixture has M components."""
+
+    weight: Array
+    """Weights of the components (M,)."""
+    mean: Array
+    """Their means (n, M, 3), commands normalized to -1..1 within each fin's limits."""
+    std: Array
+    """Their standard deviations (n, M, 3), in the same units."""
+    attention: Array
+    """How much each fin (rows) looks at each (columns), (n, n); rows sum to 1, itself included."""

@@ -2,20 +2,36 @@
 
 The file is one JSON object; `graph.schema.json` beside this module describes it, and its part `graph` is what
 `networkx.node_link_graph` reads. A SHA-256 over all the rest tells an edited or damaged file from a good one.
+Reading checks every value, and refusals name the key.
 """
 
 from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
-from finlab.deploy.graph import LayoutGraph
-from finlab.deploy.graph_document import document_of
-from finlab.deploy.graph_reading import graph_of
+import numpy as np
+
+from finlab.deploy.graph import SELF_TEST_TOLERANCE, LayoutGraph, Row, SelfTest
 from finlab.errors import LayoutError
-from finlab.layout.load import SUFFIX, checksum_of
+from finlab.inference.normalization import Normalization
+from finlab.layout import layout_to_dict
+from finlab.layout.file import FRAME
+from finlab.layout.load import (
+    FORMAT,
+    SUFFIX,
+    UNITS,
+    VERSION,
+    check_graph_document,
+    checksum_of,
+    graph_layout,
+    graph_nodes,
+)
 from finlab.layout.reading import parse_json, read_text
+from finlab.layout.rules import mapping, numbers, shown, text
 
 
 def write_graph(graph: LayoutGraph, path: str | os.PathLike[str]) -> None:
@@ -64,3 +80,116 @@ def parse_graph(content: str, source: str = "graph") -> LayoutGraph:
         return graph_of(data, source)
     except LayoutError as error:
         raise error if error.source else error.under("", source) from None
+
+
+def document_of(graph: LayoutGraph) -> dict[str, Any]:
+    """Everything but the checksum, which comes third once it is known."""
+    layout = layout_to_dict(graph.layout)
+    nodes = []
+    for fin, entry, features in zip(graph.layout.fins, layout["fins"], graph.features, strict=True):
+        node = {
+            "id": entry["name"],
+            "position_m": entry["position_m"],
+            "mounting_angle_rad": fin.mounting_angle,
+        }
+        node |= {"limits": entry["limits"], "model": entry["model"]}
+        nodes.append(node | {"healthy": fin.name not in graph.failed, "features": _plain(features)})
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "checksum": "",
+        "frame": FRAME,
+        "units": UNITS,
+        "layout": {key: layout[key] for key in ("name", "description", "body") if key in layout},
+        "graph": {
+            "directed": False,
+            "multigraph": False,
+            "graph": {"name": graph.layout.name},
+            "nodes": nodes,
+            "edges": edges_of(graph),
+        },
+        "features": {"set": graph.feature_set},
+        "normalization": {"mean": graph.normalization.mean.tolist(), "std": graph.normalization.std.tolist()},
+        "checkpoint": {"name": graph.checkpoint, "sha256": graph.checkpoint_sha256},
+        "self_test": {
+            "tolerance_err_norm": SELF_TEST_TOLERANCE,
+            "cases": [
+                {
+                    "wrench": list(case.wrench),
+                    "command": [_plain(row) for row in case.command],
+                    "predicted_wrench": list(case.predicted_wrench),
+                    "features": [_plain(row) for row in case.features],
+                }
+                for case in graph.self_test
+            ],
+        },
+    }
+
+
+def edges_of(graph: LayoutGraph) -> list[dict[str, str]]:
+    """Every pair of healthy fins, and each with itself."""
+    return [{"source": a, "target": b} for a, b in graph.edges]
+
+
+def _plain(row: Row | None) -> list[float] | None:
+    return None if row is None else list(row)
+
+
+def graph_of(data: Any, source: str) -> LayoutGraph:
+    """Check and convert the values of a file.
+
+    Raises:
+        LayoutError: it is of another format or version, was changed, or holds what no graph file holds.
+    """
+    data = check_graph_document(data)
+    nodes = graph_nodes(data)
+    layout = graph_layout(data, source)
+    normalization = _section(data, "normalization", "mean", "std")
+    checkpoint = _section(data, "checkpoint", "name", "sha256")
+    cases = _section(data, "self_test", "tolerance_err_norm", "cases")["cases"]
+    if not isinstance(cases, list):
+        raise LayoutError(f"expected a list, got {shown(cases)}", "self_test.cases")
+    graph = LayoutGraph(
+        layout=layout,
+        failed=tuple(name for name, node in zip(layout.names, nodes, strict=True) if not node["healthy"]),
+        feature_set=text(_section(data, "features", "set")["set"], "features.set", 40),
+        features=tuple(_row(node["features"], f"graph.nodes[{i}].features") for i, node in enumerate(nodes)),
+        normalization=Normalization(
+            np.array(numbers(normalization["mean"], "normalization.mean", 6)),
+            np.array(numbers(normalization["std"], "normalization.std", 6, low=0.0)),
+        ),
+        checkpoint=text(checkpoint["name"], "checkpoint.name", 200),
+        checkpoint_sha256=text(checkpoint["sha256"], "checkpoint.sha256", 64),
+        self_test=tuple(_case(case, i, layout.n_fins) for i, case in enumerate(cases)),
+    )
+    if data["graph"]["edges"] != edges_of(graph):
+        raise LayoutError("expected every pair of healthy fins, and each with itself", "graph.edges")
+    return graph
+
+
+def _section(data: Mapping[str, Any], name: str, *keys: str) -> Mapping[str, Any]:
+    """One part of the file, with exactly these keys."""
+    return mapping(data[name], name, keys, required=keys)
+
+
+def _case(data: Any, i: int, n_fins: int) -> SelfTest:
+    keys = ("wrench", "command", "predicted_wrench", "features")
+    key = f"self_test.cases[{i}]"
+    data = mapping(data, key, keys, required=keys)
+    for name in ("command", "features"):
+        if not isinstance(data[name], list) or len(data[name]) != n_fins:
+            raise LayoutError(f"expected a list of {n_fins} rows, one for each fin", f"{key}.{name}")
+    return SelfTest(
+        wrench=numbers(data["wrench"], f"{key}.wrench", 6),
+        command=tuple(_row(row, f"{key}.command[{j}]", 3) for j, row in enumerate(data["command"])),
+        predicted_wrench=numbers(data["predicted_wrench"], f"{key}.predicted_wrench", 6),
+        features=tuple(_row(row, f"{key}.features[{j}]") for j, row in enumerate(data["features"])),
+    )
+
+
+def _row(value: Any, key: str, count: int | None = None) -> Row | None:
+    """Numbers of one fin; None for a failed one."""
+    if value is None:
+        return None
+    length = len(value) if isinstance(value, list) else 0
+    return numbers(value, key, length if count is None else count)

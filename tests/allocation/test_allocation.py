@@ -11,7 +11,7 @@ import pytest
 
 from finlab.allocation import METHODS, Allocation, Allocator, Health, load_allocator
 from finlab.allocation.modes import mode_signature, same_signature
-from finlab.allocation.plain_data import equal
+from finlab.allocation.solution import equal
 from finlab.assets import shipped_checkpoints
 from finlab.errors import AllocationError, CheckpointError, DataError
 from finlab.layout import Fin, FinModelSpec, Layout, load_layout, random_layout

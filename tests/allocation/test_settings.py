@@ -8,8 +8,7 @@ import pytest
 
 from finlab.allocation import METHODS, load_allocator
 from finlab.allocation.learned.paper import PaperSettings
-from finlab.allocation.learned.settings import Settings
-from finlab.allocation.options import LearnedOptions, PaperOptions
+from finlab.allocation.learned.settings import LearnedOptions, PaperOptions, Settings
 from finlab.assets import shipped_checkpoints, shipped_layouts
 from finlab.errors import AllocationError
 from finlab.layout import load_layout

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.insight import Insight
 from finlab.allocation.methods import load_allocator
+from finlab.allocation.solution import Insight
 from finlab.errors import AllocationError
 from finlab.layout import Layout
 from webapp.session.state import State

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.learned.learned_allocator import LearnedAllocator
-from finlab.allocation.learned.refine_missed import FallbackForces, nearest_forces
+from finlab.allocation.learned.refined_candidates import FallbackForces, nearest_forces
 from finlab.allocation.solution import Solution
 from finlab.errors import AllocationError
 from finlab.forces import force_space

@@ -17,18 +17,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.insight import Insight
 from finlab.allocation.learned.levenberg_marquardt import refine
 from finlab.allocation.learned.pipeline import SEARCH, Pipeline
 from finlab.allocation.learned.prepared import Prepared
 from finlab.allocation.learned.proposal import Proposal, predict
-from finlab.allocation.learned.refine_missed import FallbackForces, nearest_forces
-from finlab.allocation.learned.refined_candidates import RefinedCandidates
+from finlab.allocation.learned.refined_candidates import FallbackForces, RefinedCandidates, nearest_forces
 from finlab.allocation.learned.settings import Settings
-from finlab.allocation.learned.unreachable import project_target
 from finlab.allocation.policy import Policy
-from finlab.allocation.solution import Candidates, Solution
+from finlab.allocation.solution import Candidates, Insight, Solution
 from finlab.errors import CheckpointError
+from finlab.forces.force_space import PlanarProblem
+from finlab.forces.nearest import Nearest, nearest, nearest_along, nearest_in_turn
 from finlab.inference.features import fin_frame_features
 from finlab.inference.threads import single_threaded_products
 from finlab.inference.weights import TrainedWeights
@@ -164,7 +163,7 @@ class LearnedAllocator(Allocator):
             return plain
         # What the policy asks for within reach is one wrench; that one is then delivered as any other.
         std = self.normalization.std
-        served = project_target(self.pipeline.prepare(layout).planar, policy, target[0] / std)
+        served = _within_reach(self.pipeline.prepare(layout).planar, policy, target[0] / std)
         return self._solve(
             layout, served.wrench * std, seed=seed, previous=previous, fallback=lambda *_: served.force
         )
@@ -179,6 +178,23 @@ def _check_kind(weights: TrainedWeights) -> None:
         )
     if not weights.check_network().joint:
         raise CheckpointError(f"checkpoint {weights.name!r}: method `learned` needs a joint-mixture network")
+
+
+def _within_reach(problem: PlanarProblem, policy: Policy, target: Array) -> Nearest:
+    """The one wrench to deliver in place of one that is out of reach, normalized, and forces that do so.
+
+    Args:
+        problem: the layout.
+        policy: what counts.
+        target: the wrench (6,) that was asked for.
+    """
+    if policy.kind == "direction":
+        return nearest_along(problem.sets, target)
+    if policy.kind == "priority":
+        return nearest_in_turn(problem.sets, target, policy.groups)
+    weights = np.array(policy.axis_weights, np.float64)
+    with np.errstate(divide="ignore"):
+        return nearest(problem.sets, target[None], (weights.max() / weights) ** 2)
 
 
 def _candidates(refined: RefinedCandidates, std: Array) -> Candidates:

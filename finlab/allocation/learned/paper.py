@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.learned.levenberg_marquardt import CommandProblem, refine
-from finlab.allocation.learned.paper_settings import STEPS, PaperSettings
+from finlab.allocation.learned.settings import STEPS, PaperSettings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.inference.features import Geometry, fin_frame_features, geometry, raw_features
 from finlab.inference.mixture import MixtureArrays

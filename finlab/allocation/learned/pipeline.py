@@ -18,8 +18,16 @@ from numpy.typing import NDArray
 from finlab.allocation.learned.prepared import Prepared, prepare
 from finlab.allocation.learned.proposal import Proposal, propose
 from finlab.allocation.learned.receding_horizon import plan_ahead
-from finlab.allocation.learned.refine_missed import MISSED, FallbackForces, nearest_forces, refine_missed
-from finlab.allocation.learned.refined_candidates import RANKING, RefinedCandidates, rank, refine_candidates
+from finlab.allocation.learned.refined_candidates import (
+    MISSED,
+    RANKING,
+    FallbackForces,
+    RefinedCandidates,
+    nearest_forces,
+    rank,
+    refine_candidates,
+    refine_missed,
+)
 from finlab.allocation.learned.settings import Settings
 from finlab.allocation.learned.turn_limits import TURNS, limit_turn, planar_thrust, unwrap_to_arc
 from finlab.allocation.learned.weighted_sum import minimize_weighted_sum

@@ -10,9 +10,8 @@ from finlab.allocation.baselines.analytic import Analytic
 from finlab.allocation.baselines.ipopt import Ipopt
 from finlab.allocation.baselines.multistart import Multistart
 from finlab.allocation.baselines.qp import Qp
-from finlab.allocation.baselines.slsqp import Slsqp
+from finlab.allocation.baselines.scipy_solvers import Slsqp, Trf
 from finlab.allocation.baselines.sqp import Sqp
-from finlab.allocation.baselines.trf import Trf
 from finlab.errors import AllocationError, LayoutError
 from finlab.inference.normalization import Normalization
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout

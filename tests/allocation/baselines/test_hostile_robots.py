@@ -9,9 +9,8 @@ import pytest
 from finlab.allocation import Allocator
 from finlab.allocation.baselines.box_least_squares import solve_box_quadratics
 from finlab.allocation.baselines.multistart import Multistart
-from finlab.allocation.baselines.slsqp import Slsqp
+from finlab.allocation.baselines.scipy_solvers import Slsqp, Trf
 from finlab.allocation.baselines.sqp import Sqp
-from finlab.allocation.baselines.trf import Trf
 from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
 from finlab.layout import Fin, FinModelSpec, Layout, Limits

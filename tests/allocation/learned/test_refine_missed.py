@@ -5,8 +5,7 @@ import pytest
 
 from finlab.allocation import load_allocator
 from finlab.allocation.learned.learned_allocator import LearnedAllocator
-from finlab.allocation.learned.refine_missed import MISSED, reduce_energy
-from finlab.allocation.learned.refined_candidates import RANKING, RefinedCandidates
+from finlab.allocation.learned.refined_candidates import MISSED, RANKING, RefinedCandidates, reduce_energy
 from finlab.forces.force_space import polar, realize
 from finlab.layout import Fin, Layout, Limits
 from finlab.physics import Plant

@@ -11,12 +11,14 @@ from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.allocation.learned.pipeline import SEARCH, _best_of_each_component
 from finlab.allocation.learned.prepared import MAX_SUBSETS, Prepared, prepare
 from finlab.allocation.learned.proposal import sample
-from finlab.allocation.learned.refine_missed import MISSED, _fresh_starts, reduce_energy
 from finlab.allocation.learned.refined_candidates import (
+    MISSED,
     RANKING,
     RefinedCandidates,
+    _fresh_starts,
     improve,
     rank,
+    reduce_energy,
     refine_candidates,
 )
 from finlab.allocation.learned.settings import Settings
