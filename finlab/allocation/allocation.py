@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Answer(PlainData):
-    """What answers to one target and to many have in common, as plain data; many have N rows of each array."""
+    """What answers to one target and to many share, as plain data; many have N rows of each array."""
 
     layout: Layout
     """The whole layout, failed fins included, with the limits that damage has left."""
