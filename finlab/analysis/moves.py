@@ -70,7 +70,7 @@ def is_mirrored(fin: Fin, other: Fin) -> bool:
     """Says whether two fins are each other's mirror image."""
     x, y, z = fin.position
     apart = np.abs(np.subtract(other.position, (x, -y, z))).max()
-    turned = abs(_wrapped(fin.mounting_angle + other.mounting_angle))
+    turned = abs(math.remainder(fin.mounting_angle + other.mounting_angle, math.tau))
     return bool(max(apart, turned) <= MIRROR_TOLERANCE)
 
 
@@ -150,7 +150,7 @@ class Moves:
         result = self.layout
         for i in self.layout.indices(self.names):
             x, y, z = (float(value) for value in position[0, i])
-            turned = _wrapped(float(angle[0, i]))
+            turned = math.remainder(float(angle[0, i]), math.tau)
             result = result.replace_fin(self.layout.names[i], position=(x, y, z), mounting_angle=turned)
         return result
 
@@ -169,8 +169,3 @@ def _twins(layout: Layout, pairs: Sequence[tuple[str, str]]) -> dict[str, str]:
             )
         twins |= {first.name: second.name, second.name: first.name}
     return twins
-
-
-def _wrapped(angle: float) -> float:
-    """An angle [rad] within half a turn either way."""
-    return math.remainder(angle, 2 * math.pi)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,14 +40,8 @@ class SensorSettings:
     """Of roll and pitch [rad]."""
 
 
-NO_NOISE = SensorSettings(
-    marker_position_m=0.0,
-    marker_yaw_rad=0.0,
-    pressure_depth_m=0.0,
-    dvl_velocity_m_s=0.0,
-    imu_rate_rad_s=0.0,
-    imu_angle_rad=0.0,
-)
+_NOISES = [field.name for field in fields(SensorSettings) if not field.name.endswith("_hz")]
+NO_NOISE = SensorSettings(**dict.fromkeys(_NOISES, 0.0))
 """Perfect sensors at the usual rates."""
 
 

@@ -55,7 +55,7 @@ def train_surrogate(
     """
     recipe = get_preset(preset)
     spec = fin_model or FinModelSpec()
-    model = make_law(spec)
+    model, written = make_law(spec), {"type": spec.type, **dict(spec.parameters)}
     training = recipe.surrogate_training
     total = steps or training.steps
     rank, world = join_processes()
@@ -74,7 +74,7 @@ def train_surrogate(
         "steps": total,
         "training": asdict(training),
         "surrogate": asdict(recipe.surrogate),
-        "fin_model": spec_to_dict(spec),
+        "fin_model": written,
     }
     settings = LoopSettings(
         total, training.batch_size, training.learning_rate, warmup=min(100, total), ema=0.99
@@ -85,7 +85,7 @@ def train_surrogate(
     checkpoint = TrainedWeights(
         name=out.name,
         normalization=normalization,
-        fin_model=spec_to_dict(spec),
+        fin_model=written,
         surrogate_config=recipe.surrogate,
         surrogate=state_of(surrogate.state_dict()),
         preset=preset,
@@ -97,11 +97,6 @@ def train_surrogate(
         plot_log(out)
     leave_processes()
     return checkpoint
-
-
-def spec_to_dict(spec: FinModelSpec) -> dict[str, Any]:
-    """A fin model as in a layout file."""
-    return {"type": spec.type, **dict(spec.parameters)}
 
 
 def measure_normalization(model: FinLaw, seed: int) -> Normalization:
