@@ -12,7 +12,7 @@ import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
-from finlab.forces.axis_ranges import Ranges
+from finlab.forces.reach import Ranges
 from webapp.handles import Changes
 from webapp.panels.commands import add_commands
 from webapp.panels.host import Panel

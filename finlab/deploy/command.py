@@ -96,7 +96,7 @@ def speed(arguments: argparse.Namespace) -> int:
     """Print times and memory of single answers, one after the other."""
     start = time.perf_counter()
     from finlab.deploy.robot import load_robot
-    from finlab.deploy.speed import answer_times, peak_memory, random_targets
+    from finlab.deploy.self_check import answer_times, peak_memory, random_targets
 
     robot = load_robot(arguments.bundle, arguments.fast)
     robot.allocate([0.0] * 6)

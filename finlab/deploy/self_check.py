@@ -1,4 +1,4 @@
-"""`finlab-runtime check`: does this computer answer as the desk did, and are the answers true?
+"""`finlab-runtime check` and `speed`: does this computer answer as the desk did, truly, and how fast?
 
 To be run on the robot before first use. For each self-test of the graph file: are the node features the same,
 does the surrogate predict the same wrench, does the fins' own model confirm what the surrogate promises, and
@@ -7,7 +7,9 @@ is this computer's own answer as good as the stored one.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import resource
+import time
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +21,8 @@ from finlab.deploy.graph import SELF_TEST_TOLERANCE, NodeFeatures, SelfTest
 from finlab.deploy.robot import Robot
 from finlab.errors import DataError
 from finlab.inference.surrogate import surrogate_on
+from finlab.layout import Layout
+from finlab.physics import Plant
 from finlab.physics.energy import command_energy
 
 Array = NDArray[np.float64]
@@ -102,3 +106,31 @@ def self_check(robot: Robot) -> list[Finding]:
 def worst(values: Iterable[float]) -> float:
     """The largest value, not below 0; NaN if any value is NaN."""
     return float(np.max([0.0, *values]))
+
+
+N_WARM = 100
+"""Answers before the clock starts."""
+
+
+def answer_times(allocate: Callable[[Array], object], targets: Array) -> tuple[float, float]:
+    """Median and 99th percentile [ms] of single answers to targets (N, 6), one after the other."""
+    for target in targets[:N_WARM]:
+        allocate(target)
+    times = []
+    for target in targets:
+        start = time.perf_counter()
+        allocate(target)
+        times.append(time.perf_counter() - start)
+    p50, p99 = np.percentile(times, [50, 99]) * 1e3
+    return float(p50), float(p99)
+
+
+def random_targets(layout: Layout, count: int) -> Array:
+    """Wrenches (count, 6) of random commands, the same ones every time."""
+    draws = np.random.default_rng(0).random((count, layout.n_fins, 3))
+    return Plant(layout).wrench(layout.lower + draws * (layout.upper - layout.lower))
+
+
+def peak_memory() -> float:
+    """Largest resident size of this process so far [MB]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from finlab.forces.axis_ranges import axis_ranges
 from finlab.forces.fin_sets import SCALE, fin_sets
+from finlab.forces.reach import axis_ranges
 from finlab.layout import Layout
 
 Layouts = Callable[[str], Layout]

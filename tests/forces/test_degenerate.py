@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from finlab.analysis import attainable_set, authority, least_energy
-from finlab.forces.axis_ranges import axis_ranges
 from finlab.forces.least_energy import plant_problem
 from finlab.forces.nearest import nearest, nearest_along, nearest_in_turn
+from finlab.forces.reach import axis_ranges
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 
 PINNED = Limits(zero_direction=(0.7, 0.7))

@@ -6,7 +6,7 @@ from typing import Protocol
 import viser
 
 from finlab.allocation.allocation import Allocation
-from finlab.forces.axis_ranges import Ranges
+from finlab.forces.reach import Ranges
 from webapp.scene.scenery import Scenery
 from webapp.session import Session
 from webapp.tasks.analyst import Beside, Findings, Question

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from finlab.analysis import AttainableSet, ScoreCard, attainable_set, score_card
-from finlab.forces.axis_ranges import Ranges, axis_ranges
+from finlab.forces.reach import Ranges, axis_ranges
 from finlab.layout import Layout
 from webapp.session.display import DRAWN
 
