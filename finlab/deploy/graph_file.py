@@ -21,10 +21,10 @@ from finlab.inference.normalization import Normalization
 from finlab.layout import layout_to_dict
 from finlab.layout.file import FRAME
 from finlab.layout.load import (
-    FORMAT,
+    GRAPH_FORMAT,
+    GRAPH_VERSION,
     SUFFIX,
     UNITS,
-    VERSION,
     check_graph_document,
     checksum_of,
     graph_layout,
@@ -95,8 +95,8 @@ def document_of(graph: LayoutGraph) -> dict[str, Any]:
         node |= {"limits": entry["limits"], "model": entry["model"]}
         nodes.append(node | {"healthy": fin.name not in graph.failed, "features": _plain(features)})
     return {
-        "format": FORMAT,
-        "version": VERSION,
+        "format": GRAPH_FORMAT,
+        "version": GRAPH_VERSION,
         "checksum": "",
         "frame": FRAME,
         "units": UNITS,

@@ -14,17 +14,15 @@ from typing import Any
 from finlab.assets import shipped_layouts
 from finlab.bundle_files import GRAPH, is_bundle, read_bundle_files
 from finlab.errors import LayoutError
-from finlab.layout.file import FORMAT as LAYOUT_FORMAT
-from finlab.layout.file import VERSION as LAYOUT_VERSION
-from finlab.layout.file import parse_layout
+from finlab.layout.file import FORMAT, VERSION, parse_layout
 from finlab.layout.layout import Layout
 from finlab.layout.reading import decode_text, parse_json, read_text
 from finlab.layout.rules import mapping, number, shown
 
 SUFFIX = ".graph.json"
 """How the name of a graph file ends."""
-FORMAT = "finlab-graph"
-VERSION = 1
+GRAPH_FORMAT = "finlab-graph"
+GRAPH_VERSION = 1
 UNITS = {"length": "m", "angle": "rad", "frequency": "Hz", "force": "N", "torque": "N m"}
 _PARTS = ("frame", "units", "layout", "graph", "features", "normalization", "checkpoint", "self_test")
 KEYS = ("format", "version", "checksum", *_PARTS)
@@ -99,11 +97,13 @@ def parse_graph_layout(content: str, source: str = "graph") -> Layout:
 def check_graph_document(data: Any) -> Mapping[str, Any]:
     """Returns the values of a graph file once format, version, keys and checksum are right."""
     # Format and version first: in a file of another kind or version, unknown keys are not the news.
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
+    if not isinstance(data, dict) or data.get("format") != GRAPH_FORMAT:
         got = shown(data.get("format")) if isinstance(data, dict) else shown(data)
-        raise LayoutError(f"expected {FORMAT}, got {got}", "format")
-    if data.get("version") != VERSION or data["version"] is True:
-        raise LayoutError(f"this finlab reads version {VERSION}, got {shown(data.get('version'))}", "version")
+        raise LayoutError(f"expected {GRAPH_FORMAT}, got {got}", "format")
+    if data.get("version") != GRAPH_VERSION or data["version"] is True:
+        raise LayoutError(
+            f"this finlab reads version {GRAPH_VERSION}, got {shown(data.get('version'))}", "version"
+        )
     document: Mapping[str, Any] = mapping(data, "", KEYS, required=KEYS)
     if document["checksum"] != checksum_of(document):
         raise LayoutError("does not fit the contents; the file was changed, export it again", "checksum")
@@ -145,7 +145,7 @@ def graph_layout(data: Mapping[str, Any], source: str) -> Layout:
         angles.append(angle)
         fin = {"name": node["id"], "mounting_angle_deg": math.degrees(angle)}
         fins.append(fin | {key: node[key] for key in ("position_m", "limits", "model")})
-    head = {"format": LAYOUT_FORMAT, "version": LAYOUT_VERSION, "frame": data["frame"]}
+    head = {"format": FORMAT, "version": VERSION, "frame": data["frame"]}
     layout = parse_layout({**head, **about, "fins": fins}, source)
     pairs = zip(layout.fins, angles, strict=True)
     return replace(layout, fins=tuple(replace(fin, mounting_angle=angle) for fin, angle in pairs))
