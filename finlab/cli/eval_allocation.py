@@ -13,10 +13,10 @@ from finlab.cli.eval_arguments import (
     Folder,
     Names,
     Run,
-    check_folder,
-    check_positive,
+    check_folders,
     open_layouts,
 )
+from finlab.cli.inputs import check_positive
 
 RUN = Run()
 MANY, FORTY, TWENTY = Cases(), Cases(layouts=40, targets=25), Cases(layouts=20, targets=100)
@@ -53,9 +53,8 @@ def wrench(
     from finlab.evaluation.splits import SPLITS
     from finlab.evaluation.statistics.records import columns_of_records, save_columns
 
-    check_positive("single", single)
-    check_positive("subsample", subsample)
-    check_folder("records", records)
+    check_positive(single=single, subsample=subsample)
+    check_folders(records=records)
     allocators = run.methods(methods)
     rows, intervals, energies = [], [], []
     for k, part in enumerate(SPLITS if cases.split == "all" else (cases.split,)):
@@ -86,11 +85,10 @@ def seeds(
     Args:
         candidates: seeds per target, of every kind.
     """
-    from finlab.evaluation.experiments.seeds import learned_allocator, seed_report, seed_rows
+    from finlab.evaluation.experiments.seeds import seed_report, seed_rows
 
-    check_positive("candidates", candidates)
-    allocator = learned_allocator(run.checkpoint)
-    rows = seed_rows(allocator, cases.draw(), n_seeds=candidates, seed=cases.seed)
+    check_positive(candidates=candidates)
+    rows = seed_rows(run.learned(), cases.draw(), n_seeds=candidates, seed=cases.seed)
     run.show(seed_report(rows, candidates), rows=rows)
 
 
@@ -108,13 +106,8 @@ def ablation(
     """
     from finlab.evaluation.experiments.ablation import ablation_report, ablation_rows
 
-    rows = ablation_rows(
-        cases.draw(),
-        checkpoint=run.checkpoint,
-        n_candidates=candidates,
-        temperature=temperature,
-        seed=cases.seed,
-    )
+    options = {"n_candidates": candidates, "temperature": temperature, "checkpoint": run.checkpoint}
+    rows = ablation_rows(cases.draw(), seed=cases.seed, **options)
     run.show(ablation_report(rows), rows=rows)
 
 
@@ -130,7 +123,7 @@ def temperature(
     """
     from finlab.evaluation.experiments.temperature import temperature_report, temperature_rows
 
-    check_positive("candidates", candidates)
+    check_positive(candidates=candidates)
     rows = temperature_rows(cases.draw(), checkpoint=run.checkpoint, n_candidates=candidates, seed=cases.seed)
     run.show(temperature_report(rows), rows=rows)
 
@@ -154,7 +147,7 @@ def latency(
     """
     from finlab.evaluation.experiments.latency import latency_cases, latency_report, latency_rows, machine
 
-    check_positive("calls", calls)
+    check_positive(calls=calls)
     cases = latency_cases(fins, seed)
     rows = latency_rows(run.methods(methods), cases, n_calls=calls, budget_s=budget)
     described = machine()
@@ -178,8 +171,7 @@ def steadiness(
     """
     from finlab.evaluation.experiments.steadiness import steadiness_report, steadiness_rows
 
-    check_positive("paths", paths)
-    check_positive("ticks", ticks - 1)
+    check_positive(paths=paths, ticks=ticks - 1)
     robots = open_layouts(layouts)
     rows = steadiness_rows(run.learned(), robots, n_paths=paths, ticks=ticks, seed=seed)
     run.show(steadiness_report(rows), rows=rows)
@@ -197,7 +189,7 @@ def modes(
     """
     from finlab.evaluation.experiments.mode_coverage import mode_report, mode_rows
 
-    check_positive("starts", starts)
+    check_positive(starts=starts)
     rows = mode_rows(run.learned(), cases.draw(), n_starts=starts, seed=cases.seed)
     run.show(mode_report(rows, starts), rows=rows)
 
@@ -211,7 +203,7 @@ def unreachable(layouts: Count = 50, seed: Count = 0, run: Annotated[Run, arg(na
     """
     from finlab.evaluation.experiments.unreachable import unreachable_report, unreachable_rows
 
-    check_positive("layouts", layouts)
+    check_positive(layouts=layouts)
     rows = unreachable_rows(run.learned(), n_layouts=layouts, seed=seed)
     run.show(unreachable_report(rows), rows=rows)
 
@@ -239,8 +231,7 @@ def fuzz(
     """
     from finlab.evaluation.experiments.fuzz import fuzz_methods, fuzz_report
 
-    check_positive("robots", robots)
-    check_positive("targets", targets)
+    check_positive(robots=robots, targets=targets)
     counts = fuzz_methods(
         run.methods(methods),
         n_robots=robots,

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import arg
 
-from finlab.errors import DataError
+from finlab.cli.inputs import check_positive, open_robot
+from finlab.errors import DataError, LayoutError
 
 if TYPE_CHECKING:
     from finlab.allocation import Allocator
+    from finlab.allocation.learned.learned_allocator import LearnedAllocator
     from finlab.evaluation.experiments.closed_loop_runs import Run as LoggedRun
     from finlab.evaluation.experiments.closed_loop_runs import Scenario
     from finlab.evaluation.plots.style import Picture
@@ -84,7 +86,7 @@ class Run(Output):
 
         return load_method_specs(names, self.checkpoint)
 
-    def learned(self) -> Allocator:
+    def learned(self) -> LearnedAllocator:
         """The learned method."""
         from finlab.allocation import load_allocator
 
@@ -111,7 +113,7 @@ class ClosedLoopRuns:
 
     def __post_init__(self) -> None:
         """Refuses before the runs what would fail after them."""
-        check_positive("runs", self.runs)
+        check_positive(runs=self.runs)
         if self.figures is not None and not self.figures.is_dir():
             raise DataError(f"figures: expected a folder that exists, got {self.figures}")
 
@@ -131,22 +133,14 @@ class ClosedLoopRuns:
 
 def open_layouts(names: str) -> list[Layout]:
     """Layouts from their names or files, with commas between."""
-    from finlab.cli.inputs import open_robot
-    from finlab.errors import LayoutError
-
     texts = [text.strip() for text in names.split(",") if text.strip()]
     if not texts:
         raise LayoutError(f"layouts: expected names or files with commas between (A,penta), got {names!r}")
     return [open_robot(text).layout for text in texts]
 
 
-def check_positive(name: str, value: int | None) -> None:
-    """Refuse a number below one."""
-    if value is not None and value < 1:
-        raise DataError(f"{name}: expected a number of at least 1, got {value}")
-
-
-def check_folder(name: str, path: Path | None) -> None:
-    """Refuse a folder that cannot be one."""
-    if path is not None and path.exists() and not path.is_dir():
-        raise DataError(f"{name}: expected a folder, got the file {path}")
+def check_folders(**paths: Path | None) -> None:
+    """Refuse folders that cannot be one."""
+    for name, path in paths.items():
+        if path is not None and path.exists() and not path.is_dir():
+            raise DataError(f"{name}: expected a folder, got the file {path}")

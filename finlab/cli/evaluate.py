@@ -13,7 +13,8 @@ from tyro.conf import arg
 from tyro.extras import SubcommandApp
 
 from finlab.cli import eval_allocation, eval_closed_loop
-from finlab.cli.eval_arguments import Checkpoint, Count, Folder, Name, Output, check_folder, check_positive
+from finlab.cli.eval_arguments import Checkpoint, Count, Folder, Name, Output, check_folders
+from finlab.cli.inputs import check_positive
 
 OUTPUT = Output()
 
@@ -48,9 +49,8 @@ def training(
     from finlab.evaluation.splits import make_split
     from finlab.training.presets import get_preset
 
-    for name, value in (("steps", steps), ("batch-size", batch_size)):
-        check_positive(name, value)
-    check_folder("out", out)
+    check_positive(steps=steps, batch_size=batch_size)
+    check_folders(out=out)
     get_preset(preset)
     make_split("id", layouts, targets, seed)
     settings = {"preset": preset, "steps": steps, "batch_size": batch_size}
@@ -89,17 +89,17 @@ def report(
     """
     from finlab.evaluation.report.make import make_report
     from finlab.evaluation.report.plan import Checkpoints
+    from finlab.evaluation.report.sizes import SIZES
 
-    check_positive("processes", processes)
-    check_folder("out", out)
-    check_folder("records", records)
+    check_positive(processes=processes)
+    check_folders(out=out, records=records)
     words = ["finlab", "eval", "report", "-o", str(out), *(["--quick"] if quick else [])]
     words += ["--seed", str(seed)] if seed else []
     words += ["--checkpoint", checkpoint] if checkpoint else []
     words += ["--paper-checkpoint", paper_checkpoint] if paper_checkpoint else []
     page = make_report(
         out,
-        size="quick" if quick else "full",
+        sizes=SIZES["quick" if quick else "full"],
         seed=seed,
         checkpoints=Checkpoints(checkpoint, paper_checkpoint),
         records=records or out / "records",

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from finlab.errors import CommandError
+
 if TYPE_CHECKING:
     from finlab.deploy.graph import LayoutGraph
     from finlab.layout import Layout
@@ -45,3 +47,10 @@ def open_robot(text: str) -> Robot:
         graph = read_graph(path)
         return Robot(graph.layout, graph.failed, graph)
     return Robot(load_layout(path))
+
+
+def check_positive(**counts: int | None) -> None:
+    """Refuse numbers below one, each under the name of its option."""
+    for name, value in counts.items():
+        if value is not None and value < 1:
+            raise CommandError(f"{name.replace('_', '-')}: expected a number of at least 1, got {value}")

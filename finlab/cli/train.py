@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import arg
 from tyro.extras import SubcommandApp
 
+from finlab.cli.inputs import check_positive
+
 if TYPE_CHECKING:
     from finlab.inference.weights import TrainedWeights
     from finlab.layout import FinModelSpec
@@ -42,7 +44,7 @@ def surrogate(
     """
     from finlab.training.surrogate import train_surrogate
 
-    _check_counts(steps=steps, stop_after=stop_after)
+    check_positive(steps=steps, stop_after=stop_after)
     spec = _fin_model(fin_model)
     checkpoint = train_surrogate(
         preset, output, seed=seed, steps=steps, stop_after=stop_after, fin_model=spec
@@ -75,7 +77,7 @@ def allocator(
     """
     from finlab.training.allocator import train_allocator
 
-    _check_counts(steps=steps, batch_size=batch_size, stop_after=stop_after)
+    check_positive(steps=steps, batch_size=batch_size, stop_after=stop_after)
     checkpoint = train_allocator(
         preset,
         output,
@@ -115,7 +117,7 @@ def fast(
     from finlab.training.distill.network import FastConfig
     from finlab.training.distill.train import FastSettings, train_fast
 
-    _check_counts(shards=shards, steps=steps, stop_after=stop_after)
+    check_positive(shards=shards, steps=steps, stop_after=stop_after)
     allocator = load_allocator(checkpoint=checkpoint)
     metrics = train_fast(
         allocator,
@@ -136,15 +138,6 @@ def _fin_model(name: str) -> "FinModelSpec":
     if name.lower().endswith(".csv"):
         return FinModelSpec("table", (("path", str(Path(name).resolve())),))
     return FinModelSpec(name)
-
-
-def _check_counts(**counts: int | None) -> None:
-    """Refuse counts below one, each under the name of its flag."""
-    from finlab.errors import CommandError
-
-    for name, value in counts.items():
-        if value is not None and value < 1:
-            raise CommandError(f"--{name.replace('_', '-')}: expected a number from 1, got {value}")
 
 
 def _report(output: Path, checkpoint: "TrainedWeights") -> None:

@@ -40,10 +40,10 @@ def test_trains_both_and_allocates_with_them(tmp_path: Path, capsys: pytest.Capt
     ("argv", "message"),
     [
         (["surrogate", "--preset", "magic"], "preset: expected one of default, paper, smoke"),
-        (["surrogate", "--steps", "0"], "--steps: expected a number from 1, got 0"),
+        (["surrogate", "--steps", "0"], "steps: expected a number of at least 1, got 0"),
         (
             ["allocator", "--surrogate", "nowhere/", "--batch-size", "-4"],
-            "--batch-size: expected a number from 1",
+            "batch-size: expected a number of at least 1",
         ),
         (["allocator", "--surrogate", "nowhere/"], "'nowhere' is not among the shipped ones"),
     ],

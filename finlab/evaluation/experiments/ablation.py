@@ -16,14 +16,13 @@ import numpy as np
 from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.learned.paper import PaperAllocator
+from finlab.allocation.methods import load_allocator
 from finlab.evaluation.experiments.wrench_tracking import score
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.evaluation.statistics.records import Records, join_records
 from finlab.evaluation.statistics.tables import text_table
-from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
 
 VARIANTS: dict[str, dict[str, Any]] = {
     "mean_only": {"mean_only": True},
@@ -60,7 +59,7 @@ def ablation_method(
     checkpoint: str | Path | None = None,
     n_candidates: int = 64,
     temperature: float = 0.02,
-) -> PaperAllocator:
+) -> Allocator:
     """The method of a row.
 
     Args:
@@ -73,9 +72,9 @@ def ablation_method(
     Raises:
         AllocationError: unknown refinement.
     """
-    weights = read_checkpoint(resolve_checkpoint(checkpoint or "paper"))
     options = {"n_candidates": n_candidates, "temperature": temperature, "refinement": refinement}
-    return PaperAllocator(weights, **{**options, **VARIANTS[variant]})
+    method: Allocator = load_allocator("paper", checkpoint=checkpoint, **{**options, **VARIANTS[variant]})
+    return method
 
 
 def run_variant(allocator: Allocator, cases: Sequence[Case], *, seed: int = 0) -> Scored:
@@ -91,12 +90,8 @@ def run_variant(allocator: Allocator, cases: Sequence[Case], *, seed: int = 0) -
         plant.append(by_plant)
         assert answer.wrench_surrogate is not None
         difference = answer.wrench_surrogate - case.targets
-        believed = replace(
-            by_plant,
-            err_norm=np.linalg.norm(difference / sigma, axis=-1),
-            err_phys=np.linalg.norm(difference, axis=-1),
-        )
-        surrogate.append(believed)
+        norm, phys = (np.linalg.norm(d, axis=-1) for d in (difference / sigma, difference))
+        surrogate.append(replace(by_plant, err_norm=norm, err_phys=phys))
     return Scored(join_records(plant), join_records(surrogate), call_s)
 
 
@@ -117,29 +112,15 @@ def ablation_row(variant: str, refinement: str, scored_by: str, records: Records
     }
 
 
-def ablation_rows(
-    cases: Sequence[Case],
-    *,
-    checkpoint: str | Path | None = None,
-    n_candidates: int = 64,
-    temperature: float = 0.02,
-    seed: int = 0,
-) -> list[Row]:
+def ablation_rows(cases: Sequence[Case], *, seed: int = 0, **options: Any) -> list[Row]:
     """Four rows per variant: each refinement, scored by the surrogate and by the plant.
 
-    Same cases, candidates and temperature in all of them; arguments as in `ablation_method`.
+    Same cases, candidates and temperature in all of them; options as in `ablation_method`.
     """
     pairs = [(variant, refinement) for variant in VARIANTS for refinement in REFINEMENTS]
     rows: list[Row] = []
     for variant, refinement in tqdm(pairs, unit="row", disable=None, leave=False, file=sys.stderr):
-        allocator = ablation_method(
-            variant,
-            refinement,
-            checkpoint=checkpoint,
-            n_candidates=n_candidates,
-            temperature=temperature,
-        )
-        scored = run_variant(allocator, cases, seed=seed)
+        scored = run_variant(ablation_method(variant, refinement, **options), cases, seed=seed)
         for name, records in (("surrogate", scored.surrogate), ("plant", scored.plant)):
             rows.append(ablation_row(variant, refinement, name, records, scored.call_s))
     return rows

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,6 @@ from finlab.allocation.learned.refined_candidates import RANKING
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.evaluation.statistics.tables import text_table
-from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.physics import Plant
 from finlab.physics.energy import command_energy
 
@@ -40,11 +38,6 @@ MET = 0.05
 """Normalized error up to which a target counts as met when energies are compared."""
 
 Row = dict[str, Any]
-
-
-def learned_allocator(checkpoint: str | Path | None = None) -> LearnedAllocator:
-    """The learned method of a checkpoint, the shipped one by default."""
-    return LearnedAllocator(read_checkpoint(resolve_checkpoint(checkpoint or "default")))
 
 
 def seed_rows(
@@ -68,13 +61,11 @@ def seed_rows(
                 command = _answer(allocator, prepared, case.targets, start, steps)
                 error = allocator.normalization.error(plant.wrench(command), case.targets)
                 energy = command_energy(command, prepared.upper)
-                found.setdefault((layout.n_fins, kind, steps), []).append(
-                    (np.full(len(error), k), error, energy)
-                )
+                part = (np.full(len(error), k), error, energy)
+                found.setdefault((layout.n_fins, kind, steps), []).append(part)
+    ordered = sorted(found, key=lambda key: (key[0], key[2], KINDS.index(key[1])))
     joined = {key: tuple(map(np.concatenate, zip(*parts, strict=True))) for key, parts in found.items()}
-    return [
-        _row(*key, *joined[key], *joined[key[0], KINDS[0], key[2]][1:]) for key in sorted(joined, key=_order)
-    ]
+    return [_row(*key, joined[key], joined[key[0], KINDS[0], key[2]]) for key in ordered]
 
 
 def seed_report(rows: Sequence[Row], n_seeds: int) -> str:
@@ -95,16 +86,10 @@ def _commands(
     if kind == "network":
         target = targets / allocator.normalization.std
         centred = target - allocator.normalization.mean / allocator.normalization.std
-        drawn = propose(
-            allocator.pipeline.network,
-            prepared,
-            centred,
-            target,
-            allocator.settings.n_candidates,
-            allocator.settings.temperature,
-            seed,
-        )
-        score = drawn.error**2 + allocator.settings.gamma * drawn.energy
+        network, chosen = allocator.pipeline.network, allocator.settings
+        count, temperature = chosen.n_candidates, chosen.temperature
+        drawn = propose(network, prepared, centred, target, count, temperature, seed)
+        score = drawn.error**2 + chosen.gamma * drawn.energy
         best = np.argsort(score, axis=1)[:, :n_seeds]
         command = np.take_along_axis(drawn.command, best[..., None, None], axis=1).astype(np.float64)
         return np.clip(command, lower, upper)
@@ -133,16 +118,8 @@ def _answer(
     return chosen
 
 
-def _row(
-    fins: int,
-    kind: str,
-    steps: int,
-    layout: Array,
-    error: Array,
-    energy: Array,
-    network_error: Array,
-    network_energy: Array,
-) -> Row:
+def _row(fins: int, kind: str, steps: int, found: tuple[Array, ...], by_network: tuple[Array, ...]) -> Row:
+    (layout, error, energy), (_, network_error, network_energy) = found, by_network
     both = (error <= MET) & (network_error <= MET)
     return {
         "fins": fins,
@@ -155,8 +132,3 @@ def _row(
         "success_0.05": float((error <= MET).mean()),
         "energy_over_network": float(energy[both].sum() / network_energy[both].sum()) if both.any() else None,
     }
-
-
-def _order(key: tuple[int, str, int]) -> tuple[int, int, int]:
-    fins, kind, steps = key
-    return fins, steps, KINDS.index(kind)

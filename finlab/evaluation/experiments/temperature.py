@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from finlab.allocation.learned.paper import PaperAllocator
+from finlab.allocation.methods import load_allocator
+from finlab.allocation.options import PaperOptions
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.evaluation.statistics.tables import text_table
-from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.layout import Layout
 from finlab.layout.angles import is_full_turn
 
@@ -49,7 +49,8 @@ def temperature_columns(
         n_candidates: candidates drawn per target.
         seed: of the draw.
     """
-    allocator = _method(checkpoint, n_candidates=n_candidates, temperature=temperature, refinement="none")
+    options: PaperOptions = {"n_candidates": n_candidates, "temperature": temperature, "refinement": "none"}
+    allocator = load_allocator("paper", checkpoint=checkpoint, **options)
     rows: list[tuple[float, ...]] = []
     for k, case in enumerate(tqdm(cases, unit="layout", disable=None, leave=False, file=sys.stderr)):
         layout = case.layout.without(case.failed) if case.failed else case.layout
@@ -59,13 +60,9 @@ def temperature_columns(
             j = samples.err_norm**2 + allocator.settings.gamma * samples.energy
             spread = diversity(samples.command, layout)
             rows.append((k, number, layout.n_fins, spread, float(j.min()), float(j.mean())))
-    names = ("layout", "target", "n_fins", "diversity", "best_j", "mean_j")
-    values = np.array(rows, dtype=np.float64)
-    whole = ("layout", "target", "n_fins")
-    return {
-        name: column.astype(np.int64) if name in whole else column
-        for name, column in zip(names, values.T, strict=True)
-    }
+    whole, real = ("layout", "target", "n_fins"), ("diversity", "best_j", "mean_j")
+    columns = dict(zip((*whole, *real), np.array(rows, dtype=np.float64).T, strict=True))
+    return columns | {name: columns[name].astype(np.int64) for name in whole}
 
 
 def refinement_columns(
@@ -81,9 +78,8 @@ def refinement_columns(
     Columns, one entry per candidate, by the surrogate: `target`, `refined` (0 before, 1 after), `energy`,
     `err_norm`.
     """
-    allocator = _method(
-        checkpoint, n_candidates=n_candidates, n_refined=n_candidates, temperature=temperature
-    )
+    options: PaperOptions = {"n_candidates": n_candidates, "temperature": temperature}
+    allocator = load_allocator("paper", checkpoint=checkpoint, n_refined=n_candidates, **options)
     parts = []
     for number, target in enumerate(case.targets):
         result = allocator.allocate(case.layout, target, failed=case.failed, seed=seed)
@@ -103,8 +99,7 @@ def refinement_columns(
 def diversity(command: Array, layout: Layout) -> float:
     """Mean distance between two of the commands (K, n, 3): root mean square over all their entries, each in
     units of its range; zero directions of a full circle are compared the short way round."""
-    lower, upper = (np.array([getattr(f.limits, end) for f in layout.fins]) for end in ("lower", "upper"))
-    width = np.maximum(upper - lower, 1e-9)
+    width = np.maximum(layout.upper - layout.lower, 1e-9)
     first, second = np.triu_indices(len(command), k=1)
     if len(first) == 0:
         return 0.0
@@ -141,7 +136,3 @@ def temperature_report(rows: Sequence[Row]) -> str:
         "those of the raw candidates, by the surrogate."
     )
     return f"{text_table(rows)}\n\n{note}"
-
-
-def _method(checkpoint: str | Path | None, **options: Any) -> PaperAllocator:
-    return PaperAllocator(read_checkpoint(resolve_checkpoint(checkpoint or "paper")), **options)

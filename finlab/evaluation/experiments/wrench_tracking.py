@@ -15,9 +15,14 @@ from finlab.allocation.baselines.single_target import DEFAULT_STARTS
 from finlab.evaluation.method_specs import method_and_starts
 from finlab.evaluation.paper_figures import paper_wrench_rows
 from finlab.evaluation.splits import Case
-from finlab.evaluation.statistics.metrics import energy_rows, rows_by_fin_count, wrench_intervals, wrench_row
 from finlab.evaluation.statistics.records import Records, join_records
-from finlab.evaluation.statistics.tables import text_table
+from finlab.evaluation.statistics.tables import (
+    energy_rows,
+    rows_by_fin_count,
+    text_table,
+    wrench_intervals,
+    wrench_row,
+)
 from finlab.physics import Plant
 from finlab.physics.energy import command_energy
 

@@ -12,9 +12,7 @@ from finlab.evaluation.report.pages import to_html, to_markdown
 from finlab.evaluation.report.plan import Checkpoints, make_plan
 from finlab.evaluation.report.provenance import Provenance, how_made_blocks, make_provenance, source_commit
 from finlab.evaluation.report.results import Results
-from finlab.evaluation.report.sections.accuracy import accuracy_blocks
 from finlab.evaluation.report.sections.closed_loop import closed_loop_blocks
-from finlab.evaluation.report.sections.energy import energy_blocks
 from finlab.evaluation.report.sections.studies import (
     ablation_blocks,
     latency_blocks,
@@ -23,7 +21,8 @@ from finlab.evaluation.report.sections.studies import (
     training_blocks,
 )
 from finlab.evaluation.report.sections.summary import summary_blocks
-from finlab.evaluation.report.sizes import SIZES, Sizes
+from finlab.evaluation.report.sections.wrench_tracking import accuracy_blocks, energy_blocks
+from finlab.evaluation.report.sizes import Sizes
 from finlab.inference.checkpoint import read_checkpoint, read_normalization, resolve_checkpoint
 
 PAGE, TWIN, TABLES, PICTURES = "index.html", "report.md", "tables.json", "pictures"
@@ -33,7 +32,7 @@ PAGE, TWIN, TABLES, PICTURES = "index.html", "report.md", "tables.json", "pictur
 def make_report(
     out: Path,
     *,
-    size: str,
+    sizes: Sizes,
     seed: int,
     checkpoints: Checkpoints,
     records: Path,
@@ -45,7 +44,7 @@ def make_report(
 
     Args:
         out: folder for the page; made if need be.
-        size: key of `SIZES`.
+        sizes: how much of everything.
         seed: of all draws.
         checkpoints: under test.
         records: folder of the results of the parts.
@@ -56,7 +55,6 @@ def make_report(
     Returns:
         The page.
     """
-    sizes = SIZES[size]
     plan = make_plan(sizes, seed=seed, checkpoints=checkpoints, runs=records / "trainings")
     store = Store(records)
     n_parts = len(list(plan))

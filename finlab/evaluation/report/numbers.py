@@ -37,32 +37,19 @@ def share(value: float) -> str:
     return f"{100 * value:.{digits}f} %"
 
 
-def count(value: int) -> str:
-    """Thousands with commas."""
-    return f"{value:,}"
-
-
 def factor(value: float) -> str:
     """How many times: 1.4, 12, 300."""
     return f"{value:.1f}" if value < 9.95 else f"{float(f'{value:.2g}'):,.0f}"
 
 
-def ratio(value: float) -> str:
-    """Three decimals: 1.002."""
-    return f"{value:.3f}"
-
-
-def metres(value: float) -> str:
-    """Four decimals, as the paper prints them."""
-    return f"{value:.4f}"
-
-
-def text(value: Any) -> str:
-    """As it is."""
-    return str(value)
-
-
 FORMATS: dict[str, Callable[[Any], str]] = {
-    function.__name__: function for function in (error, three, share, count, factor, ratio, metres, text)
+    "error": error,
+    "three": three,
+    "share": share,
+    "factor": factor,
+    "count": "{:,}".format,
+    "ratio": "{:.3f}".format,
+    "metres": "{:.4f}".format,
+    "text": str,
 }
 """Name -> how a value is shown."""

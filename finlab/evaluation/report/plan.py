@@ -205,7 +205,7 @@ def _energy_size(sizes: Sizes, method: str) -> Size:
 def _size(sizes: Sizes, split: str, method: str) -> tuple[int, int]:
     """Layouts and targets of a split, the paper's or another, for a quick or a slow method."""
     if split in paper_figures()["wrench_tracking"]:
-        return (sizes.main[0], sizes.slow_main) if is_slow(method) else sizes.main
+        return (sizes.main[0], 1) if is_slow(method) else sizes.main
     return sizes.slow_other if is_slow(method) else sizes.other
 
 

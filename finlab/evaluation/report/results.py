@@ -14,9 +14,9 @@ from finlab.evaluation.experiments.training_study import training_row
 from finlab.evaluation.report.jobs import Columns, Job, Store, rows_of_columns
 from finlab.evaluation.report.plan import REFERENCE, Plan
 from finlab.evaluation.splits import SPLITS, make_split
-from finlab.evaluation.statistics.metrics import energy_rows, wrench_intervals, wrench_row
 from finlab.evaluation.statistics.recheck import recheck
 from finlab.evaluation.statistics.records import Records, records_of_columns, same_targets
+from finlab.evaluation.statistics.tables import energy_rows, wrench_intervals, wrench_row
 
 Row = dict[str, Any]
 

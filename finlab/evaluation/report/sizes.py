@@ -10,16 +10,13 @@ class Sizes:
     """Numbers of cases of a report."""
 
     name: str
-    """`quick`, `full` or `tiny` (tests)."""
+    """`quick` or `full`."""
     main: tuple[int, int]
     """Layouts, and targets on each, of the splits that the paper has."""
     other: tuple[int, int]
     """Layouts, and targets on each, of the other splits."""
-    slow_main: int
-    """First targets of each layout of `ood` for methods of a tenth of a second; on `id` they take those of
-    `energy`."""
     slow_other: tuple[int, int]
-    """Layouts, and first targets of each, for those methods on the other splits."""
+    """Layouts, and first targets of each, for methods of a tenth of a second on the other splits."""
     energy: tuple[int, int]
     """Layouts of split `id`, and first targets of each, for the energies beside 32 starts of IPOPT."""
     energy_slow: int
@@ -41,27 +38,10 @@ class Sizes:
 
 
 SIZES = {
-    "tiny": Sizes(
-        "tiny",
-        main=(2, 3),
-        other=(2, 2),
-        slow_main=1,
-        slow_other=(1, 1),
-        energy=(2, 1),
-        energy_slow=1,
-        ablation=(2, 2),
-        temperature=(2, 2),
-        seeds=(2, 2),
-        latency=(3, 0.5),
-        training=("smoke", 4, 32),
-        swims=(0, 0, 0),
-        lost_pairs=False,
-    ),
     "quick": Sizes(
         "quick",
         main=(30, 30),
         other=(20, 10),
-        slow_main=1,
         slow_other=(8, 1),
         energy=(30, 1),
         energy_slow=1,
@@ -77,7 +57,6 @@ SIZES = {
         "full",
         main=(100, 1000),
         other=(100, 100),
-        slow_main=1,
         slow_other=(25, 1),
         energy=(100, 10),
         energy_slow=2,

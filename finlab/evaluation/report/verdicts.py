@@ -112,8 +112,8 @@ def comparison_rows(comparisons: Sequence[Comparison]) -> list[Row]:
     """Every comparison as a row of a table."""
     return [
         {
-            **{key: getattr(one, key) for key in ("measure", "case", "ours", "theirs", "verdict")},
-            **{key: getattr(one, key) for key in ("our_interval", "their_interval")},
+            **vars(one),
+            "verdict": one.verdict,
             "method": f"`{one.method}`",
             "against": f"`{one.against}`",
         }

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from finlab.allocation.methods import load_allocator
 from finlab.evaluation.experiments.ablation import ablation_method, run_variant
 from finlab.evaluation.experiments.closed_loop_runs import run_all
 from finlab.evaluation.experiments.faults import all_faults, fault_rows, fault_scenarios
 from finlab.evaluation.experiments.latency import latency_cases, latency_rows
-from finlab.evaluation.experiments.seeds import learned_allocator, seed_rows
+from finlab.evaluation.experiments.seeds import seed_rows
 from finlab.evaluation.experiments.temperature import refinement_columns, temperature_columns
 from finlab.evaluation.experiments.training_study import train_and_run
 from finlab.evaluation.experiments.trajectory_and_velocity import (
@@ -76,10 +77,8 @@ def ablation(
         variant, refinement, checkpoint=checkpoint, n_candidates=candidates, temperature=temperature
     )
     scored = run_variant(method, make_split("id", layouts, targets, seed), seed=seed)
-    believed = {
-        "surrogate_err_norm": scored.surrogate.err_norm,
-        "surrogate_err_phys": scored.surrogate.err_phys,
-    }
+    by_surrogate = scored.surrogate
+    believed = {f"surrogate_{key}": getattr(by_surrogate, key) for key in ("err_norm", "err_phys")}
     return columns_of_records(scored.plant) | believed | {"call_s": np.array(scored.call_s)}
 
 
@@ -101,7 +100,9 @@ def scatter(*, fins: int, targets: int, seed: int, checkpoint: str | None) -> Co
 def seeds(*, layouts: int, targets: int, candidates: int, seed: int, checkpoint: str | None) -> Columns:
     """Rows of the comparison of the network's seeds with random ones."""
     cases = make_split("id", layouts, targets, seed)
-    return columns_of_rows(seed_rows(learned_allocator(checkpoint), cases, n_seeds=candidates, seed=seed))
+    return columns_of_rows(
+        seed_rows(load_allocator(checkpoint=checkpoint), cases, n_seeds=candidates, seed=seed)
+    )
 
 
 def latency(
@@ -133,16 +134,8 @@ def training(
     folder: str,
 ) -> Columns:
     """Train with one thing changed and try the network."""
-
-    return train_and_run(
-        change,
-        make_split("id", layouts, targets, seed),
-        Path(folder),
-        preset=preset,
-        steps=steps,
-        batch_size=batch_size,
-        seed=seed,
-    )
+    cases, budget = make_split("id", layouts, targets, seed), {"steps": steps, "batch_size": batch_size}
+    return train_and_run(change, cases, Path(folder), preset=preset, seed=seed, **budget)
 
 
 def trajectory(*, methods: str, runs: int, seed: int, checkpoint: str | None) -> Columns:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from finlab.errors import DataError
 from finlab.evaluation.splits import Case
-from finlab.evaluation.statistics.metrics import MET
 from finlab.evaluation.statistics.records import Records
+from finlab.evaluation.statistics.tables import MET
 from finlab.layout import Layout
 
 Array = NDArray[np.float64]
@@ -62,10 +62,7 @@ def recheck(
         if len(rows) == 0:
             continue
         mine = command[rows, : case.layout.n_fins]
-        lower, upper = (
-            np.array([getattr(fin.limits, end) for fin in case.layout.fins]) for end in ("lower", "upper")
-        )
-        outside += int(((mine < lower) | (mine > upper)).sum())
+        outside += int(((mine < case.layout.lower) | (mine > case.layout.upper)).sum())
         difference = wrench_by_hand(case.layout, mine) - case.targets[records.target[rows]]
         error = np.linalg.norm(difference / sigma, axis=-1)
         worst = max(worst, float(error.max()))

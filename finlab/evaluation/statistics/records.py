@@ -49,16 +49,15 @@ class Records:
     def __len__(self) -> int:
         return len(self.err_norm)
 
-    def select(self, keep: NDArray[np.bool_]) -> Records:
-        """The records where `keep` (N,) holds."""
-        return Records(**{field.name: getattr(self, field.name)[keep] for field in fields(self)})
+    def select(self, keep: NDArray[np.bool_ | np.intp]) -> Records:
+        """The records where `keep` (N,) holds, or those at its places."""
+        return Records(**{name: values[keep] for name, values in columns_of_records(self).items()})
 
 
 def join_records(parts: list[Records]) -> Records:
     """One after the other."""
-    return Records(
-        **{field.name: np.concatenate([getattr(p, field.name) for p in parts]) for field in fields(Records)}
-    )
+    columns = [columns_of_records(part) for part in parts]
+    return Records(**{name: np.concatenate([part[name] for part in columns]) for name in columns[0]})
 
 
 def same_targets(records: Records, reference: Records) -> tuple[Records, Records]:
@@ -71,7 +70,7 @@ def same_targets(records: Records, reference: Records) -> tuple[Records, Records
     shared, ours, theirs = np.intersect1d(key, other, return_indices=True)
     if len(shared) == 0:
         raise DataError("records: the two methods share no target; run them on the same split and seed")
-    return _take(records, ours), _take(reference, theirs)
+    return records.select(ours), reference.select(theirs)
 
 
 def columns_of_records(records: Records) -> dict[str, NDArray[Any]]:
@@ -106,7 +105,3 @@ def load_columns(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     except (OSError, KeyError, ValueError, EOFError, BadZipFile) as error:
         raise DataError(f"{path}: not a file of records ({error}); delete it and run again") from error
     return columns, meta
-
-
-def _take(records: Records, index: NDArray[np.intp]) -> Records:
-    return Records(**{name: values[index] for name, values in columns_of_records(records).items()})

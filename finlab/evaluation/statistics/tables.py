@@ -1,11 +1,126 @@
-"""Rows (one dict each) as an aligned text table."""
+"""Tables: rows (one dict each) from records, and rows as an aligned text. Pure functions, numpy only."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.evaluation.statistics.bootstrap import (
+    Interval,
+    mean_interval,
+    quantile_interval,
+    ratio_interval,
+    share_interval,
+)
+from finlab.evaluation.statistics.records import Records, same_targets
+
 Row = dict[str, Any]
+
+SUCCESS_LEVELS = (0.01, 0.05, 0.5, 1.0)
+"""Levels t of `success@t`, the share of targets with `err_norm <= t`."""
+MET = 0.05
+"""Normalized error up to which a target counts as met when energies are compared."""
+
+
+def wrench_row(records: Records, *, split: str, method: str, scored_by: str = "plant") -> Row:
+    """One row of the wrench table.
+
+    Args:
+        records: at least one target.
+        split: name of the split.
+        method: name of the method.
+        scored_by: the model that computed the delivered wrench, `plant` or `surrogate`.
+    """
+    error = records.err_norm
+    row: Row = {
+        "split": split,
+        "method": method,
+        "n": len(records),
+        "scored_by": scored_by,
+        "err_norm_mean": float(error.mean()),
+        "err_norm_median": float(np.median(error)),
+        "err_norm_p95": float(np.quantile(error, 0.95)),
+        "err_norm_max": float(error.max()),
+        "err_phys_mean": float(records.err_phys.mean()),
+    }
+    row |= {f"success_{level}": float((error <= level).mean()) for level in SUCCESS_LEVELS}
+    row |= {
+        "energy_mean": float(records.energy.mean()),
+        "solve_ms_p50": float(np.quantile(records.solve_ms, 0.5)),
+        "solve_ms_p99": float(np.quantile(records.solve_ms, 0.99)),
+    }
+    return row
+
+
+def wrench_intervals(records: Records) -> dict[str, Interval]:
+    """Where the columns of `wrench_row` would lie in a rerun with another seed, by column."""
+    error, group = records.err_norm, records.layout
+    found = {
+        "err_norm_mean": mean_interval(error, group),
+        "err_norm_median": quantile_interval(error, 0.5, group),
+        "err_norm_p95": quantile_interval(error, 0.95, group),
+        "err_phys_mean": mean_interval(records.err_phys, group),
+        "energy_mean": mean_interval(records.energy, group),
+    }
+    found |= {f"success_{level}": share_interval(error <= level, group) for level in SUCCESS_LEVELS}
+    return found
+
+
+def rows_by_fin_count(records: Records, *, method: str) -> list[Row]:
+    """Error and energy for each number of healthy fins (the paper's figure B as a table)."""
+    return [
+        {
+            "method": method,
+            "fins": int(n_fins),
+            "n": len(part),
+            "err_norm_mean": float(part.err_norm.mean()),
+            "err_norm_median": float(np.median(part.err_norm)),
+            "err_norm_p95": float(np.quantile(part.err_norm, 0.95)),
+            "success_0.01": float((part.err_norm <= 0.01).mean()),
+            "energy_mean": float(part.energy.mean()),
+        }
+        for n_fins in np.unique(records.n_fins)
+        for part in [records.select(records.n_fins == n_fins)]
+    ]
+
+
+def energy_rows(records: Records, reference: Records, *, method: str) -> list[Row]:
+    """Energy over the reference's on the targets that both met, and resting fins: one row per fin count, and
+    one over all of them, whose `fins` is "all"."""
+    ours, theirs = same_targets(records, reference)
+    both = (ours.err_norm <= MET) & (theirs.err_norm <= MET)
+    counts: list[int | str] = [*np.unique(ours.n_fins).tolist(), "all"]
+    return [
+        _energy_row(ours, theirs, both, ours.n_fins == fins if fins != "all" else both | True, method, fins)
+        for fins in counts
+    ]
+
+
+def _energy_row(
+    ours: Records,
+    theirs: Records,
+    both: NDArray[np.bool_],
+    chosen: NDArray[np.bool_],
+    method: str,
+    fins: int | str,
+) -> Row:
+    a, b = ours.select(both & chosen), theirs.select(both & chosen)
+    row: Row = {"method": method, "fins": fins, "n": int(chosen.sum()), "met_by_both": len(a)}
+    row["success_0.01"] = float((ours.err_norm[chosen] <= 0.01).mean())
+    if len(a) == 0:
+        return row | {"energy_mean": None, "energy_ratio": None, "cheaper": None, "resting": None}
+    ends = ratio_interval(a.energy, b.energy, a.layout)
+    return row | {
+        "energy_mean": float(a.energy.mean()),
+        "energy_ratio": float(a.energy.sum() / b.energy.sum()),
+        "energy_ratio_low": ends.low,
+        "energy_ratio_high": ends.high,
+        "cheaper": float((a.energy < b.energy).mean()),
+        "resting": float(a.resting.mean()),
+    }
 
 
 def columns_of(rows: Sequence[Row]) -> list[str]:

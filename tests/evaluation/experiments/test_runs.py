@@ -14,8 +14,8 @@ from finlab.evaluation.experiments.ablation import REFINEMENTS, VARIANTS, ablati
 from finlab.evaluation.experiments.latency import latency_report, latency_rows, machine
 from finlab.evaluation.experiments.wrench_tracking import run_method, wrench_report, wrench_rows
 from finlab.evaluation.splits import SPLITS, make_split
-from finlab.evaluation.statistics.metrics import wrench_row
 from finlab.evaluation.statistics.records import load_columns, records_of_columns
+from finlab.evaluation.statistics.tables import wrench_row
 from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
 from finlab.physics import Plant

@@ -10,10 +10,26 @@ from finlab.evaluation.report import plan as planning
 from finlab.evaluation.report.jobs import Job
 from finlab.evaluation.report.make import PAGE, PICTURES, TABLES, TWIN, make_report
 from finlab.evaluation.report.plan import Checkpoints, make_plan
-from finlab.evaluation.report.sizes import SIZES
+from finlab.evaluation.report.sizes import Sizes
 
 pytest.importorskip("matplotlib")
 pytest.importorskip("casadi")
+
+TINY = Sizes(
+    "tiny",
+    main=(2, 3),
+    other=(2, 2),
+    slow_other=(1, 1),
+    energy=(2, 1),
+    energy_slow=1,
+    ablation=(2, 2),
+    temperature=(2, 2),
+    seeds=(2, 2),
+    latency=(3, 0.5),
+    training=("smoke", 4, 32),
+    swims=(0, 0, 0),
+    lost_pairs=False,
+)
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +58,7 @@ def folder(
 def _make(out: Path, checkpoint: Path) -> None:
     make_report(
         out,
-        size="tiny",
+        sizes=TINY,
         seed=0,
         checkpoints=Checkpoints(str(checkpoint), str(checkpoint)),
         records=out / "records",
@@ -86,9 +102,9 @@ def test_the_second_time_nothing_is_done_again(
 def test_without_casadi_and_torch_the_rest_is_planned(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    whole = make_plan(SIZES["tiny"], seed=0, checkpoints=Checkpoints(), runs=tmp_path)
+    whole = make_plan(TINY, seed=0, checkpoints=Checkpoints(), runs=tmp_path)
     monkeypatch.setattr(planning, "find_spec", lambda _: None)
-    bare = make_plan(SIZES["tiny"], seed=0, checkpoints=Checkpoints(), runs=tmp_path)
+    bare = make_plan(TINY, seed=0, checkpoints=Checkpoints(), runs=tmp_path)
     assert whole.training and not bare.training
     assert {name for name in whole.energy if name not in bare.energy} == {"ipopt", "ipopt-32"}
     assert bare.ablation == whole.ablation and bare.wrench["id", "learned"] == whole.wrench["id", "learned"]

@@ -5,9 +5,15 @@ import pytest
 
 from finlab.evaluation.experiments.wrench_tracking import energy_comparison
 from finlab.evaluation.paper_figures import paper_figures, paper_wrench_rows
-from finlab.evaluation.statistics.metrics import energy_rows, rows_by_fin_count, wrench_intervals, wrench_row
 from finlab.evaluation.statistics.records import Records, join_records
-from finlab.evaluation.statistics.tables import format_cell, text_table
+from finlab.evaluation.statistics.tables import (
+    energy_rows,
+    format_cell,
+    rows_by_fin_count,
+    text_table,
+    wrench_intervals,
+    wrench_row,
+)
 
 KEYS = [
     *("split", "method", "n", "scored_by"),

@@ -85,4 +85,4 @@ def test_training_goes_on_after_a_stop(allocator: LearnedAllocator, tmp_path: Pa
 
 def test_verb_refuses_what_is_no_count(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["train", "fast", "-o", str(tmp_path / "x"), "--steps", "0"]) == 2
-    assert "--steps: expected a number from 1" in capsys.readouterr().err
+    assert "steps: expected a number of at least 1" in capsys.readouterr().err
