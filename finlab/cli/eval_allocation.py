@@ -1,21 +1,11 @@
 """`finlab eval wrench|seeds|ablation|temperature|latency|...`: methods on targets, without a body."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from typing import Annotated
 
 from tyro.conf import arg
 
-from finlab.cli.eval_arguments import (
-    Cases,
-    Count,
-    Folder,
-    Names,
-    Run,
-    check_folders,
-    open_layouts,
-)
+from finlab.cli.eval_arguments import Cases, Count, Folder, Names, Run, check_folders, open_layouts
 from finlab.cli.inputs import check_positive
 
 RUN = Run()
@@ -178,9 +168,7 @@ def steadiness(
 
 
 def modes(
-    cases: Annotated[Cases, arg(name="")] = FEW,
-    starts: Count = 256,
-    run: Annotated[Run, arg(name="")] = RUN,
+    cases: Annotated[Cases, arg(name="")] = FEW, starts: Count = 256, run: Annotated[Run, arg(name="")] = RUN
 ) -> None:
     """Compare the distinct ways that an answer tells with those that many random starts lead to.
 

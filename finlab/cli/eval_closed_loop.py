@@ -1,7 +1,5 @@
 """`finlab eval trajectory|faults|velocity`: the paper's closed-loop experiments in simulation."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from tyro.conf import arg

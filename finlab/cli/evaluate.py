@@ -3,8 +3,6 @@
 Here are `training` and `report`, which are made of many jobs that are kept in a folder.
 """
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 from typing import Annotated

@@ -7,19 +7,16 @@ from typing import TYPE_CHECKING, NamedTuple
 from finlab.errors import CommandError
 
 if TYPE_CHECKING:
-    from finlab.deploy.graph import LayoutGraph
     from finlab.layout import Layout
 
 
 class Robot(NamedTuple):
-    """A layout, the fins of it that do not work, and the graph file that said so, if it was one."""
+    """A layout, and the fins of it that do not work."""
 
     layout: Layout
     """All fins."""
     failed: tuple[str, ...] = ()
     """Names of fins that a graph file marks as failed."""
-    graph: LayoutGraph | None = None
-    """The graph file, if the layout came from one."""
 
     def with_failed(self, names: tuple[str, ...]) -> tuple[str, ...]:
         """Names of all failed fins: those of the file and those named now, each once."""
@@ -40,12 +37,12 @@ def open_robot(text: str) -> Robot:
         from finlab.deploy.robot import read_bundle_graph
 
         graph = read_bundle_graph(path)
-        return Robot(graph.layout, graph.failed, graph)
+        return Robot(graph.layout, graph.failed)
     if path.name.endswith(SUFFIX):
         from finlab.deploy.graph_file import read_graph
 
         graph = read_graph(path)
-        return Robot(graph.layout, graph.failed, graph)
+        return Robot(graph.layout, graph.failed)
     return Robot(load_layout(path))
 
 

@@ -1,7 +1,5 @@
 """Robots and targets that are valid but hostile: degenerate limits, geometry, fin models and wrenches."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Methods as users specify them: a name, with a number of starts where a method has them: `ipopt-32`."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from pathlib import Path

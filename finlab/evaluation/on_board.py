@@ -6,8 +6,6 @@ fault-tolerant form. The published allocation and its fault rule are known to us
 thrust law and scaling at the limit are those of the robot's open software.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

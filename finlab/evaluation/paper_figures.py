@@ -1,7 +1,5 @@
 """Figures that the paper prints, for side-by-side tables; `paper_figures.yaml` names the source of each."""
 
-from __future__ import annotations
-
 from functools import cache
 from importlib.resources import files
 from typing import Any

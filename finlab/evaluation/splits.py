@@ -1,7 +1,5 @@
 """Held-out test cases: seeded layouts and reachable targets, one definition per split name."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

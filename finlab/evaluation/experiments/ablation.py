@@ -4,8 +4,6 @@ The same five rows are run twice: refined by Adam as in the paper, and by Levenb
 about as long.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -22,7 +20,7 @@ from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.evaluation.statistics.records import Records, join_records
-from finlab.evaluation.statistics.tables import text_table
+from finlab.evaluation.statistics.tables import Row, text_table
 
 VARIANTS: dict[str, dict[str, Any]] = {
     "mean_only": {"mean_only": True},
@@ -37,8 +35,6 @@ REFINEMENTS = ("adam", "levenberg-marquardt")
 """Refinements of method `paper` that are compared."""
 TIMED_CALLS = 10
 """Single calls whose mean time a row shows, after one that is not counted."""
-
-Row = dict[str, Any]
 
 
 class Scored(NamedTuple):

@@ -5,8 +5,6 @@ Systems, IROS 2012. Robot and reference share one world frame and one clock, so 
 are paired by time. Only positions count: the reference prescribes no attitude.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product

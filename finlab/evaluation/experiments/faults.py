@@ -1,7 +1,5 @@
 """The paper's fault experiment: a trajectory with fins lost from the start, or on the way."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations

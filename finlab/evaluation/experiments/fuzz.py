@@ -1,7 +1,5 @@
 """Methods on hostile robots: are answers finite, within the limits and in time, without other errors?"""
 
-from __future__ import annotations
-
 import sys
 import tempfile
 import time

@@ -1,7 +1,5 @@
 """How long one call takes: methods side by side in one run on one machine, single calls only."""
 
-from __future__ import annotations
-
 import os
 import platform
 import sys
@@ -10,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_info
@@ -20,7 +17,7 @@ from finlab.allocation.allocator import Allocator
 from finlab.errors import DataError
 from finlab.evaluation.splits import Case, make_split
 from finlab.evaluation.statistics.bootstrap import quantile_interval
-from finlab.evaluation.statistics.tables import text_table
+from finlab.evaluation.statistics.tables import Row, text_table
 
 REFERENCE = "learned"
 """The method that the others are compared with, where it takes part."""
@@ -28,8 +25,6 @@ LAYOUTS = 5
 """Layouts whose calls are timed."""
 WARM_UP = 2
 """First calls on each layout that are not counted; a robot keeps its layout for long."""
-
-Row = dict[str, Any]
 
 
 def latency_cases(fins: int, seed: int) -> list[Case]:

@@ -6,8 +6,6 @@ modes. Among those of reasonable energy, a mode counts as covered if the allocat
 the same.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from typing import Any
@@ -21,7 +19,7 @@ from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, Ipopt
 from finlab.allocation.baselines.single_target import Problem
 from finlab.allocation.modes import cluster, mode_signature, same_signature
 from finlab.evaluation.splits import Case
-from finlab.evaluation.statistics.tables import text_table
+from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.layout import Layout
 from finlab.physics import Plant, plant_of
 from finlab.physics.energy import command_energy
@@ -33,8 +31,6 @@ EXACT = 1e-4
 wrenches differ by more."""
 CHEAP = 1.25
 """Modes that need up to so much of the least energy known are counted."""
-
-Row = dict[str, Any]
 
 
 class CheapestWays(Ipopt):

@@ -5,8 +5,6 @@ Levenberg-Marquardt steps on the surrogate and scored by the plant. Of each targ
 the surrogate picks the answer: the cheapest exact one, or the most exact one.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from typing import Any
@@ -23,7 +21,7 @@ from finlab.allocation.learned.proposal import propose
 from finlab.allocation.learned.refined_candidates import RANKING
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
-from finlab.evaluation.statistics.tables import text_table
+from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.physics import Plant
 from finlab.physics.energy import command_energy
 
@@ -36,8 +34,6 @@ KINDS = ("network", "random", "quasi-random")
 
 MET = 0.05
 """Normalized error up to which a target counts as met when energies are compared."""
-
-Row = dict[str, Any]
 
 
 def seed_rows(

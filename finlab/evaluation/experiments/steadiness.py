@@ -5,18 +5,16 @@ an even spread over the fins never asks for more than half of any fin's thrust. 
 `allocate`; with `previous` it is told the last command. Every answer is scored by the plant.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
-from finlab.evaluation.statistics.tables import text_table
+from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
 from finlab.layout.arrays import layout_effectiveness
@@ -39,8 +37,6 @@ GOAL = 0.2
 """Largest turn with `previous` over that without it that counts as steady."""
 WORKS = 1e-3
 """Share of its largest thrust from which a fin has to point somewhere."""
-
-Row = dict[str, Any]
 
 
 class Rollout(NamedTuple):

@@ -1,7 +1,5 @@
 """The paper's figure A: what the temperature of the draw does, and what refinement does to a candidate."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,13 +13,12 @@ from finlab.allocation.methods import load_allocator
 from finlab.allocation.options import PaperOptions
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
-from finlab.evaluation.statistics.tables import text_table
+from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.layout import Layout
 from finlab.layout.angles import is_full_turn
 
 Array = NDArray[Any]
 Columns = dict[str, Array]
-Row = dict[str, Any]
 
 TEMPERATURES = tuple(float(t) for t in np.logspace(-3, 1, 13))
 """From 0.001 to 10, three to a decade."""

@@ -1,7 +1,5 @@
 """What each part of the training brings: small trainings on equal budgets, one thing changed at a time."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -16,14 +14,13 @@ from finlab.evaluation.experiments.wrench_tracking import run_method
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.evaluation.statistics.records import columns_of_records
-from finlab.evaluation.statistics.tables import text_table
+from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
 
 LM_STEPS = 4
 """Levenberg-Marquardt steps after which the refined error is taken."""
 
 Columns = dict[str, NDArray[Any]]
-Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -72,14 +69,7 @@ CHANGES = {
 
 
 def train_and_run(
-    name: str,
-    cases: Sequence[Case],
-    folder: Path,
-    *,
-    preset: str,
-    steps: int,
-    batch_size: int,
-    seed: int = 0,
+    name: str, cases: Sequence[Case], folder: Path, *, preset: str, steps: int, batch_size: int, seed: int = 0
 ) -> Columns:
     """Train with one change and try the network on cases; a training that was cut off goes on.
 

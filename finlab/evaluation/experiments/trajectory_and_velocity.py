@@ -1,8 +1,6 @@
 """Two of the paper's experiments: several layouts follow a trajectory with one controller and one checkpoint;
 a robot keeps a speed and a depth, for power and error of the speed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -6,8 +6,6 @@ model; the answers are scored by the plant. `closest` and the first group of `pr
 error, `direction` by the share of the target that is delivered and by what is delivered beside it.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from itertools import product
@@ -20,14 +18,13 @@ from tqdm import tqdm
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, import_casadi
 from finlab.allocation.policy import KINDS, Policy
-from finlab.evaluation.statistics.tables import text_table
+from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.layout import Layout, random_layout
 from finlab.layout.angles import is_full_turn
 from finlab.layout.arrays import layout_effectiveness
 from finlab.physics import Plant, plant_of
 
 Array = NDArray[np.float64]
-Row = dict[str, Any]
 
 DOMAIN = 0xFA2
 """Leads the seed of every case."""

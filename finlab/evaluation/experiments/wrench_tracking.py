@@ -1,7 +1,5 @@
 """Wrench tracking: methods over a split, every answer scored by the plant."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from typing import Any

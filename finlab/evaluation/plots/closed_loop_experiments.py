@@ -1,7 +1,5 @@
 """Closed-loop experiments: paths by layout, errors by fault, power against the error of speed."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Times of calls, the ablation, what the network's seeds buy, the small trainings, and the temperature."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

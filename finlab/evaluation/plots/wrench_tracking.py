@@ -1,7 +1,5 @@
 """Wrench tracking: how errors are distributed, error and energy by number of fins (the paper's figure B)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -3,8 +3,6 @@
 A heading, a paragraph or a list is a string of Markdown; a paragraph *all in italics* is a remark in small.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -80,7 +78,7 @@ class Figure:
     """What is to be seen."""
 
     @classmethod
-    def drawn(cls, name: str, picture: Picture, caption: str) -> Figure:
+    def drawn(cls, name: str, picture: Picture, caption: str) -> "Figure":
         """Of a picture that was drawn with matplotlib."""
         return cls(name, picture.svg(name), caption)
 
@@ -91,7 +89,7 @@ class Fold:
 
     title: str
     """What is inside."""
-    blocks: tuple[Block, ...]
+    blocks: "tuple[Block, ...]"
     """What is inside."""
 
 

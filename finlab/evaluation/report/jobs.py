@@ -1,7 +1,5 @@
 """Jobs: pieces of work with their settings, run on all cores, each kept in a store when it is done."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -144,7 +142,7 @@ def run_jobs(jobs: Sequence[Job], store: Store, *, commit: str, processes: int |
                 bar.update()
 
 
-def _run_pool(jobs: Sequence[Job], folder: Path, commit: str, processes: int, bar: tqdm[Any]) -> None:
+def _run_pool(jobs: Sequence[Job], folder: Path, commit: str, processes: int, bar: "tqdm[Any]") -> None:
     # Fresh processes: a fork would copy the threads of BLAS in whatever state they are.
     pool = ProcessPoolExecutor(processes, mp_context=get_context("spawn"), initializer=_calm)
     try:
@@ -169,5 +167,5 @@ def _run_one(job: Job, folder: Path, commit: str) -> None:
     job.run(Store(folder), commit)
 
 
-def _show(bar: tqdm[Any], job: Job) -> None:
+def _show(bar: "tqdm[Any]", job: Job) -> None:
     bar.set_description(job.name)

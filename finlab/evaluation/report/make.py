@@ -1,7 +1,5 @@
 """`finlab eval report`: run what is missing, then write the page, its Markdown twin and the pictures."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

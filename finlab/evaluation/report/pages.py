@@ -1,7 +1,5 @@
 """A document as one self-contained HTML page, and as Markdown with its pictures in files beside it."""
 
-from __future__ import annotations
-
 import html
 import re
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Which jobs a report needs, by table. Sections look their results up here, by method, split or setting."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields
 from importlib.util import find_spec
@@ -74,7 +72,7 @@ class Plan:
     latency: dict[str, Job] = field(default_factory=dict)
     """One job, `calls`."""
 
-    def only_done(self, store: Store) -> Plan:
+    def only_done(self, store: Store) -> "Plan":
         """The jobs whose results are there; a study that lacks a part is left out whole."""
         left: dict[str, Any] = {}
         for group in fields(self):

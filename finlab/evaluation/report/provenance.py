@@ -1,7 +1,5 @@
 """Where and from what a report was made: enough to make it again and to trace every number."""
 
-from __future__ import annotations
-
 import subprocess
 import time
 from dataclasses import dataclass

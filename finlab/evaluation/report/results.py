@@ -1,7 +1,5 @@
 """What the jobs of a plan gave, as the sections want it."""
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import Any
 
@@ -16,9 +14,7 @@ from finlab.evaluation.report.plan import REFERENCE, Plan
 from finlab.evaluation.splits import SPLITS, make_split
 from finlab.evaluation.statistics.recheck import recheck
 from finlab.evaluation.statistics.records import Records, records_of_columns, same_targets
-from finlab.evaluation.statistics.tables import energy_rows, wrench_intervals, wrench_row
-
-Row = dict[str, Any]
+from finlab.evaluation.statistics.tables import Row, energy_rows, wrench_intervals, wrench_row
 
 
 class Results:
@@ -96,10 +92,7 @@ class Results:
         for (variant, refinement), job in self.plan.ablation.items():
             columns = self.columns(job)
             by_plant = records_of_columns(columns)
-            believed = {
-                "err_norm": columns["surrogate_err_norm"],
-                "err_phys": columns["surrogate_err_phys"],
-            }
+            believed = {"err_norm": columns["surrogate_err_norm"], "err_phys": columns["surrogate_err_phys"]}
             by_surrogate = records_of_columns({**columns, **believed})
             for scored_by, records in (("plant", by_plant), ("surrogate", by_surrogate)):
                 rows.append(ablation_row(variant, refinement, scored_by, records, float(columns["call_s"])))

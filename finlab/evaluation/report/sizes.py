@@ -1,7 +1,5 @@
 """How much of everything a report measures: `quick` in minutes, `full` at the paper's size."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -4,8 +4,6 @@ A method leads another only where their intervals do not overlap: the interval o
 another seed lands. In every measure less is better.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -111,12 +109,7 @@ def standings(comparisons: Sequence[Comparison]) -> list[Row]:
 def comparison_rows(comparisons: Sequence[Comparison]) -> list[Row]:
     """Every comparison as a row of a table."""
     return [
-        {
-            **vars(one),
-            "verdict": one.verdict,
-            "method": f"`{one.method}`",
-            "against": f"`{one.against}`",
-        }
+        {**vars(one), "verdict": one.verdict, "method": f"`{one.method}`", "against": f"`{one.against}`"}
         for one in comparisons
     ]
 

@@ -1,7 +1,5 @@
 """What a job does: plain settings in, arrays out, so that it can run in a process of its own."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

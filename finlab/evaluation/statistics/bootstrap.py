@@ -5,8 +5,6 @@ seed is as uncertain as the run at hand: the difference of the two has sqrt(2) t
 percentiles are those of a normal variable at sqrt(2) x 1.96, so that the rerun lies inside 95 times of 100.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import NamedTuple

@@ -1,8 +1,6 @@
 """Answers that beat the reference, computed again: the fin law written out, apart from the plant, in double
 precision. A win that came from a broken limit or a missed target would show here."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -67,9 +65,4 @@ def recheck(
         error = np.linalg.norm(difference / sigma, axis=-1)
         worst = max(worst, float(error.max()))
         disagreement = max(disagreement, float(np.abs(error - records.err_norm[rows]).max()))
-    return {
-        "wins": int(wins.sum()),
-        "worst_error": worst,
-        "outside": outside,
-        "disagreement": disagreement,
-    }
+    return {"wins": int(wins.sum()), "worst_error": worst, "outside": outside, "disagreement": disagreement}

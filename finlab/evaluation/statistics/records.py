@@ -4,8 +4,6 @@ Every number of every table is computed from such records by pure functions. A f
 column, named as the fields of `Records`, and `meta`, a JSON text that says how the records were made.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -49,7 +47,7 @@ class Records:
     def __len__(self) -> int:
         return len(self.err_norm)
 
-    def select(self, keep: NDArray[np.bool_ | np.intp]) -> Records:
+    def select(self, keep: NDArray[np.bool_ | np.intp]) -> "Records":
         """The records where `keep` (N,) holds, or those at its places."""
         return Records(**{name: values[keep] for name, values in columns_of_records(self).items()})
 

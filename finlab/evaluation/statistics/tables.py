@@ -1,7 +1,5 @@
 """Tables: rows (one dict each) from records, and rows as an aligned text. Pure functions, numpy only."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

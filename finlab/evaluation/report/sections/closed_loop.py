@@ -1,7 +1,5 @@
 """Closed loop: trajectories on the paper's layouts, lost fins, and speed against power."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from finlab.evaluation.experiments.faults import fault_verdict

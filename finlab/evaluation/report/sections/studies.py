@@ -1,7 +1,5 @@
 """Time per call, ablation, temperature, seeds and training: one table and one picture each."""
 
-from __future__ import annotations
-
 from finlab.evaluation.experiments.ablation import VARIANTS
 from finlab.evaluation.experiments.temperature import PAPER_TEMPERATURE
 from finlab.evaluation.experiments.training_study import CHANGES

@@ -1,7 +1,5 @@
 """The first screen: a few numbers, and in which measures and cases each method leads, by their intervals."""
 
-from __future__ import annotations
-
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.report.document import Block, Card, Cards, Column, Fold, Row, Table
 from finlab.evaluation.report.numbers import error, factor, share, three

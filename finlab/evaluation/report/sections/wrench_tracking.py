@@ -1,7 +1,5 @@
 """Wrench tracking on every split, beside the paper's table, and energies beside 32 starts of IPOPT."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from finlab.evaluation.method_specs import is_slow
