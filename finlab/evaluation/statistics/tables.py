@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.evaluation.statistics.bootstrap import (
     Interval,
@@ -21,6 +20,10 @@ SUCCESS_LEVELS = (0.01, 0.05, 0.5, 1.0)
 """Levels t of `success@t`, the share of targets with `err_norm <= t`."""
 MET = 0.05
 """Normalized error up to which a target counts as met when energies are compared."""
+FIN_COUNT_COLUMNS = ("n", "err_norm_mean", "err_norm_median", "err_norm_p95", "success_0.01", "energy_mean")
+"""Of `wrench_row`, in the table by number of fins."""
+ENERGY_COLUMNS = ("energy_mean", "energy_ratio", "cheaper", "resting")
+"""Columns without a value where no target was met by both."""
 
 
 def wrench_row(records: Records, *, split: str, method: str, scored_by: str = "plant") -> Row:
@@ -69,20 +72,11 @@ def wrench_intervals(records: Records) -> dict[str, Interval]:
 
 def rows_by_fin_count(records: Records, *, method: str) -> list[Row]:
     """Error and energy for each number of healthy fins (the paper's figure B as a table)."""
-    return [
-        {
-            "method": method,
-            "fins": int(n_fins),
-            "n": len(part),
-            "err_norm_mean": float(part.err_norm.mean()),
-            "err_norm_median": float(np.median(part.err_norm)),
-            "err_norm_p95": float(np.quantile(part.err_norm, 0.95)),
-            "success_0.01": float((part.err_norm <= 0.01).mean()),
-            "energy_mean": float(part.energy.mean()),
-        }
-        for n_fins in np.unique(records.n_fins)
-        for part in [records.select(records.n_fins == n_fins)]
-    ]
+    rows = []
+    for n_fins in np.unique(records.n_fins):
+        row = wrench_row(records.select(records.n_fins == n_fins), split="", method=method)
+        rows.append({"method": method, "fins": int(n_fins)} | {key: row[key] for key in FIN_COUNT_COLUMNS})
+    return rows
 
 
 def energy_rows(records: Records, reference: Records, *, method: str) -> list[Row]:
@@ -90,34 +84,26 @@ def energy_rows(records: Records, reference: Records, *, method: str) -> list[Ro
     one over all of them, whose `fins` is "all"."""
     ours, theirs = same_targets(records, reference)
     both = (ours.err_norm <= MET) & (theirs.err_norm <= MET)
-    counts: list[int | str] = [*np.unique(ours.n_fins).tolist(), "all"]
-    return [
-        _energy_row(ours, theirs, both, ours.n_fins == fins if fins != "all" else both | True, method, fins)
-        for fins in counts
-    ]
+    rows: list[Row] = []
+    for fins in [*np.unique(ours.n_fins).tolist(), "all"]:
+        chosen = both | True if fins == "all" else ours.n_fins == fins
+        a, b = ours.select(both & chosen), theirs.select(both & chosen)
+        row: Row = {"method": method, "fins": fins, "n": int(chosen.sum()), "met_by_both": len(a)}
+        row["success_0.01"] = float((ours.err_norm[chosen] <= 0.01).mean())
+        rows.append(row | (_energy_columns(a, b) if len(a) else dict.fromkeys(ENERGY_COLUMNS)))
+    return rows
 
 
-def _energy_row(
-    ours: Records,
-    theirs: Records,
-    both: NDArray[np.bool_],
-    chosen: NDArray[np.bool_],
-    method: str,
-    fins: int | str,
-) -> Row:
-    a, b = ours.select(both & chosen), theirs.select(both & chosen)
-    row: Row = {"method": method, "fins": fins, "n": int(chosen.sum()), "met_by_both": len(a)}
-    row["success_0.01"] = float((ours.err_norm[chosen] <= 0.01).mean())
-    if len(a) == 0:
-        return row | {"energy_mean": None, "energy_ratio": None, "cheaper": None, "resting": None}
-    ends = ratio_interval(a.energy, b.energy, a.layout)
-    return row | {
-        "energy_mean": float(a.energy.mean()),
-        "energy_ratio": float(a.energy.sum() / b.energy.sum()),
+def _energy_columns(ours: Records, theirs: Records) -> Row:
+    """Energies and resting fins on targets that both met."""
+    ends = ratio_interval(ours.energy, theirs.energy, ours.layout)
+    return {
+        "energy_mean": float(ours.energy.mean()),
+        "energy_ratio": float(ours.energy.sum() / theirs.energy.sum()),
         "energy_ratio_low": ends.low,
         "energy_ratio_high": ends.high,
-        "cheaper": float((a.energy < b.energy).mean()),
-        "resting": float(a.resting.mean()),
+        "cheaper": float((ours.energy < theirs.energy).mean()),
+        "resting": float(ours.resting.mean()),
     }
 
 
