@@ -15,7 +15,9 @@ def score_card_text(card: ScoreCard) -> str:
     """Everything on the card, as tables and sentences."""
     lines = [*_span_lines(card), "", *_axis_table(card), "", *_evenness(card.authority)]
     if card.losses:
-        lines += ["", *_loss_table(card)]
+        rows = [_loss_row(loss, loss is card.worst_loss) for loss in card.losses]
+        lines += ["", "Share of the largest wrench that is left without one fin (* the worst to lose):"]
+        lines += _table(("without", "rank", "weakest [N]", *_axes(), "lost"), rows)
     error = max(a / unit for a, unit in zip(card.model_error, _LEVERS, strict=True))
     lines += [
         "",
@@ -41,21 +43,11 @@ def comparison_text(before: ScoreCard, after: ScoreCard) -> str:
     for axis, a, b, unit in zip(_axes(), _least(old), _least(new), _UNITS, strict=True):
         rows.append((f"largest {axis} [{unit}]", f"{a:.3f}", f"{b:.3f}"))
     for k, (axis, size, unit) in enumerate(zip(_axes(), before.unit_wrench, _UNITS, strict=True)):
-        rows.append(
-            (
-                f"energy of {axis} {size:g} {unit}",
-                _number(before.unit_energy[k], 2),
-                _number(after.unit_energy[k], 2),
-            )
-        )
+        energies = _number(before.unit_energy[k]), _number(after.unit_energy[k])
+        rows.append((f"energy of {axis} {size:g} {unit}", *energies))
     if before.worst_loss and after.worst_loss:
-        rows.append(
-            (
-                "weakest after worst loss [N]",
-                f"{before.worst_loss.weakest:.2f}",
-                f"{after.worst_loss.weakest:.2f}",
-            )
-        )
+        a, b = before.worst_loss.weakest, after.worst_loss.weakest
+        rows.append(("weakest after worst loss [N]", f"{a:.2f}", f"{b:.2f}"))
     return "\n".join(_table(("", "before", "after"), rows))
 
 
@@ -83,8 +75,8 @@ def _axis_table(card: ScoreCard) -> list[str]:
             f"{held.beside_others[k]:.3f}",
             _UNITS[k],
             f"{card.unit_wrench[k]:g} {_UNITS[k]}",
-            _number(card.unit_energy[k], 2),
-            _number(card.unit_energy_negative[k], 2),
+            _number(card.unit_energy[k]),
+            _number(card.unit_energy_negative[k]),
         )
         for k, axis in enumerate(_axes())
     ]
@@ -99,15 +91,6 @@ def _evenness(held: Authority) -> list[str]:
     return [
         f"Weakest direction: {held.weakest:.2f} N along {direction} (torques over 0.2 m).",
         f"Isotropy {held.isotropy:.3f}, condition {_condition(held.condition)}, singular values {values} N.",
-    ]
-
-
-def _loss_table(card: ScoreCard) -> list[str]:
-    head = ("without", "rank", "weakest [N]", *_axes(), "lost")
-    rows = [_loss_row(loss, loss is card.worst_loss) for loss in card.losses]
-    return [
-        "Share of the largest wrench that is left without one fin (* the worst to lose):",
-        *_table(head, rows),
     ]
 
 
@@ -145,5 +128,5 @@ def _condition(value: float | None) -> str:
     return "infinite" if value is None else f"{value:.2f}"
 
 
-def _number(value: float | None, digits: int) -> str:
-    return "-" if value is None else f"{value:.{digits}f}"
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f}"

@@ -111,22 +111,13 @@ def fault_verdict(row: Row) -> str:
 
 def fault_report(rows: Sequence[Row], layout: Layout, trajectory: Trajectory, plant: str) -> str:
     """What was not swum and why, the table, and the paper's."""
-    hopeless = [row["fault"] for row in rows if not row["controllable"]]
-    before = [
-        f"Not swum, since the fins that are left cannot give surge, heave and yaw independently: {fault}."
-        for fault in hopeless
-    ]
+    why = "Not swum, since the fins that are left cannot give surge, heave and yaw independently"
+    hopeless = "".join(f"{why}: {row['fault']}.\n" for row in rows if not row["controllable"])
     table = text_table([_shown(row) for row in rows if row["controllable"]])
-    return "\n".join(
-        [
-            *before,
-            *([""] if before else []),
-            table,
-            "",
-            f"Layout {layout.name}, {trajectory.name} of {trajectory.duration_s:.0f} s, plant {plant}.",
-            "In the paper, in a pool [m]:",
-            text_table(_paper_rows()),
-        ]
+    return (
+        (f"{hopeless}\n" if hopeless else "") + f"{table}\n\n"
+        f"Layout {layout.name}, {trajectory.name} of {trajectory.duration_s:.0f} s, plant {plant}.\n"
+        f"In the paper, in a pool [m]:\n{text_table(_paper_rows())}"
     )
 
 

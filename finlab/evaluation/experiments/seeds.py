@@ -21,7 +21,7 @@ from finlab.allocation.learned.proposal import propose
 from finlab.allocation.learned.refined_candidates import RANKING
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
-from finlab.evaluation.statistics.tables import Row, text_table
+from finlab.evaluation.statistics.tables import MET, Row, text_table
 from finlab.physics import Plant
 from finlab.physics.energy import command_energy
 
@@ -31,9 +31,6 @@ STEPS = (0, 1, 2, 4, 8)
 """Numbers of refinement steps that are compared."""
 KINDS = ("network", "random", "quasi-random")
 """Seeds: the mixture's best candidates; uniform commands within the limits; a scrambled Sobol sequence."""
-
-MET = 0.05
-"""Normalized error up to which a target counts as met when energies are compared."""
 
 
 def seed_rows(

@@ -132,16 +132,13 @@ def steadiness_rows(
 
 def steadiness_report(rows: Sequence[Row]) -> str:
     """The rows as a table, with what its columns mean."""
-    return "\n".join(
-        [
-            text_table(rows),
-            "",
-            f"{TICKS / RATE:g} s at {RATE:g} Hz unless told otherwise; scored by the plant. turn_free and "
-            "turn_steady: the largest turn of any fin in one tick [rad] without and with `previous`; "
-            f"turn_ratio: the worst path's; steady: paths whose ratio is at most {GOAL}; forced: the largest "
-            "turn that any answer must make, where forces are unique.",
-        ]
+    note = (
+        f"{TICKS / RATE:g} s at {RATE:g} Hz unless told otherwise; scored by the plant. turn_free and "
+        "turn_steady: the largest turn of any fin in one tick [rad] without and with `previous`; "
+        f"turn_ratio: the worst path's; steady: paths whose ratio is at most {GOAL}; forced: the largest "
+        "turn that any answer must make, where forces are unique."
     )
+    return f"{text_table(rows)}\n\n{note}"
 
 
 def _row(layout: Layout, free: list[Rollout], steady: list[Rollout], forced: list[float | None]) -> Row:
