@@ -1,1 +1,1 @@
-"""One file for each verb of `finlab eval`: what is run, its rows and its printed table."""
+"""The verbs of `finlab eval`: what is run, its rows and its printed table."""

@@ -35,12 +35,7 @@ def latency_cases(fins: int, seed: int) -> list[Case]:
 
 
 def latency_rows(
-    allocators: Mapping[str, Allocator],
-    cases: Sequence[Case],
-    *,
-    n_calls: int = 200,
-    budget_s: float = 20.0,
-    seed: int = 0,
+    allocators: Mapping[str, Allocator], cases: Sequence[Case], *, n_calls: int = 200, budget_s: float = 20.0
 ) -> list[Row]:
     """Median and 99th percentile of whole `allocate` calls [ms], and the ratio to `learned`.
 
@@ -49,13 +44,12 @@ def latency_rows(
         cases: layouts with targets, visited one after the other; every method sees the same.
         n_calls: calls of each method.
         budget_s: a slow method stops after this long [s]; its row says how many calls it made.
-        seed: passed to the methods.
     """
     rows: list[Row] = []
     for name, allocator in tqdm(
         allocators.items(), unit="method", disable=None, leave=False, file=sys.stderr
     ):
-        times = _time_calls(allocator, cases, n_calls, budget_s, seed)
+        times = _time_calls(allocator, cases, n_calls, budget_s)
         rows.append(
             {
                 "method": name,
@@ -72,9 +66,7 @@ def latency_rows(
     return rows
 
 
-def _time_calls(
-    allocator: Allocator, cases: Sequence[Case], n_calls: int, budget_s: float, seed: int
-) -> list[float]:
+def _time_calls(allocator: Allocator, cases: Sequence[Case], n_calls: int, budget_s: float) -> list[float]:
     """Wall time of each counted call [ms]."""
     times: list[float] = []
     per_case = -(-n_calls // len(cases))
@@ -85,7 +77,7 @@ def _time_calls(
         for k in range(WARM_UP + min(per_case, n_calls - len(times))):
             target = case.targets[k % len(case.targets)]
             start = time.perf_counter()
-            allocator.allocate(case.layout, target, failed=case.failed, seed=seed)
+            allocator.allocate(case.layout, target, failed=case.failed)
             end = time.perf_counter()
             if k >= WARM_UP:
                 times.append((end - start) * 1e3)

@@ -26,21 +26,20 @@ ENERGY_COLUMNS = ("energy_mean", "energy_ratio", "cheaper", "resting")
 """Columns without a value where no target was met by both."""
 
 
-def wrench_row(records: Records, *, split: str, method: str, scored_by: str = "plant") -> Row:
+def wrench_row(records: Records, *, split: str, method: str) -> Row:
     """One row of the wrench table.
 
     Args:
         records: at least one target.
         split: name of the split.
         method: name of the method.
-        scored_by: the model that computed the delivered wrench, `plant` or `surrogate`.
     """
     error = records.err_norm
     row: Row = {
         "split": split,
         "method": method,
         "n": len(records),
-        "scored_by": scored_by,
+        "scored_by": "plant",
         "err_norm_mean": float(error.mean()),
         "err_norm_median": float(np.median(error)),
         "err_norm_p95": float(np.quantile(error, 0.95)),
