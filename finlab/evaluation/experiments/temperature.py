@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from finlab.allocation.learned.settings import PaperOptions
 from finlab.allocation.methods import load_allocator
-from finlab.allocation.options import PaperOptions
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.evaluation.statistics.tables import Row, text_table
