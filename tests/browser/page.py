@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from webapp.session.search_request import Draft
+from webapp.session.search_request import SearchRequest
 from webapp.session.swim_plan import SwimSettings
 
 WAIT_MS = 45_000
@@ -67,7 +67,7 @@ class Page:
         def restart() -> None:
             self.session.start_over()
             self.session.display = self._display
-            self.session.draft, self.session.swim = Draft(), SwimSettings()
+            self.session.draft, self.session.swim = SearchRequest(), SwimSettings()
             self.session.compare_with(None)
             self.session.set_overlay(None)
             self.view.improver.forget()

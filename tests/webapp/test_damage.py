@@ -15,7 +15,7 @@ from webapp.markup.answer import fin_table
 from webapp.markup.snippets import command_line, python_lines
 from webapp.markup.words import damage_words
 from webapp.session import Session
-from webapp.session.search_request import ALL, Draft
+from webapp.session.search_request import ALL, SearchRequest, parsed_mission
 from webapp.session.session_files import restore, to_dict
 from webapp.session.swim_plan import ALONE, OWN, SwimSettings
 from webapp.session.targets import axis_reach, full_thrust
@@ -87,11 +87,11 @@ def test_the_page_may_send_anything(session: Session) -> None:
         lambda: draft.with_goal("<b>"),
         lambda: draft.with_way(ALL, (math.nan, 0.0, 0.0, 0.0)),
         lambda: draft.with_way(ALL, (0.0, 0.0, 0.0, 900.0)),
-        lambda: draft.with_mission("1 2 3").request(UCAT),
+        lambda: parsed_mission(draft.with_mission("1 2 3").mission),
     ):
         with pytest.raises(FinlabError):
             change()
-    assert session.state == before and session.draft == Draft() and session.swim == SwimSettings()
+    assert session.state == before and session.draft == SearchRequest() and session.swim == SwimSettings()
     assert len(draft.with_mission("1" * 10**6).mission) == 10_000
 
 
@@ -106,9 +106,9 @@ def test_damage_draft_and_swim_outlive_the_server(session: Session) -> None:
     again = Session(UCAT)
     restore(again, json.loads(json.dumps(to_dict(session))))
     assert again.state == session.state and again.draft == session.draft and again.swim == session.swim
-    request = again.draft.request(UCAT)
-    assert "back_right" not in request.fins and request.own_ways == {"front_left": way}
-    assert request.way == way and np.array(request.wrenches).shape == (1, 6)
+    assert set(again.draft.bounds(UCAT)) == set(UCAT.names) - {"back_right"}
+    assert again.draft.ways == ((ALL, way), ("front_left", way))
+    assert np.array(parsed_mission(again.draft.mission)).shape == (1, 6)
     session.set_swim("path", OWN)
     restore(again, json.loads(json.dumps(to_dict(session))))
     assert again.swim.path in SHIPPED, "the file of the path is not there any more"

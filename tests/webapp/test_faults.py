@@ -126,7 +126,7 @@ def _html(container: Any) -> Iterator[str]:
 def workers() -> Iterator[Workers]:
     workers = Workers()
     with pytest.MonkeyPatch.context() as patch:  # nobody types here, so nothing need come to rest first
-        for name in ("webapp.view.CARD_REST_S", "webapp.view.REST_S", "webapp.tasks.answering.SEARCH_REST_S"):
+        for name in ("webapp.page.CARD_REST_S", "webapp.page.REST_S", "webapp.tasks.answering.SEARCH_REST_S"):
             patch.setattr(name, 0.01)
         yield workers
     workers.stop()

@@ -4,6 +4,7 @@ import asyncio
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
@@ -12,7 +13,7 @@ from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.webapp.loops import AtOnce, running
 from webapp.session import Session
-from webapp.session.search_request import SearchRequest, parsed_mission
+from webapp.session.search_request import ALL, SearchRequest, parsed_mission
 from webapp.tasks.analyst import Findings, Question, find
 from webapp.tasks.background import Newest, Worker
 from webapp.tasks.improving import Improver
@@ -30,7 +31,7 @@ def until(condition: Callable[[], bool]) -> None:
 def test_search_is_cancelled_and_what_it_found_is_offered() -> None:
     worker = Worker()
     improver: Improver = Improver(AtOnce(), worker, lambda: None)
-    request = SearchRequest("weakest direction", NO_YAW.names)
+    request = SearchRequest("weakest direction")
     improver.start(NO_YAW, request)
     with pytest.raises(FinlabError, match="running already"):
         improver.start(NO_YAW, request)
@@ -49,15 +50,14 @@ def test_search_is_cancelled_and_what_it_found_is_offered() -> None:
 
 
 def test_bad_searches_are_refused() -> None:
-    names = NO_YAW.names
-    for goal, fins, way in (
-        ("gold", names, (0.05,) * 3 + (90.0,)),
-        ("weakest direction", (), (0.05,) * 3 + (90.0,)),
-        ("weakest direction", names, (float("nan"), 0.05, 0.05, 90.0)),
-        ("weakest direction", names, (0.05, 0.05, 0.05, 720.0)),
-    ):
+    request = SearchRequest()
+    with pytest.raises(FinlabError, match="goal"):
+        request.with_goal("gold")
+    with pytest.raises(FinlabError, match="no fin may move"):
+        replace(request, held=NO_YAW.names).bounds(NO_YAW)
+    for way in ((float("nan"), 0.05, 0.05, 90.0), (0.05, 0.05, 0.05, 720.0)):
         with pytest.raises(FinlabError):
-            SearchRequest(goal, fins, way)
+            request.with_way(ALL, way)
     with pytest.raises(FinlabError, match="line 2"):
         parsed_mission("1 0 0 0 0 0\n1 2 three 4 5 6")
     with pytest.raises(FinlabError, match="line 1"):
@@ -67,13 +67,11 @@ def test_bad_searches_are_refused() -> None:
 def test_each_fin_has_its_bounds_and_the_mission_is_the_users() -> None:
     worker = Worker()
     improver: Improver = Improver(AtOnce(), worker, lambda: None)
-    mission = parsed_mission("0.5, 0 0 0 0 0.1\n\n0 0 1 0 0 0")
-    assert mission == ((0.5, 0.0, 0.0, 0.0, 0.0, 0.1), (0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+    text = "0.5, 0 0 0 0 0.1\n\n0 0 1 0 0 0"
+    assert parsed_mission(text) == ((0.5, 0.0, 0.0, 0.0, 0.0, 0.1), (0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
     first, second = NO_YAW.names[:2]
-    way = (0.04, 0.0, 0.0, 20.0)
-    request = SearchRequest(
-        "energy of a mission", (first, second), (0.01, 0.01, 0.0, 0.0), {second: way}, mission
-    )
+    request = replace(SearchRequest("energy of a mission", mission=text), held=NO_YAW.names[2:])
+    request = request.with_way(ALL, (0.01, 0.01, 0.0, 0.0)).with_way(second, (0.04, 0.0, 0.0, 20.0))
     bounds = request.bounds(NO_YAW)
     x = NO_YAW.fins[1].position[0]
     assert bounds[second].x == pytest.approx((x - 0.04, x + 0.04))

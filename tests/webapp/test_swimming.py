@@ -15,7 +15,8 @@ from tests.webapp.stand_in import load_stand_in
 from webapp.markup.corner import swim_corner
 from webapp.markup.swim_card import swim_card
 from webapp.session.files import read_path
-from webapp.session.swim_plan import Plan
+from webapp.session.state import State
+from webapp.session.swim_plan import Plan, SwimSettings
 from webapp.tasks.background import Worker
 from webapp.tasks.solver import Solver
 from webapp.tasks.swimmer import ERROR, FORCES, LAG_S, POINTS, TIME
@@ -110,15 +111,11 @@ def test_fins_break_and_are_mended_while_it_swims(swimming: Swimming) -> None:
 
 
 def test_bad_plans_and_methods_out_of_order(swimming: Swimming) -> None:
-    for wrong in (
-        {"path": "moon"},
-        {"methods": ("analytic", "analytic")},
-        {"methods": ("slsqp",)},
-        {"methods": ()},
-        {"plant": "jelly"},
-    ):
-        with pytest.raises(FinlabError):
-            Plan(UCAT, (), **{"path": "circle", "methods": ("qp",), **wrong})  # type: ignore[arg-type]
+    settings = SwimSettings(method="qp", rival="qp")
+    assert settings.plan(State(UCAT), None).methods == ("qp",), "nobody swims beside himself"
+    for key, wrong in (("path", "moon"), ("method", "slsqp"), ("rival", "slsqp"), ("plant", "jelly")):
+        with pytest.raises(FinlabError, match=wrong):
+            settings.with_value(key, wrong)
     swimming._solver = Solver(load=lambda *_, **__: load_stand_in("slsqp"))
     swimming.start(Plan(UCAT, (), "circle", ("qp",)))
     until(lambda: bool(swimming.notes))  # type: ignore[attr-defined]

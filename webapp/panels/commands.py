@@ -6,21 +6,21 @@ from typing import Any
 
 import viser
 
-from webapp.panels.host import Host
+from webapp.page import Page
 from webapp.session.state import AXIS_WORDS
 from webapp.session.targets import PRESETS
 
 
-def add_commands(gui: viser.GuiApi, host: Host) -> None:
+def add_commands(gui: viser.GuiApi, page: Page) -> None:
     """Register the commands of one browser."""
-    session = host.session
+    session = page.session
 
     def add(label: str, act: Callable[[], object], hotkey: Any = None, modifier: Any = None) -> None:
         command = gui.add_command(label, hotkey=hotkey, modifier=modifier)
 
         @command.on_trigger
         async def _triggered(_event: Any) -> None:
-            host.do(act)
+            page.do(act)
 
     def fail_selected() -> None:
         session.toggle_failure(session.selected or session.state.layout.names[0])
@@ -44,12 +44,12 @@ def add_commands(gui: viser.GuiApi, host: Host) -> None:
         add(f"Ask for: {name}", partial(session.set_preset, name))
     for axis, word in enumerate(AXIS_WORDS):
         add(f"Ask for {word} alone", partial(session.set_only_axis, axis))
-    add("Compare the methods", lambda: host.comparison.start(session.state))
-    add("Play the refinement", host.playback.start)
-    add("Stop the sweep", host.sweep.stop)
-    add("Swim: pause or go on", lambda: host.swimming.set_running(not host.swimming.running), "B")
-    add("Swim: back to the design", host.scenery.end_swim)
-    add("Export the bundle for the robot", host.exports.bundle)
+    add("Compare the methods", lambda: page.comparison.start(session.state))
+    add("Play the refinement", page.playback.start)
+    add("Stop the sweep", page.sweep.stop)
+    add("Swim: pause or go on", lambda: page.swimming.set_running(not page.swimming.running), "B")
+    add("Swim: back to the design", page.scenery.end_swim)
+    add("Export the bundle for the robot", page.exports.bundle)
     add("Tour: start, or next stop", session.next_stop, "T")
     add("Start over", session.start_over)
     add("Freeze or move the fins", lambda: toggle("frozen"), "P")
@@ -58,4 +58,4 @@ def add_commands(gui: viser.GuiApi, host: Host) -> None:
     add("Show or hide the centre of gravity", lambda: toggle("center"))
     add("Dark or light theme", lambda: toggle("dark"))
     for view, key in (("3D", "1"), ("Top", "2"), ("Side", "3"), ("Front", "4")):
-        add(f"Camera: {view}", partial(host.scenery.look_from, view), key)
+        add(f"Camera: {view}", partial(page.scenery.look_from, view), key)

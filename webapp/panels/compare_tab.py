@@ -7,7 +7,7 @@ import viser
 from webapp.handles import on_user_change, on_user_click, put
 from webapp.markup.comparison import comparison_table
 from webapp.markup.picking import chosen_button, marker
-from webapp.panels.host import Host
+from webapp.page import Page
 from webapp.session.state import COMPARED
 
 PICKER = "fl-compare"
@@ -16,13 +16,13 @@ PICKER = "fl-compare"
 class CompareTab:
     """A button, a table, and whose arrows are shown."""
 
-    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
-        self._host = host
+        self._page = page
         self._run = gui.add_button(
             "Compare the methods", icon=viser.Icon.SCALE, hint="On the wrench and the failures of now."
         )
-        on_user_click(self._run, lambda: host.do(lambda: host.comparison.start(host.session.state)))
+        on_user_click(self._run, lambda: page.do(lambda: page.comparison.start(page.session.state)))
         self._chosen = gui.add_html(marker(PICKER))
         self._overlay = gui.add_button_group(
             "Overlay",
@@ -33,12 +33,12 @@ class CompareTab:
         self._table = gui.add_html("")
 
     def _choose(self, method: str) -> None:
-        wanted = method if method in COMPARED and method != self._host.session.overlay else None
-        self._host.do(partial(self._host.session.set_overlay, wanted))
+        wanted = method if method in COMPARED and method != self._page.session.overlay else None
+        self._page.do(partial(self._page.session.set_overlay, wanted))
 
     def refresh(self) -> None:
         """Write the answers."""
-        session, comparison = self._host.session, self._host.comparison
+        session, comparison = self._page.session, self._page.comparison
         stale = comparison.state is not None and comparison.state != session.state
         put(self._run, disabled=comparison.running)
         entries = (None, *COMPARED)

@@ -8,7 +8,7 @@ import viser
 
 from webapp.handles import numbered, on_user_change, put
 from webapp.markup.picking import button_colors
-from webapp.panels.host import Host
+from webapp.page import Page
 from webapp.session.state import STRENGTH_RANGE
 from webapp.theme import DEAD, css, fin_color
 
@@ -52,14 +52,14 @@ class FinButtons:
 class DamagePanel:
     """Widgets of one folder."""
 
-    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
-        self._host = host
+        self._page = page
         with gui.add_folder("Damage a fin", expand_by_default=False):
             self._fin = gui.add_dropdown(
                 "Which fin", ("1",), hint="Also the one that is selected in the view."
             )
-            on_user_change(self._fin, lambda name: host.do(partial(host.session.select, name)))
+            on_user_change(self._fin, lambda name: page.do(partial(page.session.select, name)))
             self._strength = gui.add_slider(
                 "Strength [%]",
                 100 * STRENGTH_RANGE[0],
@@ -91,27 +91,27 @@ class DamagePanel:
     @property
     def _name(self) -> str:
         """The fin that the widgets are about: the selected one, or the first."""
-        session = self._host.session
+        session = self._page.session
         return session.selected or session.state.layout.names[0]
 
     def _weaken(self, percent: float) -> None:
-        name, session = self._name, self._host.session
-        self._host.do(lambda: session.weaken(name, percent / 100.0))
+        name, session = self._name, self._page.session
+        self._page.do(lambda: session.weaken(name, percent / 100.0))
 
     def _jam(self, stuck: bool, degrees: float) -> None:
-        name, session = self._name, self._host.session
-        self._host.do(lambda: session.jam(name, math.radians(degrees) if stuck else None))
+        name, session = self._name, self._page.session
+        self._page.do(lambda: session.jam(name, math.radians(degrees) if stuck else None))
 
     def _repair(self, button: str) -> None:
-        session = self._host.session
+        session = self._page.session
         if button == "This fin":
-            self._host.do(partial(session.mend, self._name))
+            self._page.do(partial(session.mend, self._name))
         elif button == "All fins":
-            self._host.do(session.mend_all)
+            self._page.do(session.mend_all)
 
     def refresh(self) -> None:
         """Write the damage of the fin."""
-        state, name = self._host.session.state, self._name
+        state, name = self._page.session.state, self._name
         put(self._fin, options=state.layout.names)
         put(self._fin, value=name)
         put(self._strength, value=round(100.0 * dict(state.weak).get(name, 1.0), 1))

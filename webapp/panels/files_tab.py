@@ -8,16 +8,16 @@ import viser
 
 from webapp.handles import Changes, on_user_change, put
 from webapp.markup.snippets import command_line, export_line, python_lines
-from webapp.panels.host import Host
+from webapp.page import Page
 from webapp.session import files
 
 
 class FilesTab:
     """Buttons for files, and the same question as a command."""
 
-    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
-        self._host = host
+        self._page = page
         self._open = gui.add_upload_button(
             "Open a layout file",
             icon=viser.Icon.FOLDER_OPEN,
@@ -42,38 +42,38 @@ class FilesTab:
         @self._open.on_upload
         async def _opened(event: Any) -> None:
             upload = event.target.value
-            host.do(lambda: host.session.open_layout(files.read_layout(upload.name, upload.content)))
+            page.do(lambda: page.session.open_layout(files.read_layout(upload.name, upload.content)))
 
     def _press(self, button: str) -> None:
-        host = self._host
+        page = self._page
         acts: dict[str, Callable[[], object]] = {
             "Layout (YAML)": self._send_layout,
             "Candidates (CSV)": self._send_candidates,
-            "Picture (PNG)": host.exports.picture,
-            "3D view (HTML)": lambda: host.exports.html(host.shown),
-            "Graph file": host.exports.graph,
-            "Bundle (ZIP)": host.exports.bundle,
+            "Picture (PNG)": page.exports.picture,
+            "3D view (HTML)": lambda: page.exports.html(page.shown),
+            "Graph file": page.exports.graph,
+            "Bundle (ZIP)": page.exports.bundle,
         }
         if button in acts:
-            host.do(acts[button])
+            page.do(acts[button])
 
     def _send_layout(self) -> None:
-        layout = self._host.session.state.layout
-        self._host.client.send_file_download(
+        layout = self._page.session.state.layout
+        self._page.client.send_file_download(
             f"{files.file_stem(layout.name)}.yaml",
             files.layout_bytes(layout),
             save_immediately=True,
         )
-        self._host.session.note_saved()
+        self._page.session.note_saved()
 
     def _send_candidates(self) -> None:
-        self._host.client.send_file_download(
-            "candidates.csv", files.candidates_csv(self._host.answering.best), save_immediately=True
+        self._page.client.send_file_download(
+            "candidates.csv", files.candidates_csv(self._page.answering.best), save_immediately=True
         )
 
     def refresh(self) -> None:
         """Write the command that asks the same question."""
-        state = self._host.session.state
+        state = self._page.session.state
         if not self._changes(state):
             return
         texts = {

@@ -12,7 +12,7 @@ from finlab.analysis.score_card import quick_check
 from finlab.layout.body import HULL_SHAPES
 from webapp.handles import Changes, hold_kind, on_user_change, on_user_click, put
 from webapp.markup.score_card import check_card, warnings
-from webapp.panels.host import Host
+from webapp.page import Page
 from webapp.scene.meshes.hull import hull_of
 from webapp.scene.meshes.mesh_hull import UNITS
 from webapp.session import ANGLE_STEPS, POSITION_STEPS
@@ -36,15 +36,15 @@ MESH = "mesh file"
 class LayoutTab:
     """Choose, place, copy and remove."""
 
-    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
-        self._host = host
+        self._page = page
         self._layouts = gui.add_dropdown("Layout", (*shipped(), OWN), hint="Shipped layouts to start from.")
         on_user_change(self._layouts, self._open)
         self._about = gui.add_html("")
         self._fins = gui.add_dropdown("Fin", (NONE,), hint="Or click one in the view; N is next, X none.")
         on_user_change(
-            self._fins, lambda name: host.do(partial(host.session.select, None if name == NONE else name))
+            self._fins, lambda name: page.do(partial(page.session.select, None if name == NONE else name))
         )
         with gui.add_folder("Place"):
             self._position = gui.add_vector3(
@@ -81,32 +81,32 @@ class LayoutTab:
         )
         on_user_change(self._ring, self._copy_around)
         self._add = gui.add_button("Add a fin", icon=viser.Icon.PLUS, hint=f"Up to {MAX_FINS} fins.")
-        on_user_click(self._add, lambda: host.do(host.session.add_fin))
+        on_user_click(self._add, lambda: page.do(page.session.add_fin))
         self._card = gui.add_html("")
-        self._hull = HullPanel(gui, host)
+        self._hull = HullPanel(gui, page)
         self._changes = Changes()
 
     def _open(self, name: str) -> None:
         if name in shipped():
-            self._host.do(partial(self._host.session.open_layout, shipped()[name]))
+            self._page.do(partial(self._page.session.open_layout, shipped()[name]))
         else:
             self.refresh()
 
     def _move(self, position: tuple[float, float, float]) -> None:
-        if self._host.session.selected is not None:
-            self._host.do(partial(self._host.session.move_fin, self._host.session.selected, position))
+        if self._page.session.selected is not None:
+            self._page.do(partial(self._page.session.move_fin, self._page.session.selected, position))
 
     def _turn(self, degrees: float) -> None:
-        if self._host.session.selected is not None:
-            self._host.do(
-                partial(self._host.session.turn_fin, self._host.session.selected, math.radians(degrees))
+        if self._page.session.selected is not None:
+            self._page.do(
+                partial(self._page.session.turn_fin, self._page.session.selected, math.radians(degrees))
             )
 
     def _set_display(self, key: str, value: str | bool) -> None:
-        self._host.do(partial(self._host.session.set_display, key, value))
+        self._page.do(partial(self._page.session.set_display, key, value))
 
     def _edit_fin(self, button: str) -> None:
-        session = self._host.session
+        session = self._page.session
         acts: dict[str, Callable[[], object]] = {
             "Mirror": session.mirror_fin,
             "Mirror once": partial(session.mirror_fin, linked=False),
@@ -116,16 +116,16 @@ class LayoutTab:
             "To hull": session.stick_fin,
         }
         if button in acts:
-            self._host.do(acts[button])
+            self._page.do(acts[button])
 
     def _copy_around(self, button: str) -> None:
         if button in RING_SIZES:
             axis = RINGS.get(self._axis.value, "z")
-            self._host.do(partial(self._host.session.ring_of_fins, int(button), axis))
+            self._page.do(partial(self._page.session.ring_of_fins, int(button), axis))
 
     def refresh(self) -> None:
         """Write the layout and the selected fin."""
-        session, layout = self._host.session, self._host.session.state.layout
+        session, layout = self._page.session, self._page.session.state.layout
         put(self._layouts, value=shipped_name(layout) or OWN)
         put(self._fins, options=(NONE, *layout.names))
         put(self._fins, value=session.selected or NONE)
@@ -154,9 +154,9 @@ class LayoutTab:
 class HullPanel:
     """Widgets of one folder."""
 
-    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
-        self._host = host
+        self._page = page
         with gui.add_folder("Hull", expand_by_default=False):
             self._shape = gui.add_dropdown("Shape", (*HULL_SHAPES, MESH), hint="For looks and for sticking.")
             on_user_change(self._shape, self._choose_shape)
@@ -176,7 +176,7 @@ class HullPanel:
                 hint="Centre of gravity as seen from the hull's middle. Torques are about it.",
             )
             on_user_change(
-                self._center, lambda value: host.do(partial(host.session.set_center_of_gravity, value))
+                self._center, lambda value: page.do(partial(page.session.set_center_of_gravity, value))
             )
             self._unit = gui.add_dropdown("Unit of file", tuple(UNITS), hint="What 1 means in the mesh file.")
             hold_kind(self._unit)
@@ -191,24 +191,24 @@ class HullPanel:
         async def _uploaded(event: Any) -> None:
             upload = event.target.value
             unit = self._unit.value
-            host.do(lambda: host.session.import_hull(stored_hull(upload.name, upload.content, unit)))
+            page.do(lambda: page.session.import_hull(stored_hull(upload.name, upload.content, unit)))
 
     def _choose_shape(self, shape: str) -> None:
         if shape == MESH:
             self.refresh()
             return
-        half = hull_of(self._host.session.state.layout).half
+        half = hull_of(self._page.session.state.layout).half
         size = (2 * half[0], 2 * half[1], 2 * half[2])
-        self._host.do(partial(self._host.session.set_hull, shape, size))
+        self._page.do(partial(self._page.session.set_hull, shape, size))
 
     def _resize(self, size: tuple[float, float, float]) -> None:
-        shape = hull_of(self._host.session.state.layout).shape
+        shape = hull_of(self._page.session.state.layout).shape
         if shape in HULL_SHAPES:
-            self._host.do(partial(self._host.session.set_hull, shape, size))
+            self._page.do(partial(self._page.session.set_hull, shape, size))
 
     def refresh(self) -> None:
         """Write the hull."""
-        layout = self._host.session.state.layout
+        layout = self._page.session.state.layout
         hull = hull_of(layout)
         put(self._shape, value=hull.shape if hull.shape in HULL_SHAPES else MESH)
         put(self._size, disabled=hull.shape not in HULL_SHAPES)

@@ -10,12 +10,12 @@ from webapp.handles import Changes, on_user_change, on_user_click, put
 from webapp.markup.picking import chosen_button, marker
 from webapp.markup.score_card import score_table
 from webapp.markup.words import listed, three_digits
+from webapp.page import Page
 from webapp.panels.damage import FinButtons
-from webapp.panels.host import Host
 from webapp.session.display import DRAWN
 from webapp.session.files import shipped
 from webapp.session.looking import PINNED
-from webapp.session.search_request import ALL, GOAL_WORDS, WAY, Draft
+from webapp.session.search_request import ALL, GOAL_WORDS, WAY, SearchRequest
 
 PICKER = "fl-drawn"
 """Marks the buttons for the set that is drawn."""
@@ -26,9 +26,9 @@ SAVED = "saved state"
 class LimitsTab:
     """Switches and the card."""
 
-    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
-        self._host = host
+        self._page = page
         self._chosen = gui.add_html(marker(PICKER))
         self._drawn = gui.add_button_group(
             "Draw the set of", tuple(DRAWN), hint="Everything that the fins can give, as a body in the view."
@@ -45,25 +45,25 @@ class LimitsTab:
         self._pin = gui.add_button_group(
             "Put aside", ("Pin this layout",), hint="As it is now, to compare others with."
         )
-        on_user_change(self._pin, lambda _: host.do(host.session.pin))
+        on_user_change(self._pin, lambda _: page.do(page.session.pin))
         self._card = gui.add_html("")
-        self._improve = ImprovePanel(gui, host)
+        self._improve = ImprovePanel(gui, page)
         self._changes = Changes()
 
     def _set(self, key: str, value: object) -> None:
-        self._host.do(partial(self._host.session.set_display, key, value))
+        self._page.do(partial(self._page.session.set_display, key, value))
 
     def _compare(self, name: str) -> None:
-        self._host.do(partial(self._host.session.compare_with, None if name == SAVED else name))
+        self._page.do(partial(self._page.session.compare_with, None if name == SAVED else name))
 
     def refresh(self) -> None:
         """Write the findings."""
-        session = self._host.session
+        session = self._page.session
         names = (SAVED, *((PINNED,) if session.pinned is not None else ()), *shipped())
         put(self._beside, options=names)
         put(self._beside, value=session.beside or SAVED)
         self._improve.refresh()
-        analyst, display = self._host.analyst, self._host.session.display
+        analyst, display = self._page.analyst, self._page.session.display
         put(self._chosen, content=chosen_button(PICKER, list(DRAWN).index(display.drawn)))
         put(self._alone, value=display.alone, visible=display.drawn != "none")
         found = analyst.findings
@@ -87,9 +87,9 @@ class LimitsTab:
 class ImprovePanel:
     """Widgets of one folder."""
 
-    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
-        self._host = host
+        self._page = page
         with gui.add_folder("Improve this layout"):
             self._goal = gui.add_dropdown("Goal", tuple(GOAL_WORDS), hint="What to raise.")
             on_user_change(self._goal, lambda goal: self._draft(lambda draft: draft.with_goal(goal)))
@@ -127,12 +127,12 @@ class ImprovePanel:
             self._start = gui.add_button(
                 "Search", icon=viser.Icon.SPARKLES, hint="Takes up to a minute; it can be stopped any time."
             )
-            on_user_click(self._start, lambda: host.do(self._search))
+            on_user_click(self._start, lambda: page.do(self._search))
             self._bar = gui.add_progress_bar(0.0, visible=False)
             self._cancel = gui.add_button(
                 "Cancel", icon=viser.Icon.X, visible=False, hint="What was found so far is offered."
             )
-            on_user_click(self._cancel, host.improver.cancel)
+            on_user_click(self._cancel, page.improver.cancel)
             self._card = gui.add_html("")
             gui.add_html(chosen_button("fl-verdict", 0))
             self._verdict = gui.add_button_group(
@@ -141,35 +141,35 @@ class ImprovePanel:
             on_user_change(self._verdict, self._decide)
 
     def _bound(self, way: tuple[float, ...]) -> None:
-        whose = self._whose.value if self._whose.value in self._host.session.state.layout.names else ALL
+        whose = self._whose.value if self._whose.value in self._page.session.state.layout.names else ALL
         self._draft(lambda draft: draft.with_way(whose, way))
 
-    def _draft(self, change: Callable[[Draft], Draft]) -> None:
-        session = self._host.session
-        self._host.do(lambda: session.set_draft(change(session.draft)))
+    def _draft(self, change: Callable[[SearchRequest], SearchRequest]) -> None:
+        session = self._page.session
+        self._page.do(lambda: session.set_draft(change(session.draft)))
 
     def _add_wrench(self) -> None:
-        line = " ".join(f"{value:g}" for value in self._host.session.state.target)
+        line = " ".join(f"{value:g}" for value in self._page.session.state.target)
         self._draft(lambda draft: draft.with_mission(f"{draft.mission.rstrip()}\n{line}".lstrip()))
 
     def _search(self) -> None:
-        session = self._host.session
+        session = self._page.session
         layout = session.state.layout
-        self._host.improver.start(layout, session.draft.request(layout))
+        self._page.improver.start(layout, session.draft)
 
     def _decide(self, button: str) -> None:
-        improver = self._host.improver
+        improver = self._page.improver
         found = improver.found
         improver.forget()
         if button == "Accept" and found is not None:
-            self._host.do(partial(self._host.session.accept_layout, found.layout))
+            self._page.do(partial(self._page.session.accept_layout, found.layout))
         else:
             self.refresh()
 
     def refresh(self) -> None:
         """Write how far the search is."""
         self._refresh_request()
-        improver = self._host.improver
+        improver = self._page.improver
         running, progress, found = improver.running, improver.progress, improver.found
         put(self._start, disabled=running)
         put(self._bar, visible=running)
@@ -191,7 +191,7 @@ class ImprovePanel:
 
     def _refresh_request(self) -> None:
         """Write which fins may move, and how far."""
-        names, draft = self._host.session.state.layout.names, self._host.session.draft
+        names, draft = self._page.session.state.layout.names, self._page.session.draft
         put(self._goal, value=draft.goal)
         self._fins.refresh(names, held=draft.held)
         put(self._whose, options=(ALL, *names))

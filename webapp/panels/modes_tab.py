@@ -10,7 +10,7 @@ from webapp.handles import Changes, numbered, on_user_change, on_user_click, put
 from webapp.markup.modes import SAMPLES, mode_plot, mode_table
 from webapp.markup.picking import Channel, chosen_button, marker
 from webapp.markup.words import small, three_digits
-from webapp.panels.host import Host
+from webapp.page import Page
 from webapp.panels.line_plot import LinePlot
 from webapp.session.state import CANDIDATE_RANGE, GAMMA_RANGE, TEMPERATURE_RANGE
 from webapp.tasks.solver import STEPS, Densities
@@ -22,9 +22,9 @@ TITLES = ("amplitude [°]", "frequency [Hz]", "zero direction [°]")
 class ModesTab:
     """Plot, table and settings of the candidates."""
 
-    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
-        self._host = host
+        self._page = page
         self._method = gui.add_dropdown("Method", tuple(METHODS), hint="Who answers.")
         self._count = gui.add_slider("Candidates K", *CANDIDATE_RANGE, 1, 64, hint="Draws from the mixture.")
         self._temperature = gui.add_slider(
@@ -44,40 +44,40 @@ class ModesTab:
             ("gamma", self._gamma),
         ):
             on_user_change(widget, partial(self._set, key))
-        self._picker = ModePicker(gui, host, 250, "fl-modes")
+        self._picker = ModePicker(gui, page, 250, "fl-modes")
         self._table = gui.add_html("")
         self._play = gui.add_button(
             "Play the refinement",
             icon=viser.Icon.PLAYER_PLAY,
             hint="From the best raw candidate, step by step.",
         )
-        on_user_click(self._play, lambda: host.do(host.playback.start))
+        on_user_click(self._play, lambda: page.do(page.playback.start))
         self._step = gui.add_html("")
         self._density = DensityPanel(gui)
         self._changes = Changes()
 
     def _set(self, key: str, value: object) -> None:
-        self._host.do(partial(self._host.session.set_setting, key, value))
+        self._page.do(partial(self._page.session.set_setting, key, value))
 
     def refresh(self) -> None:
         """Write settings and candidates."""
-        host, state = self._host, self._host.session.state
+        page, state = self._page, self._page.session.state
         put(self._method, value=state.method)
         put(self._count, value=state.n_candidates)
         put(self._temperature, value=state.temperature)
         put(self._gamma, value=state.gamma)
         self._picker.refresh()
-        answering, picker = host.answering, self._picker
+        answering, picker = page.answering, self._picker
         if self._changes(answering.modes, answering.searching, picker.shown):
             table = mode_table(answering.modes, answering.searching, picker.shown, picker.name)
             put(self._table, content=table)
-        put(self._step, content=_step_words(host))
+        put(self._step, content=_step_words(page))
         self._density.refresh(None if answering.reply is None else answering.reply.densities)
 
 
-def _step_words(host: Host) -> str:
+def _step_words(page: Page) -> str:
     """What is on the robot while it is neither the answer nor one of its modes."""
-    frame, sample, shown = host.playback.frame, host.session.sample, host.shown
+    frame, sample, shown = page.playback.frame, page.session.sample, page.shown
     if shown is None or (frame is None and sample is None):
         return ""
     if frame is not None:
@@ -85,7 +85,7 @@ def _step_words(host: Host) -> str:
         text = words.get(frame, f"Step {frame} of {STEPS}")
     else:
         text = f"Raw sample {sample}"
-        nearest = host.answering.modes.of_samples
+        nearest = page.answering.modes.of_samples
         if nearest is not None and sample is not None and sample < len(nearest):
             text += f", nearest to mode {nearest[sample] + 1}"
     error, energy = small(shown.err_norm), three_digits(shown.energy)
@@ -95,9 +95,9 @@ def _step_words(host: Host) -> str:
 class ModePicker:
     """Plot and buttons."""
 
-    def __init__(self, gui: viser.GuiApi, host: Host, height: int, name: str) -> None:
+    def __init__(self, gui: viser.GuiApi, page: Page, height: int, name: str) -> None:
         """Build them; `height` of the plot in pixels, `name` marks the buttons on the page."""
-        self._host = host
+        self._page = page
         self._height = height
         self.name = name
         self._changes = Changes()
@@ -112,25 +112,25 @@ class ModePicker:
         on_user_change(self._choice, self._choose)
 
     def _choose(self, entry: str) -> None:
-        index = numbered(entry, len(self._host.answering.modes.shown))
+        index = numbered(entry, len(self._page.answering.modes.shown))
         if index is not None:
-            self._host.do(partial(self._host.session.show_mode, index))
+            self._page.do(partial(self._page.session.show_mode, index))
 
     def _choose_sample(self, word: list[str]) -> None:
-        best = self._host.answering.best
+        best = self._page.answering.best
         count = 0 if best is None or best.samples is None else len(best.samples.energy)
         if word[0].isdecimal() and int(word[0]) < count:
-            self._host.do(partial(self._host.session.show_sample, int(word[0])))
+            self._page.do(partial(self._page.session.show_sample, int(word[0])))
 
     @property
     def shown(self) -> int | None:
         """The mode on the robot; None while a raw sample is."""
-        session, modes = self._host.session, self._host.answering.modes.shown
+        session, modes = self._page.session, self._page.answering.modes.shown
         return None if session.sample is not None else min(session.mode, max(len(modes) - 1, 0))
 
     def refresh(self) -> None:
         """Write the modes of the newest answer."""
-        answering, sample = self._host.answering, self._host.session.sample
+        answering, sample = self._page.answering, self._page.session.sample
         best, modes = answering.best, answering.modes
         if not self._changes(best, modes, self.shown, sample):
             return

@@ -8,7 +8,7 @@ import viser
 from finlab.allocation.policy import KINDS
 from webapp.handles import on_user_change, put
 from webapp.markup.picking import Channel, send
-from webapp.panels.host import Host
+from webapp.page import Page
 from webapp.session.state import AXIS_WORDS
 from webapp.session.targets import axis_reach
 from webapp.theme import ASKED, css
@@ -84,9 +84,9 @@ def _side(axes: Pad, left: float) -> str:
 class PilotPanel:
     """Widgets of one folder."""
 
-    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
-        self._host = host
+        self._page = page
         with gui.add_folder("Steer by hand", expand_by_default=False):
             self._axes = gui.add_dropdown("Stick for", tuple(PADS), hint="What up and sideways mean.")
             on_user_change(self._axes, lambda _: self.refresh())
@@ -102,7 +102,7 @@ class PilotPanel:
                 hint="Handles on the blue arrows in the view, for the force and the torque.",
             )
             on_user_change(
-                self._grips, lambda value: host.do(partial(host.session.set_display, "grips", value))
+                self._grips, lambda value: page.do(partial(page.session.set_display, "grips", value))
             )
             self._policy = gui.add_dropdown(
                 "Out of reach",
@@ -110,14 +110,14 @@ class PilotPanel:
                 hint="Come closest, keep the direction, or serve axes by priority, heave first.",
             )
             on_user_change(
-                self._policy, lambda value: host.do(partial(host.session.set_setting, "policy", value))
+                self._policy, lambda value: page.do(partial(page.session.set_setting, "policy", value))
             )
 
     def _steer(self, word: list[str]) -> None:
         """`left,up` as shares of the stick's way, or `off`."""
-        session = self._host.session
+        session = self._page.session
         if word[0] == "off":
-            self._host.do(partial(session.release, bool(self._spring.value)))
+            self._page.do(partial(session.release, bool(self._spring.value)))
             return
         try:
             left, up = (min(max(float(part), -1.0), 1.0) for part in word)
@@ -131,11 +131,11 @@ class PilotPanel:
             axis: share * sign * SHARE * float(reach[axis])
             for share, axis, sign in ((up, found.up, 1.0), (left, found.left, found.left_sign))
         }
-        self._host.do(partial(session.steer, values))
+        self._page.do(partial(session.steer, values))
 
     def refresh(self) -> None:
         """Write the stick and the switches."""
-        state, display = self._host.session.state, self._host.session.display
+        state, display = self._page.session.state, self._page.session.display
         name = self._axes.value if self._axes.value in PADS else next(iter(PADS))
         put(self._pad, content=pad(PADS[name], CHANNEL, bool(self._spring.value)))
         put(self._policy, value=state.policy)

@@ -8,7 +8,7 @@ import viser
 from finlab.layout.layout import MAX_FINS
 from webapp.handles import hold_kind, on_user_change, on_user_click, put
 from webapp.markup.words import small
-from webapp.panels.host import Host
+from webapp.page import Page
 from webapp.panels.line_plot import LinePlot
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS
 from webapp.session.targets import nice_limit
@@ -26,9 +26,9 @@ EVERY_S = 0.25
 class SweepPanel:
     """Widgets of one folder."""
 
-    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
-        self._host = host
+        self._page = page
         self._drawn = 0.0
         with gui.add_folder("Sweep an axis", expand_by_default=False):
             self._axis = gui.add_dropdown(
@@ -48,16 +48,16 @@ class SweepPanel:
             self._said = gui.add_html("")
 
     def _toggle(self) -> None:
-        sweep = self._host.sweep
+        sweep = self._page.sweep
         if sweep.running:
-            self._host.do(sweep.stop)
+            self._page.do(sweep.stop)
         else:
             axis = AXIS_WORDS.index(self._axis.value) if self._axis.value in AXIS_WORDS else 0
-            self._host.do(lambda: sweep.start(axis, *self._range.value))
+            self._page.do(lambda: sweep.start(axis, *self._range.value))
 
     def _fit_range(self) -> None:
         """Half of what is within reach, both ways: the ends are where it becomes interesting."""
-        ranges = self._host.ranging.findings
+        ranges = self._page.ranging.findings
         axis = AXIS_WORDS.index(self._axis.value) if self._axis.value in AXIS_WORDS else 0
         if ranges is not None and np.isfinite(ranges.high[axis]):
             low, high = float(ranges.low[axis]), float(ranges.high[axis])
@@ -65,7 +65,7 @@ class SweepPanel:
 
     def refresh(self) -> None:
         """Write the state of the sweep; the plot at most a few times a second."""
-        sweep = self._host.sweep
+        sweep = self._page.sweep
         put(
             self._play,
             label="Stop the sweep" if sweep.running else "Play the sweep",

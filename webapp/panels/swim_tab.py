@@ -12,8 +12,8 @@ from finlab.layout.layout import MAX_FINS
 from finlab.sim import PLANTS, SHIPPED, Trajectory
 from webapp.handles import Changes, hold_kind, on_user_change, put
 from webapp.markup.swim_card import swim_card
+from webapp.page import Page
 from webapp.panels.damage import FinButtons
-from webapp.panels.host import Host
 from webapp.panels.line_plot import LinePlot
 from webapp.session.files import read_path
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, COMPARED
@@ -35,9 +35,9 @@ Array = NDArray[np.float64]
 class SwimTab:
     """Widgets of one tab."""
 
-    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
-        self._host = host
+        self._page = page
         self._own: Trajectory | None = None
         self._path = gui.add_dropdown(
             "Path", tuple(SHIPPED), initial_value="lissajous", hint="Where to swim."
@@ -67,13 +67,13 @@ class SwimTab:
         )
         on_user_change(self._speed, partial(self._set, "speed"))
         self._follow = gui.add_checkbox("Follow", False, hint="The camera goes along with the first robot.")
-        on_user_change(self._follow, host.scenery.look_after_swim)
+        on_user_change(self._follow, page.scenery.look_after_swim)
         self._fins = FinButtons(
             gui,
             "Break a fin",
             "Press a fin's number: break or mend it while it swims.",
             "fl-breaks",
-            lambda name: host.do(partial(host.swimming.toggle, name)),
+            lambda name: page.do(partial(page.swimming.toggle, name)),
         )
         self._card = gui.add_html("")
         self._plots = SwimPlots(gui)
@@ -89,33 +89,33 @@ class SwimTab:
         @self._upload.on_upload
         async def _uploaded(event: Any) -> None:
             upload = event.target.value
-            host.do(lambda: self._take_path(upload.name, upload.content))
+            page.do(lambda: self._take_path(upload.name, upload.content))
 
     def _take_path(self, name: str, content: bytes) -> None:
         self._own = read_path(name, content)
-        self._host.session.set_swim("path", OWN)
+        self._page.session.set_swim("path", OWN)
 
     def _set(self, key: str, value: object) -> None:
-        self._host.do(partial(self._host.session.set_swim, key, value))
+        self._page.do(partial(self._page.session.set_swim, key, value))
 
     def _press(self, button: str) -> None:
-        swimming = self._host.swimming
+        swimming = self._page.swimming
         if button == "Start":
-            self._host.do(self._start)
+            self._page.do(self._start)
         elif button == "Pause":
-            self._host.do(lambda: swimming.set_running(not swimming.running))
+            self._page.do(lambda: swimming.set_running(not swimming.running))
         elif button == "Step":
-            self._host.do(swimming.step)
+            self._page.do(swimming.step)
         elif button == "End":
-            self._host.do(self._host.scenery.end_swim)
+            self._page.do(self._page.scenery.end_swim)
 
     def _start(self) -> None:
-        session = self._host.session
-        self._host.swimming.start(session.swim.plan(session.state, self._own))
+        session = self._page.session
+        self._page.swimming.start(session.swim.plan(session.state, self._own))
 
     def refresh(self) -> None:
         """Write how the swim goes."""
-        swimming, settings = self._host.swimming, self._host.session.swim
+        swimming, settings = self._page.swimming, self._page.session.swim
         put(self._path, options=tuple(SHIPPED) if self._own is None else (*SHIPPED, OWN))
         put(self._path, value=settings.path)
         put(self._method, value=settings.method)
@@ -125,8 +125,8 @@ class SwimTab:
         if swimming.pace.speed != settings.speed:
             swimming.pace.set_speed(settings.speed)
         swimmers = swimming.swimmers
-        names = swimmers[0].fins if swimmers else self._host.session.state.layout.names
-        failed = swimmers[0].failed if swimmers else self._host.session.state.failed
+        names = swimmers[0].fins if swimmers else self._page.session.state.layout.names
+        failed = swimmers[0].failed if swimmers else self._page.session.state.failed
         paused = swimming.active and not swimming.running and not swimming.done
         put(self._run, options=("Start", "Go on" if paused else "Pause", "Step", "End"))
         self._fins.refresh(names, failed)

@@ -8,9 +8,9 @@ import viser
 
 from webapp.handles import on_user_change, put
 from webapp.markup.corner import corner, swim_corner
+from webapp.page import Page, Panel
 from webapp.panels.compare_tab import CompareTab
 from webapp.panels.files_tab import FilesTab
-from webapp.panels.host import Host, Panel
 from webapp.panels.layout_tab import LayoutTab
 from webapp.panels.limits_tab import LimitsTab
 from webapp.panels.modes_tab import ModesTab
@@ -26,7 +26,7 @@ NUMBER_FIELDS = files("webapp.panels").joinpath("number_fields.js").read_text("u
 """Script that keeps number boxes to the user while he types."""
 PANEL_WIDTH = 410
 """Width of the panel beside the view [px]."""
-TABS: dict[str, Callable[[viser.GuiApi, Host], Panel]] = {
+TABS: dict[str, Callable[[viser.GuiApi, Page], Panel]] = {
     "Wrench": WrenchTab,
     "Layout": LayoutTab,
     "Modes": ModesTab,
@@ -48,57 +48,57 @@ STYLE = f"<style>{_VARIABLES}{files('webapp.markup').joinpath('style.css').read_
 class Guarded:
     """A panel that gives way to a sentence when it cannot be shown: no old figure stands under a new name."""
 
-    def __init__(self, gui: viser.GuiApi, host: Host, make: Callable[[viser.GuiApi, Host], Panel]) -> None:
+    def __init__(self, gui: viser.GuiApi, page: Page, make: Callable[[viser.GuiApi, Page], Panel]) -> None:
         """Build the panel."""
-        self._host = host
+        self._page = page
         self._sentence = gui.add_html("", visible=False)
         with gui.add_folder(None) as self._folder:
-            self._panel = make(gui, host)
+            self._panel = make(gui, page)
 
     def refresh(self) -> None:
         """Write the session and the answer into it."""
         try:
             self._panel.refresh()
         except Exception as error:
-            name = escape(self._host.session.state.layout.name)
+            name = escape(self._page.session.state.layout.name)
             text = f"<div class='fl missing'>This cannot be shown of {name}: {escape(str(error))}</div>"
             put(self._sentence, content=text, visible=True)
             put(self._folder, visible=False)
-            self._host.fault(error)
+            self._page.fault(error)
         else:
             put(self._folder, visible=True)
             put(self._sentence, visible=False)
 
 
-def build_panels(gui: viser.GuiApi, host: Host) -> tuple[list[Panel], list[Panel]]:
+def build_panels(gui: viser.GuiApi, page: Page) -> tuple[list[Panel], list[Panel]]:
     """Build everything in the panel beside the view: all panels, and of these the ones that show a swim."""
     gui.add_html(STYLE)
     run_script(gui, NUMBER_FIELDS)
-    panels = {"Corner": Guarded(gui, host, Corner), "Header": Guarded(gui, host, Header)}
+    panels = {"Corner": Guarded(gui, page, Corner), "Header": Guarded(gui, page, Header)}
     tabs = gui.add_tab_group()
     for label, make in TABS.items():
         with tabs.add_tab(label):
-            panels[label] = Guarded(gui, host, make)
+            panels[label] = Guarded(gui, page, make)
     return list(panels.values()), [panels["Corner"], panels["Swim"]]
 
 
 class Corner:
     """What lies over the 3D view."""
 
-    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build it, empty."""
-        self._host = host
+        self._page = page
         self._content = gui.add_html("")
 
     def refresh(self) -> None:
         """Write the status line and the legend."""
-        host, answering = self._host, self._host.answering
-        raw = host.session.sample is not None or host.playback.frame is not None
-        if host.swimming.swimmers:
-            content = swim_corner(host.swimming, ARROWS_N)
+        page, answering = self._page, self._page.answering
+        raw = page.session.sample is not None or page.playback.frame is not None
+        if page.swimming.swimmers:
+            content = swim_corner(page.swimming, ARROWS_N)
         else:
             content = corner(
-                host.session.state, host.scenery.legend, host.shown, host.busy, answering.error, raw
+                page.session.state, page.scenery.legend, page.shown, page.busy, answering.error, raw
             )
         put(self._content, content=content)
 
@@ -106,9 +106,9 @@ class Corner:
 class Header:
     """The top of the panel."""
 
-    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
-        self._host = host
+        self._page = page
         self._history = gui.add_button_group(
             "Session", ("Undo", "Redo", "Tour"), hint="Ctrl+Z, Ctrl+Shift+Z, T."
         )
@@ -120,23 +120,23 @@ class Header:
         on_user_change(self._stops, self._walk)
 
     def _step(self, button: str) -> None:
-        session = self._host.session
+        session = self._page.session
         acts = {"Undo": session.undo, "Redo": session.redo, "Tour": session.next_stop}
         if button in acts:
-            self._host.do(acts[button])
+            self._page.do(acts[button])
 
     def _walk(self, button: str) -> None:
-        session = self._host.session
+        session = self._page.session
         acts = {"Back": session.previous_stop, "Next": session.next_stop, "End": session.end_tour}
         if button in acts:
-            self._host.do(acts[button])
+            self._page.do(acts[button])
 
     def refresh(self) -> None:
         """Write what can be undone, and where the tour is."""
-        history = self._host.session.history
+        history = self._page.session.history
         undo, redo = history.undo_name or "nothing", history.redo_name or "nothing"
         put(self._history, hint=f"Undo: {undo} (Ctrl+Z). Redo: {redo} (Ctrl+Shift+Z). T starts a tour.")
-        stop = self._host.session.stop
+        stop = self._page.session.stop
         put(self._card, visible=stop is not None, content="" if stop is None else tour_card(stop))
         put(self._stops, visible=stop is not None)
 

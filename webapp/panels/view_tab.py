@@ -5,7 +5,7 @@ from functools import partial
 import viser
 
 from webapp.handles import on_user_change, put
-from webapp.panels.host import Host
+from webapp.page import Page
 from webapp.scene.robot_scene import CAMERAS
 from webapp.session.display import NEWTONS
 
@@ -37,9 +37,9 @@ SCALES = {_scale_entry(newtons): newtons for newtons in (0.0, *NEWTONS)}
 class ViewTab:
     """Switches and camera."""
 
-    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
-        self._host = host
+        self._page = page
         self._camera = gui.add_button_group("Camera", tuple(CAMERAS), hint="Keys 1, 2, 3, 4.")
         on_user_change(self._camera, self._look)
         self._speed = gui.add_slider("Motion speed", 0.05, 1.0, 0.05, 0.5, hint="1 is real time.")
@@ -56,14 +56,14 @@ class ViewTab:
 
     def _look(self, view: str) -> None:
         if view in CAMERAS:
-            self._host.scenery.look_from(view)
+            self._page.scenery.look_from(view)
 
     def _set(self, key: str, value: object) -> None:
-        self._host.do(partial(self._host.session.set_display, key, value))
+        self._page.do(partial(self._page.session.set_display, key, value))
 
     def refresh(self) -> None:
         """Write the switches."""
-        display = self._host.session.display
+        display = self._page.session.display
         put(self._speed, value=display.speed)
         put(self._scale, value=_scale_entry(display.newtons))
         for key, switch in self._switches.items():

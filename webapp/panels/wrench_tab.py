@@ -12,8 +12,8 @@ from webapp.handles import Changes, on_user_change, put
 from webapp.markup.answer import fin_table, wrench_bars
 from webapp.markup.picking import marker
 from webapp.markup.words import authority_sentence, rest_sentence, three_digits
+from webapp.page import Page
 from webapp.panels.damage import DamagePanel, FinButtons
-from webapp.panels.host import Host
 from webapp.panels.modes_tab import ModePicker
 from webapp.panels.pilot import PilotPanel
 from webapp.panels.sweep import SweepPanel
@@ -25,42 +25,42 @@ from webapp.viser_internals import put_marks
 class WrenchTab:
     """Target sliders with what comes of them below."""
 
-    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
-        self._host = host
-        self._target = TargetPanel(gui, host)
+        self._page = page
+        self._target = TargetPanel(gui, page)
         self._failures = FinButtons(
             gui,
             "Fail a fin",
             "Press a number to fail or repair a fin; F does it to the selected one.",
             "fl-fails",
-            lambda name: host.do(partial(host.session.toggle_failure, name)),
+            lambda name: page.do(partial(page.session.toggle_failure, name)),
         )
         self._bars = gui.add_html("")
         self._table = gui.add_html("")
-        self._picker = ModePicker(gui, host, 150, "fl-wrench-modes")
-        self._damage = DamagePanel(gui, host)
-        self._pilot = PilotPanel(gui, host)
-        self._sweep = SweepPanel(gui, host)
+        self._picker = ModePicker(gui, page, 150, "fl-wrench-modes")
+        self._damage = DamagePanel(gui, page)
+        self._pilot = PilotPanel(gui, page)
+        self._sweep = SweepPanel(gui, page)
 
     def refresh(self) -> None:
         """Write target, failures and answer."""
-        host, state = self._host, self._host.session.state
+        page, state = self._page, self._page.session.state
         self._target.refresh()
         self._failures.refresh(state.layout.names, state.failed)
         self._picker.refresh()
         self._damage.refresh()
         self._pilot.refresh()
         self._sweep.refresh()
-        answer = host.shown
+        answer = page.shown
         given = None if answer is None else answer.wrench
         put(self._bars, content=wrench_bars(state.target, given, self._sentence()))
         fitting = answer if answer is not None and answer.layout.names == state.layout.names else None
-        put(self._table, content=fin_table(state, fitting, full_thrust(state.able), host.session.selected))
+        put(self._table, content=fin_table(state, fitting, full_thrust(state.able), page.session.selected))
 
     def _sentence(self) -> str:
         """What is left undone, and why."""
-        answer, state = self._host.shown, self._host.session.state
+        answer, state = self._page.shown, self._page.session.state
         sentence = "" if answer is None else rest_sentence(answer)
         if answer is not None and answer.unknown_fins:
             sentence = f"<span class='missing'>{escape('; '.join(answer.notes))}.</span> {sentence}"
@@ -74,11 +74,11 @@ class WrenchTab:
 class TargetPanel:
     """Buttons and sliders."""
 
-    def __init__(self, gui: viser.GuiApi, host: Host) -> None:
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
-        self._host = host
+        self._page = page
         self._presets = gui.add_button_group("Preset", tuple(PRESETS), hint="Target wrenches to start from.")
-        on_user_change(self._presets, lambda name: host.do(partial(host.session.set_preset, name)))
+        on_user_change(self._presets, lambda name: page.do(partial(page.session.set_preset, name)))
         self._only = gui.add_button_group(
             "One axis",
             AXES,
@@ -104,25 +104,25 @@ class TargetPanel:
 
     def _set_only(self, axis: str) -> None:
         if axis in AXES:
-            self._host.do(partial(self._host.session.set_only_axis, AXES.index(axis)))
+            self._page.do(partial(self._page.session.set_only_axis, AXES.index(axis)))
 
     def _set_target(self, axis: int, value: float) -> None:
-        self._host.do(partial(self._host.session.set_target, axis, value))
+        self._page.do(partial(self._page.session.set_target, axis, value))
 
     @property
     def reach(self) -> NDArray[np.float64]:
         """Largest size of each component with the others free (6,) [N, N m]."""
-        state = self._host.session.state
+        state = self._page.session.state
         return axis_reach(state.able, state.failed)
 
     def refresh(self) -> None:
         """Write the target, the sliders' ends and the marks on them."""
-        state = self._host.session.state
+        state = self._page.session.state
         for slider, value, reach in zip(self._sliders, state.target, self.reach, strict=True):
             end = slider_end(float(reach))
             put(slider, min=min(-end, value), max=max(end, value))
             put(slider, value=value)
-        ranges, error = self._host.ranging.findings, self._host.ranging.error
+        ranges, error = self._page.ranging.findings, self._page.ranging.error
         if not self._changes(ranges, error):
             return
         sentence = "" if error is None else f"<div class='fl missing'>What is in reach: {escape(error)}</div>"

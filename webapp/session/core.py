@@ -7,7 +7,7 @@ from typing import Generic, TypeVar
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.session.display import Display
-from webapp.session.search_request import Draft
+from webapp.session.search_request import SearchRequest
 from webapp.session.state import State
 from webapp.session.swim_plan import SwimSettings
 from webapp.session.targets import FIRST
@@ -123,7 +123,7 @@ class Core:
         """A layout that was put aside to compare others with."""
         self.beside: str | None = None
         """With what the score card compares: a shipped layout's name, `PINNED`, or None for the saved one."""
-        self.draft = Draft()
+        self.draft = SearchRequest()
         """What a search for a better layout is to do."""
         self.swim = SwimSettings()
         """How the robot is to swim."""

@@ -5,7 +5,7 @@ from typing import Any
 
 from finlab.errors import FinlabError
 from finlab.forces.attainable import Kind
-from webapp.session.state import number
+from webapp.session.state import chosen, number
 
 POSITION_STEPS = {"off": 0.0, "5 mm": 0.005, "1 cm": 0.01, "5 cm": 0.05}
 """Grids [m] that a fin's position can snap to."""
@@ -65,13 +65,9 @@ class Display:
         now = getattr(self, key, None)
         if now is None:
             raise FinlabError(f"there is no switch {key!r:.40}")
-        choices: dict[str, Any] = {
-            "position_snap": POSITION_STEPS,
-            "angle_snap": ANGLE_STEPS,
-            "drawn": DRAWN,
-        }
-        if key in choices and value not in choices[key]:
-            raise FinlabError(f"{key}: expected one of {', '.join(choices[key])}, got {value!r:.40}")
+        choices: dict[str, Any] = {"position_snap": POSITION_STEPS, "angle_snap": ANGLE_STEPS, "drawn": DRAWN}
+        if key in choices:
+            chosen(value, key, choices[key])
         if key == "newtons" and value not in (0.0, *NEWTONS):
             raise FinlabError(f"arrow scale: expected one of {NEWTONS} N per 0.1 m, got {value!r:.40}")
         if key == "speed":

@@ -21,6 +21,7 @@ from finlab.layout.yaml_file import parse_yaml
 from finlab.sim import Trajectory
 from finlab.sim.task import read_trajectory
 from webapp.scene.meshes.mesh_hull import UNITS, read_mesh
+from webapp.session.state import chosen
 
 MAX_PATH_BYTES = 2_000_000
 """Largest file of a way to swim that is taken."""
@@ -125,8 +126,7 @@ def stored_hull(name: str, content: bytes, unit: str) -> Hull:
     Raises:
         FinlabError: it is no mesh, too large, or cannot be kept.
     """
-    if unit not in UNITS:
-        raise FinlabError(f"unit: expected one of {', '.join(UNITS)}, got {unit!r:.40}")
+    chosen(unit, "unit", UNITS)
     short = Path(str(name)).name[-80:] or "upload"
     read_mesh(short, content, UNITS[unit])
     path = (

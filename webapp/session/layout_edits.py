@@ -12,7 +12,7 @@ from finlab.layout.angles import wrapped
 from finlab.layout.body import HULL_SHAPES, Hull
 from webapp.scene.meshes.hull import hull_of
 from webapp.session.links import existing_image, image
-from webapp.session.state import MAX_FINS, number
+from webapp.session.state import MAX_FINS, chosen, number
 
 MAX_COORDINATE = 2.0
 """How far out a fin may be placed in the browser [m]."""
@@ -62,8 +62,7 @@ def ring(layout: Layout, name: str, count: int, axis: str = "z") -> Layout:
     Shafts are horizontal, so around x and y only the azimuth of a turned shaft is kept; one that would point
     straight up or down keeps that of the fin.
     """
-    if axis not in AXES:
-        raise FinlabError(f"axis: expected one of {', '.join(AXES)}, got {axis!r:.40}")
+    chosen(axis, "axis", AXES)
     fin = layout.fins[layout.index(name)]
     place = np.array(fin.position)
     if np.linalg.norm(np.delete(place, AXES.index(axis))) < 1e-3:
@@ -149,8 +148,7 @@ def _mirror_name(name: str) -> str:
 
 def shaped(layout: Layout, shape: str, size: Vector) -> Layout:
     """The layout with a parametric hull of a size [m]; its centre stays where it is."""
-    if shape not in HULL_SHAPES:
-        raise FinlabError(f"hull: expected one of {', '.join(HULL_SHAPES)}, got {shape!r:.40}")
+    chosen(shape, "hull", HULL_SHAPES)
     checked = tuple(
         number(v, f"{word} of the hull [m]", 0.02, 5.0)
         for v, word in zip(size, ("length", "width", "height"), strict=True)

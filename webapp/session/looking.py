@@ -6,7 +6,7 @@ from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.session.core import Core
 from webapp.session.files import shipped
-from webapp.session.search_request import Draft
+from webapp.session.search_request import SearchRequest
 
 PINNED = "pinned"
 """Name of the layout that was put aside, among those to compare with."""
@@ -35,7 +35,7 @@ class Looking(Core):
         """One field of `SwimSettings`."""
         self.swim = self.swim.with_value(key, value)
 
-    def set_draft(self, draft: Draft) -> None:
+    def set_draft(self, draft: SearchRequest) -> None:
         """What the next search for a better layout is to do."""
         self.draft = draft
 

@@ -2,14 +2,13 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from finlab.analysis import Bounds
-from finlab.analysis.goals import MISSION
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from webapp.session.state import MAX_TARGET, number
+from webapp.session.state import MAX_TARGET, chosen, number
 
 GOAL_WORDS = {
     "weakest direction": "weakest_direction",
@@ -33,43 +32,6 @@ Wrench = tuple[float, float, float, float, float, float]
 
 @dataclass(frozen=True)
 class SearchRequest:
-    """Everything that a search is told; checked on construction as far as it can be without a layout."""
-
-    goal: str
-    """Key of `GOAL_WORDS`."""
-    fins: tuple[str, ...]
-    """Names of fins that may move."""
-    way: Way = WAY
-    """How far each of them may go along x, y, z [m] and turn [deg]."""
-    own_ways: Mapping[str, Way] = field(default_factory=dict)
-    """Fins with bounds of their own."""
-    mission: tuple[Wrench, ...] = ()
-    """Wrenches [N, N m] of the goal `energy of a mission`; none means the common ones."""
-
-    def __post_init__(self) -> None:
-        if self.goal not in GOAL_WORDS:
-            raise FinlabError(f"goal: expected one of {', '.join(GOAL_WORDS)}, got {self.goal!r:.40}")
-        if not self.fins:
-            raise FinlabError("no fin may move; press the numbers of those that may")
-        for way in (self.way, *self.own_ways.values()):
-            checked_way(way)
-
-    def bounds(self, layout: Layout) -> dict[str, Bounds]:
-        """Where each fin may go from where it is."""
-        bounds = {}
-        for name in self.fins:
-            *reach, turn = self.own_ways.get(name, self.way)
-            bounds[name] = Bounds.around(layout.fins[layout.index(name)], reach, math.radians(turn))
-        return bounds
-
-    @property
-    def wrenches(self) -> Any:
-        """The mission (N, 6) [N, N m]."""
-        return self.mission or MISSION
-
-
-@dataclass(frozen=True)
-class Draft:
     """What the user has asked for so far; it may name fins that are gone by now."""
 
     goal: str = next(iter(GOAL_WORDS))
@@ -77,26 +39,24 @@ class Draft:
     held: tuple[str, ...] = ()
     """Fins that may not move."""
     ways: tuple[tuple[str, Way], ...] = ()
-    """How far fins may go, by name or `ALL`; see `SearchRequest.way`."""
+    """How far fins may go along x, y, z [m] and turn [deg], by name or `ALL`."""
     mission: str = ""
     """The mission as text, see `parsed_mission`."""
 
-    def with_goal(self, goal: Any) -> "Draft":
+    def with_goal(self, goal: Any) -> "SearchRequest":
         """Another goal.
 
         Raises:
             FinlabError: there is no such goal.
         """
-        if goal not in GOAL_WORDS:
-            raise FinlabError(f"goal: expected one of {', '.join(GOAL_WORDS)}, got {goal!r:.40}")
-        return replace(self, goal=goal)
+        return replace(self, goal=chosen(goal, "goal", GOAL_WORDS))
 
-    def with_held_toggled(self, name: str) -> "Draft":
+    def with_held_toggled(self, name: str) -> "SearchRequest":
         """A fin held, or free to move again."""
         held = tuple(other for other in self.held if other != name)
         return replace(self, held=held if name in self.held else (*held, name))
 
-    def with_way(self, name: str, way: tuple[Any, ...]) -> "Draft":
+    def with_way(self, name: str, way: tuple[Any, ...]) -> "SearchRequest":
         """Other bounds of a fin, or of `ALL`.
 
         Raises:
@@ -105,7 +65,7 @@ class Draft:
         others = tuple(pair for pair in self.ways if pair[0] != name)
         return replace(self, ways=(*others, (name, checked_way(way))))
 
-    def with_mission(self, text: Any) -> "Draft":
+    def with_mission(self, text: Any) -> "SearchRequest":
         """Another mission; it is read when the search begins, so that half a line may be typed."""
         return replace(self, mission=str(text)[:MAX_TEXT])
 
@@ -114,29 +74,34 @@ class Draft:
         ways = dict(self.ways)
         return ways.get(name, ways.get(ALL, WAY))
 
-    def request(self, layout: Layout) -> SearchRequest:
-        """What a search of this layout is told.
+    def bounds(self, layout: Layout) -> dict[str, Bounds]:
+        """Where each fin that may move may go from where it is.
 
         Raises:
-            FinlabError: no fin may move, or the mission makes no sense.
+            FinlabError: none may.
         """
-        fins = tuple(name for name in layout.names if name not in self.held)
-        own = {name: way for name, way in self.ways if name in layout.names}
-        return SearchRequest(self.goal, fins, self.way(ALL), own, parsed_mission(self.mission))
+        bounds = {}
+        for fin in layout.fins:
+            if fin.name not in self.held:
+                *reach, turn = self.way(fin.name)
+                bounds[fin.name] = Bounds.around(fin, reach, math.radians(turn))
+        if not bounds:
+            raise FinlabError("no fin may move; press the numbers of those that may")
+        return bounds
 
 
-def restored_draft(values: Mapping[str, Any]) -> Draft:
-    """A draft that was kept as plain values, checked like anything that a page sends.
+def restored_request(values: Mapping[str, Any]) -> SearchRequest:
+    """A request that was kept as plain values, checked like anything that a page sends.
 
     Raises:
         FinlabError: a value is not allowed. So may KeyError, TypeError and ValueError tell.
     """
-    draft = Draft().with_goal(values["goal"]).with_mission(values["mission"])
+    request = SearchRequest().with_goal(values["goal"]).with_mission(values["mission"])
     for name in values["held"]:
-        draft = draft.with_held_toggled(str(name))
+        request = request.with_held_toggled(str(name))
     for name, way in values["ways"]:
-        draft = draft.with_way(str(name), tuple(way))
-    return draft
+        request = request.with_way(str(name), tuple(way))
+    return request
 
 
 def checked_way(way: tuple[Any, ...]) -> Way:

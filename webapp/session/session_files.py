@@ -10,7 +10,7 @@ from typing import Any
 from finlab.errors import FinlabError
 from finlab.layout import Layout, layout_to_dict, parse_layout
 from webapp.session import Session
-from webapp.session.search_request import restored_draft
+from webapp.session.search_request import restored_request
 from webapp.session.state import SETTINGS, State
 
 VERSION = 3
@@ -122,7 +122,7 @@ def restore(session: Session, values: dict[str, Any]) -> None:
     display = session.display
     for key, value in values["display"].items():
         display = display.with_value(key, value)
-    draft, swim = restored_draft(values["draft"]), session.swim
+    draft, swim = restored_request(values["draft"]), session.swim
     for key, value in values["swim"].items():
         swim = swim.with_value(key, value)
     session.resume(state)

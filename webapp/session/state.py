@@ -1,6 +1,7 @@
 """What a browser works on: one immutable, checked value that undo can put back."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -30,7 +31,15 @@ STRENGTH_RANGE = (0.05, 1.0)
 """Shares that may be left of a weak fin's largest amplitude and frequency."""
 COMPARED = ("learned", "paper", "analytic", "qp", "sqp", "multistart")
 """Methods that answer quickly enough to be compared while one waits."""
-SETTINGS = ("method", "policy", "n_candidates", "temperature", "gamma")
+CHOICES: dict[str, tuple[str, ...]] = {"method": tuple(METHODS), "policy": KINDS}
+"""Settings that are one of some words."""
+RANGES = {
+    "n_candidates": ("candidates K", *CANDIDATE_RANGE),
+    "temperature": ("temperature T", *TEMPERATURE_RANGE),
+    "gamma": ("energy weight gamma", *GAMMA_RANGE),
+}
+"""Settings that are numbers: what they are called, and their ends."""
+SETTINGS = (*CHOICES, *RANGES)
 """Fields of `State` that say how the question is answered."""
 
 
@@ -129,22 +138,23 @@ class State:
         return replace(self, links=linked(self.links, a, b))
 
     def with_setting(self, key: str, value: Any) -> "State":
-        """K, T, gamma or the method changed: `key` is the field's name."""
-        if key == "method":
-            if value not in METHODS:
-                raise FinlabError(f"method: expected one of {', '.join(METHODS)}, got {value!r:.60}")
-            return replace(self, method=value)
-        if key == "policy":
-            if value not in KINDS:
-                raise FinlabError(f"policy: expected one of {', '.join(KINDS)}, got {value!r:.60}")
-            return replace(self, policy=value)
-        if key == "n_candidates":
-            return replace(self, n_candidates=round(number(value, "candidates K", *CANDIDATE_RANGE)))
-        if key == "temperature":
-            return replace(self, temperature=number(value, "temperature T", *TEMPERATURE_RANGE))
-        if key == "gamma":
-            return replace(self, gamma=number(value, "energy weight gamma", *GAMMA_RANGE))
-        raise FinlabError(f"there is no setting {key!r:.40}")
+        """K, T, gamma, the method or the policy changed: `key` is one of `SETTINGS`."""
+        if key not in SETTINGS:
+            raise FinlabError(f"there is no setting {key!r:.40}")
+        checked: Any = chosen(value, key, CHOICES[key]) if key in CHOICES else number(value, *RANGES[key])
+        return replace(self, **{key: round(checked) if key == "n_candidates" else checked})
+
+
+def chosen(value: Any, name: str, choices: Iterable[str]) -> Any:
+    """One of some words, or a sentence that says which there are; the page may send anything.
+
+    Raises:
+        FinlabError: `value` is none of them.
+    """
+    words = tuple(choices)
+    if value not in words:
+        raise FinlabError(f"{name}: expected one of {', '.join(words)}, got {value!r:.60}")
+    return value
 
 
 def number(value: Any, name: str, low: float, high: float) -> float:

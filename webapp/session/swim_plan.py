@@ -1,15 +1,13 @@
 """What is to be swum: what the user has set so far, and the plan that comes of it when the swim starts."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.sim import PLANTS, SHIPPED, Trajectory
-from webapp.session.state import COMPARED, State, number
+from webapp.session.state import COMPARED, State, chosen, number
 
-MAX_METHODS = 2
-"""Robots that swim side by side."""
 ALONE = "nobody"
 """Rival of a robot that swims alone."""
 OWN = "own path"
@@ -49,9 +47,7 @@ class SwimSettings:
         }
         if key not in choices:
             raise FinlabError(f"a swim has no setting {key!r:.40}")
-        if value not in choices[key]:
-            raise FinlabError(f"{key}: expected one of {', '.join(choices[key])}, got {value!r:.40}")
-        return replace(self, **{key: value})
+        return replace(self, **{key: chosen(value, key, choices[key])})
 
     def without_own_path(self) -> "SwimSettings":
         """The same after a reload, when the user's file is not there any more."""
@@ -70,9 +66,8 @@ class SwimSettings:
         return Plan(state.able, state.failed, path, methods, self.plant)
 
 
-@dataclass(frozen=True)
-class Plan:
-    """One swim, checked on construction."""
+class Plan(NamedTuple):
+    """One swim."""
 
     layout: Layout
     """The robot."""
@@ -84,13 +79,3 @@ class Plan:
     """Allocation methods, one robot each."""
     plant: str = "mean"
     """How the fins' forces are simulated: one of `PLANTS`."""
-
-    def __post_init__(self) -> None:
-        if isinstance(self.path, str) and self.path not in SHIPPED:
-            raise FinlabError(f"path: expected one of {', '.join(SHIPPED)}, got {self.path!r:.40}")
-        if not 1 <= len(set(self.methods)) == len(self.methods) <= MAX_METHODS:
-            raise FinlabError("expected one method, or two different ones to compare")
-        if wrong := [method for method in self.methods if method not in COMPARED]:
-            raise FinlabError(f"method: expected one of {', '.join(COMPARED)}, got {wrong[0]!r:.40}")
-        if self.plant not in PLANTS:
-            raise FinlabError(f"fin forces: expected one of {', '.join(PLANTS)}, got {self.plant!r:.40}")

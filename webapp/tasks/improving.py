@@ -1,14 +1,15 @@
 """A search for a better layout that can be watched, stopped, and taken or left."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
-from finlab.analysis import Improvement, Progress, optimize_layout
+from finlab.analysis import Bounds, Improvement, Progress, optimize_layout
+from finlab.analysis.goals import MISSION
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from webapp.session.search_request import GOAL_WORDS, SearchRequest
+from webapp.session.search_request import GOAL_WORDS, SearchRequest, parsed_mission
 from webapp.tasks.background import EventLoop, Newest, Worker
 
 
@@ -18,8 +19,12 @@ class Search:
 
     layout: Layout
     """Where it begins; mirror pairs in it stay mirror pairs."""
-    request: SearchRequest
-    """What it may do."""
+    goal: str
+    """What to raise, as `optimize_layout` calls it."""
+    bounds: Mapping[str, Bounds]
+    """Where each fin that may move may go."""
+    mission: Sequence[Sequence[float]]
+    """Wrenches (N, 6) of the mission [N, N m]."""
     stop: threading.Event = field(default_factory=threading.Event)
     """Ends it after the present round."""
 
@@ -53,13 +58,14 @@ class Improver:
         """Search from a layout.
 
         Raises:
-            FinlabError: a search is running, or a fin of the request is not there.
+            FinlabError: a search is running, no fin may move, or the mission makes no sense.
         """
         if self.running:
             raise FinlabError("a search is running already; cancel it first")
-        request.bounds(layout)
+        mission = parsed_mission(request.mission) or MISSION
+        search = Search(layout, GOAL_WORDS[request.goal], request.bounds(layout), mission)
         self.forget()
-        self._search.ask(Search(layout, request))
+        self._search.ask(search)
 
     def cancel(self) -> None:
         """Stop after the present round; what has been found by then is offered."""
@@ -74,13 +80,12 @@ class Improver:
 
     def _improve(self, search: Search) -> Improvement:
         """On the worker's thread."""
-        request = search.request
         return optimize_layout(
             search.layout,
-            request.fins,
-            request.bounds(search.layout),
-            GOAL_WORDS[request.goal],
-            mission=request.wrenches,
+            tuple(search.bounds),
+            search.bounds,
+            search.goal,
+            mission=search.mission,
             progress=lambda progress: self._loop.post(partial(self._note, search, progress)),
             cancelled=search.stop.is_set,
         )

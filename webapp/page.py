@@ -1,0 +1,200 @@
+"""One browser's page: turns intents into changes of the session, and answers into what the page shows.
+
+Everything here runs on viser's event loop; what takes time is handed to the workers' threads.
+"""
+
+import asyncio
+import traceback
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from functools import partial
+from typing import Protocol
+
+import viser
+
+from finlab.allocation.allocation import Allocation
+from finlab.errors import FinlabError
+from finlab.forces.reach import Ranges
+from webapp.handles import Changes
+from webapp.scene.scenery import Scenery
+from webapp.session import Session
+from webapp.tasks.analyst import REST_S, Beside, Findings, Question, find, find_ranges
+from webapp.tasks.answering import Answering
+from webapp.tasks.background import EventLoop, Newest, Workers
+from webapp.tasks.comparison import Comparison
+from webapp.tasks.exports import Exports
+from webapp.tasks.improving import Improver
+from webapp.tasks.playback import Playback
+from webapp.tasks.solver import Solver
+from webapp.tasks.sweeping import Sweep
+from webapp.tasks.swimming import Swimming
+from webapp.theme import GREEN, VERMILLION
+
+CARD_REST_S = 0.35
+"""How long a layout may not change before its card is worked out [s]: that takes a second."""
+
+
+class Panel(Protocol):
+    """A group of widgets."""
+
+    def refresh(self) -> None:
+        """Write the session and the answer into the widgets."""
+
+
+class Page(ABC):
+    """The scene of one client around its session, and what the panels beside it may ask for."""
+
+    def __init__(
+        self,
+        client: viser.ClientHandle,
+        session: Session,
+        solver: Solver,
+        workers: Workers,
+        loop: asyncio.AbstractEventLoop,
+    ) -> None:
+        """Build the page and ask for a first answer.
+
+        Args:
+            client: the browser.
+            session: what it shows.
+            solver: answers its questions.
+            workers: on whose threads everything is computed.
+            loop: viser's event loop.
+        """
+        self.client = client
+        """The browser."""
+        self.session = session
+        """What it shows."""
+        self._loop = page = EventLoop(loop, self.fault)
+        self._robot = _robot(session)
+        self._faults: set[str] = set()
+        answers, changed = workers.answers, self._refresh
+        refused = partial(self.notify, "Not possible")
+        self.answering = Answering(
+            session, solver, page, answers, self._answered, partial(self.notify, "No answer")
+        )
+        """The newest answer, its modes and what of it is on the robot."""
+        self.playback = Playback(session, self.answering, solver, page, answers, changed, refused)
+        """The refinement, step by step."""
+        self.ranging: Newest[Beside, Ranges] = Newest(page, workers.marks, find_ranges, changed, REST_S)
+        """How far each component of the target can go."""
+        self.analyst: Newest[Question, Findings] = Newest(page, workers.cards, find, changed, CARD_REST_S)
+        """What the layout can do."""
+        self.improver = Improver(page, workers.searches, changed)
+        """The search for a better layout."""
+        self.comparison = Comparison(solver, page, answers, changed)
+        """Other methods on the same question."""
+        self.swimming = Swimming(solver.aside, page, workers.swims, self._swam, refused)
+        """A robot that swims."""
+        self.sweep = Sweep(session, page, self.do)
+        """A component of the target on its way through a range."""
+        self.exports = Exports(client, session, solver, page, answers, self.notify)
+        """Files to take home."""
+        self.scenery = Scenery(client, session, self.swimming, self.do)
+        """What is seen beside the panel."""
+        self._panels: list[Panel] = []
+        self._panels, self._swim_panels = self._build()
+        self._refresh()
+        self._ask()
+
+    @abstractmethod
+    def _build(self) -> tuple[list[Panel], list[Panel]]:
+        """Build everything in the panel beside the view: all panels, and of these those that show a swim."""
+
+    # What panels and scene may ask for.
+
+    @property
+    def shown(self) -> Allocation | None:
+        """What is on the robot."""
+        return self.answering.shown
+
+    @property
+    def busy(self) -> bool:
+        """True while the newest answer is older than the state."""
+        return self.answering.busy
+
+    def do(self, act: Callable[[], object]) -> None:
+        """Carry out an intent; a refusal becomes a note, and the page goes back to what the session holds."""
+        self._faults.clear()
+        try:
+            act()
+        except FinlabError as error:
+            self.notify("Not possible", str(error))
+        except Exception as error:  # the page must go on, whatever we have got wrong
+            self.fault(error)
+        self._ask()
+        self._refresh()
+
+    def notify(self, title: str, body: str, *, good: bool = False) -> None:
+        """Show a note to the user."""
+        self.client.add_notification(title, body, auto_close_seconds=8.0, color=GREEN if good else VERMILLION)
+
+    def animate(self, elapsed: float) -> None:
+        """Let time pass [s]."""
+        self.scenery.animate(elapsed)
+
+    # From the session to the page.
+
+    def _refresh(self) -> None:
+        with self.client.atomic():
+            # First: it settles the scale that the legend tells.
+            try:
+                self.scenery.refresh(self.answering, self.comparison, self.improver, self.analyst.findings)
+            except Exception as error:
+                self.scenery.hide()
+                self.fault(error)
+            for panel in self._panels:
+                panel.refresh()
+
+    # From the session to the workers and back.
+
+    def _ask(self) -> None:
+        """Have the workers answer the present state, unless they were asked already."""
+        session = self.session
+        display, state = session.display, session.state
+        if self._robot != _robot(session):
+            # What is known of another robot must not stand under this one's name.
+            self._robot = _robot(session)
+            for task in (self.answering, self.analyst, self.ranging):
+                task.forget()
+        self.analyst.ask(Question(state.able, state.failed, session.reference, display.drawn, display.alone))
+        self.ranging.ask(Beside(state.able, state.failed, state.target))
+        self.answering.ask()
+
+    def _swam(self) -> None:
+        """The swim has gone on: ten times a second, so only what shows it is written."""
+        if self.scenery.swims != bool(self.swimming.swimmers):
+            self._refresh()
+            return
+        with self.client.atomic():
+            self.scenery.refresh_swim()
+            for panel in self._swim_panels:
+                panel.refresh()
+
+    def _answered(self) -> None:
+        self.sweep.note(self.answering)
+        self._refresh()
+
+    def fault(self, error: Exception) -> None:
+        """Something that we have got wrong: it is told, and nothing that was drawn before is trusted."""
+        Changes.faults += 1
+        text = f"{type(error).__name__}: {error}"
+        if text not in self._faults:  # once is enough, however often the page is written
+            self._faults.add(text)
+            traceback.print_exception(error)
+            self.notify("A fault of the app", text)
+
+    def close(self) -> None:
+        """The browser has gone."""
+        self._loop.close()
+        self.sweep.stop()
+        self.swimming.stop()
+        self.comparison.cancel()
+        self.improver.forget()
+        for task in (self.answering, self.analyst, self.ranging):
+            task.forget()
+
+
+def _robot(session: Session) -> tuple[str, tuple[str, ...]]:
+    """What tells one robot from another, however its fins are moved."""
+    return session.state.layout.name, session.state.layout.names
