@@ -6,7 +6,7 @@ import threading
 from pathlib import Path
 
 from finlab.errors import FinlabError
-from finlab.layout import Layout, load_layout
+from finlab.layout import load_layout
 from webapp.app import App
 from webapp.guard import Guard
 from webapp.session.files import cache_folder
@@ -34,7 +34,7 @@ def serve(
     Raises:
         FinlabError: the port is taken, or layout or checkpoint cannot be read.
     """
-    first = _first_layout(layout or FIRST_LAYOUT)
+    first = load_layout(layout or FIRST_LAYOUT)
     _check_port(host, port)
     solver = Solver(checkpoint)
     # A missing checkpoint is reported now, not in the browser; and the first page finds a warm solver.
@@ -51,10 +51,6 @@ def serve(
     finally:
         app.stop()
         stop_server(server)
-
-
-def _first_layout(text: str) -> Layout:
-    return load_layout(text)
 
 
 def _check_port(host: str, port: int) -> None:

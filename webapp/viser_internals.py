@@ -82,8 +82,3 @@ def disable_sharing(server: viser.ViserServer) -> None:
 def disconnect_all(server: viser.ViserServer) -> None:
     """Drop every connection, as a bad network would; for tests."""
     server._websock_server.disconnect_all_clients()
-
-
-def backlog(server: viser.ViserServer) -> int:
-    """Messages that the server keeps for clients to come: grows where nodes or widgets are left behind."""
-    return len(server._websock_server._broadcast_buffer.message_from_id)

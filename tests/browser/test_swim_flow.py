@@ -19,7 +19,7 @@ def test_swims_loses_a_fin_and_goes_on(page: Any) -> None:
     assert page.pixel("/swim/robot0") != start, "it moves on the screen"
     assert page.page.locator(".uplot:visible").count() == 3
     page.page.get_by_role("button", name="2", exact=True).locator("visible=true").first.click()
-    page.until(lambda: page.view.swimming.swimmers[0].failed == ("front_left",))
+    page.until(lambda: page.view.swimming.swimmers[0].shown.failed == ("front_left",))
     page.until(lambda: "3 of 4 fins" in page.text(".fl-status"))
     page.until(lambda: not page.view.swimming.swimmers[0].shown.force[1].any())
     page.page.get_by_role("button", name="2 ✕", exact=True).locator("visible=true").first.wait_for()

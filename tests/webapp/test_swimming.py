@@ -96,18 +96,18 @@ def test_fins_break_and_are_mended_while_it_swims(swimming: Swimming) -> None:
     begin(swimming)
     swimming.set_running(False)
     swimming.toggle("front_left")
-    until(lambda: swimming.swimmers[0].failed == ("front_left",))
+    until(lambda: swimming.swimmers[0].shown.failed == ("front_left",))
     swimming.step()
     until(lambda: swimming.time > 0)
     assert not swimming.swimmers[0].shown.force[1].any()
     for name in ("front_right", "back_left"):
         swimming.toggle(name)
-        until(lambda name=name: name in swimming.swimmers[0].failed)
+        until(lambda name=name: name in swimming.swimmers[0].shown.failed)
     assert "drift off" in swim_card(swimming)
     with pytest.raises(FinlabError, match="last fin"):
         swimming.toggle("back_right")
     swimming.toggle("front_left")
-    until(lambda: "front_left" not in swimming.swimmers[0].failed)
+    until(lambda: "front_left" not in swimming.swimmers[0].shown.failed)
 
 
 def test_bad_plans_and_methods_out_of_order(swimming: Swimming) -> None:

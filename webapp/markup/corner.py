@@ -110,12 +110,12 @@ def swim_corner(swimming: Swimming, newtons: float) -> str:
             *((s.method, c) for s, c in zip(swimming.swimmers, (DELIVERED, OTHER), strict=False)),
         )
     )
-    alive = len(first.fins) - len(first.failed)
+    alive = len(first.fins) - len(first.shown.failed)
     off = f"{100 * float(first.shown.record[-1, ERROR]):.1f}" if len(first.shown.record) else "–"
     parts = (
         f"<b>{escape(first.swim.layout.name)}</b>",
         f"<span>{alive} of {len(first.fins)} fins</span>",
-        f"<span><b>{first.time:.1f}</b> s of {first.duration_s:.0f} s</span>",
+        f"<span><b>{first.shown.time:.1f}</b> s of {first.duration_s:.0f} s</span>",
         f"<span><span class='dim'>off the path</span> <b>{off}</b> cm</span>",
         f"<span>{pace_words(swimming)}</span>",
     )

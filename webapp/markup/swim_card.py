@@ -26,7 +26,7 @@ def swim_card(swimming: Swimming) -> str:
     if not swimming.swimmers:
         return "<div class='fl dim'>making ready …</div>"
     first = swimming.swimmers[0]
-    head = f"<b>{first.time:.1f} s</b> of {first.duration_s:.0f} s, {pace_words(swimming)}"
+    head = f"<b>{first.shown.time:.1f} s</b> of {first.duration_s:.0f} s, {pace_words(swimming)}"
     rows = []
     for swimmer, color in zip(swimming.swimmers, (DELIVERED, OTHER), strict=False):
         cells = "".join(
@@ -45,7 +45,7 @@ def swim_card(swimming: Swimming) -> str:
         if s.unknown_fins
     )
     if not first.shown.controllable:
-        numbers = listed([str(first.fins.index(name) + 1) for name in first.failed])
+        numbers = listed([str(first.fins.index(name) + 1) for name in first.shown.failed])
         warning += (
             f"<div class='missing'>Without fin {numbers} surge, heave and yaw are not free of each other: "
             "expect it to drift off.</div>"

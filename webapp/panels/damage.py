@@ -112,8 +112,7 @@ class DamagePanel:
     def refresh(self) -> None:
         """Write the damage of the fin."""
         state, name = self._page.session.state, self._name
-        put(self._fin, options=state.layout.names)
-        put(self._fin, value=name)
+        put(self._fin, options=state.layout.names, value=name)
         put(self._strength, value=round(100.0 * dict(state.weak).get(name, 1.0), 1))
         angle = dict(state.stuck).get(name)
         put(self._stuck, value=angle is not None)

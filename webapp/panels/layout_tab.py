@@ -127,8 +127,7 @@ class LayoutTab:
         """Write the layout and the selected fin."""
         session, layout = self._page.session, self._page.session.state.layout
         put(self._layouts, value=shipped_name(layout) or OWN)
-        put(self._fins, options=(NONE, *layout.names))
-        put(self._fins, value=session.selected or NONE)
+        put(self._fins, options=(NONE, *layout.names), value=session.selected or NONE)
         selected = session.selected is not None
         put(self._position, disabled=not selected)
         put(self._angle, disabled=not selected)

@@ -60,8 +60,7 @@ class LimitsTab:
         """Write the findings."""
         session = self._page.session
         names = (SAVED, *((PINNED,) if session.pinned is not None else ()), *shipped())
-        put(self._beside, options=names)
-        put(self._beside, value=session.beside or SAVED)
+        put(self._beside, options=names, value=session.beside or SAVED)
         self._improve.refresh()
         analyst, display = self._page.analyst, self._page.session.display
         put(self._chosen, content=chosen_button(PICKER, list(DRAWN).index(display.drawn)))

@@ -116,8 +116,7 @@ class SwimTab:
     def refresh(self) -> None:
         """Write how the swim goes."""
         swimming, settings = self._page.swimming, self._page.session.swim
-        put(self._path, options=tuple(SHIPPED) if self._own is None else (*SHIPPED, OWN))
-        put(self._path, value=settings.path)
+        put(self._path, options=tuple(SHIPPED) if self._own is None else (*SHIPPED, OWN), value=settings.path)
         put(self._method, value=settings.method)
         put(self._rival, value=settings.rival)
         put(self._plant, value=settings.plant)
@@ -126,7 +125,7 @@ class SwimTab:
             swimming.pace.set_speed(settings.speed)
         swimmers = swimming.swimmers
         names = swimmers[0].fins if swimmers else self._page.session.state.layout.names
-        failed = swimmers[0].failed if swimmers else self._page.session.state.failed
+        failed = swimmers[0].shown.failed if swimmers else self._page.session.state.failed
         paused = swimming.active and not swimming.running and not swimming.done
         put(self._run, options=("Start", "Go on" if paused else "Pause", "Step", "End"))
         self._fins.refresh(names, failed)

@@ -120,8 +120,7 @@ class TargetPanel:
         state = self._page.session.state
         for slider, value, reach in zip(self._sliders, state.target, self.reach, strict=True):
             end = slider_end(float(reach))
-            put(slider, min=min(-end, value), max=max(end, value))
-            put(slider, value=value)
+            put(slider, min=min(-end, value), max=max(end, value), value=value)
         ranges, error = self._page.ranging.findings, self._page.ranging.error
         if not self._changes(ranges, error):
             return

@@ -175,8 +175,7 @@ class FinNode:
         if not owned_by_user:
             put(self._move, position=np.array(fin.position))
             put(self._turn, wxyz=quaternion(fin.mounting_angle, 2))
-        put(self._label, visible=label is not None, text=label or "")
-        put(self._label, position=np.array([0.0, 0.0, 0.04]))
+        put(self._label, visible=label is not None, text=label or "", position=np.array([0.0, 0.0, 0.04]))
         shaft = np.array([math.cos(fin.mounting_angle), math.sin(fin.mounting_angle), 0.0])
         servo = np.array(fin.position) - 0.03 * shaft
         self._strut.show(_strut, servo, hull)

@@ -70,25 +70,6 @@ def densities(insight: Insight, layout: Layout, failed: tuple[str, ...], tempera
     return Densities(places * degrees[:, None], curves)
 
 
-def refinement(allocator: Allocator, answer: Allocation) -> tuple[Allocation, ...]:
-    """The best raw candidate of an answer, then what each step makes of it, and the answer itself at the end.
-
-    Raises:
-        AllocationError: the method draws no candidates and refines none.
-    """
-    if answer.samples is None:
-        raise AllocationError(f"method {allocator.name!r} draws no candidates; use method 'learned'")
-    layout = answer.layout.without(answer.failed) if answer.failed else answer.layout
-    alive = np.isfinite(answer.command[:, 0])
-    raw = answer.samples.command[0][alive]
-    frames = []
-    for steps in range(STEPS + 1):
-        command = np.full_like(answer.command, np.nan)
-        command[alive] = allocator.refined(layout, answer.target, raw, steps)
-        frames.append(answer.with_command(command))
-    return (*frames, answer)
-
-
 class Attention(NamedTuple):
     """How much the fins look at each other in the network: the graph that it sees."""
 
@@ -168,12 +149,23 @@ class Solver:
         return listed_modes(reply.answer.explore(), reply.answer.samples)
 
     def refinement(self, state: State, answer: Allocation) -> tuple[Allocation, ...]:
-        """The steps of the refinement behind an answer to a state.
+        """The best raw candidate of an answer, what each step makes of it, and the answer itself at the end.
 
         Raises:
-            FinlabError: the method refines nothing.
+            AllocationError: the method draws no candidates and refines none.
         """
-        return refinement(self.allocator(state), answer)
+        allocator = self.allocator(state)
+        if answer.samples is None:
+            raise AllocationError(f"method {allocator.name!r} draws no candidates; use method 'learned'")
+        layout = answer.layout.without(answer.failed) if answer.failed else answer.layout
+        alive = np.isfinite(answer.command[:, 0])
+        raw = answer.samples.command[0][alive]
+        frames = []
+        for steps in range(STEPS + 1):
+            command = np.full_like(answer.command, np.nan)
+            command[alive] = allocator.refined(layout, answer.target, raw, steps)
+            frames.append(answer.with_command(command))
+        return (*frames, answer)
 
     def solve(self, state: State) -> Allocation:
         """The answer to a state.

@@ -151,25 +151,6 @@ class Swimmer:
             record=np.array(thin) if thin else np.zeros((0, FORCES + n)),
         )
 
-    def take(self, moment: Moment) -> None:
-        """Show another moment."""
-        self.shown = moment
-
-    @property
-    def time(self) -> float:
-        """Simulated time of what is shown [s]."""
-        return self.shown.time
-
-    @property
-    def failed(self) -> tuple[str, ...]:
-        """Fins that are lost."""
-        return self.shown.failed
-
-    @property
-    def done(self) -> bool:
-        """Whether it has arrived."""
-        return self.shown.done
-
     @property
     def track_error(self) -> float | None:
         """Root of the mean square distance from where it should have been so far [m]."""

@@ -73,12 +73,12 @@ class Swimming:
     @property
     def done(self) -> bool:
         """Whether it has come to its end."""
-        return bool(self.swimmers) and self.swimmers[0].done
+        return bool(self.swimmers) and self.swimmers[0].shown.done
 
     @property
     def time(self) -> float:
         """Simulated time [s]."""
-        return self.swimmers[0].time if self.swimmers else 0.0
+        return self.swimmers[0].shown.time if self.swimmers else 0.0
 
     def start(self, plan: Plan) -> None:
         """Begin at the beginning; a swim that is under way is given up."""
@@ -128,9 +128,9 @@ class Swimming:
         """A fin of all robots breaks, or is mended, before the next step."""
         if not self.swimmers:
             raise FinlabError("nothing swims yet; press Start")
-        swim = self.swimmers[0]
-        broken = name in swim.failed
-        if not broken and len(swim.failed) + 1 >= len(swim.fins):
+        failed = self.swimmers[0].shown.failed
+        broken = name in failed
+        if not broken and len(failed) + 1 >= len(self.swimmers[0].fins):
             raise FinlabError(f"{name} is the last fin that works; mend another one first")
         self._acts.append(lambda swim: swim.mend(name) if broken else swim.fail(name))
         if not self.running:
@@ -169,7 +169,7 @@ class Swimming:
             return
         done, moments = self._stretch.findings
         for swimmer, moment in zip(self.swimmers, moments, strict=True):
-            swimmer.take(moment)
+            swimmer.shown = moment
         self.pace.paid(done * self.swimmers[0].period_s, self.time)
         if self.done:
             self.running = False
