@@ -12,9 +12,8 @@ from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
 from webapp.scene.dragging import Grips
 from webapp.scene.fin_node import FinNode, Flapping
-from webapp.scene.ghosts import Ghost, Overlay, moved_fins
-from webapp.scene.lines import Lines
 from webapp.scene.meshes.hull import hull_of
+from webapp.scene.overlays import Ghost, Lines, Overlay, moved_fins
 from webapp.scene.stage import Stage
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, WrenchNodes, fitting_newtons
 from webapp.session import Session

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 from finlab.layout import Layout
 from webapp.handles import put
 from webapp.scene.fin_node import FinShapes, Flapping, quaternion
-from webapp.scene.lines import NO_LINE
 from webapp.scene.meshes.hull import hull_of
 from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, joined, tube
+from webapp.scene.overlays import NO_LINE
 from webapp.scene.shape import Shape
 from webapp.tasks.swimmer import PLACE, Moment
 from webapp.theme import ASKED, DELIVERED, LIGHT, Rgb

@@ -1,4 +1,4 @@
-"""The graph that the network sees, and the selected fin's distance from the centre of gravity."""
+"""What is drawn over the robot: pale blades, another method's arrows, the fin graph, dimensions."""
 
 from itertools import combinations
 
@@ -6,12 +6,17 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from finlab.layout import Layout
+from finlab.allocation.allocation import Allocation
+from finlab.layout import Fin, Layout
 from webapp.handles import put
-from webapp.scene.meshes.mesh import NOTHING, Mesh, joined, tube
+from webapp.scene.meshes import fin as fin_mesh
+from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, joined, tube
 from webapp.scene.shape import UNLIT, Shape
 from webapp.tasks.solver import Attention
-from webapp.theme import LIGHT
+from webapp.theme import DEAD, LIGHT, Rgb, overlay_color
+
+LIFT = np.array([0.0, 0.0, 0.025])
+"""The arrows stand a little above the fins' own ones, so that equal ones can be told apart [m]."""
 
 NO_LINE = np.zeros((1, 2, 3), dtype=np.float32)
 RADIUS = 0.004
@@ -20,8 +25,58 @@ CONTRAST = 2.0
 """Power of the weights: they differ little, and the eye needs more."""
 
 
+class Ghost:
+    """Pale blades of some fins: where they stood, where a search puts them, or where one would land."""
+
+    def __init__(self, scene: viser.SceneApi, name: str, color: Rgb = DEAD, opacity: float = 0.3) -> None:
+        """Build the node, showing nothing."""
+        self._shape = Shape(scene, name, color, opacity=opacity, visible=False, **UNLIT)
+
+    def show(self, fins: tuple[Fin, ...]) -> None:
+        """Show fins; none hides the node."""
+        put(self._shape.node, visible=bool(fins))
+        if fins:
+            self._shape.show(_blades, fins)
+
+
+def moved_fins(other: Layout | None, layout: Layout) -> tuple[Fin, ...]:
+    """The fins of another version of a layout that stand elsewhere now."""
+    if other is None or other.name != layout.name:
+        return ()
+    now = {fin.name: (fin.position, fin.mounting_angle) for fin in layout.fins}
+    return tuple(fin for fin in other.fins if now.get(fin.name) != (fin.position, fin.mounting_angle))
+
+
+def _blades(fins: tuple[Fin, ...]) -> Mesh:
+    parts = []
+    for fin in fins:
+        turn = fin_mesh.mounting(fin.mounting_angle)
+        for part in (fin_mesh.blade(), fin_mesh.shaft()):
+            parts.append(Mesh(part.vertices @ turn.T + np.array(fin.position), part.faces))
+    return joined(*parts)
+
+
+class Overlay:
+    """Forces of the fins by another method, as plain arrows beside the robot's own."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        """Build the node, showing nothing."""
+        self._shape = Shape(scene, "/robot/overlay", overlay_color(False), visible=False, cast_shadow=False)
+
+    def refresh(self, answer: Allocation | None, scale: float, dark: bool) -> None:
+        """Show an answer's forces, arrows of `scale` [m/N]; nothing for None."""
+        put(self._shape.node, visible=answer is not None, color=overlay_color(dark))
+        if answer is not None:
+            place = answer.layout.position
+            self._shape.show(_arrows, place, np.nan_to_num(answer.fin_forces) * scale)
+
+
+def _arrows(place: np.ndarray, way: np.ndarray) -> Mesh:
+    return joined(*(force_arrow(w, p + LIFT, 0.005) for p, w in zip(place, way, strict=True)))
+
+
 class Lines:
-    """Nodes that are hidden when there is nothing to say."""
+    """The graph that the network sees, and how far the selected fin is from the centre of gravity."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         """Build the nodes."""
