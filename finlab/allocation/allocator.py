@@ -1,7 +1,5 @@
 """The one interface of every allocation method: check the problem, solve it, answer with an `Allocation`."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The settings that travel with a bundle, in its `bundle.json`: what the allocator on board is made with."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, fields, is_dataclass

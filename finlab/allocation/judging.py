@@ -1,7 +1,5 @@
 """What commands really give: every method's answers are judged by the plant, in one place."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Literal, NamedTuple
 

@@ -1,7 +1,5 @@
 """What an allocation method is made of: its settings, what it can solve, and how it meets a policy."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """What to do when a robot cannot deliver the wrench it is asked for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """What an allocator is asked: checked wrenches, previous commands, failed and damaged fins."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

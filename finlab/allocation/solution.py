@@ -1,7 +1,5 @@
 """What a method hands over before anybody has judged it, and what makes a result plain data."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple

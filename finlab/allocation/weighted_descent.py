@@ -10,8 +10,6 @@ leaner Levenberg-Marquardt of their own (`learned.levenberg_marquardt`): they ru
 millisecond, always for as many steps, and need neither energy nor a record of which rows are done.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol

@@ -4,8 +4,6 @@
 layout, checkpoint and settings give the same bytes, as a folder and as a zip archive.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import os

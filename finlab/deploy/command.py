@@ -1,7 +1,5 @@
 """`finlab-runtime check|allocate|serve|speed BUNDLE`: the command that runs on the robot."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -5,8 +5,6 @@ The file is one JSON object; `graph.schema.json` beside this module describes it
 Reading checks every value, and refusals name the key.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """A robot out of its bundle: the layout, the fins that it has lost, and the library's own allocator."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass

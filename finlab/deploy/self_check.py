@@ -5,8 +5,6 @@ does the surrogate predict the same wrench, does the fins' own model confirm wha
 is this computer's own answer as good as the stored one.
 """
 
-from __future__ import annotations
-
 import resource
 import time
 from collections.abc import Callable, Iterable

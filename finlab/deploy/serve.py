@@ -16,8 +16,6 @@ Only the newest request counts: those that waited behind it are skipped, since a
 the past. A late answer is thrown away.
 """
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """How the server's lines travel: over standard input and output, or as UDP datagrams on this machine."""
 
-from __future__ import annotations
-
 import queue
 import socket
 import threading

@@ -1,7 +1,5 @@
 """The forces, or torques, that a layout can give, as a body to be drawn: a convex hull of wrenches."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Literal, NamedTuple

@@ -1,7 +1,5 @@
 """How near and how far the set of all wrenches reaches: its weakest and its strongest direction."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

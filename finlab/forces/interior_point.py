@@ -6,8 +6,6 @@ for many robots at once. Newton's systems are reduced to the multipliers l = v /
 axis with a tiny c, which must be met, costs no accuracy, and more fins hardly cost time.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

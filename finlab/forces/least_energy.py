@@ -9,8 +9,6 @@ than half a turn, each half is tried. The small cost of the zero direction is le
 counted in the result.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import replace
 from itertools import combinations

@@ -8,8 +8,6 @@ An axis with a large c_j hardly counts, one with a tiny c_j must be met: policie
 wider than half a turn is not convex; its halves are tried.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

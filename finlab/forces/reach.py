@@ -1,7 +1,5 @@
 """The largest wrench in a given direction with nothing beside it, or with the other axes as they are."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ double precision and regularized, so there is nothing to check. The loop is no p
 another numpy keeps it elsewhere, the public function answers the same, a little later.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -5,8 +5,6 @@ the least energy. Knowing that pair turns allocation from three commands per fin
 one planar force per fin, in which the wrench is linear. Fins' own laws and the learned one are asked alike.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Method `analytic`: force-space pseudo-inverse, each fin's force law inverted, clipped to the limits."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -5,8 +5,6 @@ Newton step, and a search along the projected path keeps the objective falling. 
 after a finite number of steps; tests compare it with SciPy's active-set solver `lsq_linear(method="bvls")`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

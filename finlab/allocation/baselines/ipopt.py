@@ -1,7 +1,5 @@
 """Method `ipopt`: CasADi and IPOPT from random starts; needs the extra `ipopt`."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What the methods that know the fin model share: limits, starts, the objective by which starts compete."""
 
-from __future__ import annotations
-
 import math
 import time
 from abc import abstractmethod

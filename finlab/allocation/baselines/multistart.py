@@ -1,7 +1,5 @@
 """Method `multistart`: random seeds, batched Levenberg-Marquardt within the limits, the lowest J wins."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

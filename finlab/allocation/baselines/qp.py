@@ -1,7 +1,5 @@
 """Method `qp`: one linear map per layout, one box-constrained least squares per target, as in the paper."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

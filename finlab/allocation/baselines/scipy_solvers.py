@@ -1,7 +1,5 @@
 """Methods `trf` and `slsqp`: two solvers of SciPy, from random starts."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares, minimize

@@ -1,7 +1,5 @@
 """Method `sqp`: re-linearize at the iterate, box QP on the normalized residual, backtracking line search."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -6,8 +6,6 @@ turn forces into commands. Where that misses the target, because limits bind or 
 full pipeline answers instead.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ Only the learned surrogate is used here; the analytic fin model scores the answe
 are in `pipeline`; here are the policies, the batches and the notes to the user.
 """
 
-from __future__ import annotations
-
 import os
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy

@@ -4,8 +4,6 @@ The last stage of every learned allocation: it works in commands, not forces, an
 surrogate, so it removes the error that the planar search's simplifications leave.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """The paper's own pipeline: sample the mixture, rank by the surrogate, refine with Adam. numpy only."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from functools import lru_cache
 from typing import Any, NamedTuple, Self

@@ -1,7 +1,5 @@
 """What the learned allocator needs to know of a layout, computed once and kept."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """What the network proposes: K candidate commands, drawn from its mixture and scored by the surrogate."""
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import Any, NamedTuple

@@ -10,8 +10,6 @@ All of them are trajectories of planar forces that give the predicted targets ex
 together, as arrays (M, H, n), in about a millisecond.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 

@@ -3,8 +3,6 @@
 A test holds the typed options against the settings.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import TypedDict
 

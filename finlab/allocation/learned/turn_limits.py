@@ -5,8 +5,6 @@ command, each fin's arc of zero directions is narrowed around where it points; o
 of reach so is the arc widened. `receding_horizon` keeps that rare.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

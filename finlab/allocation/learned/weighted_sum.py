@@ -3,8 +3,6 @@
 It starts from exact answers; `weighted_descent` minimizes the sum on the surrogate and inside the limits.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
