@@ -1,7 +1,5 @@
 """Which axes the fins hold, how evenly, and what the loss of each single fin costs."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ A search asks for quick measures, which are within about a percent of the fine o
 whose arc is wider than half a turn count with the convex hull of what they can push.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Literal, get_args
 

@@ -1,7 +1,5 @@
 """Improve a layout: move chosen fins within bounds until a goal is as good as it gets."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Everything that a layout can do, for one glance, and what can be told in a millisecond while it changes."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import asdict, dataclass
 from typing import Any

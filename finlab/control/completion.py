@@ -5,8 +5,6 @@ may not be able to hold those zeros: two fins have four forces to choose for six
 the impossible spoils what the controller wants, so the open axes are set to what the fins give with it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Controllers: measurements and a setpoint in, a wrench out; the paper's two, and odometry."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple, Protocol
 

@@ -1,7 +1,5 @@
 """Filters in discrete time: low-pass, rate of a noisy signal, PID."""
 
-from __future__ import annotations
-
 import math
 
 from finlab.control.gains import PidGains

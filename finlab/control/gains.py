@@ -1,7 +1,5 @@
 """Gains of the controllers, and how they are read from the files beside this one."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass

@@ -1,7 +1,5 @@
 """Layouts as tables: one row for each fin, as spreadsheets and scripts write them (CSV)."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

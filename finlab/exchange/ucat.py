@@ -4,8 +4,6 @@ Their `amplitude` is the angle from one end of the stroke to the other, twice th
 command.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ the fin's shaft. REP-103 frames (x forward, y left, z up) are finlab's own; only
 centre of gravity.
 """
 
-from __future__ import annotations
-
 import io
 import math
 import os

@@ -1,7 +1,5 @@
 """Activation functions of the trained networks. Sigmoids go by way of a tangent, which never overflows."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

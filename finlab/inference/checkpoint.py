@@ -5,8 +5,6 @@ sizes, normalization, fin model, training settings, metrics and the SHA-256 of t
 inside may hold the distilled network. The weights of a deployment bundle are the same files.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -3,8 +3,6 @@
 As with checkpoints: safetensors and JSON, loaded strictly.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Mapping

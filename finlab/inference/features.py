@@ -23,8 +23,6 @@ index       meaning
 ==========  =====================================================================================
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -4,8 +4,6 @@ Refinement runs on a few hundred rows at a time, where numpy's small overhead pe
 tensor library's, and a robot's computer needs no such library.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -3,8 +3,6 @@
 Training has the same in PyTorch, `Mixture`; a test holds the two against each other.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

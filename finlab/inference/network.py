@@ -5,8 +5,6 @@ few times smaller than a tensor library's, and a robot's computer need not have 
 against `finlab.training.networks.allocator_network.AllocatorNetwork`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

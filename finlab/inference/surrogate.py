@@ -1,7 +1,5 @@
 """Trained surrogates in numpy, on one layout: what the learned methods believe of a robot's fins."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol
 

@@ -1,7 +1,5 @@
 """Keeps the small matrix products of one answer on one thread."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any

@@ -1,7 +1,5 @@
 """Trained networks as numpy arrays: their sizes, the shapes that follow, and what they were trained for."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from itertools import pairwise

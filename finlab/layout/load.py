@@ -1,7 +1,5 @@
 """Opens what a user may name as a layout: a shipped one, a layout file, a layout graph file, or a bundle."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

@@ -1,7 +1,5 @@
 """A robot that swims: sensors, controller, allocator, fins and body, one control period at a time."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -3,8 +3,6 @@
 A fin force model keeps the momentum that it needs from step to step; `step` gives each fin's planar force.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field

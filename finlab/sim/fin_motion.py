@@ -6,8 +6,6 @@ in U-CAT's open simulator (eeUVsim: k = 15 for the amplitude, 7 for the zero dir
 once, with the phase kept.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple

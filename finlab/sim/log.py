@@ -1,7 +1,5 @@
 """The record of a swim: one row per control tick, as arrays, in memory and in an NPZ file."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, fields
 from pathlib import Path

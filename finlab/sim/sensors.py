@@ -1,7 +1,5 @@
 """What the robot knows of itself: samples at each sensor's own rate, with noise."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 
 import numpy as np

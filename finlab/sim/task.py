@@ -1,7 +1,5 @@
 """What a robot is to do: follow a path over time (circle, lissajous, square, or from a file) or cruise."""
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Callable

@@ -11,8 +11,6 @@ The Coriolis terms are written by momenta (Kirchhoff): p = M_lin v_r, h = M_ang 
 Plain floats: at this size they are several times faster than arrays.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import fields, replace

@@ -1,7 +1,5 @@
 """`finlab train allocator`: imitation, guidance through the surrogate, entropy (paper, main training)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path

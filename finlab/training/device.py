@@ -1,7 +1,5 @@
 """Where training runs, and with how many processes."""
 
-from __future__ import annotations
-
 import os
 
 import torch

@@ -1,7 +1,5 @@
 """The plain training loop shared by surrogate and allocator."""
 
-from __future__ import annotations
-
 import csv
 import math
 import os

@@ -1,8 +1,6 @@
 """The terms of the training loss. Each answers one number per sample (B,), so that any split of a batch
 over processes gives the same mean."""
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor
 

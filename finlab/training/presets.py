@@ -1,7 +1,5 @@
 """Named training recipes: `default` (ours), `paper` (as printed) and `smoke` (seconds, for tests)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 from finlab.errors import DataError

@@ -1,7 +1,5 @@
 """What runs leave on disk: the state to go on from, as plain tensors and JSON, and checkpoints."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """`finlab train surrogate`: learn the fin physics from forward samples (paper, surrogate pretraining)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path

@@ -3,8 +3,6 @@
 Shard k depends on seed, k and checkpoint only, so a run that was stopped goes on where it was.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys

@@ -1,7 +1,5 @@
 """The distilled network: how hard each fin should work, in one pass, and what its answers cost."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -4,8 +4,6 @@ Two terms: the shares of thrust of the best answer, and what the decoded shares 
 first points to the right mode, the second settles what the mean of two modes would leave undecided.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path

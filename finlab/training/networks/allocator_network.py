@@ -5,8 +5,6 @@ and complete, so a padded dense form with a mask is simpler and faster than edge
 it against `torch_geometric.nn.GATv2Conv`.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ The allocator never sees the fin model that judges it, only one of these, traine
 Torque is computed from force and position in both.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import torch
