@@ -5,8 +5,6 @@ before its checksum fits. What the files mean is known to the rooms that read th
 `finlab.layout`, the weights to `finlab.inference`, the settings to `finlab.allocation`.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import stat

@@ -1,7 +1,5 @@
 """Drag propulsion: the cycle-mean thrust law that U-CAT uses on board. The default fin model."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The paper's energy proxy `J_en`, a sum of squares and one product of normalized commands, or its power."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -5,8 +5,6 @@ Fin frame: x' = shaft, y' = e_h, z' = e_z (see `finlab.layout.fin`). A law's par
 training differentiates by itself) and CasADi's symbols; its derivatives in closed form stand beside it.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from typing import Any, Protocol
 

@@ -1,7 +1,5 @@
 """From the description of a fin's model to its law."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Reactive propulsion: Lighthill's large-amplitude elongated-body theory for a rigid fin in still water."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -3,8 +3,6 @@
 It judges every allocation method, and the model-based methods optimize over it.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A soft fin as such fins are measured: its thrust saturates and then falls, and leans off its direction."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

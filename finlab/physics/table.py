@@ -8,8 +8,6 @@ forces and their derivatives are continuous. When the zero directions cover the 
 Amplitudes and frequencies beyond the table count as its edge.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 import os

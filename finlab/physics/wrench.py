@@ -4,8 +4,6 @@ Frames: fin frame x' = shaft, y' = e_h, z' = e_z (see `finlab.layout.fin`); body
 gravity. Wrench order [Fx, Fy, Fz, Tx, Ty, Tz] in N and N m.
 """
 
-from __future__ import annotations
-
 from finlab.array_library import library_of
 from finlab.layout.arrays import force_columns
 from finlab.physics.fin_law import FinLaw, Values
