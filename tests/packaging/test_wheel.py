@@ -126,7 +126,10 @@ def test_without_extras_torch_is_absent_and_missed_in_a_sentence(bare: Path, tmp
         assert bare_run(bare, tmp_path, "-c", f"import {name}").returncode == 1
     done = bare_run(bare, tmp_path, "-m", "finlab", "train", "surrogate", "-o", "out", "--preset", "smoke")
     assert done.returncode == 2
-    assert done.stderr == "finlab: error: torch is not installed; pip install 'finlab[train]'\n"
+    assert done.stderr == (
+        "finlab: error: training needs PyTorch, which cannot be imported (No module named 'torch'); "
+        "run: pip install 'finlab[train]'\n"
+    )
 
 
 def test_without_extras_every_method_but_ipopt_allocates(bare: Path, tmp_path: Path) -> None:
