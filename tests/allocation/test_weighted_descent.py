@@ -1,0 +1,228 @@
+"""The weighted descent against dense linear algebra: energies, held variables, damping, when rows stop."""
+
+import numpy as np
+import pytest
+
+from finlab.allocation.weighted_descent import (
+    DescentOptions,
+    _clamped_step,
+    _damped_step,
+    _EnergyForm,
+    _least,
+    descend,
+)
+from finlab.layout import Fin, Layout, Limits
+from finlab.physics import Plant, plant_of
+from finlab.physics.energy import EnergyWeights, command_energy
+
+SIGMA = np.array([1.4, 1.4, 2.0, 0.35, 0.3, 0.4])
+OPTIONS = DescentOptions(energy_tradeoff=0.3, energy_weights=EnergyWeights(1.0, 2.0, 0.4, 0.7))
+"""Every weight differs from every other."""
+
+
+@pytest.fixture
+def plant() -> Plant:
+    """One fin that turns freely and one in an arc, with different limits."""
+    arc = Limits((0.1, 0.5), (0.3, 1.4), (0.3, 1.7))
+    return plant_of(
+        Layout("two", (Fin("a", (0.2, 0.1, 0.0), 0.4), Fin("b", (-0.3, 0.2, 0.1), 2.0, limits=arc)))
+    )
+
+
+def dense(plant: Plant, options: DescentOptions) -> np.ndarray:
+    """Half the Hessian (3 n, 3 n) of the weighted energy by positions, entry by entry."""
+    weights, size = options.energy_weights, 3 * plant.n_fins
+    result = np.zeros((size, size))
+    for i in range(plant.n_fins):
+        a, f, d = plant.width[i] / np.abs(plant.upper[i])
+        result[3 * i, 3 * i] = weights.amplitude * a**2
+        result[3 * i + 1, 3 * i + 1] = weights.frequency * f**2
+        result[3 * i + 2, 3 * i + 2] = weights.zero_direction * d**2
+        result[3 * i, 3 * i + 1] = result[3 * i + 1, 3 * i] = weights.product * a * f / 2
+    return options.energy_tradeoff * result
+
+
+def test_the_energys_gradient_is_half_its_derivative(plant: Plant) -> None:
+    form, at = _EnergyForm(plant, OPTIONS), np.random.default_rng(0).random((4, 2, 3))
+    for i in range(2):
+        for j in range(3):
+            offset = np.zeros((2, 3))
+            offset[i, j] = 0.5
+            more, less = (
+                command_energy(
+                    plant.lower + (at + s * offset) * plant.width, plant.upper, OPTIONS.energy_weights
+                )
+                for s in (1, -1)
+            )
+            # Central differences of a quadratic form are exact.
+            expected = 0.3 * (more - less) / 2
+            np.testing.assert_allclose(form.gradient(at)[:, i, j], expected, rtol=1e-12)
+
+
+def test_the_energys_inverse_is_that_of_the_dense_matrix(plant: Plant) -> None:
+    form, damping = _EnergyForm(plant, OPTIONS), np.array([0.01, 2.0])
+    inverse, off = form.inverse(damping, np.zeros((2, 2, 3), dtype=bool))
+    for row in range(2):
+        expected = np.linalg.inv(dense(plant, OPTIONS) + damping[row] * np.eye(6))
+        np.testing.assert_allclose(inverse[row].ravel(), np.diag(expected), rtol=1e-12)
+        np.testing.assert_allclose(off[row], expected[[0, 3], [1, 4]], rtol=1e-12)
+        vector = np.random.default_rng(row).normal(size=(2, 3))
+        applied = form.apply(vector, inverse[row], off[row])
+        np.testing.assert_allclose(applied.ravel(), expected @ vector.ravel(), rtol=1e-12)
+
+
+def test_a_held_variable_leaves_the_inverse_of_the_others(plant: Plant) -> None:
+    form, held = _EnergyForm(plant, OPTIONS), np.zeros((1, 2, 3), dtype=bool)
+    held[0, 0, 0] = held[0, 1, 2] = True
+    inverse, off = form.inverse(np.array([0.01]), held)
+    free = np.flatnonzero(~held.ravel())
+    expected = np.linalg.inv((dense(plant, OPTIONS) + 0.01 * np.eye(6))[np.ix_(free, free)])
+    np.testing.assert_allclose(inverse.ravel()[free], np.diag(expected), rtol=1e-12)
+    assert inverse[held].max() < 1e-20 and abs(off[0, 0]) < 1e-20
+
+
+def step_of(
+    plant: Plant, position: np.ndarray, residual: np.ndarray, slope: np.ndarray, damping: float, passes: int
+) -> np.ndarray:
+    form = _EnergyForm(plant, OPTIONS)
+    step = _clamped_step(
+        position[None], residual[None], slope[None], np.array([damping]), form, plant, passes
+    )
+    return np.asarray(step[0])
+
+
+def solved(
+    plant: Plant,
+    position: np.ndarray,
+    residual: np.ndarray,
+    slope: np.ndarray,
+    damping: float,
+    free: np.ndarray,
+) -> np.ndarray:
+    """The damped step over the free variables (3 n,) by one dense solve."""
+    form = _EnergyForm(plant, OPTIONS)
+    gradient = slope.T @ residual + form.gradient(position).ravel()
+    matrix = slope.T @ slope + dense(plant, OPTIONS) + damping * np.eye(6)
+    step = np.zeros(6)
+    step[free] = np.linalg.solve(matrix[np.ix_(free, free)], -gradient[free])
+    return step
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_step_within_the_limits_is_that_of_the_dense_matrix(plant: Plant, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    residual, slope = 0.1 * rng.normal(size=6), rng.normal(size=(6, 6))
+    position = np.full((2, 3), 0.5)
+    expected = solved(plant, position, residual, slope, 5.0, np.arange(6))
+    assert np.abs(expected).max() < 0.5
+    np.testing.assert_allclose(step_of(plant, position, residual, slope, 5.0, 2), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("beyond", [0.0, 1e-3])
+@pytest.mark.parametrize("pull", [0.2, 3.0])
+@pytest.mark.parametrize("end", [0.0, 1.0])
+def test_what_would_leave_its_limit_is_held_from_the_first_pass(
+    plant: Plant, end: float, pull: float, beyond: float
+) -> None:
+    """At, or by rounding beyond, a limit: the others are solved without it."""
+    outwards = 1.0 if end else -1.0
+    position, slope = np.full((2, 3), 0.5), 0.3 * np.random.default_rng(3).normal(size=(6, 6))
+    position[1, 2] = end + outwards * beyond
+    form = _EnergyForm(plant, OPTIONS)
+    slope[:, 5] = np.eye(6)[5]
+    residual = np.zeros(6)
+    residual[5] = -outwards * pull - form.gradient(position)[1, 2]  # half the gradient is what is asked
+    free = np.arange(5)
+    step = step_of(plant, position, residual, slope, 20.0, 1)
+    np.testing.assert_allclose(step[:5], solved(plant, position, residual, slope, 20.0, free)[:5], rtol=1e-9)
+    assert step[5] == pytest.approx(-outwards * beyond, abs=1e-15)
+    inwards = residual.copy()
+    inwards[5] = outwards * pull - form.gradient(position)[1, 2]
+    step = step_of(plant, position, inwards, slope, 20.0, 1)
+    expected = solved(plant, position, inwards, slope, 20.0, np.arange(6))
+    np.testing.assert_allclose(step[:5], expected[:5], rtol=1e-9)
+
+
+def test_a_free_turn_is_held_nowhere_and_stops_after_half_a_turn(plant: Plant) -> None:
+    position, slope = np.full((2, 3), 0.5), np.zeros((6, 6))
+    slope[0, 2] = 1.0
+    residual = np.array([30.0, 0, 0, 0, 0, 0])
+    for end, sign in ((0.0, 1.0), (1.0, -1.0)):
+        position[0, 2] = end
+        assert step_of(plant, position, sign * residual, slope, 1e-6, 2)[2] == -0.5 * sign
+
+
+def test_a_crossed_limit_fixes_its_variable_there_and_the_rest_is_solved_anew(plant: Plant) -> None:
+    rng = np.random.default_rng(5)
+    position, slope = np.full((2, 3), 0.5), 0.2 * rng.normal(size=(6, 6))
+    position[1, 0], slope[:, 3] = 0.9, 2 * np.eye(6)[1]
+    residual = np.array([0.1, -2.0, 0.0, 0.1, 0.0, -0.1])
+    step = step_of(plant, position, residual, slope, 2.0, 2)
+    assert step[3] == pytest.approx(0.1)
+    # With the crossed variable moved to its limit, the others minimize what is left.
+    moved = position.copy()
+    moved[1, 0] = 1.0
+    rest = residual + 0.1 * slope[:, 3]
+    expected = solved(plant, moved, rest, slope, 2.0, np.array([0, 1, 2, 4, 5]))
+    expected[3] = 0.1
+    np.testing.assert_allclose(step, expected, rtol=1e-9)
+    one = step_of(plant, position, residual, slope, 2.0, 1)
+    assert one[3] == pytest.approx(0.1) and np.abs(one - step).max() > 1e-3
+
+
+def test_damped_steps_do_not_move_what_is_held(plant: Plant) -> None:
+    rng, held = np.random.default_rng(6), np.zeros((3, 2, 3), dtype=bool)
+    held[1, 0, 1] = held[2] = True
+    form = _EnergyForm(plant, OPTIONS)
+    step = _damped_step(
+        rng.normal(size=(3, 6)),
+        rng.normal(size=(3, 6, 6)),
+        rng.normal(size=(3, 2, 3)),
+        np.full(3, 0.1),
+        held,
+        form,
+    )
+    assert np.abs(step[held]).max() < 1e-20 and np.abs(step[~held]).min() > 1e-6
+
+
+def test_the_least_damping_grows_with_the_derivatives_from_an_absolute_one() -> None:
+    slope = np.zeros((2, 6, 3))
+    slope[1, 0, :2] = 3.0, 4.0
+    options = DescentOptions(least_damping=1e-3, least_relative_damping=1e-2)
+    np.testing.assert_allclose(_least(slope, options), [1e-3, 0.25])
+
+
+def test_no_step_leaves_the_start_within_its_limits_and_tells_its_objective(plant: Plant) -> None:
+    start, target = plant.sample(np.random.default_rng(1), (3,)), np.ones((3, 6))
+    found = descend(plant, start, target, SIGMA, DescentOptions(n_steps=0, energy_tradeoff=0.5))
+    np.testing.assert_array_equal(found.command, plant.feasible(start))
+    np.testing.assert_allclose(found.wrench, plant.wrench(start), rtol=1e-12)
+    missing = ((plant.wrench(start) - 1.0) / SIGMA) ** 2
+    expected = missing.sum(1) + 0.5 * command_energy(start, plant.upper)
+    np.testing.assert_allclose(found.objective, expected, rtol=1e-12)
+    other = np.full((2, 3), 7.0)
+    scaled = DescentOptions(n_steps=0, energy_tradeoff=0.5, energy_upper=other)
+    expected = missing.sum(1) + 0.5 * command_energy(start, other)
+    np.testing.assert_allclose(descend(plant, start, target, SIGMA, scaled).objective, expected, rtol=1e-12)
+
+
+def test_rows_do_not_see_each_other(plant: Plant) -> None:
+    """Among others that end earlier or later, a row ends where it ends alone."""
+    rng = np.random.default_rng(2)
+    start, target = plant.sample(rng, (6,)), 0.4 * plant.wrench(plant.sample(rng, (6,)))
+    target[0] = plant.wrench(start[:1])[0]  # done at once
+    options = DescentOptions(n_steps=15, energy_tradeoff=1e-3)
+    together = descend(plant, start, target, SIGMA, options)
+    for i in range(6):
+        alone = descend(plant, start[i : i + 1], target[i : i + 1], SIGMA, options)
+        np.testing.assert_allclose(together.command[i], alone.command[0], atol=1e-9)
+        np.testing.assert_allclose(together.wrench[i], plant.wrench(together.command[i]), atol=1e-9)
+
+
+def test_it_stops_when_told_with_the_best_so_far(plant: Plant) -> None:
+    start, target = plant.sample(np.random.default_rng(4), (2,)), np.full((2, 6), 0.3)
+    one = descend(plant, start, target, SIGMA, DescentOptions(n_steps=1))
+    stopped = descend(plant, start, target, SIGMA, DescentOptions(n_steps=20), lambda: True)
+    np.testing.assert_array_equal(stopped.command, one.command)
+    longer = descend(plant, start, target, SIGMA, DescentOptions(n_steps=20))
+    assert (longer.objective < one.objective).all()
