@@ -1,0 +1,231 @@
+"""What model-based methods do inside: starts, chunks, arcs and bounds, by hand or by brute force."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from finlab.allocation.baselines import multistart, sqp
+from finlab.allocation.baselines.analytic import Analytic, ForceInverse
+from finlab.allocation.baselines.box_least_squares import solve_box_quadratics
+from finlab.allocation.baselines.model_based import TimeLimit
+from finlab.allocation.baselines.multistart import Multistart
+from finlab.allocation.baselines.qp import LinearMap, Qp
+from finlab.allocation.baselines.scipy_solvers import Slsqp, Trf
+from finlab.allocation.baselines.sqp import Sqp
+from finlab.allocation.method import Method
+from finlab.inference.normalization import Normalization
+from finlab.layout import Fin, Layout, Limits
+from finlab.physics import Plant, plant_of
+
+SIGMA = np.array([1.4, 1.2, 2.0, 0.35, 0.3, 0.4])
+NORMALIZATION = Normalization(np.zeros(6), SIGMA)
+ARC = Limits((0.1, 0.5), (0.3, 1.4), (0.3, 1.7))
+
+
+@pytest.fixture
+def plant() -> Plant:
+    """A strong fin that turns freely and a weaker one in an arc."""
+    return plant_of(
+        Layout("two", (Fin("a", (0.2, 0.1, 0.0), 0.4), Fin("b", (-0.3, 0.2, 0.1), 2.0, limits=ARC)))
+    )
+
+
+@pytest.mark.parametrize(
+    ("method", "options"),
+    [
+        (Analytic, {"rcond": 1e-3}),
+        (Qp, {"regularization": 1.0}),
+        (Sqp, {"n_steps": 30, "n_starts": 4, "regularization": 1e-4, "time_limit_s": 0.6}),
+        (Multistart, {"n_candidates": 16, "n_steps": 20, "energy_tradeoff": 1e-4, "time_limit_s": 0.6}),
+        (Trf, {"n_starts": 8, "max_evaluations": 100, "time_limit_s": 0.6}),
+        (Slsqp, {"n_starts": 8, "max_iterations": 200, "time_limit_s": 0.6}),
+    ],
+)
+def test_published_figures_belong_to_these_settings(method: type[Method], options: dict[str, float]) -> None:
+    assert method(NORMALIZATION).options == options  # type: ignore[call-arg]
+
+
+# Analytic.
+
+
+def test_each_fins_inverted_curve_is_its_own(plant: Plant) -> None:
+    inverse = ForceInverse(plant, SIGMA, 1e-3)
+    share = np.linspace(0.0, 1.0, 2049)
+    np.testing.assert_array_equal(inverse.share, share)
+    for i in range(2):
+        amplitude = np.maximum(share * plant.upper[i, 0], plant.lower[i, 0])
+        frequency = np.maximum(share * plant.upper[i, 1], plant.lower[i, 1])
+        root = math.sqrt(4.737410112522892) * np.sin(amplitude) * frequency
+        np.testing.assert_allclose(inverse.root_thrust[i], root, rtol=1e-9)
+
+
+def test_a_curve_that_dips_is_inverted_where_it_first_rises() -> None:
+    def thrust(amplitude: np.ndarray, frequency: np.ndarray) -> np.ndarray:
+        return np.where(
+            amplitude < 0.5, 4 * amplitude, np.where(amplitude < 0.75, 1.0, 16 * (amplitude - 0.5))
+        )
+
+    dipping = SimpleNamespace(
+        lower=np.zeros((2, 3)),
+        upper=np.tile([1.0, 1.0, 2 * math.pi], (2, 1)),
+        thrust=thrust,
+        planar=np.random.default_rng(0).normal(size=(6, 4)),
+    )
+    root = ForceInverse(dipping, SIGMA, 1e-3).root_thrust  # type: ignore[arg-type]
+    assert root.shape == (2, 2049) and (np.diff(root, axis=1) >= 0).all()
+    # Between one half and three quarters the curve is below what it reached before.
+    np.testing.assert_allclose(root[:, 1200], math.sqrt(4 * 1023 / 2048))
+    np.testing.assert_allclose(root[:, -1], math.sqrt(8.0))
+
+
+@pytest.mark.parametrize(
+    ("direction", "allowed", "left"),
+    [
+        (1.0, 1.0, 1.0),
+        (0.31, 0.31, 1.0),
+        (1.9, 1.7, math.cos(0.2)),
+        (0.0, 0.3, math.cos(0.3)),
+        (1.0 - 3.0, 0.3, 0.0),
+        (1.0 + math.pi - 0.1, 1.7, 0.0),
+        (1.9 - 2 * math.pi, 1.7, math.cos(0.2)),
+    ],
+)
+def test_within_an_arc_the_nearest_direction_takes_what_points_there(
+    plant: Plant, direction: float, allowed: float, left: float
+) -> None:
+    inverse = ForceInverse(plant, SIGMA, 1e-3)
+    np.testing.assert_allclose(inverse.middle[1], 1.0)
+    np.testing.assert_allclose(inverse.half_arc, [math.pi, 0.7])
+    thrust, found = inverse._into_arc(np.array([[2.0, 2.0]]), np.array([[0.4, direction]]))
+    np.testing.assert_allclose(found, [[0.4, allowed]], atol=1e-12)
+    np.testing.assert_allclose(thrust, [[2.0, 2.0 * left]], atol=1e-12)
+
+
+def test_forces_are_the_weighted_least_ones(plant: Plant) -> None:
+    """What the fins are asked for: the least squares of shares of each fin's largest thrust."""
+    most = 4.737410112522892 * (np.sin(plant.upper[:, 0]) * plant.upper[:, 1]) ** 2
+    weight = np.repeat(most, 2)
+    target = np.array([0.2, 0.1, 0.3, 0.0, 0.02, 0.01])
+    scaled = plant.planar * weight / SIGMA[:, None]
+    expected = weight * np.linalg.lstsq(scaled, target / SIGMA, rcond=1e-3)[0]
+    np.testing.assert_allclose(target @ ForceInverse(plant, SIGMA, 1e-3).inverse, expected, atol=1e-12)
+
+
+# QP.
+
+
+def test_qp_solves_the_box_constrained_least_squares(plant: Plant) -> None:
+    """Beyond the limits too: each answer is that of another solver for the same box."""
+    qp, linear = Qp(NORMALIZATION, regularization=0.3), LinearMap(plant, SIGMA)
+    targets = np.random.default_rng(0).normal(scale=4.0, size=(12, 6)) * SIGMA
+    missing = (targets - linear.wrench) / SIGMA
+    hessian = np.tile(linear.matrix.T @ linear.matrix + 0.3 * np.eye(6), (12, 1, 1))
+    half = np.full((12, 6), 0.5)
+    step = solve_box_quadratics(hessian, -missing @ linear.matrix, -half, half)
+    found = (qp._commands(plant, targets, 0) - (plant.lower + plant.upper) / 2) / plant.width
+    np.testing.assert_allclose(found.reshape(12, 6), step, atol=1e-7)
+    assert np.isclose(np.abs(step), 0.5).any(axis=1).mean() > 0.5
+
+
+def test_qp_linearizes_at_the_middle_of_the_limits(plant: Plant) -> None:
+    linear = LinearMap(plant, SIGMA)
+    middle = (plant.lower + plant.upper) / 2
+    wrench, slope = plant.linearize(middle[None])
+    np.testing.assert_allclose(linear.reference, middle)
+    np.testing.assert_allclose(linear.wrench, wrench[0])
+    np.testing.assert_allclose(linear.matrix, slope[0] * plant.width.ravel() / SIGMA[:, None], atol=1e-6)
+
+
+# SQP.
+
+
+def test_sqp_starts_in_the_middle_of_the_limits(plant: Plant) -> None:
+    for n_starts in (1, 2):
+        command = Sqp(NORMALIZATION, n_steps=0, n_starts=n_starts)._commands(plant, np.zeros((1, 6)), 0)
+        starts = [(plant.lower + plant.upper) / 2, *plant.sample(np.random.default_rng(0), (n_starts - 1,))]
+        errors = [NORMALIZATION.error(plant.wrench(start[None]), np.zeros((1, 6)))[0] for start in starts]
+        np.testing.assert_array_equal(command[0], starts[int(np.argmin(errors))])
+
+
+def test_sqp_knows_how_far_each_command_may_step(plant: Plant) -> None:
+    at = plant.lower + np.array([0.25, 0.5, 0.75]) * plant.width
+    low, high = Sqp._room(plant, at[None])
+    np.testing.assert_allclose(low[0], [-0.25, -0.5, -0.5, -0.25, -0.5, -0.75])
+    np.testing.assert_allclose(high[0], [0.75, 0.5, 0.5, 0.75, 0.5, 0.25])
+
+
+def test_sqp_halves_a_step_until_the_error_falls(plant: Plant) -> None:
+    """A step downhill ends at the first length of 1, 1/2, ... that pays; uphill nothing moves."""
+    method, start = Sqp(NORMALIZATION), ((plant.lower + plant.upper) / 2)[None]
+    target = plant.wrench(start) * 0.8
+    error = NORMALIZATION.error(plant.wrench(start), target)
+    _, slope = plant.linearize(start)
+    downhill = -(slope[0].T @ ((plant.wrench(start) - target)[0] / SIGMA**2)).reshape(1, 2, 3)
+    for size in (0.01, 1.0, 5.0):
+        step = size * downhill / np.abs(downhill).max()
+        lengths = [0.5**k for k in range(8)]
+        errors = [
+            NORMALIZATION.error(plant.wrench(plant.feasible(start + length * step)), target)[0]
+            for length in lengths
+        ]
+        first = next(k for k in range(8) if errors[k] < error[0] * (1 - 1e-4 * lengths[k]))
+        command, reached = start.copy(), error.copy()
+        moved = method._search(plant, command, reached, target, np.array([0]), step)
+        assert moved.tolist() == [True]
+        np.testing.assert_allclose(command, plant.feasible(start + lengths[first] * step))
+        assert reached[0] == pytest.approx(errors[first])
+    command, reached = start.copy(), error.copy()
+    uphill = -0.01 * downhill / np.abs(downhill).max()
+    moved = method._search(plant, command, reached, target, np.array([0]), uphill)
+    assert moved.tolist() == [False] and reached[0] == error[0]
+    np.testing.assert_array_equal(command, start)
+
+
+def test_sqp_answers_all_targets_of_all_chunks(plant: Plant, monkeypatch: pytest.MonkeyPatch) -> None:
+    method = Sqp(NORMALIZATION, n_steps=5, n_starts=2, time_limit_s=60.0)
+    targets = 0.5 * plant.wrench(plant.sample(np.random.default_rng(1), (7,)))
+    whole = method._commands(plant, targets, 0)
+    monkeypatch.setattr(sqp, "CHUNK", 3)
+    np.testing.assert_allclose(method._commands(plant, targets, 0), whole, atol=1e-9)
+
+
+# Multistart.
+
+
+@pytest.mark.parametrize(
+    ("n_candidates", "chunks"),
+    [(16, [4, 4, 1]), (64, [1] * 9), (65, [1] * 9), (5, [9]), (32, [2, 2, 2, 2, 1])],
+)
+def test_multistart_refines_as_many_rows_together_as_fit(
+    plant: Plant, monkeypatch: pytest.MonkeyPatch, n_candidates: int, chunks: list[int]
+) -> None:
+    asked: list[np.ndarray] = []
+
+    def best(plant: Plant, start: np.ndarray, targets: np.ndarray, limit: TimeLimit) -> np.ndarray:
+        asked.append(targets)
+        assert start.shape == (n_candidates, 2, 3)
+        return np.tile(targets[:, None, :3], (1, 2, 1))
+
+    method = Multistart(NORMALIZATION, n_candidates=n_candidates)
+    monkeypatch.setattr(multistart, "CHUNK_ROWS", 64)
+    monkeypatch.setattr(method, "_best", best)
+    targets = np.arange(54.0).reshape(9, 6)
+    command = method._commands(plant, targets, 0)
+    assert [len(part) for part in asked] == chunks
+    np.testing.assert_array_equal(np.concatenate(asked), targets)
+    np.testing.assert_array_equal(command[:, 1], targets[:, :3])
+
+
+def test_multistart_polishes_the_start_that_ends_lowest(plant: Plant) -> None:
+    """Each target's winner is the best of what its starts give alone."""
+    method = Multistart(NORMALIZATION, n_candidates=5, n_steps=4, energy_tradeoff=0.05)
+    start, limit = plant.sample(np.random.default_rng(0), (5,)), TimeLimit()
+    targets = 0.6 * plant.wrench(plant.sample(np.random.default_rng(2), (3,)))
+    together = method._best(plant, start, targets, limit)
+    for row, target in zip(together, targets, strict=True):
+        ends = [multistart.descend(plant, one[None], target[None], SIGMA, method._descent) for one in start]
+        winner = min(ends, key=lambda end: end.objective[0])
+        polished = multistart.descend(plant, winner.command, target[None], SIGMA, multistart.POLISH)
+        np.testing.assert_allclose(row, polished.command[0], atol=1e-8)
