@@ -10,7 +10,7 @@ from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.assets import shipped_layouts
 from finlab.cli import main
 from finlab.errors import AllocationError, FinlabError
-from finlab.layout import Layout, load_layout
+from finlab.layout import Layout, Limits, load_layout
 from finlab.physics import Plant
 
 TARGET = [1.0, 0.3, 1.0, 0.0, 0.05, 0.1]
@@ -93,3 +93,40 @@ def test_the_command_line_tells_what_is_left(capsys: pytest.CaptureFixture[str])
 def test_health_of_the_wrong_type_is_refused_in_a_sentence(wrong: dict[str, object]) -> None:
     with pytest.raises(AllocationError, match="health: expected dictionaries by fin name"):
         Health.of(**wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("arc", "angle", "held"),
+    [
+        ((0.5 * math.pi, 1.5 * math.pi), -0.9 * math.pi, 1.1 * math.pi),
+        ((0.5 * math.pi, 1.5 * math.pi), 1.2 * math.pi, 1.2 * math.pi),
+        ((-1.5 * math.pi, -0.5 * math.pi), 0.9 * math.pi, -1.1 * math.pi),
+        ((0.0, 2 * math.pi), -0.1, 2 * math.pi - 0.1),
+        ((-0.3, 0.3), 4 * math.pi + 0.2, 0.2),
+        ((-0.3, 0.3), 1.0, 1.0),
+    ],
+)
+def test_a_stuck_fin_is_held_at_the_turn_within_its_limits(
+    penta: Layout, arc: tuple[float, float], angle: float, held: float
+) -> None:
+    limits = Limits((0.1, 0.5), (0.2, 2.0), arc)
+    layout = Health.of(stuck={"bow": angle}).applied_to(penta.replace_fin("bow", limits=limits))
+    left = layout.fins[layout.index("bow")].limits
+    assert left.zero_direction == pytest.approx((held, held))
+    assert (left.amplitude, left.frequency) == ((0.1, 0.5), (0.2, 2.0))
+
+
+@pytest.mark.parametrize(
+    ("share", "amplitude", "frequency"), [(0.6, (0.1, 0.3), (1.0, 1.2)), (0.1, (0.05, 0.05), (0.2, 0.2))]
+)
+def test_what_is_left_of_a_weak_fins_limits(
+    penta: Layout, share: float, amplitude: tuple[float, float], frequency: tuple[float, float]
+) -> None:
+    """The upper limits shrink; a lower one only where it would lie above."""
+    whole = penta.replace_fin("bow", limits=Limits((0.1, 0.5), (1.0, 2.0), (0.0, 1.0)))
+    layout = Health.of(weak={"bow": share}).applied_to(whole)
+    left = layout.fins[layout.index("bow")].limits
+    assert left.amplitude == pytest.approx(amplitude) and left.frequency == pytest.approx(frequency)
+    assert left.zero_direction == (0.0, 1.0)
+    others = [i for i, name in enumerate(penta.names) if name != "bow"]
+    assert [layout.fins[i] for i in others] == [whole.fins[i] for i in others]

@@ -7,7 +7,14 @@ import pytest
 
 from finlab.allocation import load_allocator
 from finlab.allocation.learned.learned_allocator import LearnedAllocator
-from finlab.allocation.modes import find_modes, mode_signature, same_signature
+from finlab.allocation.modes import (
+    ModeSignature,
+    cluster,
+    find_modes,
+    mode_signature,
+    same_signature,
+    signature_difference,
+)
 from finlab.allocation.solution import Candidates
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
@@ -67,3 +74,58 @@ def test_modes_of_an_answer_deliver_the_wrench_in_different_ways(learned: Learne
 def test_a_method_with_one_answer_tells_no_modes() -> None:
     layout = load_layout(shipped_layouts()["A"])
     assert load_allocator("analytic").allocate(layout, [1, 0, 0, 0, 0, 0]).explore() == ()
+
+
+def test_signatures_by_hand() -> None:
+    """Thrust grows with the squares of sin(A) and f; a fin below 15 % of the strongest one rests."""
+    command = np.array([(0.5, 2.0, 1.0), (0.2, 1.2, -2.0), (0.3, 1.0, 0.4), (0.0, 1.0, 0.0), (math.nan,) * 3])
+    signature = mode_signature(command)
+    thrust = [math.log((math.sin(a) * f) ** 2) for a, f, _ in command[:3]]
+    assert math.exp(thrust[1] - thrust[0]) < 0.15 and math.exp(thrust[2] - thrust[0]) < 0.15
+    assert signature.resting == (1, 2)
+    stronger = mode_signature(np.array([*command[:2], (0.3, 1.4, 0.4)]))
+    assert stronger.resting == (1,)
+    np.testing.assert_allclose(stronger.thrust, [thrust[0], np.nan, math.log((math.sin(0.3) * 1.4) ** 2)])
+    np.testing.assert_allclose(stronger.direction, [1.0, np.nan, 0.4])
+    np.testing.assert_allclose(stronger.style, [math.log(0.25), np.nan, math.log(0.3 / 1.4)])
+
+
+def test_what_counts_as_different() -> None:
+    """A turn of 25 degrees, or a factor of exp(1/4) in thrust or in amplitude over frequency."""
+    a = mode_signature(np.array([(0.3, 1.0, 0.2), (0.3, 1.2, 0.0)]))
+
+    def other(turn: float = 0.0, thrust: float = 0.0, style: float = 0.0) -> ModeSignature:
+        return a._replace(
+            direction=a.direction + [turn, 0.0], thrust=a.thrust + [0.0, thrust], style=a.style + [style, 0.0]
+        )
+
+    difference = signature_difference(a, other(math.radians(12.5), 0.05, -0.1))
+    np.testing.assert_allclose(difference, [[0.5, 0.0], [0.0, 0.2], [-0.4, 0.0]], atol=1e-9)
+    for limit, key in ((math.radians(25.0), "turn"), (0.25, "thrust"), (0.25, "style")):
+        for sign in (1, -1):
+            assert same_signature(a, other(**{key: 0.99 * sign * limit}))
+            assert not same_signature(a, other(**{key: 1.01 * sign * limit}))
+    assert not same_signature(a, a._replace(resting=(0,)))
+
+
+def test_groups_are_led_by_their_first() -> None:
+    """The third differs from the first, though not from the second: it leads a group of its own."""
+    ways = [mode_signature(np.array([PUSH, (0.4, 1.5, angle)])) for angle in (0.0, 0.3, 0.6, 0.1, 0.7)]
+    assert cluster(ways) == [[0, 1, 3], [2, 4]]
+
+
+@pytest.mark.parametrize(("amplitude", "frequency"), [(0.4, 1.5), (0.5, 1.1), (0.05, 0.1)])
+def test_saturation_is_the_largest_share_of_a_range(amplitude: float, frequency: float) -> None:
+    (mode,) = find_modes(candidates([(amplitude, frequency, 3.0), REST]), LOWER, UPPER)
+    assert mode.saturation == pytest.approx(max((amplitude - 0.05) / 0.55, (frequency - 0.1) / 2.0))
+
+
+def test_distance_counts_shares_of_each_range() -> None:
+    """Root mean square over the fins that both commands know, turns over half a circle."""
+    lower, upper = np.tile([0.1, 0.5, 0.0], (3, 1)), np.tile([0.5, 2.5, 2.0], (3, 1))
+    upper[1] = lower[1] = 0.3, 1.0, 0.7  # a fin that cannot move at all
+    previous = np.array([(0.2, 1.0, 0.5), (0.3, 1.0, 0.7), (0.4, 2.0, 1.0)])
+    command = previous + [(0.1, -0.5, 0.25), (0.0, 0.0, 0.0), (math.nan,) * 3]
+    (mode,) = find_modes(candidates(command.tolist()), lower, upper, previous)
+    squares = (0.1 / 0.4) ** 2 + (0.5 / 2.0) ** 2 + (0.25 / math.pi) ** 2
+    assert mode.distance == pytest.approx(math.sqrt(squares / 2)) and mode.turn == pytest.approx(0.25)

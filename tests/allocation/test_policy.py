@@ -298,3 +298,30 @@ def test_a_fin_without_freedom_still_gets_an_answer(learned: LearnedAllocator) -
 def test_policies_of_the_wrong_type_are_refused_in_a_sentence(wrong: dict[str, object]) -> None:
     with pytest.raises(CommandError, match=r"axis weights|groups of axes"):
         Policy("priority", **wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("limit", "rounds", "width", "found"),
+    [
+        (0.3, 1, 4, 0.25),  # asks 1/4, 1/2, 3/4, 1
+        (0.3, 2, 4, 0.25),  # then 5/16, ...: none
+        (0.3, 3, 4, 0.296875),  # then quarters of that first interval: 17/64, 18/64, 19/64, 20/64
+        (0.5, 1, 4, 0.5),
+        (0.74, 2, 4, 0.6875),
+        (1.0, 3, 4, 1.0),
+        (9.0, 3, 4, 1.0),
+        (0.0, 3, 4, 0.0),
+        (-1.0, 3, 4, 0.0),
+    ],
+)
+def test_each_round_narrows_the_interval(limit: float, rounds: int, width: int, found: float) -> None:
+    asked: list[np.ndarray] = []
+
+    def reached(shares: np.ndarray) -> np.ndarray:
+        asked.append(shares)
+        return np.asarray(shares <= limit)
+
+    assert largest_share(reached, rounds, width) == found
+    np.testing.assert_array_equal(asked[0], [0.25, 0.5, 0.75, 1.0])
+    assert len(asked) == (1 if limit >= 1.0 else rounds)
+    assert all(len(shares) == width and shares.min() > 0.0 and shares.max() <= 1.0 for shares in asked)

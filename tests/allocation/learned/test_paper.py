@@ -12,10 +12,11 @@ from finlab.allocation.learned.paper import ADAM_RATE, CHUNK, PaperAllocator
 from finlab.assets import shipped_layouts
 from finlab.errors import AllocationError, CheckpointError
 from finlab.inference.features import SIZES
-from finlab.inference.normalization import Normalization, to_command, to_normalized
+from finlab.inference.normalization import Normalization, clamp_to_limits, to_command, to_normalized
 from finlab.inference.weights import NetworkConfig, SurrogateConfig, TrainedWeights
 from finlab.layout import Fin, Layout, Limits, load_layout
 from finlab.physics import Plant
+from finlab.physics.energy import command_energy
 from finlab.training.networks.allocator_network import AllocatorNetwork
 from finlab.training.networks.surrogate import make_surrogate
 from finlab.training.saving import state_of, surrogate_of
@@ -254,3 +255,64 @@ def test_refuses_settings_that_leave_nothing_to_answer_with(
 ) -> None:
     with pytest.raises(AllocationError, match=message):
         PaperAllocator(checkpoint, **options)
+
+
+# One step at a time.
+
+
+def test_each_ranking_takes_what_it_ranks_first(checkpoint: TrainedWeights) -> None:
+    """Unrefined, the answer is the likeliest sample, or the one with the least J = J_norm + gamma J_en."""
+    layout, target = load_layout(shipped_layouts()["A"]), np.array([TARGET])
+    chosen = {}
+    for ranking in ("physics", "nll"):
+        options = {"ranking": ranking, "refinement": "none", "n_candidates": 12, "gamma": 0.2}
+        paper = PaperAllocator(checkpoint, **options)
+        robot, std = paper._prepared(layout), paper.normalization.std
+        mixture = paper._predict(robot, (target - paper.normalization.mean) / std)
+        sampled = clamp_to_limits(to_command(paper._draw(mixture, 3), *robot.limits), *robot.limits)[0]
+        if ranking == "nll":
+            x = to_normalized(sampled[None], *robot.limits)
+            best = int(np.argmax(mixture.log_likelihood(x, robot.problem.wraps)))
+        else:
+            error = (robot.surrogate.wrench(sampled) - target) / std
+            best = int(np.argmin((error**2).sum(1) + 0.2 * command_energy(sampled, layout.upper)))
+        chosen[ranking] = best
+        answer = paper.allocate(layout, target[0], seed=3)
+        np.testing.assert_allclose(answer.command, sampled[best], atol=1e-6)
+    assert chosen["physics"] != chosen["nll"]
+
+
+def test_adams_first_step_is_its_rate_unless_the_gradient_is_tiny(
+    checkpoint: TrainedWeights, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In units of half a range: g / (|g| + 1e-8) of the rate, against the gradient, with g by those units."""
+    layout = load_layout(shipped_layouts()["A"])
+    paper = PaperAllocator(checkpoint)
+    robot = paper._prepared(layout)
+    half = (0.5 * (layout.upper - layout.lower)).astype(np.float32)
+    middle = (0.5 * (layout.upper + layout.lower)).astype(np.float32)[None]
+    for size, share in ((1e-8, 0.5), (3e-8, 0.75), (1.0, 1.0), (-1.0, -1.0)):
+        monkeypatch.setattr(paper, "_gradient", lambda *_, size=size: (np.float32(size) / half)[None])
+        command = paper._adam(robot, middle, np.zeros((1, 6), np.float32), 1)
+        step = (command - middle)[0] / half
+        np.testing.assert_allclose(step, np.full_like(step, -share * ADAM_RATE), rtol=1e-3)
+
+
+def test_adams_gradient_is_that_of_the_score(checkpoint: TrainedWeights) -> None:
+    robot = load_layout(shipped_layouts()["A"])
+    paper = PaperAllocator(checkpoint, gamma=0.3)
+    prepared, std = paper._prepared(robot), paper.normalization.std
+    command = 0.4 * robot.lower + 0.6 * robot.upper
+    target = np.array(TARGET) / std
+    slope = paper._gradient(prepared, command[None].astype(np.float32), target[None].astype(np.float32))[0]
+
+    def score(at: np.ndarray) -> float:
+        error = prepared.problem.wrench(at[None])[0] - target
+        return float(error @ error + 0.3 * command_energy(at, robot.upper))
+
+    expected = np.empty_like(command)
+    for place in np.ndindex(command.shape):
+        offset = np.zeros_like(command)
+        offset[place] = 2e-3
+        expected[place] = (score(command + offset) - score(command - offset)) / 4e-3
+    np.testing.assert_allclose(slope, expected, atol=1e-3 * np.abs(expected).max())
