@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from itertools import count
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -160,7 +161,7 @@ def attainable_set(
     points = support(np.concatenate([axes, spread / np.linalg.norm(spread, axis=-1, keepdims=True)]))[0]
     points = np.concatenate([points, np.zeros((1, 3))])  # every fin may rest
     found = hull_of(points)
-    for round_ in range(MAX_ROUNDS + 1):
+    for round_ in count():
         new, reach = support(found.normals)
         beyond = reach - found.offsets
         size = float(np.linalg.norm(points, axis=-1).max())

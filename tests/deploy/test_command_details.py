@@ -1,0 +1,173 @@
+"""What the command on the robot prints, the deadline's arithmetic, and files that do not depend on order."""
+
+import json
+from concurrent.futures import Future
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from finlab.assets import checkpoint_path
+from finlab.deploy import serve as serve_module
+from finlab.deploy.bundle import Bundle
+from finlab.deploy.command import main
+from finlab.deploy.onnx_export import onnx_files
+from finlab.deploy.robot import Robot, parse_robot
+from finlab.deploy.self_check import N_WARM, Finding, answer_times
+from finlab.deploy.serve import MAX_LINE, Server, Timing
+from finlab.inference.checkpoint import read_checkpoint
+
+WRENCH = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
+
+
+@pytest.fixture(scope="module")
+def robot(bundle: Bundle) -> Robot:
+    return parse_robot(bundle.files)
+
+
+@pytest.fixture
+def on_board(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> Robot:
+    """The command finds this robot in any bundle."""
+    monkeypatch.setattr("finlab.deploy.robot.load_robot", lambda *_: robot)
+    return robot
+
+
+@pytest.mark.parametrize(("asked", "answered"), [("-3", 1), ("0", 1), ("1", 1), ("2", 2), ("5", 5)])
+def test_speed_answers_as_many_targets_as_asked_and_at_least_one(
+    asked: str, answered: int, on_board: Robot, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    counts: list[int] = []
+
+    def times(allocate: Any, targets: np.ndarray) -> tuple[float, float]:
+        counts.append(len(targets))
+        return 1.234, 56.789
+
+    monkeypatch.setattr("finlab.deploy.self_check.answer_times", times)
+    assert main(["speed", "bundle", f"--targets={asked}"]) == 0
+    assert counts == [answered]
+    assert capsys.readouterr().out.startswith(
+        f"{on_board.allocator.name}, 4 fins: p50 1.23 ms, p99 56.79 ms, ready after "
+    )
+
+
+def test_times_are_percentiles_in_milliseconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock, asked = [0.0], []
+
+    def allocate(target: np.ndarray) -> None:
+        asked.append(target[0])
+        clock[0] += target[0] / 1e3
+
+    monkeypatch.setattr("time.perf_counter", lambda: clock[0])
+    p50, p99 = answer_times(allocate, np.arange(1.0, 102.0)[:, None])
+    assert (p50, p99) == pytest.approx((51.0, 100.0))
+    assert asked == [*range(1, N_WARM + 1), *range(1, 102)]
+
+
+@pytest.mark.parametrize(("good", "code"), [(True, 0), (False, 1)])
+def test_check_prints_each_finding(
+    good: bool, code: int, on_board: Robot, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    findings = [Finding("first", 0.5, 1.0), Finding("second", 0.5 if good else 1.5, 1.0)]
+    monkeypatch.setattr("finlab.deploy.self_check.self_check", lambda _: findings)
+    assert main(["check", "some.zip"]) == code
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("some.zip: A, 4 fins, checkpoint default, ready in ")
+    assert lines[1] == "  ok     first: 0.5, allowed 1"
+    assert lines[2] == ("  ok     second: 0.5, allowed 1" if good else "  FAILED second: 1.5, allowed 1")
+    assert lines[3].startswith("this computer answers" if good else "do not use this bundle here")
+
+
+def test_allocate_prints_a_table_or_one_object(on_board: Robot, capsys: Any) -> None:
+    question = ["allocate", "bundle", "--wrench", *map(str, WRENCH), "--failed", "back_left"]
+    truth = on_board.allocate(WRENCH, failed=["back_left"])
+    assert main([*question, "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)
+    assert shown["failed"] == ["back_left"] and shown["target"] == WRENCH
+    lost = shown["fins"].index("back_left")
+    assert shown["command"][lost] is None
+    kept = [row for row in shown["command"] if row is not None]
+    assert np.array(kept) == pytest.approx(np.delete(truth.command, lost, axis=0))
+    assert shown["err_norm"] == pytest.approx(truth.err_norm)
+    assert main(question) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "fin          A [rad]  f [Hz]  zero direction [rad]"
+    assert lines[1 + lost] == "back_left    failed"
+    a, f, d = truth.command[0]
+    assert lines[1] == f"front_right  {a:7.3f}  {f:6.3f}  {d:20.3f}"
+
+
+@pytest.mark.parametrize(
+    ("text", "code"), [("0", 2), ("-1", 2), ("1e6", 2), ("nan", 2), ("0.001", 0), ("999999", 0)]
+)
+def test_deadlines_are_positive_and_finite(
+    text: str, code: int, on_board: Robot, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    timings: list[Timing] = []
+
+    class Spy(Server):
+        def __init__(self, robot: Robot, timing: Timing, steady: bool = False) -> None:
+            timings.append(timing)
+
+        def run(self, transport: Any) -> None:
+            pass
+
+    monkeypatch.setattr(serve_module, "Server", Spy)
+    monkeypatch.setattr("finlab.deploy.transport.StandardStreams", lambda *_: None)
+    monkeypatch.setattr("sys.stdin", type("Pipe", (), {"buffer": None}))
+    arguments = ["serve", "bundle", f"--deadline-ms={text}", "--watchdog-s=0"]
+    if code:
+        with pytest.raises(SystemExit) as stopped:
+            main(arguments)
+        assert stopped.value.code == code and not timings
+        return
+    assert main(arguments) == 0
+    assert timings == [Timing(float(text) / 1e3, None)]
+    assert main(["serve", "bundle"]) == 0
+    assert timings[1] == Timing(None, 1.0)
+
+
+class Busy(Future[Any]):
+    """Work that never ends, and how long it is waited for."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.waited: list[float | None] = []
+
+    def result(self, timeout: float | None = None) -> Any:
+        self.waited.append(timeout)
+        raise serve_module.TooLate
+
+
+def test_waiting_ends_at_the_deadline(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 2 s, 0.5 s go by before the other target is waited for, and as many after it."""
+    clock, waits, work = iter(np.arange(0.0, 10.0, 0.5)), [], Busy()
+    server = Server(robot, Timing(deadline=2.0))
+    monkeypatch.setattr("finlab.deploy.serve.time.perf_counter", lambda: float(next(clock)))
+    monkeypatch.setattr(server._worker, "submit", lambda _: work)
+    monkeypatch.setattr(serve_module, "wait", lambda _, timeout: waits.append(timeout))
+    line = json.dumps({"wrench": WRENCH}).encode()
+    assert server.answer(line)["status"] == "late"  # asks the clock at 0 and 0.5
+    assert work.waited == [1.5] and waits == []
+    assert server.answer(line)["status"] == "late"  # at 1 and 1.5: the first is still busy
+    assert work.waited == [1.5] and waits == [1.5]
+    work.set_result(None)
+    assert server.answer(line)["status"] == "late"  # at 2, 2.5 and 3
+    assert work.waited == [1.5, 1.0] and waits == [1.5, 1.5]
+    clock = iter([0.0, 5.0, 9.0])  # past the deadline nothing is waited for
+    assert server.answer(line)["status"] == "late"
+    assert work.waited[-1] == 0.0 and waits[-1] == 0.0
+
+
+def test_the_longest_request_that_is_read(robot: Robot) -> None:
+    line = json.dumps({"wrench": WRENCH}).encode()
+    server = Server(robot, Timing())
+    assert server.answer(line.ljust(MAX_LINE))["status"] == "ok"
+    assert server.answer(line.ljust(MAX_LINE + 1))["error"] == "request: longer than 65536 bytes"
+
+
+def test_exports_do_not_depend_on_the_order_of_the_fin_model() -> None:
+    weights = read_checkpoint(checkpoint_path())
+    small = replace(weights, fin_model={"type": "drag", "parameters": {"a": 1.0}})
+    turned = replace(weights, fin_model={"parameters": {"a": 1.0}, "type": "drag"})
+    assert onnx_files(small) == onnx_files(turned)

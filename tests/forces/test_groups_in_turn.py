@@ -1,0 +1,165 @@
+"""Groups of axes in order, the search over starts, and systems solved without the usual wrapper: details."""
+
+import importlib.util
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from finlab.forces import attainable, least_energy, small_systems
+from finlab.forces.attainable import MAX_ROUNDS, N_DIRECTIONS, attainable_set
+from finlab.forces.fin_sets import FinSets
+from finlab.forces.interior_point import minimize
+from finlab.forces.nearest import nearest_in_turn
+from finlab.forces.reach import COARSE, FINE
+from finlab.forces.thrust_curve import plant_curves
+from finlab.layout import Fin, Layout, Limits
+
+Array = NDArray[np.float64]
+Layouts = Callable[[str], Layout]
+X, Y, Z = (np.arange(6) == k for k in range(3))
+
+
+def planar(columns: Array, radius: Array) -> FinSets:
+    """One robot of free fins."""
+    n = len(radius)
+    return FinSets(columns[None], radius[None], np.zeros((1, n)), np.full((1, n), np.pi))
+
+
+def axes_of(*pairs: tuple[int, int]) -> Array:
+    """Columns (n, 2, 6) of fins that push along two axes each."""
+    columns = np.zeros((len(pairs), 2, 6))
+    for i, pair in enumerate(pairs):
+        columns[i, 0, pair[0]] = columns[i, 1, pair[1]] = 1.0
+    return columns
+
+
+def test_who_gives_all_for_the_first_group_gives_nothing_to_the_next() -> None:
+    """The first fin spends its 2 N on x; only the second, which does not feel x, is left for y."""
+    sets = planar(axes_of((0, 1), (1, 2)), np.array([2.0, 1.0]))
+    served = nearest_in_turn(sets, np.array([5.0, 3.0, 0.0, 0.0, 0.0, 0.0]), [X, ~X])
+    assert served.force[0] == pytest.approx(np.array([[2.0, 0.0], [1.0, 0.0]]), abs=1e-6)
+    assert served.wrench[0] == pytest.approx([2.0, 1.0, 0.0, 0.0, 0.0, 0.0], abs=1e-6)
+
+
+def test_what_the_first_group_leaves_goes_to_the_next() -> None:
+    """Of 2 N, 1.2 N along x leave 1.6 N along y; a third group gets what the second fin has left."""
+    sets = planar(axes_of((0, 1), (1, 2)), np.array([2.0, 1.0]))
+    target = np.array([1.2, 2.2, 5.0, 0.0, 0.0, 0.0])
+    served = nearest_in_turn(sets, target, [X, Y, ~X & ~Y])
+    assert served.wrench[0] == pytest.approx([1.2, 2.2, 0.8, 0.0, 0.0, 0.0], abs=1e-4)
+
+
+def test_three_groups_out_of_reach_are_served_one_by_one() -> None:
+    sets = planar(axes_of((0, 1), (1, 2), (2, 3)), np.array([2.0, 1.0, 0.5]))
+    served = nearest_in_turn(sets, np.array([9.0, 9.0, 9.0, 9.0, 0.0, 0.0]), [X, Y, ~X & ~Y])
+    assert served.wrench[0, :2] == pytest.approx([2.0, 1.0], abs=1e-6)
+    assert np.hypot(*served.wrench[0, 2:4]) == pytest.approx(0.5, abs=1e-6)
+    assert served.wrench[0, 2] == pytest.approx(served.wrench[0, 3], abs=1e-6)
+
+
+def test_starts_by_hand() -> None:
+    radius = np.array([1.0, 2.0, 4.0])
+    seeds = least_energy.starts(radius, 4000)
+    rest = least_energy.RESTING
+    assert len(seeds) == 1 + 3 + 3 + 4000
+    at_rest = [[]] + [[i] for i in range(3)] + [[0, 1], [0, 2], [1, 2]]
+    for row, fins in zip(seeds, at_rest, strict=False):
+        expected = radius.copy()
+        expected[fins] *= rest
+        assert row == pytest.approx(expected)
+    drawn = seeds[7:] / radius
+    assert (drawn >= 0.0).all() and (drawn <= 1.0).all()
+    # Squares of what is evenly spread: weak thrusts are tried more often.
+    quartiles = np.quantile(drawn, [0.25, 0.5, 0.75], axis=0)
+    assert quartiles == pytest.approx(np.array([[1 / 16, 1 / 4, 9 / 16]] * 3).T, abs=0.03)
+    assert (least_energy.starts(radius, 4000) == seeds).all()
+    assert len(least_energy.starts(radius, 0, most_resting=1)) == 4
+
+
+def test_the_cost_is_touched_twice_coarsely_then_once_exactly(
+    shipped: Layouts, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gaps: list[float] = []
+
+    def spy(sets: FinSets, wanted: Array, c: Array, bend: Array, gap: float) -> Any:
+        gaps.append(gap)
+        return minimize(sets, wanted, c, bend, gap)
+
+    monkeypatch.setattr(least_energy, "minimize", spy)
+    assert np.isfinite(least_energy.least_energy(shipped("A"), [[1.0, 0.0, 0.5, 0.0, 0.0, 0.0]])).all()
+    assert gaps == [COARSE, COARSE, FINE]
+
+
+def test_least_energy_of_what_no_fin_is_left_for(shipped: Layouts) -> None:
+    layout = shipped("A")
+    energy = least_energy.least_energy(layout, [np.zeros(6), np.eye(6)[0]], failed=layout.names)
+    assert energy[0] == 0.0 and np.isnan(energy[1])
+
+
+def test_within_reach_ends_at_the_edge() -> None:
+    sets = planar(axes_of((0, 1)), np.array([2.0]))
+    shares = np.array([0.0, 0.5, 0.999, 1.001, 2.0])
+    target = np.outer(shares * 2.0, [0.6, 0.8, 0.0, 0.0, 0.0, 0.0])
+    assert least_energy.within_reach(sets.tile(5), target).tolist() == [True, True, True, False, False]
+
+
+@pytest.mark.parametrize("arc", [(-2.0, 2.0), (-1.5, 1.5), (-np.pi, np.pi)])
+def test_one_wide_arc_makes_a_set_a_hull(arc: tuple[float, float]) -> None:
+    layout = Layout("one", (Fin("a", (0.2, 0.1, 0.0), 0.7, Limits(zero_direction=arc)),))
+    body = attainable_set(layout, "force", alone=False)
+    assert body.hull is (arc[0] == -2.0)
+    assert body.dimension == 2
+    most = plant_curves(layout).maximum[0]
+    assert np.linalg.norm(body.vertices, axis=1).max() == pytest.approx(most, rel=1e-9)
+
+
+def test_directions_are_added_a_limited_number_of_times(
+    shipped: Layouts, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[int] = []
+    free_support = attainable._free_support
+
+    def spied(sets: FinSets, kind: Any) -> Any:
+        support = free_support(sets, kind)
+
+        def spy(directions: Array) -> tuple[Array, Array]:
+            asked.append(len(directions))
+            return support(directions)
+
+        return spy
+
+    monkeypatch.setattr(attainable, "_free_support", spied)
+    one = Layout("one", (Fin("a", (0.2, 0.1, 0.0), 0.7),))
+    attainable_set(one, "force", alone=False, tolerance=1e-9)
+    # The axes, the first directions, and each round's faces; those of the last are only looked at.
+    assert asked[:2] == [6, 6 + N_DIRECTIONS] and len(asked) == 2 + MAX_ROUNDS + 1
+    gaps = []
+    for tolerance in (0.2, 0.03):
+        asked.clear()
+        body = attainable_set(shipped("A"), "force", alone=False, tolerance=tolerance)
+        gaps.append(body.gap)
+        if len(asked) < 2 + MAX_ROUNDS + 1:
+            assert body.gap <= tolerance * np.linalg.norm(body.vertices, axis=1).max()
+    assert gaps[0] >= gaps[1]
+
+
+def test_a_numpy_that_keeps_its_loop_elsewhere_answers_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(np.linalg, "_umath_linalg")
+    monkeypatch.setitem(sys.modules, "numpy.linalg._umath_linalg", None)
+    spec = importlib.util.spec_from_file_location("small_systems_without", small_systems.__file__)
+    assert spec is not None and spec.loader is not None
+    without = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(without)
+    assert without._lapack is np.linalg
+    rng = np.random.default_rng(0)
+    matrix, right = rng.standard_normal((5, 6, 6)) + 4.0 * np.eye(6), rng.standard_normal((5, 6, 1))
+    truth = np.stack([np.linalg.inv(a) @ b for a, b in zip(matrix, right, strict=True)])
+    for module in (small_systems, without):
+        assert module.solve(matrix, right) == pytest.approx(truth, rel=1e-9)
+        assert module.solve(matrix, right[:1])[3, :, 0] == pytest.approx(
+            np.linalg.inv(matrix[3]) @ right[0, :, 0]
+        )
