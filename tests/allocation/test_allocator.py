@@ -1,12 +1,14 @@
 """What every method has in common: problems are checked, failed fins left out, answers judge themselves."""
 
 import math
+from dataclasses import replace
+from types import SimpleNamespace
 from typing import get_args
 
 import numpy as np
 import pytest
 
-from finlab.allocation import METHODS, Allocation, Allocator, Candidates, Solution, load_allocator
+from finlab.allocation import METHODS, Allocation, Allocator, Candidates, Solution, allocator, load_allocator
 from finlab.allocation.methods import Method
 from finlab.errors import AllocationError, CommandError, LayoutError
 from finlab.inference.normalization import Normalization
@@ -194,3 +196,46 @@ def test_the_method_comes_first_and_the_checkpoint_by_keyword() -> None:
         assert load_allocator(name).name == name
     with pytest.raises(TypeError):
         load_allocator("learned", "default")  # type: ignore[misc]
+
+
+def test_the_time_is_that_of_the_solver_shared_by_its_targets(
+    method: Drawn, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def clock() -> SimpleNamespace:
+        return SimpleNamespace(perf_counter=iter([10.0, 40.0]).__next__)
+
+    monkeypatch.setattr(allocator, "time", clock())
+    assert method.allocate(ROBOT, SURGE).solve_ms == 30_000.0
+    monkeypatch.setattr(allocator, "time", clock())
+    assert method.allocate_batch(ROBOT, [SURGE] * 3).solve_ms.tolist() == [10_000.0] * 3
+    monkeypatch.setattr(allocator, "time", clock())
+    assert method.allocate_batch(ROBOT, np.empty((0, 6))).solve_ms.tolist() == []
+
+
+def test_rows_out_of_reach_get_the_policys_answer_the_others_keep_theirs(method: Drawn) -> None:
+    """The method claims half of each target: with that, only a target of nothing is met."""
+    targets = np.array([SURGE, [0.0] * 6, [0.0, 3.0, 0.0, 0.0, 0.0, 0.0]])
+    batch = method.allocate_batch(ROBOT, targets, policy="direction")
+    plain = method.allocate_batch(ROBOT, targets)
+    assert batch.wrench_surrogate is not None and plain.wrench_surrogate is not None
+    np.testing.assert_array_equal(batch.command[1], plain.command[1])
+    for row in (0, 2):
+        alone = method.allocate(ROBOT, targets[row], policy="direction")
+        assert alone.wrench_surrogate is not None
+        np.testing.assert_array_equal(batch.command[row], alone.command)
+        np.testing.assert_array_equal(batch.wrench_surrogate[row], alone.wrench_surrogate)
+        assert np.abs(batch.wrench_surrogate[row]).max() < np.abs(plain.wrench_surrogate[row]).max()
+
+
+def test_a_changed_answer_is_noticed(method: Drawn) -> None:
+    """Alternatives belong to an answer: up to a millionth it may differ, as between machines."""
+    answer = method.allocate(ROBOT, SURGE, failed=["left"])
+    for off, same in ((0.9e-6, True), (1.2e-6, False)):
+        other = replace(answer, command=answer.command + off)
+        if same:
+            found = method.alternatives(other)
+            assert found is not None and found.command.shape == (1, 3, 3)
+            np.testing.assert_array_equal(found.command[0], answer.command)
+        else:
+            with pytest.raises(AllocationError, match="method 'drawn' with checkpoint None gives another"):
+                method.alternatives(other)

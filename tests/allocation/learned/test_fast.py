@@ -6,6 +6,7 @@ import shutil
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from finlab.inference.checkpoint import read_checkpoint
 from finlab.inference.fast_network import save_fast
 from finlab.layout import Limits, random_layout
 from finlab.physics import Plant
-from finlab.physics.energy import command_energy
+from finlab.physics.energy import EnergyWeights, command_energy
 
 
 @pytest.fixture(scope="module")
@@ -126,3 +127,50 @@ def test_changed_weights_are_refused(tmp_path: Path) -> None:
             read_checkpoint(folder.parent)
     shutil.rmtree(folder)
     assert read_checkpoint(folder.parent).fast is None
+
+
+@pytest.mark.parametrize("case", ["previous", "tradeoff", "weights"])
+def test_questions_that_the_network_did_not_learn_go_to_the_full_pipeline(
+    fast: FastAllocator, case: str
+) -> None:
+    """Slow turns, and energies other than the usual one."""
+    changes: dict[str, Any] = {
+        "tradeoff": {"energy_tradeoff": 0.01},
+        "weights": {"energy_weights": EnergyWeights(1.0, 1.0, 0.5, 1.0)},
+    }.get(case, {})
+    allocators = fast.with_settings(**changes), LearnedAllocator(fast.weights).with_settings(**changes)
+    layout = finlab.load_layout("penta")
+    previous = 0.5 * (layout.lower + layout.upper) if case == "previous" else None
+    target = targets(layout, 1)[0] * 0.3
+    quick, full = (a.allocate(layout, target, previous=previous).command for a in allocators)
+    np.testing.assert_allclose(quick, full, atol=1e-9)
+    assert np.abs(fast.allocate(layout, target).command - full).max() > 1e-5
+
+
+def test_what_the_network_meets_never_sees_the_full_pipeline(
+    fast: FastAllocator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    layout = finlab.load_layout("penta")
+    wanted = 0.3 * targets(layout, 8)
+    expected = fast.allocate_batch(layout, wanted).command
+
+    def refuse(*_: object, **__: object) -> None:
+        raise AssertionError("asked the full pipeline")
+
+    monkeypatch.setattr(LearnedAllocator, "_solve", refuse)
+    np.testing.assert_array_equal(fast.allocate_batch(layout, wanted).command, expected)
+    with pytest.raises(AssertionError, match="asked the full pipeline"):
+        fast.allocate(layout, wanted[0], previous=expected[0])
+
+
+def test_only_the_targets_that_are_missed_go_to_the_full_pipeline(fast: FastAllocator) -> None:
+    layout = finlab.load_layout("penta")
+    wanted = np.concatenate([0.3 * targets(layout, 3), [[40.0, 0.0, 0.0, 0.0, 0.0, 0.0]]])
+    together = fast.allocate_batch(layout, wanted[[0, 3, 1, 2]])
+    for row, place in enumerate((0, 3, 1, 2)):
+        alone = fast.allocate(layout, wanted[place])
+        np.testing.assert_allclose(together.command[row], alone.command, atol=1e-5)
+        assert together.wrench_surrogate is not None and alone.wrench_surrogate is not None
+        np.testing.assert_allclose(together.wrench_surrogate[row], alone.wrench_surrogate, atol=1e-5)
+    full = LearnedAllocator(fast.weights).allocate(layout, wanted[3])
+    np.testing.assert_allclose(together.command[1], full.command, atol=1e-5)

@@ -147,3 +147,50 @@ def test_clamp_wraps_and_clips_in_either_precision(kind: type, learned: LearnedA
     clamped = problem.clamp(command)
     assert clamped.dtype == kind
     np.testing.assert_allclose(clamped, [[0.5, 0.2, 1.0], [0.3, 1.0, 7.0 - 2 * math.pi]], rtol=1e-6)
+
+
+@pytest.fixture
+def mixed(learned: LearnedAllocator) -> CommandProblem:
+    """A fin that turns freely and one in an arc."""
+    arc = Limits((0.1, 0.5), (0.3, 1.4), (0.3, 1.7))
+    return problem_of(
+        learned,
+        Layout("two", (Fin("a", (0.2, 0.1, 0.0), 0.4), Fin("b", (-0.3, 0.2, 0.1), 2.0, limits=arc))),
+    )
+
+
+def test_edges_are_just_within_the_limits_except_where_fins_turn_freely(mixed: CommandProblem) -> None:
+    low, high = mixed.edges
+    lower, upper = mixed.lower + 1e-9, mixed.upper - 1e-9
+    lower[0, 2], upper[0, 2] = -np.inf, np.inf
+    np.testing.assert_array_equal(low, lower)
+    np.testing.assert_array_equal(high, upper)
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.float32])
+def test_limits_as_each_type_sees_them(mixed: CommandProblem, kind: type[np.floating]) -> None:
+    limits = mixed.float64 if kind is np.float64 else mixed.float32
+    assert all(part.dtype == kind for part in limits)
+    np.testing.assert_allclose(limits.lower, mixed.lower, rtol=1e-6)
+    np.testing.assert_allclose(limits.upper, mixed.upper, rtol=1e-6)
+    middle = (mixed.lower[:, 2] + mixed.upper[:, 2]) / 2
+    np.testing.assert_allclose(limits.seam, middle - math.pi, rtol=1e-6)
+    np.testing.assert_allclose(limits.half, (mixed.upper - mixed.lower) / 2, rtol=1e-6)
+    assert limits.turn == pytest.approx(2 * math.pi)
+    command = np.array(
+        [[(9.0, -1.0, 4.0), (0.2, 0.4, 1.9 + 2 * math.pi)], [(0.3, 1.0, -4.0), (0.2, 0.4, 4.0)]]
+    )
+    given = command.astype(kind)
+    found = mixed.clamp(given)
+    a, f = mixed.upper[0, 0], mixed.lower[0, 1]
+    turn = 2 * math.pi
+    expected = [[(a, f, 4.0 - turn), (0.2, 0.4, 1.7)], [(0.3, 1.0, turn - 4.0), (0.2, 0.4, 1.7)]]
+    np.testing.assert_allclose(found, expected, atol=1e-5)
+    assert found.dtype == kind
+    np.testing.assert_array_equal(given, command.astype(kind))
+
+
+def test_the_ridge_is_by_the_largest_derivatives(mixed: CommandProblem) -> None:
+    largest = 2 * math.pi * np.linalg.norm(mixed.fin.force(mixed.upper), axis=-1)
+    squares = sum(float(((largest[i] * mixed.columns[i]) ** 2).sum()) for i in range(2))
+    assert mixed.ridge == pytest.approx(1e-9 + 1e-14 * squares, rel=1e-12)

@@ -1,0 +1,114 @@
+"""What an allocator may be asked: the last values that are taken, the first that are refused, and why."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+
+from finlab.allocation import Health
+from finlab.allocation.question import (
+    MAX_WRENCH,
+    check_layout_and_seed,
+    check_previous,
+    check_wrenches,
+    usable_fins,
+)
+from finlab.errors import AllocationError, CommandError
+from finlab.layout import Fin, Layout, Limits
+
+ROBOT = Layout("robot", tuple(Fin(name, (0.1 * i, 0.0, 0.0), 0.0) for i, name in enumerate("abc")))
+
+
+def test_commands_of_all_fins_are_handed_through() -> None:
+    command = np.ones((2, 3, 3))
+    assert usable_fins(ROBOT, ()).among_all(command) is command
+    assert usable_fins(ROBOT, []).among_all(command) is command
+
+
+def test_commands_of_the_working_fins_are_put_in_their_places() -> None:
+    fins = usable_fins(ROBOT, ["b"])
+    assert fins.failed == ("b",) and fins.healthy.names == ("a", "c") and fins.layout is ROBOT
+    assert fins.alive.tolist() == [True, False, True]
+    command = np.arange(12.0).reshape(2, 2, 3)
+    full = fins.among_all(command)
+    np.testing.assert_array_equal(full[:, [0, 2]], command)
+    assert full.shape == (2, 3, 3) and np.isnan(full[:, 1]).all()
+    assert fins.among_all(command[0]).shape == (3, 3)
+
+
+def test_damage_changes_the_limits_of_all_and_of_the_working_fins() -> None:
+    fins = usable_fins(ROBOT, ("a",), Health.of(running={"c": (0.2, 1.0, 0.5)}))
+    kept = Limits((0.2, 0.2), (1.0, 1.0), (0.5, 0.5))
+    assert fins.layout.fins[2].limits == fins.healthy.fins[1].limits == kept
+    assert fins.layout.fins[1] == ROBOT.fins[1]
+
+
+@pytest.mark.parametrize(
+    ("failed", "sentence"),
+    [
+        ("a", "failed: expected a list of fin names, got the text 'a'; write ['a']"),
+        (["a", 2], "failed: expected a list of fin names, got ['a', 2]"),
+        ({"a"}, "failed: expected a list of fin names, got {'a'}"),
+    ],
+)
+def test_failed_fins_are_a_list_of_names(failed: object, sentence: str) -> None:
+    with pytest.raises(AllocationError, match=f"^{re.escape(sentence)}$"):
+        usable_fins(ROBOT, failed)  # type: ignore[arg-type]
+
+
+def test_health_is_made_with_health_of() -> None:
+    with pytest.raises(AllocationError, match="health: expected a Health, got 'weak'; make one with"):
+        usable_fins(ROBOT, (), "weak")  # type: ignore[arg-type]
+
+
+def test_the_largest_wrench_is_still_taken() -> None:
+    most = [MAX_WRENCH, -MAX_WRENCH, 0, 0, 0, 0]
+    np.testing.assert_array_equal(check_wrenches(most, single=True), most)
+    assert check_wrenches([1, 2, 3, 4, 5, 6], single=True).dtype == np.float64
+    assert check_wrenches(np.empty((0, 6)), single=False).shape == (0, 6)
+    with pytest.raises(
+        CommandError, match=r"wrench: Tx must be finite and at most 1e\+06 in size, got -1000001"
+    ):
+        check_wrenches([[0] * 6, [0, 0, 0, -MAX_WRENCH - 1, 0, 9e9]], single=False)
+
+
+@pytest.mark.parametrize("shape", [(6,), (2, 5), (1, 2, 6), ()])
+def test_many_wrenches_are_rows_of_six(shape: tuple[int, ...]) -> None:
+    sentence = f"wrench: expected an array of shape (N, 6) in N and N m, got an array of shape {shape}"
+    with pytest.raises(CommandError, match=f"^{re.escape(sentence)}$"):
+        check_wrenches(np.zeros(shape), single=False)
+
+
+def test_complex_numbers_are_no_wrench() -> None:
+    with pytest.raises(CommandError, match="wrench: expected six numbers"):
+        check_wrenches([1j, 0, 0, 0, 0, 0], single=True)
+
+
+@pytest.mark.parametrize("seed", [0, 1, np.int64(3)])
+def test_seeds_are_whole_numbers_from_0(seed: object) -> None:
+    check_layout_and_seed(ROBOT, seed)
+
+
+@pytest.mark.parametrize("seed", [-1, True, 1.0, "1", None])
+def test_other_seeds_are_refused(seed: object) -> None:
+    with pytest.raises(AllocationError, match=f"^seed: expected a whole number from 0, got {seed!r}$"):
+        check_layout_and_seed(ROBOT, seed)
+
+
+def test_no_layout_is_refused() -> None:
+    with pytest.raises(AllocationError, match="layout: expected a Layout, got 'A'; read a file with"):
+        check_layout_and_seed("A", 0)
+
+
+def test_previous_commands_may_hold_nan_but_nothing_infinite() -> None:
+    previous = np.zeros((3, 3))
+    previous[1] = math.nan
+    np.testing.assert_array_equal(check_previous(previous, ROBOT), previous)
+    previous[2, 1] = -math.inf
+    with pytest.raises(CommandError, match="previous: expected finite commands"):
+        check_previous(previous, ROBOT)
+    for wrong in (np.zeros((2, 3)), np.zeros((3, 2)), np.zeros(9)):
+        sentence = f"(3, 3) for layout 'robot', got shape {wrong.shape}; pass the `command`"
+        with pytest.raises(CommandError, match=re.escape(sentence)):
+            check_previous(wrong, ROBOT)
