@@ -1,0 +1,170 @@
+"""The parts of the search in force space, hulls and extents, each against values worked out by hand."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from finlab.forces.attainable import hull_of
+from finlab.forces.extent import singular_values, strongest, weakest
+from finlab.forces.fin_sets import HALF_TURN_TOLERANCE, SCALE, FinSets, half_arcs, wide_fins
+from finlab.forces.force_space import (
+    REST,
+    RIDGE,
+    PlanarProblem,
+    _share_mobility,
+    free_terms,
+    mobility,
+    planar_problem,
+    polar,
+    realize,
+)
+from finlab.forces.thrust_curve import plant_curves
+from finlab.layout import Fin, Layout, Limits
+from finlab.physics.energy import EnergyWeights, command_energy
+
+Array = NDArray[np.float64]
+
+
+def layout_of(*arcs: tuple[float, float]) -> Layout:
+    return Layout(
+        "some",
+        tuple(
+            Fin(f"fin_{i}", (0.2, 0.1 * i, 0.05), 0.7 * i, Limits(zero_direction=arc))
+            for i, arc in enumerate(arcs)
+        ),
+    )
+
+
+def problem(*arcs: tuple[float, float], weights: EnergyWeights | None = None) -> PlanarProblem:
+    layout = layout_of(*arcs)
+    return planar_problem(layout, plant_curves(layout), SCALE, weights or EnergyWeights())
+
+
+def test_half_of_an_arc_and_which_are_wide() -> None:
+    lower, upper = np.array([-np.pi, -1.0, 0.5, -0.2]), np.array([np.pi, 1.0, 4.9, -0.2])
+    half = half_arcs(lower, upper)
+    assert half == pytest.approx([np.pi, 1.0, 2.2, 0.0])
+    edge = np.pi / 2 + HALF_TURN_TOLERANCE
+    halves = np.array([[np.pi / 2, edge, np.nextafter(edge, 4.0), 3.0, np.pi, 2.0]])
+    sets = FinSets(np.ones((1, 6, 2, 6)), np.array([[1.0, 1.0, 1.0, 1.0, 1.0, 0.0]]), 0.0 * halves, halves)
+    assert wide_fins(sets).tolist() == [2, 3]
+
+
+def test_a_problem_by_hand() -> None:
+    made = problem((-1.0, 2.0), (0.5, 4.0), (-np.pi, np.pi), (-2.0, -0.5))
+    assert made.middle == pytest.approx([0.5, 2.25, 0.0, -1.25])
+    assert made.half == pytest.approx([1.5, 1.75, np.pi, 0.75])
+    assert made.idle_direction == pytest.approx([0.0, 0.5, 0.0, -0.5])
+    assert made.direction_cost == pytest.approx([0.1 / 4.0, 0.1 / 16.0, 0.1 / np.pi**2, 0.1 / 0.25])
+    assert not made.turns_fully and made.growth == 0.5
+    assert problem((-np.pi, np.pi)).turns_fully
+    assert problem((-1.0, 1.0), weights=EnergyWeights(inertial=1.0)).growth == 1.5
+    # One newton ahead of the first fin: +y and, 0.2 m in front and 0.05 m above, torques -0.05 and 0.2.
+    assert made.columns[0, 0] == pytest.approx([0.0, 1.0, 0.0, -0.25, 0.0, 1.0])
+    assert made.columns[0, 1] == pytest.approx([0.0, 0.0, 1.0, 0.0, -1.0, 0.0])
+    outer = made.columns[1, 0][:, None] * made.columns[1, 1]
+    assert made.products[1, 0, 1] == pytest.approx(outer)
+
+
+def test_free_terms_are_sums_of_squares() -> None:
+    columns, top = np.random.default_rng(0).standard_normal((3, 2, 6)), np.array([1.0, 2.0, 0.5])
+    gram, full = free_terms(columns, top)
+    for i in range(3):
+        square = top[i] ** 2 * columns[i].T @ columns[i]
+        assert gram[i].reshape(6, 6) == pytest.approx(
+            square + RIDGE * np.trace(square) * np.eye(6), rel=1e-13
+        )
+        assert full[[i, 3 + i]] == pytest.approx(top[i] * columns[i])
+
+
+def test_mobility_is_thrust_over_the_slope_of_its_cost() -> None:
+    made = problem((-1.0, 1.0), (-1.0, 1.0))
+    top = made.curves.maximum
+    thrust = np.array([[0.04, 0.25], [1.0, 0.0], [0.0, 1e-7]]) * top
+    share = np.maximum(thrust / top, REST)
+    for growth in (0.5, 1.5, 1.2):
+        assert mobility(made._replace(growth=growth), thrust) == pytest.approx(share ** (2 - growth) * top**2)
+        assert _share_mobility(thrust / top, growth) == pytest.approx(share ** (2 - growth))
+
+
+def test_polar_forces_keep_their_arcs_and_limits() -> None:
+    made = problem((0.5, 2.5), (-np.pi, np.pi))
+    low, high = made.curves.minimum[0], made.curves.maximum[0]
+    asked = [(1.0, 0.6), (1.0, 0.2), (1.0, 3.0), (1.0, -1.5), (2 * high, 2.5), (0.5 * low, 0.5)]
+    held = [(1.0, 0.6), (1.0, 0.5), (1.0, 2.5), (1.0, 0.5), (high, 2.5), (low, 0.5)]
+    force = np.array([[[t * np.cos(a), t * np.sin(a)]] * 2 for t, a in asked])
+    found = polar(made, force)
+    assert np.stack([found.thrust[:, 0], found.direction[:, 0]], axis=-1) == pytest.approx(np.array(held))
+    assert found.direction[:, 1] == pytest.approx([a for _, a in asked])
+    assert np.isnan(found.residual).all()
+
+
+def test_a_fin_at_rest_points_where_it_costs_least() -> None:
+    made = problem((0.5, 2.5), (-1.0, 1.0))
+    low, high = made.curves.minimum, made.curves.maximum
+    planar: Any = SimpleNamespace(
+        thrust=np.stack([low, low * (1 + 1e-5), high]), direction=np.array([[2.0, 0.8]] * 3)
+    )
+    command, energy = realize(made, planar)
+    assert command[0, :, 2] == pytest.approx([0.5, 0.0])
+    assert command[1:, :, 2] == pytest.approx(np.array([[2.0, 0.8]] * 2))
+    assert energy == pytest.approx(
+        command_energy(command, layout_of((0.5, 2.5), (-1.0, 1.0)).upper), rel=1e-3
+    )
+
+
+CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 2) for z in (0, 3)], dtype=float)
+
+
+def test_hulls_of_every_dimension() -> None:
+    body = hull_of(np.concatenate([CUBE, CUBE.mean(axis=0, keepdims=True)]))
+    assert body.dimension == 3 and len(body.vertices) == 8 and len(body.faces) == 12 and not len(body.outline)
+    assert len(body.normals) == 6 and sorted(body.offsets.round(6)) == [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]
+    a, b, c = (body.vertices[body.faces[:, k]] for k in range(3))
+    assert ((np.cross(b - a, c - a) * (a - CUBE.mean(axis=0))).sum(-1) > 0.0).all()
+    assert np.einsum("fi,fi->f", a, np.cross(b, c)).sum() / 6 == pytest.approx(6.0)
+    flat = hull_of(np.concatenate([CUBE[:4:1] * [0, 1, 1] + [5, 0, 0], [[5.0, 1.0, 1.0]]]))
+    assert flat.dimension == 2 and len(flat.vertices) == 4 and not len(flat.faces)
+    assert sorted(flat.outline) == [0, 1, 2, 3] and len(flat.normals) == 6
+    line = hull_of(np.array([[1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [4.0, 4.0, 4.0]]))
+    assert line.dimension == 1 and line.outline.tolist() == [0, 1] and len(line.vertices) == 2
+    assert sorted(line.vertices[:, 0]) == [1.0, 4.0]
+    point = hull_of(np.full((3, 3), 2.0))
+    assert point.dimension == 0 and len(point.outline) == 0 and point.vertices.tolist() == [[2.0] * 3]
+    for hull, points in ((body, CUBE), (flat, flat.vertices), (line, line.vertices), (point, point.vertices)):
+        assert np.linalg.norm(hull.normals, axis=1) == pytest.approx(1.0)
+        beyond = points @ hull.normals.T - hull.offsets
+        assert beyond.max(axis=0) == pytest.approx(0.0, abs=1e-9)  # every plane touches, none cuts
+
+
+def pair_per_axis(radius: Array) -> FinSets:
+    """Three fins along axes (0, 1), (2, 3) and (4, 5): the set of wrenches is a product of discs."""
+    columns = np.zeros((1, 3, 2, 6))
+    for k in range(6):
+        columns[0, k // 2, k % 2, k] = 1.0
+    return FinSets(columns, radius[None], np.zeros((1, 3)), np.full((1, 3), np.pi))
+
+
+def test_extents_of_a_product_of_discs() -> None:
+    sets = pair_per_axis(np.array([1.0, 3.0, 2.0]))
+    values, vectors = singular_values(sets)
+    assert values[0] == pytest.approx([3.0, 3.0, 2.0, 2.0, 1.0, 1.0])
+    assert np.abs(vectors[0, 2:4, :2]).sum() == pytest.approx(2.0, abs=1e-9)
+    least, most = weakest(sets), strongest(sets)
+    assert least.size == pytest.approx([1.0], rel=1e-6)
+    assert np.hypot(*least.direction[0, :2]) == pytest.approx(1.0, abs=1e-3)
+    assert most.size == pytest.approx([np.sqrt(14.0)], rel=1e-6)  # all at full thrust
+    blocks = np.linalg.norm(most.direction.reshape(3, 2), axis=1)
+    assert blocks == pytest.approx(np.array([1.0, 3.0, 2.0]) / np.sqrt(14.0), abs=1e-6)
+    lame = weakest(pair_per_axis(np.array([1.0, 0.0, 2.0])))
+    assert lame.size == 0.0 and np.hypot(*lame.direction[0, 2:4]) == pytest.approx(1.0)
+
+
+def test_a_fin_with_stops_ends_a_set_behind_it() -> None:
+    sets = pair_per_axis(np.array([1.0, 3.0, 2.0]))._replace(half=np.array([[np.pi, np.pi, 1.0]]))
+    least = weakest(sets)
+    assert least.size == pytest.approx([0.0], abs=1e-6)
+    assert np.hypot(*least.direction[0, 4:]) == pytest.approx(1.0, abs=1e-3)
