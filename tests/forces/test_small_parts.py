@@ -168,3 +168,25 @@ def test_a_fin_with_stops_ends_a_set_behind_it() -> None:
     least = weakest(sets)
     assert least.size == pytest.approx([0.0], abs=1e-6)
     assert np.hypot(*least.direction[0, 4:]) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_polar_directions_beyond_half_a_turn() -> None:
+    made = problem((0.5, 4.0))
+    for asked, held in ((3.95, 3.95), (4.2, 4.0), (0.55, 0.55), (0.3, 0.5)):
+        found = polar(made, np.array([[[np.cos(asked), np.sin(asked)]]]))
+        assert found.direction == pytest.approx(held) and found.thrust == pytest.approx(1.0)
+
+
+def test_the_one_axis_that_no_fin_acts_along_is_weakest() -> None:
+    fixed = pair_per_axis(np.ones(3))._replace(half=np.array([[np.pi, np.pi, 0.0]]))
+    least = weakest(fixed)
+    assert least.size == 0.0 and np.abs(least.direction[0]) == pytest.approx(np.eye(6)[5], abs=1e-12)
+
+
+def test_both_ends_of_each_axis_are_tried_where_fins_have_stops() -> None:
+    """One walk from the axes alone finds the side on which a sector has nothing."""
+    for middle in (0.0, np.pi):
+        sets = pair_per_axis(np.array([1.0, 1.0, 2.0]))._replace(
+            half=np.array([[np.pi, np.pi, 1.0]]), middle=np.array([[0.0, 0.0, middle]])
+        )
+        assert weakest(sets, n_random=0, n_walks=1).size == pytest.approx([0.0], abs=1e-6)
