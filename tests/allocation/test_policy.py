@@ -325,3 +325,27 @@ def test_each_round_narrows_the_interval(limit: float, rounds: int, width: int, 
     np.testing.assert_array_equal(asked[0], [0.25, 0.5, 0.75, 1.0])
     assert len(asked) == (1 if limit >= 1.0 else rounds)
     assert all(len(shares) == width and shares.min() > 0.0 and shares.max() <= 1.0 for shares in asked)
+
+
+@pytest.mark.parametrize(
+    ("command", "pull", "sentences"),
+    [
+        ((0.4997, 1.999, 1.0), 1.0, ["fin at full thrust"]),  # within a thousandth of each range
+        ((0.4997, 1.997, 1.0), 1.0, []),
+        ((0.4995, 1.999, 1.0), 1.0, []),
+        ((0.3, 1.0, 0.501), 0.4, ["fin at the end of its arc"]),
+        ((0.3, 1.0, 0.502), 0.4, []),
+        ((0.3, 1.0, 1.4995), 1.6, ["fin at the end of its arc"]),
+        ((0.3, 1.0, 1.4995), 1.45, []),
+        ((0.1, 0.5, 1.0), 1.6, ["fin cannot point where it is needed"]),
+        ((0.1, 0.5, 1.0), 1.45, []),
+        ((0.1, 0.5, 1.0), 0.4 - np.pi, ["fin cannot point where it is needed"]),
+        ((0.1, 0.6, 0.5), 0.4, ["fin at the end of its arc"]),
+        ((0.5, 2.0, 0.5), 0.4, ["fin at full thrust", "fin at the end of its arc"]),
+        ((np.nan, np.nan, np.nan), 0.4, []),
+    ],
+)
+def test_what_binds_by_hand(command: tuple[float, ...], pull: float, sentences: list[str]) -> None:
+    lower, upper = np.array([[0.1, 0.5, 0.5]]), np.array([[0.5, 2.0, 1.5]])
+    pulls = np.array([[np.cos(pull), np.sin(pull)]])
+    assert describe_binding(["fin"], np.array([command]), lower, upper, pulls) == sentences

@@ -229,3 +229,24 @@ def test_multistart_polishes_the_start_that_ends_lowest(plant: Plant) -> None:
         winner = min(ends, key=lambda end: end.objective[0])
         polished = multistart.descend(plant, winner.command, target[None], SIGMA, multistart.POLISH)
         np.testing.assert_allclose(row, polished.command[0], atol=1e-8)
+
+
+@pytest.mark.parametrize(("place", "length"), [(1, 0.5), (3, 0.125), (7, 1 / 128)])
+@pytest.mark.parametrize("pays", [True, False])
+def test_sqp_asks_a_ten_thousandth_of_the_step_as_gain(place: int, length: float, pays: bool) -> None:
+    """An error of 1 that falls at a single length only, by a little more or less than is asked for it."""
+    asked: list[float] = []
+    gain = (1.2e-4 if pays else 0.8e-4) * length
+
+    def wrench(command: np.ndarray) -> np.ndarray:
+        asked.append(float(command[0, 0, 0]))
+        return np.full((1, 6), [1 - gain if asked[-1] == length else 2.0, 0, 0, 0, 0, 0])
+
+    fake = SimpleNamespace(wrench=wrench, feasible=lambda command: command)
+    command, error = np.zeros((1, 1, 3)), np.ones(1)
+    plain = Sqp(Normalization(np.zeros(6), np.ones(6)))
+    step = np.ones((1, 1, 3))
+    moved = plain._search(fake, command, error, np.zeros((1, 6)), np.array([0]), step)  # type: ignore[arg-type]
+    assert moved.tolist() == [pays]
+    assert asked == [0.5**k for k in range(place + 1 if pays else 8)]
+    assert command[0, 0, 0] == (length if pays else 0.0) and error[0] == (1 - gain if pays else 1.0)
