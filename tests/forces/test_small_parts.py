@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from finlab.forces import extent
 from finlab.forces.attainable import hull_of
 from finlab.forces.extent import singular_values, strongest, weakest
 from finlab.forces.fin_sets import HALF_TURN_TOLERANCE, SCALE, FinSets, half_arcs, wide_fins
@@ -21,6 +22,7 @@ from finlab.forces.force_space import (
     polar,
     realize,
 )
+from finlab.forces.reach import Largest, max_wrench_along
 from finlab.forces.thrust_curve import plant_curves
 from finlab.layout import Fin, Layout, Limits
 from finlab.physics.energy import EnergyWeights, command_energy
@@ -183,10 +185,20 @@ def test_the_one_axis_that_no_fin_acts_along_is_weakest() -> None:
     assert least.size == 0.0 and np.abs(least.direction[0]) == pytest.approx(np.eye(6)[5], abs=1e-12)
 
 
-def test_both_ends_of_each_axis_are_tried_where_fins_have_stops() -> None:
-    """One walk from the axes alone finds the side on which a sector has nothing."""
-    for middle in (0.0, np.pi):
-        sets = pair_per_axis(np.array([1.0, 1.0, 2.0]))._replace(
-            half=np.array([[np.pi, np.pi, 1.0]]), middle=np.array([[0.0, 0.0, middle]])
-        )
-        assert weakest(sets, n_random=0, n_walks=1).size == pytest.approx([0.0], abs=1e-6)
+@pytest.mark.parametrize(("half", "walks"), [(np.pi, 12), (3.0, 24), (1.0, 24)])
+def test_both_ends_of_each_direction_are_tried_where_fins_have_stops(
+    half: float, walks: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Six axes and six singular vectors; with full circles only, opposite directions are alike."""
+    started: list[Array] = []
+
+    def spy(sets: FinSets, direction: Array, tolerance: float) -> Largest:
+        started.append(direction)
+        return max_wrench_along(sets, direction, tolerance)
+
+    monkeypatch.setattr(extent, "max_wrench_along", spy)
+    sets = pair_per_axis(np.ones(3))._replace(half=np.array([[np.pi, np.pi, half]]))
+    weakest(sets, n_random=0, n_walks=1)
+    assert len(started) == 1 and len(started[0]) == walks
+    if walks == 24:
+        assert started[0][12:] == pytest.approx(-started[0][:12])
