@@ -89,7 +89,7 @@ class TableLaw:
             value = knots[0] + np.mod(value - knots[0], TURN)
         elif axis == 2:
             middle = (knots[0] + knots[-1]) / 2
-            value = middle + np.mod(value - middle + math.pi, TURN) - math.pi
+            value = value - TURN * np.rint((value - middle) / TURN)  # whole turns: an end stays the end
         inside = (value >= knots[0]) & (value <= knots[-1])
         value = np.clip(value, knots[0], knots[-1])
         cell = np.clip(np.searchsorted(knots, value, side="right") - 1, 0, len(knots) - 2)

@@ -83,6 +83,16 @@ def test_an_arc_is_not_periodic_and_holds_at_its_ends(tmp_path):
     np.testing.assert_allclose(force[1:], np.tile(force[0], (2, 1)), atol=1e-12)
 
 
+def test_a_stop_itself_has_the_slope_of_its_side(tmp_path):
+    arc = np.array([-1.5, -1.25, -0.6])
+    write_table(tmp_path / "arc.csv", DRAG, AMPLITUDE, FREQUENCY, arc)
+    law = read_table(tmp_path / "arc.csv")
+    for stop, inwards in ((arc[0], 1e-9), (arc[-1], -1e-9)):
+        at, near = (law.force_and_slopes(np.array([0.4, 1.2, d]))[1] for d in (stop, stop + inwards))
+        np.testing.assert_allclose(at, near, atol=1e-6)
+        assert np.abs(at[2]).max() > 0.1
+
+
 def test_beyond_the_table_is_its_edge(table):
     edge = np.array([0.7, 2.4, 0.3])
     beyond = np.array([1.5, 9.0, 0.3])
