@@ -113,7 +113,7 @@ class Allocation(Answer):
     settings: Mapping[str, Any] = field(default_factory=dict)
     """Settings of the method, by name."""
     previous: Array | None = None
-    """Command (n, 3) of the previous tick, if it was told."""
+    """Command (n, 3) of the previous tick, if it was given."""
     candidates: Candidates | None = None
     """Refined candidates, best first; None for methods that have a single answer."""
     samples: Candidates | None = None

@@ -43,7 +43,7 @@ class Mode(PlainData):
     saturation: float
     """Largest share of any fin's range of amplitude or frequency that is used; 1 is a limit."""
     distance: float | None
-    """To the previous command, if one was told: root mean square over the fins of the change, amplitude and
+    """To the previous command, if one was given: root mean square over the fins of the change, amplitude and
     frequency over their ranges, turns over half a circle."""
     turn: float | None
     """Largest turn from the previous command [rad]."""

@@ -12,9 +12,9 @@ if TYPE_CHECKING:
     from finlab.allocation.allocation import Allocation
 
 FIN_COLUMNS = ("A [rad]", "f [Hz]", "zero direction [deg]", "force [N]")
-"""What is told of each fin."""
+"""Columns of the table of fins."""
 WRENCH_COLUMNS = tuple(f"{axis} [{'N' if axis.startswith('F') else 'N m'}]" for axis in AXES)
-"""What is told of each wrench."""
+"""Columns of the table of wrenches."""
 
 
 def fin_rows(result: Allocation) -> list[tuple[str, ...]]:

@@ -1,4 +1,4 @@
-"""Everything that a layout can do, for one glance, and what can be told in a millisecond while it changes."""
+"""What a layout can do, for one glance, and what of it is computed in a millisecond."""
 
 from collections.abc import Collection
 from dataclasses import asdict, dataclass
@@ -13,7 +13,7 @@ from finlab.forces.least_energy import least_energy
 from finlab.layout import Layout
 
 UNIT = (1.0, 1.0, 1.0, 0.1, 0.1, 0.1)
-"""Wrench along each axis whose energy is told [N, N m]."""
+"""Wrench along each axis whose energy is given [N, N m]."""
 
 
 @dataclass(frozen=True)

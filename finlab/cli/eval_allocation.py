@@ -12,7 +12,7 @@ RUN = Run()
 MANY, FORTY, TWENTY = Cases(), Cases(layouts=40, targets=25), Cases(layouts=20, targets=100)
 FEW, PAIRS = Cases(layouts=20, targets=2), Cases(targets=2)
 SUBSAMPLE = 10
-"""Targets of each layout that methods of a tenth of a second solve unless told otherwise."""
+"""Targets of each layout that methods of a tenth of a second solve unless another number is given."""
 
 
 def wrench(

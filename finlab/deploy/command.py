@@ -13,7 +13,7 @@ POLICIES = ("closest", "direction", "priority")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; 0 is good, 1 a self-test that failed, 2 an error told in one sentence."""
+    """Run one command; 0 is good, 1 a self-test that failed, 2 an error in one sentence."""
     arguments = _parser().parse_args(argv)
     # Before numpy is loaded: every product here is too small to be shared among cores.
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):

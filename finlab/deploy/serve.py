@@ -8,7 +8,7 @@ status     meaning
 =========  ============================================================================================
 `ok`       commands for the newest target
 `late`     the deadline passed; the last commands that were sent, or neutral ones, are repeated
-`neutral`  no target for longer than the watchdog allows; the fins are told to rest
+`neutral`  no target for longer than the watchdog allows; the fins are commanded to rest
 `error`    the request was not understood; `error` holds one sentence and there are no commands
 =========  ============================================================================================
 

@@ -164,7 +164,7 @@ def descend(problem: PlanarProblem, target: Array, thrust: Array, steps: int) ->
 
 
 def polar(problem: PlanarProblem, force: Array) -> Planar:
-    """Planar forces (R, n, 2) [N] as thrusts and zero directions within the arcs; no residual is told."""
+    """Planar forces (R, n, 2) [N] as thrusts and zero directions within the arcs; without a residual."""
     angle = np.arctan2(force[..., 1], force[..., 0]) - problem.middle
     offset = np.clip(angle - 2 * np.pi * np.rint(angle / (2 * np.pi)), -problem.half, problem.half)
     thrust = np.clip(np.linalg.norm(force, axis=-1), problem.curves.minimum, problem.curves.maximum)

@@ -30,7 +30,7 @@ class FastWeights(NamedTuple):
     state: Mapping[str, NDArray[np.float32]]
     """Its state by PyTorch's names."""
     rounds: int
-    """Rounds of hearing from all fins."""
+    """Rounds in which every fin receives the mean of all."""
 
 
 def fast_files(weights: FastWeights, about: Mapping[str, Any]) -> dict[str, bytes]:
@@ -123,8 +123,8 @@ class NumpyFastNetwork:
         for own, bias, everyone in self._rounds:
             mean = (each @ hidden.reshape(rows, n, -1)) @ everyone
             mean += bias
-            heard = (hidden @ own).reshape(rows, n, -1)
-            heard += mean
-            np.maximum(heard, 0, out=heard)
-            hidden = hidden + heard.reshape(rows * n, -1)
+            message = (hidden @ own).reshape(rows, n, -1)
+            message += mean
+            np.maximum(message, 0, out=message)
+            hidden = hidden + message.reshape(rows * n, -1)
         return sigmoid((hidden @ self._last[0] + self._last[1]).reshape(rows, n))

@@ -29,7 +29,9 @@ class LearnedFin:
             for i in layers
         ]
         self._columns = [(weight, bias[:, None]) for weight, bias in self._layers]
-        self._rough = [(weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in self._columns]
+        self._float32 = [
+            (weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in self._columns
+        ]
         self._rows = [(weight.T.copy(), bias) for weight, bias in self._layers]
         weight = self._rows[0][0]
         # Cosine and sine change with the zero direction as minus the sine and the cosine.
@@ -37,11 +39,11 @@ class LearnedFin:
         self._a0, self._f0 = REFERENCE
         self._unit = FORCE_UNIT
         self._scale = np.array([REFERENCE]).T
-        self._rough_scale = self._scale.astype(np.float32)
+        self._scale_float32 = self._scale.astype(np.float32)
 
     def force(self, command: NDArray[np.floating]) -> NDArray[np.floating]:
         """Forces (..., 3) [N] of commands (..., 3), in single precision where the commands are."""
-        layers = self._rough if command.dtype == np.float32 else self._columns
+        layers = self._float32 if command.dtype == np.float32 else self._columns
         beat, hidden = self._inputs(command.reshape(-1, 3))
         c, s = hidden[2], hidden[3]
         for weight, bias in layers[:-1]:
@@ -102,7 +104,7 @@ class LearnedFin:
     def _inputs(self, flat: Array) -> tuple[Array, Array]:
         """Normalized amplitude and frequency (2, R) of commands (R, 3); what the perceptron sees (4, R)."""
         values = flat.T
-        beat = values[:2] / (self._rough_scale if flat.dtype == np.float32 else self._scale)
+        beat = values[:2] / (self._scale_float32 if flat.dtype == np.float32 else self._scale)
         inputs = np.empty((4, len(flat)), dtype=flat.dtype)
         np.subtract(beat, 0.5, out=inputs[:2])
         np.cos(values[2], out=inputs[2])

@@ -156,9 +156,9 @@ class _Transformer:
         qkv = _apply(self.qkv, _norm(x)).reshape(rows, -1, 3, self.heads, self.depth)
         q, k, v = qkv.transpose(2, 0, 3, 1, 4)
         score = q @ k.swapaxes(-1, -2)
-        heard = np.empty((rows, qkv.shape[1], self.heads, self.depth), dtype=np.float32)
-        np.matmul(softmax(score), v, out=heard.transpose(0, 2, 1, 3))
-        x += _apply(self.out, heard.reshape(x.shape))
+        attended = np.empty((rows, qkv.shape[1], self.heads, self.depth), dtype=np.float32)
+        np.matmul(softmax(score), v, out=attended.transpose(0, 2, 1, 3))
+        x += _apply(self.out, attended.reshape(x.shape))
         up = _apply(self.up, _norm(x))
         x += _apply(self.down, np.maximum(up, 0, out=up))
         return x

@@ -74,12 +74,12 @@ class EnergyMeter:
         """Make it for upper limits (n, 3)."""
         self.upper, self.weights = upper, weights
         squares = np.tile([weights.amplitude, weights.frequency, weights.zero_direction], len(upper))
-        self._exact = energy_scale(upper), squares
-        self._rough = energy_scale(upper).astype(np.float32), squares.astype(np.float32)
+        self._float64 = energy_scale(upper), squares
+        self._float32 = energy_scale(upper).astype(np.float32), squares.astype(np.float32)
 
     def __call__(self, command: NDArray[np.floating]) -> NDArray[Any]:
         """Energies (R,) of commands (R, n, 3)."""
-        scale, squares = self._rough if command.dtype == np.float32 else self._exact
+        scale, squares = self._float32 if command.dtype == np.float32 else self._float64
         scaled = command / scale
         a, f = scaled[..., 0], scaled[..., 1]
         beats: NDArray[Any] = np.einsum("rn,rn->r", a, f)
@@ -92,7 +92,7 @@ class EnergyMeter:
 
     def slopes(self, command: NDArray[np.floating]) -> NDArray[Any]:
         """Derivatives (R, n, 3) of the energies by commands (R, n, 3)."""
-        scale, squares = self._rough if command.dtype == np.float32 else self._exact
+        scale, squares = self._float32 if command.dtype == np.float32 else self._float64
         scaled = command / scale
         a, f, w = scaled[..., 0], scaled[..., 1], self.weights
         slopes: NDArray[Any] = 2 * squares.reshape(scale.shape) * scaled

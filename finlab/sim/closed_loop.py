@@ -57,7 +57,7 @@ class ClosedLoop:
             controller: by default the waypoint controller for trajectories, the velocity controller for
                 cruises.
             plant: `mean`, `ripple` or `flexible`; see `PLANTS`.
-            steady: whether the allocator is told its previous command, so that fins turn little per tick.
+            steady: whether the allocator is given its previous command, so that fins turn little per tick.
             sensors: rates and noise; the defaults of `SensorSettings`.
             servo: what drives the fins.
             current: velocity of the water (3,) in the world [m/s].

@@ -115,7 +115,7 @@ def run_all(
         allocators: methods by name.
         seeds: of the sensors' noise.
         plant: how fin forces are simulated.
-        steady: whether the allocators are told their previous command.
+        steady: whether the allocators are given their previous command.
     """
     every = list(product(scenarios, allocators.items(), seeds))
     done = []

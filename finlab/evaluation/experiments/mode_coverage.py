@@ -77,9 +77,9 @@ def mode_rows(
     for case in tqdm(cases, unit="layout", disable=None, leave=False, file=sys.stderr):
         layout = case.layout.without(case.failed) if case.failed else case.layout
         for target in case.targets:
-            told = _compare(allocator, truth, layout, target, n_starts, seed)
-            if told is not None:
-                found.setdefault(layout.n_fins, []).append(told)
+            compared = _compare(allocator, truth, layout, target, n_starts, seed)
+            if compared is not None:
+                found.setdefault(layout.n_fins, []).append(compared)
     return [
         {"fins": fins, "n": len(parts)} | {key: float(np.mean([p[key] for p in parts])) for key in parts[0]}
         for fins, parts in sorted(found.items())

@@ -2,7 +2,7 @@
 
 A path is a sum of slow sines in every axis, brought into what the layout can push at all and scaled so that
 an even spread over the fins never asks for more than half of any fin's thrust. Each tick is one call of
-`allocate`; with `previous` it is told the last command. Every answer is scored by the plant.
+`allocate`; with `previous` it is given the last command. Every answer is scored by the plant.
 """
 
 import sys
@@ -75,7 +75,7 @@ def smooth_path(layout: Layout, sigma: Array, seed: int, ticks: int = TICKS) -> 
 
 
 def rollout(allocator: Allocator, layout: Layout, path: Array, *, steady: bool, seed: int = 0) -> Rollout:
-    """Follow a path (T, 6), one call per tick; with `steady`, each is told the last command."""
+    """Follow a path (T, 6), one call per tick; with `steady`, each is given the last command."""
     commands, times = [], []
     previous = None
     for wrench in path:
@@ -109,7 +109,7 @@ def forced_turn(layout: Layout, path: Array) -> float | None:
 def steadiness_rows(
     allocator: Allocator, layouts: Sequence[Layout], *, n_paths: int = 3, ticks: int = TICKS, seed: int = 0
 ) -> list[Row]:
-    """One row per layout: the worst of its paths where turns are told, their mean where energy is.
+    """One row per layout: the worst of its paths for turns, their mean for energy.
 
     Args:
         allocator: a method that knows `previous`.
@@ -133,7 +133,7 @@ def steadiness_rows(
 def steadiness_report(rows: Sequence[Row]) -> str:
     """The rows as a table, with what its columns mean."""
     note = (
-        f"{TICKS / RATE:g} s at {RATE:g} Hz unless told otherwise; scored by the plant. turn_free and "
+        f"{TICKS / RATE:g} s at {RATE:g} Hz unless stated otherwise; scored by the plant. turn_free and "
         "turn_steady: the largest turn of any fin in one tick [rad] without and with `previous`; "
         f"turn_ratio: the worst path's; steady: paths whose ratio is at most {GOAL}; forced: the largest "
         "turn that any answer must make, where forces are unique."

@@ -39,11 +39,11 @@ class FastNetwork(nn.Module):
         self.last = nn.Linear(width, 1)
 
     def forward(self, x: Tensor, mask: Tensor) -> Tensor:
-        """Shares (B, n) in 0..1 of features (B, n, F); padded fins (mask False) are not heard."""
-        heard = mask / mask.sum(-1, keepdim=True)
+        """Shares (B, n) in 0..1 of features (B, n, F); padded fins (mask False) do not count."""
+        share = mask / mask.sum(-1, keepdim=True)
         hidden = torch.relu(self.first(x))
         for own, everyone in zip(self.own, self.all, strict=True):
-            mean = torch.einsum("bn,bnw->bw", heard, hidden)
+            mean = torch.einsum("bn,bnw->bw", share, hidden)
             hidden = hidden + torch.relu(own(hidden) + everyone(mean)[:, None])
         return torch.sigmoid(self.last(hidden)[..., 0])
 
