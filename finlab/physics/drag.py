@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from finlab.array_library import library_of
+from finlab.physics.blade import Blade
 from finlab.physics.fin_law import Array, PlanarLaw, Values
 
 
@@ -17,6 +18,8 @@ class Drag(PlanarLaw):
         # 1 - cos 2A = 2 sin^2 A is written as the latter below: it keeps its digits at small amplitudes.
         self.coefficient = 4.0 * density * drag_coefficient * area * lever**2 * (2.0 * math.pi) ** 2
         """Thrust over f^2 sin^2(A) [N s^2]; 4.737 for the defaults."""
+        # A rectangle of that area whose centre lies at the lever, one edge on the shaft.
+        self.blade = Blade(2.0 * lever, area / (2.0 * lever), density)
 
     def thrust(self, amplitude: Values, frequency: Values, zero_direction: Values = 0.0) -> Values:
         """See `PlanarLaw`; the zero direction does not matter."""

@@ -1,4 +1,4 @@
-"""What a fin's law is: command to cycle-mean force in the fin's own frame, with derivatives.
+"""What a fin's law is: command to cycle-mean force in the fin's own frame, and to power, with derivatives.
 
 Fin frame: x' = shaft, y' = e_h, z' = e_z (see `finlab.layout.fin`). A law's parameters are numbers, or arrays
 (n,) where it speaks for n fins at once. Each law is written once, for numpy's arrays, torch's tensors (which
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.array_library import library_of
+from finlab.physics.blade import Blade
 
 Array = NDArray[np.float64]
 Values = Any
@@ -19,7 +20,12 @@ Values = Any
 
 
 class FinLaw(Protocol):
-    """Command to force of one fin, or of n fins that share a model."""
+    """Command to force and power of one fin, or of n fins that share a model."""
+
+    @property
+    def uniform(self) -> bool:
+        """Whether the size of the force is the same whatever the zero direction."""
+        ...
 
     def force(self, command: Values) -> Values:
         """Returns the mean force (..., n, 3) [N] in the fin frame of commands (..., n, 3) [rad, Hz, rad]."""
@@ -29,6 +35,15 @@ class FinLaw(Protocol):
         """Returns the force and its derivative by each command in turn (..., n, 3 commands, 3 axes)."""
         ...
 
+    def power(self, command: Values, copper_loss: float = 0.0) -> Values:
+        """Returns the mean power (..., n) [W] of commands (..., n, 3): mechanical, and `copper_loss`
+        [W/(N m)^2] times the mean squared torque on the shaft."""
+        ...
+
+    def power_slopes(self, command: Array, copper_loss: float = 0.0) -> Array:
+        """Returns the power's derivatives (..., n, 3) by each command."""
+        ...
+
 
 class PlanarLaw(ABC):
     """A fin whose mean force lies in the plane that its tip sweeps: a size and a direction, none along the
@@ -36,6 +51,10 @@ class PlanarLaw(ABC):
 
     offset: Any = 0.0
     """Angle [rad] from the zero direction to the thrust."""
+    blade: Blade = Blade()
+    """The plate whose beating takes power."""
+    uniform: bool = True
+    """See `FinLaw`."""
 
     @abstractmethod
     def thrust(self, amplitude: Values, frequency: Values, zero_direction: Values) -> Values:
@@ -77,3 +96,14 @@ class PlanarLaw(ABC):
         slopes[..., 2, 1] -= force[..., 2]
         slopes[..., 2, 2] += force[..., 1]
         return force, slopes
+
+    def power(self, command: Values, copper_loss: float = 0.0) -> Values:
+        """See `FinLaw`."""
+        return self.blade.driving_power(command[..., 0], command[..., 1], copper_loss)
+
+    def power_slopes(self, command: Array, copper_loss: float = 0.0) -> Array:
+        """See `FinLaw`."""
+        slopes = np.zeros(command.shape)
+        by = self.blade.driving_slopes(command[..., 0], command[..., 1], copper_loss)
+        slopes[..., 0], slopes[..., 1] = by
+        return slopes

@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+from finlab.physics.blade import Blade
 from finlab.physics.fin_law import Array, PlanarLaw, Values
 
 # J_n(x) = (x/2)^n sum_k (-1)^k (x/2)^(2k) / (k! (k+n)!). An amplitude is at most pi/2, where the terms fall
@@ -39,6 +40,7 @@ class Lighthill(PlanarLaw):
         virtual_mass = math.pi / 4.0 * density * width**2
         self.coefficient = 0.5 * virtual_mass * length**2 * (2.0 * math.pi) ** 2
         """Thrust over f^2 A J1(A) [N s^2]; 6.20 for the defaults."""
+        self.blade = Blade(length, width, density)
 
     def thrust(self, amplitude: Values, frequency: Values, zero_direction: Values = 0.0) -> Values:
         """See `PlanarLaw`; the zero direction does not matter."""

@@ -55,16 +55,29 @@ class Plant:
     def forces(self, command: ArrayLike) -> Array:
         """Returns each fin's mean force (..., n, 3) [N] in its own frame (shaft, e_h, e_z); see `wrench`."""
         values, failed = self._checked(command)
-        force: Array
-        if len(self._laws) == 1:
-            force = self._laws[0][1].force(values)
-        else:
-            force = np.empty_like(values)
-            for places, law in self._laws:
-                force[..., places, :] = law.force(values[..., places, :])
+        force = self.force(values)
         if failed is not None:
             force[failed] = 0.0
         return force
+
+    def force(self, command: Array) -> Array:
+        """Returns forces (..., n, 3) [N] in fin frames of commands (..., n, 3) that are known to be finite."""
+        if len(self._laws) == 1:
+            alone: Array = self._laws[0][1].force(command)
+            return alone
+        force = np.empty_like(command)
+        for places, law in self._laws:
+            force[..., places, :] = law.force(command[..., places, :])
+        return force
+
+    def force_and_slopes(self, command: Array) -> tuple[Array, Array]:
+        """Returns `force` and its derivatives (..., n, 3 commands, 3 axes)."""
+        if len(self._laws) == 1:
+            return self._laws[0][1].force_and_slopes(command)
+        force, slopes = np.empty(command.shape), np.empty((*command.shape, 3))
+        for places, law in self._laws:
+            force[..., places, :], slopes[..., places, :, :] = law.force_and_slopes(command[..., places, :])
+        return force, slopes
 
     def fin_forces(self, command: ArrayLike) -> Array:
         """Returns each fin's mean force (..., n, 3) [N] in the body frame; see `wrench`."""
@@ -74,17 +87,27 @@ class Plant:
     def linearize(self, command: Array) -> tuple[Array, Array]:
         """Returns wrenches (..., 6) of commands (..., n, 3) without failed fins, and their derivatives
         (..., 6, 3 n), fin by fin."""
-        if len(self._laws) == 1:
-            force, slopes = self._laws[0][1].force_and_slopes(command)
-        else:
-            force, slopes = np.empty(command.shape), np.empty((*command.shape, 3))
-            for places, law in self._laws:
-                force[..., places, :], slopes[..., places, :, :] = law.force_and_slopes(
-                    command[..., places, :]
-                )
+        force, slopes = self.force_and_slopes(command)
         jacobian = (slopes @ self.columns).reshape(*command.shape[:-2], 3 * self.n_fins, 6)
         wrench: Array = wrench_of_forces(force, self.columns)
         return wrench, jacobian.swapaxes(-1, -2)
+
+    def power(self, command: Array, copper_loss: float = 0.0) -> Array:
+        """Returns each fin's mean power (..., n) [W] of commands (..., n, 3), NaN for a failed fin's; with a
+        motor's loss [W/(N m)^2], see `FinLaw.power`."""
+        if len(self._laws) == 1:
+            return np.asarray(self._laws[0][1].power(command, copper_loss))
+        power = np.empty(command.shape[:-1])
+        for places, law in self._laws:
+            power[..., places] = law.power(command[..., places, :], copper_loss)
+        return power
+
+    def power_slopes(self, command: Array, copper_loss: float = 0.0) -> Array:
+        """Returns the power's derivatives (..., n, 3) by each command."""
+        slopes = np.empty(command.shape)
+        for places, law in self._laws:
+            slopes[..., places, :] = law.power_slopes(command[..., places, :], copper_loss)
+        return slopes
 
     @property
     def planar(self) -> Array:

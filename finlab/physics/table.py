@@ -1,8 +1,9 @@
 """A fin model that is a table of forces, measured in a tank or computed by CFD.
 
-The CSV file has the columns A [rad], f [Hz], phi [rad], Fx, Fy, Fz [N] under a header line; A is the half
-amplitude, phi the zero direction, forces are cycle means in the fin frame (x' shaft, y' horizontal thrust
-axis, z' up). Rows come in any order but must fill a grid: every amplitude with every frequency with every
+The CSV file has the columns A [rad], f [Hz], phi [rad], Fx, Fy, Fz [N] under a header line, and P [W] where
+the power is known; A is the half amplitude, phi the zero direction, forces and power are cycle means, forces
+in the fin frame (x' shaft, y' horizontal thrust axis, z' up). A fin without P takes the power of a plate like
+U-CAT's fin. Rows come in any order but must fill a grid: every amplitude with every frequency with every
 zero direction. Spacing is free. Between the points a cubic Hermite polynomial is used along each axis, so
 forces and their derivatives are continuous. When the zero directions cover the circle the table is periodic.
 Amplitudes and frequencies beyond the table count as its edge.
@@ -20,10 +21,13 @@ from numpy.typing import NDArray
 from finlab.array_library import library_of
 from finlab.errors import DataError
 from finlab.layout.angles import TURN
+from finlab.physics.blade import Blade
 from finlab.physics.fin_law import Array, FinLaw, Values
 
 COLUMNS = ("A", "f", "phi", "Fx", "Fy", "Fz")
 """Columns of a force table, by name; their order in the file is free."""
+POWER_COLUMN = "P"
+"""Column of the mean power [W], which may be left out."""
 MAX_BYTES = 50_000_000
 """Largest table that is read [bytes]."""
 NEIGHBOURS = (-1, 0, 1, 2)
@@ -31,17 +35,28 @@ NEIGHBOURS = (-1, 0, 1, 2)
 
 
 class TableLaw:
-    """Interpolates forces on a grid of amplitude, frequency and zero direction; see `FinLaw`."""
+    """Interpolates forces and power on a grid of amplitude, frequency and zero direction; see `FinLaw`."""
 
-    def __init__(self, axes: list[Array], forces: Array, periodic: bool) -> None:
-        """Takes the grid's axes [rad, Hz, rad], rising, two points or more each, and forces (a, f, d, 3) [N].
+    uniform = False
+    """See `FinLaw`."""
+    blade = Blade()
+    """Whose power is taken where the table has none."""
+
+    def __init__(self, axes: list[Array], values: Array, periodic: bool) -> None:
+        """Takes the grid's axes [rad, Hz, rad], rising, two points or more each, and what was measured
+        (a, f, d, 3 or 4): forces [N], and power [W] where it is known.
 
         A periodic grid's zero directions cover the circle, without the first one again at the end.
         """
         self.periodic = periodic
         self._axes = axes
-        self._forces = np.ascontiguousarray(forces).reshape(-1, 3)
-        self._strides = (forces.shape[1] * forces.shape[2], forces.shape[2], 1)
+        self._values = np.ascontiguousarray(values).reshape(-1, values.shape[-1])
+        self._strides = (values.shape[1] * values.shape[2], values.shape[2], 1)
+
+    @property
+    def has_power(self) -> bool:
+        """Whether the table says what power the fin takes."""
+        return self._values.shape[1] > 3
 
     def force(self, command: Values) -> Values:
         """See `FinLaw`. Tensors are answered, too, but nothing is differentiated through the table."""
@@ -49,26 +64,50 @@ class TableLaw:
         if xp is not np:
             values = self.force(command.detach().cpu().numpy())
             return xp.from_numpy(np.ascontiguousarray(values)).to(command)
-        (by_a, by_f, by_d), grid = self._gathered(np.asarray(command, np.float64))
-        turned = np.einsum("...k,...ijkc->...ijc", by_d[0], grid)
-        force = np.einsum("...i,...ic->...c", by_a[0], np.einsum("...j,...ijc->...ic", by_f[0], turned))
-        return force.astype(command.dtype, copy=False)
+        return self._interpolated(command)[..., :3].astype(command.dtype, copy=False)
 
     def force_and_slopes(self, command: Array) -> tuple[Array, Array]:
         """See `FinLaw`; exact derivatives of the interpolation."""
+        force, slopes = self._with_slopes(command)
+        return force[..., :3], slopes[..., :3]
+
+    def power(self, command: Values, copper_loss: float = 0.0) -> Values:
+        """See `FinLaw`. Measured power is told as it is, whatever the loss."""
+        if not self.has_power:
+            return self.blade.driving_power(command[..., 0], command[..., 1], copper_loss)
+        return self._interpolated(command)[..., 3]
+
+    def power_slopes(self, command: Array, copper_loss: float = 0.0) -> Array:
+        """See `FinLaw`."""
+        if self.has_power:
+            return self._with_slopes(command)[1][..., 3]
+        slopes = np.zeros(command.shape)
+        by = self.blade.driving_slopes(command[..., 0], command[..., 1], copper_loss)
+        slopes[..., 0], slopes[..., 1] = by
+        return slopes
+
+    def _interpolated(self, command: Array) -> Array:
+        """All columns (..., 3 or 4)."""
+        (by_a, by_f, by_d), grid = self._gathered(np.asarray(command, np.float64))
+        turned = np.einsum("...k,...ijkc->...ijc", by_d[0], grid)
+        values: Array = np.einsum("...i,...ic->...c", by_a[0], np.einsum("...j,...ijc->...ic", by_f[0], turned))
+        return values
+
+    def _with_slopes(self, command: Array) -> tuple[Array, Array]:
+        """All columns (..., 3 or 4) and their derivatives (..., 3 commands, 3 or 4)."""
         (by_a, by_f, by_d), grid = self._gathered(command)
         # Value and slope along the last axis, then each along the one before: (2, ..., 4, 4, 3) and so on.
         turned = np.einsum("s...k,...ijkc->s...ijc", by_d, grid)
         value_f = np.einsum("s...j,...ijc->s...ic", by_f, turned[0])
         slope_d = np.einsum("...j,...ijc->...ic", by_f[0], turned[1])
-        force, slope_a = np.einsum("s...i,...ic->s...c", by_a, value_f[0])
+        value, slope_a = np.einsum("s...i,...ic->s...c", by_a, value_f[0])
         slope_f = np.einsum("...i,...ic->...c", by_a[0], value_f[1])
         slope_d = np.einsum("...i,...ic->...c", by_a[0], slope_d)
-        return force, np.stack([slope_a, slope_f, slope_d], axis=-2)
+        return value, np.stack([slope_a, slope_f, slope_d], axis=-2)
 
     def _gathered(self, command: Array) -> tuple[list[Array], Array]:
         """Per axis the weights of four neighbours and their slopes (2, ..., 4), and the forces of all 64
-        neighbours (..., 4, 4, 4, 3)."""
+        neighbours (..., 4, 4, 4, 3 or 4)."""
         stencils = [self._stencil(axis, command[..., axis]) for axis in range(3)]
         (a, f, d), strides = (place for place, _ in stencils), self._strides
         flat = (
@@ -76,7 +115,7 @@ class TableLaw:
             + f[..., None, :, None] * strides[1]
             + d[..., None, None, :] * strides[2]
         )
-        return [weight for _, weight in stencils], self._forces[flat]
+        return [weight for _, weight in stencils], self._values[flat]
 
     def _stencil(self, axis: int, value: Array) -> tuple[NDArray[np.intp], Array]:
         """The four grid points (..., 4) around each value on one axis; their cubic Hermite weights and those
@@ -149,7 +188,7 @@ def write_table(
 
 
 def _read_rows(path: Path) -> NDArray[np.float64]:
-    """Returns the table (rows, 6) in the order of `COLUMNS`."""
+    """Returns the table (rows, 6 or 7) in the order of `COLUMNS`, with the power behind."""
     try:
         if not path.is_file():
             raise DataError(f"{path}: no such file, expected a CSV table of fin forces")
@@ -166,7 +205,8 @@ def _read_rows(path: Path) -> NDArray[np.float64]:
         )
     if len(set(header)) < len(header):
         raise DataError(f"{path}: a column name appears twice in the header")
-    order = [header.index(name) for name in COLUMNS]
+    columns = [*COLUMNS, POWER_COLUMN] if POWER_COLUMN in header else COLUMNS
+    order = [header.index(name) for name in columns]
     rows = []
     for line, cells in enumerate(lines[1:], start=2):
         if not any(cell.strip() for cell in cells):
@@ -188,7 +228,7 @@ def _read_rows(path: Path) -> NDArray[np.float64]:
 
 
 def _grid(rows: NDArray[np.float64], source: str) -> tuple[list[NDArray[np.float64]], NDArray[np.float64]]:
-    """Returns the three axes and the forces (n_A, n_f, n_phi, 3) of rows that fill a grid."""
+    """Returns the three axes and the values (n_A, n_f, n_phi, 3 or 4) of rows that fill a grid."""
     found = [np.unique(rows[:, i], return_inverse=True) for i in range(3)]
     axes = [values for values, _ in found]
     shape = tuple(len(axis) for axis in axes)
@@ -201,9 +241,9 @@ def _grid(rows: NDArray[np.float64], source: str) -> tuple[list[NDArray[np.float
             f"frequencies and {shape[2]} zero directions, expected {math.prod(shape)}; "
             "write equal values with equal digits"
         )
-    forces = np.empty((math.prod(shape), 3))
-    forces[place] = rows[:, 3:]
-    return axes, forces.reshape(*shape, 3)
+    values = np.empty((math.prod(shape), rows.shape[1] - 3))
+    values[place] = rows[:, 3:]
+    return axes, values.reshape(*shape, -1)
 
 
 def _close_circle(

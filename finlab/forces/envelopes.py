@@ -1,0 +1,209 @@
+"""The compiled fins of one robot, side by side: what they can do, looked up for many forces at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.forces.fin_envelope import LEVELS, SHAFT, FinEnvelope, fin_envelope
+from finlab.layout import Layout
+from finlab.layout.angles import TURN
+from finlab.physics.objective import Objective
+
+Array = NDArray[Any]
+
+LEAST = 1e-12
+"""What sizes are kept above before something is divided by them."""
+LONGEST_TURN = 0.3
+"""Largest turn [rad] from a direction to that of the nearest force on the rim."""
+
+
+class Rim(NamedTuple):
+    """What R rows of n fins can do in given directions."""
+
+    largest: Array
+    """Largest force (R, n) [N]."""
+    smallest: Array
+    """Force at rest (R, n) [N]."""
+    bend: Array | float
+    """Derivative of the largest force by the direction (R, n) [N/rad]."""
+    first: Array
+    """Row of the table (R, n) just before the direction."""
+    part: Array | None
+    """How far towards the next row (R, n); None where there is but one."""
+
+
+class Projected(NamedTuple):
+    """What R rows of n fins can do near given forces."""
+
+    unit: Array
+    """Unit vector along the force (R, 2, n)."""
+    direction: Array
+    """The same as an angle (R, n) [rad]."""
+    size: Array
+    """Size of the force (R, n) [N]."""
+    rim: Rim
+    """In these directions."""
+    stopped: NDArray[np.bool_] | None
+    """Where a stop keeps the fin from pointing along the given force (R, n); None where no fin has stops."""
+
+
+@dataclass(frozen=True, eq=False)
+class Envelopes:
+    """n compiled fins; each may be kept within a part of its arc."""
+
+    largest: Array
+    """Largest force (n, K) [N] by direction; K is 1 where all fins are the same all round."""
+    smallest: Array
+    """Force at rest (n, K) [N] by direction."""
+    table: Array
+    """What `finlab.forces.fin_envelope` has compiled, (n * K * LEVELS, 8)."""
+    domain: Array
+    """Middle and half (2, n) [rad] of the arcs over which the K directions are spread."""
+    middle: Array
+    """Middle of the arc (n,) of force directions that are allowed [rad]."""
+    half: Array
+    """Half of that arc (n,) [rad]; pi for a full circle."""
+
+    @classmethod
+    def of(cls, fins: list[FinEnvelope]) -> Envelopes:
+        """Stack compiled fins."""
+        count = max(len(fin.largest) for fin in fins)
+
+        def spread(values: Array) -> Array:
+            return values if len(values) == count else np.repeat(values, count, axis=0)
+
+        table = np.stack([spread(fin.table) for fin in fins])
+        middle, half = np.array([fin.middle for fin in fins]), np.array([fin.half for fin in fins])
+        return cls(
+            np.stack([spread(fin.largest) for fin in fins]),
+            np.stack([spread(fin.smallest) for fin in fins]),
+            np.ascontiguousarray(table.reshape(-1, table.shape[-1])),
+            np.stack([middle, half]),
+            middle,
+            half,
+        )
+
+    @cached_property
+    def maximum(self) -> Array:
+        """Largest force of each fin in any direction (n,) [N]."""
+        return np.asarray(self.largest.max(axis=1))
+
+    @cached_property
+    def minimum(self) -> Array:
+        """Largest force of each fin at rest (n,) [N]."""
+        return np.asarray(self.smallest.max(axis=1))
+
+    @cached_property
+    def turns_fully(self) -> bool:
+        """Whether every fin may point anywhere."""
+        return bool((self.half >= np.pi).all())
+
+    @cached_property
+    def pushes_sideways(self) -> bool:
+        """Whether any fin has a force along its shaft."""
+        return bool(np.abs(self.table[:, SHAFT]).max() > 1e-9 * self.maximum.max())
+
+    @cached_property
+    def _grid(self) -> tuple[Array, Array, Array, Array, Array]:
+        """First direction and gap between directions (n,) [rad], first row of each fin (n,), and largest and
+        smallest forces of all rows."""
+        count = self.largest.shape[1]
+        gap = np.maximum(2.0 * self.domain[1] / max(count - 1, 1), LEAST)
+        first = np.arange(len(gap)) * count
+        return self.domain[0] - self.domain[1], gap, first, self.largest.ravel(), self.smallest.ravel()
+
+    def within(self, middle: Array, half: Array) -> Envelopes:
+        """The same fins kept within arcs (n,) of force directions [rad]."""
+        return replace(self, middle=middle, half=half)
+
+    def without_rest(self) -> Envelopes:
+        """The same fins, had they no smallest force."""
+        return replace(self, smallest=np.zeros_like(self.smallest))
+
+    def rim(self, direction: Array) -> Rim:
+        """What the fins can do in directions (R, n) [rad]."""
+        start, gap, first, largest, smallest = self._grid
+        count = self.largest.shape[1]
+        if count == 1:
+            return Rim(*np.broadcast_arrays(largest, smallest, direction)[:2], 0.0, first, None)
+        # Directions just before the first one belong to it, not to the last: counted from half a gap before.
+        place = np.mod(direction - start + 0.5 * gap, TURN)
+        place = np.minimum(np.maximum((place - 0.5 * gap) / gap, 0.0), count - 1)
+        row = np.minimum(place.astype(np.intp), count - 2)
+        part = place - row
+        row += first
+        low, high = largest.take(row), largest.take(row + 1)
+        rest, rest_after = smallest.take(row), smallest.take(row + 1)
+        rise = high - low
+        return Rim(low + part * rise, rest + part * (rest_after - rest), rise / gap, row, part)
+
+    def lookup(self, rim: Rim, size: Array) -> Array:
+        """Rows (R, n, 8) of the tables for forces of sizes (R, n) [N] in the directions of a rim."""
+        share = (size - rim.smallest) / np.maximum(rim.largest - rim.smallest, LEAST)
+        np.minimum(np.maximum(share, 0.0, out=share), 1.0, out=share)
+        np.sqrt(np.sqrt(share, out=share), out=share)
+        place = np.arcsin(share, out=share)
+        place *= 2.0 / np.pi * (LEVELS - 1)
+        level = place.astype(np.intp)
+        np.minimum(level, LEVELS - 2, out=level)
+        part = (place - level)[..., None]
+        level += rim.first * LEVELS
+        found = self._between(level, part)
+        if rim.part is not None:
+            found += (self._between(level + LEVELS, part) - found) * rim.part[..., None]
+        return found
+
+    def _between(self, row: Array, part: Array) -> Array:
+        found: Array = self.table.take(row, axis=0)
+        found += (self.table.take(row + 1, axis=0) - found) * part
+        return found
+
+    def project(self, force: Array, size: Array) -> Projected:
+        """What the fins can do near forces (R, 2, n) of sizes (R, n) [N], none of them zero."""
+        unit = force / size[:, None]
+        if self.turns_fully and self.largest.shape[1] == 1:
+            rim = self.rim(size)
+            held = np.minimum(np.maximum(size, rim.smallest), rim.largest)
+            return Projected(unit, size, held, rim, None)
+        direction = np.arctan2(force[:, 1], force[:, 0])
+        wanted, stopped = size, None
+        if not self.turns_fully:
+            offset = np.mod(direction - self.middle + np.pi, TURN) - np.pi
+            held = np.minimum(np.maximum(offset, -self.half), self.half)
+            excess = np.abs(offset - held)
+            stopped = excess > 0.0
+            wanted = np.where(excess < 0.5 * np.pi, size * np.cos(excess), 0.0)
+            direction = self.middle + held
+        rim = self.rim(direction)
+        over = wanted > rim.largest
+        if rim.part is not None and over.any():
+            # The nearest force on the rim lies where the rim is farther out.
+            over = over if stopped is None else over & ~stopped
+            turn = (wanted - rim.largest) * rim.bend / (rim.largest * wanted + rim.bend**2 + LEAST)
+            turn = np.where(over, np.clip(turn, -LONGEST_TURN, LONGEST_TURN), 0.0)
+            direction = self._stopped(direction + turn)
+            rim = self.rim(direction)
+            wanted = np.where(over, rim.largest, wanted)
+        unit = np.stack([np.cos(direction), np.sin(direction)], axis=1)
+        return Projected(unit, direction, np.minimum(np.maximum(wanted, rim.smallest), rim.largest), rim, stopped)
+
+    def _stopped(self, direction: Array) -> Array:
+        """Directions (R, n) [rad] brought within the arcs."""
+        if self.turns_fully:
+            return direction
+        offset = np.mod(direction - self.middle + np.pi, TURN) - np.pi
+        return np.asarray(self.middle + np.clip(offset, -self.half, self.half))
+
+
+def layout_envelopes(layout: Layout, objective: Objective) -> Envelopes:
+    """Returns the compiled fins of a layout, by their own laws.
+
+    Raises:
+        DataError: a fin's force table cannot be read.
+    """
+    return Envelopes.of([fin_envelope(fin.model, fin.limits, objective) for fin in layout.fins])

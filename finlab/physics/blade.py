@@ -1,0 +1,95 @@
+"""The power that beating a fin takes: a rigid plate in still water, its inertia and its drag.
+
+The blade turns as theta = A sin(2 pi f t) about its zero direction against the torque
+J theta'' + K theta' |theta'|. Driving costs power; braking wins none back. The mean over a cycle of
+max(torque theta', 0) has the closed form used here: driving ends where sin = s0 with (K A / J) cos^2 = sin.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+from finlab.array_library import library_of
+
+Values = Any
+"""A numpy array, a tensor or a symbol."""
+
+OWN_INERTIA = 0.0097
+"""Moment of inertia about the shaft of U-CAT's fin, 0.20 m long and 0.10 m wide [kg m^2]."""
+
+
+class Blade(NamedTuple):
+    """A rectangular plate that beats about one of its edges; U-CAT's where nothing else is known.
+
+    Fields are numbers, or arrays (n,) for n fins.
+    """
+
+    length: Any = 0.20
+    """From the shaft to the tip [m]; U-CAT's robot description has 0.22, its simulator 0.18."""
+    width: Any = 0.10
+    """Along the shaft [m]."""
+    density: Any = 1000.0
+    """Of the water [kg/m^3]."""
+    drag_coefficient: float = 2.0
+    """Of a plate broadside to the flow."""
+
+    @property
+    def own_inertia(self) -> Any:
+        """Moment of inertia [kg m^2] of the blade itself: U-CAT's, in proportion to W L^3."""
+        return OWN_INERTIA * (self.length / 0.20) ** 3 * (self.width / 0.10)
+
+    @property
+    def inertia(self) -> Any:
+        """J [kg m^2]: the blade's own and that of the water it carries, pi/4 rho W^2 per metre."""
+        return self.own_inertia + math.pi / 12.0 * self.density * self.width**2 * self.length**3
+
+    @property
+    def drag(self) -> Any:
+        """K [N m s^2]: 1/8 rho Cd W L^4."""
+        return 0.125 * self.density * self.drag_coefficient * self.width * self.length**4
+
+    def power(self, amplitude: Values, frequency: Values) -> Values:
+        """Returns the mean mechanical power [W] at half amplitude [rad] and frequency [Hz]."""
+        drag, inertia = self._shares(amplitude)
+        return 8.0 * math.pi**2 * frequency**3 * amplitude**2 * (drag * amplitude + inertia)
+
+    def power_slopes(self, amplitude: Values, frequency: Values) -> tuple[Values, Values]:
+        """Returns the power's derivatives by amplitude [W/rad] and frequency [W/Hz]."""
+        drag, inertia = self._shares(amplitude)
+        scale = 8.0 * math.pi**2 * frequency**2 * amplitude
+        by_amplitude = scale * frequency * (3.0 * drag * amplitude + 2.0 * inertia)
+        return by_amplitude, 3.0 * scale * amplitude * (drag * amplitude + inertia)
+
+    def driving_power(self, amplitude: Values, frequency: Values, copper_loss: float) -> Values:
+        """Returns the power [W] with the heat in a motor's windings: `copper_loss` [W/(N m)^2] times the mean
+        squared torque."""
+        power = self.power(amplitude, frequency)
+        if not copper_loss:
+            return power
+        scale, inertia, drag = self._heat(amplitude, frequency, copper_loss)
+        return power + scale * amplitude**2 * frequency * (inertia + drag)
+
+    def driving_slopes(
+        self, amplitude: Values, frequency: Values, copper_loss: float
+    ) -> tuple[Values, Values]:
+        """Returns the derivatives of `driving_power` by amplitude and frequency."""
+        by_amplitude, by_frequency = self.power_slopes(amplitude, frequency)
+        if not copper_loss:
+            return by_amplitude, by_frequency
+        scale, inertia, drag = self._heat(amplitude, frequency, copper_loss)
+        by_amplitude = by_amplitude + scale * amplitude * frequency * (2.0 * inertia + 4.0 * drag)
+        return by_amplitude, by_frequency + 4.0 * scale * amplitude**2 * (inertia + drag)
+
+    def _heat(
+        self, amplitude: Values, frequency: Values, copper_loss: float
+    ) -> tuple[Values, Values, Values]:
+        """The heat over A^2 f as a scale times the sum of an inertial part and a part of drag."""
+        scale = 16.0 * math.pi**4 * copper_loss * frequency**3
+        return scale, 0.5 * self.inertia**2, 0.375 * (self.drag * amplitude) ** 2
+
+    def _shares(self, amplitude: Values) -> tuple[Values, Values]:
+        """The parts of drag (over A) and of inertia in the mean power over (2 pi f)^3 A^2 / pi."""
+        sqrt = library_of(amplitude).sqrt
+        ratio = self.drag / self.inertia * amplitude
+        # Where the torque changes sign: ratio (1 - s0^2) = s0. The mean does not change with s0 there.
+        end = 2.0 * ratio / (1.0 + sqrt(1.0 + 4.0 * ratio**2))
+        return self.drag * (end - end**3 / 3.0 + 2.0 / 3.0), self.inertia * 0.5 * (1.0 - end**2)

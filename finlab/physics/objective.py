@@ -1,0 +1,80 @@
+"""What an allocation keeps least: mean power in watts, or the paper's effort `J_en`.
+
+Both are sums over the fins of a cost of amplitude and frequency; effort adds a little for the zero direction.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyMeter, EnergyWeights, energy_of_shares, energy_scale
+from finlab.physics.fin_law import FinLaw
+from finlab.physics.plant import Plant
+
+Array = NDArray[Any]
+
+Name = Literal["power", "effort"]
+
+
+@dataclass(frozen=True)
+class Objective:
+    """What is kept least."""
+
+    name: Name = "power"
+    """`power`: mean mechanical watts by each fin's own model. `effort`: the paper's energy proxy `J_en`."""
+    weights: EnergyWeights = DEFAULT_WEIGHTS
+    """Weights of `J_en`."""
+    copper_loss: float = 0.0
+    """Heat in a motor's windings [W/(N m)^2] that counts beside the mechanical power."""
+
+    @property
+    def convex(self) -> bool:
+        """Whether cost grows faster than force, so that one search finds the least; else fins that rest must
+        be tried."""
+        return self.name == "power"
+
+    def fin_cost(self, law: FinLaw, upper: Array) -> Callable[[Array], Array]:
+        """Returns the cost of commands (..., 3) of one fin with upper limits (3,), its direction left out."""
+        if self.name == "power":
+            return lambda command: np.asarray(law.power(command, self.copper_loss))
+        scale = energy_scale(upper)
+
+        def effort(command: Array) -> Array:
+            share = command / scale
+            return np.asarray(energy_of_shares(share[..., 0], share[..., 1], 0.0, self.weights))
+
+        return effort
+
+    def direction_cost(self, upper: Array) -> Array:
+        """Returns the cost (n,) per squared zero direction [1/rad^2] of fins with upper limits (n, 3)."""
+        if self.name == "power":
+            return np.zeros(len(upper))
+        return np.asarray(self.weights.zero_direction / energy_scale(upper)[:, 2] ** 2)
+
+    def meter(self, plant: Plant) -> "CostMeter":
+        """Returns what tells the cost of a robot's commands."""
+        return PowerMeter(plant, self.copper_loss) if self.name == "power" else EnergyMeter(plant.upper, self.weights)
+
+
+class PowerMeter:
+    """The power of one robot whose fins are all healthy, ready for many commands."""
+
+    def __init__(self, plant: Plant, copper_loss: float = 0.0) -> None:
+        """Make it for the fins of a plant."""
+        self._plant, self._copper_loss = plant, copper_loss
+
+    def __call__(self, command: Array) -> Array:
+        """Power (R,) [W] of commands (R, n, 3)."""
+        total: Array = self._plant.power(command, self._copper_loss).sum(-1)
+        return total
+
+    def slopes(self, command: Array) -> Array:
+        """Derivatives (R, n, 3) of the power by commands (R, n, 3)."""
+        return self._plant.power_slopes(command, self._copper_loss)
+
+
+CostMeter = PowerMeter | EnergyMeter
+"""Commands (R, n, 3) of one robot to costs (R,), and their slopes."""
