@@ -76,7 +76,9 @@ class BatchAllocation(Answer):
     err_norm: Array
     """Sizes (N,) of what is missing from the targets, each axis over its `sigma`."""
     energy: Array
-    """Energy proxy `J_en` (N,) of the commands."""
+    """Effort `J_en` (N,) of the commands, the paper's energy proxy."""
+    power: Array
+    """Mean mechanical power (N,) [W] of the commands, by the fins' own models."""
     solve_ms: Array = field(compare=False)
     """Time per target (N,) [ms]; the whole time divided by N where targets were solved together."""
 
@@ -107,7 +109,9 @@ class Allocation(Answer):
     err_norm: float
     """Size of what is missing from the target, each axis over its `sigma`."""
     energy: float
-    """Energy proxy `J_en` of the command."""
+    """Effort `J_en` of the command, the paper's energy proxy."""
+    power: float
+    """Mean mechanical power [W] of the command, by the fins' own models."""
     solve_ms: float = field(compare=False)
     """Time spent solving [ms], judging not included."""
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -173,6 +177,7 @@ class Allocation(Answer):
             wrench=verdict.wrench[0],
             err_norm=float(verdict.err_norm[0]),
             energy=float(verdict.energy[0]),
+            power=float(verdict.power[0]),
             judged_by="plant",
             wrench_surrogate=None,
         )
@@ -196,7 +201,7 @@ class Allocation(Answer):
         return (
             f"Allocation(layout={self.layout.name!r:.60}, fins={len(self.fins)}{failed}, "
             f"method={self.method!r}, err_norm={self.err_norm:.2e} by the {self.judged_by}, "
-            f"energy={self.energy:.3f}, reachable={self.reachable}, solve_ms={self.solve_ms:.1f})"
+            f"power={self.power:.3g} W, energy={self.energy:.3f}, reachable={self.reachable}, solve_ms={self.solve_ms:.1f})"
         )
 
     def __str__(self) -> str:

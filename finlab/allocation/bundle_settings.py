@@ -5,13 +5,13 @@ from collections.abc import Mapping
 from dataclasses import asdict, fields, is_dataclass
 from typing import Any
 
-from finlab.allocation.learned.settings import Settings
+from finlab.allocation.search.settings import Settings
 from finlab.bundle_files import ABOUT, VERSION, Files
 from finlab.errors import DataError
 from finlab.physics.energy import EnergyWeights
 
 FORMAT = "finlab-bundle"
-METHODS_ON_BOARD = ("learned", "fast")
+METHODS_ON_BOARD = ("search",)
 """Methods that a bundle can answer with; they share their settings."""
 
 _LARGEST = {"n_candidates": 4096, "n_seeds": 256, "n_refined": 256, "search_steps": 100, "refine_steps": 100}

@@ -31,7 +31,9 @@ class Verdict(NamedTuple):
     err_norm: Array
     """(N,)."""
     energy: Array
-    """(N,)."""
+    """Effort `J_en` (N,)."""
+    power: Array
+    """Mean mechanical power (N,) [W]."""
     judged_by: Judge = "plant"
     """Whose forces these are."""
 
@@ -59,11 +61,17 @@ def verdict_of(
     missing = (target - wrench) / sigma
     err_norm = np.sqrt(np.einsum("ri,ri->r", missing, missing))
     if len(command) == 0:
-        return Verdict(fin_forces, wrench, err_norm, np.empty(0))
-    energy = _meter(layout)(command)
+        return Verdict(fin_forces, wrench, err_norm, np.empty(0), np.empty(0))
+    energy, power = _meter(layout)(command), plant_of(layout).power(command).sum(-1)
     if np.isnan(energy).any():  # a failed fin costs nothing
         energy = _meter(layout)(np.where(np.isnan(command), 0.0, command))
-    return Verdict(fin_forces, wrench, err_norm, energy)
+        power = np.nansum(plant_of(layout).power(command), axis=-1)
+    return Verdict(fin_forces, wrench, err_norm, energy, power)
+
+
+def costs(layout: Layout, command: Array) -> tuple[Array, Array]:
+    """Effort (K,) and power (K,) [W] of commands (K, n, 3) of fins that all work."""
+    return _meter(layout)(command), plant_of(layout).power(command).sum(-1)
 
 
 @lru_cache(maxsize=256)

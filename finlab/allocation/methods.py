@@ -21,13 +21,15 @@ from finlab.inference.normalization import Normalization
 from finlab.inference.weights import TrainedWeights
 
 if TYPE_CHECKING:
-    from finlab.allocation.learned.learned_allocator import LearnedAllocator
+    from finlab.allocation.learned.mdn import MdnAllocator
     from finlab.allocation.learned.paper import PaperAllocator
-    from finlab.allocation.learned.settings import LearnedOptions, PaperOptions
+    from finlab.allocation.learned.settings import MdnOptions, PaperOptions
+    from finlab.allocation.search.search_allocator import SearchAllocator
+    from finlab.allocation.search.settings import SearchOptions
 
 METHODS: dict[str, tuple[str, str]] = {
-    "learned": ("finlab.allocation.learned.learned_allocator", "LearnedAllocator"),
-    "fast": ("finlab.allocation.learned.fast", "FastAllocator"),
+    "search": ("finlab.allocation.search.search_allocator", "SearchAllocator"),
+    "mdn": ("finlab.allocation.learned.mdn", "MdnAllocator"),
     "paper": ("finlab.allocation.learned.paper", "PaperAllocator"),
     "qp": ("finlab.allocation.baselines.qp", "Qp"),
     "sqp": ("finlab.allocation.baselines.sqp", "Sqp"),
@@ -39,21 +41,28 @@ METHODS: dict[str, tuple[str, str]] = {
 }
 """Name -> module and class; modules are loaded only when their method is asked for."""
 
-LEARNED = ("learned", "fast", "paper")
+LEARNED = ("mdn", "paper")
 """Methods that need a trained network; the others take only the normalization from a checkpoint."""
 
 
-Method = Literal["learned", "fast", "paper", "qp", "sqp", "analytic", "multistart", "trf", "slsqp", "ipopt"]
+Method = Literal["search", "mdn", "paper", "qp", "sqp", "analytic", "multistart", "trf", "slsqp", "ipopt"]
 """The names again, for type checkers and editors."""
 
 
 @overload
 def load_allocator(
-    method: Literal["learned", "fast"] = "learned",
+    method: Literal["search"] = "search",
     *,
     checkpoint: str | os.PathLike[str] | None = None,
-    **options: Unpack[LearnedOptions],
-) -> LearnedAllocator: ...
+    **options: Unpack[SearchOptions],
+) -> SearchAllocator: ...
+@overload
+def load_allocator(
+    method: Literal["mdn"],
+    *,
+    checkpoint: str | os.PathLike[str] | None = None,
+    **options: Unpack[MdnOptions],
+) -> MdnAllocator: ...
 @overload
 def load_allocator(
     method: Literal["paper"],
@@ -69,7 +78,7 @@ def load_allocator(
     **options: Any,
 ) -> Allocator: ...
 def load_allocator(
-    method: Method | str | os.PathLike[str] = "learned",
+    method: Method | str | os.PathLike[str] = "search",
     *,
     checkpoint: str | os.PathLike[str] | None = None,
     **options: Any,
@@ -77,7 +86,7 @@ def load_allocator(
     """The allocator of a method, ready to answer.
 
     Args:
-        method: one of `METHODS`; or a bundle made by `finlab export`, which is short for method `learned`
+        method: one of `METHODS`; or a bundle made by `finlab export`, which is short for method `search`
             with that bundle as its checkpoint.
         checkpoint: a checkpoint folder, a bundle, or the name of a shipped checkpoint; by default `paper` for
             the method `paper` and `default` for all others.
@@ -91,7 +100,7 @@ def load_allocator(
     if method not in METHODS:
         if checkpoint is not None or not (isinstance(method, os.PathLike) or is_bundle(method)):
             raise AllocationError(f"method: expected one of {', '.join(METHODS)}, got {str(method)!r}")
-        method, checkpoint = "learned", method
+        method, checkpoint = "search", method
     name = str(method)
     if checkpoint is not None and is_bundle(checkpoint):
         return allocator_from_bundle(read_bundle_files(checkpoint), str(checkpoint), name, **options)
@@ -100,7 +109,7 @@ def load_allocator(
 
 
 def allocator_from_bundle(
-    files: Files, source: str = "bundle", method: str = "learned", **options: Any
+    files: Files, source: str = "bundle", method: str = "search", **options: Any
 ) -> Allocator:
     """The allocator of a method with the weights and settings in a bundle's files; see `load_allocator`."""
     checkpoint, settings = read_about(files, source)

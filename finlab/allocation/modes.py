@@ -39,7 +39,9 @@ class Mode(PlainData):
     err_norm: float
     """Normalized error of that wrench."""
     energy: float
-    """Energy proxy."""
+    """Effort `J_en`, the paper's energy proxy."""
+    power: float
+    """Mean mechanical power [W]."""
     saturation: float
     """Largest share of any fin's range of amplitude or frequency that is used; 1 is a limit."""
     distance: float | None
@@ -90,6 +92,7 @@ def find_modes(
                 wrench=candidates.wrench[first],
                 err_norm=float(candidates.err_norm[first]),
                 energy=float(candidates.energy[first]),
+                power=float(candidates.power[first]),
                 saturation=float(np.clip(np.nanmax(used), 0.0, 1.0)),
                 distance=distance,
                 turn=turn,

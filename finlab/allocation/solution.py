@@ -47,7 +47,9 @@ class Candidates(PlainData):
     err_norm: Array
     """Normalized error (K,) of that wrench."""
     energy: Array
-    """Energy proxy (K,)."""
+    """Effort `J_en` (K,), the paper's energy proxy."""
+    power: Array
+    """Mean mechanical power (K,) [W]."""
     source: tuple[str, ...]
     """Where each one comes from, in words."""
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.forces.fin_envelope import LEVELS, SHAFT, FinEnvelope, fin_envelope
+from finlab.forces.fin_envelope import LEAN, LEVELS, SHAFT, FinEnvelope, fin_envelope
 from finlab.layout import Layout
 from finlab.layout.angles import TURN
 from finlab.physics.objective import Objective
@@ -124,6 +124,12 @@ class Envelopes:
     def without_rest(self) -> Envelopes:
         """The same fins, had they no smallest force."""
         return replace(self, smallest=np.zeros_like(self.smallest))
+
+    def lean(self, zero_direction: Array) -> Array:
+        """By how much (n,) [rad] strong forces lean off zero directions (n,) [rad]."""
+        rim = self.rim(zero_direction[None])
+        lean: Array = self.lookup(rim, self.maximum[None])[0, :, LEAN]
+        return lean
 
     def rim(self, direction: Array) -> Rim:
         """What the fins can do in directions (R, n) [rad]."""

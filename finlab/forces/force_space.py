@@ -122,7 +122,9 @@ class _Response(NamedTuple):
     """Forces along the shafts (R, n) [N], None where no fin has any."""
 
 
-def descend(problem: PlanarProblem, target: Array, seeds: Array, steps: int) -> Planar:
+def descend(
+    problem: PlanarProblem, target: Array, seeds: Array, steps: int, works: Array | None = None
+) -> Planar:
     """Follow each seed to a cheap, exact allocation.
 
     Args:
@@ -130,6 +132,7 @@ def descend(problem: PlanarProblem, target: Array, seeds: Array, steps: int) -> 
         target: normalized wrenches (R, 6), or one for all rows (1, 6).
         seeds: sizes of forces (R, n) [N]; directions follow from the target.
         steps: quadratic problems that are solved in turn, one or more.
+        works: 0 where a fin has to rest (R, n), else 1; by default every fin may work.
     """
     fins, (rows, n) = problem.fins, seeds.shape
     start = np.maximum(seeds, REST * fins.maximum)
@@ -137,12 +140,14 @@ def descend(problem: PlanarProblem, target: Array, seeds: Array, steps: int) -> 
     mobility[:, 0] = mobility[:, 2] = start
     response = _Response(start, start, mobility, np.zeros((rows, 2, n)), None)
     cut = np.ones((rows, n))
+    if works is not None:
+        mobility *= works[:, None]
     for _ in range(steps):
         multiplier = _multiplier(problem, target, response)
         force, size = _answer(problem, response, multiplier)
         found = fins.project(force, size)
         cut *= found.rim.largest / size
-        np.minimum(cut, 1.0, out=cut)
+        np.minimum(cut, 1.0 if works is None else works, out=cut)
         response = _quadratic(problem, found, cut)
     multiplier = _multiplier(problem, target, response)
     found = fins.project(*_answer(problem, response, multiplier))

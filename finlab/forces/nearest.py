@@ -122,7 +122,6 @@ def _best_part(sets: FinSets, target: Array, c: Array) -> Optimum:
 
 
 def wrench_of(columns: Array, force: Array) -> Array:
-    """Normalized wrench (R, 6) of planar forces (R, n, 2)."""
-    n = force.shape[1]
-    wrench: Array = force.reshape(-1, 2 * n) @ columns.reshape(2 * n, 6)
+    """Normalized wrench (R, 6) of planar forces (R, n, 2); columns (2n, 6) as in a `PlanarProblem`."""
+    wrench: Array = force.swapaxes(1, 2).reshape(len(force), -1) @ columns
     return wrench

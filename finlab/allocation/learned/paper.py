@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.learned.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.judging import costs
 from finlab.allocation.learned.settings import STEPS, PaperSettings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.inference.features import Geometry, fin_frame_features, geometry, raw_features
@@ -37,6 +38,8 @@ LM_DAMPING = 4e-4
 class _Robot(NamedTuple):
     """One layout of n healthy fins, ready for the pipeline."""
 
+    layout: Layout
+    """The fins."""
     surrogate: LayoutSurrogate
     """Learned fin physics."""
     problem: CommandProblem
@@ -125,7 +128,7 @@ class PaperAllocator(Allocator):
         raw = self.config.features == "raw"
         features = raw_features(*place) if raw else geometry(*place, std)
         limits = lower.astype(np.float32), upper.astype(np.float32)
-        return _Robot(surrogate, problem, limits, features, EnergyMeter(upper))
+        return _Robot(layout, surrogate, problem, limits, features, EnergyMeter(upper))
 
     def _predict(self, robot: _Robot, centred: Array) -> MixtureArrays:
         """The network's mixture for normalized, centred targets (N, 6)."""
@@ -203,7 +206,7 @@ class PaperAllocator(Allocator):
         order = np.argsort(error, kind="stable")
         inside = _inside(robot, command[order])
         names = (source,) * len(order)
-        return Candidates(inside, wrench[order], error[order], robot.energy(inside), names)
+        return Candidates(inside, wrench[order], error[order], *costs(robot.layout, inside), names)
 
 
 def _take(command: Array, index: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What the network proposes: K candidate commands, drawn from its mixture and scored by the surrogate."""
+"""What the network proposes: K candidate commands, drawn from its mixture and scored by the fins' own laws."""
 
 import math
 from functools import lru_cache
@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.learned.prepared import Prepared
-from finlab.inference.features import fin_frame_features
+from finlab.allocation.search.prepared import Prepared
+from finlab.inference.features import Geometry, fin_frame_features
 from finlab.inference.mixture import MixtureArrays
 from finlab.inference.network import NumpyNetwork
 
@@ -16,26 +16,26 @@ Array = NDArray[Any]
 
 
 class Proposal(NamedTuple):
-    """K candidates for each of N targets, inside the limits, in single precision."""
+    """K candidates for each of N targets, inside the limits."""
 
     command: Array
     """(N, K, n, 3)."""
     component: NDArray[np.int64]
     """Mixture component of each candidate (N, K)."""
     wrench: Array
-    """Normalized wrench (N, K, 6) by the surrogate."""
+    """Normalized wrench (N, K, 6)."""
     error: Array
-    """Normalized error (N, K) by the surrogate."""
-    thrust: Array
-    """Planar force of each fin (N, K, n) [N] by the surrogate."""
-    energy: Array
-    """Energy proxy (N, K)."""
+    """Normalized error (N, K)."""
+    size: Array
+    """Planar force of each fin (N, K, n) [N]."""
+    cost: Array
+    """(N, K)."""
 
 
-def predict(network: NumpyNetwork, prepared: Prepared, centred: Array) -> MixtureArrays:
+def predict(network: NumpyNetwork, place: Geometry, prepared: Prepared, centred: Array) -> MixtureArrays:
     """The network's mixture for normalized, centred targets (N, 6)."""
-    x = fin_frame_features(prepared.geometry, centred).astype(np.float32)
-    return network(x, centred.astype(np.float32), prepared.lower, prepared.upper)
+    x = fin_frame_features(place, centred).astype(np.float32)
+    return network(x, centred.astype(np.float32), prepared.plant.lower, prepared.plant.upper)
 
 
 def sample(
@@ -85,39 +85,23 @@ def draws_of_one(seed: int, extra: int, n: int) -> tuple[Array, Array]:
     return uniform, normal
 
 
-def propose(
-    network: NumpyNetwork,
-    prepared: Prepared,
-    centred: Array,
-    target: Array,
-    n_candidates: int,
-    temperature: float,
-    seed: int,
-) -> Proposal:
-    """Predict, sample, clamp and score.
+def propose(mixture: MixtureArrays, prepared: Prepared, target: Array, drawn: tuple[int, float, int]) -> Proposal:
+    """Sample, clamp and score.
 
     Args:
-        network: what predicts the mixture.
+        mixture: what the network predicts for N targets.
         prepared: the layout.
-        centred: normalized targets minus the mean (N, 6), which the network sees.
         target: normalized targets (N, 6).
-        n_candidates: K.
-        temperature: T.
-        seed: seed of the draw.
+        drawn: number K of candidates, temperature, seed of the draw.
     """
-    x, component = sample(predict(network, prepared, centred), n_candidates, temperature, seed)
-    problem = prepared.commands
-    limits = problem.float32
-    x += np.float32(1.0)
-    x *= limits.half
-    x += limits.lower
-    command = problem.clamp_in_place(x)
+    x, component = sample(mixture, *drawn)
+    plant, problem = prepared.plant, prepared.commands
+    command = problem.clamp_in_place(plant.lower + 0.5 * (x + 1.0) * plant.width)
     rows, k, n, _ = command.shape
-    force = problem.fin.force(command)
-    wrench = force.reshape(rows * k, 3 * n).dot(problem.columns_float32).reshape(rows, k, 6)
+    force = plant.force(command)
+    wrench = force.reshape(rows * k, 3 * n).dot(problem.columns.reshape(3 * n, 6)).reshape(rows, k, 6)
     missing = wrench - target[:, None]
     error = np.sqrt(np.einsum("rki,rki->rk", missing, missing))
-    across = force[..., 1:] * force[..., 1:]
-    thrust = np.sqrt(across[..., 0] + across[..., 1])
-    energy = prepared.usual_energy(command.reshape(rows * k, n, 3)).reshape(rows, k)
-    return Proposal(command, component, wrench, error, thrust, energy)
+    size = np.hypot(force[..., 1], force[..., 2])
+    cost = prepared.cost(command.reshape(rows * k, n, 3)).reshape(rows, k)
+    return Proposal(command, component, wrench, error, size, cost)

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.learned.levenberg_marquardt import CommandProblem
-from finlab.allocation.learned.prepared import Prepared
+from finlab.allocation.search.prepared import Prepared
+from finlab.layout.angles import wrapped
 
 Array = NDArray[Any]
 
@@ -45,12 +45,12 @@ def limit_turn(prepared: Prepared, previous: Array, aim: Array, width: float) ->
     lower[:, 2] = np.where(known, low, lower[:, 2])
     upper[:, 2] = np.where(known, high, upper[:, 2])
     wraps = free & ~known
-    ahead = np.where(free, direction + np.mod(aim - direction + np.pi, 2 * np.pi) - np.pi, aim)
+    ahead = np.where(free, direction + wrapped(aim - direction), aim)
+    fins = prepared.planar.fins
+    middle, half = 0.5 * (lower[:, 2] + upper[:, 2]), 0.5 * (upper[:, 2] - lower[:, 2])
     planar = prepared.planar._replace(
-        middle=0.5 * (lower[:, 2] + upper[:, 2]),
-        half=np.where(wraps, np.pi, 0.5 * (upper[:, 2] - lower[:, 2])),
+        fins=fins.within(middle + fins.lean(middle), np.where(wraps, np.pi, half)),
         idle_direction=np.clip(ahead, lower[:, 2], upper[:, 2]),
-        turns_fully=False,
     )
     commands = replace(prepared.commands, lower=lower, upper=upper, wraps=wraps)
     return prepared._replace(planar=planar, commands=commands)
@@ -59,14 +59,14 @@ def limit_turn(prepared: Prepared, previous: Array, aim: Array, width: float) ->
 def unwrap_to_arc(near: Prepared, command: Array) -> Array:
     """Commands (..., n, 3), each zero direction a turn more or less so that it is nearest to its arc."""
     turned = command.copy()
-    middle = near.planar.middle
-    turned[..., 2] = middle + np.mod(command[..., 2] - middle + np.pi, 2 * np.pi) - np.pi
+    middle = 0.5 * (near.commands.lower[:, 2] + near.commands.upper[:, 2])
+    turned[..., 2] = middle + wrapped(command[..., 2] - middle)
     return turned
 
 
-def planar_thrust(problem: CommandProblem, command: Array) -> Array:
-    """Planar force (n,) [N] of a command (n, 3) by the surrogate; NaN commands count as rest."""
+def force_sizes(prepared: Prepared, command: Array) -> Array:
+    """Sizes (n,) [N] of the planar forces of a command (n, 3); NaN commands count as rest."""
+    problem = prepared.commands
     safe = np.where(np.isfinite(command), command, problem.lower)
-    force = problem.fin.force(problem.clamp(safe))
-    thrust: Array = np.sqrt(force[:, 1] ** 2 + force[:, 2] ** 2)
-    return thrust
+    force = prepared.plant.force(problem.clamp(safe))
+    return np.asarray(np.hypot(force[:, 1], force[:, 2]))

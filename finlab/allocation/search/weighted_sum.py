@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.learned.levenberg_marquardt import CommandProblem, Refined
+from finlab.allocation.search.levenberg_marquardt import CommandProblem, Refined
 from finlab.allocation.weighted_descent import DescentOptions, descend
 from finlab.physics.energy import EnergyMeter
 

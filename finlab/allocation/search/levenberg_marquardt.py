@@ -1,7 +1,7 @@
-"""Levenberg-Marquardt on the commands, through the surrogate's closed-form Jacobian, inside the limits.
+"""Levenberg-Marquardt on the commands, through closed-form Jacobians of the fins' forces, inside the limits.
 
-The last stage of every learned allocation: it works in commands, not forces, and with the whole
-surrogate, so it removes the error that the planar search's simplifications leave.
+The last stage of a search: it works in commands, not forces, and with the fins' own laws, so it removes the
+error that the compiled fins' tables leave. The paper's method uses it with its surrogate.
 """
 
 from dataclasses import dataclass
@@ -44,9 +44,9 @@ class CommandProblem:
     """One layout as the refinement sees it."""
 
     fin: FinForces
-    """The surrogate of the fins."""
+    """What commands give: the fins' own laws, or a surrogate."""
     columns: Array
-    """Normalized wrench per newton (n, 3, 6) of each fin's force along the axes of the surrogate's frame."""
+    """Normalized wrench per newton (n, 3, 6) of each fin's force along the axes in which it says so."""
     lower: Array
     """Lower limits (n, 3)."""
     upper: Array
@@ -120,7 +120,7 @@ class Refined(NamedTuple):
     command: Array
     """(R, n, 3), inside the limits."""
     wrench: Array
-    """Normalized wrench (R, 6) by the surrogate."""
+    """Normalized wrench (R, 6)."""
     error: Array
     """Normalized error (R,) of that wrench."""
 

@@ -1,0 +1,1 @@
+"""The default method: an exact search for the cheapest allocation, on the fins' own laws."""

@@ -1,0 +1,239 @@
+"""From a target to the cheapest exact commands, by the fins' own laws.
+
+Search in force space, from all fins and where it may pay from sub-layouts -> Levenberg-Marquardt on the
+commands -> the cheapest exact answer. No network takes part, nor any random number where the target is within
+reach.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.search.prepared import Prepared, prepare, resting_fins
+from finlab.allocation.search.refined_candidates import (
+    MISSED,
+    RANKING,
+    FallbackForces,
+    RefinedCandidates,
+    nearest_forces,
+    rank,
+    refine_candidates,
+    refine_missed,
+)
+from finlab.allocation.search.settings import Settings
+from finlab.allocation.search.turn_limits import TURNS, force_sizes, limit_turn, unwrap_to_arc
+from finlab.allocation.search.weighted_sum import minimize_weighted_sum
+from finlab.errors import AllocationError
+from finlab.forces import force_space
+from finlab.layout import Layout
+from finlab.physics.energy import EnergyMeter
+from finlab.physics.objective import Objective
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class SearchNumbers:
+    """What the search does that users need not set."""
+
+    promising_error: float = 0.02
+    """Normalized error below which a search in force space counts as successful: refinement removes the
+    rest."""
+    convex_steps: int = 7
+    """Quadratic problems for a cost that grows faster than force: Newton's method, which doubles its digits."""
+    few_fins_steps: int = 7
+    """The same for other costs with up to five fins."""
+    many_fins_steps: int = 12
+    """The same from six fins on, where there are more local minima to leave."""
+    wide_seeds: int = 64
+    """Random seeds of the wide search for alternatives."""
+    wide_steps: int = 40
+    """Steps of that search, enough to converge: alternatives are counted by their local minima."""
+    alternative_error: float = 1e-3
+    """Normalized error up to which another answer is an alternative."""
+    passing_error: float = 5e-3
+    """Normalized error for a tick that is better than a fast turn: half of what counts as delivered."""
+
+
+SEARCH = SearchNumbers()
+"""What every pipeline uses."""
+
+
+class Pipeline:
+    """Answers targets on layouts without failures; every array is numpy's."""
+
+    def __init__(self, std: Array, settings: Settings, objective: Objective) -> None:
+        """Make it for wrenches normalized by `std` (6,)."""
+        self.std, self.objective = std, objective
+        self.settings = self._checked(settings)
+        self.prepare = lru_cache(maxsize=128)(lambda layout: prepare(layout, std, objective))
+
+    def with_settings(self, settings: Settings) -> Pipeline:
+        """The same layouts prepared, with other settings."""
+        other = copy(self)
+        other.settings = self._checked(settings)
+        return other
+
+    def _checked(self, settings: Settings) -> Settings:
+        if settings.energy_tradeoff > 0.0 and (self.objective.name != "effort"):
+            raise AllocationError(
+                "energy_tradeoff: the weighted sum is one of error and effort, got objective "
+                f"{self.objective.name!r}; take objective 'effort', or leave energy_tradeoff at 0"
+            )
+        return settings
+
+    def solve(
+        self,
+        prepared: Prepared,
+        targets: Array,
+        previous: Array | None = None,
+        *,
+        seeds: Array | None = None,
+        fallback: FallbackForces = nearest_forces,
+    ) -> RefinedCandidates:
+        """Refined answers, best first, to a few targets (N, 6).
+
+        Args:
+            prepared: the layout.
+            targets: desired wrenches (N, 6).
+            previous: command (n, 3) of the previous tick, for a single target.
+            seeds: sizes of forces (N, S, n) [N] to start from, by default those of the layout.
+            fallback: where to start from when targets were missed; None from it ends their search.
+        """
+        target = targets / self.std
+        if seeds is None:
+            own = prepared.seeds if self.settings.subsets else prepared.seeds[:1]
+            seeds = np.broadcast_to(own, (len(target), *own.shape))
+        if previous is None:
+            candidates = self._descend(prepared, target, seeds, fallback)
+            return self._trade_error_for_energy(prepared, target, candidates, None)
+        candidates = self._descend_from_previous(prepared, target, seeds, previous, fallback)
+        candidates = self._trade_error_for_energy(prepared, target, candidates, previous)
+        # Arcs that pass the seam are brought back inside the fin's own limits.
+        return candidates._replace(command=prepared.commands.clamp(candidates.command))
+
+    def explore(
+        self, prepared: Prepared, targets: Array, answer: RefinedCandidates, seeds: Array | None = None
+    ) -> RefinedCandidates:
+        """Many refined answers to one target (1, 6): the answer itself, then all that many seeds lead to.
+
+        Fins rest alone and in pairs, for good where the objective would have them all work.
+        """
+        target, n = targets / self.std, prepared.plant.n_fins
+        maximum = prepared.planar.fins.maximum
+        drawn = np.random.default_rng(0).random((SEARCH.wide_seeds, n)) ** 2 * maximum
+        parts = [drawn] if seeds is None else [seeds, drawn]
+        works = None
+        if self.objective.convex:
+            rests = resting_fins(n)
+            works = np.ones((len(rests), n))
+            for row, fins in enumerate(rests):
+                works[row, list(fins)] = 0.0
+            drawn = works * maximum
+        else:
+            drawn = np.concatenate([prepared.seeds, *parts])
+        command, origin = self._search(
+            prepared, target, drawn[None], False, keep=len(drawn), steps=SEARCH.wide_steps, works=works
+        )
+        found = refine_candidates(prepared, target, command, origin, MISSED.first_lm_steps)
+        return found.with_first(answer)
+
+    def _descend_from_previous(
+        self, prepared: Prepared, target: Array, seeds: Array, previous: Array, fallback: FallbackForces
+    ) -> RefinedCandidates:
+        """Answers that turn the fins as little as the target allows.
+
+        Fins at rest turn towards where they would be cheapest.
+        """
+        free = self._descend(prepared, target, seeds, fallback)
+        aim = free.command[0, 0, :, 2]
+        kept = force_sizes(prepared, previous)
+        seeds = np.concatenate([kept[None, None], seeds], axis=1)
+        candidates = free
+        for width in TURNS:
+            near = limit_turn(prepared, previous, aim, width)
+            candidates = self._descend(near, target, seeds, fallback, known=free.command[0])
+            enough = RANKING.exact_error * prepared.exactness if width == TURNS[0] else SEARCH.passing_error
+            if candidates.error[0, 0] <= enough:
+                break
+        return candidates
+
+    def _trade_error_for_energy(
+        self, prepared: Prepared, target: Array, candidates: RefinedCandidates, previous: Array | None
+    ) -> RefinedCandidates:
+        """Trade error for effort, where the settings ask for the weighted sum."""
+        weight = self.settings.energy_tradeoff
+        if weight == 0.0 or not isinstance(prepared.cost, EnergyMeter):
+            return candidates
+        if previous is not None:
+            prepared = limit_turn(prepared, previous, candidates.command[0, 0, :, 2], TURNS[0])
+        rows, p, n, _ = candidates.command.shape
+        start = prepared.commands.clamp(candidates.command.reshape(-1, n, 3))
+        found, energy = minimize_weighted_sum(
+            prepared.commands, np.repeat(target, p, axis=0), start, prepared.cost, weight
+        )
+        total = (found.error**2 + weight * energy).reshape(rows, p)
+        order = total.argsort(axis=1) + np.arange(0, rows * p, p)[:, None]
+        flat = (*found, energy, candidates.origin.reshape(-1))
+        return RefinedCandidates(*(values.take(order, axis=0) for values in flat))
+
+    def _descend(
+        self,
+        prepared: Prepared,
+        target: Array,
+        seeds: Array,
+        fallback: FallbackForces,
+        known: Array | None = None,
+    ) -> RefinedCandidates:
+        """Search from seeds (N, S, n), refine, and go on where that did not reach the target.
+
+        From tick to tick, `known` are commands (P, n, 3) that answer the single target whatever the turns:
+        the search in narrow arcs may miss them where they are within these.
+        """
+        keep_mode, steps = known is not None, self.settings.refine_steps
+        command, origin = self._search(prepared, target, seeds, keep_mode)
+        if known is not None:
+            within = prepared.commands.clamp(unwrap_to_arc(prepared, known))
+            command, steps = np.concatenate([command, within[None]], axis=1), steps + 1
+            origin = np.concatenate([origin, np.full((1, len(within)), -1)], axis=1)
+        candidates = refine_candidates(prepared, target, command, origin, steps, keep_mode)
+        missed = candidates.error[:, 0] > RANKING.exact_error * prepared.exactness
+        if missed.any():
+            refine_missed(prepared, target, candidates, missed, fallback)
+        return candidates
+
+    def _search(
+        self,
+        prepared: Prepared,
+        target: Array,
+        seeds: Array,
+        keep_mode: bool,
+        *,
+        keep: int | None = None,
+        steps: int | None = None,
+        works: Array | None = None,
+    ) -> tuple[Array, NDArray[np.intp]]:
+        """Cheapest commands (N, P, n, 3) reached from seeds (N, S, n), and whose seeds they are (N, P).
+
+        With `keep_mode`, the first seed is how the robot moves now; what it leads to stays first.
+        """
+        rows, n_seeds, n = seeds.shape
+        flat = target if rows == 1 else np.repeat(target, n_seeds, axis=0)
+        usual = SEARCH.few_fins_steps if n < 6 else SEARCH.many_fins_steps
+        steps = steps or self.settings.search_steps or (SEARCH.convex_steps if self.objective.convex else usual)
+        planar = force_space.descend(prepared.planar, flat, seeds.reshape(-1, n), steps, works)
+        command, cost = force_space.realize(prepared.planar, planar)
+        if n_seeds == 1:
+            return command[:, None], np.zeros((rows, 1), np.intp)
+        error = np.einsum("ri,ri->r", planar.residual, planar.residual)
+        score = rank(cost, error, (SEARCH.promising_error * prepared.exactness) ** 2).reshape(rows, n_seeds)
+        if keep_mode:
+            score[:, 0] = -1.0
+        chosen = score.argsort(axis=1)[:, : keep or self.settings.n_refined]
+        return command.take(chosen + np.arange(0, rows * n_seeds, n_seeds)[:, None], axis=0), chosen

@@ -1,0 +1,81 @@
+"""What the search needs to know of a layout, computed once and kept."""
+
+from itertools import combinations
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.search.levenberg_marquardt import CommandProblem
+from finlab.forces.envelopes import layout_envelopes
+from finlab.forces.force_space import PlanarProblem, planar_problem
+from finlab.layout import Layout
+from finlab.physics.objective import CostMeter, Objective
+from finlab.physics.plant import Plant, plant_of
+
+Array = NDArray[Any]
+
+MAX_SUBSETS = 40
+"""Most sub-layouts that are searched."""
+LEAST_WORKING = 2
+"""Fewest fins that work in a sub-layout."""
+
+
+class Prepared(NamedTuple):
+    """One layout of n healthy fins, ready for search and refinement."""
+
+    plant: Plant
+    """The fins' own laws."""
+    planar: PlanarProblem
+    """The layout for the search in force space."""
+    commands: CommandProblem
+    """The layout for the refinement of commands."""
+    seeds: Array
+    """Sizes of forces (S, n) [N] to start from: all fins, then sub-layouts whose other fins nearly rest."""
+    resting: tuple[tuple[int, ...], ...]
+    """Places of the fins that rest in each seed."""
+    cost: CostMeter
+    """By which answers are compared."""
+    exactness: float
+    """What thresholds on the normalized error are multiplied by: less than one for a robot that is weak
+    beside the error's yardstick."""
+
+
+def prepare(layout: Layout, std: Array, objective: Objective) -> Prepared:
+    """Prepare a layout whose fins are all healthy; `std` (6,) normalizes wrenches.
+
+    Raises:
+        DataError: a fin's force table cannot be read.
+    """
+    plant = plant_of(layout)
+    fins = layout_envelopes(layout, objective)
+    planar = planar_problem(layout, fins, std, objective)
+    rests = ((),) if objective.convex else resting_fins(layout.n_fins)
+    strongest = np.tile(fins.maximum, 2)[:, None] * planar.columns
+    return Prepared(
+        plant,
+        planar,
+        CommandProblem(plant, plant.columns / std, plant.lower, plant.upper, plant.full_turn),
+        resting_seeds(fins.maximum, rests),
+        rests,
+        objective.meter(plant),
+        min(1.0, float(np.linalg.norm(strongest))),
+    )
+
+
+def resting_fins(n: int) -> tuple[tuple[int, ...], ...]:
+    """Which of n fins are tried at rest: none, each, and each pair, while at least two others work.
+
+    Where a cost is concave in a fin's force, the cheapest allocation often rests some fins, which a search
+    from the whole layout may miss.
+    """
+    most = min(2, max(n - LEAST_WORKING, 0))
+    return tuple(c for k in range(most + 1) for c in combinations(range(n), k))[:MAX_SUBSETS]
+
+
+def resting_seeds(maximum: Array, rests: tuple[tuple[int, ...], ...]) -> Array:
+    """Seeds (S, n) [N] from largest forces (n,) in which some fins nearly rest."""
+    seeds = np.tile(maximum, (len(rests), 1))
+    for row, fins in enumerate(rests):
+        seeds[row, list(fins)] *= 1e-3
+    return seeds

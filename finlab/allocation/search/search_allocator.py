@@ -1,0 +1,213 @@
+"""The default method: the cheapest exact commands, searched for by the fins' own laws.
+
+The stages are in `pipeline`; here are the policies, the batches and what is offered beside the answer.
+"""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from copy import copy
+from dataclasses import fields
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.judging import costs
+from finlab.allocation.policy import Policy
+from finlab.allocation.search.levenberg_marquardt import refine
+from finlab.allocation.search.pipeline import SEARCH, Pipeline
+from finlab.allocation.search.prepared import Prepared, resting_fins
+from finlab.allocation.search.refined_candidates import FallbackForces, RefinedCandidates, nearest_forces
+from finlab.allocation.search.settings import Settings
+from finlab.allocation.solution import Candidates, Solution
+from finlab.errors import AllocationError
+from finlab.forces.force_space import PlanarProblem
+from finlab.forces.nearest import Nearest, nearest, nearest_along, nearest_in_turn
+from finlab.forces.planar_sets import planar_sets
+from finlab.inference.normalization import Normalization
+from finlab.inference.threads import single_threaded_products
+from finlab.layout import Layout
+from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyWeights
+from finlab.physics.objective import Name, Objective
+
+Array = NDArray[Any]
+
+CHUNK = 512
+"""Targets that are solved together; keeps memory flat for any number of targets."""
+
+
+class SearchAllocator(Allocator):
+    """Exact on any fin whose law or table is known, without a network."""
+
+    name = "search"
+    settings_class: type[Settings] = Settings
+
+    def __init__(
+        self,
+        normalization: Normalization,
+        *,
+        objective: Name = "power",
+        energy_weights: EnergyWeights = DEFAULT_WEIGHTS,
+        copper_loss: float = 0.0,
+        **settings: Any,
+    ) -> None:
+        """Make it.
+
+        Args:
+            normalization: the yardstick of the error; nothing else is taken from a checkpoint.
+            objective: what is kept least: `power` in watts, or `effort`, the paper's energy proxy.
+            energy_weights: weights of the effort.
+            copper_loss: heat in a motor's windings [W/(N m)^2] that counts beside the mechanical power.
+            settings: fields of `Settings`.
+
+        Raises:
+            AllocationError: a setting that no search can work with.
+        """
+        self.normalization = normalization
+        self.objective = _checked_objective(objective, energy_weights, copper_loss)
+        self.settings = self.settings_class(**settings)
+        self.pipeline = Pipeline(normalization.std, self.settings, self.objective)
+        # All products here are too small to be shared among threads; chunks of targets are not.
+        self._one_thread = single_threaded_products()
+
+    @classmethod
+    def option_names(cls) -> list[str]:
+        """Names of the settings."""
+        own = [field.name for field in fields(cls.settings_class)]
+        return ["objective", "energy_weights", "copper_loss", *own]
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Present settings, by name."""
+        aim = self.objective
+        chosen = {"objective": aim.name, "energy_weights": aim.weights, "copper_loss": aim.copper_loss}
+        return {**chosen, **vars(self.settings)}
+
+    def _made_with(self, options: dict[str, Any]) -> Self:
+        aim = _checked_objective(*(options.pop(k) for k in ("objective", "energy_weights", "copper_loss")))
+        other = copy(self)
+        other.settings = self.settings_class(**options)
+        if aim == self.objective:  # what is known of layouts does not depend on the other settings
+            other.pipeline = self.pipeline.with_settings(other.settings)
+        else:
+            other.objective = aim
+            other.pipeline = Pipeline(self.normalization.std, other.settings, aim)
+        return other
+
+    def _solve(
+        self,
+        layout: Layout,
+        targets: Array,
+        *,
+        seed: int,
+        previous: Array | None,
+        fallback: FallbackForces = nearest_forces,
+    ) -> Solution:
+        prepared = self.pipeline.prepare(layout)
+        if len(targets) == 1:
+            with self._one_thread():
+                refined = self.pipeline.solve(prepared, targets, previous, fallback=fallback)
+            return self._single(prepared, targets, refined)
+        solve: Callable[[int], RefinedCandidates] = lambda start: self.pipeline.solve(  # noqa: E731
+            prepared, targets[start : start + CHUNK], fallback=fallback
+        )
+        return self._many(solve, len(targets))
+
+    def _many(self, solve: Callable[[int], RefinedCandidates], count: int) -> Solution:
+        """Answers to many targets, of which `solve` answers the chunk that begins at a place."""
+        with self._one_thread(), ThreadPoolExecutor(os.cpu_count()) as executor:
+            parts = list(executor.map(solve, range(0, count, CHUNK)))
+        return Solution(np.concatenate([part.command[:, 0] for part in parts]))
+
+    def _single(
+        self, prepared: Prepared, targets: Array, refined: RefinedCandidates, names: tuple[str, ...] = ()
+    ) -> Solution:
+        """The answer to one target (1, 6), and what may be asked about it; `names` of the seeds."""
+        std = self.normalization.std
+        layout = prepared.plant.layout
+        own = names or _seed_names(layout)
+
+        def explored() -> Candidates:
+            found = self.pipeline.explore(prepared, targets, refined)
+            exact = max(SEARCH.alternative_error * prepared.exactness, 1.01 * found.error[0, 0])
+            kept = found.error[0] <= exact
+            exact_ones = RefinedCandidates(*(values[:, kept] for values in found))
+            return _candidates(exact_ones, std, layout, _seed_names(layout))
+
+        return Solution(
+            refined.command[:, 0],
+            candidates=lambda: _candidates(refined, std, layout, own),
+            alternatives=explored,
+        )
+
+    def refined(self, layout: Layout, wrench: ArrayLike, command: Array, n_steps: int) -> Array:
+        """A command (n, 3) of fins that all work after some Levenberg-Marquardt steps."""
+        target = np.asarray(wrench, dtype=float)[None] / self.normalization.std
+        found = refine(self.pipeline.prepare(layout).commands, target, command[None], n_steps)
+        return np.asarray(found.command[0])
+
+    def _check_policy(self, policy: Policy) -> None:
+        """All policies are known."""
+
+    def _solve_by(
+        self, policy: Policy, layout: Layout, target: Array, *, seed: int, previous: Array | None
+    ) -> Solution:
+        if policy.is_plain:
+            return self._solve(layout, target, seed=seed, previous=previous)
+        plain = self._solve(layout, target, seed=seed, previous=previous, fallback=lambda *_: None)
+        if self._reaches(layout, plain, target)[0]:
+            return plain
+        # What the policy asks for within reach is one wrench; that one is then delivered as any other.
+        std = self.normalization.std
+        served = _within_reach(self.pipeline.prepare(layout).planar, policy, target[0] / std)
+        return self._solve(
+            layout, served.wrench * std, seed=seed, previous=previous, fallback=lambda *_: served.force
+        )
+
+
+def _checked_objective(name: Name, weights: EnergyWeights, copper_loss: float) -> Objective:
+    if name not in ("power", "effort"):
+        raise AllocationError(f"objective: expected 'power' or 'effort', got {name!r}")
+    if not isinstance(weights, EnergyWeights):
+        raise TypeError(f"energy_weights: expected EnergyWeights, got {weights!r}")
+    if not 0.0 <= copper_loss < np.inf:
+        raise AllocationError(f"copper_loss: expected watts per (N m)^2, from 0, got {copper_loss!r}")
+    return Objective(name, weights, float(copper_loss))
+
+
+def _within_reach(problem: PlanarProblem, policy: Policy, target: Array) -> Nearest:
+    """The one wrench to deliver in place of one that is out of reach, normalized, and forces that do so.
+
+    Args:
+        problem: the layout.
+        policy: what counts.
+        target: the wrench (6,) that was asked for.
+    """
+    sets = planar_sets(problem)
+    if policy.kind == "direction":
+        return nearest_along(sets, target)
+    if policy.kind == "priority":
+        return nearest_in_turn(sets, target, policy.groups)
+    weights = np.array(policy.axis_weights, np.float64)
+    with np.errstate(divide="ignore"):
+        return nearest(sets, target[None], (weights.max() / weights) ** 2)
+
+
+def _candidates(
+    refined: RefinedCandidates, std: Array, layout: Layout, names: tuple[str, ...]
+) -> Candidates:
+    """The refined answers to a single target, from seeds of these names."""
+    command, wrench, error, _, origin = (values[0] for values in refined)
+    source = tuple(names[k] if 0 <= k < len(names) else "another start" for k in origin.tolist())
+    return Candidates(command, wrench * std, error, *costs(layout, command), source)
+
+
+def _seed_names(layout: Layout) -> tuple[str, ...]:
+    """What a candidate is called by the fins that its seed rests."""
+    names = layout.names
+    return tuple(
+        f"without {' and '.join(names[i] for i in fins)}" if fins else "all fins"
+        for fins in resting_fins(len(names))
+    )

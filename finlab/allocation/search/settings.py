@@ -1,0 +1,54 @@
+"""What can be set of the default method, and the same names for editors and type checkers.
+
+A test holds the typed options against the settings.
+"""
+
+from dataclasses import dataclass
+from typing import TypedDict
+
+import numpy as np
+
+from finlab.errors import AllocationError
+from finlab.physics.energy import EnergyWeights
+from finlab.physics.objective import Name
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How widely and how long the search goes."""
+
+    n_refined: int = 4
+    """Allocations that are refined and offered as candidates."""
+    search_steps: int | None = None
+    """Quadratic problems solved in turn by the search in force space; None: as many as the objective and the
+    number of fins ask for."""
+    refine_steps: int = 1
+    """Levenberg-Marquardt steps on the commands, by the fins' own laws."""
+    subsets: bool = True
+    """Whether allocations that rest some fins are searched, where the objective may prefer them."""
+    energy_tradeoff: float = 0.0
+    """w of the weighted sum `err_norm^2 + w J_en` to minimize, with objective `effort`; 0: the least cost
+    among exact answers."""
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.energy_tradeoff < np.inf:
+            raise AllocationError(f"energy_tradeoff: expected a number from 0, got {self.energy_tradeoff}")
+        if self.n_refined < 1 or self.refine_steps < 0 or (self.search_steps or 1) < 1:
+            raise AllocationError(
+                "method 'search' needs at least one refined answer, one step of search and no negative number "
+                f"of refining steps, got n_refined={self.n_refined}, search_steps={self.search_steps}, "
+                f"refine_steps={self.refine_steps}"
+            )
+
+
+class SearchOptions(TypedDict, total=False):
+    """Settings of the method `search`."""
+
+    objective: Name
+    energy_weights: EnergyWeights
+    copper_loss: float
+    n_refined: int
+    search_steps: int | None
+    refine_steps: int
+    subsets: bool
+    energy_tradeoff: float
