@@ -23,7 +23,7 @@ LONGEST_TURN = 0.3
 
 
 class Rim(NamedTuple):
-    """What R rows of n fins can do in given directions."""
+    """What R rows of n fins can do in given directions; (n,) where all fins are the same all round."""
 
     largest: Array
     """Largest force (R, n) [N]."""
@@ -32,7 +32,7 @@ class Rim(NamedTuple):
     bend: Array | float
     """Derivative of the largest force by the direction (R, n) [N/rad]."""
     first: Array
-    """Row of the table (R, n) just before the direction."""
+    """Direction (R, n) of the table just before this one, counted through all fins."""
     part: Array | None
     """How far towards the next row (R, n); None where there is but one."""
 
@@ -136,7 +136,7 @@ class Envelopes:
         start, gap, first, largest, smallest = self._grid
         count = self.largest.shape[1]
         if count == 1:
-            return Rim(*np.broadcast_arrays(largest, smallest, direction)[:2], 0.0, first, None)
+            return Rim(largest, smallest, 0.0, first, None)
         # Directions just before the first one belong to it, not to the last: counted from half a gap before.
         place = np.mod(direction - start + 0.5 * gap, TURN)
         place = np.minimum(np.maximum((place - 0.5 * gap) / gap, 0.0), count - 1)
@@ -150,7 +150,7 @@ class Envelopes:
 
     def lookup(self, rim: Rim, size: Array) -> Array:
         """Rows (R, n, 8) of the tables for forces of sizes (R, n) [N] in the directions of a rim."""
-        share = (size - rim.smallest) / np.maximum(rim.largest - rim.smallest, LEAST)
+        share = (size - rim.smallest) / (rim.largest - rim.smallest + LEAST)
         np.minimum(np.maximum(share, 0.0, out=share), 1.0, out=share)
         np.sqrt(np.sqrt(share, out=share), out=share)
         place = np.arcsin(share, out=share)

@@ -42,6 +42,9 @@ IDLE = 2e-3
 """Share of its largest force up to which a fin turns to its cheapest direction: refinement makes up for it."""
 LAST_STEPS = 2
 """Semismooth Newton steps at the end."""
+SETTLED = 2e-3
+"""Change of every force, as a share of the fin's largest, from which on another step would change the cost in
+its sixth digit."""
 
 
 class PlanarProblem(NamedTuple):
@@ -131,7 +134,7 @@ def descend(
         problem: the layout.
         target: normalized wrenches (R, 6), or one for all rows (1, 6).
         seeds: sizes of forces (R, n) [N]; directions follow from the target.
-        steps: quadratic problems that are solved in turn, one or more.
+        steps: most quadratic problems that are solved in turn, one or more; fewer where forces settle.
         works: 0 where a fin has to rest (R, n), else 1; by default every fin may work.
     """
     fins, (rows, n) = problem.fins, seeds.shape
@@ -142,9 +145,13 @@ def descend(
     cut = np.ones((rows, n))
     if works is not None:
         mobility *= works[:, None]
+    settled, before = SETTLED * fins.maximum, None
     for _ in range(steps):
         multiplier = _multiplier(problem, target, response)
         force, size = _answer(problem, response, multiplier)
+        if before is not None and (np.abs(force - before) <= settled).all():
+            break
+        before = force
         found = fins.project(force, size)
         cut *= found.rim.largest / size
         np.minimum(cut, 1.0 if works is None else works, out=cut)

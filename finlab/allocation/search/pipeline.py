@@ -45,9 +45,10 @@ class SearchNumbers:
     promising_error: float = 0.02
     """Normalized error below which a search in force space counts as successful: refinement removes the
     rest."""
-    convex_steps: int = 7
-    """Quadratic problems for a cost that grows faster than force: Newton's method, which doubles its digits."""
-    few_fins_steps: int = 7
+    convex_steps: int = 12
+    """Most quadratic problems for a cost that grows faster than force; by Newton's method, most forces settle
+    after five."""
+    few_fins_steps: int = 8
     """The same for other costs with up to five fins."""
     many_fins_steps: int = 12
     """The same from six fins on, where there are more local minima to leave."""

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import fields
+from functools import lru_cache
 from typing import Any, Self
 
 import numpy as np
@@ -200,10 +201,11 @@ def _candidates(
 ) -> Candidates:
     """The refined answers to a single target, from seeds of these names."""
     command, wrench, error, _, origin = (values[0] for values in refined)
-    source = tuple(names[k] if 0 <= k < len(names) else "another start" for k in origin.tolist())
+    source = tuple([names[k] if 0 <= k < len(names) else "another start" for k in origin.tolist()])
     return Candidates(command, wrench * std, error, *costs(layout, command), source)
 
 
+@lru_cache(maxsize=128)
 def _seed_names(layout: Layout) -> tuple[str, ...]:
     """What a candidate is called by the fins that its seed rests."""
     names = layout.names
