@@ -1,6 +1,5 @@
 """Methods on hostile robots: are answers finite, within the limits and in time, without other errors?"""
 
-import sys
 import tempfile
 import time
 import warnings
@@ -11,13 +10,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.policy import KINDS
 from finlab.errors import FinlabError
 from finlab.evaluation.hostile_cases import hostile_robot, hostile_targets
 from finlab.evaluation.method_specs import is_slow
+from finlab.evaluation.progress import progress
 from finlab.evaluation.statistics.tables import text_table
 from finlab.layout import FinModelSpec, Layout
 from finlab.physics import make_law, write_table
@@ -100,7 +99,7 @@ def fuzz_methods(
     with tempfile.TemporaryDirectory() as folder:
         table = _force_table(Path(folder))
         numbers = range(first_robot, first_robot + n_robots)
-        for number in tqdm(numbers, unit="robot", disable=None, leave=False, file=sys.stderr):
+        for number in progress(numbers, "robot"):
             layout = hostile_robot(number, seed, table)
             targets = hostile_targets(layout, n_targets, number, seed)
             for count in counts:

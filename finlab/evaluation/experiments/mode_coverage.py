@@ -6,18 +6,17 @@ modes. Among those of reasonable energy, a mode counts as covered if the allocat
 the same.
 """
 
-import sys
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, Ipopt
 from finlab.allocation.baselines.single_target import Problem
 from finlab.allocation.modes import cluster, mode_signature, same_signature
+from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.layout import Layout
@@ -74,7 +73,7 @@ def mode_rows(
     """
     truth = CheapestWays(allocator.normalization)
     found: dict[int, list[Row]] = {}
-    for case in tqdm(cases, unit="layout", disable=None, leave=False, file=sys.stderr):
+    for case in progress(cases, "layout"):
         layout = case.layout.without(case.failed) if case.failed else case.layout
         for target in case.targets:
             compared = _compare(allocator, truth, layout, target, n_starts, seed)

@@ -5,20 +5,19 @@ Levenberg-Marquardt steps on the surrogate and scored by the plant. Of each targ
 the surrogate picks the answer: the cheapest exact one, or the most exact one.
 """
 
-import sys
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
-from tqdm import tqdm
 
 from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.allocation.learned.levenberg_marquardt import refine
 from finlab.allocation.learned.prepared import Prepared
 from finlab.allocation.learned.proposal import propose
 from finlab.allocation.learned.refined_candidates import RANKING
+from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.evaluation.statistics.tables import MET, Row, text_table
@@ -45,7 +44,7 @@ def seed_rows(
         seed: of all draws.
     """
     found: dict[tuple[int, str, int], list[tuple[Array, Array, Array]]] = {}
-    for k, case in enumerate(tqdm(cases, unit="layout", disable=None, leave=False, file=sys.stderr)):
+    for k, case in enumerate(progress(cases, "layout")):
         layout = case.layout.without(case.failed) if case.failed else case.layout
         prepared, plant = allocator.pipeline.prepare(layout), Plant(layout)
         for kind in KINDS:

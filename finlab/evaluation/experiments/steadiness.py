@@ -5,15 +5,14 @@ an even spread over the fins never asks for more than half of any fin's thrust. 
 `allocate`; with `previous` it is given the last command. Every answer is scored by the plant.
 """
 
-import sys
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
+from finlab.evaluation.progress import progress
 from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
@@ -119,7 +118,7 @@ def steadiness_rows(
         seed: of the first path; the others follow.
     """
     rows = []
-    for layout in tqdm(layouts, unit="layout", disable=None, leave=False, file=sys.stderr):
+    for layout in progress(layouts, "layout"):
         free, steady, forced = [], [], []
         for k in range(n_paths):
             path = smooth_path(layout, allocator.normalization.std, seed + k, ticks)

@@ -1,24 +1,23 @@
 """The paper's figure A: what the temperature of the draw does, and what refinement does to a candidate."""
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from finlab.allocation.learned.settings import PaperOptions
 from finlab.allocation.methods import load_allocator
+from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
+from finlab.evaluation.statistics.records import Columns
 from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.layout import Layout
 from finlab.layout.angles import is_full_turn
 
 Array = NDArray[Any]
-Columns = dict[str, Array]
 
 TEMPERATURES = tuple(float(t) for t in np.logspace(-3, 1, 13))
 """From 0.001 to 10, three to a decade."""
@@ -49,7 +48,7 @@ def temperature_columns(
     options: PaperOptions = {"n_candidates": n_candidates, "temperature": temperature, "refinement": "none"}
     allocator = load_allocator("paper", checkpoint=checkpoint, **options)
     rows: list[tuple[float, ...]] = []
-    for k, case in enumerate(tqdm(cases, unit="layout", disable=None, leave=False, file=sys.stderr)):
+    for k, case in enumerate(progress(cases, "layout")):
         layout = case.layout.without(case.failed) if case.failed else case.layout
         for number, target in enumerate(case.targets):
             samples = allocator.allocate(layout, target, seed=seed).samples
@@ -108,8 +107,8 @@ def diversity(command: Array, layout: Layout) -> float:
 
 def temperature_rows(cases: Sequence[Case], **options: Any) -> list[Row]:
     """The table's rows, one per temperature; options as in `temperature_columns`."""
-    bar = tqdm(TEMPERATURES, unit="temperature", disable=None, leave=False, file=sys.stderr)
-    return [temperature_row(value, temperature_columns(cases, value, **options)) for value in bar]
+    values = progress(TEMPERATURES, "temperature")
+    return [temperature_row(value, temperature_columns(cases, value, **options)) for value in values]
 
 
 def temperature_row(temperature: float, columns: Columns) -> Row:

@@ -6,18 +6,17 @@ model; the answers are scored by the plant. `closest` and the first group of `pr
 error, `direction` by the share of the target that is delivered and by what is delivered beside it.
 """
 
-import sys
 from collections.abc import Sequence
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, import_casadi
 from finlab.allocation.policy import KINDS, Policy
+from finlab.evaluation.progress import progress
 from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.layout import Layout, random_layout
 from finlab.layout.angles import is_full_turn
@@ -109,8 +108,7 @@ def unreachable_rows(allocator: Allocator, *, n_layouts: int = 50, seed: int = 0
     rows = []
     for limits in ("nominal", "varied"):
         scores: dict[str, list[Score]] = {kind: [] for kind in KINDS}
-        numbers = range(n_layouts)
-        for k in tqdm(numbers, desc=limits, unit="layout", disable=None, leave=False, file=sys.stderr):
+        for k in progress(range(n_layouts), "layout", limits):
             rng = np.random.default_rng((DOMAIN, seed, k))
             layout = random_layout(rng, n_fins=int(rng.integers(FINS[0], FINS[1] + 1)), limits=limits)
             target = _far_target(rng, layout, allocator.normalization.std)

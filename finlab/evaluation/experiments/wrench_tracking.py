@@ -1,17 +1,16 @@
 """Wrench tracking: methods over a split, every answer scored by the plant."""
 
-import sys
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.single_target import DEFAULT_STARTS
 from finlab.evaluation.method_specs import method_and_starts
 from finlab.evaluation.paper_figures import paper_wrench_rows
+from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.records import Records, join_records
 from finlab.evaluation.statistics.tables import (
@@ -50,9 +49,7 @@ def run_method(
         first: only the first so many targets of each layout, solved together.
     """
     parts = []
-    # disable=None: a bar on a terminal, nothing elsewhere
-    bar = tqdm(cases, desc=allocator.name, unit="layout", disable=None, leave=False, file=sys.stderr)
-    for k, case in enumerate(bar):
+    for k, case in enumerate(progress(cases, "layout", allocator.name)):
         if single is None:
             targets = case.targets[:first]
             answer = allocator.allocate_batch(case.layout, targets, failed=case.failed, seed=seed)

@@ -21,9 +21,9 @@ from finlab.evaluation.experiments.trajectory_and_velocity import (
 from finlab.evaluation.experiments.wrench_tracking import run_method, score
 from finlab.evaluation.method_specs import load_method_spec, load_method_specs
 from finlab.evaluation.plots.closed_loop_experiments import Track
-from finlab.evaluation.report.jobs import Columns, columns_of_rows
+from finlab.evaluation.report.jobs import columns_of_rows
 from finlab.evaluation.splits import make_split
-from finlab.evaluation.statistics.records import columns_of_records, join_records
+from finlab.evaluation.statistics.records import Columns, columns_of_records, join_records
 from finlab.layout import load_layout
 from finlab.sim import make_trajectory
 
@@ -74,10 +74,7 @@ def ablation(
     method = ablation_method(
         variant, refinement, checkpoint=checkpoint, n_candidates=candidates, temperature=temperature
     )
-    scored = run_variant(method, make_split("id", layouts, targets, seed), seed=seed)
-    by_surrogate = scored.surrogate
-    believed = {f"surrogate_{key}": getattr(by_surrogate, key) for key in ("err_norm", "err_phys")}
-    return columns_of_records(scored.plant) | believed | {"call_s": np.array(scored.call_s)}
+    return run_variant(method, make_split("id", layouts, targets, seed), seed=seed)
 
 
 def temperature(
@@ -112,12 +109,13 @@ def latency(
     checkpoint: str | None,
     paper_checkpoint: str | None,
 ) -> Columns:
-    """Rows of the comparison of times; to be run with nothing beside it."""
+    """Rows of the comparison of times, the fastest first; to be run with nothing beside it."""
     cases = latency_cases(LATENCY_FINS, seed)
     allocators = {
         name: load_method_spec(name, paper_checkpoint if name == "paper" else checkpoint) for name in methods
     }
-    return columns_of_rows(latency_rows(allocators, cases, n_calls=calls, budget_s=budget_s))
+    rows = latency_rows(allocators, cases, n_calls=calls, budget_s=budget_s)
+    return columns_of_rows(sorted(rows, key=lambda row: row["p50_ms"]))
 
 
 def training(

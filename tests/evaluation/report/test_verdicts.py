@@ -133,9 +133,6 @@ def test_the_summary_compares_every_table_it_has() -> None:
             },
             {"method": "sqp", "fins": 4, "energy_ratio": None},
         ],
-        latency_rows=[
-            {"method": m, "p50_ms": t, "p50_ms_interval": (t, t)} for m, t in (("learned", 2.0), ("qp", 0.1))
-        ],
         ablation_rows=[
             {
                 "variant": "ours",
@@ -145,7 +142,15 @@ def test_the_summary_compares_every_table_it_has() -> None:
                 "err_norm_mean_interval": (0.03, 0.05),
             }
         ],
-        swim_rows={
+        tables={
+            "latency": [
+                {"method": m, "p50_ms": t, "p50_ms_interval": (t, t)}
+                for m, t in (("learned", 2.0), ("qp", 0.1))
+            ],
+            "seeds": [
+                {"seeds": k, "steps": 1, "fins": 3, "err_norm_mean": e, "err_norm_mean_interval": (e, e)}
+                for k, e in (("network", 0.01), ("random", 0.5))
+            ],
             "trajectory": [
                 {**closed_loop, "layout": "A", "method": m, "ate": a}
                 for m, a in (("learned", 0.03), ("on-board", 0.06))
@@ -155,10 +160,6 @@ def test_the_summary_compares_every_table_it_has() -> None:
                 for m, w in (("learned-power", 1.0), ("analytic", 2.0))
             ],
         },
-        seed_rows=[
-            {"seeds": k, "steps": 1, "fins": 3, "err_norm_mean": e, "err_norm_mean_interval": (e, e)}
-            for k, e in (("network", 0.01), ("random", 0.5))
-        ],
     )
     found = [(one.measure, one.case, one.against, one.verdict) for one in comparisons(results)]
     assert found == [

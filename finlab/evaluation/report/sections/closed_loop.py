@@ -22,7 +22,7 @@ FAULT_WORDS = {"healthy": "healthy", "one_fin": "one fin lost", "two_fins": "two
 
 def closed_loop_blocks(results: Results) -> list[Block]:
     """Every experiment that has run."""
-    rows = results.swim_rows
+    rows = results.tables
     blocks: list[Block] = []
     if "trajectory" in rows:
         blocks += _trajectory(rows["trajectory"], results)
@@ -30,8 +30,6 @@ def closed_loop_blocks(results: Results) -> list[Block]:
         blocks += _faults(rows["faults"])
     if "velocity" in rows:
         blocks += _velocity(rows["velocity"])
-    if not blocks:
-        return []
     return [
         "## Closed loop",
         (
@@ -57,7 +55,7 @@ def _trajectory(rows: Sequence[Row], results: Results) -> list[Block]:
         "### Trajectories",
         Figure.drawn(
             "paths",
-            draw_layouts(tracks_of_columns(results.columns(results.plan.swims["trajectory"])), rows),
+            draw_layouts(tracks_of_columns(results.columns(results.plan.tables["trajectory"])), rows),
             "One run on each of the paper's layouts: from above, and its depth over time.",
         ),
         Table(columns, shown),

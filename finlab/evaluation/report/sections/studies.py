@@ -22,8 +22,7 @@ REFINED_BY = {"adam": "Adam", "levenberg-marquardt": "Levenberg-Marquardt"}
 
 def latency_blocks(results: Results) -> list[Block]:
     """Methods side by side in one run."""
-    if not results.latency_rows:
-        return []
+    rows = results.tables["latency"]
     paper_ms = paper_figures()["inference"]["cycle_s"] * 1e3
     printed: Row = {"method": "paper's cycle, printed (Jetson Orin Nano)", "p50_ms": paper_ms}
     columns = (
@@ -41,17 +40,15 @@ def latency_blocks(results: Results) -> list[Block]:
         ),
         Figure.drawn(
             "latency",
-            latency_dots(results.latency_rows, paper_ms),
+            latency_dots(rows, paper_ms),
             "Dots are medians, bars end at the 99th percentile.",
         ),
-        Table(columns, [*map(method_row, results.latency_rows), {**printed, "_kind": "printed"}]),
+        Table(columns, [*map(method_row, rows), {**printed, "_kind": "printed"}]),
     ]
 
 
 def ablation_blocks(results: Results) -> list[Block]:
     """The paper's five rows, twice refined, twice scored."""
-    if not results.ablation_rows:
-        return []
     printed = paper_figures()["ablation"]
     rows = results.ablation_rows
     blocks: list[Block] = [
@@ -102,8 +99,6 @@ def ablation_blocks(results: Results) -> list[Block]:
 
 def temperature_blocks(results: Results) -> list[Block]:
     """The paper's figure A."""
-    if not results.temperature_rows or not results.plan.scatter:
-        return []
     rows = results.temperature_rows
     best = min(rows, key=lambda row: row["best_j_mean"])
     columns = (
@@ -135,8 +130,7 @@ def temperature_blocks(results: Results) -> list[Block]:
 
 def seed_blocks(results: Results) -> list[Block]:
     """The network's seeds against random ones."""
-    if not results.seed_rows:
-        return []
+    rows = results.tables["seeds"]
     columns = (
         Column("fins", "fins"),
         Column("steps", "steps"),
@@ -147,22 +141,20 @@ def seed_blocks(results: Results) -> list[Block]:
         Column("success_0.05", "within 0.05", "share"),
         Column("energy_over_network", "energy over the network's", "ratio"),
     )
-    rows = [{**r, "_kind": "ours"} if r["seeds"] == "network" else r for r in results.seed_rows]
+    shown = [{**row, "_kind": "ours"} if row["seeds"] == "network" else row for row in rows]
     return [
         "## What learning buys",
         (
             "The network's best 16 candidates against 16 random and 16 quasi-random ones, refined by the "
             "same number of Levenberg-Marquardt steps on the surrogate, scored by the plant."
         ),
-        Figure.drawn("seeds", seed_lines(results.seed_rows), "Mean error against refinement steps."),
-        Fold("The numbers", (Table(columns, rows),)),
+        Figure.drawn("seeds", seed_lines(rows), "Mean error against refinement steps."),
+        Fold("The numbers", (Table(columns, shown),)),
     ]
 
 
 def training_blocks(results: Results) -> list[Block]:
     """Small trainings with one thing changed."""
-    if not results.training_rows:
-        return []
     rows = results.training_rows
     settings = next(iter(results.plan.training.values())).settings
     columns = (

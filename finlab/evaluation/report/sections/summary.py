@@ -72,28 +72,30 @@ def comparisons(results: Results) -> list[Comparison]:
             beside = with_printed([{**row, "method": "paper"}], "err_norm_mean", means)
             where = f"ablation by the {row['scored_by']}"
             accuracy += compare("mean error", beside, "err_norm_mean", where, ("paper",))
+    tables = results.tables
+    seed_table = tables.get("seeds", [])
     seeds = [
         one
-        for steps in dict.fromkeys(row["steps"] for row in results.seed_rows)
+        for steps in dict.fromkeys(row["steps"] for row in seed_table)
         for one in compare(
             f"mean error of seeds, {steps} steps",
-            [row for row in results.seed_rows if row["steps"] == steps],
+            [row for row in seed_table if row["steps"] == steps],
             "err_norm_mean",
             _fins,
             ("network",),
             "seeds",
         )
     ]
-    swims, power = results.swim_rows, ("learned-power", OURS)
-    faults = [row for row in swims.get("faults", ()) if row["controllable"]]
+    power = ("learned-power", OURS)
+    faults = [row for row in tables.get("faults", ()) if row["controllable"]]
     return [
         *accuracy,
         *compare("energy", energy, "energy_ratio", _fins),
-        *compare("time per call", results.latency_rows, "p50_ms", "4 fins"),
-        *compare("ATE", swims.get("trajectory", ()), "ate", lambda row: f"layouts {row['layout']}"),
+        *compare("time per call", tables.get("latency", ()), "p50_ms", "4 fins"),
+        *compare("ATE", tables.get("trajectory", ()), "ate", lambda row: f"layouts {row['layout']}"),
         *compare("ATE, fins lost", faults, "ate", lambda row: row["fault"]),
-        *compare("inertial power", swims.get("velocity", ()), "inertial_w", _speed, power),
-        *compare("speed error", swims.get("velocity", ()), "mae", _speed, power),
+        *compare("inertial power", tables.get("velocity", ()), "inertial_w", _speed, power),
+        *compare("speed error", tables.get("velocity", ()), "mae", _speed, power),
         *seeds,
     ]
 
@@ -132,13 +134,13 @@ def _cards(results: Results, tables: dict[str, list[Row]]) -> list[Card]:
                 f"{row['resting']:.2f} fins rest on average",
             )
         )
-    times = {row["method"]: row for row in results.latency_rows}
+    times = {row["method"]: row for row in results.tables.get("latency", ())}
     if OURS in times:
         mine = times[OURS]
         others = [f"`{n}` {three(times[n]['p50_ms'])}" for n in ("paper", "ipopt", "trf") if n in times]
         detail = f"99th percentile {three(mine['p99_ms'])}; {', '.join(others)} ms"
         cards.append(Card(f"{three(mine['p50_ms'])} ms", "one call, median, four fins", detail))
-    swum = {r["method"]: r for r in results.swim_rows.get("trajectory", ()) if r["layout"] == "all"}
+    swum = {r["method"]: r for r in results.tables.get("trajectory", ()) if r["layout"] == "all"}
     if OURS in swum:
         beside = paper_figures()["trajectory"]["all"]["ate"]
         detail = f"in our simulation; paper, in another: {100 * beside:.1f} cm"
