@@ -92,10 +92,10 @@ def train_and_run(
         folder,
         surrogate=resolve_checkpoint(change.surrogate),
         seed=seed,
+        network=change.network,
         steps=steps,
         batch_size=batch_size,
-        overrides=change.training,
-        network_overrides=change.network,
+        **change.training,
     )
     train_s = time.perf_counter() - start
     physics = read_checkpoint(resolve_checkpoint("default"))

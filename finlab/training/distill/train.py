@@ -24,6 +24,7 @@ from finlab.physics.energy import command_energy
 from finlab.training.distill.answers import Answers, AnswerSettings, read_answers, write_answers
 from finlab.training.distill.network import FastConfig, FastNetwork, decode, energy
 from finlab.training.loop import LoopSettings, train
+from finlab.training.saving import state_of
 
 SEED = 80_000
 """Added to the user's seed."""
@@ -31,18 +32,8 @@ ENERGY_WEIGHT = 0.3
 """Weight of the cost beyond the best answer's, in units of that answer's energy."""
 
 
-@dataclass(frozen=True)
-class FastSettings:
-    """How to train the distilled network."""
-
-    steps: int = 20_000
-    """Optimizer steps."""
-    batch_size: int = 1024
-    """Targets per step."""
-    learning_rate: float = 2e-3
-    """Peak learning rate."""
-    seed: int = 0
-    """Seed of first weights and batches."""
+FAST_TRAINING = LoopSettings(20_000, 1024, 2e-3, warmup=200, ema=0.999)
+"""How the distilled network is trained."""
 
 
 def train_fast(
@@ -50,7 +41,7 @@ def train_fast(
     out: Path,
     *,
     config: FastConfig,
-    settings: FastSettings,
+    settings: LoopSettings,
     data: AnswerSettings,
     stop_after: int | None = None,
 ) -> dict[str, float]:
@@ -64,31 +55,35 @@ def train_fast(
     n = len(answers.position)
     cut = min(round(n * 0.98), n - 1)
     learned, judged = (Answers(*(a[rows] for a in answers)) for rows in (slice(cut), slice(cut, None)))
-    torch.manual_seed(SEED + settings.seed)
+    torch.manual_seed(SEED + data.seed)
     network = FastNetwork(config, FIN_FRAME_SIZE)
     batches = Batches(learned, allocator.normalization)
 
     def terms(net: nn.Module, step: int) -> dict[str, Tensor]:
-        rng = np.random.default_rng([SEED + settings.seed, step])
+        rng = np.random.default_rng([SEED + data.seed, step])
         return losses(net, batches.draw(rng, settings.batch_size))
 
     identity: dict[str, Any] = {"fast": asdict(settings) | asdict(config), "answers": asdict(data)}
-    loop = LoopSettings(
-        settings.steps, settings.batch_size, settings.learning_rate, warmup=200, ema=0.999, log_every=100
+
+    def save(weights: dict[str, Tensor], **about: object) -> None:
+        fast = FastWeights(state_of(weights), config.rounds)
+        save_fast(out, fast, identity | {"checkpoint": allocator.checkpoint} | about)
+
+    weights = train(
+        network,
+        terms,
+        settings,
+        out,
+        identity,
+        stop_after=stop_after,
+        on_save=lambda weights, step: save(weights, step=step),
     )
-
-    def save(weights: dict[str, Tensor], step: int) -> None:
-        fast = FastWeights({k: v.detach().numpy() for k, v in weights.items()}, config.rounds)
-        save_fast(out, fast, identity | {"checkpoint": allocator.checkpoint, "step": step})
-
-    weights = train(network, terms, loop, out, identity, stop_after=stop_after, on_save=save)
     network.load_state_dict(weights, strict=True)
     with torch.inference_mode():
         held_out = losses(network, Batches(judged, allocator.normalization).all())
-    fast = FastWeights({k: v.detach().numpy() for k, v in weights.items()}, config.rounds)
     metrics = {f"held_out_{name}": float(value) for name, value in held_out.items()}
-    metrics |= fast_metrics(allocator, fast)
-    save_fast(out, fast, identity | {"checkpoint": allocator.checkpoint, "metrics": metrics})
+    metrics |= fast_metrics(allocator, FastWeights(state_of(weights), config.rounds))
+    save(weights, metrics=metrics)
     return metrics
 
 
