@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from finlab.evaluation.experiments.closed_loop_runs import Row, Run
 from finlab.evaluation.experiments.faults import ALLOWED, HEALTHY
-from finlab.evaluation.plots.style import BLACK, COLOURS, GREY, Picture, clean, picture
+from finlab.evaluation.plots.style import BLACK, COLOURS, GREY, Picture, picture
 
 Array = NDArray[np.float64]
 
@@ -57,9 +57,6 @@ def draw_layouts(tracks: Sequence[Track], rows: Sequence[Row]) -> Picture:
             depth.set(xlabel="time [s]")
         view.axes[0].set_ylabel("y [m]")
         view.axes[len(layouts)].set_ylabel("z [m]")
-        for axis in view.axes:
-            clean(axis)
-        view.legend()
         return view
 
 
@@ -90,8 +87,6 @@ def draw_faults(rows: Sequence[Row], printed: Mapping[str, float] | None = None)
         axis.set_yticks(range(len(names)), names)
         axis.set_ylim(len(names) - 0.5, -0.5)
         axis.set(xlabel=f"ATE [m]; dashed: {ALLOWED} times that of the healthy robot", xlim=(0.0, None))
-        clean(axis)
-        view.legend()
         return view
 
 
@@ -99,7 +94,7 @@ def draw_velocity(runs: Sequence[Run]) -> Picture:
     """Speed over time of every run, under (speed, method's name), and power against its error."""
     methods = list(dict.fromkeys(method for (_, method), _ in runs))
     speeds = dict.fromkeys(speed for (speed, _), _ in runs)
-    with picture(1, 2, height=3.4, gridspec_kw={"width_ratios": [1.5, 1]}) as view:
+    with picture(1, 2, height=3.4, legend=len(methods), width_ratios=(1.5, 1)) as view:
         over_time, trade = view.axes
         for (_, method), log in runs:
             over_time.plot(log.time, log.motion[:, 0], color=COLOURS.get(method, GREY), lw=0.7, alpha=0.7)
@@ -116,7 +111,4 @@ def draw_velocity(runs: Sequence[Run]) -> Picture:
             xlabel="MAE of the speed [m/s]", ylabel="inertial power [W]", title="Left and low is better"
         )
         trade.set(xlim=(0.0, None), ylim=(0.0, None))
-        for axis in view.axes:
-            clean(axis)
-        view.legend(ncols=len(methods))
         return view

@@ -1,9 +1,6 @@
 """Pictures of one swim: path, errors, commands, wrench asked against delivered."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,15 +17,11 @@ from finlab.evaluation.plots.style import (
     VERMILION,
     YELLOW,
     Picture,
-    clean,
     picture,
 )
 from finlab.layout.angles import wrapped
 from finlab.sim import RunLog
 from finlab.sim.vehicle import euler
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 
@@ -64,14 +57,12 @@ def draw_path(log: RunLog) -> Picture:
                 at = log.position[int(np.searchsorted(log.time, time))]
                 axis.plot(*at[[0, second]], "X", color=VERMILION, ms=8, label=f"{name} lost at {time:.0f} s")
             axis.set(xlabel="x [m]", ylabel=label)
-            clean(axis)
         above.set_aspect("equal", adjustable="datalim")
         above.set_title("From above")
         side.set_title("From the side")
         low, high = side.get_ylim()
         middle = 0.5 * (low + high)
         side.set_ylim(min(low, middle - 0.3), max(high, middle + 0.3))
-        drawn.legend()
         return drawn
 
 
@@ -135,18 +126,12 @@ def draw_wrench(log: RunLog) -> Picture:
 
 
 def _finish(drawn: Picture, log: RunLog) -> None:
-    """Grid, marks of failures and the legend."""
+    """The whole run in time, with a mark where a fin is lost on the way."""
     for axis in drawn.axes:
-        clean(axis)
         axis.set_xlim(0.0, float(log.time[-1]))
-        _mark(axis, log)
-    drawn.legend()
-
-
-def _mark(axis: Axes, log: RunLog) -> None:
-    for time, name in failures(log):
-        if time > 0.0:
-            axis.axvline(time, color=SOFT, lw=1.0, ls=(0, (4, 3)), label=f"{name} lost")
+        for time, name in failures(log):
+            if time > 0.0:
+                axis.axvline(time, color=SOFT, lw=1.0, ls=(0, (4, 3)), label=f"{name} lost")
 
 
 def _broken(angle: Array) -> Array:

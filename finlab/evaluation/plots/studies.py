@@ -10,14 +10,14 @@ from finlab.evaluation.plots.style import (
     BLACK,
     BLUE,
     COLOURS,
+    DASHES,
     GREEN,
     GREY,
-    INK,
     ORANGE,
     SOFT,
     VERMILION,
     Picture,
-    clean,
+    mark_printed,
     picture,
 )
 
@@ -27,18 +27,16 @@ SEEDS = {"network": BLUE, "random": GREY, "quasi-random": ORANGE}
 def latency_dots(rows: Sequence[dict[str, Any]], paper_ms: float) -> Picture:
     """Median and 99th percentile of each method's calls."""
     ordered = sorted(rows, key=lambda row: row["p50_ms"])
-    with picture(height=0.9 + 0.26 * len(rows)) as view:
+    with picture(height=0.9 + 0.26 * len(rows), grid="x") as view:
         (axis,) = view.axes
         for k, row in enumerate(ordered):
             colour = COLOURS[row["method"]]
             axis.plot([row["p50_ms"], row["p99_ms"]], [k, k], color=colour, linewidth=4, alpha=0.45)
             axis.plot(row["p50_ms"], k, "o", color=colour, markersize=7)
-        axis.axvline(paper_ms, color=INK, linestyle=(0, (2, 2)), linewidth=1.2)
-        axis.annotate("the paper's cycle", (paper_ms, -0.9), fontsize=8, ha="center", annotation_clip=False)
+        mark_printed(axis, paper_ms, "the paper's cycle")
         axis.set(xscale="log", xlabel="one call [ms]: median (dot) to 99th percentile")
         axis.set_yticks(range(len(ordered)), [row["method"] for row in ordered])
         axis.invert_yaxis()
-        clean(axis, grid="x")
         return view
 
 
@@ -54,9 +52,7 @@ def seed_lines(rows: Sequence[dict[str, Any]]) -> Picture:
                 axis.set_xticks(range(len(steps)), [str(step) for step in steps])
             axis.set(yscale="log", xlabel="refinement steps")
             axis.set_title(f"{n} fins")
-            clean(axis)
         view.axes[0].set_ylabel("mean normalized error")
-        view.legend()
         return view
 
 
@@ -76,8 +72,6 @@ def training_bars(rows: Sequence[dict[str, Any]], titles: Mapping[str, str]) -> 
         axis.set(xscale="log", xlabel="mean normalized error, by the plant")
         axis.set_yticks(range(len(rows)), [titles[row["change"]] for row in rows])
         axis.invert_yaxis()
-        clean(axis)
-        view.legend()
         return view
 
 
@@ -89,7 +83,7 @@ def ablation_dots(
 ) -> Picture:
     """Mean normalized error of each row; rows of `ablation_row`, `printed` by variant."""
     variants = list(titles)
-    with picture(height=3.1) as view:
+    with picture(height=3.1, legend=3) as view:
         (axis,) = view.axes
         for k, (refinement, colour) in enumerate(COLOUR.items()):
             for scored_by, filled in (("plant", True), ("surrogate", False)):
@@ -115,8 +109,6 @@ def ablation_dots(
         axis.set(xscale="log", xlabel="mean normalized error")
         axis.set_yticks(range(len(variants)), [titles[name] for name in variants])
         axis.invert_yaxis()
-        clean(axis)
-        view.legend(ncols=3)
         return view
 
 
@@ -130,7 +122,7 @@ def figure_a(
     """Left: diversity and best J against T, rows of `temperature_row`. Right: columns of
     `refinement_columns`, one target's candidates, energy against error."""
     temperature = [row["temperature"] for row in rows]
-    with picture(1, 3, height=3.2, width_ratios=(1, 1, 1.25)) as view:
+    with picture(1, 3, height=3.2, legend=0, width_ratios=(1, 1, 1.25)) as view:
         spread, best, right = view.axes
         spread.plot(temperature, [row["diversity"] for row in rows], "o-", color=BLUE, markersize=4)
         spread.set_title("diversity of 64 candidates")
@@ -144,7 +136,7 @@ def figure_a(
         best.set_title("best J among them")
         best.legend(frameon=False)
         for axis in (spread, best):
-            axis.axvline(paper_temperature, color=GREY, linestyle=(0, (2, 2)), linewidth=1.2)
+            axis.axvline(paper_temperature, **DASHES)
             axis.set(xscale="log", xlabel="temperature T")
         for refined, colour, name in ((0, GREY, "drawn"), (1, BLUE, "refined")):
             keep = scatter["refined"] == refined
@@ -155,6 +147,4 @@ def figure_a(
         right.set(yscale="log", xlabel="energy J_en", ylabel="normalized error, by the surrogate")
         right.set_title("candidates, energy and error")
         right.legend(frameon=False, labelcolor=SOFT)
-        for axis in view.axes:
-            clean(axis)
         return view
