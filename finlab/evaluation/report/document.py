@@ -46,6 +46,11 @@ class Column:
     interval: str | None = None
     """Key of an interval [low, high] that stands below the number in small."""
 
+    @property
+    def is_number(self) -> bool:
+        """Whether it stands to the right."""
+        return self.format not in ("text", "code")
+
 
 @dataclass(frozen=True)
 class Table:

@@ -59,7 +59,7 @@ def _html_block(block: Block) -> str:
 
 
 def _html_table(table: Table) -> str:
-    kinds = [' class="name"' if column.format == "text" else "" for column in table.columns]
+    kinds = ["" if column.is_number else ' class="name"' for column in table.columns]
     titles = zip(table.columns, kinds, strict=True)
     lines = ["".join(f"<th{kind}>{_inline(column.title)}</th>" for column, kind in titles)]
     for row in table.rows:
@@ -112,7 +112,7 @@ def _text_block(block: Block, pictures: str) -> str:
 
 def _text_table(table: Table) -> str:
     lines = [[column.title for column in table.columns]]
-    lines.append(["---" if column.format == "text" else "---:" for column in table.columns])
+    lines.append(["---:" if column.is_number else "---" for column in table.columns])
     for row in table.rows:
         shown = [table.cell(row, column) for column in table.columns]
         cells = [f"{big} ({small})" if small else big for big, small in shown]

@@ -53,19 +53,16 @@ def how_made_blocks(results: Results, provenance: Provenance, sizes: Sizes) -> l
     machine = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in provenance.machine.items())
     prints = [f"Checkpoint `{name}`: SHA-256 `{value}`" for name, value in provenance.checkpoints.items()]
     columns = (
-        Column("name", "part"),
+        Column("name", "part", "code"),
         Column("seconds", "seconds", "three"),
         Column("made", "made"),
-        Column("commit", "commit"),
+        Column("commit", "commit", "code"),
         Column("settings", "settings"),
     )
     rows = []
     for job in results.plan:
-        meta = job.result(results.folder).meta
-        settings = {key: value for key, value in meta["settings"].items() if key not in ("work", "prints")}
-        words = ", ".join(f"{key} {value}" for key, value in settings.items())
-        rows.append({"name": f"`{job.name}`", "settings": words, **{k: meta[k] for k in ("seconds", "made")}})
-        rows[-1]["commit"] = f"`{meta['commit']}`"
+        settings = ", ".join(f"{key} {value}" for key, value in job.settings.items())
+        rows.append({**job.result(results.folder).meta, "name": job.name, "settings": settings})
     return [
         "## How this was made",
         "\n".join(

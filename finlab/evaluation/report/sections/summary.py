@@ -8,9 +8,7 @@ from finlab.evaluation.report.verdicts import (
     LEADS,
     LEVEL,
     TRAILS,
-    Comparison,
     compare,
-    comparison_rows,
     standings,
     with_printed,
 )
@@ -18,8 +16,8 @@ from finlab.evaluation.report.verdicts import (
 OURS = "learned"
 STANDINGS = (
     Column("measure", "less is better"),
-    Column("method", "method"),
-    Column("against", "against"),
+    Column("method", "method", "code"),
+    Column("against", "against", "code"),
     Column(LEADS, "it leads"),
     Column(TRAILS, "the other leads"),
     Column(LEVEL, "neither"),
@@ -27,9 +25,9 @@ STANDINGS = (
 COMPARISONS = (
     Column("measure", "less is better"),
     Column("case", "case"),
-    Column("method", "method"),
+    Column("method", "method", "code"),
     Column("ours", "its value", "error", "our_interval"),
-    Column("against", "against"),
+    Column("against", "against", "code"),
     Column("theirs", "the other's", "error", "their_interval"),
     Column("verdict", "it"),
 )
@@ -48,56 +46,43 @@ def summary_blocks(results: Results) -> list[Block]:
             "law itself, the learned allocator knows forward samples only."
         ),
         Table(STANDINGS, standings(found)),
-        Fold("Every comparison, with its values", (Table(COMPARISONS, comparison_rows(found)),)),
+        Fold("Every comparison, with its values", (Table(COMPARISONS, found),)),
     ]
 
 
-def comparisons(results: Results) -> list[Comparison]:
+def comparisons(results: Results) -> list[Row]:
     """Every table's rows against those of the learned allocator."""
-    printed = paper_figures()
-    accuracy = []
+    printed, tables = paper_figures(), results.tables
+    found: list[Row] = []
     for split, rows in results.wrench_rows.items():
         theirs = printed["wrench_tracking"].get(split, {})
         means = {"paper (printed)": theirs["ours"]["err_norm_mean"]} if theirs else {}
         beside = with_printed(rows, "err_norm_mean", means)
-        accuracy += compare("mean error", beside, "err_norm_mean", split)
-    energy = [
-        {**row, "energy_ratio_interval": (row["energy_ratio_low"], row["energy_ratio_high"])}
-        for row in results.energy_rows
-        if row["energy_ratio"] is not None
-    ]
+        found += compare("mean error", beside, "err_norm_mean", split)
     for row in results.ablation_rows:
         if (row["variant"], row["refinement"]) == ("ours", "adam"):
             means = {"paper (printed)": printed["ablation"]["ours"]["err_norm_mean"]}
             beside = with_printed([{**row, "method": "paper"}], "err_norm_mean", means)
             where = f"ablation by the {row['scored_by']}"
-            accuracy += compare("mean error", beside, "err_norm_mean", where, ("paper",))
-    tables = results.tables
-    seed_table = tables.get("seeds", [])
-    seeds = [
-        one
-        for steps in dict.fromkeys(row["steps"] for row in seed_table)
-        for one in compare(
-            f"mean error of seeds, {steps} steps",
-            [row for row in seed_table if row["steps"] == steps],
-            "err_norm_mean",
-            _fins,
-            ("network",),
-            "seeds",
-        )
+            found += compare("mean error", beside, "err_norm_mean", where, ("paper",))
+    energy = [
+        {**row, "energy_ratio_interval": (row["energy_ratio_low"], row["energy_ratio_high"])}
+        for row in results.energy_rows
+        if row["energy_ratio"] is not None
     ]
-    power = ("learned-power", OURS)
+    found += compare("energy", energy, "energy_ratio", _fins)
+    found += compare("time per call", tables.get("latency", ()), "p50_ms", "4 fins")
+    found += compare("ATE", tables.get("trajectory", ()), "ate", lambda row: f"layouts {row['layout']}")
     faults = [row for row in tables.get("faults", ()) if row["controllable"]]
-    return [
-        *accuracy,
-        *compare("energy", energy, "energy_ratio", _fins),
-        *compare("time per call", tables.get("latency", ()), "p50_ms", "4 fins"),
-        *compare("ATE", tables.get("trajectory", ()), "ate", lambda row: f"layouts {row['layout']}"),
-        *compare("ATE, fins lost", faults, "ate", lambda row: row["fault"]),
-        *compare("inertial power", tables.get("velocity", ()), "inertial_w", _speed, power),
-        *compare("speed error", tables.get("velocity", ()), "mae", _speed, power),
-        *seeds,
-    ]
+    found += compare("ATE, fins lost", faults, "ate", lambda row: row["fault"])
+    for measure, value in (("inertial power", "inertial_w"), ("speed error", "mae")):
+        found += compare(measure, tables.get("velocity", ()), value, _speed, ("learned-power", OURS))
+    seeds = tables.get("seeds", [])
+    for steps in dict.fromkeys(row["steps"] for row in seeds):
+        rows = [row for row in seeds if row["steps"] == steps]
+        measure = f"mean error of seeds, {steps} steps"
+        found += compare(measure, rows, "err_norm_mean", _fins, ("network",), "seeds")
+    return found
 
 
 def _speed(row: Row) -> str:
