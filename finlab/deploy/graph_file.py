@@ -30,6 +30,7 @@ from finlab.layout.load import (
 )
 from finlab.layout.reading import parse_json, read_text
 from finlab.layout.rules import mapping, numbers, shown, text
+from finlab.whole_file import write_whole
 
 
 def write_graph(graph: LayoutGraph, path: str | os.PathLike[str]) -> None:
@@ -38,15 +39,9 @@ def write_graph(graph: LayoutGraph, path: str | os.PathLike[str]) -> None:
     Raises:
         LayoutError: the name does not end in `.graph.json`, or the file cannot be written.
     """
-    file = Path(path)
-    check_graph_name(file)
-    temporary = file.with_name(f".{file.name}.{os.getpid()}")
-    try:
-        # Written beside and renamed, so that a kill or a full disk never leaves half a file.
-        temporary.write_bytes(graph_bytes(graph))
-        os.replace(temporary, file)
-    except OSError as error:
-        raise LayoutError(f"cannot be written: {error.strerror}", source=str(path)) from None
+    if not Path(path).name.endswith(SUFFIX):
+        raise LayoutError(f"expected a file name that ends in {SUFFIX}", source=str(path))
+    write_whole(path, graph_bytes(graph))
 
 
 def read_graph(path: str | os.PathLike[str]) -> LayoutGraph:
@@ -56,12 +51,6 @@ def read_graph(path: str | os.PathLike[str]) -> LayoutGraph:
         LayoutError: it cannot be read, is of another format or version, or was changed after it was written.
     """
     return parse_graph(read_text(Path(path), str(path)), source=str(path))
-
-
-def check_graph_name(path: Path) -> None:
-    """Raise a `LayoutError` unless a file of this name would be read back as a graph file."""
-    if not path.name.endswith(SUFFIX):
-        raise LayoutError(f"expected a file name that ends in {SUFFIX}", source=str(path))
 
 
 def graph_bytes(graph: LayoutGraph) -> bytes:

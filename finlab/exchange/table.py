@@ -9,6 +9,7 @@ from pathlib import Path
 from finlab.errors import LayoutError
 from finlab.layout import MAX_FINS, Fin, Layout, Limits
 from finlab.layout.reading import read_text
+from finlab.whole_file import write_whole
 
 POSITION = ("x_m", "y_m", "z_m")
 ANGLE = "mounting_angle_deg"
@@ -68,10 +69,7 @@ def write_csv(layout: Layout, path: str | os.PathLike[str]) -> None:
     for fin in layout.fins:
         limits = [value for name in LIMITS for value in getattr(fin.limits, name)]
         writer.writerow([fin.name, *fin.position, math.degrees(fin.mounting_angle), *limits])
-    try:
-        Path(path).write_text(text.getvalue(), encoding="utf-8")
-    except OSError as error:
-        raise LayoutError(f"cannot be written: {error.strerror}", source=str(path)) from None
+    write_whole(path, text.getvalue())
 
 
 def _fin(row: dict[str, str | None], i: int) -> Fin:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from finlab.errors import LayoutError
 from finlab.layout import Body, Fin, Layout
+from finlab.whole_file import write_whole
 
 Array = NDArray[np.float64]
 
@@ -176,10 +177,7 @@ def write_urdf(layout: Layout, path: str | os.PathLike[str]) -> None:
     Raises:
         LayoutError: the file cannot be written.
     """
-    try:
-        Path(path).write_text(urdf_text(layout), encoding="utf-8")
-    except OSError as error:
-        raise LayoutError(f"cannot be written: {error.strerror}", source=str(path)) from None
+    write_whole(path, urdf_text(layout))
 
 
 def urdf_text(layout: Layout) -> str:

@@ -19,16 +19,12 @@ class LayoutArrays(NamedTuple):
 
     position: Array
     """Where each fin's force acts, body frame [m], (B, n, 3)."""
-
     mounting_angle: Array
     """Azimuth of each shaft [rad], (B, n)."""
-
     lower: Array
     """Least (amplitude [rad], frequency [Hz], zero direction [rad]), (B, n, 3)."""
-
     upper: Array
     """Greatest (amplitude [rad], frequency [Hz], zero direction [rad]), (B, n, 3)."""
-
     mask: NDArray[np.bool_]
     """True where there is a fin, False where there is padding, (B, n)."""
 

@@ -8,7 +8,7 @@ import json
 import math
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from finlab.layout.body import BODY_KEYS, HULL_KEYS, Body, Hull
 from finlab.layout.fin import Fin, FinModelSpec, Limits
 from finlab.layout.layout import MAX_FINS, Layout
 from finlab.layout.rules import mapping, number, shown, text
+from finlab.whole_file import write_whole
 
 FORMAT = "finlab-layout"
 VERSION = 1
@@ -71,23 +72,14 @@ def save_layout(layout: Layout, path: str | os.PathLike[str]) -> None:
     Raises:
         LayoutError: the file cannot be written.
     """
-    file = Path(path)
     data = layout_to_dict(layout)
-    if file.suffix.lower() == ".json":
+    if Path(path).suffix.lower() == ".json":
         content = json.dumps(data, indent=2) + "\n"
     else:
         from finlab.layout.yaml_file import yaml_text  # a robot's computer writes JSON and may lack PyYAML
 
         content = yaml_text(data)
-    # Written beside and renamed, so that a kill or a full disk never leaves half a layout.
-    part = file.with_name(f".{file.name}.{os.getpid()}.part")
-    try:
-        part.write_text(content, encoding="utf-8")
-        os.replace(part, file)
-    except OSError as error:
-        with suppress(OSError):
-            part.unlink()
-        raise LayoutError(f"cannot be written: {error.strerror}", source=str(path)) from None
+    write_whole(path, content)
 
 
 @contextmanager

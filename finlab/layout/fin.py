@@ -74,7 +74,6 @@ class FinModelSpec:
 
     type: str = "drag"
     """One of `FIN_MODELS`."""
-
     parameters: tuple[tuple[str, float | str], ...] = ()
     """Parameters that differ from the model's defaults, as (name, value), sorted by name."""
 
@@ -125,10 +124,8 @@ class Limits:
 
     amplitude: tuple[float, float] = (0.05, 0.6)
     """Half amplitude [rad], (minimum, maximum); the maximum is above 0."""
-
     frequency: tuple[float, float] = (0.1, 2.1)
     """Frequency [Hz], (minimum, maximum); the maximum is above 0."""
-
     zero_direction: tuple[float, float] = (-math.pi, math.pi)
     """Zero direction [rad], (minimum, maximum), at most one turn apart; a full turn means any direction."""
 
@@ -169,16 +166,12 @@ class Fin:
 
     name: str
     """Unique within its layout; `--failed NAME` and the app refer to it."""
-
     position: tuple[float, float, float]
     """Where the fin's force acts, body frame (x forward, y left, z up from the centre of gravity) [m]."""
-
     mounting_angle: float
     """Azimuth of the shaft in the body xy plane, from +x, counter-clockwise [rad]."""
-
     limits: Limits = Limits()
     """What the fin may be commanded."""
-
     model: FinModelSpec = FinModelSpec()
     """Which law gives its force."""
 

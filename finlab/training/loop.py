@@ -2,7 +2,6 @@
 
 import csv
 import math
-import os
 import sys
 import time
 from collections.abc import Callable
@@ -16,11 +15,13 @@ import torch.distributed as dist
 from torch import Tensor, nn
 from tqdm import tqdm
 
+from finlab.errors import DataError
 from finlab.training.saving import load_state, save_state
+from finlab.whole_file import write_whole
 
 LOG_FILE = "log.csv"
-"""One row per logged step: step, samples, seconds, learning rate and every loss term."""
-
+"""One row per logged step: the columns below and every loss term."""
+_FIXED = ("step", "samples", "seconds", "learning_rate")
 
 Terms = Callable[[nn.Module, int], dict[str, Tensor]]
 """Loss terms of a step of training, `loss` among them, as means over this process's share of the batch."""
@@ -119,11 +120,9 @@ def train(
         if step % LOG_EVERY == 0 or step == end - 1:
             values = _mean_over_processes(terms)
             if log is not None:
-                seconds = time.monotonic() - started
+                seconds, samples = time.monotonic() - started, (step + 1) * settings.batch_size
                 rate = (step + 1 - done) * settings.batch_size / seconds
-                log.write(
-                    step, (step + 1) * settings.batch_size, seconds, learning_rate(settings, step), values
-                )
+                log.write(step, samples, seconds, learning_rate(settings, step), values)
                 bar.set_postfix_str(f"loss {values['loss']:.4g}, {rate / 1e3:.1f} k samples/s")
         if first and (time.monotonic() - saved > SAVE_EVERY_S or step == end - 1):
             # The state comes last: a run killed in between repeats a few steps and ships them after all.
@@ -132,8 +131,6 @@ def train(
             save_state(folder, step + 1, model, optimizer, average, identity)
             saved = time.monotonic()
     bar.close()
-    if log is not None:
-        log.close()
     return average or _weights(model)
 
 
@@ -154,40 +151,23 @@ class _Log:
 
     def __init__(self, path: Path, done: int) -> None:
         self.path = path
-        kept: list[dict[str, str]] = []
-        if done and path.exists():
-            with path.open(newline="") as file:
-                kept = [row for row in csv.DictReader(file) if int(row["step"]) < done]
-        self.offset = float(kept[-1]["seconds"]) if kept else 0.0
-        self.file = path.with_suffix(".new").open("w", newline="")
-        self.writer: csv.DictWriter[str] | None = None
-        for row in kept:
-            self._row(row)
-        os.replace(path.with_suffix(".new"), path)
+        lines = path.read_text().splitlines(keepends=True) if done and path.exists() else []
+        kept = [line for line in lines[1:] if int(line.split(",")[0]) < done]
+        self.offset = float(kept[-1].split(",")[_FIXED.index("seconds")]) if kept else 0.0
+        write_whole(path, "".join(lines[:1] + kept), DataError)
 
     def write(self, step: int, samples: int, seconds: float, rate: float, values: dict[str, float]) -> None:
-        fixed = {
-            "step": step,
-            "samples": samples,
-            "seconds": f"{self.offset + seconds:.1f}",
-            "learning_rate": f"{rate:.6g}",
-        }
-        self._row({**fixed, **{name: f"{value:.8g}" for name, value in values.items()}})
-
-    def _row(self, row: dict[str, Any]) -> None:
-        if self.writer is None:
-            self.writer = csv.DictWriter(self.file, list(row))
-            self.writer.writeheader()
-        self.writer.writerow(row)
-        self.file.flush()
-
-    def close(self) -> None:
-        self.file.close()
+        fixed = (step, samples, f"{self.offset + seconds:.1f}", f"{rate:.6g}")
+        row = dict(zip(_FIXED, fixed, strict=True)) | {name: f"{x:.8g}" for name, x in values.items()}
+        with self.path.open("a", newline="") as file:
+            writer = csv.DictWriter(file, list(row), lineterminator="\n")
+            if file.tell() == 0:
+                writer.writeheader()
+            writer.writerow(row)
 
 
 CURVES_FILE = "curves.png"
 """Name of the picture beside the log."""
-_FIXED = ("step", "samples", "seconds", "learning_rate")
 
 
 def plot_log(folder: Path) -> Path | None:

@@ -30,22 +30,16 @@ class Batch(NamedTuple):
 
     position: Tensor
     """(B, n, 3), body frame [m]."""
-
     mounting_angle: Tensor
     """(B, n), in [-pi, pi) [rad]."""
-
     lower: Tensor
     """(B, n, 3) [rad, Hz, rad]."""
-
     upper: Tensor
     """(B, n, 3) [rad, Hz, rad]."""
-
     mask: Tensor
     """(B, n) bool, True where there is a fin."""
-
     command: Tensor
     """(B, n, 3) [rad, Hz, rad], uniform within the limits."""
-
     wrench: Tensor
     """(B, 6) that the command causes [N, N m]."""
 
