@@ -27,8 +27,9 @@ from finlab.layout.load import (
     checksum_of,
     graph_layout,
     graph_nodes,
+    read_graph_text,
 )
-from finlab.layout.reading import parse_json, read_text
+from finlab.layout.reading import parse_json
 from finlab.layout.rules import mapping, numbers, shown, text
 from finlab.whole_file import write_whole
 
@@ -45,12 +46,13 @@ def write_graph(graph: LayoutGraph, path: str | os.PathLike[str]) -> None:
 
 
 def read_graph(path: str | os.PathLike[str]) -> LayoutGraph:
-    """Read a graph file back, whole.
+    """Read a graph file back, whole, also out of a bundle.
 
     Raises:
         LayoutError: it cannot be read, is of another format or version, or was changed after it was written.
+        DataError: the bundle cannot be read, or was changed.
     """
-    return parse_graph(read_text(Path(path), str(path)), source=str(path))
+    return parse_graph(*read_graph_text(Path(path)))
 
 
 def graph_bytes(graph: LayoutGraph) -> bytes:

@@ -41,24 +41,15 @@ def empty_arrays(n_layouts: int, n_fins: int) -> LayoutArrays:
     )
 
 
-def stack_layouts(layouts: Sequence[Layout], n_fins: int | None = None) -> LayoutArrays:
-    """Returns the layouts as one padded batch.
-
-    Args:
-        layouts: at least one.
-        n_fins: width to pad to; the largest layout's fin count when None.
+def stack_layouts(layouts: Sequence[Layout]) -> LayoutArrays:
+    """Returns the layouts, at least one, as one batch padded to the fin count of the largest.
 
     Raises:
-        LayoutError: there are no layouts, or one has more than `n_fins` fins.
+        LayoutError: there are no layouts.
     """
     if len(layouts) == 0:
         raise LayoutError("expected at least one layout to stack, got none")
-    widest = max(layouts, key=lambda layout: layout.n_fins)
-    width = widest.n_fins if n_fins is None else n_fins
-    if widest.n_fins > width:
-        raise LayoutError(
-            f"layout {widest.name} has {widest.n_fins} fins, more than the {width} there is room for"
-        )
+    width = max(layout.n_fins for layout in layouts)
     arrays = empty_arrays(len(layouts), width)
     for b, layout in enumerate(layouts):
         n = layout.n_fins

@@ -134,14 +134,9 @@ class Limits:
         frequency = interval(self.frequency, "frequency_hz", 0.0, MAX_FREQUENCY)
         zero_direction = interval(self.zero_direction, "zero_direction_rad", -2 * math.pi, 2 * math.pi)
         # The energy proxy divides by these two maxima.
-        if amplitude[1] <= 0.0:
-            raise LayoutError(
-                "the maximum must be above 0; leave the fin out if it never moves", "amplitude_rad"
-            )
-        if frequency[1] <= 0.0:
-            raise LayoutError(
-                "the maximum must be above 0; leave the fin out if it never moves", "frequency_hz"
-            )
+        for key, (_, most) in (("amplitude_rad", amplitude), ("frequency_hz", frequency)):
+            if most <= 0.0:
+                raise LayoutError("the maximum must be above 0; leave the fin out if it never moves", key)
         width = zero_direction[1] - zero_direction[0]
         if width > 2 * math.pi + 1e-6:
             raise LayoutError(f"must span at most one turn (6.2832), got {width:.4f}", "zero_direction_rad")

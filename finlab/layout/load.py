@@ -40,12 +40,9 @@ def load_layout(layout: str | os.PathLike[str]) -> Layout:
     """
     file = layout_path(layout)
     source = str(layout)
-    if is_bundle(file):
-        content = decode_text(read_bundle_files(file)[GRAPH], f"{source}/{GRAPH}")
-        return parse_graph_layout(content, f"{source}/{GRAPH}")
+    if holds_graph(file):
+        return parse_graph_layout(*read_graph_text(file))
     content = read_text(file, source)
-    if file.name.endswith(SUFFIX):
-        return parse_graph_layout(content, source)
     if file.suffix.lower() == ".json":
         data = parse_json(content, source)
     else:
@@ -77,6 +74,25 @@ def layout_path(layout: str | os.PathLike[str]) -> Path:
         f"layout {layout!r} is neither a file nor a shipped layout; "
         f"shipped are {', '.join(shipped) or 'none'}"
     )
+
+
+def holds_graph(path: Path) -> bool:
+    """Whether a path looks like a layout graph file, or a bundle with one."""
+    return is_bundle(path) or path.name.endswith(SUFFIX)
+
+
+def read_graph_text(path: Path) -> tuple[str, str]:
+    """The text of a graph file, or of the one in a bundle, and what to call it in error messages.
+
+    Raises:
+        LayoutError: the file cannot be read.
+        DataError: the bundle cannot be read, or was changed.
+    """
+    source = str(path)
+    if not is_bundle(path):
+        return read_text(path, source), source
+    place = f"{source}/{GRAPH}"
+    return decode_text(read_bundle_files(path)[GRAPH], place), place
 
 
 def parse_graph_layout(content: str, source: str = "graph") -> Layout:

@@ -210,16 +210,11 @@ def read_trajectory(path: Path) -> Trajectory:
             if missing := [name for name in COLUMNS if name not in names]:
                 raise DataError(f"{path}: column {missing[0]!r} is missing; expected {', '.join(COLUMNS)}")
             reader.fieldnames = names
-            rows = [_numbers(row, f"{path}: line {reader.line_num}") for row in reader]
+            rows = [[float(row[name]) for name in COLUMNS] for row in reader]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise DataError(f"{path}: cannot be read: {error}") from None
+    except (TypeError, ValueError):
+        line = f"{path}: line {reader.line_num}"
+        raise DataError(f"{line}: expected four numbers for {', '.join(COLUMNS)}") from None
     table = np.array(rows, dtype=np.float64).reshape(-1, 4)
     return Trajectory(path.stem, table[:, 0], table[:, 1:])
-
-
-def _numbers(row: dict[str, str], where: str) -> list[float]:
-    """The four numbers of a row, by column."""
-    try:
-        return [float(row[name]) for name in COLUMNS]
-    except (TypeError, ValueError):
-        raise DataError(f"{where}: expected four numbers for {', '.join(COLUMNS)}") from None

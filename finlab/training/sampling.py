@@ -77,7 +77,8 @@ class ForwardSampler:
         """Returns batch number `step`."""
         rng = np.random.default_rng([self.seed, step])
         layouts = random_layouts(rng, self.batch_size, self.n_fins, limits=self.varied_limits)
-        _leave_reserved(layouts)
+        # The first fin of any reserved layout moves to the body's other side, where it is uniform as well.
+        layouts.position[find_reserved(layouts, shipped_reserved()), 0] *= -1.0
         share = rng.random(layouts.lower.shape)
         command = (layouts.lower + share * (layouts.upper - layouts.lower)) * layouts.mask[..., None]
         place = layouts.position, layouts.mounting_angle, layouts.mask
@@ -90,12 +91,6 @@ def seeded_generator(seed: int, stream: int, device: torch.device | str = "cpu")
     """Returns a generator whose numbers depend on (seed, stream) alone, unrelated between streams."""
     state = np.random.SeedSequence([seed, stream]).generate_state(1, np.uint64)[0]
     return torch.Generator(device=device).manual_seed(int(state >> np.uint64(1)))
-
-
-def _leave_reserved(layouts: LayoutArrays) -> None:
-    """Moves, in place, the first fin of any reserved layout to the body's other side; it stays uniform."""
-    rows = find_reserved(layouts, shipped_reserved())
-    layouts.position[rows, 0] *= -1.0
 
 
 def _tensor(values: NDArray[Any]) -> Tensor:
