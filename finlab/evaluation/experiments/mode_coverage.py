@@ -74,7 +74,7 @@ def mode_rows(
     truth = CheapestWays(allocator.normalization)
     found: dict[int, list[Row]] = {}
     for case in progress(cases, "layout"):
-        layout = case.layout.without(case.failed) if case.failed else case.layout
+        layout = case.healthy
         for target in case.targets:
             compared = _compare(allocator, truth, layout, target, n_starts, seed)
             if compared is not None:
@@ -102,34 +102,25 @@ def _compare(
     allocator: Allocator, ways: CheapestWays, layout: Layout, target: Array, n_starts: int, seed: int
 ) -> Row | None:
     """Counts and coverage for one target; None where no start delivers it."""
-    truth = _truth(ways, layout, target, n_starts, seed)
+    starts = plant_of(layout).sample(np.random.default_rng(seed), (n_starts,))
+    ends = ways.ends(layout, target, starts)
+    truth = ends[[group[0] for group in cluster([mode_signature(one) for one in ends])]]
     mine = np.array([mode.command for mode in allocator.allocate(layout, target).explore()])
-    upper = layout.upper
     if not len(truth) or not len(mine):
         return None
-    truth_energy, energy = command_energy(truth, upper), command_energy(mine, upper)
+    both = [(command, command_energy(command, layout.upper)) for command in (truth, mine)]
+    (_, truth_energy), (_, energy) = both
     least = min(truth_energy.min(), energy.min())
-    truth_ways = [mode_signature(command) for command in truth[truth_energy <= CHEAP * least]]
-    own_ways = [mode_signature(command) for command in mine[energy <= CHEAP * least]]
+    cheap = [command[spent <= CHEAP * least] for command, spent in both]
+    truth_ways, own_ways = ([mode_signature(one) for one in command] for command in cheap)
     return {
         "truth": len(truth_ways),
         "modes": len(own_ways),
         "coverage": _covered(truth_ways, own_ways),
         "truth_coverage": _covered(own_ways, truth_ways),
         "best_energy": float(energy.min() / truth_energy.min()),
-        "distance": _energy_distance(
-            *(_forces(layout, c[e <= CHEAP * least]) for c, e in ((truth, truth_energy), (mine, energy)))
-        ),
+        "distance": _energy_distance(*(_forces(layout, command) for command in cheap)),
     }
-
-
-def _truth(truth: CheapestWays, layout: Layout, target: Array, n_starts: int, seed: int) -> Array:
-    """The best command of each mode (M, n, 3) that random starts lead to, cheapest first."""
-    starts = plant_of(layout).sample(np.random.default_rng(seed), (n_starts,))
-    command = truth.ends(layout, target, starts)
-    first = [group[0] for group in cluster([mode_signature(one) for one in command])]
-    kept: Array = command[first]
-    return kept
 
 
 def _covered(wanted: list[Any], known: list[Any]) -> float:

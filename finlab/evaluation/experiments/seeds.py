@@ -45,7 +45,7 @@ def seed_rows(
     """
     found: dict[tuple[int, str, int], list[tuple[Array, Array, Array]]] = {}
     for k, case in enumerate(progress(cases, "layout")):
-        layout = case.layout.without(case.failed) if case.failed else case.layout
+        layout = case.healthy
         prepared, plant = allocator.pipeline.prepare(layout), Plant(layout)
         for kind in KINDS:
             start = _commands(kind, allocator, prepared, case.targets, n_seeds, seed)

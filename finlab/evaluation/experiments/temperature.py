@@ -49,7 +49,7 @@ def temperature_columns(
     allocator = load_allocator("paper", checkpoint=checkpoint, **options)
     rows: list[tuple[float, ...]] = []
     for k, case in enumerate(progress(cases, "layout")):
-        layout = case.layout.without(case.failed) if case.failed else case.layout
+        layout = case.healthy
         for number, target in enumerate(case.targets):
             samples = allocator.allocate(layout, target, seed=seed).samples
             assert samples is not None

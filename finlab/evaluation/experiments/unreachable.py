@@ -8,7 +8,7 @@ error, `direction` by the share of the target that is delivered and by what is d
 
 from collections.abc import Sequence
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,16 +35,10 @@ BESIDE = 1e-6
 """Normalized wrench beside the target that the judge of `direction` allows on each axis."""
 
 
-class Score(NamedTuple):
-    """One answer to one target."""
-
-    excess: float
-    """`closest`, `priority`: normalized error beyond the least possible. `direction`: share of the target
-    that is lacking to the largest possible."""
-    beside: float
-    """`direction`: normalized wrench beside the share of the target."""
-    solve_ms: float
-    """Time of the call [ms]."""
+Score = tuple[float, float, float]
+"""Of one answer. By `closest` and `priority` the normalized error beyond the least possible, by `direction`
+the share of the target that is lacking to the largest possible; by `direction` the normalized wrench beside
+that share; the time of the call [ms]."""
 
 
 class Judge:
@@ -77,20 +71,21 @@ class Judge:
 
     def _best(self, force: Any, unknowns: Any, cost: Any, limits: list[tuple[Any, float, float]]) -> float:
         """The least cost over all choices of halves."""
-        return min(self._solve(force, unknowns, cost, limits, arcs) for arcs in self.arcs)
+        return min(self._solve(unknowns, cost, limits + self._fins(force, arcs)) for arcs in self.arcs)
 
-    def _solve(
-        self, force: Any, unknowns: Any, cost: Any, limits: list[tuple[Any, float, float]], arcs: Array
-    ) -> float:
-        limits = list(limits)
+    def _fins(self, force: Any, arcs: Array) -> list[tuple[Any, float, float]]:
+        """Limits of each fin's thrust and direction, for one choice of halves."""
+        limits: list[tuple[Any, float, float]] = []
         for i, (first, last) in enumerate(arcs):
             across, up = force[2 * i], force[2 * i + 1]
             limits.append((across**2 + up**2, 0.0, self.thrust[i] ** 2))
             if not is_full_turn(last - first):
-                limits.append((np.cos(first) * up - np.sin(first) * across, 0.0, np.inf))
-                limits.append((np.sin(last) * across - np.cos(last) * up, 0.0, np.inf))
                 middle = 0.5 * (first + last)
-                limits.append((np.cos(middle) * across + np.sin(middle) * up, 0.0, np.inf))
+                for angle in (first + 0.5 * np.pi, last - 0.5 * np.pi, middle):
+                    limits.append((np.cos(angle) * across + np.sin(angle) * up, 0.0, np.inf))
+        return limits
+
+    def _solve(self, unknowns: Any, cost: Any, limits: list[tuple[Any, float, float]]) -> float:
         what, low, high = zip(*limits, strict=True)
         program = {"x": unknowns, "f": cost, "g": self.casadi.vertcat(*what)}
         solver = self.casadi.nlpsol("judge", "ipopt", program, SOLVER_OPTIONS)
@@ -136,7 +131,7 @@ def _scores(allocator: Allocator, layout: Layout, target: Array) -> dict[str, Sc
     least = judge.least_error(wanted, np.ones(6, dtype=bool))
     if least < 0.05:
         return {}
-    scores = {}
+    scores: dict[str, Score] = {}
     for kind in KINDS:
         answer = allocator.allocate(layout, target, policy=kind)
         given = plant.wrench(answer.command) / sigma
@@ -149,7 +144,7 @@ def _scores(allocator: Allocator, layout: Layout, target: Array) -> dict[str, Sc
             axes = np.ones(6, dtype=bool) if kind == "closest" else Policy(kind).groups[0]
             possible = least if kind == "closest" else judge.least_error(wanted, axes)
             excess = float(np.linalg.norm((given - wanted)[axes])) - possible
-        scores[kind] = Score(excess, beside, answer.solve_ms)
+        scores[kind] = (excess, beside, answer.solve_ms)
     return scores
 
 

@@ -33,11 +33,6 @@ class Interval(NamedTuple):
     high: float
     """Upper end."""
 
-    def holds(self, value: float) -> bool:
-        """Whether a value lies inside, rounding aside."""
-        slack = 1e-9 * max(abs(self.low), abs(self.high))
-        return self.low - slack <= value <= self.high + slack
-
 
 def mean_interval(values: Array, group: NDArray[np.int64], *, seed: int = 0) -> Interval:
     """Of the mean of values (N,), whose layouts are numbered in group (N,)."""
