@@ -81,7 +81,8 @@ def allocate(robot: "Robot", arguments: argparse.Namespace) -> int:
 
 def speed(robot: "Robot", arguments: argparse.Namespace) -> int:
     """Print times and memory of single answers, one after the other."""
-    from finlab.deploy.self_check import answer_times, peak_memory, random_targets
+    from finlab.deploy.graph import random_targets
+    from finlab.deploy.self_check import answer_times, peak_memory
 
     robot.allocate([0.0] * 6)
     ready = time.perf_counter() - arguments.started

@@ -8,6 +8,7 @@ Reading checks every value, and refusals name the key.
 import json
 import os
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -80,9 +81,12 @@ def document_of(graph: LayoutGraph) -> dict[str, Any]:
             "id": entry["name"],
             "position_m": entry["position_m"],
             "mounting_angle_rad": fin.mounting_angle,
+            "limits": entry["limits"],
+            "model": entry["model"],
+            "healthy": fin.name not in graph.failed,
+            "features": features,
         }
-        node |= {"limits": entry["limits"], "model": entry["model"]}
-        nodes.append(node | {"healthy": fin.name not in graph.failed, "features": _plain(features)})
+        nodes.append(node)
     return {
         "format": GRAPH_FORMAT,
         "version": GRAPH_VERSION,
@@ -102,15 +106,7 @@ def document_of(graph: LayoutGraph) -> dict[str, Any]:
         "checkpoint": {"name": graph.checkpoint, "sha256": graph.checkpoint_sha256},
         "self_test": {
             "tolerance_err_norm": SELF_TEST_TOLERANCE,
-            "cases": [
-                {
-                    "wrench": list(case.wrench),
-                    "command": [_plain(row) for row in case.command],
-                    "predicted_wrench": list(case.predicted_wrench),
-                    "features": [_plain(row) for row in case.features],
-                }
-                for case in graph.self_test
-            ],
+            "cases": [asdict(case) for case in graph.self_test],
         },
     }
 
@@ -118,10 +114,6 @@ def document_of(graph: LayoutGraph) -> dict[str, Any]:
 def edges_of(graph: LayoutGraph) -> list[dict[str, str]]:
     """Every pair of healthy fins, and each with itself."""
     return [{"source": a, "target": b} for a, b in graph.edges]
-
-
-def _plain(row: Row | None) -> list[float] | None:
-    return None if row is None else list(row)
 
 
 def graph_of(data: Any, source: str) -> LayoutGraph:

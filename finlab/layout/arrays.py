@@ -79,22 +79,11 @@ def force_columns(position: Any, mounting_angle: Any) -> Any:
     return xp.stack([xp.stack(axis, axis=-1) for axis in (shaft, horizontal, vertical)], axis=-2)
 
 
-def planar_effectiveness(position: Array, mounting_angle: Array) -> Array:
-    """Returns what one newton along each fin's two thrust axes does to the robot.
-
-    Args:
-        position: (..., n, 3), body frame [m].
-        mounting_angle: (..., n) [rad].
+def layout_effectiveness(layout: Layout) -> Array:
+    """What one newton along each fin's two thrust axes does to the robot.
 
     Returns:
-        (..., n, 6, 2): wrench [Fx, Fy, Fz, Tx, Ty, Tz] of 1 N along e_h (column 0) and along e_z (column 1).
+        (6, 2 n): wrench [Fx, Fy, Fz, Tx, Ty, Tz] of 1 N along e_h and along e_z, fins side by side.
     """
-    columns = force_columns(np.asarray(position, np.float64), np.asarray(mounting_angle, np.float64))
-    planar: Array = np.swapaxes(columns[..., 1:, :], -1, -2)
-    return planar
-
-
-def layout_effectiveness(layout: Layout) -> Array:
-    """Returns one layout's planar effectiveness as a matrix (6, 2 n), fins side by side."""
-    blocks = planar_effectiveness(layout.position, layout.mounting_angle)
-    return np.concatenate(list(blocks), axis=1)
+    columns: Array = force_columns(layout.position, layout.mounting_angle)[:, 1:]
+    return columns.reshape(-1, 6).T

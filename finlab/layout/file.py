@@ -9,7 +9,7 @@ import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -58,11 +58,7 @@ def layout_to_dict(layout: Layout) -> dict[str, Any]:
     data["frame"] = dict(FRAME)
     data["fins"] = [_fin_to_dict(fin) for fin in layout.fins]
     if layout.body is not None:
-        body = {key: _plain(getattr(layout.body, key)) for key in BODY_KEYS if key != "hull"}
-        data["body"] = {key: value for key, value in body.items() if value is not None}
-        if layout.body.hull is not None:
-            hull = {key: _plain(getattr(layout.body.hull, key)) for key in HULL_KEYS}
-            data["body"] = {"hull": {k: v for k, v in hull.items() if v is not None}, **data["body"]}
+        data["body"] = _plain(asdict(layout.body))
     return data
 
 
@@ -172,4 +168,7 @@ def _fin_to_dict(fin: Fin) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
+    """Lists for tuples, and mappings without what is None."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items() if item is not None}
     return list(value) if isinstance(value, tuple) else value

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 from finlab.errors import LayoutError
 from finlab.layout.rules import MAX_NAME_LENGTH, interval, number, numbers, text
@@ -29,42 +28,30 @@ class Parameter:
 
 _DENSITY = Parameter(1000.0, "density of the water", "kg/m^3")
 
-FIN_MODELS: Mapping[str, Mapping[str, Parameter]] = MappingProxyType(
-    {
-        "drag": MappingProxyType(
-            {
-                "density": _DENSITY,
-                "drag_coefficient": Parameter(0.15, "drag coefficient of the blade"),
-                "area": Parameter(0.02, "area of the blade", "m^2"),
-                "lever": Parameter(0.1, "distance of the blade's centre from the shaft", "m"),
-            }
-        ),
-        "lighthill": MappingProxyType(
-            {
-                "density": _DENSITY,
-                "length": Parameter(0.20, "length of the fin from the shaft", "m"),
-                "width": Parameter(0.10, "width of the trailing edge", "m"),
-            }
-        ),
-        "soft": MappingProxyType(
-            {
-                "k": Parameter(3.6, "thrust at A f = 1 rad Hz, before it saturates", "N"),
-                "p": Parameter(1.0, "exponent with which thrust grows with A f", low=0.5, high=4.0),
-                "x0": Parameter(1.3, "A f from which thrust saturates and falls", "rad Hz"),
-                "q": Parameter(5.0, "exponent of that fall", high=20.0),
-                "e": Parameter(
-                    0.0, "share by which thrust differs with direction", high=0.99, positive=False
-                ),
-                "phi_e": Parameter(
-                    0.0, "zero direction of the largest thrust", "rad", -10.0, 10.0, positive=False
-                ),
-                "d": Parameter(0.0, "angle from zero direction to thrust", "rad", -1.5, 1.5, positive=False),
-            }
-        ),
-        # Its one parameter, `path`, is the text that names a CSV file of forces; it has no default.
-        "table": MappingProxyType({}),
-    }
-)
+FIN_MODELS: Mapping[str, Mapping[str, Parameter]] = {
+    "drag": {
+        "density": _DENSITY,
+        "drag_coefficient": Parameter(0.15, "drag coefficient of the blade"),
+        "area": Parameter(0.02, "area of the blade", "m^2"),
+        "lever": Parameter(0.1, "distance of the blade's centre from the shaft", "m"),
+    },
+    "lighthill": {
+        "density": _DENSITY,
+        "length": Parameter(0.20, "length of the fin from the shaft", "m"),
+        "width": Parameter(0.10, "width of the trailing edge", "m"),
+    },
+    "soft": {
+        "k": Parameter(3.6, "thrust at A f = 1 rad Hz, before it saturates", "N"),
+        "p": Parameter(1.0, "exponent with which thrust grows with A f", low=0.5, high=4.0),
+        "x0": Parameter(1.3, "A f from which thrust saturates and falls", "rad Hz"),
+        "q": Parameter(5.0, "exponent of that fall", high=20.0),
+        "e": Parameter(0.0, "share by which thrust differs with direction", high=0.99, positive=False),
+        "phi_e": Parameter(0.0, "zero direction of the largest thrust", "rad", -10.0, 10.0, positive=False),
+        "d": Parameter(0.0, "angle from zero direction to thrust", "rad", -1.5, 1.5, positive=False),
+    },
+    # Its one parameter, `path`, is the text that names a CSV file of forces; it has no default.
+    "table": {},
+}
 """The fin models there are, by name, with their numeric parameters."""
 
 

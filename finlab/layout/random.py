@@ -62,11 +62,8 @@ def random_layouts(
     count = rng.integers(least, most + 1, size=n)
     arrays.mask[:] = np.arange(arrays.mask.shape[1]) < count[:, None]
     arrays.position[:] = rng.uniform(-1.0, 1.0, arrays.position.shape) * extent
-    if outside is not None:
-        redo = ~_any_outside(arrays, outside)
-        while redo.any():
-            arrays.position[redo] = rng.uniform(-1.0, 1.0, arrays.position[redo].shape) * extent
-            redo = ~_any_outside(arrays, outside)
+    while outside is not None and (redo := ~_any_outside(arrays, outside)).any():
+        arrays.position[redo] = rng.uniform(-1.0, 1.0, arrays.position[redo].shape) * extent
     arrays.position[~arrays.mask] = 0.0
     arrays.mounting_angle[:] = np.where(arrays.mask, rng.uniform(-math.pi, math.pi, arrays.mask.shape), 0.0)
     if limits != "nominal":

@@ -6,6 +6,7 @@ enough to draw fresh samples for each step instead of reading them from a disk.
 
 import functools
 import math
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,34 +45,23 @@ class Batch(NamedTuple):
     """(B, 6) that the command causes [N, N m]."""
 
 
+@dataclass(frozen=True)
 class ForwardSampler:
     """An endless stream of fresh training batches.
 
     Batch k depends on (seed, k) alone, so a run that resumes at step k sees what it would have seen.
     """
 
-    def __init__(
-        self,
-        seed: int,
-        batch_size: int,
-        n_fins: tuple[int, int] = TRAINING_FINS,
-        fin_model: FinLaw | None = None,
-        varied_limits: float = 0.5,
-    ) -> None:
-        """Describes the stream.
-
-        Args:
-            seed: of all draws.
-            batch_size: samples in each batch.
-            n_fins: least and most fins, uniform; arrays are padded to the most.
-            fin_model: law of all fins; the default `drag` when None.
-            varied_limits: share of layouts whose fins get limits of their own; the rest keep the nominal.
-        """
-        self.seed = seed
-        self.batch_size = batch_size
-        self.n_fins = n_fins
-        self.fin_model = make_law(FinModelSpec()) if fin_model is None else fin_model
-        self.varied_limits = varied_limits
+    seed: int
+    """Of all draws."""
+    batch_size: int
+    """Samples in each batch."""
+    n_fins: tuple[int, int] = TRAINING_FINS
+    """Least and most fins, uniform; arrays are padded to the most."""
+    fin_model: FinLaw = field(default_factory=lambda: make_law(FinModelSpec()))
+    """Law of all fins; `drag` by default."""
+    varied_limits: float = 0.5
+    """Share of layouts whose fins get limits of their own; the rest keep the nominal."""
 
     def batch(self, step: int) -> Batch:
         """Returns batch number `step`."""

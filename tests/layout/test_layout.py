@@ -12,11 +12,11 @@ from finlab.layout import (
     Limits,
     layout_effectiveness,
     layout_from_arrays,
-    planar_effectiveness,
     random_layout,
     random_layouts,
     stack_layouts,
 )
+from finlab.layout.arrays import force_columns
 from finlab.layout.random import TRAINING_BOX
 
 THREE = Layout(
@@ -67,17 +67,17 @@ def test_stacking_pads_with_nothing():
         stack_layouts([])
 
 
-def test_planar_effectiveness_is_force_and_moment_of_a_newton():
+def test_force_columns_are_force_and_moment_of_a_newton():
     rng = np.random.default_rng(0)
     position, angle = rng.normal(size=(7, 3, 3)), rng.uniform(-4, 4, (7, 3))
-    blocks = planar_effectiveness(position, angle)
-    assert blocks.shape == (7, 3, 6, 2)
+    columns = force_columns(position, angle)
+    assert columns.shape == (7, 3, 3, 6)
     for b in range(7):
         for i in range(3):
-            horizontal = np.array([-math.sin(angle[b, i]), math.cos(angle[b, i]), 0.0])
-            for column, axis in enumerate([horizontal, np.array([0.0, 0.0, 1.0])]):
+            c, s = math.cos(angle[b, i]), math.sin(angle[b, i])
+            for k, axis in enumerate(np.array([(c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)])):
                 expected = np.concatenate([axis, np.cross(position[b, i], axis)])
-                np.testing.assert_allclose(blocks[b, i, :, column], expected, atol=1e-14)
+                np.testing.assert_allclose(columns[b, i, k], expected, atol=1e-14)
 
 
 def test_layout_effectiveness_sets_the_blocks_side_by_side():
