@@ -47,18 +47,17 @@ def temperature_columns(
     """
     options: PaperOptions = {"n_candidates": n_candidates, "temperature": temperature, "refinement": "none"}
     allocator = load_allocator("paper", checkpoint=checkpoint, **options)
-    rows: list[tuple[float, ...]] = []
+    rows: list[Row] = []
     for k, case in enumerate(progress(cases, "layout")):
         layout = case.healthy
         for number, target in enumerate(case.targets):
             samples = allocator.allocate(layout, target, seed=seed).samples
             assert samples is not None
             j = samples.err_norm**2 + allocator.settings.gamma * samples.energy
+            row = {"layout": k, "target": number, "n_fins": layout.n_fins}
             spread = diversity(samples.command, layout)
-            rows.append((k, number, layout.n_fins, spread, float(j.min()), float(j.mean())))
-    whole, real = ("layout", "target", "n_fins"), ("diversity", "best_j", "mean_j")
-    columns = dict(zip((*whole, *real), np.array(rows, dtype=np.float64).T, strict=True))
-    return columns | {name: columns[name].astype(np.int64) for name in whole}
+            rows.append({**row, "diversity": spread, "best_j": j.min(), "mean_j": j.mean()})
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
 def refinement_columns(
@@ -79,17 +78,12 @@ def refinement_columns(
     parts = []
     for number, target in enumerate(case.targets):
         result = allocator.allocate(case.layout, target, failed=case.failed, seed=seed)
-        for refined, found in ((0, result.samples), (1, result.candidates)):
+        for refined, found in enumerate((result.samples, result.candidates)):
             assert found is not None
-            ones = np.ones(len(found.energy))
-            parts.append(np.stack([number * ones, refined * ones, found.energy, found.err_norm]))
-    target_number, after, energy, error = np.concatenate(parts, axis=1)
-    return {
-        "target": target_number.astype(np.int64),
-        "refined": after.astype(np.int64),
-        "energy": energy,
-        "err_norm": error,
-    }
+            about = {"target": number, "refined": refined}
+            columns = {name: np.full(n_candidates, value) for name, value in about.items()}
+            parts.append({**columns, "energy": found.energy, "err_norm": found.err_norm})
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def diversity(command: Array, layout: Layout) -> float:

@@ -27,8 +27,6 @@ Array = NDArray[np.float64]
 
 FIN_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK, YELLOW)
 """Colour of each fin, in the layout's order."""
-ASKED, DELIVERED, MISSING = BLUE, GREEN, VERMILION
-"""The three colours of a wrench."""
 
 
 def save_pictures(log: RunLog, folder: Path) -> list[Path]:
@@ -113,8 +111,8 @@ def draw_wrench(log: RunLog) -> Picture:
     with picture(3, 2, height=6.2, sharex=True) as drawn:
         for k, name in enumerate(("Fx [N]", "Fy [N]", "Fz [N]", "Tx [N m]", "Ty [N m]", "Tz [N m]")):
             axis = drawn.axes[2 * (k % 3) + k // 3]
-            axis.plot(log.time, log.asked[:, k], color=ASKED, lw=1.8, label="asked")
-            axis.plot(log.time, log.delivered[:, k], color=DELIVERED, lw=1.1, label="delivered")
+            axis.plot(log.time, log.asked[:, k], color=BLUE, lw=1.8, label="asked")
+            axis.plot(log.time, log.delivered[:, k], color=GREEN, lw=1.1, label="delivered")
             axis.set_ylabel(name)
             half = 0.1 if k < 3 else 0.05
             low, high = axis.get_ylim()

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from markdown_it import MarkdownIt
 
-from finlab.evaluation.report.document import Block, Cards, Document, Figure, Fold, Table
+from finlab.evaluation.report.document import Block, Document, Figure, Fold, Table
 
 MARKDOWN = MarkdownIt("commonmark", {"html": False})
 
@@ -45,7 +45,7 @@ def _html_block(block: Block) -> str:
                     token.attrSet("id", _anchor(inside.content))
             rendered: str = MARKDOWN.renderer.render(tokens, MARKDOWN.options, {})
             return rendered
-        case Cards(cards):
+        case tuple(cards):
             parts = ("label", "value", "detail")
             texts = ["".join(_div(part, _inline(getattr(card, part))) for part in parts) for card in cards]
             return _div("cards", "".join(_div("card", text) for text in texts))
@@ -99,7 +99,7 @@ def _text_block(block: Block, pictures: str) -> str:
     match block:
         case str():
             return block
-        case Cards(cards):
+        case tuple(cards):
             return "\n".join(f"- **{card.value}** {card.label}: {card.detail}" for card in cards)
         case Table():
             return _text_table(block)

@@ -66,10 +66,13 @@ class Results:
         """Rows of the comparison of energies; none where the reference is not installed."""
         if REFERENCE not in self.energy:
             return []
-        reference = self.energy[REFERENCE]
-        return [
-            row for name, part in self.energy.items() for row in energy_rows(part, reference, method=name)
-        ]
+        reference, rows = self.energy[REFERENCE], []
+        for name, part in self.energy.items():
+            for row in energy_rows(part, reference, method=name):
+                known = row["energy_ratio"] is not None
+                ends = [row["energy_ratio_low"], row["energy_ratio_high"]] if known else None
+                rows.append({**row, "energy_ratio_interval": ends})
+        return rows
 
     @cached_property
     def recheck_rows(self) -> list[Row]:

@@ -20,7 +20,7 @@ from finlab.evaluation.experiments.trajectory_and_velocity import (
 )
 from finlab.evaluation.experiments.wrench_tracking import run_method, score
 from finlab.evaluation.method_specs import load_method_spec, load_method_specs
-from finlab.evaluation.plots.closed_loop_experiments import Track
+from finlab.evaluation.plots.closed_loop_experiments import Track, track_of
 from finlab.evaluation.report.jobs import columns_of_rows
 from finlab.evaluation.splits import make_split
 from finlab.evaluation.statistics.records import Columns, columns_of_records, join_records
@@ -143,8 +143,7 @@ def trajectory(*, methods: str, runs: int, seed: int, checkpoint: str | None) ->
     columns = columns_of_rows(trajectory_rows(found))
     for (layout, method), log in found:
         step = max(1, round(0.2 / float(log.time[1] - log.time[0])))
-        track = np.column_stack([log.time, log.position, log.reference])
-        columns.setdefault(f"{TRACK}{layout} {method}", track[::step])
+        columns.setdefault(f"{TRACK}{layout} {method}", track_of(log)[::step])
     return columns
 
 
@@ -153,8 +152,8 @@ def tracks_of_columns(columns: Columns) -> list[Track]:
     tracks = []
     for name, track in columns.items():
         if name.startswith(TRACK):
-            layout, method = name.removeprefix(TRACK).split(" ", 1)
-            tracks.append(Track(layout, method, track[:, 0], track[:, 1:4], track[:, 4:]))
+            layout, _, method = name.removeprefix(TRACK).partition(" ")
+            tracks.append(((layout, method), track))
     return tracks
 
 

@@ -5,7 +5,7 @@ from finlab.evaluation.experiments.temperature import PAPER_TEMPERATURE
 from finlab.evaluation.experiments.training_study import CHANGES
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.plots.studies import ablation_dots, figure_a, latency_dots, seed_lines, training_bars
-from finlab.evaluation.report.document import Block, Column, Figure, Fold, Row, Table, method_row
+from finlab.evaluation.report.document import Block, Column, Figure, Fold, Row, Table, method_row, printed_row
 from finlab.evaluation.report.numbers import three
 from finlab.evaluation.report.results import Results
 
@@ -24,7 +24,7 @@ def latency_blocks(results: Results) -> list[Block]:
     """Methods side by side in one run."""
     rows = results.tables["latency"]
     paper_ms = paper_figures()["inference"]["cycle_s"] * 1e3
-    printed: Row = {"method": "paper's cycle, printed (Jetson Orin Nano)", "p50_ms": paper_ms}
+    printed = printed_row("paper's cycle, printed (Jetson Orin Nano)", {"p50_ms": paper_ms})
     columns = (
         Column("method", "method"),
         Column("calls", "calls", "count"),
@@ -43,7 +43,7 @@ def latency_blocks(results: Results) -> list[Block]:
             latency_dots(rows, paper_ms),
             "Dots are medians, bars end at the 99th percentile.",
         ),
-        Table(columns, [*map(method_row, rows), {**printed, "_kind": "printed"}]),
+        Table(columns, [*map(method_row, rows), printed]),
     ]
 
 
@@ -84,12 +84,10 @@ def ablation_blocks(results: Results) -> list[Block]:
                 r["scored_by"]: r for r in rows if (r["variant"], r["refinement"]) == (variant, refinement)
             }
             line: Row = {"title": TITLES[variant], "time_s": pair["plant"]["time_s"]}
-            for name, row in pair.items():
-                line |= {name: row["err_norm_mean"], f"{name}_interval": row["err_norm_mean_interval"]}
-                line[f"{name}_std"] = row["err_norm_std"]
-            theirs = printed[variant]
-            line |= {"printed": theirs["err_norm_mean"], "printed_std": theirs["err_norm_std"]}
-            lines.append(line | {"printed_time_s": theirs["time_s"]})
+            for name, row in {**pair, "printed": printed[variant]}.items():
+                line |= {name: row["err_norm_mean"], f"{name}_interval": row.get("err_norm_mean_interval")}
+                line |= {f"{name}_std": row["err_norm_std"], f"{name}_time_s": row["time_s"]}
+            lines.append(line)
         blocks += [f"### Refined by {words}", Table(columns, lines)]
     return [
         *blocks,

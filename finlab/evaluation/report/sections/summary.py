@@ -1,7 +1,7 @@
 """The first screen: a few numbers, and in which measures and cases each method leads, by their intervals."""
 
 from finlab.evaluation.paper_figures import paper_figures
-from finlab.evaluation.report.document import Block, Card, Cards, Column, Fold, Row, Table
+from finlab.evaluation.report.document import Block, Card, Column, Fold, Row, Table
 from finlab.evaluation.report.numbers import error, factor, share, three
 from finlab.evaluation.report.results import Results
 from finlab.evaluation.report.verdicts import (
@@ -37,7 +37,7 @@ def summary_blocks(results: Results) -> list[Block]:
     """Cards, who leads where, and every comparison behind it."""
     found = comparisons(results)
     return [
-        Cards(tuple(_cards(results, results.wrench_rows))),
+        tuple(_cards(results, results.wrench_rows)),
         "## Who leads",
         (
             "The learned allocator against every other method. One leads where the intervals in which reruns "
@@ -65,12 +65,7 @@ def comparisons(results: Results) -> list[Row]:
             beside = with_printed([{**row, "method": "paper"}], "err_norm_mean", means)
             where = f"ablation by the {row['scored_by']}"
             found += compare("mean error", beside, "err_norm_mean", where, ("paper",))
-    energy = [
-        {**row, "energy_ratio_interval": (row["energy_ratio_low"], row["energy_ratio_high"])}
-        for row in results.energy_rows
-        if row["energy_ratio"] is not None
-    ]
-    found += compare("energy", energy, "energy_ratio", _fins)
+    found += compare("energy", results.energy_rows, "energy_ratio", _fins)
     found += compare("time per call", tables.get("latency", ()), "p50_ms", "4 fins")
     found += compare("ATE", tables.get("trajectory", ()), "ate", lambda row: f"layouts {row['layout']}")
     faults = [row for row in tables.get("faults", ()) if row["controllable"]]
