@@ -1,13 +1,11 @@
 """What is seen beside the panel: the robot that is designed, or those that swim."""
 
 from collections.abc import Callable
-from functools import partial
 
 import viser
 
 from finlab.allocation.allocation import Allocation
 from webapp.markup.corner import graph_row, legend, overlay_row, set_rows
-from webapp.scene.dragging import Dragging
 from webapp.scene.robot_scene import RobotScene
 from webapp.scene.swim_scene import SwimScene
 from webapp.session import Session
@@ -42,19 +40,12 @@ class Scenery:
         self._client, self._session, self._swimming = client, session, swimming
         self._dark: bool | None = None
         self._stop: int | None = None
-        self._swims = False
-        dragging = Dragging(session, do)
-        self.robot = RobotScene(
-            client, session, lambda name: do(partial(session.select, name)), dragging.fin, dragging.wrench
-        )
+        self.robot = RobotScene(client, session, do)
         self.swim = SwimScene(client, swimming)
+        self.swims = False
+        """Whether the robots that swim are on the screen."""
         self.legend = ""
         """What is drawn of the robot that is designed, as markup."""
-
-    @property
-    def swims(self) -> bool:
-        """Whether the robots that swim are on the screen."""
-        return self._swims
 
     def refresh(
         self, answering: Answering, comparison: Comparison, improver: Improver, findings: Findings | None
@@ -67,8 +58,8 @@ class Scenery:
         attention = None if reply is None else reply.attention
         other, display = self._overlaid(comparison), self._session.display
         self.robot.refresh(answering.shown, other, findings, offered, attention)
-        self._swims = bool(self._swimming.swimmers)
-        self.robot.show(not self._swims)
+        self.swims = bool(self._swimming.swimmers)
+        self.robot.show(not self.swims)
         self.legend = legend(
             self.robot.newtons,
             (

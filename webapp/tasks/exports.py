@@ -36,7 +36,7 @@ def recorded_html(session: Session, allocation: Allocation) -> bytes:
     try:
         server.scene.world_axes.visible = False
         studio: Any = SimpleNamespace(scene=server.scene, camera=server.initial_camera, atomic=server.atomic)
-        robot = RobotScene(studio, session, lambda *_: None, lambda *_: None, lambda *_: None)
+        robot = RobotScene(studio, session, lambda _: None)
         robot.refresh(allocation)
         recording = server.get_scene_serializer()
         for _ in range(int(SECONDS * FRAMES_PER_SECOND)):
