@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from finlab.layout.layout import MAX_FINS
-from webapp.handles import hold_kind, on_user_change, on_user_click, put
+from webapp.handles import hold_kind, on_user_change, put
 from webapp.markup.words import small
 from webapp.page import Page
 from webapp.panels.line_plot import LinePlot
@@ -42,7 +42,7 @@ class SweepPanel:
             self._play = gui.add_button(
                 "Play the sweep", icon=viser.Icon.PLAYER_PLAY, hint="To and fro until you stop it."
             )
-            on_user_click(self._play, self._toggle)
+            page.on_click(self._play, self._toggle)
             colors = [css(fin_color(i)) for i in range(MAX_FINS)]
             self._plot = LinePlot(gui, colors, "force of each fin [N]", height=170, widths=(2.0,))
             self._said = gui.add_html("")
@@ -50,10 +50,10 @@ class SweepPanel:
     def _toggle(self) -> None:
         sweep = self._page.sweep
         if sweep.running:
-            self._page.do(sweep.stop)
+            sweep.stop()
         else:
             axis = AXIS_WORDS.index(self._axis.value) if self._axis.value in AXIS_WORDS else 0
-            self._page.do(lambda: sweep.start(axis, *self._range.value))
+            sweep.start(axis, *self._range.value)
 
     def _fit_range(self) -> None:
         """Half of what is within reach, both ways: the ends are where it becomes interesting."""

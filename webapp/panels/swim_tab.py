@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from finlab.layout.layout import MAX_FINS
 from finlab.sim import PLANTS, SHIPPED, Trajectory
-from webapp.handles import Changes, hold_kind, on_user_change, put
+from webapp.handles import Changes, hold_kind, put
 from webapp.markup.swim_card import swim_card
 from webapp.page import Page
 from webapp.panels.damage import FinButtons
@@ -39,75 +39,54 @@ class SwimTab:
         """Build the widgets."""
         self._page = page
         self._own: Trajectory | None = None
-        self._path = gui.add_dropdown(
-            "Path", tuple(SHIPPED), initial_value="lissajous", hint="Where to swim."
-        )
-        self._method = gui.add_dropdown("Method", COMPARED, hint="Who allocates, ten times a second.")
-        self._rival = gui.add_dropdown(
-            "Beside", (ALONE, *COMPARED), hint="A second robot on the same path, with another method."
-        )
-        self._plant = gui.add_dropdown(
-            "Fin forces", tuple(PLANTS), hint="Mean forces, forces with their ripple, or flexible fins."
-        )
-        for key, widget in (
-            ("path", self._path),
-            ("method", self._method),
-            ("rival", self._rival),
-            ("plant", self._plant),
-        ):
-            on_user_change(widget, partial(self._set, key))
-        self._run = gui.add_button_group(
-            "Run",
-            ("Start", "Pause", "Step", "End"),
-            hint="Step swims for 0.1 s; B pauses or goes on.",
-        )
-        on_user_change(self._run, self._press)
-        self._speed = gui.add_slider(
-            "Speed", *SPEEDS, 0.1, 1.0, hint="Simulated time per real time; a slow machine falls short of it."
-        )
-        on_user_change(self._speed, partial(self._set, "speed"))
-        self._follow = gui.add_checkbox("Follow", False, hint="The camera goes along with the first robot.")
-        on_user_change(self._follow, page.scenery.look_after_swim)
+        where, rival = "Where to swim.", "A second robot on the same path, with another method."
+        forces = "Mean forces, forces with their ripple, or flexible fins."
+        speed = "Simulated time per real time; a slow machine falls short of it."
+        self._settings: dict[str, Any] = {
+            "path": gui.add_dropdown("Path", tuple(SHIPPED), initial_value="lissajous", hint=where),
+            "method": gui.add_dropdown("Method", COMPARED, hint="Who allocates, ten times a second."),
+            "rival": gui.add_dropdown("Beside", (ALONE, *COMPARED), hint=rival),
+            "plant": gui.add_dropdown("Fin forces", tuple(PLANTS), hint=forces),
+        }
+        runs = {
+            "Start": self._start,
+            "Pause": self._hold,
+            "Go on": self._hold,
+            "Step": page.swimming.step,
+            "End": page.scenery.end_swim,
+        }
+        self._run = page.add_buttons("Run", runs, hint="Step swims for 0.1 s; B pauses or goes on.")
+        self._settings["speed"] = gui.add_slider("Speed", *SPEEDS, 0.1, 1.0, hint=speed)
+        for key, widget in self._settings.items():
+            page.on_change(widget, partial(page.session.set_swim, key))
+        follow = gui.add_checkbox("Follow", False, hint="The camera goes along with the first robot.")
+        page.on_change(follow, page.scenery.look_after_swim)
         self._fins = FinButtons(
             gui,
+            page,
             "Break a fin",
             "Press a fin's number: break or mend it while it swims.",
             "fl-breaks",
-            lambda name: page.do(partial(page.swimming.toggle, name)),
+            page.swimming.toggle,
         )
         self._card = gui.add_html("")
         self._plots = SwimPlots(gui)
         with gui.add_folder("More", expand_by_default=False):
-            self._upload = gui.add_upload_button(
+            upload = gui.add_upload_button(
                 "Open a path (CSV)",
                 icon=viser.Icon.ROUTE,
                 mime_type=".csv",
                 hint="A table with the columns t [s], x, y, z [m].",
             )
             self._axis = self._plots.add_axis_choice(gui)
-
-        @self._upload.on_upload
-        async def _uploaded(event: Any) -> None:
-            upload = event.target.value
-            page.do(lambda: self._take_path(upload.name, upload.content))
+            page.on_upload(upload, self._take_path)
 
     def _take_path(self, name: str, content: bytes) -> None:
         self._own = read_path(name, content)
         self._page.session.set_swim("path", OWN)
 
-    def _set(self, key: str, value: object) -> None:
-        self._page.do(partial(self._page.session.set_swim, key, value))
-
-    def _press(self, button: str) -> None:
-        swimming = self._page.swimming
-        if button == "Start":
-            self._page.do(self._start)
-        elif button == "Pause":
-            self._page.do(lambda: swimming.set_running(not swimming.running))
-        elif button == "Step":
-            self._page.do(swimming.step)
-        elif button == "End":
-            self._page.do(self._page.scenery.end_swim)
+    def _hold(self) -> None:
+        self._page.swimming.set_running(not self._page.swimming.running)
 
     def _start(self) -> None:
         session = self._page.session
@@ -116,11 +95,9 @@ class SwimTab:
     def refresh(self) -> None:
         """Write how the swim goes."""
         swimming, settings = self._page.swimming, self._page.session.swim
-        put(self._path, options=tuple(SHIPPED) if self._own is None else (*SHIPPED, OWN), value=settings.path)
-        put(self._method, value=settings.method)
-        put(self._rival, value=settings.rival)
-        put(self._plant, value=settings.plant)
-        put(self._speed, value=settings.speed)
+        put(self._settings["path"], options=tuple(SHIPPED) if self._own is None else (*SHIPPED, OWN))
+        for key, widget in self._settings.items():
+            put(widget, value=getattr(settings, key))
         if swimming.pace.speed != settings.speed:
             swimming.pace.set_speed(settings.speed)
         swimmers = swimming.swimmers
