@@ -52,15 +52,7 @@ class Page(ABC):
         workers: Workers,
         loop: asyncio.AbstractEventLoop,
     ) -> None:
-        """Build the page and ask for a first answer.
-
-        Args:
-            client: the browser.
-            session: what it shows.
-            solver: answers its questions.
-            workers: on whose threads everything is computed.
-            loop: viser's event loop.
-        """
+        """Build the page and ask for a first answer; `loop` is viser's, on `workers` all is computed."""
         self.client = client
         """The browser."""
         self.session = session
@@ -74,7 +66,7 @@ class Page(ABC):
             session, solver, page, answers, self._answered, partial(self.notify, "No answer")
         )
         """The newest answer, its modes and what of it is on the robot."""
-        self.playback = Playback(session, self.answering, solver, page, answers, changed, refused)
+        self.playback = Playback(self.answering, solver, page, answers, changed, refused)
         """The refinement, step by step."""
         self.ranging: Newest[Beside, Ranges] = Newest(page, workers.marks, find_ranges, changed, REST_S)
         """How far each component of the target can go."""

@@ -152,7 +152,7 @@ class ImprovePanel:
         self._page.improver.start(session.state.layout, session.draft)
 
     def _accept(self) -> None:
-        found = self._page.improver.found
+        found = self._page.improver.findings
         self._page.improver.forget()
         if found is not None:
             self._page.session.accept_layout(found.layout)
@@ -161,7 +161,7 @@ class ImprovePanel:
         """Write how far the search is."""
         self._refresh_request()
         improver = self._page.improver
-        running, progress, found = improver.running, improver.progress, improver.found
+        running, progress, found = improver.busy, improver.progress, improver.findings
         put(self._start, disabled=running)
         put(self._bar, visible=running)
         put(self._cancel, visible=running)

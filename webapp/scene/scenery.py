@@ -29,14 +29,7 @@ class Scenery:
         swimming: Swimming,
         do: Callable[[Callable[[], object]], None],
     ) -> None:
-        """Build the nodes.
-
-        Args:
-            client: the browser.
-            session: what it shows.
-            swimming: the robots that swim, if any do.
-            do: carries out an intent.
-        """
+        """Build the nodes of the scene of `client`, a browser; `do` carries out an intent of its user."""
         self._client, self._session, self._swimming = client, session, swimming
         self._dark: bool | None = None
         self._stop: int | None = None
@@ -53,7 +46,7 @@ class Scenery:
         """Show what has been found for the session's state."""
         self._follow_tour()
         self._apply_theme()
-        found, reply = improver.found, answering.reply
+        found, reply = improver.findings, answering.reply
         offered = found.layout if found is not None and found.improved else None
         attention = None if reply is None else reply.attention
         other, display = self._overlaid(comparison), self._session.display
