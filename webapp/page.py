@@ -15,7 +15,7 @@ import viser
 from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
 from finlab.forces.reach import Ranges
-from webapp.handles import Changes, on_user_change, on_user_click
+from webapp.handles import Changes, on_user_change
 from webapp.scene.scenery import Scenery
 from webapp.session import Session
 from webapp.tasks.analyst import REST_S, Beside, Findings, Question, find, find_ranges
@@ -123,7 +123,11 @@ class Page(ABC):
 
     def on_click(self, button: viser.GuiButtonHandle, act: Callable[[], object]) -> None:
         """Carry out an intent when the user presses a button."""
-        on_user_click(button, partial(self.do, act))
+
+        @button.on_click
+        async def _clicked(event: Any) -> None:
+            if event.client is not None:
+                self.do(act)
 
     def on_upload(self, button: viser.GuiUploadButtonHandle, act: Callable[[str, bytes], object]) -> None:
         """Carry out `act(name, content)` when the user has chosen a file."""

@@ -6,16 +6,14 @@ from typing import Any
 import viser
 
 from finlab.allocation.methods import METHODS
-from finlab.layout.layout import MAX_FINS
 from webapp.handles import Changes, numbered, on_user_change, put
 from webapp.markup.modes import SAMPLES, mode_plot, mode_table
 from webapp.markup.picking import Channel, chosen_button, marker
 from webapp.markup.words import small, three_digits
 from webapp.page import Page
-from webapp.panels.line_plot import LinePlot
+from webapp.panels.line_plot import FIN_LINES, LinePlot
 from webapp.session.state import CANDIDATE_RANGE, GAMMA_RANGE, TEMPERATURE_RANGE
 from webapp.tasks.solver import STEPS, Densities
-from webapp.theme import css, fin_color
 
 TITLES = ("amplitude [°]", "frequency [Hz]", "zero direction [°]")
 
@@ -140,10 +138,9 @@ class DensityPanel:
                 "<div class='fl dim'>How likely each command is, in the fin's colour; every curve has its "
                 "highest point at the top.</div>"
             )
-            colors = [css(fin_color(i)) for i in range(MAX_FINS)]
             # Fins that do the same have the same curve: each next line is thinner, so that all are seen.
             self._plots = [
-                LinePlot(gui, colors, "", title, height=112, widths=(6.0, 4.5, 3.0, 1.5), visible=True)
+                LinePlot(gui, FIN_LINES, "", title, height=112, widths=(6.0, 4.5, 3.0, 1.5), visible=True)
                 for title in TITLES
             ]
 

@@ -6,30 +6,26 @@ from typing import Any
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
-from finlab.layout.layout import MAX_FINS
 from finlab.sim import PLANTS, SHIPPED, Trajectory
-from webapp.handles import Changes, hold_kind, put
+from webapp.handles import Changes, hold_kind, option_index, put
 from webapp.markup.swim_card import swim_card
 from webapp.page import Page
 from webapp.panels.damage import FinButtons
-from webapp.panels.line_plot import LinePlot
+from webapp.panels.line_plot import FIN_LINES, LinePlot, top_of
 from webapp.session.files import read_path
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, COMPARED
 from webapp.session.swim_plan import ALONE, OWN, SPEEDS
-from webapp.session.targets import nice_limit
 from webapp.tasks.swimmer import ASKED as ASKED_COLUMN
 from webapp.tasks.swimmer import DELIVERED as DELIVERED_COLUMN
 from webapp.tasks.swimmer import ERROR, FORCES, TIME
 from webapp.tasks.swimming import Swimming
-from webapp.theme import ASKED, DELIVERED, OTHER, css, fin_color
+from webapp.theme import ASKED, DELIVERED, OTHER, css
 
 EVERY_S = 0.2
 """Least time between two drawings [s]."""
-ROOM = 1.08
-"""Room above the last tick, so that its number is not cut off."""
-Array = NDArray[np.float64]
+SMALL = 0.01
+"""What the vertical axes show at least."""
 
 
 class SwimTab:
@@ -78,7 +74,9 @@ class SwimTab:
                 mime_type=".csv",
                 hint="A table with the columns t [s], x, y, z [m].",
             )
-            self._axis = self._plots.add_axis_choice(gui)
+            wrench = "Asked in blue, delivered in green, of the first robot."
+            self._axis = gui.add_dropdown("Plot the wrench of", AXIS_WORDS, hint=wrench)
+            hold_kind(self._axis)
             page.on_upload(upload, self._take_path)
 
     def _take_path(self, name: str, content: bytes) -> None:
@@ -107,7 +105,7 @@ class SwimTab:
         put(self._run, options=("Start", "Go on" if paused else "Pause", "Step", "End"))
         self._fins.refresh(names, failed)
         put(self._card, content=swim_card(swimming))
-        self._plots.refresh(swimming)
+        self._plots.refresh(swimming, option_index(self._axis))
 
 
 class SwimPlots:
@@ -119,27 +117,14 @@ class SwimPlots:
         self._changes = Changes()
         self._error = LinePlot(gui, (css(DELIVERED), css(OTHER)), "off path [cm]")
         self._wrench = LinePlot(gui, (css(ASKED), css(DELIVERED)), "surge [N]")
-        colors = [css(fin_color(i)) for i in range(MAX_FINS)]
-        self._force = LinePlot(gui, colors, "fins [N]", "time [s]", height=124)
-        self._axis: viser.GuiDropdownHandle[str] | None = None
+        self._force = LinePlot(gui, FIN_LINES, "fins [N]", "time [s]", height=124)
 
-    def add_axis_choice(self, gui: viser.GuiApi) -> viser.GuiDropdownHandle[str]:
-        """Let the user choose which axis of the wrench is drawn."""
-        self._axis = gui.add_dropdown(
-            "Plot the wrench of", AXIS_WORDS, hint="Asked in blue, delivered in green, of the first robot."
-        )
-        hold_kind(self._axis)
-        return self._axis
-
-    def refresh(self, swimming: Swimming) -> None:
-        """Draw, but no more often than an eye can follow."""
+    def refresh(self, swimming: Swimming, axis: int) -> None:
+        """Draw errors, one axis of the wrench and forces, but no more often than an eye can follow."""
         swimmers = swimming.swimmers
         moments = tuple(swimmer.shown for swimmer in swimmers)
         for plot in (self._error, self._wrench, self._force):
             plot.show(bool(swimmers))
-        axis = 0
-        if self._axis is not None and self._axis.value in AXIS_WORDS:
-            axis = AXIS_WORDS.index(self._axis.value)
         soon = time.monotonic() - self._drawn < EVERY_S and swimming.running
         if not moments or soon or not len(moments[0].record) or not self._changes(axis, *moments):
             return
@@ -149,13 +134,9 @@ class SwimPlots:
         lines = [
             100 * np.interp(seconds, m.record[:, TIME], m.record[:, ERROR]) for m in moments if len(m.record)
         ]
-        self._error.draw(seconds, lines, (0.0, _top(lines)))
+        self._error.draw(seconds, lines, (0.0, top_of(lines, SMALL)))
         both = [record[:, column + axis] for column in (ASKED_COLUMN, DELIVERED_COLUMN)]
         self._wrench.name(f"{AXIS_WORDS[axis]} [{AXIS_UNITS[axis]}]", "")
-        self._wrench.draw(seconds, both, (-_top([-both[0], -both[1]]), _top(both)))
+        self._wrench.draw(seconds, both, (-top_of([-both[0], -both[1]], SMALL), top_of(both, SMALL)))
         forces = list(record[:, FORCES:].T)
-        self._force.draw(seconds, forces, (0.0, _top(forces)))
-
-
-def _top(lines: list[Array]) -> float:
-    return ROOM * nice_limit(max(float(np.nanmax(line, initial=0.01)) for line in lines) / 1.2)
+        self._force.draw(seconds, forces, (0.0, top_of(forces, SMALL)))
