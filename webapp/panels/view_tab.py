@@ -40,7 +40,7 @@ class ViewTab:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
-        looks = {view: partial(page.scenery.look_from, view) for view in CAMERAS}
+        looks = {view: partial(page.scenery.robot.look_from, view) for view in CAMERAS}
         page.add_buttons("Camera", looks, hint="Keys 1, 2, 3, 4.")
         self._speed = gui.add_slider("Motion speed", 0.05, 1.0, 0.05, 0.5, hint="1 is real time.")
         page.on_change(self._speed, partial(page.session.set_display, "speed"))

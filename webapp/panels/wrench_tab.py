@@ -99,8 +99,11 @@ class TargetPanel:
         ]
         self._end = gui.add_html(marker("fl-reach-end"))
         for k, slider in enumerate(self._sliders):
-            page.on_change(slider, partial(page.session.set_target, k))
+            page.on_change(slider, partial(self._set_target, k))
         self._changes = Changes()
+
+    def _set_target(self, axis: int, value: float) -> None:
+        self._page.session.set_target(axis, value)
 
     @property
     def reach(self) -> NDArray[np.float64]:

@@ -80,10 +80,6 @@ class Scenery:
         else:
             self.robot.animate(elapsed)
 
-    def look_from(self, view: str) -> None:
-        """Move the camera to a view of the robot that is designed."""
-        self.robot.look_from(view)
-
     def look_after_swim(self, follow: bool) -> None:
         """Let the camera go along with the first robot that swims, or see all of its path."""
         if self._swimming.active:
@@ -93,7 +89,7 @@ class Scenery:
         """Go back from the robot that swims to the one that is designed."""
         if self._swimming.active:
             self._swimming.stop()
-            self.look_from("3D")
+            self.robot.look_from("3D")
 
     def _follow_tour(self) -> None:
         """At some stops of the tour the robot swims; to come to a stop, or to leave the tour, ends a swim."""

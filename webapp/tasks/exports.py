@@ -13,7 +13,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
 from webapp.scene.robot_scene import RobotScene
 from webapp.session import Session
-from webapp.session.files import bundle_bytes, file_stem, graph_bytes
+from webapp.session.files import bundle_bytes, file_stem, graph_file
 from webapp.tasks.background import EventLoop, Worker
 from webapp.tasks.solver import Solver
 from webapp.viser_internals import start_server, stop_server
@@ -69,7 +69,7 @@ class Exports:
     def graph(self) -> None:
         """Send the layout graph file."""
         state, loaded = self._session.state, self._solver.loaded
-        self._send(".graph.json", lambda: graph_bytes(state.layout, state.failed, loaded(state.method)))
+        self._send(".graph.json", lambda: graph_file(state.layout, state.failed, loaded(state.method)))
 
     def bundle(self) -> None:
         """Send the bundle for the robot: the same bytes as `finlab export --zip`.

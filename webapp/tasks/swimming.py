@@ -56,14 +56,9 @@ class Swimming:
         self._acts: deque[Callable[[ClosedLoop], None]] = deque()
 
     @property
-    def plan(self) -> Plan | None:
-        """What is being swum, None while nothing is."""
-        return self._start.question
-
-    @property
     def active(self) -> bool:
         """Whether there is a swim, running or not."""
-        return self.plan is not None
+        return self._start.question is not None
 
     @property
     def done(self) -> bool:
