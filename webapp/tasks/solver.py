@@ -55,8 +55,7 @@ def densities(insight: Insight, layout: Layout, failed: tuple[str, ...], tempera
     healthy = layout.without(failed) if failed else layout
     weight, mean, std = insight.weight, insight.mean, insight.std
     std = np.maximum(std * np.sqrt(temperature), NARROWEST)
-    lower = healthy.lower
-    upper = healthy.upper
+    lower, upper = healthy.lower, healthy.upper
     places = np.linspace(lower.min(axis=0), upper.max(axis=0), POINTS, axis=1)  # (3, P)
     width = np.maximum(upper - lower, 1e-9)
     at = 2 * (places[None] - lower[:, :, None]) / width[:, :, None] - 1  # (n, 3, P), normalized

@@ -71,17 +71,17 @@ def _tube_faces(rows: int, sides: int) -> NDArray[np.int32]:
     k = np.arange(sides)
     n, last = np.roll(k, -1), (rows - 1) * sides
     start, end = np.full(sides, rows * sides), np.full(sides, rows * sides + 1)
-    return np.concatenate([_grid_faces(rows, sides), _triangles(start, n, k, end, last + k, last + n)])
+    return np.concatenate([_grid_faces(rows, sides), triangles(start, n, k, end, last + k, last + n)])
 
 
 def _grid_faces(rows: int, columns: int) -> NDArray[np.int32]:
     """Triangles between neighbouring rings of points; the columns close on themselves."""
     a = np.arange((rows - 1) * columns).reshape(-1, columns)
     b = np.roll(a, -1, axis=1)
-    return _triangles(a, b, a + columns, b, b + columns, a + columns)
+    return triangles(a, b, a + columns, b, b + columns, a + columns)
 
 
-def _triangles(*corners: NDArray[np.intp]) -> NDArray[np.int32]:
+def triangles(*corners: NDArray[np.intp]) -> NDArray[np.int32]:
     """Arrays of corners, three for each set of triangles, as triangles (F, 3)."""
     return np.stack(corners, axis=-1).reshape(-1, 3).astype(np.int32)
 
