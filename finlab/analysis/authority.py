@@ -4,15 +4,13 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.forces.extent import RANK_TOLERANCE, singular_values, strongest, weakest
 from finlab.forces.fin_sets import SCALE, fin_sets
 from finlab.forces.reach import max_wrench_along_exactly
 from finlab.forces.thrust_curve import plant_curves
 from finlab.layout import Layout
-
-Array = NDArray[np.float64]
+from finlab.layout.arrays import Array
 
 AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 """Names of the six axes, in the order of a wrench."""

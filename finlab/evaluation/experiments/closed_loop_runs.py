@@ -10,17 +10,16 @@ from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
 from finlab.errors import DataError
 from finlab.evaluation.progress import progress
 from finlab.layout import Layout
+from finlab.layout.arrays import Array
 from finlab.sim import ClosedLoop, RunLog, Task
 
 Row = dict[str, Any]
 
-Array = NDArray[np.float64]
 
 RTE_DELTA_S = 5.0
 """Time between the two ends of a piece of path that the relative error compares [s]."""
@@ -116,8 +115,8 @@ def run_all(
         plant: how fin forces are simulated.
         steady: whether the allocators are given their previous command.
     """
-    every = list(product(scenarios, allocators.items(), seeds))
     done = []
+    every = list(product(scenarios, allocators.items(), seeds))
     for (label, layout, task, failures), (name, allocator), seed in progress(every, "run"):
         options: dict[str, Any] = {"failures": failures, "plant": plant, "steady": steady, "seed": seed}
         done.append(((label, name), ClosedLoop(layout, allocator, task, **options).run()))

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.policy import KINDS
@@ -19,9 +18,8 @@ from finlab.evaluation.method_specs import is_slow
 from finlab.evaluation.progress import progress
 from finlab.evaluation.statistics.tables import text_table
 from finlab.layout import FinModelSpec, Layout
+from finlab.layout.arrays import Array
 from finlab.physics import make_law, write_table
-
-Array = NDArray[np.float64]
 
 LATE_S = 1.0
 """A single call that takes longer counts as late [s of processor time]."""

@@ -2,6 +2,7 @@
 
 import os
 import platform
+import re
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -100,12 +101,10 @@ def machine() -> dict[str, str]:
 
 def _processor() -> str:
     """The processor's name as Linux tells it, or what Python knows."""
-    try:
-        for line in Path("/proc/cpuinfo").read_text("utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    except OSError:
-        pass
+    with suppress(OSError):
+        named = re.search(r"^model name\s*: *(.+)$", Path("/proc/cpuinfo").read_text("utf-8"), re.MULTILINE)
+        if named:
+            return named[1].strip()
     return platform.processor() or platform.machine()
 
 

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, Ipopt
@@ -20,10 +19,9 @@ from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.layout import Layout
+from finlab.layout.arrays import Array
 from finlab.physics import Plant, plant_of
 from finlab.physics.energy import command_energy
-
-Array = NDArray[np.float64]
 
 EXACT = 1e-4
 """Normalized error of each axis up to which a command delivers the wrench; the plant's and the surrogate's
@@ -42,8 +40,7 @@ class CheapestWays(Ipopt):
         found = np.array([self._minimize(problem, problem.position(start)) for start in starts])
         found = np.array([problem.command(end) for end in found if np.isfinite(end).all()])
         command = plant.feasible(found.reshape(-1, plant.n_fins, 3))
-        sorted_: Array = command[np.argsort(command_energy(command, plant.upper))]
-        return sorted_
+        return np.asarray(command[np.argsort(command_energy(command, plant.upper))])
 
     def _minimize(self, problem: Problem, start: Array) -> Array:
         end = super()._minimize(problem, start)
@@ -132,8 +129,7 @@ def _covered(wanted: list[Any], known: list[Any]) -> float:
 
 def _forces(layout: Layout, command: Array) -> Array:
     """Forces of all fins (M, 3n) [N] by the plant."""
-    force: Array = Plant(layout).fin_forces(command).reshape(len(command), 3 * layout.n_fins)
-    return force
+    return np.asarray(Plant(layout).fin_forces(command).reshape(len(command), 3 * layout.n_fins))
 
 
 def _energy_distance(one: Array, other: Array) -> float:

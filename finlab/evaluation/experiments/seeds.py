@@ -76,8 +76,9 @@ def _commands(
     lower, upper = prepared.lower, prepared.upper
     n = len(lower)
     if kind == "network":
-        target = targets / allocator.normalization.std
-        centred = target - allocator.normalization.mean / allocator.normalization.std
+        mean, sigma = allocator.normalization
+        target = targets / sigma
+        centred = target - mean / sigma
         network, chosen = allocator.pipeline.network, allocator.settings
         count, temperature = chosen.n_candidates, chosen.temperature
         drawn = propose(network, prepared, centred, target, count, temperature, seed)
@@ -92,8 +93,7 @@ def _commands(
         block = int(np.ceil(np.log2(n_seeds)))
         points = qmc.Sobol(3 * n, rng=np.random.default_rng(seed)).random_base2(block)[:n_seeds]
         unit = np.broadcast_to(points.reshape(1, n_seeds, n, 3), (len(targets), n_seeds, n, 3))
-    uniform: Array = lower + unit * (upper - lower)
-    return uniform
+    return np.asarray(lower + unit * (upper - lower))
 
 
 def _answer(
@@ -106,8 +106,7 @@ def _answer(
     energy = command_energy(refined.command, prepared.upper)
     # The tolerance of the product; without refinement nothing is exact and the error decides.
     rank = np.where(refined.error > 10 * RANKING.exact_error, 1e3 + refined.error, energy).reshape(rows, k)
-    chosen: Array = refined.command.reshape(rows, k, n, 3)[np.arange(rows), rank.argmin(1)]
-    return chosen
+    return np.asarray(refined.command.reshape(rows, k, n, 3)[np.arange(rows), rank.argmin(1)])
 
 
 def _row(fins: int, kind: str, steps: int, found: tuple[Array, ...], by_network: tuple[Array, ...]) -> Row:

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation import Allocation, Allocator
 from finlab.evaluation.progress import progress
@@ -17,11 +16,9 @@ from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.forces.thrust_curve import plant_curves
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
-from finlab.layout.arrays import layout_effectiveness
+from finlab.layout.arrays import Array, layout_effectiveness
 from finlab.physics import Plant
 from finlab.physics.energy import command_energy
-
-Array = NDArray[np.float64]
 
 TICKS, RATE = 600, 10.0
 """Length of a path, and ticks per second [Hz]: one minute."""
@@ -72,16 +69,15 @@ def smooth_path(layout: Layout, sigma: Array, seed: int, ticks: int = TICKS) -> 
     # The least planar forces (T, 2n) whose wrench comes closest to sigma times the path.
     spread = path @ np.linalg.pinv(effectiveness / sigma[:, None], rcond=1e-6).T
     share = np.linalg.norm(spread.reshape(ticks, -1, 2), axis=-1) / plant_curves(layout).maximum
-    pushed: Array = spread @ effectiveness.T * (LOAD / share.max())
-    return pushed
+    return np.asarray(spread @ effectiveness.T * (LOAD / share.max()))
 
 
-def rollout(allocator: Allocator, layout: Layout, path: Array, *, steady: bool, seed: int = 0) -> Rollout:
+def rollout(allocator: Allocator, layout: Layout, path: Array, *, steady: bool) -> Rollout:
     """Follow a path (T, 6), one call per tick; with `steady`, each is given the last command."""
     answers: list[Allocation] = []
     for wrench in path:
         previous = answers[-1].command if steady and answers else None
-        answers.append(allocator.allocate(layout, wrench, previous=previous, seed=seed))
+        answers.append(allocator.allocate(layout, wrench, previous=previous))
     command = np.array([answer.command for answer in answers])
     return Rollout(
         turn=_turns(command[..., 2]),

@@ -20,10 +20,8 @@ from finlab.evaluation.progress import progress
 from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.layout import Layout, random_layout
 from finlab.layout.angles import is_full_turn
-from finlab.layout.arrays import layout_effectiveness
+from finlab.layout.arrays import Array, layout_effectiveness
 from finlab.physics import Plant, plant_of
-
-Array = NDArray[np.float64]
 
 DOMAIN = 0xFA2
 """Leads the seed of every case."""
@@ -169,8 +167,7 @@ def _far_target(rng: np.random.Generator, layout: Layout, sigma: Array) -> Array
         near = plant_of(layout).wrench(plant_of(layout).sample(rng, ()))
     else:
         near = rng.standard_normal(6) * sigma
-    far: Array = near * farther
-    return far
+    return np.asarray(near * farther)
 
 
 def _convex_arcs(lower: Array, upper: Array) -> list[Array]:

@@ -4,15 +4,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.evaluation.experiments.closed_loop_runs import Row, Run
 from finlab.evaluation.experiments.faults import ALLOWED, HEALTHY
 from finlab.evaluation.plots.style import BLACK, COLOURS, GREY, Picture, picture
+from finlab.layout.arrays import Array
 from finlab.sim import RunLog
-
-Array = NDArray[np.float64]
-
 
 Track = tuple[tuple[str, str], Array]
 """Names of a robot and of its method, and when it swam where: time [s], position and reference [m] (K, 7)."""

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.evaluation.plots.style import (
     BLACK,
@@ -20,10 +19,9 @@ from finlab.evaluation.plots.style import (
     picture,
 )
 from finlab.layout.angles import wrapped
+from finlab.layout.arrays import Array
 from finlab.sim import RunLog
 from finlab.sim.vehicle import euler
-
-Array = NDArray[np.float64]
 
 FIN_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK, YELLOW)
 """Colour of each fin, in the layout's order."""

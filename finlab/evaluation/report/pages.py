@@ -60,17 +60,16 @@ def _html_block(block: Block) -> str:
 
 def _html_table(table: Table) -> str:
     kinds = ["" if column.is_number else ' class="name"' for column in table.columns]
-    titles = zip(table.columns, kinds, strict=True)
-    lines = ["".join(f"<th{kind}>{_inline(column.title)}</th>" for column, kind in titles)]
+    columns = list(zip(table.columns, kinds, strict=True))
+    head = "".join(f"<th{kind}>{_inline(column.title)}</th>" for column, kind in columns)
+    body = []
     for row in table.rows:
-        cells = []
-        for column, kind in zip(table.columns, kinds, strict=True):
+        body.append(f'<tr class="{row["_kind"]}">' if "_kind" in row else "<tr>")
+        for column, kind in columns:
             big, small = table.cell(row, column)
-            cells.append(f"<td{kind}>{_inline(big)}{f'<small>{small}</small>' if small else ''}</td>")
-        lines.append("".join(cells))
-    marks = [f' class="{row["_kind"]}"' if "_kind" in row else "" for row in table.rows]
-    body = "".join(f"<tr{mark}>{line}</tr>" for mark, line in zip(marks, lines[1:], strict=True))
-    return f"<table><thead><tr>{lines[0]}</tr></thead><tbody>{body}</tbody></table>"
+            body.append(f"<td{kind}>{_inline(big)}{f'<small>{small}</small>' if small else ''}</td>")
+        body.append("</tr>")
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(body)}</tbody></table>"
 
 
 def _inline(text: str) -> str:

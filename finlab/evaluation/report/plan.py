@@ -114,18 +114,20 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
         settings |= {"seed": seed} | ({} if size is None else {"layouts": size[0], "targets": size[1]})
         return Job(name, do, settings, prints[spec], {"checkpoint": checkpoints.of(spec)})
 
-    energy = {
-        name: job(f"energy-{name}", work.energy, name, _energy_size(sizes, name), method=name)
-        for name in (REFERENCE, *ENERGY_METHODS)
-        if name in prints
-    }
+    energy = {}
+    for name in (REFERENCE, *ENERGY_METHODS):
+        if name in prints:
+            layouts, targets = sizes.energy
+            size = layouts, sizes.energy_slow if is_slow(name) and name != REFERENCE else targets
+            energy[name] = job(f"energy-{name}", work.energy, name, size, method=name)
     wrench = {}
     for name in sorted(names, key=lambda name: name != "paper"):
         for split in SPLITS:
             if is_slow(name) and split == "id":
                 wrench[split, name] = energy[name]  # the same targets, and more of them
             else:
-                size = _size(sizes, split, name)
+                main = split in paper_figures()["wrench_tracking"]
+                size = sizes.of_split(main=main, slow=is_slow(name))
                 wrench[split, name] = job(
                     f"wrench-{split}-{name}", work.wrench, name, size, split=split, method=name
                 )
@@ -180,19 +182,6 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
         training=training_jobs(study, runs) if torch else {},
         tables=tables,
     )
-
-
-def _energy_size(sizes: Sizes, method: str) -> Size:
-    """Layouts and targets on which energies are compared; few for methods of 8 starts."""
-    layouts, targets = sizes.energy
-    return layouts, sizes.energy_slow if is_slow(method) and method != REFERENCE else targets
-
-
-def _size(sizes: Sizes, split: str, method: str) -> tuple[int, int]:
-    """Layouts and targets of a split, the paper's or another, for a quick or a slow method."""
-    if split in paper_figures()["wrench_tracking"]:
-        return (sizes.main[0], 1) if is_slow(method) else sizes.main
-    return sizes.slow_other if is_slow(method) else sizes.other
 
 
 def training_jobs(settings: dict[str, Any], folder: Path) -> dict[str, Job]:

@@ -53,9 +53,8 @@ def energy(*, layouts: int, targets: int, method: str, seed: int, checkpoint: st
         parts.append(
             score(case, case.targets, answer.command, answer.solve_ms, allocator.normalization.std, number=k)
         )
-        padded = np.full((len(case.targets), MOST_FINS, 3), np.nan)
-        padded[:, : case.layout.n_fins] = answer.command
-        commands.append(padded)
+        missing = (0, 0), (0, MOST_FINS - case.layout.n_fins), (0, 0)
+        commands.append(np.pad(answer.command, missing, constant_values=np.nan))
     return columns_of_records(join_records(parts)) | {"command": np.concatenate(commands)}
 
 
