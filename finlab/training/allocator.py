@@ -111,16 +111,7 @@ def make_terms(
             whole = (rows, training.batch_size)
             guidance = losses.sample_guidance(mixture, surrogate, batch, shifted, std, noise, whole).mean()
         else:
-            soft, best = losses.mode_guidance(
-                mixture,
-                surrogate,
-                batch,
-                shifted,
-                std,
-                energy_weight=training.energy,
-                softness=training.softness,
-                every_mode=training.every_mode,
-            )
+            soft, best = losses.mode_guidance(mixture, surrogate, batch, shifted, std, training)
             guidance, result["best_error"] = soft.mean(), best.mean()
         result["guidance"] = guidance
         ramp = min(1.0, step / max(1.0, training.ramp * training.steps))

@@ -11,13 +11,6 @@ import torch.distributed as dist
 from finlab.errors import DataError
 
 
-def training_device() -> torch.device:
-    """CUDA (the card of this process) where present, else the CPU."""
-    if torch.cuda.is_available():
-        return torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0")))
-    return torch.device("cpu")
-
-
 def join_processes() -> tuple[int, int]:
     """Join the processes that PyTorch's `torchrun` started; answers (rank, number of processes)."""
     if "RANK" not in os.environ or int(os.environ.get("WORLD_SIZE", "1")) == 1:
@@ -48,9 +41,11 @@ def shared_training(batch_size: int) -> Iterator[Share]:
     rank, world = join_processes()
     if batch_size % world:
         raise DataError(f"batch size {batch_size} does not divide among {world} processes; choose a multiple")
+    cuda = torch.cuda.is_available()  # then each process has a card of its own
+    device = torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0"))) if cuda else torch.device("cpu")
     rows = slice(rank * batch_size // world, (rank + 1) * batch_size // world)
     try:
-        yield Share(rank == 0, rows, training_device())
+        yield Share(rank == 0, rows, device)
     finally:
         if dist.is_initialized():
             dist.destroy_process_group()
