@@ -31,7 +31,7 @@ from finlab.layout.load import (
     read_graph_text,
 )
 from finlab.layout.reading import parse_json
-from finlab.layout.rules import mapping, numbers, shown, text
+from finlab.layout.rules import mapping, numbers, shown, text, under
 from finlab.whole_file import write_whole
 
 
@@ -66,10 +66,8 @@ def graph_bytes(graph: LayoutGraph) -> bytes:
 def parse_graph(content: str, source: str = "graph") -> LayoutGraph:
     """The graph in the text of a graph file; errors as in `read_graph`."""
     data = parse_json(content, source)
-    try:
+    with under(source=source):
         return graph_of(data, source)
-    except LayoutError as error:
-        raise error if error.source else error.under("", source) from None
 
 
 def document_of(graph: LayoutGraph) -> dict[str, Any]:

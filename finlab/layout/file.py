@@ -7,8 +7,6 @@ Every error names the file and the key, such as
 import json
 import math
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +15,7 @@ from finlab.errors import LayoutError
 from finlab.layout.body import BODY_KEYS, HULL_KEYS, Body, Hull
 from finlab.layout.fin import Fin, FinModelSpec, Limits
 from finlab.layout.layout import MAX_FINS, Layout
-from finlab.layout.rules import mapping, number, shown, text
+from finlab.layout.rules import mapping, number, shown, text, under
 from finlab.whole_file import write_whole
 
 FORMAT = "finlab-layout"
@@ -43,11 +41,8 @@ def parse_layout(data: Any, source: str = "layout", folder: Path | None = None) 
     Raises:
         LayoutError: something is missing, unknown or out of range.
     """
-    folder = Path.cwd() if folder is None else folder
-    try:
-        return _layout(data, folder)
-    except LayoutError as error:
-        raise error.under("", source) from None
+    with under(source=source):
+        return _layout(data, Path.cwd() if folder is None else folder)
 
 
 def layout_to_dict(layout: Layout) -> dict[str, Any]:
@@ -78,15 +73,6 @@ def save_layout(layout: Layout, path: str | os.PathLike[str]) -> None:
     write_whole(path, content)
 
 
-@contextmanager
-def _under(key: str) -> Iterator[None]:
-    """Puts `key` before the keys of errors raised inside."""
-    try:
-        yield
-    except LayoutError as error:
-        raise error.under(key) from None
-
-
 def _layout(data: Any, folder: Path) -> Layout:
     keys = ("format", "version", "name", "description", "frame", "fins", "body")
     # Format and version first: in a file of another kind or version, unknown keys are not the news.
@@ -109,9 +95,9 @@ def _layout(data: Any, folder: Path) -> Layout:
         raise LayoutError(f"expected 1 to {MAX_FINS} fins, got {len(fins)}", "fins")
     parsed = []
     for i, fin in enumerate(fins):
-        with _under(f"fins[{i}]"):
+        with under(f"fins[{i}]"):
             parsed.append(_fin(fin, folder))
-    with _under("body"):
+    with under("body"):
         body = None if data.get("body") is None else _body(data["body"], folder)
     description = "" if data.get("description") is None else data["description"]
     return Layout(name=data["name"], fins=tuple(parsed), description=description, body=body)
@@ -121,10 +107,10 @@ def _fin(data: Any, folder: Path) -> Fin:
     keys = ("name", "position_m", "mounting_angle_deg", "limits", "model")
     data = mapping(data, "", keys, required=("name", "position_m", "mounting_angle_deg"))
     degrees = number(data["mounting_angle_deg"], "mounting_angle_deg", -360.0, 360.0)
-    with _under("limits"):
+    with under("limits"):
         given = mapping({} if data.get("limits") is None else data["limits"], "", tuple(_LIMIT_FIELDS))
         limits = Limits(**{_LIMIT_FIELDS[key]: value for key, value in given.items()})
-    with _under("model"):
+    with under("model"):
         model = _model({"type": "drag"} if data.get("model") is None else data["model"], folder)
     return Fin(data["name"], data["position_m"], math.radians(degrees), limits, model)
 
@@ -143,7 +129,7 @@ def _model(data: Any, folder: Path) -> FinModelSpec:
 def _body(data: Any, folder: Path) -> Body:
     data = dict(mapping(data, "", BODY_KEYS))
     if data.get("hull") is not None:
-        with _under("hull"):
+        with under("hull"):
             hull = dict(mapping(data["hull"], "", HULL_KEYS))
             if hull.get("mesh") is not None:
                 hull["mesh"] = _absolute(text(hull["mesh"], "mesh", 4096), folder)

@@ -15,7 +15,7 @@ from finlab.errors import LayoutError
 from finlab.layout.file import FORMAT, VERSION, parse_layout
 from finlab.layout.layout import Layout
 from finlab.layout.reading import decode_text, parse_json, read_text
-from finlab.layout.rules import mapping, number, shown
+from finlab.layout.rules import mapping, number, shown, under
 
 SUFFIX = ".graph.json"
 """How the name of a graph file ends."""
@@ -102,10 +102,8 @@ def parse_graph_layout(content: str, source: str = "graph") -> Layout:
         LayoutError: it is of another format or version, was changed after it was written, or holds no layout.
     """
     data = parse_json(content, source)
-    try:
+    with under(source=source):
         return graph_layout(check_graph_document(data), source)
-    except LayoutError as error:
-        raise error if error.source else error.under("", source) from None
 
 
 def check_graph_document(data: Any) -> Mapping[str, Any]:
