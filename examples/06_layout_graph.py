@@ -10,7 +10,8 @@ from tempfile import TemporaryDirectory
 import networkx
 
 import finlab
-from finlab.deploy import build_graph, read_graph, write_graph
+from finlab.deploy.graph import build_graph
+from finlab.deploy.graph_file import read_graph, write_graph
 
 
 def main() -> None:

@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 from types import SimpleNamespace as Message
 
 import finlab
-from finlab.deploy import make_bundle
+from finlab.deploy.bundle import make_bundle
 from finlab.exchange import flippers
 
 

@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 LEVELS = (
     ("errors", "array_library"),
-    ("assets", "bundle_files"),
+    ("assets", "bundle_files", "whole_file"),
     ("layout",),
     ("physics", "exchange"),
     ("inference", "control"),

@@ -80,6 +80,12 @@ def hold_kind(handle: Any) -> None:
     on_user_change(handle, lambda _: None)
 
 
+def option_index(dropdown: Any) -> int:
+    """Place of the chosen option; 0 for a text that is none, which our page does not send."""
+    options = dropdown.options
+    return options.index(dropdown.value) if dropdown.value in options else 0
+
+
 def _alike(known: Any, value: Any) -> bool:
     """Whether two values are of the same kind: texts, switches, numbers, or as many numbers."""
     if isinstance(known, (tuple, list)):
@@ -97,13 +103,3 @@ def numbered(button: str, count: int) -> int | None:
     if not (number.isdecimal() and len(number) < 6 and 0 < int(number) <= count):
         return None
     return int(number) - 1
-
-
-def on_user_click(handle: Any, act: Callable[[], None]) -> None:
-    """Call `act()` on viser's event loop when the user presses a button."""
-
-    async def clicked(event: Any) -> None:
-        if event.client is not None:
-            act()
-
-    handle.on_click(clicked)

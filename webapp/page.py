@@ -6,16 +6,16 @@ Everything here runs on viser's event loop; what takes time is handed to the wor
 import asyncio
 import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Protocol
+from typing import Any, Protocol
 
 import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
 from finlab.forces.reach import Ranges
-from webapp.handles import Changes
+from webapp.handles import Changes, on_user_change
 from webapp.scene.scenery import Scenery
 from webapp.session import Session
 from webapp.tasks.analyst import REST_S, Beside, Findings, Question, find, find_ranges
@@ -52,15 +52,7 @@ class Page(ABC):
         workers: Workers,
         loop: asyncio.AbstractEventLoop,
     ) -> None:
-        """Build the page and ask for a first answer.
-
-        Args:
-            client: the browser.
-            session: what it shows.
-            solver: answers its questions.
-            workers: on whose threads everything is computed.
-            loop: viser's event loop.
-        """
+        """Build the page and ask for a first answer; `loop` is viser's, on `workers` all is computed."""
         self.client = client
         """The browser."""
         self.session = session
@@ -74,7 +66,7 @@ class Page(ABC):
             session, solver, page, answers, self._answered, partial(self.notify, "No answer")
         )
         """The newest answer, its modes and what of it is on the robot."""
-        self.playback = Playback(session, self.answering, solver, page, answers, changed, refused)
+        self.playback = Playback(self.answering, solver, page, answers, changed, refused)
         """The refinement, step by step."""
         self.ranging: Newest[Beside, Ranges] = Newest(page, workers.marks, find_ranges, changed, REST_S)
         """How far each component of the target can go."""
@@ -124,6 +116,34 @@ class Page(ABC):
             self.fault(error)
         self._ask()
         self._refresh()
+
+    def on_change(self, handle: Any, act: Callable[[Any], object]) -> None:
+        """Carry out `act(value)` when the user changes an input."""
+        on_user_change(handle, lambda value: self.do(partial(act, value)))
+
+    def on_click(self, button: viser.GuiButtonHandle, act: Callable[[], object]) -> None:
+        """Carry out an intent when the user presses a button."""
+
+        @button.on_click
+        async def _clicked(event: Any) -> None:
+            if event.client is not None:
+                self.do(act)
+
+    def on_upload(self, button: viser.GuiUploadButtonHandle, act: Callable[[str, bytes], object]) -> None:
+        """Carry out `act(name, content)` when the user has chosen a file."""
+
+        @button.on_upload
+        async def _uploaded(event: Any) -> None:
+            file = event.target.value
+            self.do(partial(act, file.name, file.content))
+
+    def add_buttons(
+        self, label: str, acts: Mapping[str, Callable[[], object]], **options: Any
+    ) -> viser.GuiButtonGroupHandle:
+        """A group of buttons that carry out an intent each; `options` as viser has them."""
+        group = self.client.gui.add_button_group(label, tuple(acts), **options)
+        on_user_change(group, lambda button: self.do(acts[button]) if button in acts else None)
+        return group
 
     def notify(self, title: str, body: str, *, good: bool = False) -> None:
         """Show a note to the user."""

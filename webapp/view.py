@@ -71,4 +71,4 @@ def add_commands(gui: viser.GuiApi, page: Page) -> None:
     add("Show or hide the centre of gravity", lambda: toggle("center"))
     add("Dark or light theme", lambda: toggle("dark"))
     for view, key in (("3D", "1"), ("Top", "2"), ("Side", "3"), ("Front", "4")):
-        add(f"Camera: {view}", partial(page.scenery.look_from, view), key)
+        add(f"Camera: {view}", partial(page.scenery.robot.look_from, view), key)

@@ -1,6 +1,6 @@
 """What a layout can do, and how to improve it: authority, attainable sets, energy, score cards, optimization.
 
-It works from the fins' own laws with numpy and scipy. Torch is loaded only for fins that follow a table.
+It works from the fins' own laws with numpy and scipy.
 """
 
 from finlab.analysis.authority import AXES as AXES

@@ -4,15 +4,13 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from finlab.forces.extent import RANK_TOLERANCE, Extent, singular_values, strongest, weakest
+from finlab.forces.extent import RANK_TOLERANCE, singular_values, strongest, weakest
 from finlab.forces.fin_sets import SCALE, fin_sets
 from finlab.forces.reach import max_wrench_along_exactly
 from finlab.forces.thrust_curve import plant_curves
 from finlab.layout import Layout
-
-Array = NDArray[np.float64]
+from finlab.layout.arrays import Array
 
 AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 """Names of the six axes, in the order of a wrench."""
@@ -22,19 +20,30 @@ NOTHING = 1e-4
 
 
 @dataclass(frozen=True)
-class Authority:
-    """What a set of fins holds. Torques are scaled by the lever 0.2 m wherever forces and torques meet."""
+class HeldAxes:
+    """Axes that fins hold, before any limit. Torques are scaled by the lever 0.2 m."""
 
     rank: int
-    """How many of the six axes the fins act on independently, before any limit."""
-    singular_values: tuple[float, ...]
-    """Of the matrix whose columns are the fins' scaled wrenches at full thrust (6,) [N], falling."""
+    """How many of the six axes the fins act on independently."""
     condition: float | None
     """Largest over smallest singular value; None below rank 6."""
     without_authority: tuple[str, ...]
     """Axes that no fin pushes at all."""
     coupled: tuple[str, ...]
     """Axes that are pushed, but never without pushing others too."""
+
+    @property
+    def alone(self) -> tuple[str, ...]:
+        """Axes that can be pushed alone."""
+        return tuple(axis for axis in AXES if axis not in self.without_authority + self.coupled)
+
+
+@dataclass(frozen=True)
+class Authority(HeldAxes):
+    """What a set of fins holds, within their limits too."""
+
+    singular_values: tuple[float, ...]
+    """Of the matrix whose columns are the fins' scaled wrenches at full thrust (6,) [N], falling."""
     largest: tuple[float, ...]
     """Largest wrench along each axis with the other five at zero (6,) [N, N m]."""
     most_negative: tuple[float, ...]
@@ -117,52 +126,36 @@ def _authorities(layout: Layout, failures: Sequence[Collection[str]]) -> list[Au
     free = rows.farthest(np.tile(axes, (len(failures), 1)))[0].reshape(-1, 2, 6).max(axis=1)
     size, free = (np.where(value > NOTHING, value, 0.0) for value in (size, free))
     least, most = weakest(sets), strongest(sets)
+    isotropy = np.divide(least.size, most.size, out=np.zeros_like(least.size), where=most.size > 0.0)
     return [
-        _authority(values[k], vectors[k], size[k], free[k], (least, most), k, gap)
+        Authority(
+            **vars(held_axes(values[k], vectors[k])),
+            singular_values=_floats(values[k]),
+            largest=_floats(size[k, :6] * SCALE),
+            most_negative=_floats(size[k, 6:] * SCALE),
+            beside_others=_floats(free[k] * SCALE),
+            weakest=float(least.size[k]),
+            weakest_direction=_floats(least.direction[k]),
+            isotropy=float(isotropy[k]),
+            gap=gap,
+        )
         for k in range(len(failures))
     ]
 
 
-def _authority(
-    values: Array,
-    vectors: Array,
-    size: Array,
-    free: Array,
-    extremes: tuple[Extent, Extent],
-    k: int,
-    gap: float,
-) -> Authority:
-    rank, pushed, alone = span(values, vectors)
-    least, most = extremes
-    near, far = float(least.size[k]), float(most.size[k])
-    return Authority(
-        rank=rank,
-        singular_values=_floats(values),
-        condition=float(values[0] / values[5]) if rank == 6 else None,
-        without_authority=axes_where(~pushed),
-        coupled=axes_where(pushed & ~alone),
-        largest=_floats(size[:6] * SCALE),
-        most_negative=_floats(size[6:] * SCALE),
-        beside_others=_floats(free * SCALE),
-        weakest=near,
-        weakest_direction=_floats(least.direction[k]),
-        isotropy=near / far if far > 0.0 else 0.0,
-        gap=gap,
-    )
-
-
-def span(values: Array, vectors: Array) -> tuple[int, NDArray[np.bool_], NDArray[np.bool_]]:
-    """Returns the rank that singular values (6,) and left vectors (6, 6) hold, which axes (6,) are pushed at
-    all, and which can be pushed alone."""
+def held_axes(values: Array, vectors: Array) -> HeldAxes:
+    """Returns what singular values (6,), falling, and left vectors (6, 6) hold."""
     kept = values > RANK_TOLERANCE * max(values[0], 1e-9)
     # How much of each axis lies in the span of all wrenches: one that is held whole can be pushed alone.
     held = np.linalg.norm(vectors[:, kept], axis=1)
-    return int(kept.sum()), held > RANK_TOLERANCE, held > 1.0 - RANK_TOLERANCE
-
-
-def axes_where(chosen: NDArray[np.bool_]) -> tuple[str, ...]:
-    """Returns the names of the axes (6,) that are true."""
-    return tuple(np.array(AXES)[chosen].tolist())
+    pushed = held > RANK_TOLERANCE
+    coupled = pushed & (held <= 1.0 - RANK_TOLERANCE)
+    return HeldAxes(
+        rank=int(kept.sum()),
+        condition=float(values[0] / values[5]) if kept.all() else None,
+        without_authority=tuple(np.array(AXES)[~pushed].tolist()),
+        coupled=tuple(np.array(AXES)[coupled].tolist()),
+    )
 
 
 def _loss(before: Authority, name: str, after: Authority) -> Loss:

@@ -5,10 +5,10 @@ whose arc is wider than half a turn count with the convex hull of what they can 
 """
 
 from collections.abc import Callable
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from finlab.errors import LayoutError
 from finlab.forces.extent import weakest
@@ -16,8 +16,7 @@ from finlab.forces.fin_sets import SCALE, FinSets
 from finlab.forces.least_energy import cheapest, plant_problem, starts
 from finlab.forces.reach import COARSE, FINE, max_wrench_along
 from finlab.layout import Layout
-
-Array = NDArray[np.float64]
+from finlab.layout.arrays import Array
 
 GoalName = Literal["weakest_direction", "mission_energy", "worst_single_failure"]
 GOALS: tuple[GoalName, ...] = get_args(GoalName)
@@ -38,8 +37,8 @@ ALL_THERE = 1e-6
 """Share of a wrench that may be missing when it counts as within reach."""
 LEAST_FINS = 4
 """Fewest fins of which one may fail while six axes remain."""
-QUICK_STARTS = (8, 4)
-"""Random directions and walks to find a weakest direction with when it has to be quick."""
+QUICK_SEARCH: dict[str, Any] = {"n_random": 8, "n_walks": 4, "fine": False}
+"""How to find a weakest direction when it has to be quick."""
 
 
 def make_goal(name: str, layout: Layout, mission: ArrayLike = MISSION, *, fine: bool = True) -> Goal:
@@ -56,26 +55,23 @@ def make_goal(name: str, layout: Layout, mission: ArrayLike = MISSION, *, fine: 
     Raises:
         LayoutError: unknown goal, too few fins for a failure, or a mission that is not wrenches.
     """
+    search: dict[str, Any] = {} if fine else QUICK_SEARCH
+
+    def of_weakest(sets: FinSets) -> Array:
+        return weakest(sets, **search).size
+
     if name == "weakest_direction":
-        return _fine if fine else _quick
+        return of_weakest
     if name == "worst_single_failure":
         if layout.n_fins < LEAST_FINS:
             raise LayoutError(
                 f"the goal {name} needs {LEAST_FINS} fins or more, layout {layout.name} has {layout.n_fins}; "
                 "with fewer, none can fail without losing an axis"
             )
-        return _after_worst_failure(_fine if fine else _quick)
+        return _after_worst_failure(of_weakest)
     if name == "mission_energy":
         return _mission_energy(layout, _wrenches(mission), fine)
     raise LayoutError(f"goal: expected one of {', '.join(GOALS)}, got {name!r:.60}")
-
-
-def _fine(sets: FinSets) -> Array:
-    return weakest(sets).size
-
-
-def _quick(sets: FinSets) -> Array:
-    return weakest(sets, *QUICK_STARTS, fine=False).size
 
 
 def _after_worst_failure(of_rest: Goal) -> Goal:

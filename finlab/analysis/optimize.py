@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import Bounds as Box
 from scipy.optimize import differential_evolution
 
@@ -13,8 +13,7 @@ from finlab.analysis.moves import Bounds, Moves, mirror_pairs
 from finlab.analysis.score_card import ScoreCard, score_card
 from finlab.forces.fin_sets import fin_sets
 from finlab.layout import Layout
-
-Array = NDArray[np.float64]
+from finlab.layout.arrays import Array
 
 CLEARANCE = 0.10
 """Least distance between two fins [m], or what there is now if that is less."""

@@ -6,7 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from finlab.analysis.authority import AXES, Authority, Loss, authority, axes_where, losses, model_error, span
+from finlab.analysis.authority import (
+    AXES,
+    Authority,
+    HeldAxes,
+    Loss,
+    authority,
+    held_axes,
+    losses,
+    model_error,
+)
 from finlab.forces.extent import singular_values
 from finlab.forces.fin_sets import MAX_CUT, fin_sets, wide_fins
 from finlab.forces.least_energy import least_energy
@@ -108,17 +117,9 @@ def _notes(layout: Layout, failed: Collection[str]) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class QuickCheck:
-    """Axes that the working fins hold, before any limit. Torques are scaled by the lever 0.2 m."""
+class QuickCheck(HeldAxes):
+    """Axes that the working fins hold, and those that a loss costs."""
 
-    rank: int
-    """How many of the six axes the fins act on independently."""
-    condition: float | None
-    """Largest over smallest singular value; None below rank 6."""
-    without_authority: tuple[str, ...]
-    """Axes that no fin pushes at all."""
-    coupled: tuple[str, ...]
-    """Axes that are pushed, but never without pushing others too."""
     lost: tuple[tuple[str, tuple[str, ...]], ...]
     """Working fins with the axes that the loss of each costs; fins that cost none are left out."""
 
@@ -134,14 +135,9 @@ def quick_check(layout: Layout, failed: Collection[str] = ()) -> QuickCheck:
     sets = fin_sets(layout, failed).tile(1 + len(single))
     for row, name in enumerate(single, start=1):
         sets.radius[row, layout.index(name)] = 0.0
-    values, vectors = singular_values(sets)
-    rank, pushed, alone = span(values[0], vectors[0])
-    left = [span(*pair)[2] for pair in zip(values[1:], vectors[1:], strict=True)]
-    lost = [(name, axes_where(alone & ~after)) for name, after in zip(single, left, strict=True)]
-    return QuickCheck(
-        rank=rank,
-        condition=float(values[0, 0] / values[0, 5]) if rank == 6 else None,
-        without_authority=axes_where(~pushed),
-        coupled=axes_where(pushed & ~alone),
-        lost=tuple(pair for pair in lost if pair[1]),
-    )
+    held, *left = (held_axes(*pair) for pair in zip(*singular_values(sets), strict=True))
+    lost = {
+        name: tuple(axis for axis in held.alone if axis not in after.alone)
+        for name, after in zip(single, left, strict=True)
+    }
+    return QuickCheck(**vars(held), lost=tuple((name, axes) for name, axes in lost.items() if axes))

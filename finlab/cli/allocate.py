@@ -11,9 +11,7 @@ from tyro.conf import Positional, UseAppendAction, arg
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy as np
-
-    from finlab.allocation import Allocation, Health
+    from finlab.allocation import Health
     from finlab.layout import Layout
 
 Wrench = tuple[float, float, float, float, float, float]
@@ -57,6 +55,7 @@ def allocate(
     from finlab.allocation import load_allocator
     from finlab.allocation.policy import policy_from
     from finlab.cli.inputs import open_robot
+    from finlab.deploy.record import allocation_record
 
     robot = open_robot(layout)
     options = {"energy_tradeoff": energy_tradeoff} if energy_tradeoff else {}
@@ -67,7 +66,8 @@ def allocate(
     result = allocator.allocate(robot.layout, wrench, failed=lost, policy=answer, health=damage, seed=seed)
     lost_axes = axes_lost(robot.layout, result.layout, lost) if lost or damage is not None else None
     if json:
-        print(json_format.dumps(allocation_record(result, lost_axes), allow_nan=False))
+        axes = {} if lost_axes is None else {"axes": lost_axes}
+        print(json_format.dumps(allocation_record(result) | axes, allow_nan=False))
     else:
         print("\n".join([str(result), *([loss_text(lost_axes)] if lost_axes else [])]))
 
@@ -114,40 +114,3 @@ def loss_text(axes: dict[str, list[str]]) -> str:
     """`axes_lost` in words."""
     before, after, lost = (", ".join(axes[key]) or "none" for key in ("before", "after", "lost"))
     return f"reachable alone before: {before}; after: {after}; lost: {lost}"
-
-
-def allocation_record(result: Allocation, lost_axes: dict[str, list[str]] | None = None) -> dict[str, object]:
-    """The JSON object of `finlab allocate --json`; its keys are a contract.
-
-    `axes`, there where a fin is lost or damaged, are those that can be had alone.
-    """
-    surrogate = result.wrench_surrogate
-    record: dict[str, object] = {
-        "fins": list(result.fins),
-        "failed": list(result.failed),
-        "command": [
-            None if name in result.failed else _numbers(row)
-            for name, row in zip(result.fins, result.command, strict=True)
-        ],
-        "target": _numbers(result.target),
-        "wrench_surrogate": None if surrogate is None else _numbers(surrogate),
-        "wrench_plant": _numbers(result.wrench) if result.judged_by == "plant" else None,
-        "unallocated": _numbers(result.unallocated),
-        "err_norm": result.err_norm,
-        "energy": result.energy,
-        "sigma": _numbers(result.sigma),
-        "solve_ms": result.solve_ms,
-        "method": result.method,
-        "checkpoint": result.checkpoint,
-        "reachable": result.reachable,
-        "scale": result.scale,
-        "binding": list(result.binding),
-        "judged_by": result.judged_by,
-        "unknown_fins": list(result.unknown_fins),
-        "notes": list(result.notes),
-    }
-    return record if lost_axes is None else {**record, "axes": lost_axes}
-
-
-def _numbers(row: np.ndarray) -> list[float]:
-    return [float(value) for value in row]

@@ -25,14 +25,14 @@ def trajectory(
         trajectory: circle, lissajous, square, or a CSV file with the columns t, x, y, z.
     """
     from finlab.evaluation.experiments import trajectory_and_velocity as experiment
-    from finlab.evaluation.plots.closed_loop_experiments import draw_layouts, tracks_of
+    from finlab.evaluation.plots.closed_loop_experiments import draw_layouts, track_of
     from finlab.sim import make_trajectory
 
     robots, path = open_layouts(layouts), make_trajectory(trajectory)
     found = loop.swim(experiment.trajectory_scenarios(robots, path), run)
     rows = experiment.trajectory_rows(found)
     run.show(experiment.trajectory_report(rows, path, loop.plant), rows=rows)
-    loop.save("trajectory", lambda: draw_layouts(tracks_of(found), rows))
+    loop.save("trajectory", lambda: draw_layouts([(key, track_of(log)) for key, log in found], rows))
 
 
 def faults(

@@ -41,7 +41,7 @@ def training(
         seed: draws data, weights, layouts and targets.
     """
     from finlab.evaluation.experiments.training_study import training_report, training_row
-    from finlab.evaluation.report.jobs import Store, run_jobs
+    from finlab.evaluation.report.jobs import run_jobs
     from finlab.evaluation.report.plan import training_jobs
     from finlab.evaluation.report.provenance import source_commit
     from finlab.evaluation.splits import make_split
@@ -54,9 +54,8 @@ def training(
     settings = {"preset": preset, "steps": steps, "batch_size": batch_size}
     settings |= {"layouts": layouts, "targets": targets, "seed": seed}
     jobs = training_jobs(settings, out)
-    store = Store(out)
-    run_jobs(list(jobs.values()), store, commit=source_commit(), processes=0)
-    rows = [training_row(name, job.result(store).columns) for name, job in jobs.items()]
+    run_jobs(list(jobs.values()), out, commit=source_commit(), processes=0)
+    rows = [training_row(name, job.result(out).columns) for name, job in jobs.items()]
     output.show(training_report(rows, preset, steps, batch_size), rows=rows)
 
 

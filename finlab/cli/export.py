@@ -41,7 +41,8 @@ def export(
 
     allocator = load_allocator(checkpoint=checkpoint)
     if graph_alone:
-        from finlab.deploy import build_graph, write_graph
+        from finlab.deploy.graph import build_graph
+        from finlab.deploy.graph_file import write_graph
 
         graph = build_graph(robot.layout, allocator, failed)
         write_graph(graph, output)

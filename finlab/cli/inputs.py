@@ -29,21 +29,15 @@ def open_robot(text: str) -> Robot:
     Raises:
         LayoutError: neither a readable file nor a shipped layout.
     """
-    from finlab.bundle_files import is_bundle
-    from finlab.layout.load import SUFFIX, layout_path, load_layout
+    from finlab.layout.load import holds_graph, layout_path, load_layout
 
     path = layout_path(text)
-    if is_bundle(path):
-        from finlab.deploy.robot import read_bundle_graph
+    if not holds_graph(path):
+        return Robot(load_layout(path))
+    from finlab.deploy.graph_file import read_graph
 
-        graph = read_bundle_graph(path)
-        return Robot(graph.layout, graph.failed)
-    if path.name.endswith(SUFFIX):
-        from finlab.deploy.graph_file import read_graph
-
-        graph = read_graph(path)
-        return Robot(graph.layout, graph.failed)
-    return Robot(load_layout(path))
+    graph = read_graph(path)
+    return Robot(graph.layout, graph.failed)
 
 
 def check_positive(**counts: int | None) -> None:

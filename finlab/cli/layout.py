@@ -72,22 +72,19 @@ def show(
 
 def layout_text(layout: Layout) -> str:
     """A layout in words and a table: what it is, and its fins."""
-    width = max(len("fin"), *(len(name) for name in layout.names))
-    lines = [f"{layout.name}: {layout.description}" if layout.description else layout.name, ""]
-    lines.append(
-        f"{'fin':<{width}}   x [m]   y [m]   z [m]  angle [deg]  A max [rad]  f max [Hz]"
-        "  directions [deg]  model"
-    )
+    from finlab.cli.score_card import table
+
+    head = ("fin", "x [m]", "y [m]", "z [m]", "angle [deg]", "A max [rad]", "f max [Hz]", "directions [deg]")
+    rows = []
     for fin in layout.fins:
         low, high = (math.degrees(angle) for angle in fin.limits.zero_direction)
         directions = "any" if high - low >= 360.0 - 1e-6 else f"{low:.0f}..{high:.0f}"
-        position = "  ".join(f"{value:6.3f}" for value in fin.position)
-        lines.append(
-            f"{fin.name:<{width}}  {position}  {math.degrees(fin.mounting_angle):11.1f}"
-            f"  {fin.limits.amplitude[1]:11.3f}  {fin.limits.frequency[1]:10.3f}  {directions:>16}"
-            f"  {fin.model.type}"
-        )
-    return "\n".join(lines)
+        position = (f"{value:6.3f}" for value in fin.position)
+        largest = (f"{fin.limits.amplitude[1]:.3f}", f"{fin.limits.frequency[1]:.3f}")
+        angle = f"{math.degrees(fin.mounting_angle):.1f}"
+        rows.append((fin.name, *position, angle, *largest, directions, fin.model.type))
+    title = f"{layout.name}: {layout.description}" if layout.description else layout.name
+    return "\n".join([title, "", *table((*head, "model"), rows)])
 
 
 @verbs.command(name="import")

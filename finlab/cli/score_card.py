@@ -17,7 +17,7 @@ def score_card_text(card: ScoreCard) -> str:
     if card.losses:
         rows = [_loss_row(loss, loss is card.worst_loss) for loss in card.losses]
         lines += ["", "Share of the largest wrench that is left without one fin (* the worst to lose):"]
-        lines += _table(("without", "rank", "weakest [N]", *_axes(), "lost"), rows)
+        lines += table(("without", "rank", "weakest [N]", *_axes(), "lost"), rows)
     error = max(a / unit for a, unit in zip(card.model_error, _LEVERS, strict=True))
     lines += [
         "",
@@ -48,7 +48,7 @@ def comparison_text(before: ScoreCard, after: ScoreCard) -> str:
     if before.worst_loss and after.worst_loss:
         a, b = before.worst_loss.weakest, after.worst_loss.weakest
         rows.append(("weakest after worst loss [N]", f"{a:.2f}", f"{b:.2f}"))
-    return "\n".join(_table(("", "before", "after"), rows))
+    return "\n".join(table(("", "before", "after"), rows))
 
 
 def _span_lines(card: ScoreCard) -> list[str]:
@@ -80,7 +80,7 @@ def _axis_table(card: ScoreCard) -> list[str]:
         )
         for k, axis in enumerate(_axes())
     ]
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _evenness(held: Authority) -> list[str]:
@@ -100,10 +100,10 @@ def _loss_row(loss: Loss, worst: bool) -> tuple[str, ...]:
     return (name, f"{loss.rank}", f"{loss.weakest:.2f}", *shares, ", ".join(loss.lost) or "nothing")
 
 
-def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
+def table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
     """Rows under a head; the first column and a last one of words are flush left, numbers are flush right."""
     widths = [max(len(row[k]) for row in [head, *rows]) for k in range(len(head))]
-    words = {0, len(head) - 1} if head[-1] == "lost" else {0}
+    words = {0, len(head) - 1} if head[-1] in ("lost", "model") else {0}
     return [
         "  ".join(
             cell.ljust(width) if k in words else cell.rjust(width)

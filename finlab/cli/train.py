@@ -4,6 +4,7 @@ All go on from the last saved state when they are called again with the same arg
 run on several processes or machines under `torchrun ... -m finlab train ...`.
 """
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -115,7 +116,7 @@ def fast(
     from finlab.allocation import load_allocator
     from finlab.training.distill.answers import AnswerSettings
     from finlab.training.distill.network import FastConfig
-    from finlab.training.distill.train import FastSettings, train_fast
+    from finlab.training.distill.train import FAST_TRAINING, train_fast
 
     check_positive(shards=shards, steps=steps, stop_after=stop_after)
     allocator = load_allocator(checkpoint=checkpoint)
@@ -123,7 +124,7 @@ def fast(
         allocator,
         output,
         config=FastConfig(),
-        settings=FastSettings(steps=steps, seed=seed),
+        settings=replace(FAST_TRAINING, steps=steps),
         data=AnswerSettings(n_shards=shards, seed=seed),
         stop_after=stop_after,
     )

@@ -74,14 +74,14 @@ class VelocityController:
         """Takes gains; the shipped file `velocity` by default."""
         self.gains = load_gains(VelocityGains, "velocity") if gains is None else gains
         self.period_s = self.gains.period_s
-        self._speed = LowPass(self.gains.velocity_filter_s, self.period_s)
-        self._surge = Pid(self.gains.surge, self.gains.max_surge, self.period_s)
-        self._depth = Pid(self.gains.depth, self.gains.max_heave, self.period_s)
+        self.reset()
 
     def reset(self) -> None:
         """Forget filters and integrals."""
-        for part in (self._speed, self._surge, self._depth):
-            part.reset()
+        g = self.gains
+        self._speed = LowPass(g.velocity_filter_s, g.period_s)
+        self._surge = Pid(g.surge, g.max_surge, g.period_s)
+        self._depth = Pid(g.depth, g.max_heave, g.period_s)
 
     def wrench(self, measurement: Measurement, setpoint: Setpoint) -> Array:
         """Returns the wrench (6,) towards the speed and depth asked for [N, N m]."""
@@ -107,11 +107,11 @@ class WaypointController:
         self.gains = load_gains(WaypointGains, "waypoint") if gains is None else gains
         self.lead_s = self.gains.lead_s
         self.period_s = self.gains.period_s
-        self._odometry = Odometry(self.gains.odometry_filter_s, self.gains.climb_filter_s, self.period_s)
+        self.reset()
 
     def reset(self) -> None:
         """Forget the pose."""
-        self._odometry.reset()
+        self._odometry = Odometry(self.gains.odometry_filter_s, self.gains.climb_filter_s, self.period_s)
 
     def wrench(self, measurement: Measurement, setpoint: Setpoint) -> Array:
         """Returns the wrench (6,) towards the waypoint [N, N m]."""
@@ -124,16 +124,8 @@ class WaypointController:
         surge = g.surge * distance * max(0.0, math.cos(yaw_error))
         heave = g.heave * dz - g.heave_damping * climb
         yaw = g.yaw * nearness * yaw_error - g.yaw_damping * float(measurement.rates[2])
-        return np.array(
-            [
-                min(surge, g.max_surge),
-                0.0,
-                min(max(heave, -g.max_heave), g.max_heave),
-                0.0,
-                0.0,
-                min(max(yaw, -g.max_yaw), g.max_yaw),
-            ]
-        )
+        most = np.array([g.max_surge, 0.0, g.max_heave, 0.0, 0.0, g.max_yaw])
+        return np.array([surge, 0.0, heave, 0.0, 0.0, yaw]).clip(-most, most)
 
 
 class Pose(NamedTuple):
@@ -150,8 +142,8 @@ class Pose(NamedTuple):
 class Odometry:
     """Complementary filter: the DVL and the gyro carry the pose on, markers and pressure correct it.
 
-    The correction has one time constant; what is faster comes from the velocities, so steady motion is
-    followed without lag.
+    The first measurement is taken as it is. The correction has one time constant; what is faster comes from
+    the velocities, so steady motion is followed without lag.
     """
 
     def __init__(self, correction_s: float, climb_filter_s: float, period_s: float) -> None:
@@ -160,11 +152,6 @@ class Odometry:
         self._share = LowPass(correction_s, period_s).share
         self._climb = LowPass(climb_filter_s, period_s)
         self._pose: Pose | None = None
-
-    def reset(self) -> None:
-        """Forget the pose; the next measurement is taken as it is."""
-        self._climb.reset()
-        self._pose = None
 
     def step(self, measurement: Measurement) -> Pose:
         """Takes a measurement and returns the pose."""

@@ -1,4 +1,4 @@
-"""Filters in discrete time: low-pass, rate of a noisy signal, PID."""
+"""Filters in discrete time: low-pass and PID."""
 
 import math
 
@@ -15,37 +15,17 @@ class LowPass:
         self.value: float | None = None
         """Output after the last sample; None before the first."""
 
-    def reset(self) -> None:
-        """Forget all samples."""
-        self.value = None
-
     def step(self, sample: float) -> float:
         """Takes a sample and returns the filtered value."""
         self.value = sample if self.value is None else self.value + self.share * (sample - self.value)
         return self.value
 
 
-class Rate:
-    """Derivative after a first-order filter: never steeper than noise over the time constant."""
-
-    def __init__(self, time_constant_s: float, period_s: float) -> None:
-        """Takes the filter's time constant [s] and the time between samples [s]."""
-        self.period_s = period_s
-        self._filter = LowPass(time_constant_s, period_s)
-
-    def reset(self) -> None:
-        """Forget all samples."""
-        self._filter.reset()
-
-    def step(self, sample: float) -> float:
-        """Takes a sample and returns its filtered rate [1/s]; 0 at the first one."""
-        before = self._filter.value
-        after = self._filter.step(sample)
-        return 0.0 if before is None else (after - before) / self.period_s
-
-
 class Pid:
-    """u = kp e + ki integral(e) + kd de/dt, limited to +-limit, anti-windup by conditional integration."""
+    """u = kp e + ki integral(e) + kd de/dt, limited to +-limit, anti-windup by conditional integration.
+
+    The rate is that of the error after a first-order filter: never steeper than noise over its time constant.
+    """
 
     def __init__(self, gains: PidGains, limit: float, period_s: float) -> None:
         """Takes gains, the largest output [N] and the time between calls [s]."""
@@ -54,16 +34,14 @@ class Pid:
         self.period_s = period_s
         self.integral = 0.0
         """Integral part of the output [N]."""
-        self._rate = Rate(gains.rate_filter_s, period_s)
+        self._smooth = LowPass(gains.rate_filter_s, period_s)
 
-    def reset(self) -> None:
-        """Forget the integral and the last error."""
-        self.integral = 0.0
-        self._rate.reset()
-
-    def step(self, error: float, forward: float = 0.0) -> float:
-        """Returns the output for an error, with `forward` added before the limit."""
-        direct = self.gains.kp * error + self.gains.kd * self._rate.step(error) + forward
+    def step(self, error: float) -> float:
+        """Returns the output for an error."""
+        before = self._smooth.value
+        after = self._smooth.step(error)
+        rate = 0.0 if before is None else (after - before) / self.period_s
+        direct = self.gains.kp * error + self.gains.kd * rate
         integral = self.integral + self.gains.ki * error * self.period_s
         output = direct + integral
         if abs(output) <= self.limit or output * error <= 0.0:

@@ -21,6 +21,7 @@ from finlab.deploy.graph_file import graph_bytes
 from finlab.errors import AllocationError, DataError
 from finlab.inference.checkpoint import WEIGHTS_FILE, checkpoint_files
 from finlab.layout import Layout
+from finlab.whole_file import write_whole
 
 
 @dataclass(frozen=True)
@@ -59,13 +60,7 @@ class Bundle:
         Raises:
             DataError: the file cannot be written.
         """
-        path = Path(file)
-        part = path.with_name(f".{path.name}.{os.getpid()}")
-        try:
-            part.write_bytes(self.zip_bytes())
-            os.replace(part, path)
-        except OSError as error:
-            raise DataError(f"{path}: cannot be written: {error.strerror}") from None
+        write_whole(file, self.zip_bytes(), DataError)
 
     def zip_bytes(self) -> bytes:
         """The bundle as one zip archive."""

@@ -6,8 +6,12 @@ import os
 import sys
 import time
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 from finlab.errors import FinlabError
+
+if TYPE_CHECKING:
+    from finlab.deploy.robot import Robot
 
 POLICIES = ("closest", "direction", "priority")
 
@@ -19,7 +23,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     try:
-        code: int = arguments.run(arguments)
+        arguments.started = time.perf_counter()
+        from finlab.deploy.robot import load_robot
+
+        code: int = arguments.run(load_robot(arguments.bundle, arguments.fast), arguments)
         sys.stdout.flush()
         return code
     except FinlabError as error:
@@ -32,16 +39,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 141
 
 
-def check(arguments: argparse.Namespace) -> int:
+def check(robot: "Robot", arguments: argparse.Namespace) -> int:
     """Print each question of the self-test with its answer."""
-    start = time.perf_counter()
-    from finlab.deploy.robot import load_robot
     from finlab.deploy.self_check import self_check
 
-    robot = load_robot(arguments.bundle, arguments.fast)
     print(
         f"{arguments.bundle}: {robot.layout.name}, {robot.layout.n_fins} fins, "
-        f"checkpoint {robot.graph.checkpoint}, ready in {time.perf_counter() - start:.2f} s"
+        f"checkpoint {robot.graph.checkpoint}, ready in {time.perf_counter() - arguments.started:.2f} s"
     )
     findings = self_check(robot)
     for finding in findings:
@@ -54,34 +58,19 @@ def check(arguments: argparse.Namespace) -> int:
     return 1
 
 
-def allocate(arguments: argparse.Namespace) -> int:
+def allocate(robot: "Robot", arguments: argparse.Namespace) -> int:
     """Print the commands for one target."""
-    from finlab.deploy.robot import load_robot
+    from finlab.deploy.record import allocation_record, command_rows
 
-    robot = load_robot(arguments.bundle, arguments.fast)
     answer = robot.allocate(
         arguments.wrench, failed=arguments.failed, policy=arguments.policy, seed=arguments.seed
     )
-    rows = [None if row[0] != row[0] else row.tolist() for row in answer.command]
     if arguments.json:
-        values = {
-            "fins": list(answer.fins),
-            "failed": list(answer.failed),
-            "command": rows,
-            "target": list(arguments.wrench),
-            "wrench_surrogate": None if answer.wrench_surrogate is None else answer.wrench_surrogate.tolist(),
-            "wrench_plant": answer.wrench.tolist(),
-            "unallocated": answer.unallocated.tolist(),
-            "err_norm": answer.err_norm,
-            "energy": answer.energy,
-            "solve_ms": answer.solve_ms,
-            "notes": list(answer.notes),
-        }
-        print(json.dumps(values, allow_nan=False))
+        print(json.dumps(allocation_record(answer), allow_nan=False))
         return 0
     width = max(map(len, ("fin", *answer.fins)))
     print(f"{'fin':<{width}}  A [rad]  f [Hz]  zero direction [rad]")
-    for name, row in zip(answer.fins, rows, strict=True):
+    for name, row in zip(answer.fins, command_rows(answer.command), strict=True):
         values_text = "failed" if row is None else f"{row[0]:7.3f}  {row[1]:6.3f}  {row[2]:20.3f}"
         print(f"{name:<{width}}  {values_text}")
     print(f"err_norm {answer.err_norm:.2e}   energy {answer.energy:.3f}   {answer.solve_ms:.1f} ms")
@@ -90,15 +79,13 @@ def allocate(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def speed(arguments: argparse.Namespace) -> int:
+def speed(robot: "Robot", arguments: argparse.Namespace) -> int:
     """Print times and memory of single answers, one after the other."""
-    start = time.perf_counter()
-    from finlab.deploy.robot import load_robot
-    from finlab.deploy.self_check import answer_times, peak_memory, random_targets
+    from finlab.deploy.graph import random_targets
+    from finlab.deploy.self_check import answer_times, peak_memory
 
-    robot = load_robot(arguments.bundle, arguments.fast)
     robot.allocate([0.0] * 6)
-    ready = time.perf_counter() - start
+    ready = time.perf_counter() - arguments.started
     p50, p99 = answer_times(robot.allocate, random_targets(robot.layout, max(arguments.targets, 1)))
     print(
         f"{robot.allocator.name}, {robot.layout.n_fins} fins: p50 {p50:.2f} ms, p99 {p99:.2f} ms, "
@@ -107,13 +94,11 @@ def speed(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def serve(arguments: argparse.Namespace) -> int:
+def serve(robot: "Robot", arguments: argparse.Namespace) -> int:
     """Answer requests until they end."""
-    from finlab.deploy.robot import load_robot
     from finlab.deploy.serve import Server, Timing, Transport
     from finlab.deploy.transport import LoopbackUdp, StandardStreams
 
-    robot = load_robot(arguments.bundle, arguments.fast)
     if unknown := robot.allocator.unknown_fins(robot.layout):
         names = ", ".join(unknown)
         print(f"finlab-runtime: warning: commands are wrong: unknown fins {names}", file=sys.stderr)
@@ -140,7 +125,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser("finlab-runtime", description="Control allocation on board.")
     verbs = parser.add_subparsers(required=True, metavar="check|allocate|serve|speed")
 
-    def verb(run: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
+    def verb(run: Callable[["Robot", argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
         made = verbs.add_parser(run.__name__, help=text, description=text)
         made.set_defaults(run=run)
         made.add_argument("bundle", metavar="BUNDLE", help="folder or zip archive made by `finlab export`")

@@ -1,19 +1,16 @@
 """The layout graph as a value: a robot as the network sees it, and proof of what it should answer."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.allocation import Allocator
 from finlab.errors import AllocationError
+from finlab.inference.features import fin_frame_features, geometry, raw_features
 from finlab.inference.normalization import Normalization
 from finlab.layout import Layout, stack_layouts
-
-if TYPE_CHECKING:
-    from finlab.allocation import Allocator
+from finlab.physics import Plant
 
 N_SELF_TEST = 4
 """Self-test wrenches in a graph file: enough to notice a wrong file, few enough to read."""
@@ -76,8 +73,6 @@ def build_graph(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = 
         LayoutError: an unknown failed fin, or none left.
         AllocationError: the allocator's method has no network, or its network has not learned the fins.
     """
-    from finlab.physics import Plant
-
     healthy = layout.without(failed) if failed else layout
     checkpoint = allocator.weights
     if checkpoint is None:
@@ -91,11 +86,8 @@ def build_graph(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = 
             "them, or give the fins a model that the checkpoint knows"
         )
     features = NodeFeatures(checkpoint.check_network().features, healthy, checkpoint.normalization)
-    lower = healthy.lower
-    upper = healthy.upper
-    draws = np.random.default_rng(0).uniform(size=(N_SELF_TEST, *lower.shape))
     cases = []
-    for target in Plant(healthy).wrench(lower + draws * (upper - lower)):
+    for target in random_targets(healthy, N_SELF_TEST):
         target = _rounded(target)
         result = allocator.allocate(layout, target, failed=failed, seed=0)
         assert result.wrench_surrogate is not None
@@ -119,13 +111,17 @@ def build_graph(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = 
     )
 
 
+def random_targets(layout: Layout, count: int) -> Array:
+    """Wrenches (count, 6) of random commands, the same ones every time."""
+    draws = np.random.default_rng(0).random((count, layout.n_fins, 3))
+    return Plant(layout).wrench(layout.lower + draws * (layout.upper - layout.lower))
+
+
 class NodeFeatures:
     """The node features of one layout, from the same functions that training uses."""
 
     def __init__(self, name: str, layout: Layout, normalization: Normalization) -> None:
         """`name` is a feature set of `finlab.inference.features`; all fins of `layout` are healthy."""
-        from finlab.inference.features import geometry, raw_features
-
         arrays = stack_layouts([layout])
         numbers = (arrays.position, arrays.mounting_angle, arrays.lower, arrays.upper)
         self.name = name
@@ -136,8 +132,6 @@ class NodeFeatures:
 
     def of(self, target: Array) -> Array:
         """All node features (n, F) for a target wrench (6,)."""
-        from finlab.inference.features import fin_frame_features
-
         if self._geometry is None:
             return self.fixed
         scaled = (target - self._normalization.mean) / self._normalization.std

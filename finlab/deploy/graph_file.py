@@ -8,6 +8,7 @@ Reading checks every value, and refusals name the key.
 import json
 import os
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +28,11 @@ from finlab.layout.load import (
     checksum_of,
     graph_layout,
     graph_nodes,
+    read_graph_text,
 )
-from finlab.layout.reading import parse_json, read_text
-from finlab.layout.rules import mapping, numbers, shown, text
+from finlab.layout.reading import parse_json
+from finlab.layout.rules import mapping, numbers, shown, text, under
+from finlab.whole_file import write_whole
 
 
 def write_graph(graph: LayoutGraph, path: str | os.PathLike[str]) -> None:
@@ -38,30 +41,19 @@ def write_graph(graph: LayoutGraph, path: str | os.PathLike[str]) -> None:
     Raises:
         LayoutError: the name does not end in `.graph.json`, or the file cannot be written.
     """
-    file = Path(path)
-    check_graph_name(file)
-    temporary = file.with_name(f".{file.name}.{os.getpid()}")
-    try:
-        # Written beside and renamed, so that a kill or a full disk never leaves half a file.
-        temporary.write_bytes(graph_bytes(graph))
-        os.replace(temporary, file)
-    except OSError as error:
-        raise LayoutError(f"cannot be written: {error.strerror}", source=str(path)) from None
+    if not Path(path).name.endswith(SUFFIX):
+        raise LayoutError(f"expected a file name that ends in {SUFFIX}", source=str(path))
+    write_whole(path, graph_bytes(graph))
 
 
 def read_graph(path: str | os.PathLike[str]) -> LayoutGraph:
-    """Read a graph file back, whole.
+    """Read a graph file back, whole, also out of a bundle.
 
     Raises:
         LayoutError: it cannot be read, is of another format or version, or was changed after it was written.
+        DataError: the bundle cannot be read, or was changed.
     """
-    return parse_graph(read_text(Path(path), str(path)), source=str(path))
-
-
-def check_graph_name(path: Path) -> None:
-    """Raise a `LayoutError` unless a file of this name would be read back as a graph file."""
-    if not path.name.endswith(SUFFIX):
-        raise LayoutError(f"expected a file name that ends in {SUFFIX}", source=str(path))
+    return parse_graph(*read_graph_text(Path(path)))
 
 
 def graph_bytes(graph: LayoutGraph) -> bytes:
@@ -74,10 +66,8 @@ def graph_bytes(graph: LayoutGraph) -> bytes:
 def parse_graph(content: str, source: str = "graph") -> LayoutGraph:
     """The graph in the text of a graph file; errors as in `read_graph`."""
     data = parse_json(content, source)
-    try:
+    with under(source=source):
         return graph_of(data, source)
-    except LayoutError as error:
-        raise error if error.source else error.under("", source) from None
 
 
 def document_of(graph: LayoutGraph) -> dict[str, Any]:
@@ -89,9 +79,12 @@ def document_of(graph: LayoutGraph) -> dict[str, Any]:
             "id": entry["name"],
             "position_m": entry["position_m"],
             "mounting_angle_rad": fin.mounting_angle,
+            "limits": entry["limits"],
+            "model": entry["model"],
+            "healthy": fin.name not in graph.failed,
+            "features": features,
         }
-        node |= {"limits": entry["limits"], "model": entry["model"]}
-        nodes.append(node | {"healthy": fin.name not in graph.failed, "features": _plain(features)})
+        nodes.append(node)
     return {
         "format": GRAPH_FORMAT,
         "version": GRAPH_VERSION,
@@ -111,15 +104,7 @@ def document_of(graph: LayoutGraph) -> dict[str, Any]:
         "checkpoint": {"name": graph.checkpoint, "sha256": graph.checkpoint_sha256},
         "self_test": {
             "tolerance_err_norm": SELF_TEST_TOLERANCE,
-            "cases": [
-                {
-                    "wrench": list(case.wrench),
-                    "command": [_plain(row) for row in case.command],
-                    "predicted_wrench": list(case.predicted_wrench),
-                    "features": [_plain(row) for row in case.features],
-                }
-                for case in graph.self_test
-            ],
+            "cases": [asdict(case) for case in graph.self_test],
         },
     }
 
@@ -127,10 +112,6 @@ def document_of(graph: LayoutGraph) -> dict[str, Any]:
 def edges_of(graph: LayoutGraph) -> list[dict[str, str]]:
     """Every pair of healthy fins, and each with itself."""
     return [{"source": a, "target": b} for a, b in graph.edges]
-
-
-def _plain(row: Row | None) -> list[float] | None:
-    return None if row is None else list(row)
 
 
 def graph_of(data: Any, source: str) -> LayoutGraph:

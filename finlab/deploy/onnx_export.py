@@ -92,13 +92,18 @@ class _Graph:
         self.state = state
 
     def __call__(self, operator: str, *inputs: str, name: str = "", **attributes: Any) -> str:
-        return self.split(operator, *inputs, names=(name or f"t{len(self._nodes)}",), **attributes)[0]
-
-    def split(self, operator: str, *inputs: str, names: Sequence[str], **attributes: Any) -> Sequence[str]:
-        """Add an operator with several outputs."""
         from onnx import helper
 
-        self._nodes.append(helper.make_node(operator, inputs, names, **attributes))
+        name = name or f"t{len(self._nodes)}"
+        self._nodes.append(helper.make_node(operator, inputs, [name], **attributes))
+        return name
+
+    def parts(self, x: str, *sizes: int, axis: int = -1) -> list[str]:
+        """A tensor cut into parts of these sizes along an axis."""
+        from onnx import helper
+
+        names = [f"t{len(self._nodes)}_{k}" for k in range(len(sizes))]
+        self._nodes.append(helper.make_node("Split", [x, self.whole(*sizes)], names, axis=axis))
         return names
 
     def constant(self, value: Any, name: str = "", dtype: type[Any] = np.float32) -> str:
@@ -145,11 +150,10 @@ class _Graph:
     def model(self, name: str, inputs: Shapes, outputs: Shapes) -> ModelProto:
         from onnx import TensorProto, helper
 
-        ends = (
+        taken, given = (
             [helper.make_tensor_value_info(key, TensorProto.FLOAT, shape) for key, shape in end.items()]
             for end in (inputs, outputs)
         )
-        taken, given = ends
         graph = helper.make_graph(self._nodes, name, taken, given, initializer=list(self._constants.values()))
         opset = helper.make_opsetid("", OPSET)
         return helper.make_model(graph, opset_imports=[opset], ir_version=IR_VERSION, producer_name="finlab")
@@ -165,17 +169,14 @@ def _network(state: State, sizes: NetworkConfig) -> ModelProto:
     wrench = g.linear("target", "wrench.0")
     wrench = g.linear(g("Mul", wrench, g("Sigmoid", wrench)), "wrench.2")
     # The layer that sees fins and wrench side by side, as a sum of two products.
-    parts = g.split(
-        "Split", g.weight("join.weight"), g.whole(width, width), names=("of_fins", "of_wrench"), axis=0
-    )
-    wrench = g("Add", g("MatMul", wrench, parts[1]), g.weight("join.bias"))
-    hidden = g("Add", g("MatMul", hidden, parts[0]), g("Unsqueeze", wrench, g.whole(1)))
+    of_fins, of_wrench = g.parts(g.weight("join.weight"), width, width, axis=0)
+    wrench = g("Add", g("MatMul", wrench, of_wrench), g.weight("join.bias"))
+    hidden = g("Add", g("MatMul", hidden, of_fins), g("Unsqueeze", wrench, g.whole(1)))
     for i in range(sizes.transformer_layers):
         hidden = _transform(g, hidden, f"transformer.layers.{i}", heads, width)
     hidden = g.norm(hidden, "norm")
     raw = g("Reshape", g.linear(hidden, "head"), g.whole(0, 0, m, 7))
-    names = ("beat", "x", "y", "spread")
-    beat, x, y, spread = g.split("Split", raw, g.whole(2, 1, 1, 3), names=names, axis=-1)
+    beat, x, y, spread = g.parts(raw, 2, 1, 1, 3)
     direction = _direction(g, x, y)
     g("Concat", g("Tanh", beat), direction, axis=-1, name="mean")
     scaled = g("Mul", g("Sigmoid", spread), g.constant(2 * LOG_STD_BOUND))
@@ -207,9 +208,7 @@ def _attend(g: _Graph, x: str, name: str, heads: int, width: int) -> str:
 def _transform(g: _Graph, x: str, name: str, heads: int, width: int) -> str:
     """One Transformer encoder layer, normalization first, ReLU."""
     both = g.linear(g.norm(x, f"{name}.norm1"), f"{name}.self_attn.in_proj", "_")
-    roles = [f"{name}.{role}" for role in ("query", "key", "value")]
-    parts = g.split("Split", both, g.whole(width, width, width), names=roles, axis=-1)
-    query, key, value = (g.split_heads(part, heads, width) for part in parts)
+    query, key, value = (g.split_heads(part, heads, width) for part in g.parts(both, width, width, width))
     score = g("MatMul", query, g("Transpose", key, perm=[0, 1, 3, 2]))
     share = g("Softmax", g("Mul", score, g.constant((width // heads) ** -0.5)), axis=-1)
     seen = g.join_heads(g("MatMul", share, value), width)
@@ -238,8 +237,7 @@ def _direction(g: _Graph, x: str, y: str) -> str:
 def _surrogate(state: State) -> ModelProto:
     """Commands and geometry in; forces of the fins in their own frames, and the robot's wrench out."""
     g = _Graph(state)
-    names = ("amplitude", "frequency", "direction")
-    amplitude, frequency, direction = g.split("Split", "command", g.whole(1, 1, 1), names=names, axis=-1)
+    amplitude, frequency, direction = g.parts("command", 1, 1, 1)
     amplitude = g("Div", amplitude, g.constant(REFERENCE[0]))
     frequency = g("Div", frequency, g.constant(REFERENCE[1]))
     c, s, half = g("Cos", direction), g("Sin", direction), g.constant(0.5)
@@ -250,8 +248,7 @@ def _surrogate(state: State) -> ModelProto:
     beat = g("Mul", amplitude, frequency)
     scale = g("Mul", g("Mul", beat, beat), g.constant(FORCE_UNIT))
     k = g("Mul", g.linear(hidden, f"net.{layers[-1]}"), scale)
-    names = ("shaft", "along", "across")
-    shaft, along, across = g.split("Split", k, g.whole(1, 1, 1), names=names, axis=-1)
+    shaft, along, across = g.parts(k, 1, 1, 1)
     horizontal = g("Sub", g("Mul", c, along), g("Mul", s, across))
     vertical = g("Add", g("Mul", s, along), g("Mul", c, across))
     g("Concat", shaft, horizontal, vertical, axis=-1, name="fin_force")
@@ -259,7 +256,7 @@ def _surrogate(state: State) -> ModelProto:
     c, s = g("Cos", angle), g("Sin", angle)
     fx = g("Sub", g("Mul", shaft, c), g("Mul", horizontal, s))
     fy = g("Add", g("Mul", shaft, s), g("Mul", horizontal, c))
-    x, y, z = g.split("Split", "position", g.whole(1, 1, 1), names=("x", "y", "z"), axis=-1)
+    x, y, z = g.parts("position", 1, 1, 1)
     tx = g("Sub", g("Mul", y, vertical), g("Mul", z, fy))
     ty = g("Sub", g("Mul", z, fx), g("Mul", x, vertical))
     tz = g("Sub", g("Mul", x, fy), g("Mul", y, fx))

@@ -73,11 +73,6 @@ class Robot:
         return command
 
 
-def read_bundle_graph(path: str | os.PathLike[str]) -> LayoutGraph:
-    """The layout graph in a bundle, a folder or a zip archive; errors as in `load_robot`."""
-    return _graph(read_bundle_files(path), str(path))
-
-
 def load_robot(path: str | os.PathLike[str], fast: bool = False) -> Robot:
     """The robot in a bundle, a folder or a zip archive.
 
@@ -94,7 +89,8 @@ def load_robot(path: str | os.PathLike[str], fast: bool = False) -> Robot:
 def parse_robot(files: Files, source: str = "bundle", fast: bool = False) -> Robot:
     """The robot in the contents of a bundle's files; see `load_robot`."""
     check_bundle_files(files, source)
-    graph = _graph(files, source)
+    place = f"{source}/{GRAPH}"
+    graph = parse_graph(decode_text(files[GRAPH], place), place)
     allocator = allocator_from_bundle(files, source, "fast" if fast else "learned")
     weights = allocator.weights
     if weights is None or weights.sha256 != graph.checkpoint_sha256:
@@ -102,8 +98,3 @@ def parse_robot(files: Files, source: str = "bundle", fast: bool = False) -> Rob
     if not all(np.array_equal(a, b) for a, b in zip(weights.normalization, graph.normalization, strict=True)):
         raise DataError(f"{source}: {GRAPH} and the weights differ in normalization; export again")
     return Robot(graph, allocator)
-
-
-def _graph(files: Files, source: str) -> LayoutGraph:
-    place = f"{source}/{GRAPH}"
-    return parse_graph(decode_text(files[GRAPH], place), place)

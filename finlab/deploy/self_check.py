@@ -19,8 +19,6 @@ from finlab.deploy.graph import SELF_TEST_TOLERANCE, NodeFeatures, SelfTest
 from finlab.deploy.robot import Robot
 from finlab.errors import DataError
 from finlab.inference.surrogate import surrogate_on
-from finlab.layout import Layout
-from finlab.physics import Plant
 from finlab.physics.energy import command_energy
 
 Array = NDArray[np.float64]
@@ -121,12 +119,6 @@ def answer_times(allocate: Callable[[Array], object], targets: Array) -> tuple[f
         times.append(time.perf_counter() - start)
     p50, p99 = np.percentile(times, [50, 99]) * 1e3
     return float(p50), float(p99)
-
-
-def random_targets(layout: Layout, count: int) -> Array:
-    """Wrenches (count, 6) of random commands, the same ones every time."""
-    draws = np.random.default_rng(0).random((count, layout.n_fins, 3))
-    return Plant(layout).wrench(layout.lower + draws * (layout.upper - layout.lower))
 
 
 def peak_memory() -> float:

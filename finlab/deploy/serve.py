@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
+from finlab.deploy.record import command_rows
 from finlab.deploy.robot import Robot
 from finlab.errors import CommandError, FinlabError
 
@@ -171,8 +172,7 @@ def _request(line: bytes) -> Mapping[str, Any]:
 
 
 def _reply(name: Any, status: str, fins: tuple[str, ...], command: Array) -> dict[str, Any]:
-    rows = [None if np.isnan(row).any() else row.tolist() for row in command]
-    return {"id": name, "status": status, "fins": list(fins), "command": rows}
+    return {"id": name, "status": status, "fins": list(fins), "command": command_rows(command)}
 
 
 def _line(reply: Mapping[str, Any]) -> bytes:

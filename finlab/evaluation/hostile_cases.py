@@ -4,14 +4,12 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
+from finlab.layout.arrays import Array
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY, MAX_POSITION
 from finlab.layout.layout import MAX_FINS
 from finlab.physics import Plant
-
-Array = NDArray[np.float64]
 
 DOMAIN = 0xF022
 """Leads the seed of every robot."""
@@ -59,8 +57,8 @@ def hostile_robot(number: int, seed: int, table: str | None = None) -> Layout:
 def hostile_targets(layout: Layout, count: int, number: int, seed: int) -> Array:
     """Wrenches (count, 6) for robot `number`, of every kind in `TARGETS` in turn."""
     rng = np.random.default_rng([DOMAIN, seed, number, 1])
-    command = layout.lower + rng.uniform(size=(count, layout.n_fins, 3)) * (layout.upper - layout.lower)
-    targets = np.clip(Plant(layout).wrench(command), -1e6, 1e6).reshape(count, 6)
+    plant = Plant(layout)
+    targets = np.clip(plant.wrench(plant.sample(rng, (count,))), -1e6, 1e6).reshape(count, 6)
     for i in range(count):
         kind = TARGETS[i % len(TARGETS)]
         if kind == "zero":

@@ -22,14 +22,6 @@ DISTILLED = "fast"
 _WITH_STARTS = re.compile(r"(\w+)-(\d+)")
 
 
-def method_names(text: str) -> list[str]:
-    """Names with commas between, each once, in their order; `AllocationError` where there is none."""
-    names = list(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
-    if not names:
-        raise AllocationError(f"methods: expected names with commas between (learned,paper), got {text!r}")
-    return names
-
-
 def is_slow(name: str) -> bool:
     """Whether a method runs on a subsample only."""
     return method_and_starts(name)[0] in SLOW
@@ -37,7 +29,10 @@ def is_slow(name: str) -> bool:
 
 def load_method_specs(names: str, checkpoint: str | Path | None = None) -> dict[str, Allocator]:
     """Allocators by name, from names with commas between; `AllocationError` where there is none."""
-    return {name: load_method_spec(name, checkpoint) for name in method_names(names)}
+    each = dict.fromkeys(name.strip() for name in names.split(",") if name.strip())
+    if not each:
+        raise AllocationError(f"methods: expected names with commas between (learned,paper), got {names!r}")
+    return {name: load_method_spec(name, checkpoint) for name in each}
 
 
 def load_method_spec(name: str, checkpoint: str | Path | None = None) -> Allocator:

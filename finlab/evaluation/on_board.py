@@ -7,13 +7,10 @@ thrust law and scaling at the limit are those of the robot's open software.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.baselines.model_based import ModelBased
-from finlab.inference.normalization import Normalization
+from finlab.layout.arrays import Array
 from finlab.physics import Plant
-
-Array = NDArray[np.float64]
 
 FREQUENCY_HZ = 2.0
 """Of the wrench driver in U-CAT's simulator; the robot itself has modes of 1.1 and 2.1 Hz."""
@@ -28,15 +25,10 @@ class OnBoard(ModelBased):
 
     name = "on-board"
 
-    def __init__(self, normalization: Normalization, *, frequency_hz: float = FREQUENCY_HZ) -> None:
-        """Takes the yardstick of errors and the frequency of all fins [Hz]."""
-        super().__init__(normalization)
-        self.frequency_hz = frequency_hz
-
     def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
         planar = plant.planar
         force = (targets @ np.linalg.pinv(planar, rcond=1e-6).T).reshape(len(targets), plant.n_fins, 2)
-        frequency = np.clip(self.frequency_hz, plant.lower[:, 1], plant.upper[:, 1])
+        frequency = np.clip(FREQUENCY_HZ, plant.lower[:, 1], plant.upper[:, 1])
         # Beyond the limit too, so that the scaling sees how much too large an amplitude is.
         amplitudes = np.linspace(0.0, 0.5 * np.pi, TABLE_SIZE)
         thrust = plant.thrust(amplitudes[:, None] + np.zeros(plant.n_fins), frequency)

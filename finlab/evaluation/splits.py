@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,11 @@ class Case(NamedTuple):
     failed: tuple[str, ...]
     """Names of the fins that do not work."""
 
+    @property
+    def healthy(self) -> Layout:
+        """The fins that work."""
+        return self.layout.without(self.failed)
+
 
 def make_split(name: str, n_layouts: int, n_targets: int, seed: int) -> list[Case]:
     """The test cases of a split.
@@ -64,34 +69,21 @@ def _make_case(split: str, n_targets: int, seed: int, k: int) -> Case:
     entropy = (DOMAIN, list(SPLITS).index(split), seed, k)
     layout_seed, target_seed = np.random.SeedSequence(entropy).spawn(2)
     layout, failed = SPLITS[split](np.random.default_rng(layout_seed), f"{split}-{seed}-{k}")
-    healthy = layout.without(failed) if failed else layout
-    lower = healthy.lower
-    upper = healthy.upper
-    rng = np.random.default_rng(target_seed)
-    command = lower + rng.uniform(size=(n_targets, healthy.n_fins, 3)) * (upper - lower)
-    return Case(layout, Plant(healthy).wrench(command), failed)
+    plant = Plant(layout.without(failed))
+    targets = plant.wrench(plant.sample(np.random.default_rng(target_seed), (n_targets,)))
+    return Case(layout, targets, failed)
 
 
-Drawn = tuple[Layout, tuple[str, ...]]
+Draw = Callable[[np.random.Generator, str], tuple[Layout, tuple[str, ...]]]
+"""From a generator and a name: a layout and its failed fins."""
 
 
-def _id(rng: np.random.Generator, name: str) -> Drawn:
-    return random_layout(rng, name), ()
+def _whole(**options: Any) -> Draw:
+    """Layouts of which no fin has failed; options of `random_layout`."""
+    return lambda rng, name: (random_layout(rng, name, **options), ())
 
 
-def _ood(rng: np.random.Generator, name: str) -> Drawn:
-    return random_layout(rng, name, box=OOD_BOX, outside=TRAINING_BOX), ()
-
-
-def _ood_fins(rng: np.random.Generator, name: str) -> Drawn:
-    return random_layout(rng, name, n_fins=OOD_FINS), ()
-
-
-def _limits(rng: np.random.Generator, name: str) -> Drawn:
-    return random_layout(rng, name, limits="varied"), ()
-
-
-def _failure(rng: np.random.Generator, name: str) -> Drawn:
+def _failure(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
     """One or two fins lost, never all."""
     layout = random_layout(rng, name)
     n_lost = min(int(rng.integers(1, 3)), layout.n_fins - 1)
@@ -99,7 +91,7 @@ def _failure(rng: np.random.Generator, name: str) -> Drawn:
     return layout, tuple(layout.names[i] for i in lost)
 
 
-def _near_singular(rng: np.random.Generator, name: str) -> Drawn:
+def _near_singular(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
     """Half of the layouts have nearly parallel shafts, half have a nearly coincident pair of fins."""
     layout = random_layout(rng, name)
     first, *others = layout.fins
@@ -117,11 +109,11 @@ def _near_singular(rng: np.random.Generator, name: str) -> Drawn:
     return replace(layout, fins=(first, *fins)), ()
 
 
-SPLITS: dict[str, Callable[[np.random.Generator, str], Drawn]] = {
-    "id": _id,
-    "ood": _ood,
-    "ood-fins": _ood_fins,
-    "limits": _limits,
+SPLITS: dict[str, Draw] = {
+    "id": _whole(),
+    "ood": _whole(box=OOD_BOX, outside=TRAINING_BOX),
+    "ood-fins": _whole(n_fins=OOD_FINS),
+    "limits": _whole(limits="varied"),
     "failure": _failure,
     "near-singular": _near_singular,
 }

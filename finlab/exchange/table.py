@@ -9,6 +9,8 @@ from pathlib import Path
 from finlab.errors import LayoutError
 from finlab.layout import MAX_FINS, Fin, Layout, Limits
 from finlab.layout.reading import read_text
+from finlab.layout.rules import under
+from finlab.whole_file import write_whole
 
 POSITION = ("x_m", "y_m", "z_m")
 ANGLE = "mounting_angle_deg"
@@ -32,28 +34,25 @@ def read_csv(path: str | os.PathLike[str]) -> Layout:
     """
     source = str(path)
     rows = csv.DictReader(io.StringIO(read_text(Path(path), source)), restkey="", strict=True)
-    try:
-        header = [column.strip() for column in rows.fieldnames or []]
-        rows.fieldnames = header
-        if unknown := [column for column in header if column not in COLUMNS]:
-            raise LayoutError(f"unknown column {unknown[0]!r:.60}, expected {', '.join(COLUMNS)}")
-        if missing := [column for column in POSITION if column not in header]:
-            raise LayoutError(f"column {missing[0]!r} is missing; a fin needs {', '.join(POSITION)}")
-        if len(set(header)) < len(header):
-            raise LayoutError("a column is given twice")
-        fins = []
-        for i, row in enumerate(rows, start=1):
-            if i > MAX_FINS:
-                raise LayoutError(f"expected 1 to {MAX_FINS} fins, got more")
-            try:
-                fins.append(_fin(row, i))
-            except LayoutError as error:
-                raise error.under(f"row {i}") from None
-        return Layout(Path(path).stem, tuple(fins), f"From {Path(path).name}.")
-    except csv.Error as error:
-        raise LayoutError(f"is not valid CSV: {error}", source=source) from None
-    except LayoutError as error:
-        raise error.under("", source) from None
+    with under(source=source):
+        try:
+            header = [column.strip() for column in rows.fieldnames or []]
+            rows.fieldnames = header
+            if unknown := [column for column in header if column not in COLUMNS]:
+                raise LayoutError(f"unknown column {unknown[0]!r:.60}, expected {', '.join(COLUMNS)}")
+            if missing := [column for column in POSITION if column not in header]:
+                raise LayoutError(f"column {missing[0]!r} is missing; a fin needs {', '.join(POSITION)}")
+            if len(set(header)) < len(header):
+                raise LayoutError("a column is given twice")
+            fins = []
+            for i, row in enumerate(rows, start=1):
+                if i > MAX_FINS:
+                    raise LayoutError(f"expected 1 to {MAX_FINS} fins, got more")
+                with under(f"row {i}"):
+                    fins.append(_fin(row, i))
+            return Layout(Path(path).stem, tuple(fins), f"From {Path(path).name}.")
+        except csv.Error as error:
+            raise LayoutError(f"is not valid CSV: {error}") from None
 
 
 def write_csv(layout: Layout, path: str | os.PathLike[str]) -> None:
@@ -68,10 +67,7 @@ def write_csv(layout: Layout, path: str | os.PathLike[str]) -> None:
     for fin in layout.fins:
         limits = [value for name in LIMITS for value in getattr(fin.limits, name)]
         writer.writerow([fin.name, *fin.position, math.degrees(fin.mounting_angle), *limits])
-    try:
-        Path(path).write_text(text.getvalue(), encoding="utf-8")
-    except OSError as error:
-        raise LayoutError(f"cannot be written: {error.strerror}", source=str(path)) from None
+    write_whole(path, text.getvalue())
 
 
 def _fin(row: dict[str, str | None], i: int) -> Fin:

@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 
 from finlab.errors import LayoutError
 from finlab.layout import Body, Fin, Layout
+from finlab.layout.rules import under
+from finlab.whole_file import write_whole
 
 Array = NDArray[np.float64]
 
@@ -41,64 +43,62 @@ def read_urdf(path: str | os.PathLike[str], fins: Sequence[str], origin: str = "
     Raises:
         LayoutError: it cannot be read, lacks a link, or a shaft is not horizontal.
     """
-    source = str(path)
     if origin not in ORIGINS:
         raise LayoutError(f"origin: expected one of {', '.join(ORIGINS)}, got {origin!r:.40}")
-    if not fins:
-        raise LayoutError("name the links that are fins: --fins LINK...", source=source)
-    robot = _robot(Path(path), source)
-    joints = {joint.child: joint for joint in robot.joints}
-    poses = _poses(robot, joints, source)
-    mass, center, inertia = _masses(robot, poses)
-    if origin == "gravity" and mass <= 0:
-        raise LayoutError(
-            "has no masses, so its centre of gravity is unknown; use --origin base if that is at it",
-            source=source,
-        )
-    start = center if origin == "gravity" else np.zeros(3)
-    made = []
-    for name in fins:
-        if name not in joints:
-            links = ", ".join(sorted(joints)) or "none"
+    with under(source=str(path)):
+        if not fins:
+            raise LayoutError("name the links that are fins: --fins LINK...")
+        robot = _robot(Path(path))
+        joints = {joint.child: joint for joint in robot.joints}
+        poses = _poses(robot, joints)
+        mass, center, inertia = _masses(robot, poses)
+        if origin == "gravity" and mass <= 0:
             raise LayoutError(
-                f"has no link {name!r:.60} that a joint moves; such links: {links}", source=source
+                "has no masses, so its centre of gravity is unknown; use --origin base if that is at it"
             )
-        made.append(_fin(joints[name], poses[name], start, source))
-    # The inertia is about the centre of gravity; a layout keeps its diagonal.
-    diagonal = tuple(np.diag(inertia).tolist())
-    body = None
-    if origin == "gravity":
-        body = Body(mass_kg=mass, inertia_kgm2=diagonal if min(diagonal) > 0 else None)
-    description = f"From {Path(path).name}, origin at the {'centre of gravity' if body else 'base frame'}."
-    return Layout(str(robot.name or Path(path).stem), tuple(made), description, body)
+        start = center if origin == "gravity" else np.zeros(3)
+        made = []
+        for name in fins:
+            if name not in joints:
+                links = ", ".join(sorted(joints)) or "none"
+                raise LayoutError(f"has no link {name!r:.60} that a joint moves; such links: {links}")
+            made.append(_fin(joints[name], poses[name], start))
+        # The inertia is about the centre of gravity; a layout keeps its diagonal.
+        diagonal = tuple(np.diag(inertia).tolist())
+        body = None
+        if origin == "gravity":
+            body = Body(mass_kg=mass, inertia_kgm2=diagonal if min(diagonal) > 0 else None)
+        place = "centre of gravity" if body else "base frame"
+        description = f"From {Path(path).name}, origin at the {place}."
+        return Layout(str(robot.name or Path(path).stem), tuple(made), description, body)
 
 
-def _robot(path: Path, source: str) -> Any:
+def _robot(path: Path) -> Any:
     """The parsed description; nothing but its text is read."""
     try:
         from yourdfpy import URDF
     except ImportError:
-        raise LayoutError("reading URDF needs yourdfpy; pip install 'finlab[urdf]'", source=source) from None
+        raise LayoutError("reading URDF needs yourdfpy; pip install 'finlab[urdf]'") from None
     try:
         with path.open("rb") as file:
             content = file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise LayoutError(f"cannot be read: {reason}", source=source) from None
+        raise LayoutError(f"cannot be read: {reason}") from None
     if len(content) > MAX_BYTES:
-        raise LayoutError(f"is larger than {MAX_BYTES:,} bytes; expected a URDF file", source=source)
+        raise LayoutError(f"is larger than {MAX_BYTES:,} bytes; expected a URDF file")
     # Entities could pull in other files or grow without bound; robot descriptions have no use for them.
     if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
-        raise LayoutError("declares a DOCTYPE or entities, which are not allowed; remove them", source=source)
+        raise LayoutError("declares a DOCTYPE or entities, which are not allowed; remove them")
     try:
         with_files = {"build_scene_graph": False, "load_meshes": False, "load_collision_meshes": False}
         return URDF.load(io.BytesIO(content), **with_files).robot
     except Exception as error:  # the reader raises whatever its own parser and conversions do
         reason = str(error).splitlines()[0][:120] if str(error) else type(error).__name__
-        raise LayoutError(f"is not a readable URDF: {reason}", source=source) from None
+        raise LayoutError(f"is not a readable URDF: {reason}") from None
 
 
-def _poses(robot: Any, joints: dict[str, Any], source: str) -> dict[str, Array]:
+def _poses(robot: Any, joints: dict[str, Any]) -> dict[str, Array]:
     """Pose (4, 4) of every link in the root link's frame, all joints at zero."""
     poses: dict[str, Array] = {}
     for link in robot.links:
@@ -108,7 +108,7 @@ def _poses(robot: Any, joints: dict[str, Any], source: str) -> dict[str, Array]:
             chain.append(joints[name])
             name = joints[name].parent
             if len(chain) > len(robot.links):
-                raise LayoutError(f"has joints in a circle around link {link.name!r:.60}", source=source)
+                raise LayoutError(f"has joints in a circle around link {link.name!r:.60}")
         pose = poses.setdefault(name, np.eye(4))
         for joint in reversed(chain):
             pose = pose @ (np.eye(4) if joint.origin is None else np.asarray(joint.origin, dtype=np.float64))
@@ -137,12 +137,11 @@ def _masses(robot: Any, poses: dict[str, Array]) -> tuple[float, Array, Array]:
     return mass, center, inertia
 
 
-def _fin(joint: Any, pose: Array, origin: Array, source: str) -> Fin:
+def _fin(joint: Any, pose: Array, origin: Array) -> Fin:
     """The fin that a joint moves."""
     if joint.type not in ("revolute", "continuous"):
         raise LayoutError(
-            f"joint {joint.name!r:.60} is {joint.type}; a fin's joint turns: revolute or continuous",
-            source=source,
+            f"joint {joint.name!r:.60} is {joint.type}; a fin's joint turns: revolute or continuous"
         )
     axis = pose[:3, :3] @ np.asarray((1.0, 0.0, 0.0) if joint.axis is None else joint.axis, dtype=np.float64)
     size = float(np.linalg.norm(axis))
@@ -150,8 +149,7 @@ def _fin(joint: Any, pose: Array, origin: Array, source: str) -> Fin:
     if tilt > MAX_TILT:
         raise LayoutError(
             f"the axis of joint {joint.name!r:.60} leaves the horizontal plane by {math.degrees(tilt):.0f} "
-            f"degrees; finlab's fins have horizontal shafts (up to {math.degrees(MAX_TILT):.0f})",
-            source=source,
+            f"degrees; finlab's fins have horizontal shafts (up to {math.degrees(MAX_TILT):.0f})"
         )
     position = pose[:3, 3] - origin
     # A joint may turn about the same line the other way round; finlab's shafts point out of the hull.
@@ -176,10 +174,7 @@ def write_urdf(layout: Layout, path: str | os.PathLike[str]) -> None:
     Raises:
         LayoutError: the file cannot be written.
     """
-    try:
-        Path(path).write_text(urdf_text(layout), encoding="utf-8")
-    except OSError as error:
-        raise LayoutError(f"cannot be written: {error.strerror}", source=str(path)) from None
+    write_whole(path, urdf_text(layout))
 
 
 def urdf_text(layout: Layout) -> str:

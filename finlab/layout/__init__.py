@@ -2,7 +2,6 @@
 
 from finlab.layout.arrays import LayoutArrays as LayoutArrays
 from finlab.layout.arrays import layout_effectiveness as layout_effectiveness
-from finlab.layout.arrays import planar_effectiveness as planar_effectiveness
 from finlab.layout.arrays import stack_layouts as stack_layouts
 from finlab.layout.body import Body as Body
 from finlab.layout.body import Hull as Hull

@@ -19,16 +19,12 @@ class LayoutArrays(NamedTuple):
 
     position: Array
     """Where each fin's force acts, body frame [m], (B, n, 3)."""
-
     mounting_angle: Array
     """Azimuth of each shaft [rad], (B, n)."""
-
     lower: Array
     """Least (amplitude [rad], frequency [Hz], zero direction [rad]), (B, n, 3)."""
-
     upper: Array
     """Greatest (amplitude [rad], frequency [Hz], zero direction [rad]), (B, n, 3)."""
-
     mask: NDArray[np.bool_]
     """True where there is a fin, False where there is padding, (B, n)."""
 
@@ -45,24 +41,15 @@ def empty_arrays(n_layouts: int, n_fins: int) -> LayoutArrays:
     )
 
 
-def stack_layouts(layouts: Sequence[Layout], n_fins: int | None = None) -> LayoutArrays:
-    """Returns the layouts as one padded batch.
-
-    Args:
-        layouts: at least one.
-        n_fins: width to pad to; the largest layout's fin count when None.
+def stack_layouts(layouts: Sequence[Layout]) -> LayoutArrays:
+    """Returns the layouts, at least one, as one batch padded to the fin count of the largest.
 
     Raises:
-        LayoutError: there are no layouts, or one has more than `n_fins` fins.
+        LayoutError: there are no layouts.
     """
     if len(layouts) == 0:
         raise LayoutError("expected at least one layout to stack, got none")
-    widest = max(layouts, key=lambda layout: layout.n_fins)
-    width = widest.n_fins if n_fins is None else n_fins
-    if widest.n_fins > width:
-        raise LayoutError(
-            f"layout {widest.name} has {widest.n_fins} fins, more than the {width} there is room for"
-        )
+    width = max(layout.n_fins for layout in layouts)
     arrays = empty_arrays(len(layouts), width)
     for b, layout in enumerate(layouts):
         n = layout.n_fins
@@ -92,22 +79,11 @@ def force_columns(position: Any, mounting_angle: Any) -> Any:
     return xp.stack([xp.stack(axis, axis=-1) for axis in (shaft, horizontal, vertical)], axis=-2)
 
 
-def planar_effectiveness(position: Array, mounting_angle: Array) -> Array:
-    """Returns what one newton along each fin's two thrust axes does to the robot.
-
-    Args:
-        position: (..., n, 3), body frame [m].
-        mounting_angle: (..., n) [rad].
+def layout_effectiveness(layout: Layout) -> Array:
+    """What one newton along each fin's two thrust axes does to the robot.
 
     Returns:
-        (..., n, 6, 2): wrench [Fx, Fy, Fz, Tx, Ty, Tz] of 1 N along e_h (column 0) and along e_z (column 1).
+        (6, 2 n): wrench [Fx, Fy, Fz, Tx, Ty, Tz] of 1 N along e_h and along e_z, fins side by side.
     """
-    columns = force_columns(np.asarray(position, np.float64), np.asarray(mounting_angle, np.float64))
-    planar: Array = np.swapaxes(columns[..., 1:, :], -1, -2)
-    return planar
-
-
-def layout_effectiveness(layout: Layout) -> Array:
-    """Returns one layout's planar effectiveness as a matrix (6, 2 n), fins side by side."""
-    blocks = planar_effectiveness(layout.position, layout.mounting_angle)
-    return np.concatenate(list(blocks), axis=1)
+    columns: Array = force_columns(layout.position, layout.mounting_angle)[:, 1:]
+    return columns.reshape(-1, 6).T

@@ -25,16 +25,12 @@ class Hull:
 
     shape: str | None = None
     """One of `HULL_SHAPES`; None when a mesh is given."""
-
     size_m: tuple[float, ...] | None = None
     """Length (x), width (y), height (z) [m] of a parametric shape; None when a mesh is given."""
-
     mesh: str | None = None
     """Path of a mesh file, absolute once loaded from a layout file; None when a shape is given."""
-
     scale: float = 1.0
     """Metres per unit of the mesh file (0.001 for millimetres)."""
-
     center_m: tuple[float, ...] = (0.0, 0.0, 0.0)
     """The hull's centre as seen from the centre of gravity, body frame [m]."""
 
@@ -65,25 +61,18 @@ class Body:
 
     hull: Hull | None = None
     """What the hull looks like."""
-
     mass_kg: float | None = None
     """Mass [kg], above 0."""
-
     inertia_kgm2: tuple[float, ...] | None = None
     """Moments of inertia about x, y, z through the centre of gravity [kg m^2], each above 0."""
-
     added_mass: tuple[float, ...] | None = None
     """Added mass, 3 in [kg] then 3 in [kg m^2], each at least 0."""
-
     linear_damping: tuple[float, ...] | None = None
     """Damping per speed, 3 in [N s/m] then 3 in [N m s], each at least 0."""
-
     quadratic_damping: tuple[float, ...] | None = None
     """Damping per speed times its magnitude, 3 in [N s^2/m^2] then 3 in [N m s^2], each at least 0."""
-
     center_of_buoyancy_m: tuple[float, ...] | None = None
     """Centre of buoyancy as seen from the centre of gravity, body frame [m]."""
-
     buoyancy_n: float | None = None
     """Buoyant force when submerged [N], at least 0; None means neutral, equal to the weight."""
 

@@ -7,9 +7,7 @@ Every error names the file and the key, such as
 import json
 import math
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +15,8 @@ from finlab.errors import LayoutError
 from finlab.layout.body import BODY_KEYS, HULL_KEYS, Body, Hull
 from finlab.layout.fin import Fin, FinModelSpec, Limits
 from finlab.layout.layout import MAX_FINS, Layout
-from finlab.layout.rules import mapping, number, shown, text
+from finlab.layout.rules import mapping, number, shown, text, under
+from finlab.whole_file import write_whole
 
 FORMAT = "finlab-layout"
 VERSION = 1
@@ -42,11 +41,8 @@ def parse_layout(data: Any, source: str = "layout", folder: Path | None = None) 
     Raises:
         LayoutError: something is missing, unknown or out of range.
     """
-    folder = Path.cwd() if folder is None else folder
-    try:
-        return _layout(data, folder)
-    except LayoutError as error:
-        raise error.under("", source) from None
+    with under(source=source):
+        return _layout(data, Path.cwd() if folder is None else folder)
 
 
 def layout_to_dict(layout: Layout) -> dict[str, Any]:
@@ -57,11 +53,7 @@ def layout_to_dict(layout: Layout) -> dict[str, Any]:
     data["frame"] = dict(FRAME)
     data["fins"] = [_fin_to_dict(fin) for fin in layout.fins]
     if layout.body is not None:
-        body = {key: _plain(getattr(layout.body, key)) for key in BODY_KEYS if key != "hull"}
-        data["body"] = {key: value for key, value in body.items() if value is not None}
-        if layout.body.hull is not None:
-            hull = {key: _plain(getattr(layout.body.hull, key)) for key in HULL_KEYS}
-            data["body"] = {"hull": {k: v for k, v in hull.items() if v is not None}, **data["body"]}
+        data["body"] = _plain(asdict(layout.body))
     return data
 
 
@@ -71,32 +63,14 @@ def save_layout(layout: Layout, path: str | os.PathLike[str]) -> None:
     Raises:
         LayoutError: the file cannot be written.
     """
-    file = Path(path)
     data = layout_to_dict(layout)
-    if file.suffix.lower() == ".json":
+    if Path(path).suffix.lower() == ".json":
         content = json.dumps(data, indent=2) + "\n"
     else:
         from finlab.layout.yaml_file import yaml_text  # a robot's computer writes JSON and may lack PyYAML
 
         content = yaml_text(data)
-    # Written beside and renamed, so that a kill or a full disk never leaves half a layout.
-    part = file.with_name(f".{file.name}.{os.getpid()}.part")
-    try:
-        part.write_text(content, encoding="utf-8")
-        os.replace(part, file)
-    except OSError as error:
-        with suppress(OSError):
-            part.unlink()
-        raise LayoutError(f"cannot be written: {error.strerror}", source=str(path)) from None
-
-
-@contextmanager
-def _under(key: str) -> Iterator[None]:
-    """Puts `key` before the keys of errors raised inside."""
-    try:
-        yield
-    except LayoutError as error:
-        raise error.under(key) from None
+    write_whole(path, content)
 
 
 def _layout(data: Any, folder: Path) -> Layout:
@@ -121,9 +95,9 @@ def _layout(data: Any, folder: Path) -> Layout:
         raise LayoutError(f"expected 1 to {MAX_FINS} fins, got {len(fins)}", "fins")
     parsed = []
     for i, fin in enumerate(fins):
-        with _under(f"fins[{i}]"):
+        with under(f"fins[{i}]"):
             parsed.append(_fin(fin, folder))
-    with _under("body"):
+    with under("body"):
         body = None if data.get("body") is None else _body(data["body"], folder)
     description = "" if data.get("description") is None else data["description"]
     return Layout(name=data["name"], fins=tuple(parsed), description=description, body=body)
@@ -133,10 +107,10 @@ def _fin(data: Any, folder: Path) -> Fin:
     keys = ("name", "position_m", "mounting_angle_deg", "limits", "model")
     data = mapping(data, "", keys, required=("name", "position_m", "mounting_angle_deg"))
     degrees = number(data["mounting_angle_deg"], "mounting_angle_deg", -360.0, 360.0)
-    with _under("limits"):
+    with under("limits"):
         given = mapping({} if data.get("limits") is None else data["limits"], "", tuple(_LIMIT_FIELDS))
         limits = Limits(**{_LIMIT_FIELDS[key]: value for key, value in given.items()})
-    with _under("model"):
+    with under("model"):
         model = _model({"type": "drag"} if data.get("model") is None else data["model"], folder)
     return Fin(data["name"], data["position_m"], math.radians(degrees), limits, model)
 
@@ -155,7 +129,7 @@ def _model(data: Any, folder: Path) -> FinModelSpec:
 def _body(data: Any, folder: Path) -> Body:
     data = dict(mapping(data, "", BODY_KEYS))
     if data.get("hull") is not None:
-        with _under("hull"):
+        with under("hull"):
             hull = dict(mapping(data["hull"], "", HULL_KEYS))
             if hull.get("mesh") is not None:
                 hull["mesh"] = _absolute(text(hull["mesh"], "mesh", 4096), folder)
@@ -180,4 +154,7 @@ def _fin_to_dict(fin: Fin) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
+    """Lists for tuples, and mappings without what is None."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items() if item is not None}
     return list(value) if isinstance(value, tuple) else value

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 from finlab.errors import LayoutError
 from finlab.layout.rules import MAX_NAME_LENGTH, interval, number, numbers, text
@@ -29,42 +28,30 @@ class Parameter:
 
 _DENSITY = Parameter(1000.0, "density of the water", "kg/m^3")
 
-FIN_MODELS: Mapping[str, Mapping[str, Parameter]] = MappingProxyType(
-    {
-        "drag": MappingProxyType(
-            {
-                "density": _DENSITY,
-                "drag_coefficient": Parameter(0.15, "drag coefficient of the blade"),
-                "area": Parameter(0.02, "area of the blade", "m^2"),
-                "lever": Parameter(0.1, "distance of the blade's centre from the shaft", "m"),
-            }
-        ),
-        "lighthill": MappingProxyType(
-            {
-                "density": _DENSITY,
-                "length": Parameter(0.20, "length of the fin from the shaft", "m"),
-                "width": Parameter(0.10, "width of the trailing edge", "m"),
-            }
-        ),
-        "soft": MappingProxyType(
-            {
-                "k": Parameter(3.6, "thrust at A f = 1 rad Hz, before it saturates", "N"),
-                "p": Parameter(1.0, "exponent with which thrust grows with A f", low=0.5, high=4.0),
-                "x0": Parameter(1.3, "A f from which thrust saturates and falls", "rad Hz"),
-                "q": Parameter(5.0, "exponent of that fall", high=20.0),
-                "e": Parameter(
-                    0.0, "share by which thrust differs with direction", high=0.99, positive=False
-                ),
-                "phi_e": Parameter(
-                    0.0, "zero direction of the largest thrust", "rad", -10.0, 10.0, positive=False
-                ),
-                "d": Parameter(0.0, "angle from zero direction to thrust", "rad", -1.5, 1.5, positive=False),
-            }
-        ),
-        # Its one parameter, `path`, is the text that names a CSV file of forces; it has no default.
-        "table": MappingProxyType({}),
-    }
-)
+FIN_MODELS: Mapping[str, Mapping[str, Parameter]] = {
+    "drag": {
+        "density": _DENSITY,
+        "drag_coefficient": Parameter(0.15, "drag coefficient of the blade"),
+        "area": Parameter(0.02, "area of the blade", "m^2"),
+        "lever": Parameter(0.1, "distance of the blade's centre from the shaft", "m"),
+    },
+    "lighthill": {
+        "density": _DENSITY,
+        "length": Parameter(0.20, "length of the fin from the shaft", "m"),
+        "width": Parameter(0.10, "width of the trailing edge", "m"),
+    },
+    "soft": {
+        "k": Parameter(3.6, "thrust at A f = 1 rad Hz, before it saturates", "N"),
+        "p": Parameter(1.0, "exponent with which thrust grows with A f", low=0.5, high=4.0),
+        "x0": Parameter(1.3, "A f from which thrust saturates and falls", "rad Hz"),
+        "q": Parameter(5.0, "exponent of that fall", high=20.0),
+        "e": Parameter(0.0, "share by which thrust differs with direction", high=0.99, positive=False),
+        "phi_e": Parameter(0.0, "zero direction of the largest thrust", "rad", -10.0, 10.0, positive=False),
+        "d": Parameter(0.0, "angle from zero direction to thrust", "rad", -1.5, 1.5, positive=False),
+    },
+    # Its one parameter, `path`, is the text that names a CSV file of forces; it has no default.
+    "table": {},
+}
 """The fin models there are, by name, with their numeric parameters."""
 
 
@@ -74,7 +61,6 @@ class FinModelSpec:
 
     type: str = "drag"
     """One of `FIN_MODELS`."""
-
     parameters: tuple[tuple[str, float | str], ...] = ()
     """Parameters that differ from the model's defaults, as (name, value), sorted by name."""
 
@@ -125,10 +111,8 @@ class Limits:
 
     amplitude: tuple[float, float] = (0.05, 0.6)
     """Half amplitude [rad], (minimum, maximum); the maximum is above 0."""
-
     frequency: tuple[float, float] = (0.1, 2.1)
     """Frequency [Hz], (minimum, maximum); the maximum is above 0."""
-
     zero_direction: tuple[float, float] = (-math.pi, math.pi)
     """Zero direction [rad], (minimum, maximum), at most one turn apart; a full turn means any direction."""
 
@@ -137,14 +121,9 @@ class Limits:
         frequency = interval(self.frequency, "frequency_hz", 0.0, MAX_FREQUENCY)
         zero_direction = interval(self.zero_direction, "zero_direction_rad", -2 * math.pi, 2 * math.pi)
         # The energy proxy divides by these two maxima.
-        if amplitude[1] <= 0.0:
-            raise LayoutError(
-                "the maximum must be above 0; leave the fin out if it never moves", "amplitude_rad"
-            )
-        if frequency[1] <= 0.0:
-            raise LayoutError(
-                "the maximum must be above 0; leave the fin out if it never moves", "frequency_hz"
-            )
+        for key, (_, most) in (("amplitude_rad", amplitude), ("frequency_hz", frequency)):
+            if most <= 0.0:
+                raise LayoutError("the maximum must be above 0; leave the fin out if it never moves", key)
         width = zero_direction[1] - zero_direction[0]
         if width > 2 * math.pi + 1e-6:
             raise LayoutError(f"must span at most one turn (6.2832), got {width:.4f}", "zero_direction_rad")
@@ -169,16 +148,12 @@ class Fin:
 
     name: str
     """Unique within its layout; `--failed NAME` and the app refer to it."""
-
     position: tuple[float, float, float]
     """Where the fin's force acts, body frame (x forward, y left, z up from the centre of gravity) [m]."""
-
     mounting_angle: float
     """Azimuth of the shaft in the body xy plane, from +x, counter-clockwise [rad]."""
-
     limits: Limits = Limits()
     """What the fin may be commanded."""
-
     model: FinModelSpec = FinModelSpec()
     """Which law gives its force."""
 

@@ -23,13 +23,10 @@ class Layout:
 
     name: str
     """What the layout is called."""
-
     fins: tuple[Fin, ...]
     """The fins, 1 to 16, with unique names. Commands and arrays follow this order."""
-
     description: str = ""
     """What there is to know about it, for people."""
-
     body: Body | None = None
     """Hull, mass and hydrodynamics, where known."""
 

@@ -15,7 +15,7 @@ from finlab.errors import LayoutError
 from finlab.layout.file import FORMAT, VERSION, parse_layout
 from finlab.layout.layout import Layout
 from finlab.layout.reading import decode_text, parse_json, read_text
-from finlab.layout.rules import mapping, number, shown
+from finlab.layout.rules import mapping, number, shown, under
 
 SUFFIX = ".graph.json"
 """How the name of a graph file ends."""
@@ -40,12 +40,9 @@ def load_layout(layout: str | os.PathLike[str]) -> Layout:
     """
     file = layout_path(layout)
     source = str(layout)
-    if is_bundle(file):
-        content = decode_text(read_bundle_files(file)[GRAPH], f"{source}/{GRAPH}")
-        return parse_graph_layout(content, f"{source}/{GRAPH}")
+    if holds_graph(file):
+        return parse_graph_layout(*read_graph_text(file))
     content = read_text(file, source)
-    if file.name.endswith(SUFFIX):
-        return parse_graph_layout(content, source)
     if file.suffix.lower() == ".json":
         data = parse_json(content, source)
     else:
@@ -79,6 +76,25 @@ def layout_path(layout: str | os.PathLike[str]) -> Path:
     )
 
 
+def holds_graph(path: Path) -> bool:
+    """Whether a path looks like a layout graph file, or a bundle with one."""
+    return is_bundle(path) or path.name.endswith(SUFFIX)
+
+
+def read_graph_text(path: Path) -> tuple[str, str]:
+    """The text of a graph file, or of the one in a bundle, and what to call it in error messages.
+
+    Raises:
+        LayoutError: the file cannot be read.
+        DataError: the bundle cannot be read, or was changed.
+    """
+    source = str(path)
+    if not is_bundle(path):
+        return read_text(path, source), source
+    place = f"{source}/{GRAPH}"
+    return decode_text(read_bundle_files(path)[GRAPH], place), place
+
+
 def parse_graph_layout(content: str, source: str = "graph") -> Layout:
     """Returns the layout in the text of a graph file, failed fins included.
 
@@ -86,10 +102,8 @@ def parse_graph_layout(content: str, source: str = "graph") -> Layout:
         LayoutError: it is of another format or version, was changed after it was written, or holds no layout.
     """
     data = parse_json(content, source)
-    try:
+    with under(source=source):
         return graph_layout(check_graph_document(data), source)
-    except LayoutError as error:
-        raise error if error.source else error.under("", source) from None
 
 
 def check_graph_document(data: Any) -> Mapping[str, Any]:

@@ -37,9 +37,8 @@ def random_layouts(
     box: tuple[float, float, float] = TRAINING_BOX,
     limits: LimitsKind | float = "nominal",
     outside: tuple[float, float, float] | None = None,
-    pad_to: int | None = None,
 ) -> LayoutArrays:
-    """Returns n random layouts as one padded batch.
+    """Returns n random layouts as one batch, padded to the largest possible fin count.
 
     Positions are uniform in the box and angles in [-pi, pi). With `limits="varied"` every fin gets its own
     limits as in split `limits`; with a number, this share of the layouts; `"mixed"` is half of them.
@@ -51,7 +50,6 @@ def random_layouts(
         box: largest |x|, |y|, |z| [m].
         limits: see above.
         outside: when given, at least one fin of each layout lies outside this smaller box.
-        pad_to: width of the arrays; the largest possible fin count when None.
 
     Raises:
         DataError: `outside` is not smaller than `box` in any direction, so no such layout exists.
@@ -60,15 +58,12 @@ def random_layouts(
     extent = np.array(box)
     if outside is not None and not np.any(extent > np.array(outside)):
         raise DataError(f"no fin within {box} can lie outside {outside}; make the first box larger")
-    arrays = empty_arrays(n, most if pad_to is None else pad_to)
+    arrays = empty_arrays(n, most)
     count = rng.integers(least, most + 1, size=n)
     arrays.mask[:] = np.arange(arrays.mask.shape[1]) < count[:, None]
     arrays.position[:] = rng.uniform(-1.0, 1.0, arrays.position.shape) * extent
-    if outside is not None:
-        redo = ~_any_outside(arrays, outside)
-        while redo.any():
-            arrays.position[redo] = rng.uniform(-1.0, 1.0, arrays.position[redo].shape) * extent
-            redo = ~_any_outside(arrays, outside)
+    while outside is not None and (redo := ~_any_outside(arrays, outside)).any():
+        arrays.position[redo] = rng.uniform(-1.0, 1.0, arrays.position[redo].shape) * extent
     arrays.position[~arrays.mask] = 0.0
     arrays.mounting_angle[:] = np.where(arrays.mask, rng.uniform(-math.pi, math.pi, arrays.mask.shape), 0.0)
     if limits != "nominal":

@@ -4,7 +4,8 @@ Each takes a value that may be anything (a file or a page sent it), the key it s
 in its final type or raises a `LayoutError` that names the key, the value and the expectation.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,15 @@ from finlab.errors import LayoutError
 
 MAX_NAME_LENGTH = 64
 MAX_DESCRIPTION_LENGTH = 4000
+
+
+@contextmanager
+def under(key: str = "", source: str = "") -> Iterator[None]:
+    """Puts `key` before the keys of layout errors raised inside, and `source`, their file, before that."""
+    try:
+        yield
+    except LayoutError as error:
+        raise error.under(key, source) from None
 
 
 def shown(value: Any) -> str:

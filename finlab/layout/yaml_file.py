@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from finlab.errors import LayoutError
+from finlab.layout.rules import under
 
 MAX_EVENTS = 30_000
 """Most YAML events (keys, values, brackets); a layout of 16 fins has under a thousand."""
@@ -45,10 +46,9 @@ _Loader.add_implicit_resolver(
 def parse_yaml(content: str, source: str) -> Any:
     """Returns the values of one YAML document; aliases, tags and duplicate keys are refused."""
     try:
-        _inspect(content)
-        return yaml.load(content, Loader=_Loader)  # noqa: S506 (a safe loader)
-    except LayoutError as error:
-        raise error.under("", source) from None
+        with under(source=source):
+            _inspect(content)
+            return yaml.load(content, Loader=_Loader)  # noqa: S506 (a safe loader)
     except yaml.YAMLError as error:
         raise LayoutError(f"is not valid YAML: {_place(error)}", source=source) from None
     except (ValueError, OverflowError, RecursionError) as error:

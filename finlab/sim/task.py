@@ -5,7 +5,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,28 +13,6 @@ from finlab.control import Setpoint
 from finlab.errors import DataError
 
 Array = NDArray[np.float64]
-
-
-class Task(Protocol):
-    """A setpoint for every time, and where to begin."""
-
-    @property
-    def name(self) -> str:
-        """What it is called in logs and tables."""
-        ...
-
-    @property
-    def duration_s(self) -> float:
-        """When it is over [s]."""
-        ...
-
-    def setpoint(self, time: float) -> Setpoint:
-        """Where to be, or how fast, at `time` [s]; after the end as at the end."""
-        ...
-
-    def start(self) -> tuple[Array, float]:
-        """Position (3,) [m] and heading [rad] to begin with."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -76,7 +53,7 @@ COLUMNS = ("t", "x", "y", "z")
 
 
 class Trajectory:
-    """Positions at times, with straight lines between them. A `Task` for the waypoint controller."""
+    """Positions at times, with straight lines between them, for the waypoint controller."""
 
     def __init__(self, name: str, time: Array, position: Array) -> None:
         """Takes a name, rising times (N,) [s] from 0 and positions (N, 3) in the world [m].
@@ -122,6 +99,11 @@ class Trajectory:
     def length_m(self) -> float:
         """Length of the path [m]."""
         return float(np.linalg.norm(np.diff(self.samples, axis=0), axis=1).sum())
+
+
+Task = Trajectory | Cruise
+"""What a `ClosedLoop` can be given: whatever has a `name`, a `duration_s` [s], a `setpoint` for every time
+(after the end as at the end) and a `start`: position (3,) [m] and heading [rad] to begin with."""
 
 
 def _eased(duration_s: float) -> tuple[Array, Array]:
@@ -210,16 +192,11 @@ def read_trajectory(path: Path) -> Trajectory:
             if missing := [name for name in COLUMNS if name not in names]:
                 raise DataError(f"{path}: column {missing[0]!r} is missing; expected {', '.join(COLUMNS)}")
             reader.fieldnames = names
-            rows = [_numbers(row, f"{path}: line {reader.line_num}") for row in reader]
+            rows = [[float(row[name]) for name in COLUMNS] for row in reader]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise DataError(f"{path}: cannot be read: {error}") from None
+    except (TypeError, ValueError):
+        line = f"{path}: line {reader.line_num}"
+        raise DataError(f"{line}: expected four numbers for {', '.join(COLUMNS)}") from None
     table = np.array(rows, dtype=np.float64).reshape(-1, 4)
     return Trajectory(path.stem, table[:, 0], table[:, 1:])
-
-
-def _numbers(row: dict[str, str], where: str) -> list[float]:
-    """The four numbers of a row, by column."""
-    try:
-        return [float(row[name]) for name in COLUMNS]
-    except (TypeError, ValueError):
-        raise DataError(f"{where}: expected four numbers for {', '.join(COLUMNS)}") from None

@@ -126,18 +126,6 @@ class Vehicle:
             tz / iz,
         ]
 
-    def energy(self, state: Sequence[float]) -> float:
-        """Kinetic energy of body and carried water, and potential energy of weight and buoyancy [J].
-
-        In water at rest and with no thrust it never grows.
-        """
-        motion = np.asarray(state[7:13], dtype=np.float64)
-        kinetic = 0.5 * float(np.dot(np.asarray(self.inertia), motion**2))
-        _, _, z, qw, qx, qy, qz = state[:7]
-        up = (2 * (qx * qz - qw * qy), 2 * (qy * qz + qw * qx), 1 - 2 * (qx * qx + qy * qy))
-        height = z + sum(a * b for a, b in zip(up, self._center, strict=True))
-        return kinetic + self.weight * z - self.lift * height
-
     def step(self, state: Array, wrench: Sequence[float], dt: float) -> Array:
         """The state (13,) after `dt` [s] under a wrench that the body carries along: Runge-Kutta, order 4."""
         y0: list[float] = state.tolist()

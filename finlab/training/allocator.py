@@ -1,6 +1,6 @@
 """`finlab train allocator`: imitation, guidance through the surrogate, entropy (paper, main training)."""
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -14,14 +14,8 @@ from finlab.inference.weights import NetworkConfig, TrainedWeights
 from finlab.layout import FinModelSpec
 from finlab.physics import make_law
 from finlab.training import losses
-from finlab.training.device import (
-    autocast_dtype,
-    join_processes,
-    leave_processes,
-    share_of_batch,
-    training_device,
-)
-from finlab.training.loop import LoopSettings, plot_log, train
+from finlab.training.device import autocast_dtype, shared_training
+from finlab.training.loop import Terms, plot_log, train
 from finlab.training.networks.allocator_network import AllocatorNetwork
 from finlab.training.presets import AllocatorTraining, get_preset
 from finlab.training.sampling import Batch, ForwardSampler, seeded_generator
@@ -35,12 +29,9 @@ def train_allocator(
     *,
     surrogate: Path,
     seed: int = 0,
-    steps: int | None = None,
-    batch_size: int | None = None,
-    learning_rate: float | None = None,
     stop_after: int | None = None,
-    overrides: dict[str, Any] | None = None,
-    network_overrides: dict[str, Any] | None = None,
+    network: Mapping[str, Any] | None = None,
+    **training: Any,
 ) -> TrainedWeights:
     """Train a preset's allocator network and write a whole checkpoint folder.
 
@@ -52,50 +43,37 @@ def train_allocator(
         out: folder for checkpoint, log, loss curves and resume state.
         surrogate: checkpoint folder of the trained surrogate, which stays as it is.
         seed: seed of the data and of the first weights.
-        steps: optimizer steps instead of the preset's.
-        batch_size: samples per step, over all processes, instead of the preset's.
-        learning_rate: peak learning rate instead of the preset's.
         stop_after: stop (resumable) after so many steps.
-        overrides: other fields of `AllocatorTraining` to change, for ablations.
-        network_overrides: fields of `NetworkConfig` to change, for ablations.
+        network: fields of `NetworkConfig` that differ from the preset's.
+        training: fields of `AllocatorTraining` that differ from the preset's; None does not.
     """
     recipe = get_preset(preset)
-    recipe = replace(recipe, network=replace(recipe.network, **(network_overrides or {})))
     base = read_checkpoint(resolve_checkpoint(surrogate))
-    changes = {"steps": steps, "batch_size": batch_size, "learning_rate": learning_rate, **(overrides or {})}
-    training = replace(recipe.allocator_training, **{k: v for k, v in changes.items() if v is not None})
-    rank, world = join_processes()
-    device = training_device()
+    config = replace(recipe.network, **(network or {}))
+    settings = replace(recipe.allocator_training, **{k: v for k, v in training.items() if v is not None})
     torch.manual_seed(seed)
-    network = AllocatorNetwork(recipe.network, SIZES[recipe.network.features]).to(device)
-    terms = make_terms(base, recipe.network, training, seed, device, rank, world)
+    model = AllocatorNetwork(config, SIZES[config.features])
     identity: dict[str, Any] = {
         "preset": preset,
         "seed": seed,
-        "training": asdict(training),
-        "network": asdict(recipe.network),
+        "training": asdict(settings),
+        "network": asdict(config),
         "surrogate_sha256": base.sha256,
     }
 
     def save(weights: dict[str, Tensor], step: int) -> None:
-        done = {"steps_done": step, "samples": step * training.batch_size}
+        done = {"steps_done": step, "samples": step * settings.batch_size}
         made = {**base.training, "allocator": identity | done}
-        config, state = recipe.network, state_of(weights)
-        whole = replace(base, preset=preset, network_config=config, network=state, training=made)
-        save_checkpoint(out, whole)
+        state = state_of(weights)
+        save_checkpoint(
+            out, replace(base, preset=preset, network_config=config, network=state, training=made)
+        )
         plot_log(out)
 
-    settings = LoopSettings(
-        training.steps,
-        training.batch_size,
-        training.learning_rate,
-        warmup=training.warmup,
-        cosine=training.cosine,
-        ema=training.ema,
-    )
-    train(network, terms, settings, out, identity, stop_after=stop_after, on_save=save)
-    leave_processes()
-    return read_checkpoint(out) if rank == 0 else base
+    with shared_training(settings.batch_size) as share:
+        terms = make_terms(base, config, settings, seed, share.device, share.rows)
+        train(model.to(share.device), terms, settings, out, identity, stop_after=stop_after, on_save=save)
+    return read_checkpoint(out) if share.first else base
 
 
 def make_terms(
@@ -104,22 +82,20 @@ def make_terms(
     training: AllocatorTraining,
     seed: int,
     device: torch.device,
-    rank: int = 0,
-    world: int = 1,
-) -> Callable[[nn.Module, int], dict[str, Tensor]]:
-    """The loss terms of a step, for this process's share of the batch."""
+    rows: slice = slice(None),
+) -> Terms:
+    """The loss terms of a step, for these rows of the batch."""
     model, surrogate = make_law(FinModelSpec.from_values(base.fin_model)), surrogate_of(base).to(device)
     sampler = ForwardSampler(
         TRAIN_SEED + seed, training.batch_size, fin_model=model, varied_limits=training.varied_limits
     )
     mean, std = (torch.tensor(v, dtype=torch.float32, device=device) for v in base.normalization)
-    share = share_of_batch(training.batch_size, rank, world)
     # Only the network runs in reduced precision; statistics, losses and physics stay in float32.
     dtype = autocast_dtype(device.type)
     autocast = torch.autocast(device.type, dtype, enabled=dtype is not None)
 
     def terms(net: nn.Module, step: int) -> dict[str, Tensor]:
-        batch = Batch(*(t[share].to(device) for t in sampler.batch(step)))
+        batch = Batch(*(t[rows].to(device) for t in sampler.batch(step)))
         target = (batch.wrench - mean) / std
         x = node_features(network, batch, target, std)
         with autocast:
@@ -132,19 +108,10 @@ def make_terms(
         shifted = target + mean / std
         if training.guide == "samples":
             noise = seeded_generator(TRAIN_SEED + seed, step, device)
-            whole = (share, training.batch_size)
+            whole = (rows, training.batch_size)
             guidance = losses.sample_guidance(mixture, surrogate, batch, shifted, std, noise, whole).mean()
         else:
-            soft, best = losses.mode_guidance(
-                mixture,
-                surrogate,
-                batch,
-                shifted,
-                std,
-                energy_weight=training.energy,
-                softness=training.softness,
-                every_mode=training.every_mode,
-            )
+            soft, best = losses.mode_guidance(mixture, surrogate, batch, shifted, std, training)
             guidance, result["best_error"] = soft.mean(), best.mean()
         result["guidance"] = guidance
         ramp = min(1.0, step / max(1.0, training.ramp * training.steps))

@@ -1,18 +1,14 @@
 """Where training runs, and with how many processes."""
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import NamedTuple
 
 import torch
 import torch.distributed as dist
 
 from finlab.errors import DataError
-
-
-def training_device() -> torch.device:
-    """CUDA (the card of this process) where present, else the CPU."""
-    if torch.cuda.is_available():
-        return torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0")))
-    return torch.device("cpu")
 
 
 def join_processes() -> tuple[int, int]:
@@ -24,17 +20,35 @@ def join_processes() -> tuple[int, int]:
     return dist.get_rank(), dist.get_world_size()
 
 
-def share_of_batch(batch_size: int, rank: int, world: int) -> slice:
-    """The rows of each batch that are this process's; `DataError` where they do not divide evenly."""
+class Share(NamedTuple):
+    """What one of the processes of a training does."""
+
+    first: bool
+    """Whether it is the one that writes."""
+    rows: slice
+    """Its rows of each batch."""
+    device: torch.device
+    """Where it computes."""
+
+
+@contextmanager
+def shared_training(batch_size: int) -> Iterator[Share]:
+    """This process's share of a training that all processes of `torchrun` do together.
+
+    Raises:
+        DataError: the batches do not divide evenly among them.
+    """
+    rank, world = join_processes()
     if batch_size % world:
         raise DataError(f"batch size {batch_size} does not divide among {world} processes; choose a multiple")
-    return slice(rank * batch_size // world, (rank + 1) * batch_size // world)
-
-
-def leave_processes() -> None:
-    """Undo `join_processes`."""
-    if dist.is_initialized():
-        dist.destroy_process_group()
+    cuda = torch.cuda.is_available()  # then each process has a card of its own
+    device = torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0"))) if cuda else torch.device("cpu")
+    rows = slice(rank * batch_size // world, (rank + 1) * batch_size // world)
+    try:
+        yield Share(rank == 0, rows, device)
+    finally:
+        if dist.is_initialized():
+            dist.destroy_process_group()
 
 
 def autocast_dtype(device_type: str) -> torch.dtype | None:

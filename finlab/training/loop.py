@@ -2,7 +2,6 @@
 
 import csv
 import math
-import os
 import sys
 import time
 from collections.abc import Callable
@@ -16,39 +15,47 @@ import torch.distributed as dist
 from torch import Tensor, nn
 from tqdm import tqdm
 
+from finlab.errors import DataError
 from finlab.training.saving import load_state, save_state
+from finlab.whole_file import write_whole
 
 LOG_FILE = "log.csv"
-"""One row per logged step: step, samples, seconds, learning rate and every loss term."""
+"""One row per logged step: the columns below and every loss term."""
+_FIXED = ("step", "samples", "seconds", "learning_rate")
+
+Terms = Callable[[nn.Module, int], dict[str, Tensor]]
+"""Loss terms of a step of training, `loss` among them, as means over this process's share of the batch."""
 
 
 @dataclass(frozen=True)
 class LoopSettings:
-    """What the loop itself needs to know."""
+    """What every training has to say, whatever it learns."""
 
     steps: int
     """Optimizer steps in all."""
     batch_size: int
-    """Samples per step, over all processes; only for the throughput shown."""
+    """Samples per step, over all processes."""
     learning_rate: float
-    """Peak learning rate."""
+    """Peak learning rate of Adam."""
     warmup: int = 0
-    """Steps over which it rises linearly."""
+    """Steps over which it rises linearly, if there are as many."""
     cosine: bool = True
-    """Whether it falls to a hundredth along a cosine."""
+    """Whether it falls to a hundredth along a cosine (True) or stays (the paper)."""
     ema: float = 0.0
-    """Decay of the running average of the weights; 0 keeps none."""
-    clip: float = 1.0
-    """Largest norm of the gradient."""
-    log_every: int = 20
-    """Steps between rows of the log."""
-    save_every_s: float = 60.0
-    """Seconds between saved states."""
+    """Decay of the running average of the weights that is shipped; 0 ships the last weights."""
+
+
+CLIP = 1.0
+"""Largest norm of the gradient."""
+LOG_EVERY = 20
+"""Steps between rows of the log."""
+SAVE_EVERY_S = 60.0
+"""Seconds between saved states."""
 
 
 def learning_rate(settings: LoopSettings, step: int) -> float:
     """Learning rate of a step, a function of the step alone so that a resumed run goes on exactly."""
-    rise = min(1.0, (step + 1) / settings.warmup) if settings.warmup else 1.0
+    rise = min(1.0, (step + 1) / max(min(settings.warmup, settings.steps), 1))
     if not settings.cosine:
         return settings.learning_rate * rise
     fall = 0.5 * (1 + math.cos(math.pi * step / max(settings.steps, 1)))
@@ -57,7 +64,7 @@ def learning_rate(settings: LoopSettings, step: int) -> float:
 
 def train(
     model: nn.Module,
-    terms_of_step: Callable[[nn.Module, int], dict[str, Tensor]],
+    terms_of_step: Terms,
     settings: LoopSettings,
     folder: Path,
     identity: dict[str, Any],
@@ -69,7 +76,7 @@ def train(
 
     Args:
         model: what is trained, already on its device.
-        terms_of_step: means over this process's share of the batch, `loss` among them.
+        terms_of_step: see `Terms`.
         settings: see `LoopSettings`.
         folder: where log and state are written (by the first process only).
         identity: settings that a resumed run must share.
@@ -101,7 +108,7 @@ def train(
         optimizer.zero_grad(set_to_none=True)
         terms = terms_of_step(wrapped, step)
         terms["loss"].backward()
-        nn.utils.clip_grad_norm_(model.parameters(), settings.clip)
+        nn.utils.clip_grad_norm_(model.parameters(), CLIP)
         optimizer.step()
         if average:
             # The average starts short and grows, so that early weights are soon forgotten.
@@ -110,24 +117,20 @@ def train(
                 for name, parameter in model.named_parameters():
                     average[name].lerp_(parameter, 1 - decay)
         bar.update()
-        if step % settings.log_every == 0 or step == end - 1:
+        if step % LOG_EVERY == 0 or step == end - 1:
             values = _mean_over_processes(terms)
             if log is not None:
-                seconds = time.monotonic() - started
+                seconds, samples = time.monotonic() - started, (step + 1) * settings.batch_size
                 rate = (step + 1 - done) * settings.batch_size / seconds
-                log.write(
-                    step, (step + 1) * settings.batch_size, seconds, learning_rate(settings, step), values
-                )
+                log.write(step, samples, seconds, learning_rate(settings, step), values)
                 bar.set_postfix_str(f"loss {values['loss']:.4g}, {rate / 1e3:.1f} k samples/s")
-        if first and (time.monotonic() - saved > settings.save_every_s or step == end - 1):
+        if first and (time.monotonic() - saved > SAVE_EVERY_S or step == end - 1):
             # The state comes last: a run killed in between repeats a few steps and ships them after all.
             if on_save is not None:
                 on_save(average or _weights(model), step + 1)
             save_state(folder, step + 1, model, optimizer, average, identity)
             saved = time.monotonic()
     bar.close()
-    if log is not None:
-        log.close()
     return average or _weights(model)
 
 
@@ -148,40 +151,23 @@ class _Log:
 
     def __init__(self, path: Path, done: int) -> None:
         self.path = path
-        kept: list[dict[str, str]] = []
-        if done and path.exists():
-            with path.open(newline="") as file:
-                kept = [row for row in csv.DictReader(file) if int(row["step"]) < done]
-        self.offset = float(kept[-1]["seconds"]) if kept else 0.0
-        self.file = path.with_suffix(".new").open("w", newline="")
-        self.writer: csv.DictWriter[str] | None = None
-        for row in kept:
-            self._row(row)
-        os.replace(path.with_suffix(".new"), path)
+        lines = path.read_text().splitlines(keepends=True) if done and path.exists() else []
+        kept = [line for line in lines[1:] if int(line.split(",")[0]) < done]
+        self.offset = float(kept[-1].split(",")[_FIXED.index("seconds")]) if kept else 0.0
+        write_whole(path, "".join(lines[:1] + kept), DataError)
 
     def write(self, step: int, samples: int, seconds: float, rate: float, values: dict[str, float]) -> None:
-        fixed = {
-            "step": step,
-            "samples": samples,
-            "seconds": f"{self.offset + seconds:.1f}",
-            "learning_rate": f"{rate:.6g}",
-        }
-        self._row({**fixed, **{name: f"{value:.8g}" for name, value in values.items()}})
-
-    def _row(self, row: dict[str, Any]) -> None:
-        if self.writer is None:
-            self.writer = csv.DictWriter(self.file, list(row))
-            self.writer.writeheader()
-        self.writer.writerow(row)
-        self.file.flush()
-
-    def close(self) -> None:
-        self.file.close()
+        fixed = (step, samples, f"{self.offset + seconds:.1f}", f"{rate:.6g}")
+        row = dict(zip(_FIXED, fixed, strict=True)) | {name: f"{x:.8g}" for name, x in values.items()}
+        with self.path.open("a", newline="") as file:
+            writer = csv.DictWriter(file, list(row), lineterminator="\n")
+            if file.tell() == 0:
+                writer.writeheader()
+            writer.writerow(row)
 
 
 CURVES_FILE = "curves.png"
 """Name of the picture beside the log."""
-_FIXED = ("step", "samples", "seconds", "learning_rate")
 
 
 def plot_log(folder: Path) -> Path | None:

@@ -8,6 +8,7 @@ from finlab.inference.normalization import clamp_to_limits, to_command, to_norma
 from finlab.physics.energy import fin_energy
 from finlab.training.networks.allocator_network import Mixture
 from finlab.training.networks.surrogate import Surrogate
+from finlab.training.presets import AllocatorTraining
 from finlab.training.sampling import Batch
 
 HUBER = 0.02
@@ -65,23 +66,22 @@ def mode_guidance(
     batch: Batch,
     target: Tensor,
     std: Tensor,
-    *,
-    energy_weight: float,
-    softness: float,
-    every_mode: float,
+    weights: AllocatorTraining,
 ) -> tuple[Tensor, Tensor]:
     """Soft best of all components: each is scored by error and energy, weighted by the mixture's weights.
 
-    -s log sum_k pi_k exp(-L_k / s) rewards one good component and teaches the weights to find it.
+    -s log sum_k pi_k exp(-L_k / s) rewards one good component and teaches the weights to find it. Of
+    `weights` count `energy`, `softness` s and `every_mode`.
 
     Returns:
         The loss (B,) and the smallest normalized error among the components (B,).
     """
     command = to_command(mixture.mean.transpose(1, 2), batch.lower[:, None], batch.upper[:, None])
     squared = tracking_error(surrogate, command, batch, target, std).square().sum(-1)
-    loss = torch.sqrt(squared + HUBER**2) - HUBER + energy_weight * energy(command, batch)
-    soft = -softness * torch.logsumexp(mixture.logits.log_softmax(-1) - loss / softness, dim=-1)
-    return soft + every_mode * loss.mean(1), squared.detach().amin(1).sqrt()
+    loss = torch.sqrt(squared + HUBER**2) - HUBER + weights.energy * energy(command, batch)
+    s = weights.softness
+    soft = -s * torch.logsumexp(mixture.logits.log_softmax(-1) - loss / s, dim=-1)
+    return soft + weights.every_mode * loss.mean(1), squared.detach().amin(1).sqrt()
 
 
 def negative_entropy(mixture: Mixture, mask: Tensor) -> Tensor:

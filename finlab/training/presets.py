@@ -4,30 +4,13 @@ from dataclasses import dataclass, field, replace
 
 from finlab.errors import DataError
 from finlab.inference.weights import NetworkConfig, SurrogateConfig
+from finlab.training.loop import LoopSettings
 
 
 @dataclass(frozen=True)
-class SurrogateTraining:
-    """How the surrogate is trained."""
-
-    steps: int = 20_000
-    """Optimizer steps."""
-    batch_size: int = 4096
-    """Samples per step."""
-    learning_rate: float = 3e-3
-    """Peak learning rate of Adam."""
-
-
-@dataclass(frozen=True)
-class AllocatorTraining:
+class AllocatorTraining(LoopSettings):
     """How the allocator network is trained: L = imitation NLL + beta guidance + lambda entropy."""
 
-    steps: int = 30_000
-    """Optimizer steps."""
-    batch_size: int = 2048
-    """Samples per step, over all processes."""
-    learning_rate: float = 1e-3
-    """Peak learning rate of Adam."""
     imitation: float = 0.01
     """Weight of the negative log-likelihood of the recorded commands."""
     imitate: str = "spread"
@@ -52,12 +35,6 @@ class AllocatorTraining:
     """Weight lambda of the entropy of the mixture weights."""
     varied_limits: float = 0.5
     """Share of training layouts with limits of their own."""
-    ema: float = 0.999
-    """Decay of the running average of the weights that is shipped; 0 ships the last weights."""
-    warmup: int = 200
-    """Steps over which the learning rate rises."""
-    cosine: bool = True
-    """Whether the learning rate falls to a hundredth along a cosine (True) or stays (the paper)."""
 
 
 @dataclass(frozen=True)
@@ -66,31 +43,30 @@ class Preset:
 
     name: str
     """Its name."""
+    surrogate_training: LoopSettings
+    """How the surrogate is trained."""
+    allocator_training: AllocatorTraining
+    """How the network is trained."""
     surrogate: SurrogateConfig = field(default_factory=SurrogateConfig)
     """Kind and size of the surrogate."""
     network: NetworkConfig = field(default_factory=NetworkConfig)
     """Sizes of the allocator network."""
-    surrogate_training: SurrogateTraining = field(default_factory=SurrogateTraining)
-    """How the surrogate is trained."""
-    allocator_training: AllocatorTraining = field(default_factory=AllocatorTraining)
-    """How the network is trained."""
 
 
 _DEFAULT = Preset(
     "default",
+    LoopSettings(40_000, 4096, 3e-3, warmup=100, ema=0.99),
+    AllocatorTraining(20_000, 1024, 1e-3, warmup=200, ema=0.999),
     network=NetworkConfig(width=96, transformer_layers=2, feedforward=192, n_components=16),
-    surrogate_training=SurrogateTraining(steps=40_000),
-    allocator_training=AllocatorTraining(steps=20_000, batch_size=1024),
 )
 _PAPER = Preset(
     "paper",
-    surrogate=SurrogateConfig(kind="mlp", hidden=(512, 64)),
-    network=NetworkConfig(features="raw", joint=False, n_components=8),
-    surrogate_training=SurrogateTraining(steps=30_000, batch_size=512, learning_rate=2e-3),
-    allocator_training=AllocatorTraining(
+    LoopSettings(30_000, 512, 2e-3, warmup=100, ema=0.99),
+    AllocatorTraining(
         steps=35_000,  # 115 epochs of 5 M samples
         batch_size=16_384,
         learning_rate=1e-4,
+        cosine=False,
         imitation=1.0,
         imitate="all",
         guidance=1.0,
@@ -98,19 +74,16 @@ _PAPER = Preset(
         ramp=0.5,
         guide="samples",
         entropy=0.01,
-        ema=0.0,
-        warmup=0,
-        cosine=False,
     ),
+    SurrogateConfig(kind="mlp", hidden=(512, 64)),
+    NetworkConfig(features="raw", joint=False, n_components=8),
 )
 _SMOKE = Preset(
     "smoke",
-    surrogate=SurrogateConfig(hidden=(16,)),
-    network=NetworkConfig(
-        width=32, heads=2, graph_layers=1, transformer_layers=1, feedforward=32, n_components=4
-    ),
-    surrogate_training=SurrogateTraining(steps=60, batch_size=256),
-    allocator_training=replace(_DEFAULT.allocator_training, steps=40, batch_size=128, warmup=5, ema=0.9),
+    replace(_DEFAULT.surrogate_training, steps=60, batch_size=256),
+    replace(_DEFAULT.allocator_training, steps=40, batch_size=128, warmup=5, ema=0.9),
+    SurrogateConfig(hidden=(16,)),
+    NetworkConfig(width=32, heads=2, graph_layers=1, transformer_layers=1, feedforward=32, n_components=4),
 )
 
 PRESETS = {preset.name: preset for preset in (_DEFAULT, _PAPER, _SMOKE)}

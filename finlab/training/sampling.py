@@ -6,6 +6,7 @@ enough to draw fresh samples for each step instead of reading them from a disk.
 
 import functools
 import math
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,60 +31,44 @@ class Batch(NamedTuple):
 
     position: Tensor
     """(B, n, 3), body frame [m]."""
-
     mounting_angle: Tensor
     """(B, n), in [-pi, pi) [rad]."""
-
     lower: Tensor
     """(B, n, 3) [rad, Hz, rad]."""
-
     upper: Tensor
     """(B, n, 3) [rad, Hz, rad]."""
-
     mask: Tensor
     """(B, n) bool, True where there is a fin."""
-
     command: Tensor
     """(B, n, 3) [rad, Hz, rad], uniform within the limits."""
-
     wrench: Tensor
     """(B, 6) that the command causes [N, N m]."""
 
 
+@dataclass(frozen=True)
 class ForwardSampler:
     """An endless stream of fresh training batches.
 
     Batch k depends on (seed, k) alone, so a run that resumes at step k sees what it would have seen.
     """
 
-    def __init__(
-        self,
-        seed: int,
-        batch_size: int,
-        n_fins: tuple[int, int] = TRAINING_FINS,
-        fin_model: FinLaw | None = None,
-        varied_limits: float = 0.5,
-    ) -> None:
-        """Describes the stream.
-
-        Args:
-            seed: of all draws.
-            batch_size: samples in each batch.
-            n_fins: least and most fins, uniform; arrays are padded to the most.
-            fin_model: law of all fins; the default `drag` when None.
-            varied_limits: share of layouts whose fins get limits of their own; the rest keep the nominal.
-        """
-        self.seed = seed
-        self.batch_size = batch_size
-        self.n_fins = n_fins
-        self.fin_model = make_law(FinModelSpec()) if fin_model is None else fin_model
-        self.varied_limits = varied_limits
+    seed: int
+    """Of all draws."""
+    batch_size: int
+    """Samples in each batch."""
+    n_fins: tuple[int, int] = TRAINING_FINS
+    """Least and most fins, uniform; arrays are padded to the most."""
+    fin_model: FinLaw = field(default_factory=lambda: make_law(FinModelSpec()))
+    """Law of all fins; `drag` by default."""
+    varied_limits: float = 0.5
+    """Share of layouts whose fins get limits of their own; the rest keep the nominal."""
 
     def batch(self, step: int) -> Batch:
         """Returns batch number `step`."""
         rng = np.random.default_rng([self.seed, step])
         layouts = random_layouts(rng, self.batch_size, self.n_fins, limits=self.varied_limits)
-        _leave_reserved(layouts)
+        # The first fin of any reserved layout moves to the body's other side, where it is uniform as well.
+        layouts.position[find_reserved(layouts, shipped_reserved()), 0] *= -1.0
         share = rng.random(layouts.lower.shape)
         command = (layouts.lower + share * (layouts.upper - layouts.lower)) * layouts.mask[..., None]
         place = layouts.position, layouts.mounting_angle, layouts.mask
@@ -96,12 +81,6 @@ def seeded_generator(seed: int, stream: int, device: torch.device | str = "cpu")
     """Returns a generator whose numbers depend on (seed, stream) alone, unrelated between streams."""
     state = np.random.SeedSequence([seed, stream]).generate_state(1, np.uint64)[0]
     return torch.Generator(device=device).manual_seed(int(state >> np.uint64(1)))
-
-
-def _leave_reserved(layouts: LayoutArrays) -> None:
-    """Moves, in place, the first fin of any reserved layout to the body's other side; it stays uniform."""
-    rows = find_reserved(layouts, shipped_reserved())
-    layouts.position[rows, 0] *= -1.0
 
 
 def _tensor(values: NDArray[Any]) -> Tensor:

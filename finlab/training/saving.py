@@ -1,4 +1,4 @@
-"""What runs leave on disk: the state to go on from, as plain tensors and JSON, and checkpoints."""
+"""What runs leave on disk: the state to go on from, as plain tensors, and checkpoints."""
 
 import json
 import os
@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import torch
-from safetensors.torch import load_file, save_file
+from safetensors import safe_open
+from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from finlab.errors import DataError
@@ -19,9 +20,7 @@ from finlab.training.networks.allocator_network import AllocatorNetwork
 from finlab.training.networks.surrogate import Surrogate, make_surrogate
 
 STATE_FILE = "resume.safetensors"
-"""Weights, optimizer moments and running average of the weights."""
-PROGRESS_FILE = "resume.json"
-"""Step and settings they belong to."""
+"""Weights, optimizer moments, running average of the weights and step; in its header, the run's settings."""
 
 
 def save_state(
@@ -33,17 +32,14 @@ def save_state(
     settings: dict[str, Any],
 ) -> None:
     """Write the state after `step` steps; a kill at any moment leaves the old or the new one whole."""
-    tensors: dict[str, Tensor] = {}
+    tensors = {"step": torch.tensor(step)} | {f"average.{name}": value for name, value in average.items()}
     for name, parameter in model.named_parameters():
         tensors[f"weight.{name}"] = parameter.detach()
-        for key, value in optimizer.state.get(parameter, {}).items():
-            tensors[f"optimizer.{key}.{name}"] = value
-    for name, value in average.items():
-        tensors[f"average.{name}"] = value
-    tensors["step"] = torch.tensor(step)
+        moments = optimizer.state.get(parameter, {})
+        tensors |= {f"optimizer.{key}.{name}": value for key, value in moments.items()}
     temporary = folder / (STATE_FILE + ".new")
-    save_file({k: v.contiguous().clone() for k, v in tensors.items()}, temporary)
-    write_json(folder / PROGRESS_FILE, settings)
+    copies = {name: value.contiguous().clone() for name, value in tensors.items()}
+    save_file(copies, temporary, {"settings": json.dumps(settings)})
     os.replace(temporary, folder / STATE_FILE)
 
 
@@ -62,14 +58,15 @@ def load_state(
     path = folder / STATE_FILE
     if not path.exists():
         return 0
-    saved = json.loads((folder / PROGRESS_FILE).read_text())
+    with safe_open(path, "pt") as file:
+        saved = json.loads((file.metadata() or {}).get("settings", "{}"))
+        tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (not a mapping)
     changed = [k for k in settings if saved.get(k) != json.loads(json.dumps(settings[k]))]
     if changed:
         raise DataError(
             f"{folder}: holds a run with other settings ({', '.join(changed)}); "
             "resume with the same ones, or train into an empty folder"
         )
-    tensors = load_file(path)
     with torch.no_grad():
         for name, parameter in model.named_parameters():
             parameter.copy_(tensors[f"weight.{name}"])
@@ -79,13 +76,6 @@ def load_state(
         for name in average:
             average[name].copy_(tensors[f"average.{name}"])
     return int(tensors["step"])
-
-
-def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Write JSON in one piece."""
-    temporary = path.with_suffix(path.suffix + ".new")
-    temporary.write_text(json.dumps(content, indent=2, sort_keys=True) + "\n")
-    os.replace(temporary, path)
 
 
 Module = TypeVar("Module", bound=nn.Module)

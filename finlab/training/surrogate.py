@@ -1,7 +1,6 @@
 """`finlab train surrogate`: learn the fin physics from forward samples (paper, surrogate pretraining)."""
 
-from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +13,13 @@ from finlab.inference.normalization import Normalization
 from finlab.inference.weights import TrainedWeights
 from finlab.layout import FinModelSpec
 from finlab.physics import FinLaw, make_law
-from finlab.training.device import join_processes, leave_processes, share_of_batch, training_device
-from finlab.training.loop import LoopSettings, plot_log, train
+from finlab.training.device import Share, shared_training
+from finlab.training.loop import Terms, plot_log, train
 from finlab.training.networks.surrogate import CoefficientSurrogate, Surrogate, make_surrogate
 from finlab.training.presets import get_preset
 from finlab.training.sampling import Batch, ForwardSampler
 from finlab.training.saving import save_checkpoint, state_of
 
-Terms = Callable[[nn.Module, int], dict[str, Tensor]]
-"""Loss terms of a step of training."""
 TRAIN_SEED = 20_000
 """Added to the user's seed, so that no training stream equals one of evaluation."""
 NORMALIZATION_SAMPLES = 200_000
@@ -54,30 +51,24 @@ def train_surrogate(
     recipe = get_preset(preset)
     spec = fin_model or FinModelSpec()
     model, written = make_law(spec), {"type": spec.type, **dict(spec.parameters)}
-    training = recipe.surrogate_training
-    total = steps or training.steps
-    rank, world = join_processes()
-    share = share_of_batch(training.batch_size, rank, world)
-    device = training_device()
+    training = replace(recipe.surrogate_training, steps=steps or recipe.surrogate_training.steps)
     torch.manual_seed(seed)
-    surrogate = make_surrogate(recipe.surrogate).to(device)
+    surrogate = make_surrogate(recipe.surrogate)
     normalization = measure_normalization(model, seed)
-    if isinstance(surrogate, CoefficientSurrogate):
-        terms = _coefficient_terms(model, training.batch_size, seed, device, share)
-    else:
-        terms = _wrench_terms(model, training.batch_size, seed, normalization, device, share)
     identity: dict[str, Any] = {
         "preset": preset,
         "seed": seed,
-        "steps": total,
         "training": asdict(training),
         "surrogate": asdict(recipe.surrogate),
         "fin_model": written,
     }
-    settings = LoopSettings(
-        total, training.batch_size, training.learning_rate, warmup=min(100, total), ema=0.99
-    )
-    weights = train(surrogate, terms, settings, out, identity, stop_after=stop_after)
+    with shared_training(training.batch_size) as share:
+        surrogate.to(share.device)
+        if isinstance(surrogate, CoefficientSurrogate):
+            terms = _coefficient_terms(model, training.batch_size, seed, share)
+        else:
+            terms = _wrench_terms(model, training.batch_size, seed, normalization, share)
+        weights = train(surrogate, terms, training, out, identity, stop_after=stop_after)
     surrogate.load_state_dict(weights, strict=True)
     surrogate.cpu().eval().requires_grad_(False)
     checkpoint = TrainedWeights(
@@ -87,14 +78,13 @@ def train_surrogate(
         surrogate_config=recipe.surrogate,
         surrogate=state_of(surrogate.state_dict()),
         preset=preset,
-        training={"surrogate": identity | {"samples": total * training.batch_size}},
+        training={"surrogate": identity | {"samples": training.steps * training.batch_size}},
         metrics={"surrogate": surrogate_metrics(surrogate, model, seed + 1)},
     )
-    if rank == 0:
-        checkpoint = save_checkpoint(out, checkpoint)
-        plot_log(out)
-    leave_processes()
-    return checkpoint
+    if not share.first:
+        return checkpoint
+    plot_log(out)
+    return save_checkpoint(out, checkpoint)
 
 
 def measure_normalization(model: FinLaw, seed: int) -> Normalization:
@@ -126,20 +116,17 @@ def surrogate_metrics(surrogate: Surrogate, model: FinLaw, seed: int) -> dict[st
     return metrics
 
 
-def _coefficient_terms(
-    model: FinLaw, batch_size: int, seed: int, device: torch.device, share: slice
-) -> Terms:
+def _coefficient_terms(model: FinLaw, batch_size: int, seed: int, share: Share) -> Terms:
     """Mean squared error of force coefficients over single fins: the same relative weight for all forces."""
-    low, high = (
-        torch.tensor(v, dtype=torch.float32, device=device) for v in zip(*COMMAND_RANGE, strict=True)
-    )
+    device = share.device
+    low, high = torch.tensor(COMMAND_RANGE, dtype=torch.float32, device=device).T
     a0, f0 = REFERENCE
     # Of a lone fin at the origin, shaft along x, the wrench's force is the force in the fin frame.
     position, angle = torch.zeros(1, 3, device=device), torch.zeros(1, device=device)
 
     def terms(net: nn.Module, step: int) -> dict[str, Tensor]:
         generator = torch.Generator().manual_seed((TRAIN_SEED + seed) * 1_000_003 + step)
-        draw = torch.rand(batch_size, 3, generator=generator)[share]
+        draw = torch.rand(batch_size, 3, generator=generator)[share.rows]
         command = low + (high - low) * draw.to(device)
         scale = (command[:, 0] * command[:, 1] / (a0 * f0)).square()[:, None]
         force = net(command[:, None], position, angle, low, high)[:, :3]
@@ -149,19 +136,14 @@ def _coefficient_terms(
 
 
 def _wrench_terms(
-    model: FinLaw,
-    batch_size: int,
-    seed: int,
-    normalization: Normalization,
-    device: torch.device,
-    share: slice,
+    model: FinLaw, batch_size: int, seed: int, normalization: Normalization, share: Share
 ) -> Terms:
     """The paper's L_phys: squared error of the normalized wrench of whole robots."""
     sampler = ForwardSampler(TRAIN_SEED + seed, batch_size, fin_model=model)
-    std = torch.tensor(normalization.std, dtype=torch.float32, device=device)
+    std = torch.tensor(normalization.std, dtype=torch.float32, device=share.device)
 
     def terms(net: nn.Module, step: int) -> dict[str, Tensor]:
-        b = Batch(*(t[share].to(device) for t in sampler.batch(step)))
+        b = Batch(*(t[share.rows].to(share.device) for t in sampler.batch(step)))
         wrench = net(b.command, b.position, b.mounting_angle, b.lower, b.upper, b.mask)
         return {"loss": ((wrench - b.wrench) / std).square().sum(-1).mean()}
 

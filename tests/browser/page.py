@@ -73,7 +73,7 @@ class Page:
             self.view.improver.forget()
             self.view.sweep.stop()
             self.view.scenery.end_swim()
-            self.view.scenery.look_from("3D")
+            self.view.scenery.robot.look_from("3D")
 
         self._served.server.get_event_loop().call_soon_threadsafe(self.view.do, restart)
         self.close_notes()

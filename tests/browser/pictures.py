@@ -125,7 +125,7 @@ def _improve(page: Page) -> None:
     page.press("Search")
     page.until(lambda: page.view.improver.progress is not None and page.view.improver.progress.round > 5)
     page.press("Cancel")
-    page.until(lambda: page.view.improver.found is not None)
+    page.until(lambda: page.view.improver.findings is not None)
     page.page.wait_for_timeout(500)
     _scroll(page)
 

@@ -94,12 +94,12 @@ def test_search_is_watched_and_accepted(page: Any) -> None:
     page.press("Search")
     page.until(lambda: page.view.improver.progress is not None, seconds=60)
     page.press("Cancel")
-    page.until(lambda: page.view.improver.found is not None, seconds=60)
-    found = page.view.improver.found
+    page.until(lambda: page.view.improver.findings is not None, seconds=60)
+    found = page.view.improver.findings
     assert found.goal == "mission_energy"
     page.until(lambda: page.page.get_by_role("button", name="Accept").count() == 1)
     page.press("Accept")
-    page.until(lambda: page.session.state.layout == found.layout and page.view.improver.found is None)
+    page.until(lambda: page.session.state.layout == found.layout and page.view.improver.findings is None)
     if found.layout != before:
         page.press("Undo")
         page.until(lambda: page.session.state.layout == before)

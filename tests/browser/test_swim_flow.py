@@ -31,6 +31,8 @@ def test_swims_loses_a_fin_and_goes_on(page: Any) -> None:
     held = page.view.swimming.time
     page.press("Step")
     page.until(lambda: held < page.view.swimming.time < held + 0.9)
+    page.press("Go on")
+    page.until(lambda: page.view.swimming.running)
     page.press("End")
     page.until(lambda: not page.view.swimming.active)
     page.visible("/robot")

@@ -114,8 +114,17 @@ def test_pid_terms_by_hand() -> None:
     pid = Pid(PidGains(kp=2.0, ki=0.5, kd=3.0, rate_filter_s=0.0), limit=100.0, period_s=0.1)
     assert pid.step(1.0) == pytest.approx(2.0 + 0.05)
     assert pid.step(1.2) == pytest.approx(2.4 + 0.05 + 0.06 + 3.0 * 2.0)
-    pid.reset()
-    assert pid.integral == 0.0
+
+
+@pytest.mark.parametrize("kind", [VelocityController, WaypointController])
+def test_a_reset_controller_remembers_nothing(kind: type[VelocityController | WaypointController]) -> None:
+    moving = STILL._replace(velocity=np.array([0.05, 0.0, 0.02]), depth=0.9, rates=np.array([0.0, 0.0, 0.3]))
+    setpoint = Setpoint(np.array([1.0, 0.5, -1.0]), 0.15)
+    controller = kind()
+    first = controller.wrench(STILL, setpoint)
+    assert not np.array_equal(controller.wrench(moving, setpoint), first)
+    controller.reset()
+    np.testing.assert_array_equal(controller.wrench(STILL, setpoint), first)
 
 
 def test_velocity_controller_pushes_dives_and_damps() -> None:

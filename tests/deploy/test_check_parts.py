@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from finlab.deploy.bundle import Bundle
-from finlab.deploy.graph import N_SELF_TEST, _rounded, _rows
+from finlab.deploy.graph import N_SELF_TEST, _rounded, _rows, random_targets
 from finlab.deploy.robot import Robot, parse_robot
-from finlab.deploy.self_check import Finding, random_targets, self_check, worst
+from finlab.deploy.self_check import Finding, self_check, worst
 from finlab.errors import DataError
 from finlab.physics import Plant
 

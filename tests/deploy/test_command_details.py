@@ -89,6 +89,7 @@ def test_allocate_prints_a_table_or_one_object(on_board: Robot, capsys: Any) -> 
     kept = [row for row in shown["command"] if row is not None]
     assert np.array(kept) == pytest.approx(np.delete(truth.command, lost, axis=0))
     assert shown["err_norm"] == pytest.approx(truth.err_norm)
+    assert shown["sigma"] == truth.sigma.tolist() and shown["judged_by"] == "plant"
     assert main(question) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "fin          A [rad]  f [Hz]  zero direction [rad]"

@@ -12,7 +12,8 @@ import finlab
 from finlab.allocation import Allocator
 from finlab.assets import shipped_layouts
 from finlab.cli import main
-from finlab.deploy import build_graph, graph_bytes
+from finlab.deploy.graph import build_graph
+from finlab.deploy.graph_file import graph_bytes
 from finlab.errors import FinlabError
 from finlab.inference.checkpoint import read_checkpoint
 from finlab.inference.features import fin_frame_features, geometry

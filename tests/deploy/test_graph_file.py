@@ -15,7 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from finlab.assets import shipped_layouts
-from finlab.deploy import LayoutGraph, SelfTest, graph_bytes, parse_graph, read_graph, write_graph
+from finlab.deploy.graph import LayoutGraph, SelfTest
+from finlab.deploy.graph_file import graph_bytes, parse_graph, read_graph, write_graph
 from finlab.errors import FinlabError, LayoutError
 from finlab.inference.normalization import Normalization
 from finlab.layout import Fin, Layout, load_layout

@@ -66,6 +66,11 @@ def test_shipped_layouts_survive_the_way_there_and_back(name: str, tmp_path: Pat
         (TURTLE.read_text(), ("rudder",), "leaves the horizontal plane by 90 degrees"),
         (TURTLE.read_text(), (), "name the links that are fins"),
         (TURTLE.read_text().replace('mass value="10"', 'mass value="0"'), FINS, "has no masses"),
+        (
+            TURTLE.read_text().replace('origin xyz="0.2 ', 'origin xyz="20 '),
+            FINS,
+            r"position_m\[0\]: must lie",
+        ),
     ],
 )
 def test_refusals_say_what_is_wrong(
@@ -73,8 +78,9 @@ def test_refusals_say_what_is_wrong(
 ) -> None:
     path = tmp_path / "x.urdf"
     path.write_text(content)
-    with pytest.raises(LayoutError, match=message):
+    with pytest.raises(LayoutError, match=message) as caught:
         read_urdf(path, fins)
+    assert str(caught.value).startswith(f"{path}: ")
 
 
 @settings(max_examples=40)

@@ -17,7 +17,7 @@ from finlab.inference.features import (
     raw_features,
 )
 from finlab.layout import Fin, Layout, LayoutArrays, Limits, random_layouts, stack_layouts
-from finlab.layout.arrays import planar_effectiveness
+from finlab.layout.arrays import force_columns
 
 STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 
@@ -90,7 +90,8 @@ def test_columns_are_the_geometry_of_the_layout_module(arrays: LayoutArrays) -> 
     *layout, mask = arrays
     columns = geometry(*layout, STD, mask).columns  # (B, 6, 2n)
     share = (arrays.upper[..., 0] * arrays.upper[..., 1] / (0.6 * 2.1)) ** 2 * mask
-    effect = planar_effectiveness(arrays.position, arrays.mounting_angle)  # (B, n, 6, 2)
+    planar = force_columns(arrays.position, arrays.mounting_angle)[..., 1:, :]
+    effect = np.swapaxes(planar, -1, -2)  # (B, n, 6, 2)
     expected = effect / STD[:, None] * (FULL_FORCE * share)[..., None, None]
     np.testing.assert_allclose(columns.reshape(8, 6, 5, 2).transpose(0, 2, 1, 3), expected, atol=1e-12)
 

@@ -12,11 +12,11 @@ from finlab.layout import (
     Limits,
     layout_effectiveness,
     layout_from_arrays,
-    planar_effectiveness,
     random_layout,
     random_layouts,
     stack_layouts,
 )
+from finlab.layout.arrays import force_columns
 from finlab.layout.random import TRAINING_BOX
 
 THREE = Layout(
@@ -57,29 +57,27 @@ def test_numpy_numbers_become_plain_ones():
 
 
 def test_stacking_pads_with_nothing():
-    arrays = stack_layouts([THREE, THREE.without(["a"])], n_fins=5)
-    assert arrays.mask.tolist() == [[True] * 3 + [False] * 2, [True] * 2 + [False] * 3]
+    arrays = stack_layouts([THREE, THREE.without(["a"])])
+    assert arrays.mask.tolist() == [[True] * 3, [True] * 2 + [False]]
     assert arrays.position[1, 0].tolist() == list(THREE.fins[1].position)
     assert not arrays.position[1, 2:].any()
-    assert arrays.upper[0, 4].tolist() == list(Limits().upper)
+    assert arrays.upper[1, 2].tolist() == list(Limits().upper)
     assert layout_from_arrays(arrays, 1).fins[0].position == THREE.fins[1].position
-    with pytest.raises(LayoutError, match="more than the 2"):
-        stack_layouts([THREE], n_fins=2)
     with pytest.raises(LayoutError, match="at least one layout"):
         stack_layouts([])
 
 
-def test_planar_effectiveness_is_force_and_moment_of_a_newton():
+def test_force_columns_are_force_and_moment_of_a_newton():
     rng = np.random.default_rng(0)
     position, angle = rng.normal(size=(7, 3, 3)), rng.uniform(-4, 4, (7, 3))
-    blocks = planar_effectiveness(position, angle)
-    assert blocks.shape == (7, 3, 6, 2)
+    columns = force_columns(position, angle)
+    assert columns.shape == (7, 3, 3, 6)
     for b in range(7):
         for i in range(3):
-            horizontal = np.array([-math.sin(angle[b, i]), math.cos(angle[b, i]), 0.0])
-            for column, axis in enumerate([horizontal, np.array([0.0, 0.0, 1.0])]):
+            c, s = math.cos(angle[b, i]), math.sin(angle[b, i])
+            for k, axis in enumerate(np.array([(c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)])):
                 expected = np.concatenate([axis, np.cross(position[b, i], axis)])
-                np.testing.assert_allclose(blocks[b, i, :, column], expected, atol=1e-14)
+                np.testing.assert_allclose(columns[b, i, k], expected, atol=1e-14)
 
 
 def test_layout_effectiveness_sets_the_blocks_side_by_side():
@@ -107,11 +105,11 @@ def test_random_layouts_keep_to_box_counts_and_limits():
 
 def test_random_layouts_outside_a_box_have_a_fin_there():
     arrays = random_layouts(
-        np.random.default_rng(1), 500, n_fins=(6, 8), box=(0.45, 0.45, 0.2), outside=TRAINING_BOX, pad_to=9
+        np.random.default_rng(1), 500, n_fins=(6, 8), box=(0.45, 0.45, 0.2), outside=TRAINING_BOX
     )
     beyond = (np.abs(arrays.position) > np.array(TRAINING_BOX)).any(-1) & arrays.mask
     assert beyond.any(1).all()
-    assert arrays.mask.shape == (500, 9) and set(arrays.mask.sum(1)) == {6, 7, 8}
+    assert arrays.mask.shape == (500, 8) and set(arrays.mask.sum(1)) == {6, 7, 8}
 
 
 def test_half_of_mixed_layouts_keep_nominal_limits():

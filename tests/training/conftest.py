@@ -2,7 +2,6 @@
 
 import csv
 from collections.abc import Callable, Iterator
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,7 +9,7 @@ import pytest
 
 from finlab.inference.weights import TrainedWeights
 from finlab.training import train_allocator, train_surrogate
-from finlab.training.loop import LOG_FILE, LoopSettings
+from finlab.training.loop import LOG_FILE
 
 
 class Run(NamedTuple):
@@ -34,7 +33,7 @@ def read_log(folder: Path) -> list[dict[str, float]]:
 def log_every_step() -> Iterator[None]:
     """Log each step instead of every twentieth, so that there is more to compare."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("finlab.training.allocator.LoopSettings", partial(LoopSettings, log_every=1))
+        patch.setattr("finlab.training.loop.LOG_EVERY", 1)
         yield
 
 

@@ -1,6 +1,7 @@
 """The terms of the loss: one number per sample, and on small cases the number one gets by hand."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from finlab.physics import assemble_wrench, make_law
 from finlab.physics.energy import command_energy
 from finlab.training import losses
 from finlab.training.networks.allocator_network import Mixture
+from finlab.training.presets import get_preset
 from finlab.training.sampling import Batch, ForwardSampler
 
 DRAG = make_law(FinModelSpec())
@@ -50,16 +52,10 @@ def target_of(batch: Batch) -> Tensor:
 
 
 def guidance(mixture: Mixture, batch: Batch, every_mode: float = 0.0) -> tuple[Tensor, Tensor]:
-    return losses.mode_guidance(
-        mixture,
-        physics,  # type: ignore[arg-type]
-        batch,
-        target_of(batch),
-        STD,
-        energy_weight=0.05,
-        softness=0.02,
-        every_mode=every_mode,
+    weights = replace(
+        get_preset("default").allocator_training, energy=0.05, softness=0.02, every_mode=every_mode
     )
+    return losses.mode_guidance(mixture, physics, batch, target_of(batch), STD, weights)  # type: ignore[arg-type]
 
 
 def part(value: Batch | Mixture, rows: slice) -> Batch | Mixture:

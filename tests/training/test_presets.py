@@ -56,6 +56,11 @@ def test_the_learning_rate_rises_and_falls() -> None:
     assert rates[-1] == pytest.approx(0.001, rel=1e-2)
 
 
+def test_a_run_shorter_than_its_warmup_still_reaches_its_peak() -> None:
+    settings = LoopSettings(steps=4, batch_size=1, learning_rate=0.1, warmup=100, cosine=False)
+    assert [learning_rate(settings, step) for step in range(4)] == pytest.approx([0.025, 0.05, 0.075, 0.1])
+
+
 def test_the_paper_s_learning_rate_stays() -> None:
     settings = LoopSettings(steps=1000, batch_size=1, learning_rate=1e-4, cosine=False)
     assert {learning_rate(settings, step) for step in (0, 1, 500, 999)} == {1e-4}

@@ -15,12 +15,11 @@ from finlab.training.device import autocast_dtype
 
 SAVING_ALL_THE_TIME = """
 import sys, time
-from functools import partial
 from pathlib import Path
-from finlab.training import allocator
+from finlab.training import allocator, loop
 
 allocator.plot_log = lambda folder: time.sleep(0.2)  # leaves time to be killed
-allocator.LoopSettings = partial(allocator.LoopSettings, log_every=1, save_every_s=0.0)
+loop.LOG_EVERY, loop.SAVE_EVERY_S = 1, 0.0
 allocator.train_allocator("smoke", Path(sys.argv[1]), surrogate=Path(sys.argv[2]))
 """
 

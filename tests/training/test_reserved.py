@@ -7,7 +7,14 @@ import pytest
 import torch
 
 from finlab.assets import shipped_layouts
-from finlab.layout import LayoutArrays, layout_from_arrays, load_layout, random_layouts, stack_layouts
+from finlab.layout import (
+    LayoutArrays,
+    layout_from_arrays,
+    load_layout,
+    random_layout,
+    random_layouts,
+    stack_layouts,
+)
 from finlab.training import sampling
 from finlab.training.sampling import Batch, ForwardSampler, find_reserved, shipped_reserved
 
@@ -39,7 +46,9 @@ def test_every_shipped_layout_is_recognised_in_any_order_and_nearly(layout):
 
 
 def test_padding_does_not_matter():
-    wide = stack_layouts(SHIPPED, n_fins=12)
+    wide = stack_layouts([*SHIPPED, random_layout(np.random.default_rng(0), n_fins=12)])
+    wide = LayoutArrays(*(part[:-1] for part in wide))
+    assert wide.mask.shape[1] == 12
     assert find_reserved(wide, shipped_reserved()).all()
 
 

@@ -64,7 +64,8 @@ def test_the_surrogate_learns(smoke_surrogate) -> None:
     assert smoke_surrogate.checkpoint.network_config is None
 
 
-def test_the_allocator_learns(tmp_path: Path) -> None:
+def test_the_allocator_learns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("finlab.training.loop.LOG_EVERY", 20)  # other tests log each step
     base = read_checkpoint(resolve_checkpoint("default"))  # its surrogate knows what a fin can do
     network = get_preset("smoke").network
     torch.manual_seed(0)
@@ -158,7 +159,7 @@ def test_a_run_that_dies_while_it_writes_the_checkpoint_can_go_on(
 
 @pytest.mark.parametrize(
     ("options", "named"),
-    [({"seed": 1}, "seed"), ({"steps": 50}, "training"), ({"overrides": {"entropy": 0.0}}, "training")],
+    [({"seed": 1}, "seed"), ({"steps": 50}, "training"), ({"entropy": 0.0}, "training")],
 )
 def test_refuses_to_go_on_with_other_settings(
     resume, tmp_path: Path, options: dict[str, object], named: str
@@ -183,7 +184,7 @@ def test_refuses_to_go_on_with_another_surrogate(resume, untrained_checkpoint: P
 def test_refuses_a_batch_that_does_not_divide(
     resume, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("finlab.training.allocator.join_processes", lambda: (0, 3))
+    monkeypatch.setattr("finlab.training.device.join_processes", lambda: (0, 3))
     with pytest.raises(DataError, match="batch size 128 does not divide among 3 processes"):
         resume(tmp_path / "run")
 

@@ -68,13 +68,13 @@ def test_densities_of_the_shipped_network() -> None:
 @pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
 def test_refinement_makes_a_raw_candidate_exact() -> None:
     solver, state = Solver(), State(UCAT, failed=("back_left",), target=PRESETS["Turn"])
-    answer = solver.solve(state)
-    frames = solver.refinement(state, answer)
+    reply = solver.reply(state)
+    frames = solver.refinement(reply)
     errors = [frame.err_norm for frame in frames]
-    assert len(frames) == STEPS + 2 and frames[-1] is answer
+    assert len(frames) == STEPS + 2 and frames[-1] is reply.answer
     assert errors[0] > 10 * errors[STEPS] and np.isnan(frames[0].command[2]).all()
     with pytest.raises(AllocationError, match="learned"):
-        Solver(load=load_stand_in).refinement(state, answer)
+        Solver(load=load_stand_in).refinement(reply)
 
 
 def test_what_a_page_tries_out_stays_with_its_own_answers() -> None:

@@ -37,15 +37,15 @@ def test_search_is_cancelled_and_what_it_found_is_offered() -> None:
         improver.start(NO_YAW, request)
     until(lambda: improver.progress is not None)
     improver.cancel()
-    until(lambda: improver.found is not None)
-    assert improver.found is not None and improver.found.cancelled and not improver.running
+    until(lambda: improver.findings is not None)
+    assert improver.findings is not None and improver.findings.cancelled and not improver.busy
     session = Session(NO_YAW)
-    session.accept_layout(improver.found.layout)
+    session.accept_layout(improver.findings.layout)
     assert session.history.undo_name == "Improve the layout"
     session.undo()
     assert session.state.layout == NO_YAW
     improver.forget()
-    assert improver.found is None and not improver.running
+    assert improver.findings is None and not improver.busy
     worker.stop()
 
 
@@ -79,9 +79,9 @@ def test_each_fin_has_its_bounds_and_the_mission_is_the_users() -> None:
     improver.start(NO_YAW, request)
     until(lambda: improver.progress is not None)
     improver.cancel()
-    until(lambda: improver.found is not None)
-    assert improver.found is not None and improver.found.goal == "mission_energy"
-    assert improver.found.moved == (first, second)
+    until(lambda: improver.findings is not None)
+    assert improver.findings is not None and improver.findings.goal == "mission_energy"
+    assert improver.findings.moved == (first, second)
     worker.stop()
 
 

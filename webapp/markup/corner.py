@@ -93,10 +93,7 @@ def corner(
         error: why there is no answer.
         raw: whether it is a raw command on show, of which nobody expects that it is exact.
     """
-    return (
-        f"<div class='fl-corner'><div class='fl fl-card fl-legend-card'>{legend}</div>"
-        f"<div class='fl fl-card fl-status'>{_status(state, allocation, busy, error, raw)}</div></div>"
-    )
+    return _cards(legend, _status(state, allocation, busy, error, raw))
 
 
 def swim_corner(swimming: Swimming, newtons: float) -> str:
@@ -119,10 +116,14 @@ def swim_corner(swimming: Swimming, newtons: float) -> str:
         f"<span><span class='dim'>off the path</span> <b>{off}</b> cm</span>",
         f"<span>{pace_words(swimming)}</span>",
     )
+    scale = f"<div class='dim scales'>arrow 0.1 m = {newtons:g} N</div>"
+    return _cards(f"<div class='fl-legend'>{trails}</div>{scale}", "".join(parts))
+
+
+def _cards(legend: str, status: str) -> str:
     return (
-        f"<div class='fl-corner'><div class='fl fl-card fl-legend-card'><div class='fl-legend'>{trails}</div>"
-        f"<div class='dim scales'>arrow 0.1 m = {newtons:g} N</div></div>"
-        f"<div class='fl fl-card fl-status'>{''.join(parts)}</div></div>"
+        f"<div class='fl-corner'><div class='fl fl-card fl-legend-card'>{legend}</div>"
+        f"<div class='fl fl-card fl-status'>{status}</div></div>"
     )
 
 

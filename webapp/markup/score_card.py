@@ -45,8 +45,8 @@ def rank_sentence(a: Authority | QuickCheck) -> str:
 
 def _summary(card: ScoreCard, before: ScoreCard | None, name: str) -> str:
     now, old = card.authority, None if before is None else before.authority
-    rank = None if old is None else f"{old.rank} of 6"
-    rows = [_words("axes independent", f"{now.rank} of 6", rank)] if before is not None else []
+    ranks = "" if old is None else f"<td>{old.rank} of 6</td><td>{now.rank} of 6</td><td></td>"
+    rows = [f"<tr><td>axes independent</td>{ranks}</tr>"] if ranks else []
     rows += [
         _row("weakest direction [N]", now.weakest, None if old is None else old.weakest),
         _row("isotropy", now.isotropy, None if old is None else old.isotropy),
@@ -68,10 +68,6 @@ def _row(name: str, now: float, old: float | None) -> str:
         f"<tr><td>{name}</td><td>{three_digits(old)}</td><td>{three_digits(now)}</td>"
         f"<td class='{kind}'>{sign}</td></tr>"
     )
-
-
-def _words(name: str, now: str, old: str | None) -> str:
-    return f"<tr><td>{name}</td><td>{old or '–'}</td><td>{now}</td><td></td></tr>"
 
 
 def _axes(card: ScoreCard, before: ScoreCard | None, name: str) -> str:

@@ -1,10 +1,8 @@
 """Several methods on the same wrench, with the forces of one of them over those of the robot."""
 
-from functools import partial
-
 import viser
 
-from webapp.handles import on_user_change, on_user_click, put
+from webapp.handles import put
 from webapp.markup.comparison import comparison_table
 from webapp.markup.picking import chosen_button, marker
 from webapp.page import Page
@@ -22,19 +20,19 @@ class CompareTab:
         self._run = gui.add_button(
             "Compare the methods", icon=viser.Icon.SCALE, hint="On the wrench and the failures of now."
         )
-        on_user_click(self._run, lambda: page.do(lambda: page.comparison.start(page.session.state)))
+        page.on_click(self._run, lambda: page.comparison.start(page.session.state))
         self._chosen = gui.add_html(marker(PICKER))
-        self._overlay = gui.add_button_group(
+        overlay = gui.add_button_group(
             "Overlay",
             ("none", *COMPARED),
             hint="The fins' forces by that method, as plain arrows over those of the robot.",
         )
-        on_user_change(self._overlay, self._choose)
+        page.on_change(overlay, self._choose)
         self._table = gui.add_html("")
 
     def _choose(self, method: str) -> None:
-        wanted = method if method in COMPARED and method != self._page.session.overlay else None
-        self._page.do(partial(self._page.session.set_overlay, wanted))
+        session = self._page.session
+        session.set_overlay(method if method in COMPARED and method != session.overlay else None)
 
     def refresh(self) -> None:
         """Write the answers."""

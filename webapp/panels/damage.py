@@ -17,10 +17,16 @@ class FinButtons:
     """A row of numbers."""
 
     def __init__(
-        self, gui: viser.GuiApi, label: str, hint: str, marker: str, press: Callable[[str], None]
+        self,
+        gui: viser.GuiApi,
+        page: Page,
+        label: str,
+        hint: str,
+        marker: str,
+        act: Callable[[str], object],
     ) -> None:
-        """Build the row; `marker` is its name on the page, `press` gets the name of a fin."""
-        self._marker, self._press = marker, press
+        """Build the row; `marker` is its name on the page, `act` an intent about the fin of a name."""
+        self._page, self._marker, self._act = page, marker, act
         self._names: Sequence[str] = ()
         self._paint = gui.add_html("")
         self._buttons = gui.add_button_group(label, ("1",), hint=hint)
@@ -29,7 +35,7 @@ class FinButtons:
     def _pressed(self, button: str) -> None:
         index = numbered(button, len(self._names))
         if index is not None:
-            self._press(self._names[index])
+            self._page.do(partial(self._act, self._names[index]))
 
     def refresh(self, names: Sequence[str], failed: Sequence[str] = (), held: Sequence[str] = ()) -> None:
         """Write the row for fins in their order."""
@@ -59,7 +65,7 @@ class DamagePanel:
             self._fin = gui.add_dropdown(
                 "Which fin", ("1",), hint="Also the one that is selected in the view."
             )
-            on_user_change(self._fin, lambda name: page.do(partial(page.session.select, name)))
+            page.on_change(self._fin, page.session.select)
             self._strength = gui.add_slider(
                 "Strength [%]",
                 100 * STRENGTH_RANGE[0],
@@ -68,11 +74,11 @@ class DamagePanel:
                 100.0,
                 hint="What is left of its largest amplitude and frequency: a worn motor, a torn fin.",
             )
-            on_user_change(self._strength, self._weaken)
+            page.on_change(self._strength, lambda share: page.session.weaken(self._name, share / 100.0))
             self._stuck = gui.add_checkbox(
                 "Stuck", False, hint="It no longer turns: it flaps about one direction only."
             )
-            on_user_change(self._stuck, lambda stuck: self._jam(stuck, self._angle.value))
+            page.on_change(self._stuck, lambda stuck: self._jam(stuck, self._angle.value))
             self._angle = gui.add_slider(
                 "Stuck at [°]",
                 -180.0,
@@ -82,11 +88,9 @@ class DamagePanel:
                 hint="Zero direction at which it stays.",
                 visible=False,
             )
-            on_user_change(self._angle, partial(self._jam, True))
-            self._mend = gui.add_button_group(
-                "Repair", ("This fin", "All fins"), hint="Whole again; can be undone like all else."
-            )
-            on_user_change(self._mend, self._repair)
+            page.on_change(self._angle, partial(self._jam, True))
+            mends = {"This fin": lambda: page.session.mend(self._name), "All fins": page.session.mend_all}
+            page.add_buttons("Repair", mends, hint="Whole again; can be undone like all else.")
 
     @property
     def _name(self) -> str:
@@ -94,20 +98,8 @@ class DamagePanel:
         session = self._page.session
         return session.selected or session.state.layout.names[0]
 
-    def _weaken(self, percent: float) -> None:
-        name, session = self._name, self._page.session
-        self._page.do(lambda: session.weaken(name, percent / 100.0))
-
     def _jam(self, stuck: bool, degrees: float) -> None:
-        name, session = self._name, self._page.session
-        self._page.do(lambda: session.jam(name, math.radians(degrees) if stuck else None))
-
-    def _repair(self, button: str) -> None:
-        session = self._page.session
-        if button == "This fin":
-            self._page.do(partial(session.mend, self._name))
-        elif button == "All fins":
-            self._page.do(session.mend_all)
+        self._page.session.jam(self._name, math.radians(degrees) if stuck else None)
 
     def refresh(self) -> None:
         """Write the damage of the fin."""

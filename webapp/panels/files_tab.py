@@ -1,12 +1,10 @@
 """Files: open and save a layout, take home what the robot needs, copy the question as a command."""
 
-from collections.abc import Callable
 from html import escape
-from typing import Any
 
 import viser
 
-from webapp.handles import Changes, on_user_change, put
+from webapp.handles import Changes, put
 from webapp.markup.snippets import command_line, export_line, python_lines
 from webapp.page import Page
 from webapp.session import files
@@ -18,44 +16,30 @@ class FilesTab:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
-        self._open = gui.add_upload_button(
+        upload = gui.add_upload_button(
             "Open a layout file",
             icon=viser.Icon.FOLDER_OPEN,
             mime_type=".yaml,.yml,.json",
             hint="A layout file (YAML or JSON) or a layout graph file.",
         )
-        self._save = gui.add_button_group(
-            "Save",
-            ("Layout (YAML)", "Candidates (CSV)", "Picture (PNG)", "3D view (HTML)"),
-            hint="The HTML page moves by itself and needs no server.",
-        )
-        on_user_change(self._save, self._press)
-        self._robot = gui.add_button_group(
-            "For the robot",
-            ("Graph file", "Bundle (ZIP)"),
-            hint="The layout graph alone, or with networks, README and checksums: what finlab export makes.",
-        )
-        on_user_change(self._robot, self._press)
-        self._command = gui.add_html("")
-        self._changes = Changes()
-
-        @self._open.on_upload
-        async def _opened(event: Any) -> None:
-            upload = event.target.value
-            page.do(lambda: page.session.open_layout(files.read_layout(upload.name, upload.content)))
-
-    def _press(self, button: str) -> None:
-        page = self._page
-        acts: dict[str, Callable[[], object]] = {
+        page.on_upload(upload, self._open)
+        saves = {
             "Layout (YAML)": self._send_layout,
             "Candidates (CSV)": self._send_candidates,
             "Picture (PNG)": page.exports.picture,
             "3D view (HTML)": lambda: page.exports.html(page.shown),
-            "Graph file": page.exports.graph,
-            "Bundle (ZIP)": page.exports.bundle,
         }
-        if button in acts:
-            page.do(acts[button])
+        page.add_buttons("Save", saves, hint="The HTML page moves by itself and needs no server.")
+        page.add_buttons(
+            "For the robot",
+            {"Graph file": page.exports.graph, "Bundle (ZIP)": page.exports.bundle},
+            hint="The layout graph alone, or with networks, README and checksums: what finlab export makes.",
+        )
+        self._command = gui.add_html("")
+        self._changes = Changes()
+
+    def _open(self, name: str, content: bytes) -> None:
+        self._page.session.open_layout(files.read_layout(name, content))
 
     def _send_layout(self) -> None:
         layout = self._page.session.state.layout

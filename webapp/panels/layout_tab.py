@@ -4,13 +4,12 @@ import math
 from collections.abc import Callable
 from functools import partial
 from html import escape
-from typing import Any
 
 import viser
 
 from finlab.analysis.score_card import quick_check
 from finlab.layout.body import HULL_SHAPES
-from webapp.handles import Changes, hold_kind, on_user_change, on_user_click, put
+from webapp.handles import Changes, hold_kind, put
 from webapp.markup.score_card import check_card, warnings
 from webapp.page import Page
 from webapp.scene.meshes.hull import hull_of
@@ -24,7 +23,7 @@ NONE = "none"
 """Entry of the list of fins that selects nothing."""
 RINGS = {"z, up": "z", "x, forward": "x", "y, to the left": "y"}
 """Axes that copies can stand around, by what they are called."""
-RING_SIZES = ("2", "3", "4", "5", "6", "8")
+RING_SIZES = (2, 3, 4, 5, 6, 8)
 """How many fins can stand around an axis."""
 OWN = "(edited)"
 """Entry of the list of layouts while the robot is none of them."""
@@ -38,90 +37,74 @@ class LayoutTab:
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
-        self._page = page
+        self._page, session = page, page.session
         self._layouts = gui.add_dropdown("Layout", (*shipped(), OWN), hint="Shipped layouts to start from.")
-        on_user_change(self._layouts, self._open)
+        page.on_change(self._layouts, self._open)
         self._about = gui.add_html("")
         self._fins = gui.add_dropdown("Fin", (NONE,), hint="Or click one in the view; N is next, X none.")
-        on_user_change(
-            self._fins, lambda name: page.do(partial(page.session.select, None if name == NONE else name))
-        )
+        page.on_change(self._fins, lambda name: session.select(None if name == NONE else name))
         with gui.add_folder("Place"):
             self._position = gui.add_vector3(
                 "Position [m]", (0.0, 0.0, 0.0), step=0.005, hint="x forward, y left, z up."
             )
-            on_user_change(self._position, self._move)
+            page.on_change(self._position, self._move)
             self._angle = gui.add_slider(
                 "Shaft [°]", -180.0, 180.0, 1.0, 0.0, hint="Azimuth of the shaft, 0 is ahead."
             )
             self._angle.precision = 1  # typed more finely than dragged
-            on_user_change(self._angle, self._turn)
+            page.on_change(self._angle, self._turn)
             self._snap_m = gui.add_dropdown("Snap place", tuple(POSITION_STEPS), hint="Grid for positions.")
-            on_user_change(self._snap_m, partial(self._set_display, "position_snap"))
+            page.on_change(self._snap_m, partial(session.set_display, "position_snap"))
             self._snap_deg = gui.add_dropdown("Snap turn", tuple(ANGLE_STEPS), hint="Grid for the shaft.")
-            on_user_change(self._snap_deg, partial(self._set_display, "angle_snap"))
+            page.on_change(self._snap_deg, partial(session.set_display, "angle_snap"))
             self._stick = gui.add_checkbox(
                 "Stick to hull", False, hint="Fins slide on the hull's surface, shafts along its normal."
             )
-            on_user_change(self._stick, partial(self._set_display, "stick"))
-        self._edit = gui.add_button_group(
+            page.on_change(self._stick, partial(session.set_display, "stick"))
+        edits: dict[str, Callable[[], object]] = {
+            "Mirror": session.mirror_fin,
+            "Mirror once": partial(session.mirror_fin, linked=False),
+            "Unlink": session.unlink_fin,
+            "Duplicate": session.duplicate_fin,
+            "To hull": session.stick_fin,
+            "Delete": session.delete_fin,
+        }
+        page.add_buttons(
             "Selected fin",
-            ("Mirror", "Mirror once", "Unlink", "Duplicate", "To hull", "Delete"),
+            edits,
             hint="What Mirror (M) makes moves along until it is unlinked; Mirror once links nothing.",
         )
-        on_user_change(self._edit, self._edit_fin)
         self._axis = gui.add_dropdown(
             "Copies around", tuple(RINGS), hint="Axis through the centre of gravity that copies stand around."
         )
         hold_kind(self._axis)
-        self._ring = gui.add_button_group(
+        page.add_buttons(
             "How many",
-            RING_SIZES,
+            {str(count): partial(self._copy_around, count) for count in RING_SIZES},
             hint="Copies of the selected fin, so that so many stand evenly around the axis.",
         )
-        on_user_change(self._ring, self._copy_around)
-        self._add = gui.add_button("Add a fin", icon=viser.Icon.PLUS, hint=f"Up to {MAX_FINS} fins.")
-        on_user_click(self._add, lambda: page.do(page.session.add_fin))
+        add = gui.add_button("Add a fin", icon=viser.Icon.PLUS, hint=f"Up to {MAX_FINS} fins.")
+        page.on_click(add, session.add_fin)
         self._card = gui.add_html("")
         self._hull = HullPanel(gui, page)
         self._changes = Changes()
 
     def _open(self, name: str) -> None:
         if name in shipped():
-            self._page.do(partial(self._page.session.open_layout, shipped()[name]))
-        else:
-            self.refresh()
+            self._page.session.open_layout(shipped()[name])
 
     def _move(self, position: tuple[float, float, float]) -> None:
-        if self._page.session.selected is not None:
-            self._page.do(partial(self._page.session.move_fin, self._page.session.selected, position))
+        session = self._page.session
+        if session.selected is not None:
+            session.move_fin(session.selected, position)
 
     def _turn(self, degrees: float) -> None:
-        if self._page.session.selected is not None:
-            self._page.do(
-                partial(self._page.session.turn_fin, self._page.session.selected, math.radians(degrees))
-            )
-
-    def _set_display(self, key: str, value: str | bool) -> None:
-        self._page.do(partial(self._page.session.set_display, key, value))
-
-    def _edit_fin(self, button: str) -> None:
         session = self._page.session
-        acts: dict[str, Callable[[], object]] = {
-            "Mirror": session.mirror_fin,
-            "Mirror once": partial(session.mirror_fin, linked=False),
-            "Unlink": session.unlink_fin,
-            "Duplicate": session.duplicate_fin,
-            "Delete": session.delete_fin,
-            "To hull": session.stick_fin,
-        }
-        if button in acts:
-            self._page.do(acts[button])
+        if session.selected is not None:
+            session.turn_fin(session.selected, math.radians(degrees))
 
-    def _copy_around(self, button: str) -> None:
-        if button in RING_SIZES:
-            axis = RINGS.get(self._axis.value, "z")
-            self._page.do(partial(self._page.session.ring_of_fins, int(button), axis))
+    def _copy_around(self, count: int) -> None:
+        self._page.session.ring_of_fins(count, RINGS.get(self._axis.value, "z"))
 
     def refresh(self) -> None:
         """Write the layout and the selected fin."""
@@ -158,7 +141,7 @@ class HullPanel:
         self._page = page
         with gui.add_folder("Hull", expand_by_default=False):
             self._shape = gui.add_dropdown("Shape", (*HULL_SHAPES, MESH), hint="For looks and for sticking.")
-            on_user_change(self._shape, self._choose_shape)
+            page.on_change(self._shape, self._choose_shape)
             self._size = gui.add_vector3(
                 "Size [m]",
                 (0.5, 0.3, 0.2),
@@ -167,43 +150,36 @@ class HullPanel:
                 step=0.01,
                 hint="Length, width and height of a shape.",
             )
-            on_user_change(self._size, self._resize)
+            page.on_change(self._size, self._resize)
             self._center = gui.add_vector3(
                 "Gravity [m]",
                 (0.0, 0.0, 0.0),
                 step=0.005,
                 hint="Centre of gravity as seen from the hull's middle. Torques are about it.",
             )
-            on_user_change(
-                self._center, lambda value: page.do(partial(page.session.set_center_of_gravity, value))
-            )
+            page.on_change(self._center, page.session.set_center_of_gravity)
             self._unit = gui.add_dropdown("Unit of file", tuple(UNITS), hint="What 1 means in the mesh file.")
             hold_kind(self._unit)
-            self._upload = gui.add_upload_button(
+            upload = gui.add_upload_button(
                 "Import a hull (STL, OBJ, GLB)",
                 icon=viser.Icon.UPLOAD,
                 mime_type=".stl,.obj,.glb,.ply",
                 hint="Up to 20 MB and 60,000 triangles.",
             )
+            page.on_upload(upload, self._import)
 
-        @self._upload.on_upload
-        async def _uploaded(event: Any) -> None:
-            upload = event.target.value
-            unit = self._unit.value
-            page.do(lambda: page.session.import_hull(stored_hull(upload.name, upload.content, unit)))
+    def _import(self, name: str, content: bytes) -> None:
+        self._page.session.import_hull(stored_hull(name, content, self._unit.value))
 
     def _choose_shape(self, shape: str) -> None:
-        if shape == MESH:
-            self.refresh()
-            return
-        half = hull_of(self._page.session.state.layout).half
-        size = (2 * half[0], 2 * half[1], 2 * half[2])
-        self._page.do(partial(self._page.session.set_hull, shape, size))
+        if shape != MESH:
+            x, y, z = hull_of(self._page.session.state.layout).half
+            self._page.session.set_hull(shape, (2 * x, 2 * y, 2 * z))
 
     def _resize(self, size: tuple[float, float, float]) -> None:
         shape = hull_of(self._page.session.state.layout).shape
         if shape in HULL_SHAPES:
-            self._page.do(partial(self._page.session.set_hull, shape, size))
+            self._page.session.set_hull(shape, size)
 
     def refresh(self) -> None:
         """Write the hull."""

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import viser
 
 from finlab.analysis import Improvement
-from webapp.handles import Changes, on_user_change, on_user_click, put
+from webapp.handles import Changes, on_user_change, put
 from webapp.markup.picking import chosen_button, marker
 from webapp.markup.score_card import score_table
 from webapp.markup.words import listed, three_digits
@@ -30,31 +31,26 @@ class LimitsTab:
         """Build the widgets."""
         self._page = page
         self._chosen = gui.add_html(marker(PICKER))
-        self._drawn = gui.add_button_group(
+        drawn = gui.add_button_group(
             "Draw the set of", tuple(DRAWN), hint="Everything that the fins can give, as a body in the view."
         )
-        on_user_change(self._drawn, partial(self._set, "drawn"))
+        page.on_change(drawn, partial(page.session.set_display, "drawn"))
         self._alone = gui.add_checkbox(
             "Alone", True, hint="Forces without any torque, torques without any force; else they are free."
         )
-        on_user_change(self._alone, partial(self._set, "alone"))
+        page.on_change(self._alone, partial(page.session.set_display, "alone"))
         self._beside = gui.add_dropdown(
             "Beside", (SAVED, *shipped()), hint="The layout that stands next to this one on the card."
         )
-        on_user_change(self._beside, self._compare)
-        self._pin = gui.add_button_group(
-            "Put aside", ("Pin this layout",), hint="As it is now, to compare others with."
-        )
-        on_user_change(self._pin, lambda _: page.do(page.session.pin))
+        page.on_change(self._beside, self._compare)
+        pins = {"Pin this layout": page.session.pin}
+        page.add_buttons("Put aside", pins, hint="As it is now, to compare others with.")
         self._card = gui.add_html("")
         self._improve = ImprovePanel(gui, page)
         self._changes = Changes()
 
-    def _set(self, key: str, value: object) -> None:
-        self._page.do(partial(self._page.session.set_display, key, value))
-
     def _compare(self, name: str) -> None:
-        self._page.do(partial(self._page.session.compare_with, None if name == SAVED else name))
+        self._page.session.compare_with(None if name == SAVED else name)
 
     def refresh(self) -> None:
         """Write the findings."""
@@ -91,13 +87,14 @@ class ImprovePanel:
         self._page = page
         with gui.add_folder("Improve this layout"):
             self._goal = gui.add_dropdown("Goal", tuple(GOAL_WORDS), hint="What to raise.")
-            on_user_change(self._goal, lambda goal: self._draft(lambda draft: draft.with_goal(goal)))
+            page.on_change(self._goal, partial(self._draft, SearchRequest.with_goal))
             self._fins = FinButtons(
                 gui,
+                page,
                 "May move",
                 "Press a number to hold a fin, or to let it move. Pairs stay pairs.",
                 "fl-movers",
-                lambda name: self._draft(lambda draft: draft.with_held_toggled(name)),
+                partial(self._draft, SearchRequest.with_held_toggled),
             )
             self._whose = gui.add_dropdown(
                 "Bounds of", (ALL,), hint="All fins, or one that gets bounds of its own."
@@ -106,11 +103,11 @@ class ImprovePanel:
             self._reach = gui.add_vector3(
                 "Reach ± [m]", WAY[:3], min=(0.0,) * 3, max=(0.5,) * 3, step=0.01, hint="Along x, y and z."
             )
-            on_user_change(self._reach, lambda reach: self._bound((*reach, self._turn.value)))
+            page.on_change(self._reach, lambda reach: self._bound((*reach, self._turn.value)))
             self._turn = gui.add_slider(
                 "Turn ± [°]", 0.0, 180.0, 5.0, WAY[3], hint="How far its shaft may turn either way."
             )
-            on_user_change(self._turn, lambda turn: self._bound((*self._reach.value, turn)))
+            page.on_change(self._turn, lambda turn: self._bound((*self._reach.value, turn)))
             self._mission = gui.add_text(
                 "Mission",
                 "",
@@ -118,58 +115,53 @@ class ImprovePanel:
                 hint="Wrenches, one line each: Fx Fy Fz Tx Ty Tz [N, N m]. Empty: the common ones.",
                 visible=False,
             )
-            on_user_change(self._mission, lambda text: self._draft(lambda draft: draft.with_mission(text)))
-            self._take = gui.add_button_group(
-                " ", ("Add the present wrench",), hint="To the mission.", visible=False
-            )
-            on_user_change(self._take, lambda _: self._add_wrench())
+            page.on_change(self._mission, partial(self._draft, SearchRequest.with_mission))
+            takes = {"Add the present wrench": self._add_wrench}
+            self._take = page.add_buttons(" ", takes, hint="To the mission.", visible=False)
             self._start = gui.add_button(
                 "Search", icon=viser.Icon.SPARKLES, hint="Takes up to a minute; it can be stopped any time."
             )
-            on_user_click(self._start, lambda: page.do(self._search))
+            page.on_click(self._start, self._search)
             self._bar = gui.add_progress_bar(0.0, visible=False)
             self._cancel = gui.add_button(
                 "Cancel", icon=viser.Icon.X, visible=False, hint="What was found so far is offered."
             )
-            on_user_click(self._cancel, page.improver.cancel)
+            page.on_click(self._cancel, page.improver.cancel)
             self._card = gui.add_html("")
             gui.add_html(chosen_button("fl-verdict", 0))
-            self._verdict = gui.add_button_group(
-                "Result", ("Accept", "Leave"), visible=False, hint="Accepting can be undone."
+            verdicts = {"Accept": self._accept, "Leave": page.improver.forget}
+            self._verdict = page.add_buttons(
+                "Result", verdicts, visible=False, hint="Accepting can be undone."
             )
-            on_user_change(self._verdict, self._decide)
 
     def _bound(self, way: tuple[float, ...]) -> None:
         whose = self._whose.value if self._whose.value in self._page.session.state.layout.names else ALL
-        self._draft(lambda draft: draft.with_way(whose, way))
+        self._draft(SearchRequest.with_way, whose, way)
 
-    def _draft(self, change: Callable[[SearchRequest], SearchRequest]) -> None:
+    def _draft(self, change: Callable[..., SearchRequest], *values: Any) -> None:
         session = self._page.session
-        self._page.do(lambda: session.set_draft(change(session.draft)))
+        session.set_draft(change(session.draft, *values))
 
     def _add_wrench(self) -> None:
-        line = " ".join(f"{value:g}" for value in self._page.session.state.target)
-        self._draft(lambda draft: draft.with_mission(f"{draft.mission.rstrip()}\n{line}".lstrip()))
+        session = self._page.session
+        line = " ".join(f"{value:g}" for value in session.state.target)
+        self._draft(SearchRequest.with_mission, f"{session.draft.mission.rstrip()}\n{line}".lstrip())
 
     def _search(self) -> None:
         session = self._page.session
-        layout = session.state.layout
-        self._page.improver.start(layout, session.draft)
+        self._page.improver.start(session.state.layout, session.draft)
 
-    def _decide(self, button: str) -> None:
-        improver = self._page.improver
-        found = improver.found
-        improver.forget()
-        if button == "Accept" and found is not None:
-            self._page.do(partial(self._page.session.accept_layout, found.layout))
-        else:
-            self.refresh()
+    def _accept(self) -> None:
+        found = self._page.improver.findings
+        self._page.improver.forget()
+        if found is not None:
+            self._page.session.accept_layout(found.layout)
 
     def refresh(self) -> None:
         """Write how far the search is."""
         self._refresh_request()
         improver = self._page.improver
-        running, progress, found = improver.running, improver.progress, improver.found
+        running, progress, found = improver.busy, improver.progress, improver.findings
         put(self._start, disabled=running)
         put(self._bar, visible=running)
         put(self._cancel, visible=running)

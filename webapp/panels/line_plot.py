@@ -1,15 +1,22 @@
 """A small plot of several lines over one axis, as all tabs draw it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
 from viser import uplot
 
+from finlab.layout.layout import MAX_FINS
 from webapp.handles import put
+from webapp.session.targets import nice_limit
+from webapp.theme import css, fin_color
 
 FONT = "11px sans-serif"
+FIN_LINES = tuple(css(fin_color(i)) for i in range(MAX_FINS))
+"""Colours of lines that belong to a fin each."""
+ROOM = 1.08
+"""Room above the last tick, so that its number is not cut off."""
 Array = NDArray[np.float64]
 
 
@@ -73,6 +80,11 @@ class LinePlot:
         rest = [np.full(len(x), np.nan)] * (self._n_lines - len(lines))
         put(self._plot, scales=_scales(ends))
         put(self._plot, data=tuple(np.ascontiguousarray(line) for line in (x, *lines, *rest)))
+
+
+def top_of(lines: Iterable[Array], least: float) -> float:
+    """Where a vertical axis ends that shows all of some lines, and at least a value."""
+    return ROOM * nice_limit(max(float(np.nanmax(line, initial=least)) for line in lines) / 1.2)
 
 
 def _scales(ends: tuple[float, float]) -> dict[str, uplot.Scale]:

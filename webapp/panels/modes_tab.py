@@ -1,20 +1,19 @@
 """Why one wrench has many answers: its modes, the mixture's candidates, and the settings that draw them."""
 
 from functools import partial
+from typing import Any
 
 import viser
 
 from finlab.allocation.methods import METHODS
-from finlab.layout.layout import MAX_FINS
-from webapp.handles import Changes, numbered, on_user_change, on_user_click, put
+from webapp.handles import Changes, numbered, on_user_change, put
 from webapp.markup.modes import SAMPLES, mode_plot, mode_table
 from webapp.markup.picking import Channel, chosen_button, marker
 from webapp.markup.words import small, three_digits
 from webapp.page import Page
-from webapp.panels.line_plot import LinePlot
+from webapp.panels.line_plot import FIN_LINES, LinePlot
 from webapp.session.state import CANDIDATE_RANGE, GAMMA_RANGE, TEMPERATURE_RANGE
 from webapp.tasks.solver import STEPS, Densities
-from webapp.theme import css, fin_color
 
 TITLES = ("amplitude [°]", "frequency [Hz]", "zero direction [°]")
 
@@ -25,47 +24,33 @@ class ModesTab:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
-        self._method = gui.add_dropdown("Method", tuple(METHODS), hint="Who answers.")
-        self._count = gui.add_slider("Candidates K", *CANDIDATE_RANGE, 1, 64, hint="Draws from the mixture.")
-        self._temperature = gui.add_slider(
-            "Temperature T",
-            *TEMPERATURE_RANGE,
-            0.01,
-            0.02,
-            hint="How far draws stray from the mixture's means.",
-        )
-        self._gamma = gui.add_slider(
-            "Energy weight γ", *GAMMA_RANGE, 0.005, 0.01, hint="How much energy counts in the ranking."
-        )
-        for key, widget in (
-            ("method", self._method),
-            ("n_candidates", self._count),
-            ("temperature", self._temperature),
-            ("gamma", self._gamma),
-        ):
-            on_user_change(widget, partial(self._set, key))
+        stray, count = "How far draws stray from the mixture's means.", "Draws from the mixture."
+        weight = "How much energy counts in the ranking."
+        self._settings: dict[str, Any] = {
+            "method": gui.add_dropdown("Method", tuple(METHODS), hint="Who answers."),
+            "n_candidates": gui.add_slider("Candidates K", *CANDIDATE_RANGE, 1, 64, hint=count),
+            "temperature": gui.add_slider("Temperature T", *TEMPERATURE_RANGE, 0.01, 0.02, hint=stray),
+            "gamma": gui.add_slider("Energy weight γ", *GAMMA_RANGE, 0.005, 0.01, hint=weight),
+        }
+        for key, widget in self._settings.items():
+            page.on_change(widget, partial(page.session.set_setting, key))
         self._picker = ModePicker(gui, page, 250, "fl-modes")
         self._table = gui.add_html("")
-        self._play = gui.add_button(
+        play = gui.add_button(
             "Play the refinement",
             icon=viser.Icon.PLAYER_PLAY,
             hint="From the best raw candidate, step by step.",
         )
-        on_user_click(self._play, lambda: page.do(page.playback.start))
+        page.on_click(play, page.playback.start)
         self._step = gui.add_html("")
         self._density = DensityPanel(gui)
         self._changes = Changes()
 
-    def _set(self, key: str, value: object) -> None:
-        self._page.do(partial(self._page.session.set_setting, key, value))
-
     def refresh(self) -> None:
         """Write settings and candidates."""
         page, state = self._page, self._page.session.state
-        put(self._method, value=state.method)
-        put(self._count, value=state.n_candidates)
-        put(self._temperature, value=state.temperature)
-        put(self._gamma, value=state.gamma)
+        for key, widget in self._settings.items():
+            put(widget, value=getattr(state, key))
         self._picker.refresh()
         answering, picker = page.answering, self._picker
         if self._changes(answering.modes, answering.searching, picker.shown):
@@ -153,10 +138,9 @@ class DensityPanel:
                 "<div class='fl dim'>How likely each command is, in the fin's colour; every curve has its "
                 "highest point at the top.</div>"
             )
-            colors = [css(fin_color(i)) for i in range(MAX_FINS)]
             # Fins that do the same have the same curve: each next line is thinner, so that all are seen.
             self._plots = [
-                LinePlot(gui, colors, "", title, height=112, widths=(6.0, 4.5, 3.0, 1.5), visible=True)
+                LinePlot(gui, FIN_LINES, "", title, height=112, widths=(6.0, 4.5, 3.0, 1.5), visible=True)
                 for title in TITLES
             ]
 

@@ -101,17 +101,13 @@ class PilotPanel:
                 False,
                 hint="Handles on the blue arrows in the view, for the force and the torque.",
             )
-            on_user_change(
-                self._grips, lambda value: page.do(partial(page.session.set_display, "grips", value))
-            )
+            page.on_change(self._grips, partial(page.session.set_display, "grips"))
             self._policy = gui.add_dropdown(
                 "Out of reach",
                 KINDS,
                 hint="Come closest, keep the direction, or serve axes by priority, heave first.",
             )
-            on_user_change(
-                self._policy, lambda value: page.do(partial(page.session.set_setting, "policy", value))
-            )
+            page.on_change(self._policy, partial(page.session.set_setting, "policy"))
 
     def _steer(self, word: list[str]) -> None:
         """`left,up` as shares of the stick's way, or `off`."""

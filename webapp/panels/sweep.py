@@ -5,18 +5,13 @@ import time
 import numpy as np
 import viser
 
-from finlab.layout.layout import MAX_FINS
-from webapp.handles import hold_kind, on_user_change, on_user_click, put
+from webapp.handles import hold_kind, on_user_change, option_index, put
 from webapp.markup.words import small
 from webapp.page import Page
-from webapp.panels.line_plot import LinePlot
+from webapp.panels.line_plot import FIN_LINES, LinePlot, top_of
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS
-from webapp.session.targets import nice_limit
 from webapp.tasks.sweeping import Sweep
-from webapp.theme import css, fin_color
 
-ROOM = 1.08
-"""Room above the last tick, so that its number is not cut off."""
 EXACT = 0.01
 """Error [σ] up to which a wrench counts as delivered."""
 EVERY_S = 0.25
@@ -42,23 +37,21 @@ class SweepPanel:
             self._play = gui.add_button(
                 "Play the sweep", icon=viser.Icon.PLAYER_PLAY, hint="To and fro until you stop it."
             )
-            on_user_click(self._play, self._toggle)
-            colors = [css(fin_color(i)) for i in range(MAX_FINS)]
-            self._plot = LinePlot(gui, colors, "force of each fin [N]", height=170, widths=(2.0,))
+            page.on_click(self._play, self._toggle)
+            self._plot = LinePlot(gui, FIN_LINES, "force of each fin [N]", height=170, widths=(2.0,))
             self._said = gui.add_html("")
 
     def _toggle(self) -> None:
         sweep = self._page.sweep
         if sweep.running:
-            self._page.do(sweep.stop)
+            sweep.stop()
         else:
-            axis = AXIS_WORDS.index(self._axis.value) if self._axis.value in AXIS_WORDS else 0
-            self._page.do(lambda: sweep.start(axis, *self._range.value))
+            sweep.start(option_index(self._axis), *self._range.value)
 
     def _fit_range(self) -> None:
         """Half of what is within reach, both ways: the ends are where it becomes interesting."""
         ranges = self._page.ranging.findings
-        axis = AXIS_WORDS.index(self._axis.value) if self._axis.value in AXIS_WORDS else 0
+        axis = option_index(self._axis)
         if ranges is not None and np.isfinite(ranges.high[axis]):
             low, high = float(ranges.low[axis]), float(ranges.high[axis])
             put(self._range, value=(round(0.5 * low, 2), round(0.5 * high, 2)))
@@ -74,10 +67,9 @@ class SweepPanel:
         if not sweep.fins or time.monotonic() - self._drawn < EVERY_S:
             return
         self._drawn = time.monotonic()
-        top = nice_limit(float(np.nanmax(sweep.force, initial=0.0)) / 1.2)
         self._plot.show(True)
         self._plot.name("force of each fin [N]", f"{AXIS_WORDS[sweep.axis]} asked [{AXIS_UNITS[sweep.axis]}]")
-        self._plot.draw(sweep.values, list(sweep.force), (0.0, ROOM * top))
+        self._plot.draw(sweep.values, list(sweep.force), (0.0, top_of(sweep.force, 0.0)))
         put(self._said, content=f"<div class='fl'>{_sentence(sweep)}</div>")
 
 

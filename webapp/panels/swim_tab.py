@@ -6,30 +6,26 @@ from typing import Any
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
-from finlab.layout.layout import MAX_FINS
 from finlab.sim import PLANTS, SHIPPED, Trajectory
-from webapp.handles import Changes, hold_kind, on_user_change, put
+from webapp.handles import Changes, hold_kind, option_index, put
 from webapp.markup.swim_card import swim_card
 from webapp.page import Page
 from webapp.panels.damage import FinButtons
-from webapp.panels.line_plot import LinePlot
+from webapp.panels.line_plot import FIN_LINES, LinePlot, top_of
 from webapp.session.files import read_path
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, COMPARED
 from webapp.session.swim_plan import ALONE, OWN, SPEEDS
-from webapp.session.targets import nice_limit
 from webapp.tasks.swimmer import ASKED as ASKED_COLUMN
 from webapp.tasks.swimmer import DELIVERED as DELIVERED_COLUMN
 from webapp.tasks.swimmer import ERROR, FORCES, TIME
 from webapp.tasks.swimming import Swimming
-from webapp.theme import ASKED, DELIVERED, OTHER, css, fin_color
+from webapp.theme import ASKED, DELIVERED, OTHER, css
 
 EVERY_S = 0.2
 """Least time between two drawings [s]."""
-ROOM = 1.08
-"""Room above the last tick, so that its number is not cut off."""
-Array = NDArray[np.float64]
+SMALL = 0.01
+"""What the vertical axes show at least."""
 
 
 class SwimTab:
@@ -39,75 +35,56 @@ class SwimTab:
         """Build the widgets."""
         self._page = page
         self._own: Trajectory | None = None
-        self._path = gui.add_dropdown(
-            "Path", tuple(SHIPPED), initial_value="lissajous", hint="Where to swim."
-        )
-        self._method = gui.add_dropdown("Method", COMPARED, hint="Who allocates, ten times a second.")
-        self._rival = gui.add_dropdown(
-            "Beside", (ALONE, *COMPARED), hint="A second robot on the same path, with another method."
-        )
-        self._plant = gui.add_dropdown(
-            "Fin forces", tuple(PLANTS), hint="Mean forces, forces with their ripple, or flexible fins."
-        )
-        for key, widget in (
-            ("path", self._path),
-            ("method", self._method),
-            ("rival", self._rival),
-            ("plant", self._plant),
-        ):
-            on_user_change(widget, partial(self._set, key))
-        self._run = gui.add_button_group(
-            "Run",
-            ("Start", "Pause", "Step", "End"),
-            hint="Step swims for 0.1 s; B pauses or goes on.",
-        )
-        on_user_change(self._run, self._press)
-        self._speed = gui.add_slider(
-            "Speed", *SPEEDS, 0.1, 1.0, hint="Simulated time per real time; a slow machine falls short of it."
-        )
-        on_user_change(self._speed, partial(self._set, "speed"))
-        self._follow = gui.add_checkbox("Follow", False, hint="The camera goes along with the first robot.")
-        on_user_change(self._follow, page.scenery.look_after_swim)
+        where, rival = "Where to swim.", "A second robot on the same path, with another method."
+        forces = "Mean forces, forces with their ripple, or flexible fins."
+        speed = "Simulated time per real time; a slow machine falls short of it."
+        self._settings: dict[str, Any] = {
+            "path": gui.add_dropdown("Path", tuple(SHIPPED), initial_value="lissajous", hint=where),
+            "method": gui.add_dropdown("Method", COMPARED, hint="Who allocates, ten times a second."),
+            "rival": gui.add_dropdown("Beside", (ALONE, *COMPARED), hint=rival),
+            "plant": gui.add_dropdown("Fin forces", tuple(PLANTS), hint=forces),
+        }
+        runs = {
+            "Start": self._start,
+            "Pause": self._hold,
+            "Go on": self._hold,
+            "Step": page.swimming.step,
+            "End": page.scenery.end_swim,
+        }
+        self._run = page.add_buttons("Run", runs, hint="Step swims for 0.1 s; B pauses or goes on.")
+        self._settings["speed"] = gui.add_slider("Speed", *SPEEDS, 0.1, 1.0, hint=speed)
+        for key, widget in self._settings.items():
+            page.on_change(widget, partial(page.session.set_swim, key))
+        follow = gui.add_checkbox("Follow", False, hint="The camera goes along with the first robot.")
+        page.on_change(follow, page.scenery.look_after_swim)
         self._fins = FinButtons(
             gui,
+            page,
             "Break a fin",
             "Press a fin's number: break or mend it while it swims.",
             "fl-breaks",
-            lambda name: page.do(partial(page.swimming.toggle, name)),
+            page.swimming.toggle,
         )
         self._card = gui.add_html("")
         self._plots = SwimPlots(gui)
         with gui.add_folder("More", expand_by_default=False):
-            self._upload = gui.add_upload_button(
+            upload = gui.add_upload_button(
                 "Open a path (CSV)",
                 icon=viser.Icon.ROUTE,
                 mime_type=".csv",
                 hint="A table with the columns t [s], x, y, z [m].",
             )
-            self._axis = self._plots.add_axis_choice(gui)
-
-        @self._upload.on_upload
-        async def _uploaded(event: Any) -> None:
-            upload = event.target.value
-            page.do(lambda: self._take_path(upload.name, upload.content))
+            wrench = "Asked in blue, delivered in green, of the first robot."
+            self._axis = gui.add_dropdown("Plot the wrench of", AXIS_WORDS, hint=wrench)
+            hold_kind(self._axis)
+            page.on_upload(upload, self._take_path)
 
     def _take_path(self, name: str, content: bytes) -> None:
         self._own = read_path(name, content)
         self._page.session.set_swim("path", OWN)
 
-    def _set(self, key: str, value: object) -> None:
-        self._page.do(partial(self._page.session.set_swim, key, value))
-
-    def _press(self, button: str) -> None:
-        swimming = self._page.swimming
-        if button == "Start":
-            self._page.do(self._start)
-        elif button == "Pause":
-            self._page.do(lambda: swimming.set_running(not swimming.running))
-        elif button == "Step":
-            self._page.do(swimming.step)
-        elif button == "End":
-            self._page.do(self._page.scenery.end_swim)
+    def _hold(self) -> None:
+        self._page.swimming.set_running(not self._page.swimming.running)
 
     def _start(self) -> None:
         session = self._page.session
@@ -116,11 +93,9 @@ class SwimTab:
     def refresh(self) -> None:
         """Write how the swim goes."""
         swimming, settings = self._page.swimming, self._page.session.swim
-        put(self._path, options=tuple(SHIPPED) if self._own is None else (*SHIPPED, OWN), value=settings.path)
-        put(self._method, value=settings.method)
-        put(self._rival, value=settings.rival)
-        put(self._plant, value=settings.plant)
-        put(self._speed, value=settings.speed)
+        put(self._settings["path"], options=tuple(SHIPPED) if self._own is None else (*SHIPPED, OWN))
+        for key, widget in self._settings.items():
+            put(widget, value=getattr(settings, key))
         if swimming.pace.speed != settings.speed:
             swimming.pace.set_speed(settings.speed)
         swimmers = swimming.swimmers
@@ -130,7 +105,7 @@ class SwimTab:
         put(self._run, options=("Start", "Go on" if paused else "Pause", "Step", "End"))
         self._fins.refresh(names, failed)
         put(self._card, content=swim_card(swimming))
-        self._plots.refresh(swimming)
+        self._plots.refresh(swimming, option_index(self._axis))
 
 
 class SwimPlots:
@@ -142,27 +117,14 @@ class SwimPlots:
         self._changes = Changes()
         self._error = LinePlot(gui, (css(DELIVERED), css(OTHER)), "off path [cm]")
         self._wrench = LinePlot(gui, (css(ASKED), css(DELIVERED)), "surge [N]")
-        colors = [css(fin_color(i)) for i in range(MAX_FINS)]
-        self._force = LinePlot(gui, colors, "fins [N]", "time [s]", height=124)
-        self._axis: viser.GuiDropdownHandle[str] | None = None
+        self._force = LinePlot(gui, FIN_LINES, "fins [N]", "time [s]", height=124)
 
-    def add_axis_choice(self, gui: viser.GuiApi) -> viser.GuiDropdownHandle[str]:
-        """Let the user choose which axis of the wrench is drawn."""
-        self._axis = gui.add_dropdown(
-            "Plot the wrench of", AXIS_WORDS, hint="Asked in blue, delivered in green, of the first robot."
-        )
-        hold_kind(self._axis)
-        return self._axis
-
-    def refresh(self, swimming: Swimming) -> None:
-        """Draw, but no more often than an eye can follow."""
+    def refresh(self, swimming: Swimming, axis: int) -> None:
+        """Draw errors, one axis of the wrench and forces, but no more often than an eye can follow."""
         swimmers = swimming.swimmers
         moments = tuple(swimmer.shown for swimmer in swimmers)
         for plot in (self._error, self._wrench, self._force):
             plot.show(bool(swimmers))
-        axis = 0
-        if self._axis is not None and self._axis.value in AXIS_WORDS:
-            axis = AXIS_WORDS.index(self._axis.value)
         soon = time.monotonic() - self._drawn < EVERY_S and swimming.running
         if not moments or soon or not len(moments[0].record) or not self._changes(axis, *moments):
             return
@@ -172,13 +134,9 @@ class SwimPlots:
         lines = [
             100 * np.interp(seconds, m.record[:, TIME], m.record[:, ERROR]) for m in moments if len(m.record)
         ]
-        self._error.draw(seconds, lines, (0.0, _top(lines)))
+        self._error.draw(seconds, lines, (0.0, top_of(lines, SMALL)))
         both = [record[:, column + axis] for column in (ASKED_COLUMN, DELIVERED_COLUMN)]
         self._wrench.name(f"{AXIS_WORDS[axis]} [{AXIS_UNITS[axis]}]", "")
-        self._wrench.draw(seconds, both, (-_top([-both[0], -both[1]]), _top(both)))
+        self._wrench.draw(seconds, both, (-top_of([-both[0], -both[1]], SMALL), top_of(both, SMALL)))
         forces = list(record[:, FORCES:].T)
-        self._force.draw(seconds, forces, (0.0, _top(forces)))
-
-
-def _top(lines: list[Array]) -> float:
-    return ROOM * nice_limit(max(float(np.nanmax(line, initial=0.01)) for line in lines) / 1.2)
+        self._force.draw(seconds, forces, (0.0, top_of(forces, SMALL)))

@@ -6,7 +6,7 @@ from importlib.resources import files
 
 import viser
 
-from webapp.handles import on_user_change, put
+from webapp.handles import put
 from webapp.markup.corner import corner, swim_corner
 from webapp.page import Page, Panel
 from webapp.panels.compare_tab import CompareTab
@@ -108,28 +108,14 @@ class Header:
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
-        self._page = page
-        self._history = gui.add_button_group(
-            "Session", ("Undo", "Redo", "Tour"), hint="Ctrl+Z, Ctrl+Shift+Z, T."
-        )
-        on_user_change(self._history, self._step)
+        self._page, session = page, page.session
+        steps = {"Undo": session.undo, "Redo": session.redo, "Tour": session.next_stop}
+        self._history = page.add_buttons("Session", steps, hint="Ctrl+Z, Ctrl+Shift+Z, T.")
         self._card = gui.add_html("", visible=False)
-        self._stops = gui.add_button_group(
-            "Tour", ("Back", "Next", "End"), hint="T is next; ending brings your work back.", visible=False
+        stops = {"Back": session.previous_stop, "Next": session.next_stop, "End": session.end_tour}
+        self._stops = page.add_buttons(
+            "Tour", stops, hint="T is next; ending brings your work back.", visible=False
         )
-        on_user_change(self._stops, self._walk)
-
-    def _step(self, button: str) -> None:
-        session = self._page.session
-        acts = {"Undo": session.undo, "Redo": session.redo, "Tour": session.next_stop}
-        if button in acts:
-            self._page.do(acts[button])
-
-    def _walk(self, button: str) -> None:
-        session = self._page.session
-        acts = {"Back": session.previous_stop, "Next": session.next_stop, "End": session.end_tour}
-        if button in acts:
-            self._page.do(acts[button])
 
     def refresh(self) -> None:
         """Write what can be undone, and where the tour is."""

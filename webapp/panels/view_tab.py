@@ -4,7 +4,7 @@ from functools import partial
 
 import viser
 
-from webapp.handles import on_user_change, put
+from webapp.handles import put
 from webapp.page import Page
 from webapp.scene.robot_scene import CAMERAS
 from webapp.session.display import NEWTONS
@@ -40,26 +40,19 @@ class ViewTab:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
-        self._camera = gui.add_button_group("Camera", tuple(CAMERAS), hint="Keys 1, 2, 3, 4.")
-        on_user_change(self._camera, self._look)
+        looks = {view: partial(page.scenery.robot.look_from, view) for view in CAMERAS}
+        page.add_buttons("Camera", looks, hint="Keys 1, 2, 3, 4.")
         self._speed = gui.add_slider("Motion speed", 0.05, 1.0, 0.05, 0.5, hint="1 is real time.")
-        on_user_change(self._speed, partial(self._set, "speed"))
+        page.on_change(self._speed, partial(page.session.set_display, "speed"))
         self._scale = gui.add_dropdown(
             "Arrow scale", tuple(SCALES), initial_value=next(iter(SCALES)), hint="Force of an arrow of 0.1 m."
         )
-        on_user_change(self._scale, lambda entry: self._set("newtons", SCALES.get(entry)))
+        page.on_change(self._scale, lambda entry: page.session.set_display("newtons", SCALES.get(entry)))
         self._switches = {
             key: gui.add_checkbox(label, False, hint=hint) for key, (label, hint) in SWITCHES.items()
         }
         for key, switch in self._switches.items():
-            on_user_change(switch, partial(self._set, key))
-
-    def _look(self, view: str) -> None:
-        if view in CAMERAS:
-            self._page.scenery.look_from(view)
-
-    def _set(self, key: str, value: object) -> None:
-        self._page.do(partial(self._page.session.set_display, key, value))
+            page.on_change(switch, partial(page.session.set_display, key))
 
     def refresh(self) -> None:
         """Write the switches."""

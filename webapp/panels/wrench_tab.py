@@ -8,7 +8,7 @@ import viser
 from numpy.typing import NDArray
 
 from finlab.allocation.policy import AXES
-from webapp.handles import Changes, on_user_change, put
+from webapp.handles import Changes, put
 from webapp.markup.answer import fin_table, wrench_bars
 from webapp.markup.picking import marker
 from webapp.markup.words import authority_sentence, rest_sentence, three_digits
@@ -31,10 +31,11 @@ class WrenchTab:
         self._target = TargetPanel(gui, page)
         self._failures = FinButtons(
             gui,
+            page,
             "Fail a fin",
             "Press a number to fail or repair a fin; F does it to the selected one.",
             "fl-fails",
-            lambda name: page.do(partial(page.session.toggle_failure, name)),
+            page.session.toggle_failure,
         )
         self._bars = gui.add_html("")
         self._table = gui.add_html("")
@@ -77,14 +78,13 @@ class TargetPanel:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
-        self._presets = gui.add_button_group("Preset", tuple(PRESETS), hint="Target wrenches to start from.")
-        on_user_change(self._presets, lambda name: page.do(partial(page.session.set_preset, name)))
-        self._only = gui.add_button_group(
+        presets = gui.add_button_group("Preset", tuple(PRESETS), hint="Target wrenches to start from.")
+        page.on_change(presets, page.session.set_preset)
+        page.add_buttons(
             "One axis",
-            AXES,
+            {axis: partial(page.session.set_only_axis, k) for k, axis in enumerate(AXES)},
             hint="This axis alone, at a quarter of what the fins can give; press again to reverse it.",
         )
-        on_user_change(self._only, self._set_only)
         gui.add_html(marker("fl-reach"))
         self._sliders = [
             gui.add_slider(
@@ -99,15 +99,11 @@ class TargetPanel:
         ]
         self._end = gui.add_html(marker("fl-reach-end"))
         for k, slider in enumerate(self._sliders):
-            on_user_change(slider, partial(self._set_target, k))
+            page.on_change(slider, partial(self._set_target, k))
         self._changes = Changes()
 
-    def _set_only(self, axis: str) -> None:
-        if axis in AXES:
-            self._page.do(partial(self._page.session.set_only_axis, AXES.index(axis)))
-
     def _set_target(self, axis: int, value: float) -> None:
-        self._page.do(partial(self._page.session.set_target, axis, value))
+        self._page.session.set_target(axis, value)
 
     @property
     def reach(self) -> NDArray[np.float64]:

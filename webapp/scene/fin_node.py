@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from finlab.layout import Fin
 from webapp.handles import put
+from webapp.scene.gizmos import add_gizmo
 from webapp.scene.meshes import fin as fin_mesh
 from webapp.scene.meshes.hull import AnyHull
 from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, tube
@@ -108,25 +109,15 @@ class FinNode:
             on_drag: called with index, phase (`start`, `update`, `end`), position [m] and angle [rad].
         """
         name = f"/robot/fins/{index}"
+
+        def dragged(phase: str) -> None:
+            on_drag(index, phase, *self.pose())
+
         # Only the ring turns; the arrows stay along the body's axes, like the numbers beside them.
-        self._move = scene.add_transform_controls(
-            name,
-            GIZMO_SIZE,
-            line_width=3.5,
-            depth_test=False,
-            disable_rotations=True,
-            disable_sliders=True,
-            active_axes=(False,) * 3,
-        )
-        self._turn = scene.add_transform_controls(
-            f"{name}/turn",
-            RING_SIZE,
-            line_width=4.0,
-            depth_test=False,
-            disable_axes=True,
-            disable_sliders=True,
-            active_axes=(False,) * 3,
-        )
+        arrows = {"line_width": 3.5, "disable_rotations": True, "disable_sliders": True}
+        ring = {"line_width": 4.0, "disable_axes": True, "disable_sliders": True}
+        self._move = add_gizmo(scene, name, GIZMO_SIZE, dragged, **arrows)
+        self._turn = add_gizmo(scene, f"{name}/turn", RING_SIZE, dragged, **ring)
         self._fin = fin = FinShapes(scene, f"{name}/turn", index, cast_shadow=False)
         fan = fin_mesh.sweep(0.1)
         self._fan = Shape(scene, f"{name}/turn/fan", fin.color, fan, opacity=0.3, side="double", **UNLIT)
@@ -140,13 +131,6 @@ class FinNode:
             @node.on_click
             async def _clicked(event: Any) -> None:
                 on_click(index)
-
-        for gizmo in (self._move, self._turn):
-
-            @gizmo.on_update
-            async def _dragged(event: Any) -> None:
-                if event.client is not None:
-                    on_drag(index, event.phase, *self.pose())
 
     def pose(self) -> tuple[tuple[float, float, float], float]:
         """Position [m] and mounting angle [rad] as they stand in the scene."""

@@ -1,17 +1,17 @@
 """The whole 3D view of one browser."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.layout import Fin, Layout
 from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
-from webapp.scene.dragging import Grips
 from webapp.scene.fin_node import FinNode, Flapping
+from webapp.scene.gizmos import Grips
 from webapp.scene.meshes.hull import hull_of
 from webapp.scene.overlays import Ghost, Lines, Overlay, moved_fins
 from webapp.scene.stage import Stage
@@ -32,29 +32,16 @@ CAMERAS = {
 
 
 class RobotScene:
-    """Draws a session; tells of clicks and drags through two callbacks."""
+    """Draws a session, and makes intents of clicks and drags."""
 
     def __init__(
         self,
         client: viser.ClientHandle,
         session: Session,
-        on_select: Callable[[str | None], None],
-        on_drag: Callable[[str, str, tuple[float, float, float], float], None],
-        on_wrench: Callable[[int, str, NDArray[np.float64]], None],
+        do: Callable[[Callable[[], object]], None],
     ) -> None:
-        """Build the nodes of a client's scene.
-
-        Args:
-            client: the browser.
-            session: what it shows.
-            on_select: called with the name of a clicked fin.
-            on_drag: called with name, phase, position [m] and mounting angle [rad] while a fin is dragged.
-            on_wrench: called with first axis, phase and vector (3,) while the asked wrench is dragged.
-        """
-        self._client = client
-        self._session = session
-        self._on_select = on_select
-        self._on_drag = on_drag
+        """Build the nodes of the scene of `client`, a browser; `do` carries out an intent of its user."""
+        self._client, self._session, self._do = client, session, do
         scene = client.scene
         self._root = scene.add_frame("/robot", show_axes=False)
         self.shown = True
@@ -66,7 +53,7 @@ class RobotScene:
         self._landing = Ghost(scene, "/robot/landing", ASKED, 0.45)
         self._overlay = Overlay(scene)
         self._attainable = AttainableNodes(scene)
-        self._grips = Grips(scene, on_wrench)
+        self._grips = Grips(scene, session, do)
         self._fins: list[FinNode] = []
         self._dragged: int | None = None
         self._flapping = Flapping()
@@ -162,13 +149,18 @@ class RobotScene:
             node.pose_blade(angle)
 
     def _clicked(self, index: int) -> None:
-        self._on_select(self._session.state.layout.names[index])
+        self._do(partial(self._session.select, self._session.state.layout.names[index]))
 
     def _drag(self, index: int, phase: str, position: tuple[float, float, float], angle: float) -> None:
-        if index >= self._session.state.layout.n_fins:
+        session = self._session
+        if index >= session.state.layout.n_fins:
             return
         self._dragged = None if phase == "end" else index
-        self._on_drag(self._session.state.layout.names[index], phase, position, angle)
+        if phase == "start":
+            session.history.end_merge()
+            return
+        drag = session.end_drag if phase == "end" else session.drag_fin
+        self._do(partial(drag, session.state.layout.names[index], position, angle))
 
 
 def _label(state: State, index: int, selected: bool) -> str:

@@ -1,13 +1,11 @@
 """What is seen beside the panel: the robot that is designed, or those that swim."""
 
 from collections.abc import Callable
-from functools import partial
 
 import viser
 
 from finlab.allocation.allocation import Allocation
 from webapp.markup.corner import graph_row, legend, overlay_row, set_rows
-from webapp.scene.dragging import Dragging
 from webapp.scene.robot_scene import RobotScene
 from webapp.scene.swim_scene import SwimScene
 from webapp.session import Session
@@ -31,30 +29,16 @@ class Scenery:
         swimming: Swimming,
         do: Callable[[Callable[[], object]], None],
     ) -> None:
-        """Build the nodes.
-
-        Args:
-            client: the browser.
-            session: what it shows.
-            swimming: the robots that swim, if any do.
-            do: carries out an intent.
-        """
+        """Build the nodes of the scene of `client`, a browser; `do` carries out an intent of its user."""
         self._client, self._session, self._swimming = client, session, swimming
         self._dark: bool | None = None
         self._stop: int | None = None
-        self._swims = False
-        dragging = Dragging(session, do)
-        self.robot = RobotScene(
-            client, session, lambda name: do(partial(session.select, name)), dragging.fin, dragging.wrench
-        )
+        self.robot = RobotScene(client, session, do)
         self.swim = SwimScene(client, swimming)
+        self.swims = False
+        """Whether the robots that swim are on the screen."""
         self.legend = ""
         """What is drawn of the robot that is designed, as markup."""
-
-    @property
-    def swims(self) -> bool:
-        """Whether the robots that swim are on the screen."""
-        return self._swims
 
     def refresh(
         self, answering: Answering, comparison: Comparison, improver: Improver, findings: Findings | None
@@ -62,13 +46,13 @@ class Scenery:
         """Show what has been found for the session's state."""
         self._follow_tour()
         self._apply_theme()
-        found, reply = improver.found, answering.reply
+        found, reply = improver.findings, answering.reply
         offered = found.layout if found is not None and found.improved else None
         attention = None if reply is None else reply.attention
         other, display = self._overlaid(comparison), self._session.display
         self.robot.refresh(answering.shown, other, findings, offered, attention)
-        self._swims = bool(self._swimming.swimmers)
-        self.robot.show(not self._swims)
+        self.swims = bool(self._swimming.swimmers)
+        self.robot.show(not self.swims)
         self.legend = legend(
             self.robot.newtons,
             (
@@ -96,10 +80,6 @@ class Scenery:
         else:
             self.robot.animate(elapsed)
 
-    def look_from(self, view: str) -> None:
-        """Move the camera to a view of the robot that is designed."""
-        self.robot.look_from(view)
-
     def look_after_swim(self, follow: bool) -> None:
         """Let the camera go along with the first robot that swims, or see all of its path."""
         if self._swimming.active:
@@ -109,7 +89,7 @@ class Scenery:
         """Go back from the robot that swims to the one that is designed."""
         if self._swimming.active:
             self._swimming.stop()
-            self.look_from("3D")
+            self.robot.look_from("3D")
 
     def _follow_tour(self) -> None:
         """At some stops of the tour the robot swims; to come to a stop, or to leave the tour, ends a swim."""

@@ -67,7 +67,6 @@ class SwimScene:
         """Another swim: its robots, its way, and the camera where all of it can be seen."""
         swimming = self._swimming
         self._shown = swimming.swimmers
-        assert swimming.plan is not None
         while len(self._robots) < len(swimming.swimmers):  # the second one is made when it is first needed
             second = len(self._robots) == 1
             color, opacity = (OTHER, 0.45) if second else (DELIVERED, None)
@@ -77,7 +76,7 @@ class SwimScene:
         for robot in self._robots[len(swimming.swimmers) :]:
             robot.hide()
         for robot, swimmer in zip(self._robots, swimming.swimmers, strict=False):
-            robot.begin(swimming.plan.layout, swimmer.shown)
+            robot.begin(swimmer.swim.layout, swimmer.shown)
         path = swimming.swimmers[0].path
         self._goal.show(goal, path)
         put(self._floor, position=np.array([0.0, 0.0, path[:, 2].min() - DEPTH_BELOW]))

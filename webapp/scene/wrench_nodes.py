@@ -92,17 +92,15 @@ class AttainableNodes:
 
     def refresh(self, findings: Findings | None, target: Array) -> None:
         """Show the sets of findings, nothing for None; the ball marks what `target` (6,) asks in them."""
-        now = None if findings is None else findings.now
-        whole = None if findings is None else findings.whole
+        now, whole = (None, None) if findings is None else (findings.now, findings.whole)
+        scale = 1.0 if findings is None else set_scale(findings)
         for shape, body in ((self._now, now), (self._whole, whole)):
             put(shape.node, visible=body is not None)
-        put(self._asked, visible=now is not None)
-        if findings is None or now is None:
-            return
-        scale = set_scale(findings)
-        for shape, body in ((self._now, now), (self._whole, whole)):
             if body is not None:
                 shape.show(_body, body.vertices * scale, body.faces, body.outline)
+        put(self._asked, visible=now is not None)
+        if now is None:
+            return
         part = target[:3] if now.kind == "force" else target[3:]
         put(self._asked, position=np.asarray(part * scale))
 

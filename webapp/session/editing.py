@@ -45,30 +45,27 @@ class Editing(Core):
 
     def drag_fin(self, name: str, position: Vector, angle: float) -> None:
         """A fin on its way in the user's hand: not snapped yet, and one step of undo for the whole drag."""
-        layout = layout_edits.turned(layout_edits.moved(self.state.layout, name, position), name, angle)
-        self._drag(name, layout)
+        self._drag(name, self._placed(name, position, angle, 0.0, 0.0))
 
     def end_drag(self, name: str, position: Vector, angle: float) -> None:
         """A drag is over: snap, and let the next change be a step of its own."""
-        self._drag(name, self._snapped(name, position, angle))
+        self._drag(name, self._placed(name, position, angle, self._step_m, self._step_rad))
         self.history.end_merge()
 
     def landing(self, name: str, position: Vector, angle: float) -> Fin | None:
         """Where a fin would come to stand if it were let go now; None if that is where it is held."""
         if not self.display.stick and self._step_m == 0.0 and self._step_rad == 0.0:
             return None
-        layout = self._snapped(name, position, angle)
-        if self.display.stick:
-            layout = layout_edits.stuck(layout, name)
+        layout = self._placed(name, position, angle, self._step_m, self._step_rad)
         return layout.fins[layout.index(name)]
 
-    def _snapped(self, name: str, position: Vector, angle: float) -> Layout:
-        layout = layout_edits.moved(self.state.layout, name, position, self._step_m)
-        return layout_edits.turned(layout, name, angle, self._step_rad)
+    def _placed(self, name: str, position: Vector, angle: float, step_m: float, step_rad: float) -> Layout:
+        """The layout with a fin let go at a place, snapped to steps and stuck to the hull where wanted."""
+        layout = layout_edits.moved(self.state.layout, name, position, step_m)
+        layout = layout_edits.turned(layout, name, angle, step_rad)
+        return layout_edits.stuck(layout, name) if self.display.stick else layout
 
     def _drag(self, name: str, layout: Layout) -> None:
-        if self.display.stick:
-            layout = layout_edits.stuck(layout, name)
         state = self.state.with_layout(followed(layout, self.state.links, name))
         self._commit(f"Move {name}", state, f"drag {name}", timed=False)
 

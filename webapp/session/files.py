@@ -13,11 +13,11 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.assets import shipped_layouts
 from finlab.errors import DataError, FinlabError, LayoutError
-from finlab.layout import Layout, load_layout, parse_layout, save_layout
+from finlab.layout import Layout, layout_to_dict, load_layout, parse_layout
 from finlab.layout.body import Hull
 from finlab.layout.load import SUFFIX, parse_graph_layout
-from finlab.layout.reading import MAX_BYTES, parse_json
-from finlab.layout.yaml_file import parse_yaml
+from finlab.layout.reading import MAX_BYTES, decode_text, parse_json
+from finlab.layout.yaml_file import parse_yaml, yaml_text
 from finlab.sim import Trajectory
 from finlab.sim.task import read_trajectory
 from webapp.scene.meshes.mesh_hull import UNITS, read_mesh
@@ -52,12 +52,7 @@ def read_layout(name: str, content: bytes) -> Layout:
     source = Path(str(name)).name[:80] or "upload"
     if len(content) > MAX_BYTES:
         raise LayoutError(f"is larger than {MAX_BYTES:,} bytes, a layout has a few thousand", source=source)
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise LayoutError("is not UTF-8 text, expected a YAML or JSON layout file", source=source) from None
-    if "\0" in text:
-        raise LayoutError("is a binary file, expected a YAML or JSON layout file", source=source)
+    text = decode_text(content, source)
     if source.lower().endswith(SUFFIX):
         return parse_graph_layout(text, source)
     parse = parse_json if source.lower().endswith(".json") else parse_yaml
@@ -66,21 +61,15 @@ def read_layout(name: str, content: bytes) -> Layout:
 
 def layout_bytes(layout: Layout) -> bytes:
     """The layout as a YAML file."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "layout.yaml"
-        save_layout(layout, path)
-        return path.read_bytes()
+    return yaml_text(layout_to_dict(layout)).encode()
 
 
-def graph_bytes(layout: Layout, failed: tuple[str, ...], allocator: Allocator) -> bytes:
+def graph_file(layout: Layout, failed: tuple[str, ...], allocator: Allocator) -> bytes:
     """The layout graph file for deployment with the allocator's checkpoint."""
     from finlab.deploy.graph import build_graph
-    from finlab.deploy.graph_file import write_graph
+    from finlab.deploy.graph_file import graph_bytes
 
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "layout.graph.json"
-        write_graph(build_graph(layout, allocator, failed), path)
-        return path.read_bytes()
+    return graph_bytes(build_graph(layout, allocator, failed))
 
 
 def bundle_bytes(layout: Layout, failed: tuple[str, ...], allocator: Allocator) -> bytes:

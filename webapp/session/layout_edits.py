@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from finlab.errors import FinlabError
 from finlab.layout import Body, Fin, Layout
@@ -69,22 +69,13 @@ def ring(layout: Layout, name: str, count: int, axis: str = "z") -> Layout:
         raise FinlabError(f"{name} stands on the axis {axis}, so its copies would all be in one place")
     shaft = np.array([math.cos(fin.mounting_angle), math.sin(fin.mounting_angle), 0.0])
     for k in range(1, round(number(count, "fins around the axis", 2, MAX_FINS))):
-        turn = _rotation(axis, 2 * math.pi * k / count)
+        turn = Rotation.from_euler(axis, 2 * math.pi * k / count).as_matrix()
         x, y, z = (round(float(v), 9) for v in turn @ place)
         ahead, left, _ = turn @ shaft
         azimuth = fin.mounting_angle if math.hypot(ahead, left) < 0.2 else math.atan2(left, ahead)
         copy = replace(fin, position=(x, y, z), mounting_angle=float(wrapped(azimuth)))
         layout, _ = _added(layout, copy, name)
     return layout
-
-
-def _rotation(axis: str, angle: float) -> NDArray[np.float64]:
-    """The matrix (3, 3) of a right-handed turn [rad] about a body axis."""
-    a, b = ((1, 2), (2, 0), (0, 1))[AXES.index(axis)]
-    turn = np.eye(3)
-    turn[a, a] = turn[b, b] = math.cos(angle)
-    turn[b, a], turn[a, b] = math.sin(angle), -math.sin(angle)
-    return turn
 
 
 def stuck(layout: Layout, name: str) -> Layout:

@@ -62,8 +62,12 @@ class SearchRequest:
         Raises:
             FinlabError: they are too far, or no numbers.
         """
+        x, y, z = (
+            number(v, f"reach along {axis} [m]", 0.0, 0.5) for v, axis in zip(way, "xyz", strict=False)
+        )
+        checked = x, y, z, number(way[3], "turn of the shaft [°]", 0.0, 180.0)
         others = tuple(pair for pair in self.ways if pair[0] != name)
-        return replace(self, ways=(*others, (name, checked_way(way))))
+        return replace(self, ways=(*others, (name, checked)))
 
     def with_mission(self, text: Any) -> "SearchRequest":
         """Another mission; it is read when the search begins, so that half a line may be typed."""
@@ -102,16 +106,6 @@ def restored_request(values: Mapping[str, Any]) -> SearchRequest:
     for name, way in values["ways"]:
         request = request.with_way(str(name), tuple(way))
     return request
-
-
-def checked_way(way: tuple[Any, ...]) -> Way:
-    """How far a fin may go, as the page sent it.
-
-    Raises:
-        FinlabError: it is too far, or no number.
-    """
-    x, y, z = (number(v, f"reach along {axis} [m]", 0.0, 0.5) for v, axis in zip(way, "xyz", strict=False))
-    return x, y, z, number(way[3], "turn of the shaft [°]", 0.0, 180.0)
 
 
 def parsed_mission(text: str) -> tuple[Wrench, ...]:

@@ -18,7 +18,6 @@ class SessionStore:
         """`make` gives a fresh session; `files` keep sessions beyond the life of the server."""
         self._make = make
         self._files = files
-        self._fresh = make()
         self._kept: dict[str, object] = {}
         self._sessions: dict[str, Session] = {}
         self._open: set[str] = set()
@@ -38,8 +37,7 @@ class SessionStore:
         found = max(free, key=lambda k: self._left.get(k, 0.0), default=None)
         key = found or secrets.token_urlsafe(12)
         if found is None:
-            self._sessions[key] = self._make()
-            self._forget_old()
+            self._add(key, self._make())
         self._open.add(key)
         return key, self._sessions[key]
 
@@ -54,27 +52,27 @@ class SessionStore:
             return
         session = self._make()
         if self._files.read(key, session):
-            self._sessions[key] = session
-            self._kept[key] = _mark(session)
-            self._forget_old()
+            self._add(key, session)
 
     def keep(self) -> None:
         """Write the sessions that have changed since the last time."""
         if self._files is None:
             return
         for key, session in self._sessions.items():
-            if _mark(session) != self._kept.get(key, _mark(self._fresh)):
+            if _mark(session) != self._kept[key]:
                 self._kept[key] = _mark(session)
                 self._files.write(key, session)
 
-    def _forget_old(self) -> None:
+    def _add(self, key: str, session: Session) -> None:
+        """One more session, of which nothing is new yet; what is too many is forgotten."""
+        self._sessions[key], self._kept[key] = session, _mark(session)
         waiting = sorted(
             (k for k in self._sessions if k not in self._open), key=lambda k: self._left.get(k, 0.0)
         )
         for key in waiting[: max(0, len(self._sessions) - MAX_SESSIONS)]:
             del self._sessions[key]
             self._left.pop(key, None)
-            self._kept.pop(key, None)
+            del self._kept[key]
 
 
 def _mark(session: Session) -> object:

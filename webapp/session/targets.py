@@ -45,8 +45,5 @@ def nice_limit(value: float) -> float:
     """The next of 1, 2, 5, 10, ... above 1.2 times `value`: a scale's end."""
     if value < 1e-6:
         return 1.0
-    exponent = math.floor(math.log10(1.2 * value))
-    for factor in (1.0, 2.0, 5.0, 10.0):
-        if factor * 10.0**exponent >= 1.2 * value:
-            return factor * 10.0**exponent
-    return 10.0 ** (exponent + 1)
+    power = 10.0 ** math.floor(math.log10(1.2 * value))
+    return next((factor * power for factor in (1.0, 2.0, 5.0) if factor * power >= 1.2 * value), 10.0 * power)

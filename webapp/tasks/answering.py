@@ -1,7 +1,6 @@
 """Keeps one page's answer up to date: asks for the newest state, and knows what of the answer is shown."""
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +16,6 @@ SEARCH_REST_S = 0.2
 """How long there must be no newer answer before all its modes are searched for [s]: that takes a while."""
 
 
-class Asked(NamedTuple):
-    """One question."""
-
-    revision: int
-    """Revision of the session."""
-    state: State
-    """Its state then."""
-
-
 class Answering:
     """The newest answer, its modes, and the part of it that is on the robot."""
 
@@ -38,22 +28,14 @@ class Answering:
         changed: Callable[[], None],
         failed: Callable[[str], None],
     ) -> None:
-        """Prepare.
+        """Answer for `session` on the thread of `worker`.
 
-        Args:
-            session: whose questions are answered.
-            solver: answers them.
-            loop: where everything else runs.
-            worker: on whose thread it answers.
-            changed: called on the loop when there is a new answer, or none.
-            failed: called there with a sentence when a state has no answer.
+        On the loop, `changed` is called when there is a new answer or none, `failed` with a sentence why not.
         """
         self._session, self._changed, self._failed = session, changed, failed
         self._told: str | None = None
         self._shown: tuple[Allocation, NDArray[np.float64], Allocation] | None = None
-        self._answer: Newest[Asked, Reply] = Newest(
-            loop, worker, lambda asked: solver.reply(asked.state), self._take
-        )
+        self._answer: Newest[State, Reply] = Newest(loop, worker, solver.reply, self._take)
         self._search: Newest[Reply, Modes] = Newest(
             loop, worker, solver.modes, self._take_modes, SEARCH_REST_S
         )
@@ -82,8 +64,7 @@ class Answering:
     @property
     def busy(self) -> bool:
         """True while the newest answer is older than the state."""
-        answered = self._answer.answered
-        return answered is None or answered.revision != self._session.revision
+        return self._answer.answered != self._session.state
 
     @property
     def searching(self) -> bool:
@@ -118,9 +99,7 @@ class Answering:
 
     def ask(self) -> None:
         """Have the worker answer the present state, unless it was asked already."""
-        asked = self._answer.question
-        if asked is None or asked.revision != self._session.revision:
-            self._answer.ask(Asked(self._session.revision, self._session.state))
+        self._answer.ask(self._session.state)
 
     def forget(self) -> None:
         """Nothing is known of the robot any more: another one was opened, or the page has gone."""

@@ -119,7 +119,7 @@ class Workers:
 
     def stop(self) -> None:
         """End all threads."""
-        for worker in (self.answers, self.marks, self.cards, self.swims, self.searches):
+        for worker in vars(self).values():
             worker.stop()
 
 

@@ -51,9 +51,7 @@ class Comparison:
             self._asked.ask(replace(state, method=waiting[0]))
 
     def _quickest(self, state: State) -> Allocation:
-        answers = [self._solver.solve(state) for _ in range(TRIES)]
-        answer = min(answers, key=lambda answer: answer.solve_ms)
-        return answer
+        return min((self._solver.solve(state) for _ in range(TRIES)), key=lambda answer: answer.solve_ms)
 
     def _take(self) -> None:
         asked = self._asked

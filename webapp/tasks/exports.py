@@ -4,7 +4,7 @@ import threading
 from collections.abc import Callable
 from functools import partial
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 import imageio.v3 as iio
 import viser
@@ -13,8 +13,8 @@ from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
 from webapp.scene.robot_scene import RobotScene
 from webapp.session import Session
-from webapp.session.files import bundle_bytes, file_stem, graph_bytes
-from webapp.tasks.background import EventLoop, Newest, Worker
+from webapp.session.files import bundle_bytes, file_stem, graph_file
+from webapp.tasks.background import EventLoop, Worker
 from webapp.tasks.solver import Solver
 from webapp.viser_internals import start_server, stop_server
 
@@ -36,7 +36,7 @@ def recorded_html(session: Session, allocation: Allocation) -> bytes:
     try:
         server.scene.world_axes.visible = False
         studio: Any = SimpleNamespace(scene=server.scene, camera=server.initial_camera, atomic=server.atomic)
-        robot = RobotScene(studio, session, lambda *_: None, lambda *_: None, lambda *_: None)
+        robot = RobotScene(studio, session, lambda _: None)
         robot.refresh(allocation)
         recording = server.get_scene_serializer()
         for _ in range(int(SECONDS * FRAMES_PER_SECOND)):
@@ -45,15 +45,6 @@ def recorded_html(session: Session, allocation: Allocation) -> bytes:
         return recording.as_html(dark_mode=session.display.dark).encode()
     finally:
         stop_server(server)
-
-
-class Wanted(NamedTuple):
-    """One file."""
-
-    name: str
-    """What it is called."""
-    make: Callable[[], bytes]
-    """Makes its content."""
 
 
 class Exports:
@@ -68,24 +59,17 @@ class Exports:
         worker: Worker,
         failed: Callable[[str, str], None],
     ) -> None:
-        """Prepare.
+        """Send what `session` holds to `client`, with the networks of `solver`.
 
-        Args:
-            client: the browser.
-            session: what is exported.
-            solver: whose networks go into files.
-            loop: where everything else runs.
-            worker: on whose thread files are made.
-            failed: called on the loop with a title and a sentence when there is no file.
+        `failed` is called on the loop with a title and a sentence when there is no file.
         """
         self._client, self._session, self._solver = client, session, solver
         self._loop, self._worker, self._failed = loop, worker, failed
-        self._files: dict[str, Newest[Wanted, bytes]] = {}
 
     def graph(self) -> None:
         """Send the layout graph file."""
         state, loaded = self._session.state, self._solver.loaded
-        self._send(".graph.json", lambda: graph_bytes(state.layout, state.failed, loaded(state.method)))
+        self._send(".graph.json", lambda: graph_file(state.layout, state.failed, loaded(state.method)))
 
     def bundle(self) -> None:
         """Send the bundle for the robot: the same bytes as `finlab export --zip`.
@@ -113,18 +97,12 @@ class Exports:
 
     def _send(self, suffix: str, make: Callable[[], bytes]) -> None:
         """Have the worker make a file, and send it; of each kind only the newest that is asked for."""
-        if suffix not in self._files:
-            self._files[suffix] = Newest(
-                self._loop, self._worker, lambda wanted: wanted.make(), partial(self._made, suffix)
-            )
-        self._files[suffix].ask(Wanted(f"{file_stem(self._session.state.layout.name)}{suffix}", make))
-
-    def _made(self, suffix: str) -> None:
-        file = self._files[suffix]
-        if file.answered is not None and file.findings is not None:
-            self._download(file.answered.name, file.findings)
-        else:
-            self._failed("Not exported", file.error or "")
+        name = f"{file_stem(self._session.state.layout.name)}{suffix}"
+        self._worker.submit(
+            (id(self), suffix),
+            lambda: self._loop.post(partial(self._download, name, make())),
+            lambda text: self._loop.post(partial(self._failed, "Not exported", text)),
+        )
 
     def _download(self, name: str, content: bytes) -> None:
         self._client.send_file_download(name, content, save_immediately=True)

@@ -29,30 +29,14 @@ class Search:
     """Ends it after the present round."""
 
 
-class Improver:
+class Improver(Newest[Search, Improvement]):
     """One search at a time for one page."""
 
     def __init__(self, loop: EventLoop, worker: Worker, changed: Callable[[], None]) -> None:
         """`changed` is called on the event loop when there is progress on the worker's thread."""
-        self._loop, self._changed = loop, changed
-        self._search: Newest[Search, Improvement] = Newest(loop, worker, self._improve, changed)
+        super().__init__(loop, worker, self._improve, changed)
         self.progress: Progress | None = None
         """How far it is."""
-
-    @property
-    def running(self) -> bool:
-        """True from the start to the result."""
-        return self._search.busy
-
-    @property
-    def found(self) -> Improvement | None:
-        """What came of it."""
-        return self._search.findings
-
-    @property
-    def error(self) -> str | None:
-        """Why nothing came of it."""
-        return self._search.error
 
     def start(self, layout: Layout, request: SearchRequest) -> None:
         """Search from a layout.
@@ -60,22 +44,22 @@ class Improver:
         Raises:
             FinlabError: a search is running, no fin may move, or the mission makes no sense.
         """
-        if self.running:
+        if self.busy:
             raise FinlabError("a search is running already; cancel it first")
         mission = parsed_mission(request.mission) or MISSION
         search = Search(layout, GOAL_WORDS[request.goal], request.bounds(layout), mission)
         self.forget()
-        self._search.ask(search)
+        self.ask(search)
 
     def cancel(self) -> None:
         """Stop after the present round; what has been found by then is offered."""
-        if self._search.question is not None:
-            self._search.question.stop.set()
+        if self.question is not None:
+            self.question.stop.set()
 
     def forget(self) -> None:
         """The result has been taken or left, or the page has gone."""
         self.cancel()
-        self._search.forget()
+        super().forget()
         self.progress = None
 
     def _improve(self, search: Search) -> Improvement:
@@ -91,6 +75,6 @@ class Improver:
         )
 
     def _note(self, search: Search, progress: Progress) -> None:
-        if search is self._search.question:  # else it was forgotten
+        if search is self.question:  # else it was forgotten
             self.progress = progress
             self._changed()

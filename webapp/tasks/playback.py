@@ -1,15 +1,12 @@
 """Plays the refinement of an answer step by step on the robot."""
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
-from webapp.session import Session
-from webapp.session.state import State
 from webapp.tasks.answering import Answering
 from webapp.tasks.background import EventLoop, Newest, Worker
-from webapp.tasks.solver import STEPS, Solver
+from webapp.tasks.solver import STEPS, Reply, Solver
 
 FRAME_S = 0.9
 """How long each step of a refinement is shown [s]."""
@@ -17,23 +14,11 @@ FRAME_S = 0.9
 Frames = tuple[Allocation, ...]
 
 
-class Wanted(NamedTuple):
-    """Whose refinement is to be played."""
-
-    revision: int
-    """Revision of the session."""
-    state: State
-    """Its state then."""
-    answer: Allocation
-    """The answer to it."""
-
-
 class Playback:
     """Puts one frame after another in the place of the answer; a change of the state ends it."""
 
     def __init__(
         self,
-        session: Session,
         answering: Answering,
         solver: Solver,
         loop: EventLoop,
@@ -42,9 +27,8 @@ class Playback:
         failed: Callable[[str], None],
     ) -> None:
         """Prepare; `changed` and `failed` are called on the event loop."""
-        self._session, self._answering, self._solver = session, answering, solver
-        self._loop, self._changed, self._failed = loop, changed, failed
-        self._steps: Newest[Wanted, Frames] = Newest(loop, worker, self._refine, self._begin)
+        self._answering, self._loop, self._changed, self._failed = answering, loop, changed, failed
+        self._steps: Newest[Reply, Frames] = Newest(loop, worker, solver.refinement, self._begin)
 
     @property
     def frame(self) -> int | None:
@@ -58,20 +42,17 @@ class Playback:
         Raises:
             FinlabError: there is no answer to the present state yet.
         """
-        best = self._answering.best
-        if best is None or self._answering.busy:
+        reply = self._answering.reply
+        if reply is None or self._answering.busy:
             raise FinlabError("there is no answer yet; wait for one")
         self._steps.forget()
-        self._steps.ask(Wanted(self._session.revision, self._session.state, best))
-
-    def _refine(self, wanted: Wanted) -> Frames:
-        return self._solver.refinement(wanted.state, wanted.answer)
+        self._steps.ask(reply)
 
     def _begin(self) -> None:
         steps = self._steps
         if steps.error is not None:
             self._failed(steps.error)
-        elif steps.answered is not None and steps.answered.revision == self._session.revision:
+        elif steps.answered is self._answering.reply and not self._answering.busy:
             self._play(steps.findings or ())
 
     def _play(self, frames: Frames) -> None:

@@ -55,8 +55,7 @@ def densities(insight: Insight, layout: Layout, failed: tuple[str, ...], tempera
     healthy = layout.without(failed) if failed else layout
     weight, mean, std = insight.weight, insight.mean, insight.std
     std = np.maximum(std * np.sqrt(temperature), NARROWEST)
-    lower = healthy.lower
-    upper = healthy.upper
+    lower, upper = healthy.lower, healthy.upper
     places = np.linspace(lower.min(axis=0), upper.max(axis=0), POINTS, axis=1)  # (3, P)
     width = np.maximum(upper - lower, 1e-9)
     at = 2 * (places[None] - lower[:, :, None]) / width[:, :, None] - 1  # (n, 3, P), normalized
@@ -83,6 +82,8 @@ class Attention(NamedTuple):
 class Reply:
     """An answer and what belongs to it."""
 
+    state: State
+    """The question."""
     answer: Allocation
     """The answer itself."""
     densities: Densities | None
@@ -140,21 +141,21 @@ class Solver:
         insight = self.allocator(state).insight(healthy, state.target)
         modes = listed_modes(known_modes(answer), answer.samples)
         if insight is None:
-            return Reply(answer, None, None, modes)
+            return Reply(state, answer, None, None, modes)
         shown = densities(insight, answer.layout, failed, state.temperature)
-        return Reply(answer, shown, Attention(healthy.names, insight.attention), modes)
+        return Reply(state, answer, shown, Attention(healthy.names, insight.attention), modes)
 
     def modes(self, reply: Reply) -> Modes:
         """All distinct ways to do what an answer does: a search of its own, tens of milliseconds."""
         return listed_modes(reply.answer.explore(), reply.answer.samples)
 
-    def refinement(self, state: State, answer: Allocation) -> tuple[Allocation, ...]:
+    def refinement(self, reply: Reply) -> tuple[Allocation, ...]:
         """The best raw candidate of an answer, what each step makes of it, and the answer itself at the end.
 
         Raises:
             AllocationError: the method draws no candidates and refines none.
         """
-        allocator = self.allocator(state)
+        allocator, answer = self.allocator(reply.state), reply.answer
         if answer.samples is None:
             raise AllocationError(f"method {allocator.name!r} draws no candidates; use method 'learned'")
         layout = answer.layout.without(answer.failed) if answer.failed else answer.layout

@@ -28,13 +28,7 @@ class Sweep:
         loop: EventLoop,
         do: Callable[[Callable[[], object]], None],
     ) -> None:
-        """Prepare.
-
-        Args:
-            session: whose target is moved.
-            loop: where everything here runs.
-            do: carries out an intent on the page.
-        """
+        """Move the target of `session`; everything here runs on `loop`, `do` carries out an intent."""
         self._session, self._loop, self._do = session, loop, do
         self._timer: asyncio.TimerHandle | None = None
         self._place, self._step, self._revision = 0, 1, -1

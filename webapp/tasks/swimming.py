@@ -38,14 +38,9 @@ class Swimming:
         changed: Callable[[], None],
         failed: Callable[[str], None],
     ) -> None:
-        """Prepare.
+        """Use the allocators of `solver` on the thread of `worker` alone.
 
-        Args:
-            solver: whose allocators are used, on the worker's thread alone.
-            loop: where everything else runs.
-            worker: whose thread swims.
-            changed: called on the loop when the state of the run has changed.
-            failed: called there with a sentence when it cannot go on.
+        On the loop, `changed` is called when the run has changed, `failed` with a sentence why it ends.
         """
         self._solver, self._changed, self._failed = solver, changed, failed
         self._start: Newest[Plan, tuple[Swimmer, ...]] = Newest(loop, worker, self._made, self._begin)
@@ -61,14 +56,9 @@ class Swimming:
         self._acts: deque[Callable[[ClosedLoop], None]] = deque()
 
     @property
-    def plan(self) -> Plan | None:
-        """What is being swum, None while nothing is."""
-        return self._start.question
-
-    @property
     def active(self) -> bool:
         """Whether there is a swim, running or not."""
-        return self.plan is not None
+        return self._start.question is not None
 
     @property
     def done(self) -> bool:

@@ -4,22 +4,21 @@ The same five rows are run twice: refined by Adam as in the paper, and by Levenb
 about as long.
 """
 
-import sys
 from collections.abc import Sequence
-from dataclasses import replace
+from itertools import cycle, islice, product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import load_allocator
 from finlab.evaluation.experiments.wrench_tracking import score
 from finlab.evaluation.paper_figures import paper_figures
+from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
-from finlab.evaluation.statistics.records import Records, join_records
+from finlab.evaluation.statistics.records import Columns, columns_of_records, join_records
 from finlab.evaluation.statistics.tables import Row, text_table
 
 VARIANTS: dict[str, dict[str, Any]] = {
@@ -35,17 +34,6 @@ REFINEMENTS = ("adam", "levenberg-marquardt")
 """Refinements of method `paper` that are compared."""
 TIMED_CALLS = 10
 """Single calls whose mean time a row shows, after one that is not counted."""
-
-
-class Scored(NamedTuple):
-    """What one variant did, scored twice, the same commands."""
-
-    plant: Records
-    """By the analytic fin model."""
-    surrogate: Records
-    """By the surrogate that refined them."""
-    call_s: float
-    """Mean time of single calls [s]."""
 
 
 def ablation_method(
@@ -73,39 +61,51 @@ def ablation_method(
     return method
 
 
-def run_variant(allocator: Allocator, cases: Sequence[Case], *, seed: int = 0) -> Scored:
-    """One row's records; same cases and seed, same candidates in every row that draws them."""
-    call_s = _seconds_per_call(allocator, cases, seed)
-    plant: list[Records] = []
-    surrogate: list[Records] = []
+def run_variant(allocator: Allocator, cases: Sequence[Case], *, seed: int = 0) -> Columns:
+    """What one variant does; same cases and seed, same candidates in every row that draws them.
+
+    Columns: those of `Records`, scored by the plant; `surrogate_err_norm` and `surrogate_err_phys`, the same
+    commands scored by the surrogate that refined them; `call_s`, the mean time of single calls [s].
+    """
+    times = [
+        allocator.allocate(case.layout, case.targets[0], failed=case.failed, seed=seed).solve_ms
+        for case in islice(cycle(cases), TIMED_CALLS + 1)
+    ]
+    parts, believed = [], []
     sigma = allocator.normalization.std
-    bar = tqdm(cases, desc="layouts", unit="layout", disable=None, leave=False, file=sys.stderr)
-    for k, case in enumerate(bar):
+    for k, case in enumerate(progress(cases, "layout")):
         answer = allocator.allocate_batch(case.layout, case.targets, failed=case.failed, seed=seed)
-        by_plant = score(case, case.targets, answer.command, answer.solve_ms, sigma, number=k)
-        plant.append(by_plant)
+        parts.append(score(case, case.targets, answer.command, answer.solve_ms, sigma, number=k))
         assert answer.wrench_surrogate is not None
-        difference = answer.wrench_surrogate - case.targets
-        norm, phys = (np.linalg.norm(d, axis=-1) for d in (difference / sigma, difference))
-        surrogate.append(replace(by_plant, err_norm=norm, err_phys=phys))
-    return Scored(join_records(plant), join_records(surrogate), call_s)
-
-
-def ablation_row(variant: str, refinement: str, scored_by: str, records: Records, call_s: float) -> Row:
-    """One row of the table, with the interval of its mean."""
-    ends = mean_interval(records.err_norm, records.layout)
-    return {
-        "variant": variant,
-        "refinement": refinement,
-        "scored_by": scored_by,
-        "n": len(records),
-        "err_norm_mean": float(records.err_norm.mean()),
-        "err_norm_mean_interval": list(ends),
-        "err_norm_std": float(records.err_norm.std()),
-        "err_norm_median": float(np.median(records.err_norm)),
-        "err_phys_mean": float(records.err_phys.mean()),
-        "time_s": call_s,
+        believed.append(answer.wrench_surrogate - case.targets)
+    difference = np.concatenate(believed)
+    return columns_of_records(join_records(parts)) | {
+        "surrogate_err_norm": np.linalg.norm(difference / sigma, axis=-1),
+        "surrogate_err_phys": np.linalg.norm(difference, axis=-1),
+        "call_s": np.array(np.mean(times[1:]) / 1e3),
     }
+
+
+def variant_rows(variant: str, refinement: str, columns: Columns) -> list[Row]:
+    """The two rows of a variant, scored by the surrogate and by the plant, with the interval of the mean."""
+    rows: list[Row] = []
+    for scored_by, prefix in (("surrogate", "surrogate_"), ("plant", "")):
+        error, physical = columns[f"{prefix}err_norm"], columns[f"{prefix}err_phys"]
+        rows.append(
+            {
+                "variant": variant,
+                "refinement": refinement,
+                "scored_by": scored_by,
+                "n": len(error),
+                "err_norm_mean": float(error.mean()),
+                "err_norm_mean_interval": list(mean_interval(error, columns["layout"])),
+                "err_norm_std": float(error.std()),
+                "err_norm_median": float(np.median(error)),
+                "err_phys_mean": float(physical.mean()),
+                "time_s": float(columns["call_s"]),
+            }
+        )
+    return rows
 
 
 def ablation_rows(cases: Sequence[Case], *, seed: int = 0, **options: Any) -> list[Row]:
@@ -113,22 +113,11 @@ def ablation_rows(cases: Sequence[Case], *, seed: int = 0, **options: Any) -> li
 
     Same cases, candidates and temperature in all of them; options as in `ablation_method`.
     """
-    pairs = [(variant, refinement) for variant in VARIANTS for refinement in REFINEMENTS]
-    rows: list[Row] = []
-    for variant, refinement in tqdm(pairs, unit="row", disable=None, leave=False, file=sys.stderr):
-        scored = run_variant(ablation_method(variant, refinement, **options), cases, seed=seed)
-        for name, records in (("surrogate", scored.surrogate), ("plant", scored.plant)):
-            rows.append(ablation_row(variant, refinement, name, records, scored.call_s))
-    return rows
-
-
-def _seconds_per_call(allocator: Allocator, cases: Sequence[Case], seed: int) -> float:
-    """Mean time of single calls [s]."""
-    chosen = [cases[k % len(cases)] for k in range(TIMED_CALLS + 1)]
-    results = [
-        allocator.allocate(case.layout, case.targets[0], failed=case.failed, seed=seed) for case in chosen
+    return [
+        row
+        for pair in progress(list(product(VARIANTS, REFINEMENTS)), "row")
+        for row in variant_rows(*pair, run_variant(ablation_method(*pair, **options), cases, seed=seed))
     ]
-    return float(np.mean([result.solve_ms for result in results[1:]])) / 1e3
 
 
 def paper_ablation_rows() -> list[Row]:

@@ -5,23 +5,21 @@ Systems, IROS 2012. Robot and reference share one world frame and one clock, so 
 are paired by time. Only positions count: the reference prescribes no attitude.
 """
 
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
 from finlab.errors import DataError
+from finlab.evaluation.progress import progress
 from finlab.layout import Layout
+from finlab.layout.arrays import Array
 from finlab.sim import ClosedLoop, RunLog, Task
 
 Row = dict[str, Any]
 
-Array = NDArray[np.float64]
 
 RTE_DELTA_S = 5.0
 """Time between the two ends of a piece of path that the relative error compares [s]."""
@@ -117,11 +115,9 @@ def run_all(
         plant: how fin forces are simulated.
         steady: whether the allocators are given their previous command.
     """
-    every = list(product(scenarios, allocators.items(), seeds))
     done = []
-    for (label, layout, task, failures), (name, allocator), seed in tqdm(
-        every, unit="run", disable=None, leave=False, file=sys.stderr
-    ):
+    every = list(product(scenarios, allocators.items(), seeds))
+    for (label, layout, task, failures), (name, allocator), seed in progress(every, "run"):
         options: dict[str, Any] = {"failures": failures, "plant": plant, "steady": steady, "seed": seed}
         done.append(((label, name), ClosedLoop(layout, allocator, task, **options).run()))
     return done

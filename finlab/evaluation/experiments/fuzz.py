@@ -1,6 +1,5 @@
 """Methods on hostile robots: are answers finite, within the limits and in time, without other errors?"""
 
-import sys
 import tempfile
 import time
 import warnings
@@ -10,19 +9,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.policy import KINDS
 from finlab.errors import FinlabError
 from finlab.evaluation.hostile_cases import hostile_robot, hostile_targets
 from finlab.evaluation.method_specs import is_slow
+from finlab.evaluation.progress import progress
 from finlab.evaluation.statistics.tables import text_table
 from finlab.layout import FinModelSpec, Layout
+from finlab.layout.arrays import Array
 from finlab.physics import make_law, write_table
-
-Array = NDArray[np.float64]
 
 LATE_S = 1.0
 """A single call that takes longer counts as late [s of processor time]."""
@@ -98,9 +95,11 @@ def fuzz_methods(
     """
     counts = [FuzzCount(name) for name in allocators]
     with tempfile.TemporaryDirectory() as folder:
-        table = _force_table(Path(folder))
+        table = str(Path(folder) / "forces.csv")
+        axes = np.linspace(0.0, 0.6, 7), np.linspace(0.0, 2.1, 6), np.linspace(-np.pi, np.pi, 13)
+        write_table(table, make_law(FinModelSpec()), *axes)
         numbers = range(first_robot, first_robot + n_robots)
-        for number in tqdm(numbers, unit="robot", disable=None, leave=False, file=sys.stderr):
+        for number in progress(numbers, "robot"):
             layout = hostile_robot(number, seed, table)
             targets = hostile_targets(layout, n_targets, number, seed)
             for count in counts:
@@ -118,12 +117,10 @@ def fuzz_report(counts: Sequence[FuzzCount]) -> str:
 
 
 def _try_batch(count: FuzzCount, allocator: Allocator, layout: Layout, targets: Array) -> None:
-    def call() -> Array:
-        return allocator.allocate_batch(layout, targets).command
-
-    command, seconds = _watched(count, layout, "batch", call)
+    command, seconds = _watched(
+        count, layout, "batch", lambda: allocator.allocate_batch(layout, targets).command
+    )
     if command is not None:
-        _check(count, layout, command, "batch")
         count.slowest_in_batch_ms = max(count.slowest_in_batch_ms, 1e3 * seconds / max(len(targets), 1))
 
 
@@ -139,7 +136,7 @@ def _try_singles(count: FuzzCount, allocator: Allocator, layout: Layout, targets
         def call(target: Array = target, options: dict[str, Any] = options) -> Array:
             result = allocator.allocate(layout, target, **options)
             judged = np.array([result.err_norm, result.energy, result.scale])
-            healthy = result.command[len(options.get("failed", ())) :]
+            healthy = result.command[None, len(options.get("failed", ())) :]
             return healthy if np.isfinite(judged).all() else np.full_like(healthy, np.nan)
 
         where = f"target {i}"
@@ -150,15 +147,14 @@ def _try_singles(count: FuzzCount, allocator: Allocator, layout: Layout, targets
         if seconds > LATE_S:
             count.late += 1
             count.note(layout, f"{where}: took {seconds:.2f} s")
-        _check(count, layout, healthy[None], where)
-        whole = np.isfinite(healthy).all() and len(healthy) == layout.n_fins
-        previous = healthy if whole else None
+        whole = np.isfinite(healthy).all() and healthy.shape[1] == layout.n_fins
+        previous = healthy[0] if whole else None
 
 
 def _watched(
     count: FuzzCount, layout: Layout, where: str, call: Callable[[], Array]
 ) -> tuple[Array | None, float]:
-    """What a call returns, None where it failed, and its time [s]; errors and warnings are counted."""
+    """The answers (N, n, 3) of a call, None where it failed, and its time [s]; faults are counted."""
     count.calls += 1
     start = time.process_time()
     with warnings.catch_warnings(record=True) as caught:
@@ -176,6 +172,8 @@ def _watched(
         count.warnings += 1
         at = f"{Path(caught[0].filename).name}:{caught[0].lineno}"
         count.note(layout, f"{where}: {caught[0].category.__name__}: {caught[0].message} ({at})")
+    if answer is not None:
+        _check(count, layout, answer, where)
     return answer, seconds
 
 
@@ -194,11 +192,3 @@ def _check(count: FuzzCount, layout: Layout, command: Array, where: str) -> None
         k = int(broken.argmax())
         excess = np.maximum(lower - command[k], command[k] - upper)
         count.note(layout, f"{where}: {excess.max():.3g} outside the limits at place {k}")
-
-
-def _force_table(folder: Path) -> str:
-    """Path of a small table of a drag fin's forces."""
-    path = folder / "forces.csv"
-    axes = np.linspace(0.0, 0.6, 7), np.linspace(0.0, 2.1, 6), np.linspace(-np.pi, np.pi, 13)
-    write_table(path, make_law(FinModelSpec()), *axes)
-    return str(path)

@@ -2,7 +2,7 @@
 
 import os
 import platform
-import sys
+import re
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_info
-from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
 from finlab.errors import DataError
+from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case, make_split
 from finlab.evaluation.statistics.bootstrap import quantile_interval
 from finlab.evaluation.statistics.tables import Row, text_table
@@ -46,9 +46,7 @@ def latency_rows(
         budget_s: a slow method stops after this long [s]; its row says how many calls it made.
     """
     rows: list[Row] = []
-    for name, allocator in tqdm(
-        allocators.items(), unit="method", disable=None, leave=False, file=sys.stderr
-    ):
+    for name, allocator in progress(allocators.items(), "method"):
         times = _time_calls(allocator, cases, n_calls, budget_s)
         rows.append(
             {
@@ -103,12 +101,10 @@ def machine() -> dict[str, str]:
 
 def _processor() -> str:
     """The processor's name as Linux tells it, or what Python knows."""
-    try:
-        for line in Path("/proc/cpuinfo").read_text("utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    except OSError:
-        pass
+    with suppress(OSError):
+        named = re.search(r"^model name\s*: *(.+)$", Path("/proc/cpuinfo").read_text("utf-8"), re.MULTILINE)
+        if named:
+            return named[1].strip()
     return platform.processor() or platform.machine()
 
 

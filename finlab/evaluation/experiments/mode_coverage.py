@@ -6,25 +6,22 @@ modes. Among those of reasonable energy, a mode counts as covered if the allocat
 the same.
 """
 
-import sys
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, Ipopt
 from finlab.allocation.baselines.single_target import Problem
 from finlab.allocation.modes import cluster, mode_signature, same_signature
+from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.layout import Layout
+from finlab.layout.arrays import Array
 from finlab.physics import Plant, plant_of
 from finlab.physics.energy import command_energy
-
-Array = NDArray[np.float64]
 
 EXACT = 1e-4
 """Normalized error of each axis up to which a command delivers the wrench; the plant's and the surrogate's
@@ -43,8 +40,7 @@ class CheapestWays(Ipopt):
         found = np.array([self._minimize(problem, problem.position(start)) for start in starts])
         found = np.array([problem.command(end) for end in found if np.isfinite(end).all()])
         command = plant.feasible(found.reshape(-1, plant.n_fins, 3))
-        sorted_: Array = command[np.argsort(command_energy(command, plant.upper))]
-        return sorted_
+        return np.asarray(command[np.argsort(command_energy(command, plant.upper))])
 
     def _minimize(self, problem: Problem, start: Array) -> Array:
         end = super()._minimize(problem, start)
@@ -74,8 +70,8 @@ def mode_rows(
     """
     truth = CheapestWays(allocator.normalization)
     found: dict[int, list[Row]] = {}
-    for case in tqdm(cases, unit="layout", disable=None, leave=False, file=sys.stderr):
-        layout = case.layout.without(case.failed) if case.failed else case.layout
+    for case in progress(cases, "layout"):
+        layout = case.healthy
         for target in case.targets:
             compared = _compare(allocator, truth, layout, target, n_starts, seed)
             if compared is not None:
@@ -103,34 +99,25 @@ def _compare(
     allocator: Allocator, ways: CheapestWays, layout: Layout, target: Array, n_starts: int, seed: int
 ) -> Row | None:
     """Counts and coverage for one target; None where no start delivers it."""
-    truth = _truth(ways, layout, target, n_starts, seed)
+    starts = plant_of(layout).sample(np.random.default_rng(seed), (n_starts,))
+    ends = ways.ends(layout, target, starts)
+    truth = ends[[group[0] for group in cluster([mode_signature(one) for one in ends])]]
     mine = np.array([mode.command for mode in allocator.allocate(layout, target).explore()])
-    upper = layout.upper
     if not len(truth) or not len(mine):
         return None
-    truth_energy, energy = command_energy(truth, upper), command_energy(mine, upper)
+    both = [(command, command_energy(command, layout.upper)) for command in (truth, mine)]
+    (_, truth_energy), (_, energy) = both
     least = min(truth_energy.min(), energy.min())
-    truth_ways = [mode_signature(command) for command in truth[truth_energy <= CHEAP * least]]
-    own_ways = [mode_signature(command) for command in mine[energy <= CHEAP * least]]
+    cheap = [command[spent <= CHEAP * least] for command, spent in both]
+    truth_ways, own_ways = ([mode_signature(one) for one in command] for command in cheap)
     return {
         "truth": len(truth_ways),
         "modes": len(own_ways),
         "coverage": _covered(truth_ways, own_ways),
         "truth_coverage": _covered(own_ways, truth_ways),
         "best_energy": float(energy.min() / truth_energy.min()),
-        "distance": _energy_distance(
-            *(_forces(layout, c[e <= CHEAP * least]) for c, e in ((truth, truth_energy), (mine, energy)))
-        ),
+        "distance": _energy_distance(*(_forces(layout, command) for command in cheap)),
     }
-
-
-def _truth(truth: CheapestWays, layout: Layout, target: Array, n_starts: int, seed: int) -> Array:
-    """The best command of each mode (M, n, 3) that random starts lead to, cheapest first."""
-    starts = plant_of(layout).sample(np.random.default_rng(seed), (n_starts,))
-    command = truth.ends(layout, target, starts)
-    first = [group[0] for group in cluster([mode_signature(one) for one in command])]
-    kept: Array = command[first]
-    return kept
 
 
 def _covered(wanted: list[Any], known: list[Any]) -> float:
@@ -142,8 +129,7 @@ def _covered(wanted: list[Any], known: list[Any]) -> float:
 
 def _forces(layout: Layout, command: Array) -> Array:
     """Forces of all fins (M, 3n) [N] by the plant."""
-    force: Array = Plant(layout).fin_forces(command).reshape(len(command), 3 * layout.n_fins)
-    return force
+    return np.asarray(Plant(layout).fin_forces(command).reshape(len(command), 3 * layout.n_fins))
 
 
 def _energy_distance(one: Array, other: Array) -> float:

@@ -5,20 +5,19 @@ Levenberg-Marquardt steps on the surrogate and scored by the plant. Of each targ
 the surrogate picks the answer: the cheapest exact one, or the most exact one.
 """
 
-import sys
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
-from tqdm import tqdm
 
 from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.allocation.learned.levenberg_marquardt import refine
 from finlab.allocation.learned.prepared import Prepared
 from finlab.allocation.learned.proposal import propose
 from finlab.allocation.learned.refined_candidates import RANKING
+from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.evaluation.statistics.tables import MET, Row, text_table
@@ -45,8 +44,8 @@ def seed_rows(
         seed: of all draws.
     """
     found: dict[tuple[int, str, int], list[tuple[Array, Array, Array]]] = {}
-    for k, case in enumerate(tqdm(cases, unit="layout", disable=None, leave=False, file=sys.stderr)):
-        layout = case.layout.without(case.failed) if case.failed else case.layout
+    for k, case in enumerate(progress(cases, "layout")):
+        layout = case.healthy
         prepared, plant = allocator.pipeline.prepare(layout), Plant(layout)
         for kind in KINDS:
             start = _commands(kind, allocator, prepared, case.targets, n_seeds, seed)
@@ -77,8 +76,9 @@ def _commands(
     lower, upper = prepared.lower, prepared.upper
     n = len(lower)
     if kind == "network":
-        target = targets / allocator.normalization.std
-        centred = target - allocator.normalization.mean / allocator.normalization.std
+        mean, sigma = allocator.normalization
+        target = targets / sigma
+        centred = target - mean / sigma
         network, chosen = allocator.pipeline.network, allocator.settings
         count, temperature = chosen.n_candidates, chosen.temperature
         drawn = propose(network, prepared, centred, target, count, temperature, seed)
@@ -93,8 +93,7 @@ def _commands(
         block = int(np.ceil(np.log2(n_seeds)))
         points = qmc.Sobol(3 * n, rng=np.random.default_rng(seed)).random_base2(block)[:n_seeds]
         unit = np.broadcast_to(points.reshape(1, n_seeds, n, 3), (len(targets), n_seeds, n, 3))
-    uniform: Array = lower + unit * (upper - lower)
-    return uniform
+    return np.asarray(lower + unit * (upper - lower))
 
 
 def _answer(
@@ -107,8 +106,7 @@ def _answer(
     energy = command_energy(refined.command, prepared.upper)
     # The tolerance of the product; without refinement nothing is exact and the error decides.
     rank = np.where(refined.error > 10 * RANKING.exact_error, 1e3 + refined.error, energy).reshape(rows, k)
-    chosen: Array = refined.command.reshape(rows, k, n, 3)[np.arange(rows), rank.argmin(1)]
-    return chosen
+    return np.asarray(refined.command.reshape(rows, k, n, 3)[np.arange(rows), rank.argmin(1)])
 
 
 def _row(fins: int, kind: str, steps: int, found: tuple[Array, ...], by_network: tuple[Array, ...]) -> Row:

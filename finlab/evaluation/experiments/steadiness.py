@@ -5,23 +5,20 @@ an even spread over the fins never asks for more than half of any fin's thrust. 
 `allocate`; with `previous` it is given the last command. Every answer is scored by the plant.
 """
 
-import sys
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from tqdm import tqdm
 
-from finlab.allocation.allocator import Allocator
+from finlab.allocation import Allocation, Allocator
+from finlab.evaluation.progress import progress
 from finlab.evaluation.statistics.tables import Row, text_table
+from finlab.forces.thrust_curve import plant_curves
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
-from finlab.layout.arrays import layout_effectiveness
+from finlab.layout.arrays import Array, layout_effectiveness
 from finlab.physics import Plant
 from finlab.physics.energy import command_energy
-
-Array = NDArray[np.float64]
 
 TICKS, RATE = 600, 10.0
 """Length of a path, and ticks per second [Hz]: one minute."""
@@ -68,27 +65,25 @@ def smooth_path(layout: Layout, sigma: Array, seed: int, ticks: int = TICKS) -> 
         frequency = rng.uniform(1.0 / PERIODS[1], 1.0 / PERIODS[0], 6)
         phase, size = rng.uniform(0.0, 2.0 * np.pi, 6), rng.uniform(0.3, 1.0, 6)
         path += size * np.sin(2.0 * np.pi * frequency * time + phase)
-    spread = _even_spread(layout, path, sigma)
-    share = np.linalg.norm(spread.reshape(ticks, -1, 2), axis=-1) / _largest_thrust(layout)
-    pushed: Array = spread @ layout_effectiveness(layout).T * (LOAD / share.max())
-    return pushed
+    effectiveness = layout_effectiveness(layout)
+    # The least planar forces (T, 2n) whose wrench comes closest to sigma times the path.
+    spread = path @ np.linalg.pinv(effectiveness / sigma[:, None], rcond=1e-6).T
+    share = np.linalg.norm(spread.reshape(ticks, -1, 2), axis=-1) / plant_curves(layout).maximum
+    return np.asarray(spread @ effectiveness.T * (LOAD / share.max()))
 
 
-def rollout(allocator: Allocator, layout: Layout, path: Array, *, steady: bool, seed: int = 0) -> Rollout:
+def rollout(allocator: Allocator, layout: Layout, path: Array, *, steady: bool) -> Rollout:
     """Follow a path (T, 6), one call per tick; with `steady`, each is given the last command."""
-    commands, times = [], []
-    previous = None
+    answers: list[Allocation] = []
     for wrench in path:
-        answer = allocator.allocate(layout, wrench, previous=previous, seed=seed)
-        commands.append(answer.command)
-        times.append(answer.solve_ms)
-        previous = answer.command if steady else None
-    command = np.array(commands)
+        previous = answers[-1].command if steady and answers else None
+        answers.append(allocator.allocate(layout, wrench, previous=previous))
+    command = np.array([answer.command for answer in answers])
     return Rollout(
         turn=_turns(command[..., 2]),
         energy=command_energy(command, layout.upper),
         err_norm=allocator.normalization.error(Plant(layout).wrench(command), path),
-        solve_ms=np.array(times),
+        solve_ms=np.array([answer.solve_ms for answer in answers]),
     )
 
 
@@ -101,7 +96,7 @@ def forced_turn(layout: Layout, path: Array) -> float | None:
     if np.linalg.matrix_rank(effectiveness, 1e-6) < effectiveness.shape[1]:
         return None
     force = (path @ np.linalg.pinv(effectiveness).T).reshape(len(path), -1, 2)
-    works = np.linalg.norm(force, axis=-1) > WORKS * _largest_thrust(layout)
+    works = np.linalg.norm(force, axis=-1) > WORKS * plant_curves(layout).maximum
     turn = _turns(np.arctan2(force[..., 1], force[..., 0]))
     return float(np.where(works[1:] & works[:-1], turn, 0.0).max())
 
@@ -119,7 +114,7 @@ def steadiness_rows(
         seed: of the first path; the others follow.
     """
     rows = []
-    for layout in tqdm(layouts, unit="layout", disable=None, leave=False, file=sys.stderr):
+    for layout in progress(layouts, "layout"):
         free, steady, forced = [], [], []
         for k in range(n_paths):
             path = smooth_path(layout, allocator.normalization.std, seed + k, ticks)
@@ -160,22 +155,6 @@ def _row(layout: Layout, free: list[Rollout], steady: list[Rollout], forced: lis
         "ms_free": float(np.median([a.solve_ms for a in free])),
         "ms_steady": float(np.median([b.solve_ms for b in steady])),
     }
-
-
-def _even_spread(layout: Layout, path: Array, sigma: Array) -> Array:
-    """The least planar forces (T, 2n) whose wrench comes closest to sigma times the path."""
-    effectiveness = layout_effectiveness(layout)
-    spread: Array = path @ np.linalg.pinv(effectiveness / sigma[:, None], rcond=1e-6).T
-    return spread
-
-
-def _largest_thrust(layout: Layout) -> Array:
-    """Largest thrust of each fin (n,) [N]."""
-    strongest = np.array(
-        [[*fin.limits.upper[:2], 0.5 * sum(fin.limits.zero_direction)] for fin in layout.fins]
-    )
-    thrust: Array = np.linalg.norm(Plant(layout).fin_forces(strongest), axis=-1)
-    return thrust
 
 
 def _turns(direction: Array) -> Array:

@@ -1,24 +1,23 @@
 """The paper's figure A: what the temperature of the draw does, and what refinement does to a candidate."""
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from finlab.allocation.learned.settings import PaperOptions
 from finlab.allocation.methods import load_allocator
+from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
+from finlab.evaluation.statistics.records import Columns
 from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.layout import Layout
 from finlab.layout.angles import is_full_turn
 
 Array = NDArray[Any]
-Columns = dict[str, Array]
 
 TEMPERATURES = tuple(float(t) for t in np.logspace(-3, 1, 13))
 """From 0.001 to 10, three to a decade."""
@@ -48,18 +47,17 @@ def temperature_columns(
     """
     options: PaperOptions = {"n_candidates": n_candidates, "temperature": temperature, "refinement": "none"}
     allocator = load_allocator("paper", checkpoint=checkpoint, **options)
-    rows: list[tuple[float, ...]] = []
-    for k, case in enumerate(tqdm(cases, unit="layout", disable=None, leave=False, file=sys.stderr)):
-        layout = case.layout.without(case.failed) if case.failed else case.layout
+    rows: list[Row] = []
+    for k, case in enumerate(progress(cases, "layout")):
+        layout = case.healthy
         for number, target in enumerate(case.targets):
             samples = allocator.allocate(layout, target, seed=seed).samples
             assert samples is not None
             j = samples.err_norm**2 + allocator.settings.gamma * samples.energy
+            row = {"layout": k, "target": number, "n_fins": layout.n_fins}
             spread = diversity(samples.command, layout)
-            rows.append((k, number, layout.n_fins, spread, float(j.min()), float(j.mean())))
-    whole, real = ("layout", "target", "n_fins"), ("diversity", "best_j", "mean_j")
-    columns = dict(zip((*whole, *real), np.array(rows, dtype=np.float64).T, strict=True))
-    return columns | {name: columns[name].astype(np.int64) for name in whole}
+            rows.append({**row, "diversity": spread, "best_j": j.min(), "mean_j": j.mean()})
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
 def refinement_columns(
@@ -80,17 +78,12 @@ def refinement_columns(
     parts = []
     for number, target in enumerate(case.targets):
         result = allocator.allocate(case.layout, target, failed=case.failed, seed=seed)
-        for refined, found in ((0, result.samples), (1, result.candidates)):
+        for refined, found in enumerate((result.samples, result.candidates)):
             assert found is not None
-            ones = np.ones(len(found.energy))
-            parts.append(np.stack([number * ones, refined * ones, found.energy, found.err_norm]))
-    target_number, after, energy, error = np.concatenate(parts, axis=1)
-    return {
-        "target": target_number.astype(np.int64),
-        "refined": after.astype(np.int64),
-        "energy": energy,
-        "err_norm": error,
-    }
+            about = {"target": number, "refined": refined}
+            columns = {name: np.full(n_candidates, value) for name, value in about.items()}
+            parts.append({**columns, "energy": found.energy, "err_norm": found.err_norm})
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def diversity(command: Array, layout: Layout) -> float:
@@ -108,8 +101,8 @@ def diversity(command: Array, layout: Layout) -> float:
 
 def temperature_rows(cases: Sequence[Case], **options: Any) -> list[Row]:
     """The table's rows, one per temperature; options as in `temperature_columns`."""
-    bar = tqdm(TEMPERATURES, unit="temperature", disable=None, leave=False, file=sys.stderr)
-    return [temperature_row(value, temperature_columns(cases, value, **options)) for value in bar]
+    values = progress(TEMPERATURES, "temperature")
+    return [temperature_row(value, temperature_columns(cases, value, **options)) for value in values]
 
 
 def temperature_row(temperature: float, columns: Columns) -> Row:

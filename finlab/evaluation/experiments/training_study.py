@@ -7,20 +7,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.learned.paper import PaperAllocator
 from finlab.evaluation.experiments.wrench_tracking import run_method
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
-from finlab.evaluation.statistics.records import columns_of_records
+from finlab.evaluation.statistics.records import Columns, columns_of_records
 from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
 
 LM_STEPS = 4
 """Levenberg-Marquardt steps after which the refined error is taken."""
-
-Columns = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
@@ -95,10 +92,10 @@ def train_and_run(
         folder,
         surrogate=resolve_checkpoint(change.surrogate),
         seed=seed,
+        network=change.network,
         steps=steps,
         batch_size=batch_size,
-        overrides=change.training,
-        network_overrides=change.network,
+        **change.training,
     )
     train_s = time.perf_counter() - start
     physics = read_checkpoint(resolve_checkpoint("default"))

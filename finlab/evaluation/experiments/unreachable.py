@@ -6,25 +6,22 @@ model; the answers are scored by the plant. `closest` and the first group of `pr
 error, `direction` by the share of the target that is delivered and by what is delivered beside it.
 """
 
-import sys
 from collections.abc import Sequence
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, import_casadi
 from finlab.allocation.policy import KINDS, Policy
+from finlab.evaluation.progress import progress
 from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.layout import Layout, random_layout
 from finlab.layout.angles import is_full_turn
-from finlab.layout.arrays import layout_effectiveness
+from finlab.layout.arrays import Array, layout_effectiveness
 from finlab.physics import Plant, plant_of
-
-Array = NDArray[np.float64]
 
 DOMAIN = 0xFA2
 """Leads the seed of every case."""
@@ -36,16 +33,10 @@ BESIDE = 1e-6
 """Normalized wrench beside the target that the judge of `direction` allows on each axis."""
 
 
-class Score(NamedTuple):
-    """One answer to one target."""
-
-    excess: float
-    """`closest`, `priority`: normalized error beyond the least possible. `direction`: share of the target
-    that is lacking to the largest possible."""
-    beside: float
-    """`direction`: normalized wrench beside the share of the target."""
-    solve_ms: float
-    """Time of the call [ms]."""
+Score = tuple[float, float, float]
+"""Of one answer. By `closest` and `priority` the normalized error beyond the least possible, by `direction`
+the share of the target that is lacking to the largest possible; by `direction` the normalized wrench beside
+that share; the time of the call [ms]."""
 
 
 class Judge:
@@ -78,20 +69,21 @@ class Judge:
 
     def _best(self, force: Any, unknowns: Any, cost: Any, limits: list[tuple[Any, float, float]]) -> float:
         """The least cost over all choices of halves."""
-        return min(self._solve(force, unknowns, cost, limits, arcs) for arcs in self.arcs)
+        return min(self._solve(unknowns, cost, limits + self._fins(force, arcs)) for arcs in self.arcs)
 
-    def _solve(
-        self, force: Any, unknowns: Any, cost: Any, limits: list[tuple[Any, float, float]], arcs: Array
-    ) -> float:
-        limits = list(limits)
+    def _fins(self, force: Any, arcs: Array) -> list[tuple[Any, float, float]]:
+        """Limits of each fin's thrust and direction, for one choice of halves."""
+        limits: list[tuple[Any, float, float]] = []
         for i, (first, last) in enumerate(arcs):
             across, up = force[2 * i], force[2 * i + 1]
             limits.append((across**2 + up**2, 0.0, self.thrust[i] ** 2))
             if not is_full_turn(last - first):
-                limits.append((np.cos(first) * up - np.sin(first) * across, 0.0, np.inf))
-                limits.append((np.sin(last) * across - np.cos(last) * up, 0.0, np.inf))
                 middle = 0.5 * (first + last)
-                limits.append((np.cos(middle) * across + np.sin(middle) * up, 0.0, np.inf))
+                for angle in (first + 0.5 * np.pi, last - 0.5 * np.pi, middle):
+                    limits.append((np.cos(angle) * across + np.sin(angle) * up, 0.0, np.inf))
+        return limits
+
+    def _solve(self, unknowns: Any, cost: Any, limits: list[tuple[Any, float, float]]) -> float:
         what, low, high = zip(*limits, strict=True)
         program = {"x": unknowns, "f": cost, "g": self.casadi.vertcat(*what)}
         solver = self.casadi.nlpsol("judge", "ipopt", program, SOLVER_OPTIONS)
@@ -109,8 +101,7 @@ def unreachable_rows(allocator: Allocator, *, n_layouts: int = 50, seed: int = 0
     rows = []
     for limits in ("nominal", "varied"):
         scores: dict[str, list[Score]] = {kind: [] for kind in KINDS}
-        numbers = range(n_layouts)
-        for k in tqdm(numbers, desc=limits, unit="layout", disable=None, leave=False, file=sys.stderr):
+        for k in progress(range(n_layouts), "layout", limits):
             rng = np.random.default_rng((DOMAIN, seed, k))
             layout = random_layout(rng, n_fins=int(rng.integers(FINS[0], FINS[1] + 1)), limits=limits)
             target = _far_target(rng, layout, allocator.normalization.std)
@@ -138,7 +129,7 @@ def _scores(allocator: Allocator, layout: Layout, target: Array) -> dict[str, Sc
     least = judge.least_error(wanted, np.ones(6, dtype=bool))
     if least < 0.05:
         return {}
-    scores = {}
+    scores: dict[str, Score] = {}
     for kind in KINDS:
         answer = allocator.allocate(layout, target, policy=kind)
         given = plant.wrench(answer.command) / sigma
@@ -151,7 +142,7 @@ def _scores(allocator: Allocator, layout: Layout, target: Array) -> dict[str, Sc
             axes = np.ones(6, dtype=bool) if kind == "closest" else Policy(kind).groups[0]
             possible = least if kind == "closest" else judge.least_error(wanted, axes)
             excess = float(np.linalg.norm((given - wanted)[axes])) - possible
-        scores[kind] = Score(excess, beside, answer.solve_ms)
+        scores[kind] = (excess, beside, answer.solve_ms)
     return scores
 
 
@@ -176,8 +167,7 @@ def _far_target(rng: np.random.Generator, layout: Layout, sigma: Array) -> Array
         near = plant_of(layout).wrench(plant_of(layout).sample(rng, ()))
     else:
         near = rng.standard_normal(6) * sigma
-    far: Array = near * farther
-    return far
+    return np.asarray(near * farther)
 
 
 def _convex_arcs(lower: Array, upper: Array) -> list[Array]:

@@ -1,17 +1,16 @@
 """Wrench tracking: methods over a split, every answer scored by the plant."""
 
-import sys
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.single_target import DEFAULT_STARTS
 from finlab.evaluation.method_specs import method_and_starts
 from finlab.evaluation.paper_figures import paper_wrench_rows
+from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.records import Records, join_records
 from finlab.evaluation.statistics.tables import (
@@ -21,11 +20,9 @@ from finlab.evaluation.statistics.tables import (
     wrench_intervals,
     wrench_row,
 )
+from finlab.layout.arrays import Array
 from finlab.physics import Plant
 from finlab.physics.energy import command_energy
-
-Array = NDArray[np.float64]
-
 
 RESTING = 0.01
 """A fin rests when it gives less than this share of the force that its limits allow."""
@@ -50,9 +47,7 @@ def run_method(
         first: only the first so many targets of each layout, solved together.
     """
     parts = []
-    # disable=None: a bar on a terminal, nothing elsewhere
-    bar = tqdm(cases, desc=allocator.name, unit="layout", disable=None, leave=False, file=sys.stderr)
-    for k, case in enumerate(bar):
+    for k, case in enumerate(progress(cases, "layout", allocator.name)):
         if single is None:
             targets = case.targets[:first]
             answer = allocator.allocate_batch(case.layout, targets, failed=case.failed, seed=seed)
@@ -80,7 +75,6 @@ def score(
         number: of the layout in its split.
     """
     plant = Plant(case.layout)
-    upper = case.layout.upper
     difference = plant.wrench(command) - targets
     return Records(
         layout=np.full(len(targets), number, np.int64),
@@ -88,20 +82,17 @@ def score(
         n_fins=np.full(len(targets), case.layout.n_fins - len(case.failed), np.int64),
         err_norm=np.linalg.norm(difference / sigma, axis=-1),
         err_phys=np.linalg.norm(difference, axis=-1),
-        energy=command_energy(command, upper),
-        resting=count_resting(plant, command),
+        energy=command_energy(command, plant.upper),
+        resting=_count_resting(plant, command),
         solve_ms=np.asarray(solve_ms, np.float64),
     )
 
 
-def count_resting(plant: Plant, command: Array) -> NDArray[np.int64]:
+def _count_resting(plant: Plant, command: Array) -> NDArray[np.int64]:
     """Healthy fins that rest (N,) in commands (N, n, 3): nearly no force beside their largest one."""
-    upper = plant.layout.upper
-    largest = np.linalg.norm(plant.fin_forces(upper), axis=-1)
-    force = np.linalg.norm(plant.fin_forces(command), axis=-1)
+    force, largest = (np.linalg.norm(plant.fin_forces(u), axis=-1) for u in (command, plant.upper))
     rests = (force < RESTING * largest) & ~np.isnan(command).any(axis=-1)
-    count: NDArray[np.int64] = rests.sum(axis=-1)
-    return count
+    return np.asarray(rests.sum(axis=-1))
 
 
 def wrench_rows(records: dict[str, Records], split: str) -> list[dict[str, Any]]:
@@ -135,12 +126,9 @@ def energy_comparison(records: dict[str, Records]) -> list[dict[str, Any]]:
 def wrench_report(records: dict[str, Records], split: str, *, single: int | None = None) -> str:
     """The table beside the paper's printed figures, its intervals, and the error by fin count, as text."""
     by_fins = [row for method, part in records.items() for row in rows_by_fin_count(part, method=method)]
-    timing = (
-        "solve_ms: the time of all targets of a layout over their number."
-        if single is None
-        else "solve_ms: one call at a time."
-    )
+    timing = "one call at a time" if single else "the time of all targets of a layout over their number"
     energies = energy_comparison(records)
+    beside = [f"energy over that of {energies[0]['reference']}", text_table(energies), ""] if energies else []
     shown = ("method", "err_norm_mean", "err_norm_median", "err_norm_p95", "success_0.01", "energy_mean")
     return "\n".join(
         [
@@ -151,11 +139,7 @@ def wrench_report(records: dict[str, Records], split: str, *, single: int | None
             "",
             text_table(by_fins),
             "",
-            *(
-                [f"energy over that of {energies[0]['reference']}", text_table(energies), ""]
-                if energies
-                else []
-            ),
-            f"scored by the plant, the analytic fin model. {timing}",
+            *beside,
+            f"scored by the plant, the analytic fin model. solve_ms: {timing}.",
         ]
     )

@@ -1,36 +1,23 @@
 """Closed-loop experiments: paths by layout, errors by fault, power against the error of speed."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.evaluation.experiments.closed_loop_runs import Row, Run
 from finlab.evaluation.experiments.faults import ALLOWED, HEALTHY
-from finlab.evaluation.plots.style import BLACK, COLOURS, GREY, Picture, clean, picture
+from finlab.evaluation.plots.style import BLACK, COLOURS, GREY, Picture, picture
+from finlab.layout.arrays import Array
+from finlab.sim import RunLog
 
-Array = NDArray[np.float64]
-
-
-class Track(NamedTuple):
-    """Where a robot swam, K moments."""
-
-    layout: str
-    """Name of the robot."""
-    method: str
-    """Name of the allocation method."""
-    time: Array
-    """(K,) [s]."""
-    position: Array
-    """(K, 3) in the world [m]."""
-    reference: Array
-    """Where it should have been (K, 3) [m]."""
+Track = tuple[tuple[str, str], Array]
+"""Names of a robot and of its method, and when it swam where: time [s], position and reference [m] (K, 7)."""
 
 
-def tracks_of(runs: Sequence[Run]) -> list[Track]:
-    """The tracks of runs under (layout's name, method's name)."""
-    return [Track(*key, log.time, log.position, log.reference) for key, log in runs]
+def track_of(log: RunLog) -> Array:
+    """Time, position and reference of every tick (K, 7)."""
+    return np.column_stack([log.time, log.position, log.reference])
 
 
 def draw_layouts(tracks: Sequence[Track], rows: Sequence[Row]) -> Picture:
@@ -40,26 +27,23 @@ def draw_layouts(tracks: Sequence[Track], rows: Sequence[Row]) -> Picture:
         tracks: of all layouts and methods.
         rows: of the trajectory table, for the titles: the error of the first method.
     """
-    layouts = list(dict.fromkeys(track.layout for track in tracks))
+    layouts = list(dict.fromkeys(layout for (layout, _), _ in tracks))
     with picture(2, len(layouts), height=4.6, sharex="row", sharey="row") as view:
         for above, depth, layout in zip(view.axes, view.axes[len(layouts) :], layouts, strict=False):
-            mine = [track for track in tracks if track.layout == layout]
-            reference = mine[0].reference
-            above.plot(reference[:, 0], reference[:, 1], color=GREY, lw=3.0, alpha=0.6, label="reference")
-            depth.plot(mine[0].time, reference[:, 2], color=GREY, lw=3.0, alpha=0.6)
-            for track in mine:
-                style: dict[str, Any] = {"color": COLOURS.get(track.method, GREY), "lw": 1.0, "alpha": 0.8}
-                above.plot(track.position[:, 0], track.position[:, 1], label=track.method, **style)
-                depth.plot(track.time, track.position[:, 2], **style)
+            mine = [(method, track.T) for (name, method), track in tracks if name == layout]
+            time, *_, x, y, z = mine[0][1]
+            above.plot(x, y, color=GREY, lw=3.0, alpha=0.6, label="reference")
+            depth.plot(time, z, color=GREY, lw=3.0, alpha=0.6)
+            for method, (time, x, y, z, *_) in mine:
+                style: dict[str, Any] = {"color": COLOURS.get(method, GREY), "lw": 1.0, "alpha": 0.8}
+                above.plot(x, y, label=method, **style)
+                depth.plot(time, z, **style)
             ate = next(row["ate"] for row in rows if row["layout"] == layout)
             above.set(title=f"{layout}: ATE {100 * ate:.1f} cm", xlabel="x [m]")
             above.set_aspect("equal", adjustable="box")
             depth.set(xlabel="time [s]")
         view.axes[0].set_ylabel("y [m]")
         view.axes[len(layouts)].set_ylabel("z [m]")
-        for axis in view.axes:
-            clean(axis)
-        view.legend()
         return view
 
 
@@ -90,8 +74,6 @@ def draw_faults(rows: Sequence[Row], printed: Mapping[str, float] | None = None)
         axis.set_yticks(range(len(names)), names)
         axis.set_ylim(len(names) - 0.5, -0.5)
         axis.set(xlabel=f"ATE [m]; dashed: {ALLOWED} times that of the healthy robot", xlim=(0.0, None))
-        clean(axis)
-        view.legend()
         return view
 
 
@@ -99,7 +81,7 @@ def draw_velocity(runs: Sequence[Run]) -> Picture:
     """Speed over time of every run, under (speed, method's name), and power against its error."""
     methods = list(dict.fromkeys(method for (_, method), _ in runs))
     speeds = dict.fromkeys(speed for (speed, _), _ in runs)
-    with picture(1, 2, height=3.4, gridspec_kw={"width_ratios": [1.5, 1]}) as view:
+    with picture(1, 2, height=3.4, legend=len(methods), width_ratios=(1.5, 1)) as view:
         over_time, trade = view.axes
         for (_, method), log in runs:
             over_time.plot(log.time, log.motion[:, 0], color=COLOURS.get(method, GREY), lw=0.7, alpha=0.7)
@@ -116,7 +98,4 @@ def draw_velocity(runs: Sequence[Run]) -> Picture:
             xlabel="MAE of the speed [m/s]", ylabel="inertial power [W]", title="Left and low is better"
         )
         trade.set(xlim=(0.0, None), ylim=(0.0, None))
-        for axis in view.axes:
-            clean(axis)
-        view.legend(ncols=len(methods))
         return view

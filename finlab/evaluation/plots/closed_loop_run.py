@@ -1,12 +1,8 @@
 """Pictures of one swim: path, errors, commands, wrench asked against delivered."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.evaluation.plots.style import (
     BLACK,
@@ -20,22 +16,15 @@ from finlab.evaluation.plots.style import (
     VERMILION,
     YELLOW,
     Picture,
-    clean,
     picture,
 )
 from finlab.layout.angles import wrapped
+from finlab.layout.arrays import Array
 from finlab.sim import RunLog
 from finlab.sim.vehicle import euler
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-Array = NDArray[np.float64]
-
 FIN_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK, YELLOW)
 """Colour of each fin, in the layout's order."""
-ASKED, DELIVERED, MISSING = BLUE, GREEN, VERMILION
-"""The three colours of a wrench."""
 
 
 def save_pictures(log: RunLog, folder: Path) -> list[Path]:
@@ -64,14 +53,12 @@ def draw_path(log: RunLog) -> Picture:
                 at = log.position[int(np.searchsorted(log.time, time))]
                 axis.plot(*at[[0, second]], "X", color=VERMILION, ms=8, label=f"{name} lost at {time:.0f} s")
             axis.set(xlabel="x [m]", ylabel=label)
-            clean(axis)
         above.set_aspect("equal", adjustable="datalim")
         above.set_title("From above")
         side.set_title("From the side")
         low, high = side.get_ylim()
         middle = 0.5 * (low + high)
         side.set_ylim(min(low, middle - 0.3), max(high, middle + 0.3))
-        drawn.legend()
         return drawn
 
 
@@ -122,8 +109,8 @@ def draw_wrench(log: RunLog) -> Picture:
     with picture(3, 2, height=6.2, sharex=True) as drawn:
         for k, name in enumerate(("Fx [N]", "Fy [N]", "Fz [N]", "Tx [N m]", "Ty [N m]", "Tz [N m]")):
             axis = drawn.axes[2 * (k % 3) + k // 3]
-            axis.plot(log.time, log.asked[:, k], color=ASKED, lw=1.8, label="asked")
-            axis.plot(log.time, log.delivered[:, k], color=DELIVERED, lw=1.1, label="delivered")
+            axis.plot(log.time, log.asked[:, k], color=BLUE, lw=1.8, label="asked")
+            axis.plot(log.time, log.delivered[:, k], color=GREEN, lw=1.1, label="delivered")
             axis.set_ylabel(name)
             half = 0.1 if k < 3 else 0.05
             low, high = axis.get_ylim()
@@ -135,18 +122,12 @@ def draw_wrench(log: RunLog) -> Picture:
 
 
 def _finish(drawn: Picture, log: RunLog) -> None:
-    """Grid, marks of failures and the legend."""
+    """The whole run in time, with a mark where a fin is lost on the way."""
     for axis in drawn.axes:
-        clean(axis)
         axis.set_xlim(0.0, float(log.time[-1]))
-        _mark(axis, log)
-    drawn.legend()
-
-
-def _mark(axis: Axes, log: RunLog) -> None:
-    for time, name in failures(log):
-        if time > 0.0:
-            axis.axvline(time, color=SOFT, lw=1.0, ls=(0, (4, 3)), label=f"{name} lost")
+        for time, name in failures(log):
+            if time > 0.0:
+                axis.axvline(time, color=SOFT, lw=1.0, ls=(0, (4, 3)), label=f"{name} lost")
 
 
 def _broken(angle: Array) -> Array:

@@ -6,39 +6,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.evaluation.plots.style import (
-    BLACK,
-    BLUE,
-    COLOURS,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    SOFT,
-    VERMILION,
-    Picture,
-    clean,
-    picture,
-)
+from finlab.evaluation.plots import style
+from finlab.evaluation.plots.style import Picture, picture
 
-SEEDS = {"network": BLUE, "random": GREY, "quasi-random": ORANGE}
+SEEDS = {"network": style.BLUE, "random": style.GREY, "quasi-random": style.ORANGE}
 
 
 def latency_dots(rows: Sequence[dict[str, Any]], paper_ms: float) -> Picture:
     """Median and 99th percentile of each method's calls."""
     ordered = sorted(rows, key=lambda row: row["p50_ms"])
-    with picture(height=0.9 + 0.26 * len(rows)) as view:
+    with picture(height=0.9 + 0.26 * len(rows), grid="x") as view:
         (axis,) = view.axes
         for k, row in enumerate(ordered):
-            colour = COLOURS[row["method"]]
+            colour = style.COLOURS[row["method"]]
             axis.plot([row["p50_ms"], row["p99_ms"]], [k, k], color=colour, linewidth=4, alpha=0.45)
             axis.plot(row["p50_ms"], k, "o", color=colour, markersize=7)
-        axis.axvline(paper_ms, color=INK, linestyle=(0, (2, 2)), linewidth=1.2)
-        axis.annotate("the paper's cycle", (paper_ms, -0.9), fontsize=8, ha="center", annotation_clip=False)
+        style.mark_printed(axis, paper_ms, "the paper's cycle")
         axis.set(xscale="log", xlabel="one call [ms]: median (dot) to 99th percentile")
         axis.set_yticks(range(len(ordered)), [row["method"] for row in ordered])
         axis.invert_yaxis()
-        clean(axis, grid="x")
         return view
 
 
@@ -54,9 +40,7 @@ def seed_lines(rows: Sequence[dict[str, Any]]) -> Picture:
                 axis.set_xticks(range(len(steps)), [str(step) for step in steps])
             axis.set(yscale="log", xlabel="refinement steps")
             axis.set_title(f"{n} fins")
-            clean(axis)
         view.axes[0].set_ylabel("mean normalized error")
-        view.legend()
         return view
 
 
@@ -65,23 +49,21 @@ def training_bars(rows: Sequence[dict[str, Any]], titles: Mapping[str, str]) -> 
     with picture(height=0.9 + 0.34 * len(rows)) as view:
         (axis,) = view.axes
         for key, colour, name in (
-            ("err_norm_mean", GREY, "best raw candidate"),
-            ("refined_err_norm_mean", GREEN, "after 4 Levenberg-Marquardt steps"),
+            ("err_norm_mean", style.GREY, "best raw candidate"),
+            ("refined_err_norm_mean", style.GREEN, "after 4 Levenberg-Marquardt steps"),
         ):
             value = [row[key] for row in rows]
             low = [max(0.0, row[key] - row[f"{key}_interval"][0]) for row in rows]
             high = [max(0.0, row[f"{key}_interval"][1] - row[key]) for row in rows]
-            style: dict[str, Any] = {"color": colour, "markersize": 6, "elinewidth": 1.3, "label": name}
-            axis.errorbar(value, range(len(rows)), xerr=[low, high], fmt="o", **style)
+            look: dict[str, Any] = {"color": colour, "markersize": 6, "elinewidth": 1.3, "label": name}
+            axis.errorbar(value, range(len(rows)), xerr=[low, high], fmt="o", **look)
         axis.set(xscale="log", xlabel="mean normalized error, by the plant")
         axis.set_yticks(range(len(rows)), [titles[row["change"]] for row in rows])
         axis.invert_yaxis()
-        clean(axis)
-        view.legend()
         return view
 
 
-COLOUR = {"adam": ORANGE, "levenberg-marquardt": BLUE}
+COLOUR = {"adam": style.ORANGE, "levenberg-marquardt": style.BLUE}
 
 
 def ablation_dots(
@@ -89,34 +71,21 @@ def ablation_dots(
 ) -> Picture:
     """Mean normalized error of each row; rows of `ablation_row`, `printed` by variant."""
     variants = list(titles)
-    with picture(height=3.1) as view:
+    with picture(height=3.1, legend=3) as view:
         (axis,) = view.axes
         for k, (refinement, colour) in enumerate(COLOUR.items()):
             for scored_by, filled in (("plant", True), ("surrogate", False)):
                 mine = [r for r in rows if (r["refinement"], r["scored_by"]) == (refinement, scored_by)]
-                axis.plot(
-                    [row["err_norm_mean"] for row in mine],
-                    [variants.index(row["variant"]) + 0.16 * (2 * k - 1) for row in mine],
-                    "o",
-                    color=colour,
-                    markerfacecolor=colour if filled else "white",
-                    markersize=7,
-                    label=f"{refinement}, scored by the {scored_by}",
-                )
-        axis.plot(
-            [printed[name] for name in variants],
-            range(len(variants)),
-            "D",
-            color=BLACK,
-            markerfacecolor="none",
-            markersize=7,
-            label="printed in the paper",
-        )
+                place = [variants.index(row["variant"]) + 0.16 * (2 * k - 1) for row in mine]
+                look: dict[str, Any] = {"color": colour, "markerfacecolor": colour if filled else "white"}
+                label = f"{refinement}, scored by the {scored_by}"
+                axis.plot([row["err_norm_mean"] for row in mine], place, "o", ms=7, label=label, **look)
+        look = {"color": style.BLACK, "markerfacecolor": "none"}
+        means = [printed[name] for name in variants]
+        axis.plot(means, range(len(variants)), "D", ms=7, label="printed in the paper", **look)
         axis.set(xscale="log", xlabel="mean normalized error")
         axis.set_yticks(range(len(variants)), [titles[name] for name in variants])
         axis.invert_yaxis()
-        clean(axis)
-        view.legend(ncols=3)
         return view
 
 
@@ -130,23 +99,23 @@ def figure_a(
     """Left: diversity and best J against T, rows of `temperature_row`. Right: columns of
     `refinement_columns`, one target's candidates, energy against error."""
     temperature = [row["temperature"] for row in rows]
-    with picture(1, 3, height=3.2, width_ratios=(1, 1, 1.25)) as view:
+    with picture(1, 3, height=3.2, legend=0, width_ratios=(1, 1, 1.25)) as view:
         spread, best, right = view.axes
-        spread.plot(temperature, [row["diversity"] for row in rows], "o-", color=BLUE, markersize=4)
+        spread.plot(temperature, [row["diversity"] for row in rows], "o-", color=style.BLUE, markersize=4)
         spread.set_title("diversity of 64 candidates")
         ends = np.array([row["best_j_mean_interval"] for row in rows])
-        best.fill_between(temperature, *ends.T, color=VERMILION, alpha=0.15, linewidth=0)
+        best.fill_between(temperature, *ends.T, color=style.VERMILION, alpha=0.15, linewidth=0)
         mean = [row["best_j_mean"] for row in rows]
         median = [row["best_j_median"] for row in rows]
-        best.plot(temperature, mean, "o-", color=VERMILION, markersize=4, label="mean")
-        best.plot(temperature, median, "o--", color=ORANGE, markersize=3, linewidth=1.2, label="median")
+        best.plot(temperature, mean, "o-", color=style.VERMILION, markersize=4, label="mean")
+        best.plot(temperature, median, "o--", color=style.ORANGE, markersize=3, linewidth=1.2, label="median")
         best.set(yscale="log")
         best.set_title("best J among them")
         best.legend(frameon=False)
         for axis in (spread, best):
-            axis.axvline(paper_temperature, color=GREY, linestyle=(0, (2, 2)), linewidth=1.2)
+            axis.axvline(paper_temperature, **style.DASHES)
             axis.set(xscale="log", xlabel="temperature T")
-        for refined, colour, name in ((0, GREY, "drawn"), (1, BLUE, "refined")):
+        for refined, colour, name in ((0, style.GREY, "drawn"), (1, style.BLUE, "refined")):
             keep = scatter["refined"] == refined
             error = np.maximum(scatter["err_norm"][keep], FLOOR)
             right.plot(
@@ -154,7 +123,5 @@ def figure_a(
             )
         right.set(yscale="log", xlabel="energy J_en", ylabel="normalized error, by the surrogate")
         right.set_title("candidates, energy and error")
-        right.legend(frameon=False, labelcolor=SOFT)
-        for axis in view.axes:
-            clean(axis)
+        right.legend(frameon=False, labelcolor=style.SOFT)
         return view

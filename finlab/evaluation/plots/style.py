@@ -32,6 +32,8 @@ COLOURS = {
     "learned-power": VERMILION,
 }
 """Method -> colour."""
+DASHES: dict[str, Any] = {"color": GREY, "linestyle": (0, (2, 2)), "linewidth": 1.2}
+"""Of a line at a figure of the paper."""
 WIDTH = 9.6
 """Inches of a picture across the page."""
 FONT = 9.5
@@ -43,13 +45,24 @@ COLOURS_IN_PNG = 96
 
 
 @contextmanager
-def picture(rows: int = 1, columns: int = 1, *, height: float = 3.2, **options: Any) -> Iterator[Picture]:
-    """Axes to draw on, in the common look.
+def picture(
+    rows: int = 1,
+    columns: int = 1,
+    *,
+    height: float = 3.2,
+    grid: str = "both",
+    legend: int = 10,
+    **options: Any,
+) -> Iterator[Picture]:
+    """Axes to draw on, in the common look: hairlines behind the data, no box around it, and one legend for
+    all axes, above them, where a name that several share is shown once.
 
     Args:
         rows: of axes.
         columns: of axes.
         height: of the picture in inches.
+        grid: axes with hairlines.
+        legend: most names in a line of the legend; 0 for none.
         options: of `Figure.subplots`.
     """
     import matplotlib
@@ -59,8 +72,16 @@ def picture(rows: int = 1, columns: int = 1, *, height: float = 3.2, **options: 
     with matplotlib.rc_context(_LOOK):
         figure = Figure(figsize=(WIDTH, height), layout="constrained")
         FigureCanvasAgg(figure)
-        axes = figure.subplots(rows, columns, squeeze=False, **options)
-        yield Picture(figure, [axis for line in axes for axis in line])
+        axes = list(figure.subplots(rows, columns, squeeze=False, **options).flat)
+        yield Picture(figure, axes)
+        names: dict[str, Any] = {}
+        for axis in axes:
+            _clean(axis, grid)
+            for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
+                names.setdefault(label, handle)
+        if legend and names:
+            where: dict[str, Any] = {"loc": "outside upper left", "ncols": min(len(names), legend)}
+            figure.legend(list(names.values()), list(names), frameon=False, **where)
 
 
 class Picture:
@@ -68,15 +89,6 @@ class Picture:
 
     def __init__(self, figure: Figure, axes: list[Axes]) -> None:
         self.figure, self.axes = figure, axes
-
-    def legend(self, **options: Any) -> None:
-        """One legend for all axes, above them; a name that several share is shown once."""
-        found: dict[str, Any] = {}
-        for axis in self.axes:
-            for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
-                found.setdefault(label, handle)
-        settings = {"loc": "outside upper left", "ncols": min(len(found), 10), "frameon": False, **options}
-        self.figure.legend(list(found.values()), list(found), **settings)
 
     def save(self, path: Path) -> Path:
         """Write a PNG with a palette, a third of the size of one with full colours."""
@@ -97,8 +109,14 @@ class Picture:
         return text.getvalue()
 
 
-def clean(axis: Axes, *, grid: str = "both") -> None:
-    """Hairlines behind the data, no box around it."""
+def mark_printed(axis: Axes, value: float, words: str) -> None:
+    """Dashes at a figure that the paper prints, with words above them."""
+    axis.axvline(value, **DASHES)
+    place, above = (value, 1.02), ("data", "axes fraction")
+    axis.annotate(words, place, xycoords=above, fontsize=8, color=SOFT, ha="center", annotation_clip=False)
+
+
+def _clean(axis: Axes, grid: str) -> None:
     axis.grid(True, axis=grid, color=LINE, linewidth=0.7)  # type: ignore[arg-type]
     axis.set_axisbelow(True)
     for side in ("top", "right"):

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from finlab.evaluation.plots.style import COLOURS, GREY, INK, SOFT, Picture, clean, picture
+from finlab.evaluation.plots.style import COLOURS, INK, Picture, mark_printed, picture
 from finlab.evaluation.statistics.records import Records
 
 QUANTILES = np.concatenate([np.linspace(0, 0.9, 91), 1 - np.logspace(-1, -5, 60)])
@@ -30,27 +30,17 @@ def error_distribution(records: Mapping[str, Mapping[str, Records]], printed: Ma
                 width = 2.6 if method == "learned" else 1.4
                 axis.plot(error, 1 - level, color=COLOURS[method], label=method, linewidth=width)
             if split in printed:
-                axis.axvline(printed[split], color=GREY, linestyle=(0, (2, 2)), linewidth=1.2)
-                axis.annotate(
-                    "paper's printed mean",
-                    (printed[split], 1.15),
-                    fontsize=8,
-                    color=SOFT,
-                    ha="center",
-                    annotation_clip=False,
-                )
+                mark_printed(axis, printed[split], "paper's printed mean")
             axis.set(xscale="log", yscale="log", xlabel="normalized error", ylim=(1e-5, 1.0))
             axis.set_title(f"split {split}", pad=14)
-            clean(axis)
         view.axes[0].set_ylabel("share of targets above")
-        view.legend()
         return view
 
 
 def error_by_fins(records: Mapping[str, Records], order: Sequence[str]) -> Picture:
     """Mean, and the span from median to 95th percentile, for each number of fins."""
     fins = sorted({int(n) for part in records.values() for n in np.unique(part.n_fins)})
-    with picture(height=3.3) as view:
+    with picture(height=3.3, grid="y") as view:
         (axis,) = view.axes
         shown = [method for method in order if method in records]
         for k, method in enumerate(shown):
@@ -65,8 +55,6 @@ def error_by_fins(records: Mapping[str, Records], order: Sequence[str]) -> Pictu
                 label = method if n == fins[0] else None
                 axis.plot(n + offset, error.mean(), "o", color=colour, markersize=5.5, label=label)
         axis.set(yscale="log", xlabel="working fins", ylabel="normalized error", xticks=fins)
-        clean(axis, grid="y")
-        view.legend()
         return view
 
 
@@ -74,7 +62,7 @@ def energy_by_fins(rows: Sequence[dict[str, Any]], reference: str) -> Picture:
     """Energy over the reference's, and resting fins, for each number of fins; rows of `energy_rows`."""
     methods = list(dict.fromkeys(row["method"] for row in rows))
     fins = sorted({row["fins"] for row in rows if row["fins"] != "all"})
-    with picture(1, 2, height=3.3) as view:
+    with picture(1, 2, height=3.3, grid="y") as view:
         left, right = view.axes
         for k, method in enumerate(methods):
             offset = (k - (len(methods) - 1) / 2) * 0.7 / len(methods)
@@ -96,6 +84,4 @@ def energy_by_fins(rows: Sequence[dict[str, Any]], reference: str) -> Picture:
         right.set(ylabel="fins at rest, mean", title="fins at rest")
         for axis in view.axes:
             axis.set(xlabel="fins", xticks=fins)
-            clean(axis, grid="y")
-        view.legend()
         return view

@@ -26,14 +26,6 @@ class Card:
 
 
 @dataclass(frozen=True)
-class Cards:
-    """The numbers that stand on top."""
-
-    cards: tuple[Card, ...]
-    """At most four in a line."""
-
-
-@dataclass(frozen=True)
 class Column:
     """A column of a table."""
 
@@ -45,6 +37,11 @@ class Column:
     """Key of `FORMATS`."""
     interval: str | None = None
     """Key of an interval [low, high] that stands below the number in small."""
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it stands to the right."""
+        return self.format not in ("text", "code")
 
 
 @dataclass(frozen=True)
@@ -93,8 +90,8 @@ class Fold:
     """What is inside."""
 
 
-Block = str | Cards | Table | Figure | Fold
-"""A string is Markdown."""
+Block = str | tuple[Card, ...] | Table | Figure | Fold
+"""A string is Markdown; cards, at most four in a line, are the numbers that stand on top."""
 
 
 @dataclass(frozen=True)
@@ -124,3 +121,8 @@ def method_row(row: Row) -> Row:
     """A row with its method's name as code, which stands out where it is the learned one."""
     kind = {"_kind": "ours"} if row["method"].startswith("learned") else {}
     return {**row, "method": f"`{row['method']}`", **kind}
+
+
+def printed_row(method: str, values: Row, **about: str) -> Row:
+    """A row of figures that the paper prints for a method."""
+    return {"method": method, "_kind": "printed", **about, **values}

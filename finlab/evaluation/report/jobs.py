@@ -1,4 +1,4 @@
-"""Jobs: pieces of work with their settings, run on all cores, each kept in a store when it is done."""
+"""Jobs: pieces of work with their settings, run on all cores, each kept in a folder when it is done."""
 
 import hashlib
 import json
@@ -6,7 +6,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from multiprocessing import get_context
@@ -14,13 +14,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from finlab.evaluation.statistics.records import VERSION, load_columns, save_columns
-
-Columns = dict[str, NDArray[Any]]
+from finlab.evaluation.statistics.records import VERSION, Columns, load_columns, save_columns
 
 
 class Result(NamedTuple):
@@ -32,48 +29,12 @@ class Result(NamedTuple):
     """How they were made: settings, seconds, commit, time of day."""
 
 
-class Store:
-    """Results on disk, one NPZ file each, named after the job and a digest of its settings."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-
-    def path(self, name: str, settings: Mapping[str, Any]) -> Path:
-        """Where a result lies, or will lie."""
-        text = json.dumps({"version": VERSION, **settings}, sort_keys=True)
-        return self.folder / f"{name}-{hashlib.sha256(text.encode()).hexdigest()[:12]}.npz"
-
-    def has(self, name: str, settings: Mapping[str, Any]) -> bool:
-        """Whether the work is done."""
-        return self.path(name, settings).is_file()
-
-    def load(self, name: str, settings: Mapping[str, Any]) -> Result:
-        """A result that is there; `DataError` if it is not."""
-        return Result(*load_columns(self.path(name, settings)))
-
-    def keep(
-        self, name: str, settings: Mapping[str, Any], make: Callable[[], Columns], **meta: Any
-    ) -> Result:
-        """The result that is there, or else the one that `make` gives, kept with the settings and `meta`."""
-        if not self.has(name, settings):
-            start = time.perf_counter()
-            columns = make()
-            made = {
-                "settings": dict(settings),
-                "seconds": time.perf_counter() - start,
-                "made": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
-                **meta,
-            }
-            save_columns(self.path(name, settings), columns, made)
-        return self.load(name, settings)
-
-
 def columns_of_rows(rows: list[dict[str, Any]]) -> Columns:
     """Rows of a finished table as one column of JSON texts, for results that have no entry per target."""
     return {"rows": np.array([json.dumps(row) for row in rows])}
 
 
-def rows_of_columns(columns: Mapping[str, NDArray[Any]]) -> list[dict[str, Any]]:
+def rows_of_columns(columns: Columns) -> list[dict[str, Any]]:
     """Inverse of `columns_of_rows`."""
     return [json.loads(str(text)) for text in columns["rows"]]
 
@@ -100,56 +61,61 @@ class Job:
         """What the result depends on."""
         return {"work": self.work.__name__, "prints": self.prints, **self.settings}
 
-    def done(self, store: Store) -> bool:
+    def path(self, folder: Path) -> Path:
+        """Where its result lies, or will lie: a file named after the job and a digest of its key."""
+        text = json.dumps({"version": VERSION, **self.key}, sort_keys=True)
+        return folder / f"{self.name}-{hashlib.sha256(text.encode()).hexdigest()[:12]}.npz"
+
+    def done(self, folder: Path) -> bool:
         """Whether its result is there."""
-        return store.has(self.name, self.key)
+        return self.path(folder).is_file()
 
-    def result(self, store: Store) -> Result:
+    def result(self, folder: Path) -> Result:
         """Its result; `DataError` if it is not there."""
-        return store.load(self.name, self.key)
+        return Result(*load_columns(self.path(folder)))
 
-    def run(self, store: Store, commit: str) -> None:
-        """Do the work, unless it is done."""
-        arguments = {**self.settings, **self.context}
-        store.keep(self.name, self.key, lambda: self.work(**arguments), commit=commit)
+    def run(self, folder: Path, commit: str) -> None:
+        """Do the work and keep its result."""
+        start = time.perf_counter()
+        columns = self.work(**self.settings, **self.context)
+        made = {
+            "settings": self.key,
+            "seconds": time.perf_counter() - start,
+            "made": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+            "commit": commit,
+        }
+        save_columns(self.path(folder), columns, made)
 
 
-def run_jobs(jobs: Sequence[Job], store: Store, *, commit: str, processes: int | None = None) -> None:
+def run_jobs(jobs: Sequence[Job], folder: Path, *, commit: str, processes: int | None = None) -> None:
     """Run what is not done yet: together first, then one by one what measures time.
 
     Args:
         jobs: in any order; those listed first start first.
-        store: keeps each result as soon as it is there, so that a run that was stopped goes on.
+        folder: keeps each result as soon as it is there, so that a run that was stopped goes on.
         commit: kept with the results.
         processes: how many at once; the number of cores by default, 0 for this process alone.
     """
-    left = [job for job in jobs if not job.done(store)]
-    together = [job for job in left if not job.alone]
-    bar = tqdm(total=len(left), unit="part", disable=None, file=sys.stderr)
+    left = [job for job in jobs if not job.done(folder)]
     processes = os.cpu_count() or 1 if processes is None else processes
-    with bar:
-        if processes == 0:
-            for job in together:
-                _show(bar, job)
-                job.run(store, commit)
-                bar.update()
-        elif together:
-            _run_pool(together, store.folder, commit, min(processes, len(together)), bar)
-        for job in left:
-            if job.alone:
-                _show(bar, job)
-                job.run(store, commit)
-                bar.update()
+    together = [job for job in left if processes and not job.alone]
+    with tqdm(total=len(left), unit="part", disable=None, file=sys.stderr) as bar:
+        if together:
+            _run_pool(together, folder, commit, min(processes, len(together)), bar)
+        for job in sorted((job for job in left if job.alone or not processes), key=lambda job: job.alone):
+            bar.set_description(job.name)
+            job.run(folder, commit)
+            bar.update()
 
 
 def _run_pool(jobs: Sequence[Job], folder: Path, commit: str, processes: int, bar: "tqdm[Any]") -> None:
     # Fresh processes: a fork would copy the threads of BLAS in whatever state they are.
     pool = ProcessPoolExecutor(processes, mp_context=get_context("spawn"), initializer=_calm)
     try:
-        waiting = {pool.submit(_run_one, job, folder, commit): job for job in jobs}
+        waiting = {pool.submit(job.run, folder, commit): job for job in jobs}
         for done in as_completed(waiting):
             done.result()
-            _show(bar, waiting[done])
+            bar.set_description(waiting[done].name)
             bar.update()
     finally:
         pool.shutdown(cancel_futures=True)
@@ -161,11 +127,3 @@ def _calm() -> None:
     os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")  # of what is loaded later
     threadpool_limits(1)
     sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 - for the life of the process
-
-
-def _run_one(job: Job, folder: Path, commit: str) -> None:
-    job.run(Store(folder), commit)
-
-
-def _show(bar: "tqdm[Any]", job: Job) -> None:
-    bar.set_description(job.name)

@@ -5,26 +5,19 @@ from pathlib import Path
 from typing import Any
 
 from finlab.evaluation.report.document import Block, Document, figures_of
-from finlab.evaluation.report.jobs import Store, run_jobs
+from finlab.evaluation.report.jobs import run_jobs
 from finlab.evaluation.report.pages import to_html, to_markdown
 from finlab.evaluation.report.plan import Checkpoints, make_plan
-from finlab.evaluation.report.provenance import Provenance, how_made_blocks, make_provenance, source_commit
+from finlab.evaluation.report.provenance import Provenance, how_made_blocks, source_commit
 from finlab.evaluation.report.results import Results
-from finlab.evaluation.report.sections.closed_loop import closed_loop_blocks
-from finlab.evaluation.report.sections.studies import (
-    ablation_blocks,
-    latency_blocks,
-    seed_blocks,
-    temperature_blocks,
-    training_blocks,
-)
-from finlab.evaluation.report.sections.summary import summary_blocks
-from finlab.evaluation.report.sections.wrench_tracking import accuracy_blocks, energy_blocks
+from finlab.evaluation.report.sections import closed_loop, studies, summary, wrench_tracking
 from finlab.evaluation.report.sizes import Sizes
 from finlab.inference.checkpoint import read_checkpoint, read_normalization, resolve_checkpoint
 
 PAGE, TWIN, TABLES, PICTURES = "index.html", "report.md", "tables.json", "pictures"
 """What a report's folder holds."""
+CLOSED_LOOP = {"trajectory", "faults", "velocity"}
+"""Tables of the experiments in closed loop."""
 
 
 def make_report(
@@ -54,38 +47,39 @@ def make_report(
         The page.
     """
     plan = make_plan(sizes, seed=seed, checkpoints=checkpoints, runs=records / "trainings")
-    store = Store(records)
     n_parts = len(list(plan))
     if as_is:
-        plan = plan.only_done(store)
+        plan = plan.only_done(records)
     else:
-        run_jobs(list(plan), store, commit=source_commit(), processes=processes)
+        run_jobs(list(plan), records, commit=source_commit(), processes=processes)
     left_out = n_parts - len(list(plan))
     paths = {
         "learned": resolve_checkpoint(checkpoints.learned or "default"),
         "paper": resolve_checkpoint(checkpoints.paper or "paper"),
     }
     prints = {f"{path.name} ({name})": read_checkpoint(path).sha256 for name, path in paths.items()}
-    results = Results(plan, store, read_normalization(paths["learned"]).std)
-    provenance = make_provenance(prints, seed, command)
+    results = Results(plan, records, read_normalization(paths["learned"]).std)
+    provenance = Provenance(prints, seed, command)
     write_report(out, make_document(results, provenance, sizes, left_out), tables_of(results, provenance))
     return out / PAGE
 
 
 def make_document(results: Results, provenance: Provenance, sizes: Sizes, left_out: int = 0) -> Document:
     """The page's blocks, from results; `left_out` parts have none yet."""
-    blocks: list[Block] = [
-        *summary_blocks(results),
-        *accuracy_blocks(results),
-        *energy_blocks(results),
-        *latency_blocks(results),
-        *closed_loop_blocks(results),
-        *seed_blocks(results),
-        *ablation_blocks(results),
-        *temperature_blocks(results),
-        *training_blocks(results),
-        *how_made_blocks(results, provenance, sizes),
-    ]
+    tables = results.tables
+    sections = (
+        (summary.summary_blocks, True),
+        (wrench_tracking.accuracy_blocks, results.wrench),
+        (wrench_tracking.energy_blocks, results.energy_rows),
+        (studies.latency_blocks, "latency" in tables),
+        (closed_loop.closed_loop_blocks, CLOSED_LOOP & tables.keys()),
+        (studies.seed_blocks, "seeds" in tables),
+        (studies.ablation_blocks, results.ablation_rows),
+        (studies.temperature_blocks, results.temperature_rows and results.plan.scatter),
+        (studies.training_blocks, results.training_rows),
+    )
+    blocks: list[Block] = [block for section, has_run in sections if has_run for block in section(results)]
+    blocks += how_made_blocks(results, provenance, sizes)
     note = "" if sizes.name == "full" else f" A {sizes.name} look on few cases; intervals are wide."
     note += f" {left_out} parts had not been run when this page was made." if left_out else ""
     subtitle = (
@@ -104,9 +98,9 @@ def tables_of(results: Results, provenance: Provenance) -> dict[str, Any]:
         "machine": provenance.machine,
         "wrench": [row for rows in results.wrench_rows.values() for row in rows],
         "energy": results.energy_rows,
-        "latency": results.latency_rows,
-        "closed_loop": results.swim_rows,
-        "seeds": results.seed_rows,
+        "latency": results.tables.get("latency", []),
+        "closed_loop": {name: rows for name, rows in results.tables.items() if name in CLOSED_LOOP},
+        "seeds": results.tables.get("seeds", []),
         "ablation": results.ablation_rows,
         "temperature": results.temperature_rows,
         "training": results.training_rows,

@@ -49,5 +49,6 @@ FORMATS: dict[str, Callable[[Any], str]] = {
     "ratio": "{:.3f}".format,
     "metres": "{:.4f}".format,
     "text": str,
+    "code": "`{}`".format,
 }
 """Name -> how a value is shown."""

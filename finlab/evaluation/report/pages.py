@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from markdown_it import MarkdownIt
 
-from finlab.evaluation.report.document import Block, Cards, Document, Figure, Fold, Table
+from finlab.evaluation.report.document import Block, Document, Figure, Fold, Table
 
 MARKDOWN = MarkdownIt("commonmark", {"html": False})
 
@@ -45,7 +45,7 @@ def _html_block(block: Block) -> str:
                     token.attrSet("id", _anchor(inside.content))
             rendered: str = MARKDOWN.renderer.render(tokens, MARKDOWN.options, {})
             return rendered
-        case Cards(cards):
+        case tuple(cards):
             parts = ("label", "value", "detail")
             texts = ["".join(_div(part, _inline(getattr(card, part))) for part in parts) for card in cards]
             return _div("cards", "".join(_div("card", text) for text in texts))
@@ -59,18 +59,17 @@ def _html_block(block: Block) -> str:
 
 
 def _html_table(table: Table) -> str:
-    kinds = [' class="name"' if column.format == "text" else "" for column in table.columns]
-    titles = zip(table.columns, kinds, strict=True)
-    lines = ["".join(f"<th{kind}>{_inline(column.title)}</th>" for column, kind in titles)]
+    kinds = ["" if column.is_number else ' class="name"' for column in table.columns]
+    columns = list(zip(table.columns, kinds, strict=True))
+    head = "".join(f"<th{kind}>{_inline(column.title)}</th>" for column, kind in columns)
+    body = []
     for row in table.rows:
-        cells = []
-        for column, kind in zip(table.columns, kinds, strict=True):
+        body.append(f'<tr class="{row["_kind"]}">' if "_kind" in row else "<tr>")
+        for column, kind in columns:
             big, small = table.cell(row, column)
-            cells.append(f"<td{kind}>{_inline(big)}{f'<small>{small}</small>' if small else ''}</td>")
-        lines.append("".join(cells))
-    marks = [f' class="{row["_kind"]}"' if "_kind" in row else "" for row in table.rows]
-    body = "".join(f"<tr{mark}>{line}</tr>" for mark, line in zip(marks, lines[1:], strict=True))
-    return f"<table><thead><tr>{lines[0]}</tr></thead><tbody>{body}</tbody></table>"
+            body.append(f"<td{kind}>{_inline(big)}{f'<small>{small}</small>' if small else ''}</td>")
+        body.append("</tr>")
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(body)}</tbody></table>"
 
 
 def _inline(text: str) -> str:
@@ -99,7 +98,7 @@ def _text_block(block: Block, pictures: str) -> str:
     match block:
         case str():
             return block
-        case Cards(cards):
+        case tuple(cards):
             return "\n".join(f"- **{card.value}** {card.label}: {card.detail}" for card in cards)
         case Table():
             return _text_table(block)
@@ -112,7 +111,7 @@ def _text_block(block: Block, pictures: str) -> str:
 
 def _text_table(table: Table) -> str:
     lines = [[column.title for column in table.columns]]
-    lines.append(["---" if column.format == "text" else "---:" for column in table.columns])
+    lines.append(["---:" if column.is_number else "---" for column in table.columns])
     for row in table.rows:
         shown = [table.cell(row, column) for column in table.columns]
         cells = [f"{big} ({small})" if small else big for big, small in shown]

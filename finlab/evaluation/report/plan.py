@@ -19,9 +19,10 @@ from finlab.evaluation.method_specs import (
 )
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.report import work
-from finlab.evaluation.report.jobs import Columns, Job, Store
+from finlab.evaluation.report.jobs import Job
 from finlab.evaluation.report.sizes import Sizes
 from finlab.evaluation.splits import SPLITS
+from finlab.evaluation.statistics.records import Columns
 
 Size = tuple[int, int]
 
@@ -39,14 +40,8 @@ SCATTER_FINS, SCATTER_TARGETS = 4, 3
 """Fins of the layout, and its targets, whose candidates are drawn before and after refinement."""
 
 
-WHOLE = ("ablation", "temperature", "scatter", "seeds")
+WHOLE = ("ablation", "temperature", "scatter")
 """Studies that say something only when all of their jobs are done."""
-SWIM_METHODS = {
-    "trajectory": "learned,on-board",
-    "faults": "learned,on-board",
-    "velocity": "learned-power,learned,analytic,on-board",
-}
-"""Closed-loop experiment -> methods."""
 
 
 @dataclass(frozen=True)
@@ -63,21 +58,18 @@ class Plan:
     """By temperature."""
     scatter: dict[str, Job] = field(default_factory=dict)
     """One job, `paper`."""
-    seeds: dict[str, Job] = field(default_factory=dict)
-    """One job, `id`."""
     training: dict[str, Job] = field(default_factory=dict)
     """By change."""
-    swims: dict[str, Job] = field(default_factory=dict)
-    """Closed-loop experiments: `trajectory`, `faults` and `velocity`; none in a tiny report."""
-    latency: dict[str, Job] = field(default_factory=dict)
-    """One job, `calls`."""
+    tables: dict[str, Job] = field(default_factory=dict)
+    """Jobs that give the rows of one table: `seeds`, the closed-loop experiments `trajectory`, `faults` and
+    `velocity` (none in a tiny report), and `latency`."""
 
-    def only_done(self, store: Store) -> "Plan":
+    def only_done(self, folder: Path) -> "Plan":
         """The jobs whose results are there; a study that lacks a part is left out whole."""
         left: dict[str, Any] = {}
         for group in fields(self):
             jobs = getattr(self, group.name)
-            done = {key: job for key, job in jobs.items() if job.done(store)}
+            done = {key: job for key, job in jobs.items() if job.done(folder)}
             whole = group.name in WHOLE and len(done) < len(jobs)
             left[group.name] = {} if whole else done
         return Plan(**left)
@@ -122,18 +114,20 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
         settings |= {"seed": seed} | ({} if size is None else {"layouts": size[0], "targets": size[1]})
         return Job(name, do, settings, prints[spec], {"checkpoint": checkpoints.of(spec)})
 
-    energy = {
-        name: job(f"energy-{name}", work.energy, name, _energy_size(sizes, name), method=name)
-        for name in (REFERENCE, *ENERGY_METHODS)
-        if name in prints
-    }
+    energy = {}
+    for name in (REFERENCE, *ENERGY_METHODS):
+        if name in prints:
+            layouts, targets = sizes.energy
+            size = layouts, sizes.energy_slow if is_slow(name) and name != REFERENCE else targets
+            energy[name] = job(f"energy-{name}", work.energy, name, size, method=name)
     wrench = {}
     for name in sorted(names, key=lambda name: name != "paper"):
         for split in SPLITS:
             if is_slow(name) and split == "id":
                 wrench[split, name] = energy[name]  # the same targets, and more of them
             else:
-                size = _size(sizes, split, name)
+                main = split in paper_figures()["wrench_tracking"]
+                size = sizes.of_split(main=main, slow=is_slow(name))
                 wrench[split, name] = job(
                     f"wrench-{split}-{name}", work.wrench, name, size, split=split, method=name
                 )
@@ -161,19 +155,17 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
     preset, steps, batch_size = sizes.training
     study = {"preset": preset, "steps": steps, "batch_size": batch_size, "seed": seed}
     study |= {"layouts": sizes.seeds[0], "targets": sizes.seeds[1]}
-    loops: dict[str, tuple[Callable[..., Columns], int, dict[str, Any]]] = {
-        "trajectory": (work.trajectory, sizes.swims[0], {}),
-        "faults": (work.faults, sizes.swims[1], {"pairs": sizes.lost_pairs}),
-        "velocity": (work.velocity, sizes.swims[2], {}),
-    }
-    swims = {
-        name: job(f"swim-{name}", do, "learned", None, methods=SWIM_METHODS[name], runs=n, **more)
-        for name, (do, n, more) in loops.items()
-        if n
-    }
+    tables = {"seeds": job("seeds", work.seeds, "learned", sizes.seeds, candidates=N_SEEDS)}
+    for do, n_runs, options in (
+        (work.trajectory, sizes.swims[0], {"methods": "learned,on-board"}),
+        (work.faults, sizes.swims[1], {"methods": "learned,on-board", "pairs": sizes.lost_pairs}),
+        (work.velocity, sizes.swims[2], {"methods": "learned-power,learned,analytic,on-board"}),
+    ):
+        if n_runs:
+            tables[do.__name__] = job(f"swim-{do.__name__}", do, "learned", runs=n_runs, **options)
     calls, budget_s = sizes.latency
     methods = [name for name in LATENCY_METHODS if name in prints]
-    latency = Job(
+    tables["latency"] = Job(
         "latency",
         work.latency,
         {"seed": seed, "methods": methods, "calls": calls, "budget_s": budget_s},
@@ -187,24 +179,9 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
         ablation=ablation,
         temperature=temperature,
         scatter={"paper": scatter},
-        seeds={"id": job("seeds", work.seeds, "learned", sizes.seeds, candidates=N_SEEDS)},
         training=training_jobs(study, runs) if torch else {},
-        swims=swims,
-        latency={"calls": latency},
+        tables=tables,
     )
-
-
-def _energy_size(sizes: Sizes, method: str) -> Size:
-    """Layouts and targets on which energies are compared; few for methods of 8 starts."""
-    layouts, targets = sizes.energy
-    return layouts, sizes.energy_slow if is_slow(method) and method != REFERENCE else targets
-
-
-def _size(sizes: Sizes, split: str, method: str) -> tuple[int, int]:
-    """Layouts and targets of a split, the paper's or another, for a quick or a slow method."""
-    if split in paper_figures()["wrench_tracking"]:
-        return (sizes.main[0], 1) if is_slow(method) else sizes.main
-    return sizes.slow_other if is_slow(method) else sizes.other
 
 
 def training_jobs(settings: dict[str, Any], folder: Path) -> dict[str, Job]:

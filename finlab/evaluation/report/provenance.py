@@ -2,7 +2,7 @@
 
 import subprocess
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import finlab
@@ -10,24 +10,6 @@ from finlab.evaluation.experiments.latency import machine
 from finlab.evaluation.report.document import Block, Column, Fold, Table
 from finlab.evaluation.report.results import Results
 from finlab.evaluation.report.sizes import Sizes
-
-
-@dataclass(frozen=True)
-class Provenance:
-    """What a reader needs to make the report again."""
-
-    commit: str
-    """Of the source tree, `+` for changes that are not in it; the version where there is no tree."""
-    made: str
-    """Time of day, UTC."""
-    machine: dict[str, str]
-    """Processor, cores and versions."""
-    checkpoints: dict[str, str]
-    """Name of each checkpoint -> SHA-256 of its weights."""
-    seed: int
-    """Of all draws."""
-    command: str
-    """That makes it again."""
 
 
 def source_commit() -> str:
@@ -41,12 +23,6 @@ def source_commit() -> str:
     return f"{commit}+" if changed else commit
 
 
-def make_provenance(checkpoints: dict[str, str], seed: int, command: str) -> Provenance:
-    """What is known now."""
-    made = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
-    return Provenance(source_commit(), made, machine(), checkpoints, seed, command)
-
-
 def _git(root: Path, *arguments: str) -> str:
     done = subprocess.run(
         ["git", *arguments], cwd=root, capture_output=True, text=True, check=True, timeout=10
@@ -54,24 +30,39 @@ def _git(root: Path, *arguments: str) -> str:
     return done.stdout.strip()
 
 
+@dataclass(frozen=True)
+class Provenance:
+    """What a reader needs to make the report again."""
+
+    checkpoints: dict[str, str]
+    """Name of each checkpoint -> SHA-256 of its weights."""
+    seed: int
+    """Of all draws."""
+    command: str
+    """That makes it again."""
+    commit: str = field(default_factory=source_commit)
+    """Of the source tree, `+` for changes that are not in it; the version where there is no tree."""
+    made: str = field(default_factory=lambda: time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()))
+    """Time of day, UTC."""
+    machine: dict[str, str] = field(default_factory=machine)
+    """Processor, cores and versions."""
+
+
 def how_made_blocks(results: Results, provenance: Provenance, sizes: Sizes) -> list[Block]:
     """The section that says so."""
     machine = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in provenance.machine.items())
     prints = [f"Checkpoint `{name}`: SHA-256 `{value}`" for name, value in provenance.checkpoints.items()]
     columns = (
-        Column("name", "part"),
+        Column("name", "part", "code"),
         Column("seconds", "seconds", "three"),
         Column("made", "made"),
-        Column("commit", "commit"),
+        Column("commit", "commit", "code"),
         Column("settings", "settings"),
     )
     rows = []
     for job in results.plan:
-        meta = job.result(results.store).meta
-        settings = {key: value for key, value in meta["settings"].items() if key not in ("work", "prints")}
-        words = ", ".join(f"{key} {value}" for key, value in settings.items())
-        rows.append({"name": f"`{job.name}`", "settings": words, **{k: meta[k] for k in ("seconds", "made")}})
-        rows[-1]["commit"] = f"`{meta['commit']}`"
+        settings = ", ".join(f"{key} {value}" for key, value in job.settings.items())
+        rows.append({**job.result(results.folder).meta, "name": job.name, "settings": settings})
     return [
         "## How this was made",
         "\n".join(

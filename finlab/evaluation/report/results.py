@@ -1,38 +1,38 @@
 """What the jobs of a plan gave, as the sections want it."""
 
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.evaluation.experiments.ablation import ablation_row
+from finlab.evaluation.experiments.ablation import variant_rows
 from finlab.evaluation.experiments.temperature import temperature_row
 from finlab.evaluation.experiments.training_study import training_row
-from finlab.evaluation.report.jobs import Columns, Job, Store, rows_of_columns
+from finlab.evaluation.report.jobs import Job, rows_of_columns
 from finlab.evaluation.report.plan import REFERENCE, Plan
 from finlab.evaluation.splits import SPLITS, make_split
 from finlab.evaluation.statistics.recheck import recheck
-from finlab.evaluation.statistics.records import Records, records_of_columns, same_targets
+from finlab.evaluation.statistics.records import Columns, Records, records_of_columns, same_targets
 from finlab.evaluation.statistics.tables import Row, energy_rows, wrench_intervals, wrench_row
 
 
 class Results:
-    """Records and rows by table; everything is computed from the files of the store."""
+    """Records and rows by table; everything is computed from the files of the jobs.
 
-    def __init__(self, plan: Plan, store: Store, sigma: NDArray[np.float64]) -> None:
-        """Look into a store.
+    Args:
+        plan: the jobs.
+        folder: their results.
+        sigma: the yardstick of the error, per axis (6,).
+    """
 
-        Args:
-            plan: the jobs.
-            store: their results.
-            sigma: the yardstick of the error, per axis (6,).
-        """
-        self.plan, self.store, self.sigma = plan, store, sigma
+    def __init__(self, plan: Plan, folder: Path, sigma: NDArray[np.float64]) -> None:
+        self.plan, self.folder, self.sigma = plan, folder, sigma
 
     def columns(self, job: Job) -> Columns:
         """The arrays of a job."""
-        return job.result(self.store).columns
+        return job.result(self.folder).columns
 
     @cached_property
     def wrench(self) -> dict[str, dict[str, Records]]:
@@ -66,10 +66,13 @@ class Results:
         """Rows of the comparison of energies; none where the reference is not installed."""
         if REFERENCE not in self.energy:
             return []
-        reference = self.energy[REFERENCE]
-        return [
-            row for name, part in self.energy.items() for row in energy_rows(part, reference, method=name)
-        ]
+        reference, rows = self.energy[REFERENCE], []
+        for name, part in self.energy.items():
+            for row in energy_rows(part, reference, method=name):
+                known = row["energy_ratio"] is not None
+                ends = [row["energy_ratio_low"], row["energy_ratio_high"]] if known else None
+                rows.append({**row, "energy_ratio_interval": ends})
+        return rows
 
     @cached_property
     def recheck_rows(self) -> list[Row]:
@@ -88,15 +91,8 @@ class Results:
     @cached_property
     def ablation_rows(self) -> list[Row]:
         """Each variant and refinement, scored by plant and surrogate."""
-        rows = []
-        for (variant, refinement), job in self.plan.ablation.items():
-            columns = self.columns(job)
-            by_plant = records_of_columns(columns)
-            believed = {"err_norm": columns["surrogate_err_norm"], "err_phys": columns["surrogate_err_phys"]}
-            by_surrogate = records_of_columns({**columns, **believed})
-            for scored_by, records in (("plant", by_plant), ("surrogate", by_surrogate)):
-                rows.append(ablation_row(variant, refinement, scored_by, records, float(columns["call_s"])))
-        return rows
+        jobs = self.plan.ablation.items()
+        return [row for key, job in jobs for row in variant_rows(*key, self.columns(job))]
 
     @cached_property
     def temperature_rows(self) -> list[Row]:
@@ -111,20 +107,9 @@ class Results:
         return {name: values[chosen] for name, values in columns.items()}
 
     @cached_property
-    def seed_rows(self) -> list[Row]:
-        """Rows of the comparison of seeds."""
-        return [row for job in self.plan.seeds.values() for row in rows_of_columns(self.columns(job))]
-
-    @cached_property
-    def latency_rows(self) -> list[Row]:
-        """Rows of the comparison of times, the fastest first."""
-        rows = [row for job in self.plan.latency.values() for row in rows_of_columns(self.columns(job))]
-        return sorted(rows, key=lambda row: row["p50_ms"])
-
-    @cached_property
-    def swim_rows(self) -> dict[str, list[Row]]:
-        """Closed-loop experiment -> its rows; those that were left out are missing."""
-        return {name: rows_of_columns(self.columns(job)) for name, job in self.plan.swims.items()}
+    def tables(self) -> dict[str, list[Row]]:
+        """Rows of the experiments whose results are finished tables; those that were left out are missing."""
+        return {name: rows_of_columns(self.columns(job)) for name, job in self.plan.tables.items()}
 
     @cached_property
     def training_rows(self) -> list[Row]:

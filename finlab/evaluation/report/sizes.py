@@ -34,6 +34,12 @@ class Sizes:
     lost_pairs: bool
     """Whether pairs of lost fins swim too."""
 
+    def of_split(self, *, main: bool, slow: bool) -> tuple[int, int]:
+        """Layouts and targets of a split for a quick or a slow method."""
+        if main:
+            return (self.main[0], 1) if slow else self.main
+        return self.slow_other if slow else self.other
+
 
 SIZES = {
     "quick": Sizes(

@@ -20,10 +20,10 @@ from finlab.evaluation.experiments.trajectory_and_velocity import (
 )
 from finlab.evaluation.experiments.wrench_tracking import run_method, score
 from finlab.evaluation.method_specs import load_method_spec, load_method_specs
-from finlab.evaluation.plots.closed_loop_experiments import Track
-from finlab.evaluation.report.jobs import Columns, columns_of_rows
+from finlab.evaluation.plots.closed_loop_experiments import Track, track_of
+from finlab.evaluation.report.jobs import columns_of_rows
 from finlab.evaluation.splits import make_split
-from finlab.evaluation.statistics.records import columns_of_records, join_records
+from finlab.evaluation.statistics.records import Columns, columns_of_records, join_records
 from finlab.layout import load_layout
 from finlab.sim import make_trajectory
 
@@ -53,9 +53,8 @@ def energy(*, layouts: int, targets: int, method: str, seed: int, checkpoint: st
         parts.append(
             score(case, case.targets, answer.command, answer.solve_ms, allocator.normalization.std, number=k)
         )
-        padded = np.full((len(case.targets), MOST_FINS, 3), np.nan)
-        padded[:, : case.layout.n_fins] = answer.command
-        commands.append(padded)
+        missing = (0, 0), (0, MOST_FINS - case.layout.n_fins), (0, 0)
+        commands.append(np.pad(answer.command, missing, constant_values=np.nan))
     return columns_of_records(join_records(parts)) | {"command": np.concatenate(commands)}
 
 
@@ -74,10 +73,7 @@ def ablation(
     method = ablation_method(
         variant, refinement, checkpoint=checkpoint, n_candidates=candidates, temperature=temperature
     )
-    scored = run_variant(method, make_split("id", layouts, targets, seed), seed=seed)
-    by_surrogate = scored.surrogate
-    believed = {f"surrogate_{key}": getattr(by_surrogate, key) for key in ("err_norm", "err_phys")}
-    return columns_of_records(scored.plant) | believed | {"call_s": np.array(scored.call_s)}
+    return run_variant(method, make_split("id", layouts, targets, seed), seed=seed)
 
 
 def temperature(
@@ -112,12 +108,13 @@ def latency(
     checkpoint: str | None,
     paper_checkpoint: str | None,
 ) -> Columns:
-    """Rows of the comparison of times; to be run with nothing beside it."""
+    """Rows of the comparison of times, the fastest first; to be run with nothing beside it."""
     cases = latency_cases(LATENCY_FINS, seed)
     allocators = {
         name: load_method_spec(name, paper_checkpoint if name == "paper" else checkpoint) for name in methods
     }
-    return columns_of_rows(latency_rows(allocators, cases, n_calls=calls, budget_s=budget_s))
+    rows = latency_rows(allocators, cases, n_calls=calls, budget_s=budget_s)
+    return columns_of_rows(sorted(rows, key=lambda row: row["p50_ms"]))
 
 
 def training(
@@ -145,8 +142,7 @@ def trajectory(*, methods: str, runs: int, seed: int, checkpoint: str | None) ->
     columns = columns_of_rows(trajectory_rows(found))
     for (layout, method), log in found:
         step = max(1, round(0.2 / float(log.time[1] - log.time[0])))
-        track = np.column_stack([log.time, log.position, log.reference])
-        columns.setdefault(f"{TRACK}{layout} {method}", track[::step])
+        columns.setdefault(f"{TRACK}{layout} {method}", track_of(log)[::step])
     return columns
 
 
@@ -155,8 +151,8 @@ def tracks_of_columns(columns: Columns) -> list[Track]:
     tracks = []
     for name, track in columns.items():
         if name.startswith(TRACK):
-            layout, method = name.removeprefix(TRACK).split(" ", 1)
-            tracks.append(Track(layout, method, track[:, 0], track[:, 1:4], track[:, 4:]))
+            layout, _, method = name.removeprefix(TRACK).partition(" ")
+            tracks.append(((layout, method), track))
     return tracks
 
 

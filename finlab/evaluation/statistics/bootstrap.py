@@ -33,33 +33,26 @@ class Interval(NamedTuple):
     high: float
     """Upper end."""
 
-    def holds(self, value: float) -> bool:
-        """Whether a value lies inside, rounding aside."""
-        slack = 1e-9 * max(abs(self.low), abs(self.high))
-        return self.low - slack <= value <= self.high + slack
 
-
-def mean_interval(values: Array, group: NDArray[np.int64], *, seed: int = 0) -> Interval:
+def mean_interval(values: Array, group: NDArray[np.int64]) -> Interval:
     """Of the mean of values (N,), whose layouts are numbered in group (N,)."""
-    return ratio_interval(values, np.ones(len(values)), group, seed=seed)
+    return ratio_interval(values, np.ones(len(values)), group)
 
 
-def ratio_interval(
-    numerator: Array, denominator: Array, group: NDArray[np.int64], *, seed: int = 0
-) -> Interval:
+def ratio_interval(numerator: Array, denominator: Array, group: NDArray[np.int64]) -> Interval:
     """Of the sum of numerators over the sum of denominators, each (N,)."""
     member, n_groups = _members(group)
     above, below = (np.bincount(member, v, minlength=n_groups) for v in (numerator, denominator))
-    counts = _counts(n_groups, seed)
+    counts = _counts(n_groups)
     with np.errstate(divide="ignore", invalid="ignore"):
         drawn = (counts @ above) / (counts @ below)
     return _ends(drawn[np.isfinite(drawn)])
 
 
-def share_interval(holds: NDArray[np.bool_], group: NDArray[np.int64], *, seed: int = 0) -> Interval:
+def share_interval(holds: NDArray[np.bool_], group: NDArray[np.int64]) -> Interval:
     """Of the share of entries (N,) that hold; never narrower than Wilson's interval for N separate draws,
     since a run without a single failure does not show that there are none."""
-    drawn = mean_interval(holds.astype(np.float64), group, seed=seed)
+    drawn = mean_interval(holds.astype(np.float64), group)
     n, share = len(holds), float(holds.mean())
     centre = (share + SPREAD**2 / (2 * n)) / (1 + SPREAD**2 / n)
     half = SPREAD / (1 + SPREAD**2 / n) * np.sqrt(share * (1 - share) / n + SPREAD**2 / (4 * n**2))
@@ -67,7 +60,7 @@ def share_interval(holds: NDArray[np.bool_], group: NDArray[np.int64], *, seed: 
     return Interval(max(0.0, float(low)), min(1.0, float(high)))
 
 
-def quantile_interval(values: Array, quantile: float, group: NDArray[np.int64], *, seed: int = 0) -> Interval:
+def quantile_interval(values: Array, quantile: float, group: NDArray[np.int64]) -> Interval:
     """Of a quantile of values (N,), to the resolution of `BINS` ranks."""
     member, n_groups = _members(group)
     order = np.argsort(values)
@@ -75,7 +68,7 @@ def quantile_interval(values: Array, quantile: float, group: NDArray[np.int64], 
     rank[order] = np.arange(len(values)) * BINS // len(values)
     table = np.zeros((n_groups, BINS))
     np.add.at(table, (member, rank), 1.0)
-    cumulative = np.cumsum(_counts(n_groups, seed) @ table, axis=1)
+    cumulative = np.cumsum(_counts(n_groups) @ table, axis=1)
     at = (cumulative < quantile * cumulative[:, -1:]).sum(axis=1).clip(max=BINS - 1)
     # The smallest value of each rank, so that a rank without one takes the next.
     edges = values[order][np.minimum(-(-np.arange(BINS) * len(values) // BINS), len(values) - 1)]
@@ -97,9 +90,9 @@ def _members(group: NDArray[np.int64]) -> tuple[NDArray[np.intp], int]:
 
 
 @lru_cache(maxsize=4)
-def _counts(n_groups: int, seed: int) -> Array:
+def _counts(n_groups: int) -> Array:
     """How often each group is drawn (REPLICATES, n_groups); the same for every table of a report."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     return rng.multinomial(n_groups, np.full(n_groups, 1 / n_groups), size=REPLICATES).astype(np.float64)
 
 

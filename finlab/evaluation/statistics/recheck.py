@@ -4,15 +4,13 @@ precision. A win that came from a broken limit or a missed target would show her
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.errors import DataError
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.records import Records
 from finlab.evaluation.statistics.tables import MET
 from finlab.layout import Layout
-
-Array = NDArray[np.float64]
+from finlab.layout.arrays import Array
 
 
 def wrench_by_hand(layout: Layout, command: Array) -> Array:

@@ -18,6 +18,7 @@ from finlab.errors import DataError
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
+Columns = dict[str, NDArray[Any]]
 
 VERSION = 2
 """Of the file format; part of the settings that a file is found by."""
@@ -71,7 +72,7 @@ def same_targets(records: Records, reference: Records) -> tuple[Records, Records
     return records.select(ours), reference.select(theirs)
 
 
-def columns_of_records(records: Records) -> dict[str, NDArray[Any]]:
+def columns_of_records(records: Records) -> Columns:
     """The arrays by their names."""
     return {field.name: getattr(records, field.name) for field in fields(Records)}
 
@@ -90,7 +91,7 @@ def save_columns(path: Path, columns: Mapping[str, NDArray[Any]], meta: Mapping[
     partial.replace(path)
 
 
-def load_columns(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+def load_columns(path: Path) -> tuple[Columns, dict[str, Any]]:
     """What `save_columns` wrote: the arrays, and how they were made.
 
     Raises:

@@ -27,15 +27,10 @@ ENERGY_COLUMNS = ("energy_mean", "energy_ratio", "cheaper", "resting")
 
 
 def wrench_row(records: Records, *, split: str, method: str) -> Row:
-    """One row of the wrench table.
-
-    Args:
-        records: at least one target.
-        split: name of the split.
-        method: name of the method.
-    """
+    """One row of the wrench table, from at least one target."""
     error = records.err_norm
-    row: Row = {
+    shares = {f"success_{level}": float((error <= level).mean()) for level in SUCCESS_LEVELS}
+    return {
         "split": split,
         "method": method,
         "n": len(records),
@@ -45,28 +40,25 @@ def wrench_row(records: Records, *, split: str, method: str) -> Row:
         "err_norm_p95": float(np.quantile(error, 0.95)),
         "err_norm_max": float(error.max()),
         "err_phys_mean": float(records.err_phys.mean()),
-    }
-    row |= {f"success_{level}": float((error <= level).mean()) for level in SUCCESS_LEVELS}
-    row |= {
+        **shares,
         "energy_mean": float(records.energy.mean()),
         "solve_ms_p50": float(np.quantile(records.solve_ms, 0.5)),
         "solve_ms_p99": float(np.quantile(records.solve_ms, 0.99)),
     }
-    return row
 
 
 def wrench_intervals(records: Records) -> dict[str, Interval]:
     """Where the columns of `wrench_row` would lie in a rerun with another seed, by column."""
     error, group = records.err_norm, records.layout
-    found = {
+    shares = {f"success_{level}": share_interval(error <= level, group) for level in SUCCESS_LEVELS}
+    return {
         "err_norm_mean": mean_interval(error, group),
         "err_norm_median": quantile_interval(error, 0.5, group),
         "err_norm_p95": quantile_interval(error, 0.95, group),
         "err_phys_mean": mean_interval(records.err_phys, group),
         "energy_mean": mean_interval(records.energy, group),
+        **shares,
     }
-    found |= {f"success_{level}": share_interval(error <= level, group) for level in SUCCESS_LEVELS}
-    return found
 
 
 def rows_by_fin_count(records: Records, *, method: str) -> list[Row]:
@@ -106,11 +98,6 @@ def _energy_columns(ours: Records, theirs: Records) -> Row:
     }
 
 
-def columns_of(rows: Sequence[Row]) -> list[str]:
-    """Every key that occurs, in order of first appearance."""
-    return list(dict.fromkeys(key for row in rows for key in row))
-
-
 def format_cell(value: object) -> str:
     """A cell as text: small and large numbers with three significant digits, nothing for a missing one, an
     interval in brackets."""
@@ -126,8 +113,9 @@ def format_cell(value: object) -> str:
 
 
 def text_table(rows: Sequence[Row], columns: Sequence[str] | None = None) -> str:
-    """Columns padded with spaces, numbers to the right, a rule under the heading."""
-    columns = list(columns or columns_of(rows))
+    """Columns padded with spaces, numbers to the right, a rule under the heading; by default every key that
+    occurs, in order of first appearance."""
+    columns = list(columns or dict.fromkeys(key for row in rows for key in row))
     cells = [[format_cell(row.get(column)) for column in columns] for row in rows]
     widths = [max([len(column), *(len(line[i]) for line in cells)]) for i, column in enumerate(columns)]
     is_text = [any(isinstance(row.get(column), str) for row in rows) for column in columns]

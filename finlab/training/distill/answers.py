@@ -8,7 +8,7 @@ import os
 import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ from finlab.layout import layout_from_arrays, random_layouts
 from finlab.physics.energy import command_energy
 
 Array = NDArray[Any]
+Values = TypeVar("Values")
+"""Arrays, or the tensors of a batch."""
 
 SEED = 70_000
 """Added to the user's seed, so that no layout here is one of training or evaluation."""
@@ -43,30 +45,30 @@ class AnswerSettings:
     """Seed of layouts and targets."""
 
 
-class Answers(NamedTuple):
-    """Answers on B layouts of n fins (padded), M targets each."""
+class Answers(NamedTuple, Generic[Values]):
+    """Answers on B layouts of n fins (padded), M targets each; in training, batches without axis M."""
 
-    position: Array
+    position: Values
     """(B, n, 3) [m]."""
-    mounting_angle: Array
+    mounting_angle: Values
     """(B, n) [rad]."""
-    lower: Array
+    lower: Values
     """(B, n, 3)."""
-    upper: Array
+    upper: Values
     """(B, n, 3)."""
-    mask: Array
+    mask: Values
     """True (B, n) where there is a fin."""
-    columns: Array
+    columns: Values
     """Normalized wrench per newton (B, n, 2, 6) of each fin's horizontal and vertical force."""
-    maximum: Array
+    maximum: Values
     """Largest thrust (B, n) [N]; 1 for padding."""
-    free: Array
+    free: Values
     """True (B,) where every fin may point anywhere."""
-    target: Array
+    target: Values
     """Normalized targets (B, M, 6)."""
-    share: Array
+    share: Values
     """Fourth root (B, M, n) of each fin's thrust in the answer over its largest."""
-    energy: Array
+    energy: Values
     """Energy proxy (B, M) of the answer."""
 
 
@@ -94,7 +96,7 @@ def write_answers(allocator: LearnedAllocator, folder: Path, settings: AnswerSet
         os.replace(part, _shard(folder, k))
 
 
-def read_answers(folder: Path) -> Answers:
+def read_answers(folder: Path) -> Answers[Array]:
     """All answers in a folder.
 
     Raises:
@@ -110,7 +112,7 @@ def read_answers(folder: Path) -> Answers:
     return Answers(*(np.concatenate(parts) for parts in zip(*shards, strict=True)))
 
 
-def make_answers(allocator: LearnedAllocator, settings: AnswerSettings, k: int) -> Answers:
+def make_answers(allocator: LearnedAllocator, settings: AnswerSettings, k: int) -> Answers[Array]:
     """Shard k."""
     rng = np.random.default_rng([SEED + settings.seed, k])
     n_layouts, n_targets = settings.layouts_per_shard, settings.targets_per_layout

@@ -5,7 +5,7 @@ first points to the right mode, the second settles what the mean of two modes wo
 """
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +21,10 @@ from finlab.inference.normalization import Normalization
 from finlab.layout import random_layout
 from finlab.physics import Plant
 from finlab.physics.energy import command_energy
-from finlab.training.distill.answers import Answers, AnswerSettings, read_answers, write_answers
+from finlab.training.distill.answers import Answers, AnswerSettings, Array, read_answers, write_answers
 from finlab.training.distill.network import FastConfig, FastNetwork, decode, energy
 from finlab.training.loop import LoopSettings, train
+from finlab.training.saving import state_of
 
 SEED = 80_000
 """Added to the user's seed."""
@@ -31,18 +32,8 @@ ENERGY_WEIGHT = 0.3
 """Weight of the cost beyond the best answer's, in units of that answer's energy."""
 
 
-@dataclass(frozen=True)
-class FastSettings:
-    """How to train the distilled network."""
-
-    steps: int = 20_000
-    """Optimizer steps."""
-    batch_size: int = 1024
-    """Targets per step."""
-    learning_rate: float = 2e-3
-    """Peak learning rate."""
-    seed: int = 0
-    """Seed of first weights and batches."""
+FAST_TRAINING = LoopSettings(20_000, 1024, 2e-3, warmup=200, ema=0.999)
+"""How the distilled network is trained."""
 
 
 def train_fast(
@@ -50,7 +41,7 @@ def train_fast(
     out: Path,
     *,
     config: FastConfig,
-    settings: FastSettings,
+    settings: LoopSettings,
     data: AnswerSettings,
     stop_after: int | None = None,
 ) -> dict[str, float]:
@@ -64,59 +55,41 @@ def train_fast(
     n = len(answers.position)
     cut = min(round(n * 0.98), n - 1)
     learned, judged = (Answers(*(a[rows] for a in answers)) for rows in (slice(cut), slice(cut, None)))
-    torch.manual_seed(SEED + settings.seed)
+    torch.manual_seed(SEED + data.seed)
     network = FastNetwork(config, FIN_FRAME_SIZE)
     batches = Batches(learned, allocator.normalization)
 
     def terms(net: nn.Module, step: int) -> dict[str, Tensor]:
-        rng = np.random.default_rng([SEED + settings.seed, step])
-        return losses(net, batches.draw(rng, settings.batch_size))
+        rng = np.random.default_rng([SEED + data.seed, step])
+        return losses(net, *batches.draw(rng, settings.batch_size))
 
     identity: dict[str, Any] = {"fast": asdict(settings) | asdict(config), "answers": asdict(data)}
-    loop = LoopSettings(
-        settings.steps, settings.batch_size, settings.learning_rate, warmup=200, ema=0.999, log_every=100
+
+    def save(weights: dict[str, Tensor], **about: object) -> None:
+        fast = FastWeights(state_of(weights), config.rounds)
+        save_fast(out, fast, identity | {"checkpoint": allocator.checkpoint} | about)
+
+    weights = train(
+        network,
+        terms,
+        settings,
+        out,
+        identity,
+        stop_after=stop_after,
+        on_save=lambda weights, step: save(weights, step=step),
     )
-
-    def save(weights: dict[str, Tensor], step: int) -> None:
-        fast = FastWeights({k: v.detach().numpy() for k, v in weights.items()}, config.rounds)
-        save_fast(out, fast, identity | {"checkpoint": allocator.checkpoint, "step": step})
-
-    weights = train(network, terms, loop, out, identity, stop_after=stop_after, on_save=save)
     network.load_state_dict(weights, strict=True)
     with torch.inference_mode():
-        held_out = losses(network, Batches(judged, allocator.normalization).all())
-    fast = FastWeights({k: v.detach().numpy() for k, v in weights.items()}, config.rounds)
+        held_out = losses(network, *Batches(judged, allocator.normalization).all())
     metrics = {f"held_out_{name}": float(value) for name, value in held_out.items()}
-    metrics |= fast_metrics(allocator, fast)
-    save_fast(out, fast, identity | {"checkpoint": allocator.checkpoint, "metrics": metrics})
+    metrics |= fast_metrics(allocator, FastWeights(state_of(weights), config.rounds))
+    save(weights, metrics=metrics)
     return metrics
 
 
-@dataclass(frozen=True)
-class Batch:
-    """Targets with their best answers, B of them on layouts of n fins."""
-
-    features: Tensor
-    """(B, n, F)."""
-    mask: Tensor
-    """(B, n)."""
-    columns: Tensor
-    """(B, n, 2, 6)."""
-    maximum: Tensor
-    """(B, n)."""
-    free: Tensor
-    """(B,)."""
-    target: Tensor
-    """(B, 6)."""
-    share: Tensor
-    """(B, n)."""
-    energy: Tensor
-    """(B,)."""
-
-
-def losses(net: Callable[..., Tensor], batch: Batch) -> dict[str, Tensor]:
-    """The loss and its parts, means over a batch."""
-    share = net(batch.features, batch.mask)
+def losses(net: Callable[..., Tensor], features: Tensor, batch: Answers[Tensor]) -> dict[str, Tensor]:
+    """The loss and its parts, means over a batch with these node features (B, n, F)."""
+    share = net(features, batch.mask)
     apart = nn.functional.smooth_l1_loss(share, batch.share, reduction="none", beta=0.1)
     imitation = (apart * batch.mask).sum() / batch.mask.sum()
     forces = decode(share, batch.columns, batch.maximum, batch.mask, batch.target)
@@ -129,38 +102,33 @@ def losses(net: Callable[..., Tensor], batch: Batch) -> dict[str, Tensor]:
 class Batches:
     """Draws batches from answers; node features are made as they are needed."""
 
-    def __init__(self, answers: Answers, normalization: Normalization) -> None:
+    def __init__(self, answers: Answers[Array], normalization: Normalization) -> None:
         """Take over answers in memory."""
         self._answers, self._normalization = answers, normalization
         position, angle, lower, upper = (np.asarray(a, dtype=np.float64) for a in answers[:4])
         self._geometry = geometry(position, angle, lower, upper, normalization.std, answers.mask)
 
-    def draw(self, rng: np.random.Generator, size: int) -> Batch:
-        """A random batch."""
+    def draw(self, rng: np.random.Generator, size: int) -> tuple[Tensor, Answers[Tensor]]:
+        """Node features and answers of a random batch."""
         n_layouts, n_targets, _ = self._answers.target.shape
         return self._of(rng.integers(n_layouts, size=size), rng.integers(n_targets, size=size))
 
-    def all(self) -> Batch:
+    def all(self) -> tuple[Tensor, Answers[Tensor]]:
         """Everything at once."""
         rows, columns = np.indices(self._answers.energy.shape)
         return self._of(rows.ravel(), columns.ravel())
 
-    def _of(self, row: np.ndarray, place: np.ndarray) -> Batch:
+    def _of(self, row: Array, place: Array) -> tuple[Tensor, Answers[Tensor]]:
         a = self._answers
-        target = a.target[row, place]
-        centred = target - self._normalization.mean / self._normalization.std
+        parts = [part[row] for part in a[:8]] + [part[row, place] for part in a[8:]]
+        picked = Answers(*parts)
+        centred = picked.target - self._normalization.mean / self._normalization.std
         seen = type(self._geometry)(*(part[row] for part in self._geometry))
-        arrays = (
-            fin_frame_features(seen, centred),
-            a.mask[row],
-            a.columns[row],
-            a.maximum[row],
-            a.free[row],
-            target,
-            a.share[row, place],
-            a.energy[row, place],
-        )
-        return Batch(*(torch.from_numpy(np.asarray(array, dtype=np.float32)) for array in arrays))
+        return _tensor(fin_frame_features(seen, centred)), Answers(*map(_tensor, picked))
+
+
+def _tensor(values: Array) -> Tensor:
+    return torch.from_numpy(np.asarray(values, dtype=np.float32))
 
 
 JUDGE_SEED = 90_000
@@ -179,9 +147,7 @@ def fast_metrics(
     errors, ratios = [], []
     for _ in range(n_layouts):
         layout = random_layout(rng)
-        plant = Plant(layout)
-        lower = layout.lower
-        upper = layout.upper
+        plant, lower, upper = Plant(layout), layout.lower, layout.upper
         targets = plant.wrench(lower + rng.random((n_targets, layout.n_fins, 3)) * (upper - lower))
         quick = fast.allocate_batch(layout, targets).command
         whole = allocator.allocate_batch(layout, targets).command

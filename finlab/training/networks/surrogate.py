@@ -26,13 +26,6 @@ def mlp(n_in: int, hidden: Sequence[int], n_out: int, activation: type[nn.Module
     return nn.Sequential(*blocks, nn.Linear(sizes[-1], n_out))
 
 
-def first_layer(net: nn.Sequential) -> nn.Linear:
-    """The layer that sees the inputs."""
-    layer = net[0]
-    assert isinstance(layer, nn.Linear)
-    return layer
-
-
 class CoefficientSurrogate(nn.Module):
     """Dimensionless force coefficients of one fin, learned in the frame turned by its zero direction.
 
@@ -88,7 +81,7 @@ class MlpSurrogate(nn.Module):
         self.net = mlp(13, config.hidden, 3, nn.SiLU)
         # Angles enter as plain numbers and their sines must be learned; wider first weights start
         # nearer to that (measured: a sixth of the loss after the same minute).
-        nn.init.uniform_(first_layer(self.net).weight, -0.8, 0.8)
+        nn.init.uniform_(next(self.net.parameters()), -0.8, 0.8)
         self.descriptor = nn.Sequential(nn.Linear(10, DESCRIPTOR), nn.Tanh())
         self.affine = nn.Linear(DESCRIPTOR, 12)
         nn.init.zeros_(self.affine.weight)
@@ -120,13 +113,8 @@ class MlpSurrogate(nn.Module):
 
 Surrogate = CoefficientSurrogate | MlpSurrogate
 
-KINDS: dict[str, type[CoefficientSurrogate] | type[MlpSurrogate]] = {
-    "coefficient": CoefficientSurrogate,
-    "mlp": MlpSurrogate,
-}
-"""Kind of surrogate -> class."""
-
 
 def make_surrogate(config: SurrogateConfig) -> Surrogate:
     """The surrogate of a configuration."""
-    return KINDS[config.kind](config)
+    kinds: dict[str, type[Surrogate]] = {"coefficient": CoefficientSurrogate, "mlp": MlpSurrogate}
+    return kinds[config.kind](config)

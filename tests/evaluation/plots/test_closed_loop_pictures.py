@@ -16,7 +16,7 @@ from finlab.evaluation.plots.closed_loop_experiments import (  # noqa: E402
     draw_faults,
     draw_layouts,
     draw_velocity,
-    tracks_of,
+    track_of,
 )
 
 WRENCH = ("Fx [N]", "Tx [N m]", "Fy [N]", "Ty [N m]", "Fz [N]", "Tz [N m]")
@@ -79,7 +79,8 @@ def test_each_axis_of_the_wrench_has_its_own_place(log: RunLog) -> None:
 
 
 def test_layouts_have_a_column_each(log: RunLog) -> None:
-    tracks = tracks_of([(("A", "learned"), log), (("B", "learned"), log), (("B", "on-board"), log)])
+    runs = (("A", "learned"), ("B", "learned"), ("B", "on-board"))
+    tracks = [(names, track_of(log)) for names in runs]
     rows = [{"layout": name, "ate": ate} for name, ate in (("A", 0.012), ("B", 0.034))]
     view = draw_layouts(tracks, rows)
     above_a, above_b, _, depth_b = view.axes

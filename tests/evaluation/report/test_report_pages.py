@@ -2,7 +2,7 @@
 
 import pytest
 
-from finlab.evaluation.report.document import Card, Cards, Column, Document, Figure, Fold, Table, figures_of
+from finlab.evaluation.report.document import Card, Column, Document, Figure, Fold, Table, figures_of
 from finlab.evaluation.report.numbers import FORMATS
 from finlab.evaluation.report.pages import to_html, to_markdown
 
@@ -16,7 +16,7 @@ DOCUMENT = Document(
     "A title & more",
     "One **line**.",
     (
-        Cards((Card("1.8 ms", "a call", "others 90"),)),
+        (Card("1.8 ms", "a call", "others 90"),),
         "## First section",
         "See [the docs](docs/x.md), `code` and 1 < 2.",
         Table(COLUMNS, ROWS),

@@ -1,13 +1,15 @@
 """Records in files, and results that are found again."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from finlab.errors import DataError
-from finlab.evaluation.report.jobs import Store, columns_of_rows, rows_of_columns
+from finlab.evaluation.report.jobs import Job, columns_of_rows, rows_of_columns, run_jobs
 from finlab.evaluation.statistics.records import (
+    Columns,
     Records,
     columns_of_records,
     join_records,
@@ -59,20 +61,35 @@ def test_join_and_select() -> None:
     assert len(both) == 2 and both.select(both.layout == 1).err_norm.tolist() == [2.0]
 
 
+MADE: list[int] = []
+
+
+def _work(*, seed: int, checkpoint: str) -> Columns:
+    MADE.append(seed)
+    return {"values": np.arange(3)}
+
+
 def test_a_result_is_made_once(tmp_path: Path) -> None:
-    store, made = Store(tmp_path), []
+    MADE.clear()
+    jobs = [Job("job", _work, {"seed": seed}, "print", {"checkpoint": "here"}) for seed in (0, 1, 2)]
+    run_jobs(jobs[:1], tmp_path, commit="abc", processes=0)
+    run_jobs(jobs[:2], tmp_path, commit="def", processes=0)
+    assert MADE == [0, 1]
+    first, second = (job.result(tmp_path) for job in jobs[:2])
+    np.testing.assert_array_equal(first.columns["values"], np.arange(3))
+    assert (first.meta["commit"], second.meta["commit"]) == ("abc", "def")
+    assert first.meta["settings"] == {"work": "_work", "prints": "print", "seed": 0}
+    assert [job.done(tmp_path) for job in jobs] == [True, True, False]
 
-    def make() -> dict[str, np.ndarray]:
-        made.append(1)
-        return {"values": np.arange(3)}
 
-    first = store.keep("job", {"seed": 0}, make, commit="abc")
-    again = store.keep("job", {"seed": 0}, make)
-    store.keep("job", {"seed": 1}, make)
-    assert len(made) == 2
-    np.testing.assert_array_equal(first.columns["values"], again.columns["values"])
-    assert again.meta["commit"] == "abc" and again.meta["settings"] == {"seed": 0}
-    assert store.has("job", {"seed": 1}) and not store.has("job", {"seed": 2})
+def test_what_measures_time_runs_last_and_other_weights_are_other_work(tmp_path: Path) -> None:
+    MADE.clear()
+    timed = Job("timed", _work, {"seed": 1}, "print", {"checkpoint": "here"}, alone=True)
+    job = Job("job", _work, {"seed": 2}, "print", {"checkpoint": "here"})
+    run_jobs([timed, job], tmp_path, commit="abc", processes=0)
+    assert MADE == [2, 1]
+    assert not replace(job, prints="other").done(tmp_path)
+    assert replace(job, context={"checkpoint": "there"}).done(tmp_path)
 
 
 def test_rows_travel_as_text() -> None:

@@ -1,5 +1,6 @@
 """The way to the fast path: answers on disk, what shares cost, and a training that goes on after a stop."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from finlab.layout import layout_from_arrays
 from finlab.layout.arrays import LayoutArrays
 from finlab.training.distill.answers import AnswerSettings, make_answers, read_answers, write_answers
 from finlab.training.distill.network import FastConfig, decode, energy
-from finlab.training.distill.train import FastSettings, train_fast
+from finlab.training.distill.train import FAST_TRAINING, train_fast
 
 SMALL = AnswerSettings(n_shards=2, layouts_per_shard=4, targets_per_layout=5)
 
@@ -65,7 +66,7 @@ def test_decoding_is_that_of_the_robot(allocator: LearnedAllocator) -> None:
 
 def test_training_goes_on_after_a_stop(allocator: LearnedAllocator, tmp_path: Path) -> None:
     small = FastConfig(width=8, rounds=1)
-    settings = FastSettings(steps=6, batch_size=16)
+    settings = replace(FAST_TRAINING, steps=6, batch_size=16)
 
     def run(folder: str, stop_after: int | None = None) -> dict[str, float]:
         return train_fast(

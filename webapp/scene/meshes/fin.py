@@ -6,7 +6,7 @@ A fin that points aft pushes forward, so the blade lies opposite to its thrust.
 import numpy as np
 from numpy.typing import NDArray
 
-from webapp.scene.meshes.mesh import Mesh, joined, tube
+from webapp.scene.meshes.mesh import Mesh, joined, triangles, tube
 
 CHORD = 0.18
 """Length of the blade from the shaft to its trailing edge [m]."""
@@ -39,19 +39,14 @@ def blade() -> Mesh:
 
 def _shell_faces(rows: int, columns: int) -> NDArray[np.int32]:
     """Upper side, lower side, and the strip around the edge."""
-    faces, below = [], rows * columns
-    for r in range(rows - 1):
-        for k in range(columns - 1):
-            a = r * columns + k
-            b, c, d = a + 1, a + columns, a + columns + 1
-            faces += [(a, c, b), (b, c, d)]
-            faces += [(a + below, b + below, c + below), (b + below, d + below, c + below)]
-    last = (rows - 1) * columns
-    edge = [*range(columns), *(r * columns + columns - 1 for r in range(1, rows))]
-    edge += [*(last + k for k in range(columns - 2, -1, -1)), *(r * columns for r in range(rows - 2, 0, -1))]
-    for a, b in zip(edge, edge[1:] + edge[:1], strict=True):
-        faces += [(a, b, a + below), (b, b + below, a + below)]
-    return np.array(faces, dtype=np.int32)
+    place = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = place[:-1, :-1], place[:-1, 1:], place[1:, :-1], place[1:, 1:]
+    low = place.size  # from a point of the upper side to the one below it
+    sides = triangles(a, c, b, b, c, d, a + low, b + low, c + low, b + low, d + low, c + low)
+    edge = np.concatenate([place[0], place[1:, -1], place[-1, -2::-1], place[-2:0:-1, 0]])
+    following = np.roll(edge, -1)
+    strip = triangles(edge, following, edge + low, following, following + low, edge + low)
+    return np.concatenate([sides, strip])
 
 
 def shaft() -> Mesh:

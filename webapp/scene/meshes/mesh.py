@@ -33,12 +33,9 @@ NOTHING = Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]], dtype=np.int32))
 
 def joined(*meshes: Mesh) -> Mesh:
     """Several meshes as one."""
-    vertices, faces, offset = [], [], 0
-    for mesh in meshes:
-        vertices.append(mesh.vertices)
-        faces.append(mesh.faces + offset)
-        offset += len(mesh.vertices)
-    return Mesh(np.concatenate(vertices), np.concatenate(faces).astype(np.int32))
+    offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    faces = [mesh.faces + offset for mesh, offset in zip(meshes, offsets, strict=False)]
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces).astype(np.int32))
 
 
 def tube(path: Array, radius: Array | float, sides: int = 16, across: Array | None = None) -> Mesh:
@@ -71,22 +68,22 @@ def tube(path: Array, radius: Array | float, sides: int = 16, across: Array | No
 @cache
 def _tube_faces(rows: int, sides: int) -> NDArray[np.int32]:
     """Triangles of a tube of so many rings, with a fan at each end whose middle points come last."""
-    faces = _grid_faces(rows, sides)
-    start, end, last = rows * sides, rows * sides + 1, (rows - 1) * sides
-    for k in range(sides):
-        n = (k + 1) % sides
-        faces += [(start, n, k), (end, last + k, last + n)]
-    return np.array(faces, dtype=np.int32)
+    k = np.arange(sides)
+    n, last = np.roll(k, -1), (rows - 1) * sides
+    start, end = np.full(sides, rows * sides), np.full(sides, rows * sides + 1)
+    return np.concatenate([_grid_faces(rows, sides), triangles(start, n, k, end, last + k, last + n)])
 
 
-def _grid_faces(rows: int, columns: int) -> list[tuple[int, int, int]]:
+def _grid_faces(rows: int, columns: int) -> NDArray[np.int32]:
     """Triangles between neighbouring rings of points; the columns close on themselves."""
-    faces = []
-    for r in range(rows - 1):
-        for k in range(columns):
-            a, b = r * columns + k, r * columns + (k + 1) % columns
-            faces += [(a, b, a + columns), (b, b + columns, a + columns)]
-    return faces
+    a = np.arange((rows - 1) * columns).reshape(-1, columns)
+    b = np.roll(a, -1, axis=1)
+    return triangles(a, b, a + columns, b, b + columns, a + columns)
+
+
+def triangles(*corners: NDArray[np.intp]) -> NDArray[np.int32]:
+    """Arrays of corners, three for each set of triangles, as triangles (F, 3)."""
+    return np.stack(corners, axis=-1).reshape(-1, 3).astype(np.int32)
 
 
 def revolved(x: Array, radius_y: Array, radius_z: Array, power: float = 2.0, sides: int = 48) -> Mesh:
@@ -112,7 +109,7 @@ def revolved(x: Array, radius_y: Array, radius_z: Array, power: float = 2.0, sid
         axis=-1,
     )
     vertices = points.reshape(-1, 3)
-    faces = np.array(_grid_faces(len(x), sides), dtype=np.int32)
+    faces = _grid_faces(len(x), sides)
     if x[-1] < x[0]:
         faces = faces[:, ::-1].copy()
     return Mesh(vertices, faces)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from finlab.evaluation.experiments.faults import fault_verdict
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.plots.closed_loop_experiments import draw_faults, draw_layouts
-from finlab.evaluation.report.document import Block, Column, Figure, Row, Table, method_row
+from finlab.evaluation.report.document import Block, Column, Figure, Row, Table, method_row, printed_row
 from finlab.evaluation.report.results import Results
 from finlab.evaluation.report.work import tracks_of_columns
 
@@ -22,7 +22,7 @@ FAULT_WORDS = {"healthy": "healthy", "one_fin": "one fin lost", "two_fins": "two
 
 def closed_loop_blocks(results: Results) -> list[Block]:
     """Every experiment that has run."""
-    rows = results.swim_rows
+    rows = results.tables
     blocks: list[Block] = []
     if "trajectory" in rows:
         blocks += _trajectory(rows["trajectory"], results)
@@ -30,8 +30,6 @@ def closed_loop_blocks(results: Results) -> list[Block]:
         blocks += _faults(rows["faults"])
     if "velocity" in rows:
         blocks += _velocity(rows["velocity"])
-    if not blocks:
-        return []
     return [
         "## Closed loop",
         (
@@ -50,14 +48,13 @@ def _trajectory(rows: Sequence[Row], results: Results) -> list[Block]:
     shown: list[Row] = []
     for layout in dict.fromkeys(row["layout"] for row in rows):
         shown += [method_row(row) for row in rows if row["layout"] == layout]
-        theirs = {"layout": layout, "method": PRINTED["ours"], **printed[layout]}
-        shown.append({**theirs, "_kind": "printed"})
+        shown.append(printed_row(PRINTED["ours"], printed[layout], layout=layout))
     columns = (Column("layout", "layout"), *WHAT, *ERRORS)
     return [
         "### Trajectories",
         Figure.drawn(
             "paths",
-            draw_layouts(tracks_of_columns(results.columns(results.plan.swims["trajectory"])), rows),
+            draw_layouts(tracks_of_columns(results.columns(results.plan.tables["trajectory"])), rows),
             "One run on each of the paper's layouts: from above, and its depth over time.",
         ),
         Table(columns, shown),
@@ -68,7 +65,7 @@ def _faults(rows: Sequence[Row]) -> list[Block]:
     printed = paper_figures()["fault_tolerance"]
     swum = [{**method_row(row), "verdict": fault_verdict(row)} for row in rows if row["controllable"]]
     theirs = [
-        {"fault": FAULT_WORDS[fault], "method": PRINTED[method], "_kind": "printed", **values}
+        printed_row(PRINTED[method], values, fault=FAULT_WORDS[fault])
         for fault, methods in printed.items()
         for method, values in methods.items()
     ]
@@ -97,10 +94,7 @@ def _faults(rows: Sequence[Row]) -> list[Block]:
 def _velocity(rows: Sequence[Row]) -> list[Block]:
     printed = paper_figures()["velocity"]
     shown = [{**method_row(row), "speed": row["speed"] or "all"} for row in rows]
-    shown += [
-        {"speed": "all", "method": PRINTED[method], "_kind": "printed", **values}
-        for method, values in printed.items()
-    ]
+    shown += [printed_row(PRINTED[method], values, speed="all") for method, values in printed.items()]
     columns = (
         Column("speed", "speed [m/s]"),
         *WHAT,

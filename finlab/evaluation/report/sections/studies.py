@@ -5,7 +5,7 @@ from finlab.evaluation.experiments.temperature import PAPER_TEMPERATURE
 from finlab.evaluation.experiments.training_study import CHANGES
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.plots.studies import ablation_dots, figure_a, latency_dots, seed_lines, training_bars
-from finlab.evaluation.report.document import Block, Column, Figure, Fold, Row, Table, method_row
+from finlab.evaluation.report.document import Block, Column, Figure, Fold, Row, Table, method_row, printed_row
 from finlab.evaluation.report.numbers import three
 from finlab.evaluation.report.results import Results
 
@@ -22,10 +22,9 @@ REFINED_BY = {"adam": "Adam", "levenberg-marquardt": "Levenberg-Marquardt"}
 
 def latency_blocks(results: Results) -> list[Block]:
     """Methods side by side in one run."""
-    if not results.latency_rows:
-        return []
+    rows = results.tables["latency"]
     paper_ms = paper_figures()["inference"]["cycle_s"] * 1e3
-    printed: Row = {"method": "paper's cycle, printed (Jetson Orin Nano)", "p50_ms": paper_ms}
+    printed = printed_row("paper's cycle, printed (Jetson Orin Nano)", {"p50_ms": paper_ms})
     columns = (
         Column("method", "method"),
         Column("calls", "calls", "count"),
@@ -41,17 +40,15 @@ def latency_blocks(results: Results) -> list[Block]:
         ),
         Figure.drawn(
             "latency",
-            latency_dots(results.latency_rows, paper_ms),
+            latency_dots(rows, paper_ms),
             "Dots are medians, bars end at the 99th percentile.",
         ),
-        Table(columns, [*map(method_row, results.latency_rows), {**printed, "_kind": "printed"}]),
+        Table(columns, [*map(method_row, rows), printed]),
     ]
 
 
 def ablation_blocks(results: Results) -> list[Block]:
     """The paper's five rows, twice refined, twice scored."""
-    if not results.ablation_rows:
-        return []
     printed = paper_figures()["ablation"]
     rows = results.ablation_rows
     blocks: list[Block] = [
@@ -87,12 +84,10 @@ def ablation_blocks(results: Results) -> list[Block]:
                 r["scored_by"]: r for r in rows if (r["variant"], r["refinement"]) == (variant, refinement)
             }
             line: Row = {"title": TITLES[variant], "time_s": pair["plant"]["time_s"]}
-            for name, row in pair.items():
-                line |= {name: row["err_norm_mean"], f"{name}_interval": row["err_norm_mean_interval"]}
-                line[f"{name}_std"] = row["err_norm_std"]
-            theirs = printed[variant]
-            line |= {"printed": theirs["err_norm_mean"], "printed_std": theirs["err_norm_std"]}
-            lines.append(line | {"printed_time_s": theirs["time_s"]})
+            for name, row in {**pair, "printed": printed[variant]}.items():
+                line |= {name: row["err_norm_mean"], f"{name}_interval": row.get("err_norm_mean_interval")}
+                line |= {f"{name}_std": row["err_norm_std"], f"{name}_time_s": row["time_s"]}
+            lines.append(line)
         blocks += [f"### Refined by {words}", Table(columns, lines)]
     return [
         *blocks,
@@ -102,8 +97,6 @@ def ablation_blocks(results: Results) -> list[Block]:
 
 def temperature_blocks(results: Results) -> list[Block]:
     """The paper's figure A."""
-    if not results.temperature_rows or not results.plan.scatter:
-        return []
     rows = results.temperature_rows
     best = min(rows, key=lambda row: row["best_j_mean"])
     columns = (
@@ -135,8 +128,7 @@ def temperature_blocks(results: Results) -> list[Block]:
 
 def seed_blocks(results: Results) -> list[Block]:
     """The network's seeds against random ones."""
-    if not results.seed_rows:
-        return []
+    rows = results.tables["seeds"]
     columns = (
         Column("fins", "fins"),
         Column("steps", "steps"),
@@ -147,22 +139,20 @@ def seed_blocks(results: Results) -> list[Block]:
         Column("success_0.05", "within 0.05", "share"),
         Column("energy_over_network", "energy over the network's", "ratio"),
     )
-    rows = [{**r, "_kind": "ours"} if r["seeds"] == "network" else r for r in results.seed_rows]
+    shown = [{**row, "_kind": "ours"} if row["seeds"] == "network" else row for row in rows]
     return [
         "## What learning buys",
         (
             "The network's best 16 candidates against 16 random and 16 quasi-random ones, refined by the "
             "same number of Levenberg-Marquardt steps on the surrogate, scored by the plant."
         ),
-        Figure.drawn("seeds", seed_lines(results.seed_rows), "Mean error against refinement steps."),
-        Fold("The numbers", (Table(columns, rows),)),
+        Figure.drawn("seeds", seed_lines(rows), "Mean error against refinement steps."),
+        Fold("The numbers", (Table(columns, shown),)),
     ]
 
 
 def training_blocks(results: Results) -> list[Block]:
     """Small trainings with one thing changed."""
-    if not results.training_rows:
-        return []
     rows = results.training_rows
     settings = next(iter(results.plan.training.values())).settings
     columns = (

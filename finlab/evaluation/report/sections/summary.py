@@ -1,16 +1,14 @@
 """The first screen: a few numbers, and in which measures and cases each method leads, by their intervals."""
 
 from finlab.evaluation.paper_figures import paper_figures
-from finlab.evaluation.report.document import Block, Card, Cards, Column, Fold, Row, Table
+from finlab.evaluation.report.document import Block, Card, Column, Fold, Row, Table
 from finlab.evaluation.report.numbers import error, factor, share, three
 from finlab.evaluation.report.results import Results
 from finlab.evaluation.report.verdicts import (
     LEADS,
     LEVEL,
     TRAILS,
-    Comparison,
     compare,
-    comparison_rows,
     standings,
     with_printed,
 )
@@ -18,8 +16,8 @@ from finlab.evaluation.report.verdicts import (
 OURS = "learned"
 STANDINGS = (
     Column("measure", "less is better"),
-    Column("method", "method"),
-    Column("against", "against"),
+    Column("method", "method", "code"),
+    Column("against", "against", "code"),
     Column(LEADS, "it leads"),
     Column(TRAILS, "the other leads"),
     Column(LEVEL, "neither"),
@@ -27,9 +25,9 @@ STANDINGS = (
 COMPARISONS = (
     Column("measure", "less is better"),
     Column("case", "case"),
-    Column("method", "method"),
+    Column("method", "method", "code"),
     Column("ours", "its value", "error", "our_interval"),
-    Column("against", "against"),
+    Column("against", "against", "code"),
     Column("theirs", "the other's", "error", "their_interval"),
     Column("verdict", "it"),
 )
@@ -39,7 +37,7 @@ def summary_blocks(results: Results) -> list[Block]:
     """Cards, who leads where, and every comparison behind it."""
     found = comparisons(results)
     return [
-        Cards(tuple(_cards(results, results.wrench_rows))),
+        tuple(_cards(results, results.wrench_rows)),
         "## Who leads",
         (
             "The learned allocator against every other method. One leads where the intervals in which reruns "
@@ -48,54 +46,38 @@ def summary_blocks(results: Results) -> list[Block]:
             "law itself, the learned allocator knows forward samples only."
         ),
         Table(STANDINGS, standings(found)),
-        Fold("Every comparison, with its values", (Table(COMPARISONS, comparison_rows(found)),)),
+        Fold("Every comparison, with its values", (Table(COMPARISONS, found),)),
     ]
 
 
-def comparisons(results: Results) -> list[Comparison]:
+def comparisons(results: Results) -> list[Row]:
     """Every table's rows against those of the learned allocator."""
-    printed = paper_figures()
-    accuracy = []
+    printed, tables = paper_figures(), results.tables
+    found: list[Row] = []
     for split, rows in results.wrench_rows.items():
         theirs = printed["wrench_tracking"].get(split, {})
         means = {"paper (printed)": theirs["ours"]["err_norm_mean"]} if theirs else {}
         beside = with_printed(rows, "err_norm_mean", means)
-        accuracy += compare("mean error", beside, "err_norm_mean", split)
-    energy = [
-        {**row, "energy_ratio_interval": (row["energy_ratio_low"], row["energy_ratio_high"])}
-        for row in results.energy_rows
-        if row["energy_ratio"] is not None
-    ]
+        found += compare("mean error", beside, "err_norm_mean", split)
     for row in results.ablation_rows:
         if (row["variant"], row["refinement"]) == ("ours", "adam"):
             means = {"paper (printed)": printed["ablation"]["ours"]["err_norm_mean"]}
             beside = with_printed([{**row, "method": "paper"}], "err_norm_mean", means)
             where = f"ablation by the {row['scored_by']}"
-            accuracy += compare("mean error", beside, "err_norm_mean", where, ("paper",))
-    seeds = [
-        one
-        for steps in dict.fromkeys(row["steps"] for row in results.seed_rows)
-        for one in compare(
-            f"mean error of seeds, {steps} steps",
-            [row for row in results.seed_rows if row["steps"] == steps],
-            "err_norm_mean",
-            _fins,
-            ("network",),
-            "seeds",
-        )
-    ]
-    swims, power = results.swim_rows, ("learned-power", OURS)
-    faults = [row for row in swims.get("faults", ()) if row["controllable"]]
-    return [
-        *accuracy,
-        *compare("energy", energy, "energy_ratio", _fins),
-        *compare("time per call", results.latency_rows, "p50_ms", "4 fins"),
-        *compare("ATE", swims.get("trajectory", ()), "ate", lambda row: f"layouts {row['layout']}"),
-        *compare("ATE, fins lost", faults, "ate", lambda row: row["fault"]),
-        *compare("inertial power", swims.get("velocity", ()), "inertial_w", _speed, power),
-        *compare("speed error", swims.get("velocity", ()), "mae", _speed, power),
-        *seeds,
-    ]
+            found += compare("mean error", beside, "err_norm_mean", where, ("paper",))
+    found += compare("energy", results.energy_rows, "energy_ratio", _fins)
+    found += compare("time per call", tables.get("latency", ()), "p50_ms", "4 fins")
+    found += compare("ATE", tables.get("trajectory", ()), "ate", lambda row: f"layouts {row['layout']}")
+    faults = [row for row in tables.get("faults", ()) if row["controllable"]]
+    found += compare("ATE, fins lost", faults, "ate", lambda row: row["fault"])
+    for measure, value in (("inertial power", "inertial_w"), ("speed error", "mae")):
+        found += compare(measure, tables.get("velocity", ()), value, _speed, ("learned-power", OURS))
+    seeds = tables.get("seeds", [])
+    for steps in dict.fromkeys(row["steps"] for row in seeds):
+        rows = [row for row in seeds if row["steps"] == steps]
+        measure = f"mean error of seeds, {steps} steps"
+        found += compare(measure, rows, "err_norm_mean", _fins, ("network",), "seeds")
+    return found
 
 
 def _speed(row: Row) -> str:
@@ -132,13 +114,13 @@ def _cards(results: Results, tables: dict[str, list[Row]]) -> list[Card]:
                 f"{row['resting']:.2f} fins rest on average",
             )
         )
-    times = {row["method"]: row for row in results.latency_rows}
+    times = {row["method"]: row for row in results.tables.get("latency", ())}
     if OURS in times:
         mine = times[OURS]
         others = [f"`{n}` {three(times[n]['p50_ms'])}" for n in ("paper", "ipopt", "trf") if n in times]
         detail = f"99th percentile {three(mine['p99_ms'])}; {', '.join(others)} ms"
         cards.append(Card(f"{three(mine['p50_ms'])} ms", "one call, median, four fins", detail))
-    swum = {r["method"]: r for r in results.swim_rows.get("trajectory", ()) if r["layout"] == "all"}
+    swum = {r["method"]: r for r in results.tables.get("trajectory", ()) if r["layout"] == "all"}
     if OURS in swum:
         beside = paper_figures()["trajectory"]["all"]["ate"]
         detail = f"in our simulation; paper, in another: {100 * beside:.1f} cm"

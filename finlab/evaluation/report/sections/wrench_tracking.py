@@ -6,7 +6,7 @@ from finlab.evaluation.method_specs import is_slow
 from finlab.evaluation.paper_figures import PAPER_METHODS, paper_figures
 from finlab.evaluation.plots.style import COLOURS
 from finlab.evaluation.plots.wrench_tracking import energy_by_fins, error_by_fins, error_distribution
-from finlab.evaluation.report.document import Block, Column, Figure, Fold, Row, Table, method_row
+from finlab.evaluation.report.document import Block, Column, Figure, Fold, Row, Table, method_row, printed_row
 from finlab.evaluation.report.plan import REFERENCE
 from finlab.evaluation.report.results import Results
 from finlab.evaluation.statistics.records import Records, join_records
@@ -48,7 +48,7 @@ ENERGY_COLUMNS = (
     Column("resting", "fins at rest", "three"),
 )
 CHECKS = (
-    Column("method", "method"),
+    Column("method", "method", "code"),
     Column("wins", f"targets cheaper than {REFERENCE}", "count"),
     Column("worst_error", "their largest error, checked again", "error"),
     Column("outside", "commands outside limits", "count"),
@@ -57,8 +57,6 @@ CHECKS = (
 
 def accuracy_blocks(results: Results) -> list[Block]:
     """The whole section."""
-    if not results.wrench:
-        return []
     printed = paper_figures()["wrench_tracking"]
     shown = {split: _quick(results.wrench[split]) for split in printed if split in results.wrench}
     blocks: list[Block] = [
@@ -103,7 +101,7 @@ def wrench_table(rows: Sequence[Row], split: str) -> list[Row]:
     for row in sorted(rows, key=lambda row: ORDER.index(row["method"])):
         shown.append(method_row(row))
         if (theirs := PAPER_METHODS.get(row["method"], "")) in printed:
-            shown.append({"method": PRINTED[theirs], "_kind": "printed", **printed[theirs]})
+            shown.append(printed_row(PRINTED[theirs], printed[theirs]))
     return shown
 
 
@@ -120,12 +118,10 @@ def _by_fins(results: Results) -> dict[str, Records]:
 
 
 def energy_blocks(results: Results) -> list[Block]:
-    """The whole section; nothing where the reference is not installed."""
+    """The whole section."""
     rows = results.energy_rows
-    if not rows:
-        return []
-    whole = [_shown(row) for row in rows if row["fins"] == "all"]
-    by_fins = [_shown(row) for row in rows if row["fins"] != "all"]
+    whole = [method_row(row) for row in rows if row["fins"] == "all"]
+    by_fins = [method_row(row) for row in rows if row["fins"] != "all"]
     return [
         "## Energy",
         (
@@ -146,11 +142,5 @@ def energy_blocks(results: Results) -> list[Block]:
             f"Each answer that is cheaper than `{REFERENCE}`'s was computed once more in double precision, "
             "by the fin law written out apart from the plant, and held against the limits bit for bit."
         ),
-        Table(CHECKS, [{**row, "method": f"`{row['method']}`"} for row in results.recheck_rows]),
+        Table(CHECKS, results.recheck_rows),
     ]
-
-
-def _shown(row: Row) -> Row:
-    known = row["method"] != REFERENCE and "energy_ratio_low" in row
-    ends = [row["energy_ratio_low"], row["energy_ratio_high"]] if known else None
-    return method_row({**row, "energy_ratio_interval": ends})
