@@ -7,8 +7,8 @@ from finlab.physics.fin_model import stack_laws as stack_laws
 from finlab.physics.plant import Plant as Plant
 from finlab.physics.plant import plant_of as plant_of
 from finlab.physics.table import TableLaw as TableLaw
-from finlab.physics.table import read_table as read_table
-from finlab.physics.table import write_table as write_table
+from finlab.physics.table_file import read_table as read_table
+from finlab.physics.table_file import write_table as write_table
 from finlab.physics.wrench import assemble_wrench as assemble_wrench
 from finlab.physics.wrench import body_force as body_force
 from finlab.physics.wrench import wrench_of_forces as wrench_of_forces

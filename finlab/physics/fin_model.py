@@ -13,7 +13,8 @@ from finlab.physics.drag import Drag
 from finlab.physics.fin_law import FinLaw, PlanarLaw
 from finlab.physics.lighthill import Lighthill
 from finlab.physics.soft import Soft
-from finlab.physics.table import TableLaw, read_table
+from finlab.physics.table import TableLaw
+from finlab.physics.table_file import read_table
 
 PLANAR_LAWS: dict[str, type[PlanarLaw]] = {"drag": Drag, "lighthill": Lighthill, "soft": Soft}
 """Fin model -> law with a formula; its parameters may be arrays, one number for each of n fins."""

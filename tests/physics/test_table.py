@@ -138,6 +138,27 @@ def test_a_layout_may_use_a_table(tmp_path):
 
 
 HEADER = "A,f,phi,Fx,Fy,Fz"
+
+
+def scaled(*, amplitude=1.0, frequency=1.0, direction=1.0, force=1.0, power=None):
+    """A good table whose columns were multiplied by something."""
+    rows = [
+        [
+            amplitude * a,
+            frequency * f,
+            direction * d,
+            0.5,
+            force,
+            2 * force,
+            *([] if power is None else [f * f * power]),
+        ]
+        for a in (0.1, 0.2)
+        for f in (1, 2)
+        for d in (0, 1)
+    ]
+    return [HEADER + ("" if power is None else ",P"), *(",".join(map(str, row)) for row in rows)]
+
+
 BLOCK = [f"{a},{f},{d},0,1,2" for a in (0.1, 0.2) for f in (1, 2) for d in (0, 1)]
 
 
@@ -149,10 +170,29 @@ BLOCK = [f"{a},{f},{d},0,1,2" for a in (0.1, 0.2) for f in (1, 2) for d in (0, 1
         (["A,f,phi,Fx,Fy,Fz,Fz", "1,2,3,4,5,6,7"], "appears twice"),
         ([HEADER], "no rows"),
         ([HEADER, "1,2,3,4"], "line 2 has 4 values"),
-        ([HEADER, "1,2,x,4,5,6"], "line 2 holds something that is not a number"),
-        ([HEADER, *BLOCK[:-1], "0.2,2,1,nan,1,2"], "line 9 holds a value that is not finite"),
+        ([HEADER, "1,2,x,4,5,6"], "line 2, column phi, holds 'x', which is not a number"),
+        (
+            [HEADER, *BLOCK[:-1], "0.2,2,1,nan,1,2"],
+            "line 9, column Fx, holds a value that is not finite (nan)",
+        ),
         ([HEADER, *BLOCK[:-1]], "do not fill the grid of 2 amplitudes, 2 frequencies and 2 zero directions"),
-        ([HEADER, *BLOCK, BLOCK[0]], "appears in two rows"),
+        ([HEADER, *BLOCK[:-1]], "the row A = 0.2, f = 2, phi = 1 is missing"),
+        ([HEADER, *BLOCK[:-1], "0.2,2,1,,1,2"], "line 9, column Fx, is empty; leave no gaps"),
+        ([HEADER, *BLOCK, BLOCK[0]], "appears in two rows, lines 2 and 10"),
+        (
+            scaled(amplitude=57.3),
+            "A goes up to 11.46, expected half amplitudes in rad up to 1.571; these look like degrees",
+        ),
+        (scaled(amplitude=10.0), "these look like peak-to-peak angles; halve them"),
+        (scaled(frequency=60.0), "f goes up to 120, expected Hz up to 20; these look like beats per minute"),
+        (scaled(direction=57.3), "span 57.3 rad, expected at most one turn (6.283); these look like degrees"),
+        (scaled(amplitude=-1.0), "column A has -0.2, expected rad from 0"),
+        (scaled(frequency=-1.0), "column f has -2, expected Hz from 0"),
+        (scaled(force=0.0), "the thrust is 0 everywhere"),
+        (scaled(power=math.nan), "line 2, column P, holds a value that is not finite (nan)"),
+        (scaled(power=math.inf), "line 2, column P, holds a value that is not finite (inf)"),
+        (scaled(power=-1.0), "column P has -4, expected the mean power in W that drives it, from 0"),
+        (scaled(power=0.0), "column P is 0 everywhere; leave it out"),
         ([HEADER, *BLOCK[:4]], "column A has one value"),
         ([HEADER, *BLOCK, *(row.replace(",1,0,1,2", ",7,0,1,2") for row in BLOCK[1::2])], "span 7 rad"),
     ],
@@ -164,6 +204,25 @@ def test_a_bad_table_is_refused_with_file_and_place(lines, why, tmp_path):
         read_table(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert why in str(caught.value)
+
+
+def test_a_good_table_with_power_is_read(tmp_path):
+    (tmp_path / "t.csv").write_text("\n".join(scaled(power=0.5)))
+    law, at = read_table(tmp_path / "t.csv"), np.array([[0.2, 2.0, 0.5], [0.1, 1.0, 1.0]])
+    assert law.has_power and law.power(at) == pytest.approx([2.0, 0.5])
+
+
+def test_power_never_falls_below_zero_between_points_near_zero(tmp_path):
+    """A cubic through 0, 0, 1 dips; its slope is then told as that of zero."""
+    power = [0.0, 0.0, 0.0, 1.0, 1.0]
+    rows = [f"{a},{f},{d},0,1,2,{p}" for a in (0.1, 0.2) for f, p in enumerate(power) for d in (0, 1)]
+    (tmp_path / "t.csv").write_text("\n".join([HEADER + ",P", *rows]))
+    law, at = read_table(tmp_path / "t.csv"), np.zeros((401, 3))
+    at[:, 0], at[:, 1] = 0.15, np.linspace(0.0, 4.0, 401)
+    found, slopes = law.power(at), law.power_slopes(at)
+    assert found.min() == 0.0 and found.max() > 1.0
+    dips = (at[:, 1] > 1.0) & (at[:, 1] < 2.0)
+    assert not found[dips].any() and not slopes[dips].any() and slopes[:, 1].max() > 0.5
 
 
 def test_one_turn_apart_forces_must_agree(tmp_path):

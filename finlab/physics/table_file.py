@@ -1,0 +1,196 @@
+"""The CSV file of a force table: reading it, with a plain sentence for whatever is wrong, and writing one.
+
+Its columns are A [rad], f [Hz], phi [rad], Fx, Fy, Fz [N] under a header line, and P [W] where the power is
+known; A is the half amplitude, phi the zero direction, forces and power are cycle means, forces in the fin
+frame (x' shaft, y' horizontal thrust axis, z' up). A fin without P takes the power of a plate like U-CAT's
+fin. Rows come in any order but must fill a grid: every amplitude with every frequency with every zero
+direction. Spacing is free.
+"""
+
+import csv
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.errors import DataError
+from finlab.layout.angles import TURN
+from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
+from finlab.physics.fin_law import Array, FinLaw
+from finlab.physics.table import TableLaw
+
+COLUMNS = ("A", "f", "phi", "Fx", "Fy", "Fz")
+"""Columns of a force table, by name; their order in the file is free."""
+POWER_COLUMN = "P"
+"""Column of the mean power [W], which may be left out."""
+MAX_BYTES = 50_000_000
+"""Largest table that is read [bytes]."""
+
+
+def read_table(path: str | os.PathLike[str]) -> TableLaw:
+    """Returns the law in a CSV file.
+
+    Raises:
+        DataError: the file is missing, lacks a column, holds something that is not a finite number or whose
+            unit cannot be right, its rows do not fill a grid with at least two points per axis, or it has no
+            thrust or no power to tell of.
+    """
+    source = str(path)
+    rows, lines = _read_rows(Path(path))
+    _check_units(rows, source)
+    axes, values = _grid(rows, lines, source)
+    periodic, axes[2], values = _close_circle(axes[2], values, source)
+    for name, axis in zip(COLUMNS, axes, strict=False):
+        if len(axis) < 2:
+            raise DataError(f"{source}: column {name} has one value, expected at least 2 to interpolate")
+    return TableLaw(axes, values, periodic)
+
+
+def write_table(
+    path: str | os.PathLike[str], law: FinLaw, amplitude: Array, frequency: Array, zero_direction: Array
+) -> None:
+    """Writes the forces of a law on a grid of amplitude [rad], frequency [Hz] and zero direction [rad]."""
+    axes = [np.asarray(axis, dtype=np.float64) for axis in (amplitude, frequency, zero_direction)]
+    command = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    force: Any = law.force(command)
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(COLUMNS)
+        writer.writerows([f"{value:.10g}" for value in row] for row in np.hstack([command, force + 0.0]))
+
+
+def _read_rows(path: Path) -> tuple[Array, NDArray[np.intp]]:
+    """Returns the table (rows, 6 or 7) in the order of `COLUMNS`, with the power behind, and the line (rows,)
+    of the file that each row stands in."""
+    try:
+        if not path.is_file():
+            raise DataError(f"{path}: no such file, expected a CSV table of fin forces")
+        if path.stat().st_size > MAX_BYTES:
+            raise DataError(f"{path}: is larger than {MAX_BYTES:,} bytes, too large for a force table")
+        lines = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines()))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise DataError(f"{path}: cannot be read as CSV text: {error}") from None
+    header = [cell.strip() for cell in lines[0]] if lines else []
+    missing = [name for name in COLUMNS if name not in header]
+    if missing:
+        raise DataError(
+            f"{path}: column {missing[0]} is missing, expected a header with {', '.join(COLUMNS)}"
+        )
+    if len(set(header)) < len(header):
+        raise DataError(f"{path}: a column name appears twice in the header")
+    columns = [*COLUMNS, POWER_COLUMN] if POWER_COLUMN in header else [*COLUMNS]
+    order = [header.index(name) for name in columns]
+    rows, numbers = [], []
+    for line, cells in enumerate(lines[1:], start=2):
+        if not any(cell.strip() for cell in cells):
+            continue
+        if len(cells) != len(header):
+            raise DataError(f"{path}: line {line} has {len(cells)} values, the header has {len(header)}")
+        rows.append([_number(cells[i], f"{path}: line {line}, column {header[i]},") for i in order])
+        numbers.append(line)
+    if not rows:
+        raise DataError(f"{path}: has no rows below its header")
+    return np.array(rows), np.array(numbers)
+
+
+def _number(cell: str, where: str) -> float:
+    """A cell as a finite number."""
+    if not cell.strip():
+        raise DataError(f"{where} is empty; leave no gaps in the table")
+    try:
+        value = float(cell)
+    except ValueError:
+        raise DataError(f"{where} holds {cell.strip()!r:.40}, which is not a number") from None
+    if not math.isfinite(value):
+        raise DataError(f"{where} holds a value that is not finite ({value}); leave no gaps in the table")
+    return value
+
+
+def _check_units(rows: Array, source: str) -> None:
+    """Refuse what no fin can do, with a guess at what was meant."""
+    amplitude, frequency, direction = rows[:, 0], rows[:, 1], rows[:, 2]
+    for name, values, unit in ((COLUMNS[0], amplitude, "rad"), (COLUMNS[1], frequency, "Hz")):
+        if values.min() < 0.0:
+            raise DataError(f"{source}: column {name} has {values.min():.4g}, expected {unit} from 0")
+    most = amplitude.max()
+    if most > MAX_AMPLITUDE + 1e-9:
+        doubled = most <= 2 * MAX_AMPLITUDE + 1e-9
+        hint = "peak-to-peak angles; halve them" if doubled else "degrees; write radians"
+        raise DataError(
+            f"{source}: column A goes up to {most:.4g}, expected half amplitudes in rad up to "
+            f"{MAX_AMPLITUDE:.4g}; these look like {hint}"
+        )
+    if frequency.max() > MAX_FREQUENCY:
+        raise DataError(
+            f"{source}: column f goes up to {frequency.max():.4g}, expected Hz up to {MAX_FREQUENCY:g}; "
+            "these look like beats per minute (rev/min); divide them by 60"
+        )
+    span = np.ptp(direction)
+    if span > TURN + 1e-3:
+        hint = "; these look like degrees; write radians" if span > 2 * TURN else ""
+        raise DataError(
+            f"{source}: the zero directions phi span {span:.4g} rad, expected at most one turn (6.283){hint}"
+        )
+    if not rows[:, 4:6].any():
+        raise DataError(f"{source}: the thrust is 0 everywhere, Fy as well as Fz; such a fin drives nothing")
+    if rows.shape[1] > len(COLUMNS):
+        _check_power(rows[:, len(COLUMNS)], source)
+
+
+def _check_power(power: Array, source: str) -> None:
+    """Refuse powers (rows,) [W] that no fin takes."""
+    if power.min() < 0.0:
+        raise DataError(
+            f"{source}: column P has {power.min():.4g}, expected the mean power in W that drives it, from 0"
+        )
+    if not power.any():
+        raise DataError(f"{source}: column P is 0 everywhere; leave it out where the power is not known")
+
+
+def _grid(rows: Array, lines: NDArray[np.intp], source: str) -> tuple[list[Array], Array]:
+    """Returns the three axes and the values (n_A, n_f, n_phi, 3 or 4) of rows that fill a grid."""
+    found = [np.unique(rows[:, i], return_inverse=True) for i in range(3)]
+    axes = [values for values, _ in found]
+    shape = tuple(len(axis) for axis in axes)
+    place = np.ravel_multi_index(tuple(inverse.ravel() for _, inverse in found), shape)
+    order = place.argsort(kind="stable")
+    repeated = np.flatnonzero(np.diff(place[order]) == 0)
+    if len(repeated):
+        first, second = order[repeated[0]], order[repeated[0] + 1]
+        raise DataError(
+            f"{source}: the same A, f, phi appears in two rows, lines {lines[first]} and {lines[second]}; "
+            "keep one"
+        )
+    if len(place) != math.prod(shape):
+        hole = np.flatnonzero(~np.isin(np.arange(math.prod(shape)), place))[0]
+        at = ", ".join(
+            f"{name} = {axis[i]:.6g}"
+            for name, axis, i in zip(COLUMNS, axes, np.unravel_index(hole, shape), strict=False)
+        )
+        raise DataError(
+            f"{source}: {len(rows)} rows do not fill the grid of {shape[0]} amplitudes, {shape[1]} "
+            f"frequencies and {shape[2]} zero directions, expected {math.prod(shape)}; the row {at} is "
+            "missing (write equal values with equal digits)"
+        )
+    values = np.empty((math.prod(shape), rows.shape[1] - 3))
+    values[place] = rows[:, 3:]
+    return axes, values.reshape(*shape, -1)
+
+
+def _close_circle(angle: Array, values: Array, source: str) -> tuple[bool, Array, Array]:
+    """Returns whether the zero directions cover the circle, and the grid without a repeated end point."""
+    span = angle[-1] - angle[0]
+    if abs(span - TURN) <= 1e-3:
+        forces = values[..., :3]
+        scale = np.abs(forces).max()
+        if not np.allclose(forces[:, :, 0], forces[:, :, -1], rtol=0.0, atol=0.05 * scale + 1e-12):
+            raise DataError(
+                f"{source}: forces at phi = {angle[0]:.4g} and one turn later differ; they are the same"
+            )
+        return True, angle[:-1], values[:, :, :-1]
+    # A full circle given without its end point leaves a last gap like the others.
+    closes = len(angle) > 2 and TURN - span <= 1.5 * np.diff(angle).max()
+    return bool(closes), angle, values
