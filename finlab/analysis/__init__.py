@@ -1,4 +1,4 @@
-"""What a layout can do, and how to improve it: authority, attainable sets, energy, score cards, optimization.
+"""What a layout can do, and how to improve it: authority, attainable sets, power, score cards, optimization.
 
 It works from the fins' own laws with numpy and scipy.
 """
@@ -18,4 +18,4 @@ from finlab.analysis.score_card import ScoreCard as ScoreCard
 from finlab.analysis.score_card import score_card as score_card
 from finlab.forces.attainable import AttainableSet as AttainableSet
 from finlab.forces.attainable import attainable_set as attainable_set
-from finlab.forces.least_energy import least_energy as least_energy
+from finlab.forces.least_power import least_power as least_power

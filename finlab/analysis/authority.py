@@ -8,9 +8,10 @@ import numpy as np
 from finlab.forces.extent import RANK_TOLERANCE, singular_values, strongest, weakest
 from finlab.forces.fin_sets import SCALE, fin_sets
 from finlab.forces.reach import max_wrench_along_exactly
-from finlab.forces.thrust_curve import plant_curves
+from finlab.forces.envelopes import layout_envelopes
 from finlab.layout import Layout
 from finlab.layout.arrays import Array
+from finlab.physics.objective import Objective
 
 AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 """Names of the six axes, in the order of a wrench."""
@@ -179,8 +180,8 @@ def model_error(layout: Layout, failed: Collection[str] = ()) -> Array:
     directions than in its strongest one.
     """
     sets = fin_sets(layout, failed)
-    curves = plant_curves(layout)
-    off = (curves.minimum + curves.spread) * (sets.radius[0] > 0.0)
+    fins = layout_envelopes(layout, Objective())
+    off = (fins.minimum + fins.maximum - fins.largest.min(axis=1)) * (sets.radius[0] > 0.0)
     lever = np.linalg.norm(sets.columns[0], axis=1)
     return np.asarray((lever * off[:, None]).sum(axis=0) * SCALE)
 

@@ -13,12 +13,12 @@ from numpy.typing import ArrayLike
 from finlab.errors import LayoutError
 from finlab.forces.extent import weakest
 from finlab.forces.fin_sets import SCALE, FinSets
-from finlab.forces.least_energy import cheapest, plant_problem, starts
+from finlab.forces.least_power import cheapest, power_problem, variant
 from finlab.forces.reach import COARSE, FINE, max_wrench_along
 from finlab.layout import Layout
 from finlab.layout.arrays import Array
 
-GoalName = Literal["weakest_direction", "mission_energy", "worst_single_failure"]
+GoalName = Literal["weakest_direction", "mission_power", "worst_single_failure"]
 GOALS: tuple[GoalName, ...] = get_args(GoalName)
 """Names of the goals."""
 Goal = Callable[[FinSets], Array]
@@ -32,7 +32,7 @@ MISSION = (
 )
 """Wrenches [N, N m] of a mission when none are given: cruise, turn left, turn right, dive."""
 UNREACHED = 100.0
-"""What a wrench out of reach costs, more than any allocation does."""
+"""What a wrench out of reach costs [W], more than allocations do."""
 ALL_THERE = 1e-6
 """Share of a wrench that may be missing when it counts as within reach."""
 LEAST_FINS = 4
@@ -47,7 +47,7 @@ def make_goal(name: str, layout: Layout, mission: ArrayLike = MISSION, *, fine: 
     Args:
         name: `weakest_direction`: the scaled wrench that is within reach in every direction [N].
             `worst_single_failure`: the same after the loss of the fin that leaves least of it [N].
-            `mission_energy`: minus the mean least energy of the mission's wrenches.
+            `mission_power`: minus the mean least power of the mission's wrenches [W].
         layout: its limits and fin models hold for all variants.
         mission: wrenches (N, 6) [N, N m].
         fine: as the score card has it; otherwise quick.
@@ -69,8 +69,8 @@ def make_goal(name: str, layout: Layout, mission: ArrayLike = MISSION, *, fine: 
                 "with fewer, none can fail without losing an axis"
             )
         return _after_worst_failure(of_weakest)
-    if name == "mission_energy":
-        return _mission_energy(layout, _wrenches(mission), fine)
+    if name == "mission_power":
+        return _mission_power(layout, _wrenches(mission), fine)
     raise LayoutError(f"goal: expected one of {', '.join(GOALS)}, got {name!r:.60}")
 
 
@@ -85,19 +85,17 @@ def _after_worst_failure(of_rest: Goal) -> Goal:
     return goal
 
 
-def _mission_energy(layout: Layout, mission: Array, fine: bool) -> Goal:
-    """Energy from starts in which a few fins rest; a wrench out of reach costs by what is missing."""
+def _mission_power(layout: Layout, mission: Array, fine: bool) -> Goal:
+    """Mean least power; a wrench out of reach costs by what is missing."""
     wanted = mission / SCALE
-    problem = plant_problem(layout)
-    tolerance, most_resting = (FINE, 2) if fine else (COARSE, 1)
-    seeds = starts(problem.curves.maximum, n_random=0, most_resting=most_resting)
+    problem = power_problem(layout)
+    tolerance = FINE if fine else COARSE
 
     def goal(sets: FinSets) -> Array:
-        targets = np.tile(wanted, (len(sets.radius), 1, 1))
-        rows = sets.repeat(len(wanted))
-        missing = _missing(rows, targets.reshape(-1, 6), tolerance).reshape(-1, len(wanted))
-        energy = cheapest(problem, sets, targets, seeds)
-        cost = np.where(np.isnan(energy), UNREACHED, energy)
+        targets = np.tile(wanted, (len(sets.radius), 1))
+        missing = _missing(sets.repeat(len(wanted)), targets, tolerance).reshape(-1, len(wanted))
+        power = np.stack([cheapest(variant(problem, sets, k), wanted) for k in range(len(sets.radius))])
+        cost = np.where(np.isnan(power), UNREACHED, power)
         cost = np.where(missing < ALL_THERE, cost, UNREACHED * (1.0 + missing))
         return np.asarray(-cost.mean(axis=1))
 

@@ -82,9 +82,9 @@ def optimize_layout(
         layout: where to start; its limits and fin models stay.
         fins: names of those that move.
         bounds: where each may go; 5 cm and a quarter turn around where it is when left out.
-        goal: `weakest_direction`, `mission_energy` or `worst_single_failure`, see `make_goal`.
+        goal: `weakest_direction`, `mission_power` or `worst_single_failure`, see `make_goal`.
         mirror: pairs that stay each other's mirror image; when None, all that are so now.
-        mission: wrenches (N, 6) [N, N m] for the goal `mission_energy`.
+        mission: wrenches (N, 6) [N, N m] for the goal `mission_power`.
         rounds: most rounds of the search.
         seed: of its random numbers.
         clearance: least distance between fins [m]; fins that are closer already need not part.

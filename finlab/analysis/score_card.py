@@ -18,11 +18,11 @@ from finlab.analysis.authority import (
 )
 from finlab.forces.extent import singular_values
 from finlab.forces.fin_sets import MAX_CUT, fin_sets, wide_fins
-from finlab.forces.least_energy import least_energy
+from finlab.forces.least_power import least_power
 from finlab.layout import Layout
 
 UNIT = (1.0, 1.0, 1.0, 0.1, 0.1, 0.1)
-"""Wrench along each axis whose energy is given [N, N m]."""
+"""Wrench along each axis whose least power is given [N, N m]."""
 
 
 @dataclass(frozen=True)
@@ -40,10 +40,10 @@ class ScoreCard:
     losses: tuple[Loss, ...]
     """What losing one more fin costs, fin by fin; none when but one works."""
     unit_wrench: tuple[float, ...]
-    """Size of the wrench along each axis whose energy follows (6,) [N, N m]."""
-    unit_energy: tuple[float | None, ...]
-    """Least energy found for it along each positive axis (6,), other axes zero; None where out of reach."""
-    unit_energy_negative: tuple[float | None, ...]
+    """Size of the wrench along each axis whose least power follows (6,) [N, N m]."""
+    unit_power: tuple[float | None, ...]
+    """Least power [W] for it along each positive axis (6,), other axes zero; None where out of reach."""
+    unit_power_negative: tuple[float | None, ...]
     """The same along the negative axes."""
     model_error: tuple[float, ...]
     """By how much each entry of a wrench may differ because fins cannot rest fully, or a table is uneven
@@ -75,9 +75,9 @@ def score_card(layout: Layout, failed: Collection[str] = ()) -> ScoreCard:
     """
     held = authority(layout, failed)
     wrenches = np.diag(UNIT)
-    energy = [
+    power = [
         None if np.isnan(value) else float(value)
-        for value in least_energy(layout, np.concatenate([wrenches, -wrenches]), failed=failed)
+        for value in least_power(layout, np.concatenate([wrenches, -wrenches]), failed=failed)
     ]
     return ScoreCard(
         layout=layout.name,
@@ -86,8 +86,8 @@ def score_card(layout: Layout, failed: Collection[str] = ()) -> ScoreCard:
         authority=held,
         losses=losses(layout, failed, held),
         unit_wrench=UNIT,
-        unit_energy=tuple(energy[:6]),
-        unit_energy_negative=tuple(energy[6:]),
+        unit_power=tuple(power[:6]),
+        unit_power_negative=tuple(power[6:]),
         model_error=tuple(float(value) for value in model_error(layout, failed)),
         notes=_notes(layout, failed),
     )

@@ -21,7 +21,7 @@ def allocate(
     layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
     wrench: Annotated[Wrench, arg(metavar="FX FY FZ TX TY TZ")],
     failed: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = (),
-    method: Annotated[str, arg(metavar="NAME")] = "learned",
+    method: Annotated[str, arg(metavar="NAME")] = "search",
     checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
     policy: Annotated[str, arg(metavar="NAME")] = "closest",
     axis_weights: Annotated[Wrench | None, arg(metavar="W1 ... W6")] = None,

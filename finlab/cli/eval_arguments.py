@@ -97,7 +97,7 @@ class Run(Output):
 class ClosedLoopRuns:
     """Runs in simulation."""
 
-    methods: Names = "learned"
+    methods: Names = "search"
     """Names with commas between; also on-board, U-CAT's own law at a fixed frequency, and learned-power, the
     learned method with inertial power for its energy."""
     runs: Count = 5

@@ -38,12 +38,12 @@ def optimize(
         layout: layout file, layout graph file, or the name of a shipped layout.
         fins: fins that may move; mirrored twins follow.
         output: layout file to write.
-        goal: weakest_direction, mission_energy or worst_single_failure.
+        goal: weakest_direction, mission_power or worst_single_failure.
         bounds: box in the body frame that the fins may not leave [m]; overrides --reach.
         reach: how far each fin may go from where it is, either way along x, y and z [m].
         turn: how far each shaft may turn from where it points, either way [deg].
         mirror: keep fins that are each other's mirror image so.
-        wrench: a wrench of the mission for mission_energy [N, N m]; may be given several times.
+        wrench: a wrench of the mission for mission_power [N, N m]; may be given several times.
         rounds: most rounds of the search.
         seed: same arguments and seed, same layout.
         json: print one JSON object instead of a table.

@@ -43,8 +43,8 @@ def comparison_text(before: ScoreCard, after: ScoreCard) -> str:
     for axis, a, b, unit in zip(_axes(), _least(old), _least(new), _UNITS, strict=True):
         rows.append((f"largest {axis} [{unit}]", f"{a:.3f}", f"{b:.3f}"))
     for k, (axis, size, unit) in enumerate(zip(_axes(), before.unit_wrench, _UNITS, strict=True)):
-        energies = _number(before.unit_energy[k]), _number(after.unit_energy[k])
-        rows.append((f"energy of {axis} {size:g} {unit}", *energies))
+        energies = _number(before.unit_power[k]), _number(after.unit_power[k])
+        rows.append((f"power for {axis} {size:g} {unit}", *energies))
     if before.worst_loss and after.worst_loss:
         a, b = before.worst_loss.weakest, after.worst_loss.weakest
         rows.append(("weakest after worst loss [N]", f"{a:.2f}", f"{b:.2f}"))
@@ -66,7 +66,7 @@ def _span_lines(card: ScoreCard) -> list[str]:
 
 def _axis_table(card: ScoreCard) -> list[str]:
     held = card.authority
-    head = ("axis", "largest +", "largest -", "others free", "", "energy of", "+", "-")
+    head = ("axis", "largest +", "largest -", "others free", "", "power for", "+", "-")
     rows = [
         (
             axis,
@@ -75,8 +75,8 @@ def _axis_table(card: ScoreCard) -> list[str]:
             f"{held.beside_others[k]:.3f}",
             _UNITS[k],
             f"{card.unit_wrench[k]:g} {_UNITS[k]}",
-            _number(card.unit_energy[k]),
-            _number(card.unit_energy_negative[k]),
+            _number(card.unit_power[k]),
+            _number(card.unit_power_negative[k]),
         )
         for k, axis in enumerate(_axes())
     ]

@@ -17,7 +17,7 @@ def simulate(
     layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
     trajectory: Annotated[str, arg(metavar="NAME|FILE")] = "lissajous",
     fail: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME@SECONDS")] = (),
-    method: Annotated[str, arg(metavar="NAME")] = "learned",
+    method: Annotated[str, arg(metavar="NAME")] = "search",
     duration: Annotated[float | None, arg(metavar="SECONDS")] = None,
     plant: Annotated[str, arg(metavar="NAME")] = "mean",
     gains: Annotated[str, arg(metavar="NAME|FILE")] = "waypoint",

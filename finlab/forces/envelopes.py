@@ -206,6 +206,15 @@ class Envelopes:
         return np.asarray(self.middle + np.clip(offset, -self.half, self.half))
 
 
+def largest_forces(layout: Layout) -> Array:
+    """Returns the largest force (n,) [N] that each fin of a layout can give in any direction.
+
+    Raises:
+        DataError: a fin's force table cannot be read.
+    """
+    return layout_envelopes(layout, Objective()).maximum
+
+
 def layout_envelopes(layout: Layout, objective: Objective) -> Envelopes:
     """Returns the compiled fins of a layout, by their own laws.
 

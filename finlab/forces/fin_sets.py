@@ -17,11 +17,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.forces.envelopes import layout_envelopes
+from finlab.forces.envelopes import largest_forces
 from finlab.layout import Layout
 from finlab.layout.angles import is_full_turn, wrapped
 from finlab.layout.arrays import force_columns
-from finlab.physics.objective import Objective
 
 Array = NDArray[np.float64]
 
@@ -109,7 +108,7 @@ def fin_sets(layout: Layout, failed: Collection[str] = ()) -> FinSets:
     """
     lost = layout.indices(tuple(failed))
     columns = force_columns(layout.position, layout.mounting_angle)[:, 1:] / SCALE
-    radius = layout_envelopes(layout, Objective()).maximum
+    radius = largest_forces(layout)
     radius[list(lost)] = 0.0
     lower, upper = layout.lower[:, 2], layout.upper[:, 2]
     return FinSets(

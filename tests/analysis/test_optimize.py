@@ -77,7 +77,7 @@ def test_fins_keep_their_distance(shipped: Layouts) -> None:
     layout = shipped("A")
     box = Bounds((-0.26, 0.26), (0.14, 0.16), (0.0, 0.0), (1.0, 1.1))
     found = optimize_layout(
-        layout, ["front_left"], {"front_left": box}, "mission_energy", (), rounds=1, clearance=0.2
+        layout, ["front_left"], {"front_left": box}, "mission_power", (), rounds=1, clearance=0.2
     )
     places = found.layout.position
     assert np.linalg.norm(places[1] - np.delete(places, 1, axis=0), axis=1).min() >= 0.2 - 1e-9
@@ -85,9 +85,9 @@ def test_fins_keep_their_distance(shipped: Layouts) -> None:
 
 def test_an_unreachable_mission_costs_by_what_is_missing(shipped: Layouts) -> None:
     layout = shipped("no_yaw")
-    goal = make_goal("mission_energy", layout, [[0, 0, 0, 0, 0, 1.0]])
+    goal = make_goal("mission_power", layout, [[0, 0, 0, 0, 0, 1.0]])
     assert goal(fin_sets(layout))[0] == pytest.approx(-2 * UNREACHED)
-    half = make_goal("mission_energy", layout, [[26.6432, 0, 0, 0, 0, 0]])
+    half = make_goal("mission_power", layout, [[26.6432, 0, 0, 0, 0, 0]])
     assert half(fin_sets(layout))[0] == pytest.approx(-1.5 * UNREACHED, rel=1e-3)
 
 
@@ -96,8 +96,8 @@ def test_an_unreachable_mission_costs_by_what_is_missing(shipped: Layouts) -> No
     [
         ("A", "beauty", [[1, 0, 0, 0, 0, 0]], "goal: expected one of weakest_direction"),
         ("D", "worst_single_failure", [[1, 0, 0, 0, 0, 0]], "needs 4 fins or more"),
-        ("A", "mission_energy", [[1, 2, 3]], "mission: expected wrenches"),
-        ("A", "mission_energy", [[1, 0, 0, 0, 0, float("nan")]], "mission: expected wrenches"),
+        ("A", "mission_power", [[1, 2, 3]], "mission: expected wrenches"),
+        ("A", "mission_power", [[1, 0, 0, 0, 0, float("nan")]], "mission: expected wrenches"),
     ],
 )
 def test_wrong_goals(shipped: Layouts, name: str, goal: str, mission: object, message: str) -> None:

@@ -19,8 +19,8 @@ def test_a_card_is_json(shipped: Layouts) -> None:
     record = json.loads(json.dumps(card.to_dict(), allow_nan=False))
     assert record["layout"] == "D"
     assert record["authority"]["condition"] is None
-    assert record["unit_energy"][1] is None  # no sway
-    assert record["unit_energy"][0] > 0.0
+    assert record["unit_power"][1] is None  # no sway
+    assert record["unit_power"][0] > 0.0
     assert [loss["fin"] for loss in record["losses"]] == list(shipped("D").names)
     assert record["worst_loss"] in shipped("D").names
     assert card.notes == ()
@@ -42,7 +42,7 @@ def test_all_fins_failed(shipped: Layouts) -> None:
     assert card.n_fins == card.authority.rank == 0
     assert card.losses == ()
     assert card.worst_loss is None
-    assert card.unit_energy == (None,) * 6
+    assert card.unit_power == (None,) * 6
 
 
 def test_wide_arcs_are_noted(wide: Layout) -> None:

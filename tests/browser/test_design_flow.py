@@ -96,7 +96,7 @@ def test_search_is_watched_and_accepted(page: Any) -> None:
     page.press("Cancel")
     page.until(lambda: page.view.improver.findings is not None, seconds=60)
     found = page.view.improver.findings
-    assert found.goal == "mission_energy"
+    assert found.goal == "mission_power"
     page.until(lambda: page.page.get_by_role("button", name="Accept").count() == 1)
     page.press("Accept")
     page.until(lambda: page.session.state.layout == found.layout and page.view.improver.findings is None)

@@ -24,12 +24,12 @@ def test_optimize_writes_a_better_layout(tmp_path: Path, capsys: pytest.CaptureF
 def test_optimize_as_json_within_a_box(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / "better.json"
     box = ["--bounds", "0.2", "0.3", "-0.2", "-0.1", "0", "0"]
-    mission = ["--goal", "mission_energy", "--wrench", "1", "0", "0", "0", "0", "0"]
+    mission = ["--goal", "mission_power", "--wrench", "1", "0", "0", "0", "0", "0"]
     mission += ["--wrench", "0", "0", "1", "0", "0", "0"]
     arguments = ["--fins", "front_right", "--rounds", "1", "--seed", "2", "--no-mirror", "--json"]
     assert main(["layout", "optimize", "A", *arguments, *box, *mission, "-o", str(output)]) == 0
     record = json.loads(capsys.readouterr().out)
-    assert record["goal"] == "mission_energy"
+    assert record["goal"] == "mission_power"
     assert record["moved"] == ["front_right"]
     assert record["value_after"] >= record["value_before"]
     assert record["before"]["layout"] == "A"

@@ -80,7 +80,7 @@ def test_each_fin_has_its_bounds_and_the_mission_is_the_users() -> None:
     until(lambda: improver.progress is not None)
     improver.cancel()
     until(lambda: improver.findings is not None)
-    assert improver.findings is not None and improver.findings.goal == "mission_energy"
+    assert improver.findings is not None and improver.findings.goal == "mission_power"
     assert improver.findings.moved == (first, second)
     worker.stop()
 

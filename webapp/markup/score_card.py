@@ -82,17 +82,17 @@ def _axes(card: ScoreCard, before: ScoreCard | None, name: str) -> str:
         shares = [loss.share_left[k] for loss in card.losses]
         left = [share for share in shares if share is not None]
         least = f"{100 * min(left):.0f} %" if left else "–"
-        energy = card.unit_energy[k]
+        power = card.unit_power[k]
         rows.append(
             f"<tr><td>{word} <span class='dim'>{AXIS_UNITS[k]}</span></td>{old}<td>{largest}</td>"
-            f"<td>{least}</td><td>{'–' if energy is None else three_digits(energy)}</td></tr>"
+            f"<td>{least}</td><td>{'–' if power is None else three_digits(power)}</td></tr>"
         )
     old = f"<th>{name}</th>" if before is not None else ""
     column = "" if before is None else "now"
     head = (
         f"<tr><th>largest on its own</th>{old}<th>{column}</th>"
         "<th title='after the worst loss of a fin'>one lost</th>"
-        "<th title='energy of 1 N, or 0.1 N m'>energy</th></tr>"
+        "<th title='least power for 1 N, or 0.1 N m [W]'>power</th></tr>"
     )
     return f"<table>{head}{''.join(rows)}</table>"
 

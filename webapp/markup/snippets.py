@@ -16,7 +16,7 @@ def command_line(state: State) -> str:
         words += ["--health", f"{name}={share:g}"]
     for name, angle in state.stuck:
         words += ["--stuck", f"{name}={math.degrees(angle):g}"]
-    if state.method != "learned":
+    if state.method != "search":
         words += ["--method", state.method]
     if state.policy != "closest":
         words += ["--policy", state.policy]
@@ -34,7 +34,7 @@ def export_line(state: State) -> str:
 def python_lines(state: State) -> str:
     """The same question in Python."""
     name = _layout_name(state)
-    method = "" if state.method == "learned" else repr(state.method)
+    method = "" if state.method == "search" else repr(state.method)
     target = ", ".join(f"{value:g}" for value in state.target)
     options = [f"failed={list(state.failed)!r}"] if state.failed else []
     if state.policy != "closest":

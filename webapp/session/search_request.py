@@ -12,7 +12,7 @@ from webapp.session.state import MAX_TARGET, chosen, number
 
 GOAL_WORDS = {
     "weakest direction": "weakest_direction",
-    "energy of a mission": "mission_energy",
+    "power for a mission": "mission_power",
     "worst single failure": "worst_single_failure",
 }
 """What may be improved, in words, and the name that the search knows."""

@@ -29,7 +29,7 @@ GAMMA_RANGE = (0.0, 1.0)
 """Weights gamma of the energy in the ranking."""
 STRENGTH_RANGE = (0.05, 1.0)
 """Shares that may be left of a weak fin's largest amplitude and frequency."""
-COMPARED = ("learned", "paper", "analytic", "qp", "sqp", "multistart")
+COMPARED = ("search", "mdn", "paper", "analytic", "qp", "sqp", "multistart")
 """Methods that answer quickly enough to be compared while one waits."""
 CHOICES: dict[str, tuple[str, ...]] = {"method": tuple(METHODS), "policy": KINDS}
 """Settings that are one of some words."""
@@ -63,7 +63,7 @@ class State:
     """T, how far the draws may stray from the mixture's means."""
     gamma: float = 0.01
     """Weight of the energy in the ranking."""
-    method: str = "learned"
+    method: str = "search"
     """Name of the allocation method."""
     policy: str = "closest"
     """What to do about a wrench that is out of reach: one of `KINDS`."""

@@ -19,7 +19,7 @@ from finlab.evaluation.splits import Case, make_split
 from finlab.evaluation.statistics.bootstrap import quantile_interval
 from finlab.evaluation.statistics.tables import Row, text_table
 
-REFERENCE = "learned"
+REFERENCE = "search"
 """The method that the others are compared with, where it takes part."""
 LAYOUTS = 5
 """Layouts whose calls are timed."""

@@ -13,7 +13,7 @@ import numpy as np
 from finlab.allocation import Allocation, Allocator
 from finlab.evaluation.progress import progress
 from finlab.evaluation.statistics.tables import Row, text_table
-from finlab.forces.thrust_curve import plant_curves
+from finlab.forces.envelopes import largest_forces
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
 from finlab.layout.arrays import Array, layout_effectiveness
@@ -68,7 +68,7 @@ def smooth_path(layout: Layout, sigma: Array, seed: int, ticks: int = TICKS) -> 
     effectiveness = layout_effectiveness(layout)
     # The least planar forces (T, 2n) whose wrench comes closest to sigma times the path.
     spread = path @ np.linalg.pinv(effectiveness / sigma[:, None], rcond=1e-6).T
-    share = np.linalg.norm(spread.reshape(ticks, -1, 2), axis=-1) / plant_curves(layout).maximum
+    share = np.linalg.norm(spread.reshape(ticks, -1, 2), axis=-1) / largest_forces(layout)
     return np.asarray(spread @ effectiveness.T * (LOAD / share.max()))
 
 
@@ -96,7 +96,7 @@ def forced_turn(layout: Layout, path: Array) -> float | None:
     if np.linalg.matrix_rank(effectiveness, 1e-6) < effectiveness.shape[1]:
         return None
     force = (path @ np.linalg.pinv(effectiveness).T).reshape(len(path), -1, 2)
-    works = np.linalg.norm(force, axis=-1) > WORKS * plant_curves(layout).maximum
+    works = np.linalg.norm(force, axis=-1) > WORKS * largest_forces(layout)
     turn = _turns(np.arctan2(force[..., 1], force[..., 0]))
     return float(np.where(works[1:] & works[:-1], turn, 0.0).max())
 
