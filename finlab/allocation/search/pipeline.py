@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.search.prepared import Prepared, prepare, resting_fins
+from finlab.allocation.search.receding_horizon import plan_ahead
 from finlab.allocation.search.refined_candidates import (
     MISSED,
     RANKING,
@@ -58,6 +59,8 @@ class SearchNumbers:
     """Steps of that search, enough to converge: alternatives are counted by their local minima."""
     alternative_error: float = 1e-3
     """Normalized error up to which another answer is an alternative."""
+    plan_lm_steps: int = 4
+    """Levenberg-Marquardt steps on a command of the receding horizon."""
     passing_error: float = 5e-3
     """Normalized error for a tick that is better than a fast turn: half of what counts as delivered."""
 
@@ -148,21 +151,30 @@ class Pipeline:
     def _descend_from_previous(
         self, prepared: Prepared, target: Array, seeds: Array, previous: Array, fallback: FallbackForces
     ) -> RefinedCandidates:
-        """Answers that turn the fins as little as the target allows.
+        """Answers that turn the fins as little as the target allows, with regard to the next ticks.
 
-        Fins at rest turn towards where they would be cheapest.
+        Fins at rest turn towards where they will be needed, or else where they would be cheapest.
         """
         free = self._descend(prepared, target, seeds, fallback)
         aim = free.command[0, 0, :, 2]
         kept = force_sizes(prepared, previous)
         seeds = np.concatenate([kept[None, None], seeds], axis=1)
-        candidates = free
-        for width in TURNS:
+        near = limit_turn(prepared, previous, aim, TURNS[0])
+        candidates = self._descend(near, target, seeds, fallback, known=free.command[0])
+        exact = RANKING.exact_error * prepared.exactness
+        plan = plan_ahead(prepared, previous, target[0], candidates.command[0, 0], free.command[0])
+        if plan is not None:
+            near = limit_turn(prepared, previous, plan.ready, TURNS[1])
+            start = near.commands.clamp(unwrap_to_arc(near, plan.command))
+            fresh = np.full((1, 1), -1)
+            planned = refine_candidates(near, target, start[None, None], fresh, SEARCH.plan_lm_steps)
+            if planned.error[0, 0] <= max(exact, candidates.error[0, 0]):
+                candidates = candidates.with_first(planned)
+        for width in TURNS[1:]:
+            if candidates.error[0, 0] <= (exact if width == TURNS[1] else SEARCH.passing_error):
+                break
             near = limit_turn(prepared, previous, aim, width)
             candidates = self._descend(near, target, seeds, fallback, known=free.command[0])
-            enough = RANKING.exact_error * prepared.exactness if width == TURNS[0] else SEARCH.passing_error
-            if candidates.error[0, 0] <= enough:
-                break
         return candidates
 
     def _trade_error_for_energy(
