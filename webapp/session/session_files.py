@@ -80,11 +80,7 @@ def to_dict(session: Session) -> dict[str, Any]:
     def plain(state: State) -> dict[str, Any]:
         return {
             "layout": place(state.layout),
-            "failed": list(state.failed),
-            "weak": [list(pair) for pair in state.weak],
-            "stuck": [list(pair) for pair in state.stuck],
-            "target": list(state.target),
-            "links": [list(pair) for pair in state.links],
+            **{key: getattr(state, key) for key in ("failed", "weak", "stuck", "target", "links")},
             "settings": {key: getattr(state, key) for key in SETTINGS},
         }
 
@@ -126,7 +122,7 @@ def restore(session: Session, values: dict[str, Any]) -> None:
     for key, value in values["swim"].items():
         swim = swim.with_value(key, value)
     session.resume(state)
-    session.history.restore(past, future)
+    session.history.past, session.history.future = past, future
     session.saved, session.display = saved, display
     session.draft, session.swim = draft, swim.without_own_path()
     session.pinned = None if pinned is None else layouts[pinned]
