@@ -115,13 +115,11 @@ def steadiness_rows(
     """
     rows = []
     for layout in progress(layouts, "layout"):
-        free, steady, forced = [], [], []
-        for k in range(n_paths):
-            path = smooth_path(layout, allocator.normalization.std, seed + k, ticks)
-            free.append(rollout(allocator, layout, path, steady=False))
-            steady.append(rollout(allocator, layout, path, steady=True))
-            forced.append(forced_turn(layout, path))
-        rows.append(_row(layout, free, steady, forced))
+        sigma = allocator.normalization.std
+        paths = [smooth_path(layout, sigma, seed + k, ticks) for k in range(n_paths)]
+        free = [rollout(allocator, layout, path, steady=False) for path in paths]
+        steady = [rollout(allocator, layout, path, steady=True) for path in paths]
+        rows.append(_row(layout, free, steady, [forced_turn(layout, path) for path in paths]))
     return rows
 
 

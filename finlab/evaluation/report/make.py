@@ -4,10 +4,11 @@ import json
 from pathlib import Path
 from typing import Any
 
+from finlab.evaluation.method_specs import Checkpoints
 from finlab.evaluation.report.document import Block, Document, figures_of
 from finlab.evaluation.report.jobs import run_jobs
 from finlab.evaluation.report.pages import to_html, to_markdown
-from finlab.evaluation.report.plan import Checkpoints, make_plan
+from finlab.evaluation.report.plan import make_plan
 from finlab.evaluation.report.provenance import Provenance, how_made_blocks, source_commit
 from finlab.evaluation.report.results import Results
 from finlab.evaluation.report.sections import closed_loop, studies, summary, wrench_tracking
