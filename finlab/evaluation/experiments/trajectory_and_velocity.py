@@ -105,14 +105,13 @@ def velocity_report(rows: Sequence[Row], baseline: str, layout: Layout, plant: s
             for key, label in (("inertial_w", "inertial"), ("torque_w", "torque"), ("mae", "MAE")):
                 line[f"{label} to {baseline}"] = f"{100 * (row[key] / other[key] - 1):+.1f} %"
         shown.append(line)
-    paper = paper_figures()["velocity"]
     printed = [
         {
             "method": f"{name} (printed in the paper)",
             "power [W]": spread(values, "inertial_w", 2),
             "MAE [m/s]": spread(values, "mae"),
         }
-        for name, values in paper.items()
+        for name, values in paper_figures()["velocity"].items()
     ]
     return (
         f"{text_table(shown)}\n\nLayout {layout.name}, runs from rest, plant {plant}. Inertial power is the "

@@ -54,10 +54,8 @@ def make_report(
     else:
         run_jobs(list(plan), records, commit=source_commit(), processes=processes)
     left_out = n_parts - len(list(plan))
-    paths = {
-        "learned": resolve_checkpoint(checkpoints.learned or "default"),
-        "paper": resolve_checkpoint(checkpoints.paper or "paper"),
-    }
+    given = {"learned": checkpoints.learned or "default", "paper": checkpoints.paper or "paper"}
+    paths = {method: resolve_checkpoint(checkpoint) for method, checkpoint in given.items()}
     prints = {f"{path.name} ({name})": read_checkpoint(path).sha256 for name, path in paths.items()}
     results = Results(plan, records, read_normalization(paths["learned"]).std)
     provenance = Provenance(prints, seed, command)

@@ -26,8 +26,6 @@ from finlab.evaluation.report.sizes import Sizes
 from finlab.evaluation.splits import SPLITS
 from finlab.evaluation.statistics.records import Columns
 
-Size = tuple[int, int]
-
 REFERENCE = "ipopt-32"
 """Whose energies the others are measured by."""
 ENERGY_METHODS = ("learned", "fast", "paper", "analytic", "sqp", "multistart", "trf", "slsqp", "ipopt")
@@ -91,7 +89,7 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
     prints = {name: fingerprint(name, checkpoints.of(name)) for name in names}
 
     def job(
-        name: str, do: Callable[..., Columns], spec: str, size: Size | None = None, **settings: Any
+        name: str, do: Callable[..., Columns], spec: str, size: tuple[int, int] | None = None, **settings: Any
     ) -> Job:
         settings |= {"seed": seed} | ({} if size is None else {"layouts": size[0], "targets": size[1]})
         return Job(name, do, settings, prints[spec], {"checkpoint": checkpoints.of(spec)})
