@@ -48,7 +48,7 @@ class Bench:
     def __init__(self, solver: Solver, n_sessions: int = SESSIONS) -> None:
         """Open the pages."""
         self.workers = Workers()
-        self.servers = [start_server("127.0.0.1", 0) for _ in range(n_sessions)]
+        self.servers = [start_server() for _ in range(n_sessions)]
         layout = load_layout(shipped_layouts()[LAYOUT])
         self.views: list[View] = []
         for server in self.servers:

@@ -99,7 +99,5 @@ def _alike(known: Any, value: Any) -> bool:
 
 def numbered(button: str, count: int) -> int | None:
     """Place that a numbered button stands for (`3`, `3 ✕`: 2), of `count`; None for any other text."""
-    number = button.split(" ")[0]
-    if not (number.isdecimal() and len(number) < 6 and 0 < int(number) <= count):
-        return None
-    return int(number) - 1
+    number, numbers = button.split(" ")[0], [str(k + 1) for k in range(count)]
+    return numbers.index(number) if number in numbers else None

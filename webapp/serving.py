@@ -13,7 +13,7 @@ from webapp.session.files import cache_folder
 from webapp.session.state import State
 from webapp.session.targets import FIRST
 from webapp.tasks.solver import Solver
-from webapp.viser_internals import start_guarded, stop_server
+from webapp.viser_internals import start_server, stop_server
 
 FIRST_LAYOUT = "ucat"
 """The shipped layout that a new session opens."""
@@ -40,7 +40,7 @@ def serve(
     # A missing checkpoint is reported now, not in the browser; and the first page finds a warm solver.
     solver.solve(State(first, target=FIRST))
     guard = Guard.of(host)
-    server = start_guarded(guard, port)
+    server = start_server(guard, port)
     app = App(server, solver, first, folder=cache_folder() / "sessions")
     try:
         if port not in (0, server.get_port()):

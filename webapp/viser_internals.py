@@ -16,15 +16,12 @@ from websockets.http11 import Request, Response
 from webapp.guard import Guard
 
 _STARTING = threading.Lock()
+LOCAL = Guard("127.0.0.1")
+"""Lets only pages of this machine in."""
 
 
-def start_server(host: str, port: int) -> viser.ViserServer:
-    """A server that lets only its own pages in, and does not print a banner of its own."""
-    return start_guarded(Guard(host), port)
-
-
-def start_guarded(guard: Guard, port: int) -> viser.ViserServer:
-    """A server behind a guard; `verbose=False` alone would leave the banner."""
+def start_server(guard: Guard = LOCAL, port: int = 0) -> viser.ViserServer:
+    """A server behind a guard, without a banner of viser's own; `verbose=False` alone would leave it."""
     with _STARTING, _guarded(guard), contextlib.redirect_stdout(io.StringIO()):
         return viser.ViserServer(host=guard.host, port=port, label="finlab", verbose=False)
 

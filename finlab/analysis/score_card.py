@@ -59,12 +59,9 @@ class ScoreCard:
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the card as numbers, strings, lists and None, for JSON."""
-        record = asdict(self)
-        record["axes"] = list(AXES)
-        record["reachable"] = list(self.authority.reachable)
-        worst = self.worst_loss
-        record["worst_loss"] = None if worst is None else worst.fin
-        return record
+        worst = None if self.worst_loss is None else self.worst_loss.fin
+        reachable = list(self.authority.reachable)
+        return asdict(self) | {"axes": list(AXES), "reachable": reachable, "worst_loss": worst}
 
 
 def score_card(layout: Layout, failed: Collection[str] = ()) -> ScoreCard:

@@ -55,7 +55,7 @@ def training(
     settings |= {"layouts": layouts, "targets": targets, "seed": seed}
     jobs = training_jobs(settings, out)
     run_jobs(list(jobs.values()), out, commit=source_commit(), processes=0)
-    rows = [training_row(name, job.result(out).columns) for name, job in jobs.items()]
+    rows = [training_row(name, job.result(out)[0]) for name, job in jobs.items()]
     output.show(training_report(rows, preset, steps, batch_size), rows=rows)
 
 
@@ -84,8 +84,8 @@ def report(
         processes: parts that run at once; the number of cores by default.
         as_is: do no work; make the page from what is there.
     """
+    from finlab.evaluation.method_specs import Checkpoints
     from finlab.evaluation.report.make import make_report
-    from finlab.evaluation.report.plan import Checkpoints
     from finlab.evaluation.report.sizes import SIZES
 
     check_positive(processes=processes)

@@ -2,6 +2,7 @@
 
 import hashlib
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 from finlab.allocation.allocator import Allocator
@@ -20,6 +21,20 @@ QUICK = ("learned", "fast", "paper", "qp", "sqp", "analytic", "multistart")
 DISTILLED = "fast"
 """Folder of the distilled network in a checkpoint."""
 _WITH_STARTS = re.compile(r"(\w+)-(\d+)")
+
+
+@dataclass(frozen=True)
+class Checkpoints:
+    """The checkpoints under test: names of shipped ones, or folders."""
+
+    learned: str | None = None
+    """Of method `learned`, which also gives the yardstick of the baselines."""
+    paper: str | None = None
+    """Of method `paper`."""
+
+    def of(self, method: str) -> str | None:
+        """The checkpoint of a method."""
+        return self.paper if method == "paper" else self.learned
 
 
 def is_slow(name: str) -> bool:

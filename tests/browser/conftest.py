@@ -65,7 +65,7 @@ def served() -> Iterator[Served]:
     from webapp.tasks.solver import Solver
     from webapp.viser_internals import start_server, stop_server
 
-    server = start_server("127.0.0.1", 0)
+    server = start_server()
     layout = load_layout(shipped_layouts()["ucat"])
     app = App(server, Solver(load=load_stand_in), layout, Display(shadows=False, frozen=True))
     yield Served(f"http://127.0.0.1:{server.get_port()}/?fixedDpr=0.3", app, server)

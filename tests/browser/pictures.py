@@ -195,7 +195,7 @@ def main(folder: Path, wanted: list[str], dark: bool = False) -> None:
     from webapp.tasks.solver import Solver
     from webapp.viser_internals import start_server, stop_server
 
-    server = start_server("127.0.0.1", 0)
+    server = start_server()
     ucat, solver = load_layout(shipped_layouts()["ucat"]), Solver()
     solver.reply(State(ucat, target=FIRST))  # as `serve` does, so that the first page finds a warm solver
     app = App(server, solver, ucat, Display(shadows=False, dark=dark))

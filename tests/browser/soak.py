@@ -61,7 +61,7 @@ def main(seconds: float) -> None:
     from webapp.tasks.solver import Solver
     from webapp.viser_internals import start_server, stop_server
 
-    server, solver = start_server("127.0.0.1", 0), Solver()
+    server, solver = start_server(), Solver()
     ucat = load_layout(shipped_layouts()["ucat"])
     solver.reply(State(ucat, target=FIRST))
     app = App(server, solver, ucat, Display(shadows=False, frozen=True))

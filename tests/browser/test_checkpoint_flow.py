@@ -24,7 +24,7 @@ pytestmark = pytest.mark.skipif(
 @pytest.fixture(scope="module")
 def trained(browser: Any) -> Iterator[Page]:
     """A page of a server with the real solver."""
-    server = start_server("127.0.0.1", 0)
+    server = start_server()
     ucat = load_layout(shipped_layouts()["ucat"])
     app = App(server, Solver(), ucat, Display(shadows=False, speed=0.2))
     context = browser.new_context(viewport={"width": 900, "height": 600})

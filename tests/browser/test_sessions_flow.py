@@ -13,7 +13,7 @@ from webapp.app import App
 from webapp.guard import Guard
 from webapp.session import Display
 from webapp.tasks.solver import Solver
-from webapp.viser_internals import disconnect_all, start_guarded, stop_server
+from webapp.viser_internals import disconnect_all, start_server, stop_server
 
 
 def test_two_tabs_are_apart(page: Any, new_page: Callable[..., Any]) -> None:
@@ -58,7 +58,7 @@ def test_token_opens_and_a_restart_loses_nothing(browser: Any, tmp_path: Path) -
     guard, layout = Guard("127.0.0.1", "a-secret-token"), load_layout(shipped_layouts()["ucat"])
 
     def start(port: int) -> Served:
-        server = start_guarded(guard, port)
+        server = start_server(guard, port)
         app = App(
             server, Solver(load=load_stand_in), layout, Display(shadows=False, frozen=True), folder=tmp_path
         )

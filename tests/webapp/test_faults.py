@@ -64,7 +64,7 @@ class Tab:
     """One page on a server of its own."""
 
     def __init__(self, workers: Workers, layout: Any) -> None:
-        self.server = start_server("127.0.0.1", 0)
+        self.server = start_server()
         self.client: Any = SilentClient(self.server)
         session = Session(layout, DISPLAY)
         solver = Solver(load=load_stand_in)

@@ -16,7 +16,7 @@ from webapp.session import Session
 from webapp.session.session_files import SessionFiles, to_dict
 from webapp.session.store import SessionStore
 from webapp.tasks.solver import Solver
-from webapp.viser_internals import start_guarded, start_server, stop_server
+from webapp.viser_internals import start_server, stop_server
 
 OWN = {"host": "localhost:8080"}
 
@@ -61,7 +61,7 @@ def test_token_is_asked_for_beyond_this_machine() -> None:
 
 
 def test_real_server_refuses_before_anything_is_shown() -> None:
-    server = start_guarded(Guard("127.0.0.1", "secret-token"), 0)
+    server = start_server(Guard("127.0.0.1", "secret-token"), 0)
     try:
         port = server.get_port()
 
@@ -89,7 +89,7 @@ def test_session_survives_the_server(tmp_path: Path) -> None:
     layout = load_layout(shipped_layouts()["ucat"])
     keys = []
     for life in range(2):
-        server = start_server("127.0.0.1", 0)
+        server = start_server()
         app = App(server, Solver(load=load_stand_in), layout, folder=tmp_path)
         key, session = app._store.enter(keys)
         if life == 0:

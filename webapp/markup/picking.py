@@ -1,9 +1,10 @@
 """Clicks on the page's own markup: they press a button of a group, or send a word to the server."""
 
 from collections.abc import Callable
-from typing import Any
 
 import viser
+
+from webapp.handles import on_user_change
 
 MAX_LENGTH = 60
 """Longest word that is heard; pages may send anything."""
@@ -41,19 +42,11 @@ def button_colors(name: str, colors: list[tuple[str, str]]) -> str:
     return f"<style>{''.join(rules)}</style>{marker(name)}"
 
 
-class Channel:
-    """A hidden text box behind a marker."""
-
-    def __init__(self, gui: viser.GuiApi, name: str, hear: Callable[[list[str]], None]) -> None:
-        """Build it; `hear` gets the comma-separated parts of each word on the event loop."""
-        gui.add_html(f"<style>div:has(>.{name}) + div {{ display: none; }}</style>{marker(name)}")
-        self._box = gui.add_text(name, "")
-
-        @self._box.on_update
-        async def _changed(event: Any) -> None:
-            word = event.target.value
-            if event.client is not None and isinstance(word, str) and 0 < len(word) <= MAX_LENGTH:
-                hear(word.split(","))
+def add_channel(gui: viser.GuiApi, name: str, hear: Callable[[list[str]], None]) -> None:
+    """A hidden text box behind a marker; `hear` gets the comma-separated parts of each word sent there."""
+    gui.add_html(f"<style>div:has(>.{name}) + div {{ display: none; }}</style>{marker(name)}")
+    box = gui.add_text(name, "")
+    on_user_change(box, lambda word: hear(word.split(",")) if 0 < len(word) <= MAX_LENGTH else None)
 
 
 def send(name: str, word: str) -> str:

@@ -16,17 +16,10 @@ from webapp.theme import DEAD, css, fin_color
 class FinButtons:
     """A row of numbers."""
 
-    def __init__(
-        self,
-        gui: viser.GuiApi,
-        page: Page,
-        label: str,
-        hint: str,
-        marker: str,
-        act: Callable[[str], object],
-    ) -> None:
+    def __init__(self, page: Page, label: str, hint: str, marker: str, act: Callable[[str], object]) -> None:
         """Build the row; `marker` is its name on the page, `act` an intent about the fin of a name."""
         self._page, self._marker, self._act = page, marker, act
+        gui = page.client.gui
         self._names: Sequence[str] = ()
         self._paint = gui.add_html("")
         self._buttons = gui.add_button_group(label, ("1",), hint=hint)

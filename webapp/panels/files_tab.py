@@ -43,17 +43,12 @@ class FilesTab:
 
     def _send_layout(self) -> None:
         layout = self._page.session.state.layout
-        self._page.client.send_file_download(
-            f"{files.file_stem(layout.name)}.yaml",
-            files.layout_bytes(layout),
-            save_immediately=True,
-        )
+        self._page.exports.download(f"{files.file_stem(layout.name)}.yaml", files.layout_bytes(layout))
         self._page.session.note_saved()
 
     def _send_candidates(self) -> None:
-        self._page.client.send_file_download(
-            "candidates.csv", files.candidates_csv(self._page.answering.best), save_immediately=True
-        )
+        page = self._page
+        page.exports.download("candidates.csv", files.candidates_csv(page.answering.best))
 
     def refresh(self) -> None:
         """Write the command that asks the same question."""

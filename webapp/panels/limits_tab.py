@@ -89,7 +89,6 @@ class ImprovePanel:
             self._goal = gui.add_dropdown("Goal", tuple(GOAL_WORDS), hint="What to raise.")
             page.on_change(self._goal, partial(self._draft, SearchRequest.with_goal))
             self._fins = FinButtons(
-                gui,
                 page,
                 "May move",
                 "Press a number to hold a fin, or to let it move. Pairs stay pairs.",

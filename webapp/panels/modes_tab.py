@@ -8,7 +8,7 @@ import viser
 from finlab.allocation.methods import METHODS
 from webapp.handles import Changes, numbered, on_user_change, put
 from webapp.markup.modes import SAMPLES, mode_plot, mode_table
-from webapp.markup.picking import Channel, chosen_button, marker
+from webapp.markup.picking import add_channel, chosen_button, marker
 from webapp.markup.words import small, three_digits
 from webapp.page import Page
 from webapp.panels.line_plot import FIN_LINES, LinePlot
@@ -87,7 +87,7 @@ class ModePicker:
         self.name = name
         self._changes = Changes()
         self._plot = gui.add_html("")
-        Channel(gui, f"{name}-{SAMPLES}", self._choose_sample)
+        add_channel(gui, f"{name}-{SAMPLES}", self._choose_sample)
         self._chosen = gui.add_html(marker(name))
         self._choice = gui.add_button_group(
             "Mode",

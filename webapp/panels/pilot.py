@@ -7,7 +7,7 @@ import viser
 
 from finlab.allocation.policy import KINDS
 from webapp.handles import on_user_change, put
-from webapp.markup.picking import Channel, send
+from webapp.markup.picking import add_channel, send
 from webapp.page import Page
 from webapp.session.state import AXIS_WORDS
 from webapp.session.targets import axis_reach
@@ -95,7 +95,7 @@ class PilotPanel:
             )
             on_user_change(self._spring, lambda _: self.refresh())
             self._pad = gui.add_html("")
-            Channel(gui, CHANNEL, self._steer)
+            add_channel(gui, CHANNEL, self._steer)
             self._grips = gui.add_checkbox(
                 "Drag in 3D (G)",
                 False,

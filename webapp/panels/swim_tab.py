@@ -58,7 +58,6 @@ class SwimTab:
         follow = gui.add_checkbox("Follow", False, hint="The camera goes along with the first robot.")
         page.on_change(follow, page.scenery.look_after_swim)
         self._fins = FinButtons(
-            gui,
             page,
             "Break a fin",
             "Press a fin's number: break or mend it while it swims.",

@@ -30,7 +30,6 @@ class WrenchTab:
         self._page = page
         self._target = TargetPanel(gui, page)
         self._failures = FinButtons(
-            gui,
             page,
             "Fail a fin",
             "Press a number to fail or repair a fin; F does it to the selected one.",

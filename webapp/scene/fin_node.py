@@ -118,7 +118,8 @@ class FinNode:
         ring = {"line_width": 4.0, "disable_axes": True, "disable_sliders": True}
         self._move = add_gizmo(scene, name, GIZMO_SIZE, dragged, **arrows)
         self._turn = add_gizmo(scene, f"{name}/turn", RING_SIZE, dragged, **ring)
-        self._fin = fin = FinShapes(scene, f"{name}/turn", index, cast_shadow=False)
+        self.shapes = fin = FinShapes(scene, f"{name}/turn", index, cast_shadow=False)
+        """Its blade, shaft and force."""
         fan = fin_mesh.sweep(0.1)
         self._fan = Shape(scene, f"{name}/turn/fan", fin.color, fan, opacity=0.3, side="double", **UNLIT)
         self._label = scene.add_label(
@@ -168,18 +169,14 @@ class FinNode:
     def command(self, command: Array | None, arrow: Array, mounting_angle: float, fans: bool) -> None:
         """Show a command (3,), None for a failed fin, and its force as a body-frame arrow (3,) [m]."""
         alive = command is not None
-        self._fin.paint(alive)
+        self.shapes.paint(alive)
         put(self._fan.node, visible=fans and alive)
-        put(self._fin.force.node, visible=alive)
+        put(self.shapes.force.node, visible=alive)
         if command is None:
             return
         self._fan.show(fin_mesh.sweep, float(command[0]))
         put(self._fan.node, wxyz=quaternion(float(command[2]), 0))
-        self._fin.push(arrow, mounting_angle, 0.007)
-
-    def pose_blade(self, angle: float) -> None:
-        """Turn the blade about its shaft to an angle [rad]."""
-        self._fin.pose(angle)
+        self.shapes.push(arrow, mounting_angle, 0.007)
 
 
 def _strut(servo: Array, hull: AnyHull) -> Mesh:

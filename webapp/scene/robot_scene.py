@@ -146,7 +146,7 @@ class RobotScene:
         display = self._session.display
         angles = self._flapping.angles(elapsed * display.speed, display.frozen)
         for node, angle in zip(self._fins, angles, strict=False):  # a fin may be newer than the answer
-            node.pose_blade(angle)
+            node.shapes.pose(angle)
 
     def _clicked(self, index: int) -> None:
         self._do(partial(self._session.select, self._session.state.layout.names[index]))

@@ -3,7 +3,7 @@
 import numpy as np
 import viser
 
-from webapp.handles import put
+from webapp.handles import Changes, put
 from webapp.scene.meshes.hull import AnyHull
 from webapp.scene.shape import Shape
 from webapp.theme import LIGHT, Look, look
@@ -18,8 +18,7 @@ class Stage:
     def __init__(self, scene: viser.SceneApi, hull: AnyHull) -> None:
         """Build the stage around a hull."""
         self._scene = scene
-        self._dark: bool | None = None
-        self._shadows: bool | None = None
+        self._new_theme, self._new_lights = Changes(), Changes()
         self._hull = hull
         mesh, bow = hull.mesh(), hull.bow()
         self._body = Shape(scene, "/robot/hull", LIGHT.hull, mesh, side="double")
@@ -58,11 +57,9 @@ class Stage:
             self._body.become(hull.mesh())
             self._bow.become(hull.bow())
         put(self._grid, position=np.array([0.0, 0.0, self.floor_height(hull)]))
-        if shadows != self._shadows:
-            self._shadows = shadows
+        if self._new_lights(shadows):
             self._scene.configure_default_lights(cast_shadow=shadows)
-        if dark != self._dark:
-            self._dark = dark
+        if self._new_theme(dark):
             self._paint(look(dark))
 
     def show_floor(self, visible: bool) -> None:

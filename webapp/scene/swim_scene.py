@@ -12,6 +12,8 @@ from webapp.theme import ASKED, DELIVERED, OTHER, look
 
 ARROWS_N = 1.0
 """Force that an arrow of 0.1 m stands for while robots swim [N]: one for all, so that they compare."""
+ROBOTS = ((DELIVERED, None), (OTHER, 0.45))
+"""Colours of the robots' trails, and how opaque the robots are."""
 DEPTH_BELOW = 0.6
 """How far the floor is below the deepest point of the way [m]."""
 
@@ -68,11 +70,8 @@ class SwimScene:
         swimming = self._swimming
         self._shown = swimming.swimmers
         while len(self._robots) < len(swimming.swimmers):  # the second one is made when it is first needed
-            second = len(self._robots) == 1
-            color, opacity = (OTHER, 0.45) if second else (DELIVERED, None)
-            self._robots.append(
-                SwimRobot(self._client.scene, f"/swim/robot{len(self._robots)}", color, opacity)
-            )
+            k = len(self._robots)
+            self._robots.append(SwimRobot(self._client.scene, f"/swim/robot{k}", *ROBOTS[k]))
         for robot in self._robots[len(swimming.swimmers) :]:
             robot.hide()
         for robot, swimmer in zip(self._robots, swimming.swimmers, strict=False):

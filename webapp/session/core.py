@@ -1,7 +1,7 @@
 """What all intents of a session share: its state with undo, and what is selected and shown."""
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Generic, TypeVar
 
 from finlab.errors import FinlabError
@@ -27,8 +27,10 @@ class History(Generic[Snapshot]):
         """Start with one state; `clock` gives seconds and is replaced in tests."""
         self.state = state
         self._clock = clock
-        self._past: list[tuple[str, Snapshot]] = []
-        self._future: list[tuple[str, Snapshot]] = []
+        self.past: list[tuple[str, Snapshot]] = []
+        """Steps that can be undone, oldest first: names, and the states before them."""
+        self.future: list[tuple[str, Snapshot]] = []
+        """Steps that can be redone, last one first: names, and the states after them."""
         self.merge_key: str | None = None
         """Key of the step that is still being merged into, if any."""
         self._merge_time = 0.0
@@ -46,11 +48,11 @@ class History(Generic[Snapshot]):
             return
         now = self._clock()
         same = merge_key is not None and merge_key == self.merge_key
-        if not (same and self._past and (not timed or now - self._merge_time < MERGE_WINDOW_S)):
-            self._past.append((name, self.state))
-            del self._past[:-MAX_STEPS]
+        if not (same and self.past and (not timed or now - self._merge_time < MERGE_WINDOW_S)):
+            self.past.append((name, self.state))
+            del self.past[:-MAX_STEPS]
         self.merge_key, self._merge_time = merge_key, now
-        self._future.clear()
+        self.future.clear()
         self.state = state
 
     def end_merge(self) -> None:
@@ -59,43 +61,29 @@ class History(Generic[Snapshot]):
 
     def abandon(self) -> bool:
         """Take the step back that is being merged into, leaving no trace of it; False if there is none."""
-        if self.merge_key is None or not self._past:
+        if self.merge_key is None or not self.past:
             return False
-        _, self.state = self._past.pop()
+        _, self.state = self.past.pop()
         self.merge_key = None
         return True
 
     @property
-    def past(self) -> tuple[tuple[str, Snapshot], ...]:
-        """Steps that can be undone, oldest first: names, and the states before them."""
-        return tuple(self._past)
-
-    @property
-    def future(self) -> tuple[tuple[str, Snapshot], ...]:
-        """Steps that can be redone, last one first: names, and the states after them."""
-        return tuple(self._future)
-
-    def restore(self, past: Iterable[tuple[str, Snapshot]], future: Iterable[tuple[str, Snapshot]]) -> None:
-        """Take over steps that were kept."""
-        self._past, self._future = list(past), list(future)
-
-    @property
     def undo_name(self) -> str | None:
         """Name of the step that undo takes back, if any."""
-        return self._past[-1][0] if self._past else None
+        return self.past[-1][0] if self.past else None
 
     @property
     def redo_name(self) -> str | None:
         """Name of the step that redo brings back, if any."""
-        return self._future[-1][0] if self._future else None
+        return self.future[-1][0] if self.future else None
 
     def undo(self) -> str | None:
         """Go back one step; returns its name, None when there is none."""
-        return self._step(self._past, self._future)
+        return self._step(self.past, self.future)
 
     def redo(self) -> str | None:
         """Go forward one step; returns its name, None when there is none."""
-        return self._step(self._future, self._past)
+        return self._step(self.future, self.past)
 
     def _step(self, source: list[tuple[str, Snapshot]], sink: list[tuple[str, Snapshot]]) -> str | None:
         if not source:

@@ -7,7 +7,7 @@ from typing import Any
 from finlab.allocation.policy import AXES
 from finlab.errors import FinlabError
 from webapp.session.core import Core
-from webapp.session.state import AXIS_WORDS, number
+from webapp.session.state import AXIS_WORDS, State
 from webapp.session.targets import PRESETS, axis_reach
 
 SHARE = 0.25
@@ -25,19 +25,21 @@ class Questions(Core):
 
     def drag_target(self, first: int, vector: Sequence[float], over: bool) -> None:
         """Force (`first` 0) or torque (3) of the target in the user's hand; one step of undo for the drag."""
-        state, word = self.state, "force" if first == 0 else "torque"
-        for axis, value in enumerate(vector, start=first):
-            state = state.with_target(axis, round(float(value), 2 if first == 0 else 3))
-        self._commit(f"Drag the {word}", state, f"drag {word}", timed=False)
+        word, values = "force" if first == 0 else "torque", dict(enumerate(vector, start=first))
+        self._commit(f"Drag the {word}", self._aimed(values), f"drag {word}", timed=False)
         if over:
             self.history.end_merge()
 
     def steer(self, values: dict[int, float]) -> None:
         """Some components [N or N m] of the target under the user's thumb: one step of undo."""
+        self._commit("Steer", self._aimed(values), STEER, timed=False)
+
+    def _aimed(self, values: dict[int, float]) -> State:
+        """The state with some components [N or N m] of the target, as finely as a hand can mean them."""
         state = self.state
         for axis, value in values.items():
             state = state.with_target(axis, round(float(value), 2 if axis < 3 else 3))
-        self._commit("Steer", state, STEER, timed=False)
+        return state
 
     def release(self, spring_back: bool) -> None:
         """The thumb is off: the target stays, or goes back to what it was before without leaving a trace."""
@@ -70,10 +72,8 @@ class Questions(Core):
         value = float(f"{SHARE * reach:.2g}")
         alone = all(v == 0.0 for k, v in enumerate(state.target) if k != axis)
         sign = -1.0 if alone and state.target[axis] > 0.0 else 1.0
-        target = [0.0] * 6
-        target[axis] = number(sign * value, AXES[axis], -1000.0, 1000.0)
-        fx, fy, fz, tx, ty, tz = target
-        self._commit(f"Only {AXIS_WORDS[axis]}", replace(state, target=(fx, fy, fz, tx, ty, tz)))
+        only = replace(state, target=(0.0,) * 6).with_target(axis, sign * value)
+        self._commit(f"Only {AXIS_WORDS[axis]}", only)
 
     def set_setting(self, key: str, value: Any) -> None:
         """K, T, gamma or the method; `key` is the field of `State`."""

@@ -80,11 +80,7 @@ def to_dict(session: Session) -> dict[str, Any]:
     def plain(state: State) -> dict[str, Any]:
         return {
             "layout": place(state.layout),
-            "failed": list(state.failed),
-            "weak": [list(pair) for pair in state.weak],
-            "stuck": [list(pair) for pair in state.stuck],
-            "target": list(state.target),
-            "links": [list(pair) for pair in state.links],
+            **{key: getattr(state, key) for key in ("failed", "weak", "stuck", "target", "links")},
             "settings": {key: getattr(state, key) for key in SETTINGS},
         }
 
@@ -109,6 +105,7 @@ def restore(session: Session, values: dict[str, Any]) -> None:
 
     Raises:
         FinlabError: a value is not allowed. So may KeyError, TypeError, ValueError and IndexError tell.
+            The session is to be dropped then: it is half restored.
     """
     if values["version"] != VERSION:
         raise FinlabError(f"kept session: expected version {VERSION}, got {values['version']!r:.20}")
@@ -117,19 +114,16 @@ def restore(session: Session, values: dict[str, Any]) -> None:
     def steps(key: str) -> list[tuple[str, State]]:
         return [(str(name)[:200], _state(state, layouts)) for name, state in values[key][-MAX_STEPS:]]
 
-    state, past, future = _state(values["state"], layouts), steps("past"), steps("future")
-    saved, pinned = layouts[values["saved"]], values["pinned"]
-    display = session.display
-    for key, value in values["display"].items():
-        display = display.with_value(key, value)
-    draft, swim = restored_request(values["draft"]), session.swim
-    for key, value in values["swim"].items():
-        swim = swim.with_value(key, value)
-    session.resume(state)
-    session.history.restore(past, future)
-    session.saved, session.display = saved, display
-    session.draft, session.swim = draft, swim.without_own_path()
+    session.resume(_state(values["state"], layouts))
+    session.history.past, session.history.future = steps("past"), steps("future")
+    session.saved, pinned = layouts[values["saved"]], values["pinned"]
     session.pinned = None if pinned is None else layouts[pinned]
+    for key, value in values["display"].items():
+        session.set_display(key, value)
+    for key, value in values["swim"].items():
+        session.set_swim(key, value)
+    session.swim = session.swim.without_own_path()
+    session.set_draft(restored_request(values["draft"]))
     session.compare_with(values["beside"])
 
 

@@ -32,7 +32,7 @@ def recorded_html(session: Session, allocation: Allocation) -> bytes:
     Takes a second and must not run on the event loop: viser records shared scenes only, so the robot is
     built once more on a server of its own.
     """
-    server = start_server("127.0.0.1", 0)
+    server = start_server()
     try:
         server.scene.world_axes.visible = False
         studio: Any = SimpleNamespace(scene=server.scene, camera=server.initial_camera, atomic=server.atomic)
@@ -100,11 +100,12 @@ class Exports:
         name = f"{file_stem(self._session.state.layout.name)}{suffix}"
         self._worker.submit(
             (id(self), suffix),
-            lambda: self._loop.post(partial(self._download, name, make())),
+            lambda: self._loop.post(partial(self.download, name, make())),
             lambda text: self._loop.post(partial(self._failed, "Not exported", text)),
         )
 
-    def _download(self, name: str, content: bytes) -> None:
+    def download(self, name: str, content: bytes) -> None:
+        """Send a file that is there already."""
         self._client.send_file_download(name, content, save_immediately=True)
 
     def _take_picture(self, name: str) -> None:
@@ -114,4 +115,4 @@ class Exports:
             self._loop.post(partial(self._failed, "No picture", str(error)))
             return
         content = iio.imwrite("<bytes>", picture, extension=".png")
-        self._loop.post(partial(self._download, name, content))
+        self._loop.post(partial(self.download, name, content))

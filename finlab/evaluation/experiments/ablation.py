@@ -44,17 +44,10 @@ def ablation_method(
     n_candidates: int = 64,
     temperature: float = 0.02,
 ) -> Allocator:
-    """The method of a row.
+    """The method of a row: one of `VARIANTS` with one of `REFINEMENTS`; `AllocationError` for another one.
 
-    Args:
-        variant: one of `VARIANTS`.
-        refinement: one of `REFINEMENTS`.
-        checkpoint: of method `paper`; the shipped one by default.
-        n_candidates: candidates drawn per target.
-        temperature: of the draw.
-
-    Raises:
-        AllocationError: unknown refinement.
+    The checkpoint is one of method `paper`, by default the shipped one. So many candidates are drawn for each
+    target, at this temperature.
     """
     options = {"n_candidates": n_candidates, "temperature": temperature, "refinement": refinement}
     method: Allocator = load_allocator("paper", checkpoint=checkpoint, **{**options, **VARIANTS[variant]})

@@ -13,9 +13,8 @@ from finlab.evaluation.experiments.closed_loop_runs import (
     follow_row,
     group_runs,
     over_seeds,
-    spread,
+    shown_errors,
 )
-from finlab.evaluation.experiments.trajectory_and_velocity import LABELS
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.statistics.tables import text_table
 from finlab.layout import Layout
@@ -113,11 +112,16 @@ def fault_report(rows: Sequence[Row], layout: Layout, trajectory: Trajectory, pl
     """What was not swum and why, the table, and the paper's."""
     why = "Not swum, since the fins that are left cannot give surge, heave and yaw independently"
     hopeless = "".join(f"{why}: {row['fault']}.\n" for row in rows if not row["controllable"])
+    printed = [
+        {"fault": fault.replace("_", " "), "method": method, **shown_errors(values)}
+        for fault, methods in paper_figures()["fault_tolerance"].items()
+        for method, values in methods.items()
+    ]
     table = text_table([_shown(row) for row in rows if row["controllable"]])
     return (
         (f"{hopeless}\n" if hopeless else "") + f"{table}\n\n"
         f"Layout {layout.name}, {trajectory.name} of {trajectory.duration_s:.0f} s, plant {plant}.\n"
-        f"In the paper, in a pool [m]:\n{text_table(_paper_rows())}"
+        f"In the paper, in a pool [m]:\n{text_table(printed)}"
     )
 
 
@@ -127,16 +131,7 @@ def _shown(row: Row) -> Row:
     return {
         "fault": row["fault"],
         "method": row["method"],
-        **{label: spread(row, key) for key, label in LABELS.items()},
+        **shown_errors(row),
         "ATE / healthy": "" if ratio is None else f"{ratio:.2f}",
         "tracked": "yes" if row["tracked"] else "no",
     }
-
-
-def _paper_rows() -> list[Row]:
-    return [
-        {"fault": fault.replace("_", " "), "method": method}
-        | {label: f"{values[key]:.3f}" for key, label in LABELS.items()}
-        for fault, methods in paper_figures()["fault_tolerance"].items()
-        for method, values in methods.items()
-    ]

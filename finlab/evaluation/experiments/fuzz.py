@@ -111,9 +111,9 @@ def fuzz_methods(
 
 def fuzz_report(counts: Sequence[FuzzCount]) -> str:
     """The table, and the first faults in words."""
-    lines = [text_table([count.row() for count in counts])]
     examples = [example for count in counts for example in count.examples]
-    return "\n".join([*lines, *(["", "first faults"] if examples else []), *examples])
+    heading = ["", "first faults"] if examples else []
+    return "\n".join([text_table([count.row() for count in counts]), *heading, *examples])
 
 
 def _try_batch(count: FuzzCount, allocator: Allocator, layout: Layout, targets: Array) -> None:

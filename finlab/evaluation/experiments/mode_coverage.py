@@ -99,16 +99,18 @@ def _compare(
     allocator: Allocator, ways: CheapestWays, layout: Layout, target: Array, n_starts: int, seed: int
 ) -> Row | None:
     """Counts and coverage for one target; None where no start delivers it."""
-    starts = plant_of(layout).sample(np.random.default_rng(seed), (n_starts,))
+    plant = plant_of(layout)
+    starts = plant.sample(np.random.default_rng(seed), (n_starts,))
     ends = ways.ends(layout, target, starts)
     truth = ends[[group[0] for group in cluster([mode_signature(one) for one in ends])]]
     mine = np.array([mode.command for mode in allocator.allocate(layout, target).explore()])
     if not len(truth) or not len(mine):
         return None
-    both = [(command, command_energy(command, layout.upper)) for command in (truth, mine)]
+    both = [(command, command_energy(command, plant.upper)) for command in (truth, mine)]
     (_, truth_energy), (_, energy) = both
     least = min(truth_energy.min(), energy.min())
     cheap = [command[spent <= CHEAP * least] for command, spent in both]
+    forces = (plant.fin_forces(command).reshape(-1, 3 * layout.n_fins) for command in cheap)
     truth_ways, own_ways = ([mode_signature(one) for one in command] for command in cheap)
     return {
         "truth": len(truth_ways),
@@ -116,7 +118,7 @@ def _compare(
         "coverage": _covered(truth_ways, own_ways),
         "truth_coverage": _covered(own_ways, truth_ways),
         "best_energy": float(energy.min() / truth_energy.min()),
-        "distance": _energy_distance(*(_forces(layout, command) for command in cheap)),
+        "distance": _energy_distance(*forces),
     }
 
 
@@ -125,11 +127,6 @@ def _covered(wanted: list[Any], known: list[Any]) -> float:
     if not wanted:
         return 1.0
     return float(np.mean([any(same_signature(way, other) for other in known) for way in wanted]))
-
-
-def _forces(layout: Layout, command: Array) -> Array:
-    """Forces of all fins (M, 3n) [N] by the plant."""
-    return np.asarray(Plant(layout).fin_forces(command).reshape(len(command), 3 * layout.n_fins))
 
 
 def _energy_distance(one: Array, other: Array) -> float:

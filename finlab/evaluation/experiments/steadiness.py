@@ -115,13 +115,11 @@ def steadiness_rows(
     """
     rows = []
     for layout in progress(layouts, "layout"):
-        free, steady, forced = [], [], []
-        for k in range(n_paths):
-            path = smooth_path(layout, allocator.normalization.std, seed + k, ticks)
-            free.append(rollout(allocator, layout, path, steady=False))
-            steady.append(rollout(allocator, layout, path, steady=True))
-            forced.append(forced_turn(layout, path))
-        rows.append(_row(layout, free, steady, forced))
+        sigma = allocator.normalization.std
+        paths = [smooth_path(layout, sigma, seed + k, ticks) for k in range(n_paths)]
+        free = [rollout(allocator, layout, path, steady=False) for path in paths]
+        steady = [rollout(allocator, layout, path, steady=True) for path in paths]
+        rows.append(_row(layout, free, steady, [forced_turn(layout, path) for path in paths]))
     return rows
 
 
@@ -139,7 +137,6 @@ def steadiness_report(rows: Sequence[Row]) -> str:
 def _row(layout: Layout, free: list[Rollout], steady: list[Rollout], forced: list[float | None]) -> Row:
     ratios = [b.turn.max() / max(a.turn.max(), 1e-9) for a, b in zip(free, steady, strict=True)]
     energies = [b.energy.mean() / a.energy.mean() for a, b in zip(free, steady, strict=True)]
-    known = [turn for turn in forced if turn is not None]
     return {
         "layout": layout.name,
         "fins": layout.n_fins,
@@ -148,7 +145,7 @@ def _row(layout: Layout, free: list[Rollout], steady: list[Rollout], forced: lis
         "turn_steady": float(max(b.turn.max() for b in steady)),
         "turn_ratio": float(max(ratios)),
         "steady": int(sum(ratio <= GOAL for ratio in ratios)),
-        "forced": max(known) if known else None,
+        "forced": max((turn for turn in forced if turn is not None), default=None),
         "energy_ratio": float(np.mean(energies)),
         "energy_ratio_worst": float(max(energies)),
         "err_norm_max": float(max(b.err_norm.max() for b in steady)),

@@ -11,9 +11,11 @@ from finlab.evaluation.experiments.closed_loop_runs import (
     Row,
     Run,
     Scenario,
+    depth_error,
     follow_row,
     power_row,
     rows_and_totals,
+    shown_errors,
     spread,
 )
 from finlab.evaluation.paper_figures import paper_figures
@@ -21,8 +23,6 @@ from finlab.evaluation.statistics.tables import text_table
 from finlab.layout import Layout
 from finlab.sim import Cruise, RunLog, Trajectory
 
-LABELS = {"ate": "ATE [m]", "rte": "RTE [m]", "depth_rmse": "depth RMSE [m]"}
-"""Keys of a row and how a table calls them."""
 SPEEDS = (0.10, 0.15, 0.20)
 """The paper's speeds [m/s]."""
 SETTLED_S = 10.0
@@ -44,8 +44,7 @@ def trajectory_report(rows: Sequence[Row], trajectory: Trajectory, plant: str) -
     paper = paper_figures()["trajectory"]
     shown = [_shown(row) for row in rows]
     shown += [
-        {"layout": name, "method": "(printed in the paper)"}
-        | {label: f"{values[key]:.3f}" for key, label in LABELS.items()}
+        {"layout": name, "method": "(printed in the paper)", **shown_errors(values)}
         for name, values in paper.items()
         if name in {row["layout"] for row in rows}
     ]
@@ -60,10 +59,9 @@ def trajectory_report(rows: Sequence[Row], trajectory: Trajectory, plant: str) -
 
 def _shown(row: Row) -> Row:
     """A row for people."""
-    errors = {label: spread(row, key) for key, label in LABELS.items()}
     lost = "" if row["max"] < LOST_M else "lost"
     power = {"inertial [W]": f"{row['inertial_w']:.2f}", "torque [W]": f"{row['torque_w']:.2f}"}
-    return {"layout": row["layout"], "method": row["method"], **errors, **power, "": lost}
+    return {"layout": row["layout"], "method": row["method"], **shown_errors(row), **power, "": lost}
 
 
 def velocity_scenarios(
@@ -81,11 +79,10 @@ def velocity_rows(runs: Sequence[Run]) -> list[Row]:
 def _row(log: RunLog) -> Row:
     """Errors of one run [m/s, m] and power [W]."""
     error = np.abs(log.motion[:, 0] - log.reference_surge)
-    depth = log.position[:, 2] - log.reference[:, 2]
     return {
         "mae": float(error.mean()),
         "mae_settled": float(error[log.time >= SETTLED_S].mean()),
-        "depth_rmse": float(np.sqrt(np.square(depth).mean())),
+        "depth_rmse": depth_error(log.position, log.reference),
         **power_row(log),
     }
 
@@ -108,14 +105,13 @@ def velocity_report(rows: Sequence[Row], baseline: str, layout: Layout, plant: s
             for key, label in (("inertial_w", "inertial"), ("torque_w", "torque"), ("mae", "MAE")):
                 line[f"{label} to {baseline}"] = f"{100 * (row[key] / other[key] - 1):+.1f} %"
         shown.append(line)
-    paper = paper_figures()["velocity"]
     printed = [
         {
             "method": f"{name} (printed in the paper)",
-            "power [W]": f"{values['inertial_w']:.2f} +- {values['inertial_w_std']:.2f}",
-            "MAE [m/s]": f"{values['mae']:.3f} +- {values['mae_std']:.3f}",
+            "power [W]": spread(values, "inertial_w", 2),
+            "MAE [m/s]": spread(values, "mae"),
         }
-        for name, values in paper.items()
+        for name, values in paper_figures()["velocity"].items()
     ]
     return (
         f"{text_table(shown)}\n\nLayout {layout.name}, runs from rest, plant {plant}. Inertial power is the "

@@ -48,12 +48,11 @@ def run_method(
     """
     parts = []
     for k, case in enumerate(progress(cases, "layout", allocator.name)):
+        targets = case.targets[: first if single is None else single]
         if single is None:
-            targets = case.targets[:first]
             answer = allocator.allocate_batch(case.layout, targets, failed=case.failed, seed=seed)
             command, solve_ms = answer.command, answer.solve_ms
         else:
-            targets = case.targets[:single]
             answers = [allocator.allocate(case.layout, t, failed=case.failed, seed=seed) for t in targets]
             command = np.array([answer.command for answer in answers])
             solve_ms = np.array([answer.solve_ms for answer in answers])

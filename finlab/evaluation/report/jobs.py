@@ -11,22 +11,13 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from finlab.evaluation.statistics.records import VERSION, Columns, load_columns, save_columns
-
-
-class Result(NamedTuple):
-    """What a job gave."""
-
-    columns: Columns
-    """Arrays by name."""
-    meta: dict[str, Any]
-    """How they were made: settings, seconds, commit, time of day."""
 
 
 def columns_of_rows(rows: list[dict[str, Any]]) -> Columns:
@@ -70,9 +61,9 @@ class Job:
         """Whether its result is there."""
         return self.path(folder).is_file()
 
-    def result(self, folder: Path) -> Result:
-        """Its result; `DataError` if it is not there."""
-        return Result(*load_columns(self.path(folder)))
+    def result(self, folder: Path) -> tuple[Columns, dict[str, Any]]:
+        """Its arrays by name, and how they were made; `DataError` if they are not there."""
+        return load_columns(self.path(folder))
 
     def run(self, folder: Path, commit: str) -> None:
         """Do the work and keep its result."""

@@ -4,10 +4,11 @@ import json
 from pathlib import Path
 from typing import Any
 
+from finlab.evaluation.method_specs import Checkpoints
 from finlab.evaluation.report.document import Block, Document, figures_of
 from finlab.evaluation.report.jobs import run_jobs
 from finlab.evaluation.report.pages import to_html, to_markdown
-from finlab.evaluation.report.plan import Checkpoints, make_plan
+from finlab.evaluation.report.plan import make_plan
 from finlab.evaluation.report.provenance import Provenance, how_made_blocks, source_commit
 from finlab.evaluation.report.results import Results
 from finlab.evaluation.report.sections import closed_loop, studies, summary, wrench_tracking
@@ -53,10 +54,8 @@ def make_report(
     else:
         run_jobs(list(plan), records, commit=source_commit(), processes=processes)
     left_out = n_parts - len(list(plan))
-    paths = {
-        "learned": resolve_checkpoint(checkpoints.learned or "default"),
-        "paper": resolve_checkpoint(checkpoints.paper or "paper"),
-    }
+    given = {"learned": checkpoints.learned or "default", "paper": checkpoints.paper or "paper"}
+    paths = {method: resolve_checkpoint(checkpoint) for method, checkpoint in given.items()}
     prints = {f"{path.name} ({name})": read_checkpoint(path).sha256 for name, path in paths.items()}
     results = Results(plan, records, read_normalization(paths["learned"]).std)
     provenance = Provenance(prints, seed, command)

@@ -27,12 +27,12 @@ def to_html(document: Document) -> str:
 {style}</style></head><body>
 <header><h1>{title}</h1><p>{_inline(document.subtitle)}</p></header>
 <nav>{links}</nav>
-<main>{_html_blocks(document.blocks)}</main>
+<main>{_html(document.blocks)}</main>
 </body></html>
 """
 
 
-def _html_blocks(blocks: Sequence[Block]) -> str:
+def _html(blocks: Sequence[Block]) -> str:
     return "\n".join(map(_html_block, blocks))
 
 
@@ -55,7 +55,7 @@ def _html_block(block: Block) -> str:
             # The picture without what only a file of its own needs.
             return f"<figure>{svg[svg.index('<svg') :]}<figcaption>{_inline(caption)}</figcaption></figure>"
         case Fold(title, hidden):
-            return f"<details><summary>{_inline(title)}</summary>{_html_blocks(hidden)}</details>"
+            return f"<details><summary>{_inline(title)}</summary>{_html(hidden)}</details>"
 
 
 def _html_table(table: Table) -> str:

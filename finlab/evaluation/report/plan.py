@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields
 from importlib.util import find_spec
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from finlab.evaluation.experiments.training_study import CHANGES
 from finlab.evaluation.method_specs import (
     QUICK,
     SLOW,
+    Checkpoints,
     fingerprint,
     has_distilled,
     is_slow,
@@ -23,8 +25,6 @@ from finlab.evaluation.report.jobs import Job
 from finlab.evaluation.report.sizes import Sizes
 from finlab.evaluation.splits import SPLITS
 from finlab.evaluation.statistics.records import Columns
-
-Size = tuple[int, int]
 
 REFERENCE = "ipopt-32"
 """Whose energies the others are measured by."""
@@ -80,36 +80,16 @@ class Plan:
         yield from {job.name: job for job in jobs}.values()
 
 
-@dataclass(frozen=True)
-class Checkpoints:
-    """The checkpoints under test: names of shipped ones, or folders."""
-
-    learned: str | None = None
-    """Of method `learned`, which also gives the yardstick of the baselines."""
-    paper: str | None = None
-    """Of method `paper`."""
-
-    def of(self, method: str) -> str | None:
-        """The checkpoint of a method."""
-        return self.paper if method == "paper" else self.learned
-
-
 def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) -> Plan:
-    """The jobs of a report; what needs CasADi or PyTorch is left out where it is not installed.
-
-    Args:
-        sizes: how much of everything.
-        seed: of all draws.
-        checkpoints: under test.
-        runs: folder for the small trainings.
-    """
+    """The jobs of a report; what needs CasADi or PyTorch is left out where it is not installed. The small
+    trainings have their runs in the folder `runs`."""
     casadi, torch = (find_spec(package) is not None for package in ("casadi", "torch"))
     names = [name for name in QUICK if name != "fast" or has_distilled(checkpoints.learned)]
     names += [name for name in (*SLOW, REFERENCE) if casadi or "ipopt" not in name]
     prints = {name: fingerprint(name, checkpoints.of(name)) for name in names}
 
     def job(
-        name: str, do: Callable[..., Columns], spec: str, size: Size | None = None, **settings: Any
+        name: str, do: Callable[..., Columns], spec: str, size: tuple[int, int] | None = None, **settings: Any
     ) -> Job:
         settings |= {"seed": seed} | ({} if size is None else {"layouts": size[0], "targets": size[1]})
         return Job(name, do, settings, prints[spec], {"checkpoint": checkpoints.of(spec)})
@@ -132,24 +112,13 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
                     f"wrench-{split}-{name}", work.wrench, name, size, split=split, method=name
                 )
     drawn = {"candidates": N_CANDIDATES, "temperature": PAPER_TEMPERATURE}
-    ablation = {
-        (variant, by): job(
-            f"ablation-{variant}-{by}",
-            work.ablation,
-            "paper",
-            sizes.ablation,
-            variant=variant,
-            refinement=by,
-            **drawn,
-        )
-        for by in REFINEMENTS
-        for variant in VARIANTS
-    }
+    ablation = {}
+    for by, variant in product(REFINEMENTS, VARIANTS):
+        name, change = f"ablation-{variant}-{by}", {"variant": variant, "refinement": by}
+        ablation[variant, by] = job(name, work.ablation, "paper", sizes.ablation, **change, **drawn)
     temperature = {
-        value: job(
-            f"temperature-{value:.3g}", work.temperature, "paper", sizes.temperature, temperature=value
-        )
-        for value in TEMPERATURES
+        t: job(f"temperature-{t:.3g}", work.temperature, "paper", sizes.temperature, temperature=t)
+        for t in TEMPERATURES
     }
     scatter = job("scatter", work.scatter, "paper", fins=SCATTER_FINS, targets=SCATTER_TARGETS)
     preset, steps, batch_size = sizes.training
@@ -170,7 +139,7 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
         work.latency,
         {"seed": seed, "methods": methods, "calls": calls, "budget_s": budget_s},
         prints["learned"] + prints["paper"],
-        {"checkpoint": checkpoints.learned, "paper_checkpoint": checkpoints.paper},
+        {"checkpoints": checkpoints},
         alone=True,
     )
     return Plan(

@@ -14,20 +14,18 @@ from finlab.evaluation.report.sizes import Sizes
 
 def source_commit() -> str:
     """Commit of the source tree this runs from; the package's version where there is none."""
-    root = Path(finlab.__file__).resolve().parent.parent
+
+    def git(*arguments: str) -> str:
+        root = Path(finlab.__file__).resolve().parent.parent
+        command = ["git", "-C", str(root), *arguments]
+        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
+
     try:
-        commit = _git(root, "rev-parse", "--short=10", "HEAD")
-        changed = _git(root, "status", "--porcelain", "--untracked-files=no", "--", "finlab", "checkpoints")
+        commit = git("rev-parse", "--short=10", "HEAD")
+        changed = git("status", "--porcelain", "--untracked-files=no", "--", "finlab", "checkpoints")
     except (OSError, subprocess.SubprocessError):
         return f"version {finlab.__version__}"
     return f"{commit}+" if changed else commit
-
-
-def _git(root: Path, *arguments: str) -> str:
-    done = subprocess.run(
-        ["git", *arguments], cwd=root, capture_output=True, text=True, check=True, timeout=10
-    )
-    return done.stdout.strip()
 
 
 @dataclass(frozen=True)
@@ -51,7 +49,7 @@ class Provenance:
 def how_made_blocks(results: Results, provenance: Provenance, sizes: Sizes) -> list[Block]:
     """The section that says so."""
     machine = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in provenance.machine.items())
-    prints = [f"Checkpoint `{name}`: SHA-256 `{value}`" for name, value in provenance.checkpoints.items()]
+    prints = [f"\n- Checkpoint `{name}`: SHA-256 `{value}`" for name, value in provenance.checkpoints.items()]
     columns = (
         Column("name", "part", "code"),
         Column("seconds", "seconds", "three"),
@@ -62,18 +60,13 @@ def how_made_blocks(results: Results, provenance: Provenance, sizes: Sizes) -> l
     rows = []
     for job in results.plan:
         settings = ", ".join(f"{key} {value}" for key, value in job.settings.items())
-        rows.append({**job.result(results.folder).meta, "name": job.name, "settings": settings})
+        _, made = job.result(results.folder)
+        rows.append({**made, "name": job.name, "settings": settings})
     return [
         "## How this was made",
-        "\n".join(
-            f"- {item}"
-            for item in (
-                f"Command: `{provenance.command}` (size {sizes.name}, seed {provenance.seed})",
-                f"Commit `{provenance.commit}`, {provenance.made}",
-                f"Machine: {machine}",
-                *prints,
-            )
-        ),
+        f"- Command: `{provenance.command}` (size {sizes.name}, seed {provenance.seed})\n"
+        f"- Commit `{provenance.commit}`, {provenance.made}\n"
+        f"- Machine: {machine}" + "".join(prints),
         (
             "Each part is kept as a file of records, one entry per target, found by its settings and the "
             "fingerprint of the weights; a report that was stopped goes on where it was. The columns are "

@@ -32,7 +32,7 @@ class Results:
 
     def columns(self, job: Job) -> Columns:
         """The arrays of a job."""
-        return job.result(self.folder).columns
+        return job.result(self.folder)[0]
 
     @cached_property
     def wrench(self) -> dict[str, dict[str, Records]]:

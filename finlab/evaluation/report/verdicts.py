@@ -50,9 +50,8 @@ def compare(
         mine, theirs = found[method, where], found[other, where]
         ends = _interval(mine, value), _interval(theirs, value)
         about = {"measure": measure, "case": where, "method": method, "against": other}
-        values = {"ours": mine[value], "theirs": theirs[value]}
-        intervals = dict(zip(("our_interval", "their_interval"), ends, strict=True))
-        comparisons.append({**about, **values, **intervals, "verdict": _verdict(*ends)})
+        values = {"ours": mine[value], "theirs": theirs[value], "verdict": _verdict(*ends)}
+        comparisons.append({**about, **values, "our_interval": ends[0], "their_interval": ends[1]})
     return comparisons
 
 

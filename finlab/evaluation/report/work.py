@@ -1,6 +1,7 @@
 """What a job does: plain settings in, arrays out, so that it can run in a process of its own."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from finlab.evaluation.experiments.trajectory_and_velocity import (
     velocity_scenarios,
 )
 from finlab.evaluation.experiments.wrench_tracking import run_method, score
-from finlab.evaluation.method_specs import load_method_spec, load_method_specs
+from finlab.evaluation.method_specs import Checkpoints, load_method_spec, load_method_specs
 from finlab.evaluation.plots.closed_loop_experiments import Track, track_of
 from finlab.evaluation.report.jobs import columns_of_rows
 from finlab.evaluation.splits import make_split
@@ -58,30 +59,15 @@ def energy(*, layouts: int, targets: int, method: str, seed: int, checkpoint: st
     return columns_of_records(join_records(parts)) | {"command": np.concatenate(commands)}
 
 
-def ablation(
-    *,
-    variant: str,
-    refinement: str,
-    layouts: int,
-    targets: int,
-    candidates: int,
-    temperature: float,
-    seed: int,
-    checkpoint: str | None,
-) -> Columns:
-    """Records of one variant, scored by plant and surrogate, and the time of single calls."""
-    method = ablation_method(
-        variant, refinement, checkpoint=checkpoint, n_candidates=candidates, temperature=temperature
-    )
+def ablation(*, layouts: int, targets: int, candidates: int, seed: int, **options: Any) -> Columns:
+    """Records of one variant, scored by plant and surrogate; options as in `ablation_method`."""
+    method = ablation_method(n_candidates=candidates, **options)
     return run_variant(method, make_split("id", layouts, targets, seed), seed=seed)
 
 
-def temperature(
-    *, temperature: float, layouts: int, targets: int, seed: int, checkpoint: str | None
-) -> Columns:
-    """Diversity and best J at one temperature."""
-    cases = make_split("id", layouts, targets, seed)
-    return temperature_columns(cases, temperature, checkpoint=checkpoint, seed=seed)
+def temperature(*, layouts: int, targets: int, seed: int, **options: Any) -> Columns:
+    """Diversity and best J at one temperature; options as in `temperature_columns`."""
+    return temperature_columns(make_split("id", layouts, targets, seed), seed=seed, **options)
 
 
 def scatter(*, fins: int, targets: int, seed: int, checkpoint: str | None) -> Columns:
@@ -100,37 +86,18 @@ def seeds(*, layouts: int, targets: int, candidates: int, seed: int, checkpoint:
 
 
 def latency(
-    *,
-    methods: list[str],
-    calls: int,
-    budget_s: float,
-    seed: int,
-    checkpoint: str | None,
-    paper_checkpoint: str | None,
+    *, methods: list[str], calls: int, budget_s: float, seed: int, checkpoints: Checkpoints
 ) -> Columns:
     """Rows of the comparison of times, the fastest first; to be run with nothing beside it."""
     cases = latency_cases(LATENCY_FINS, seed)
-    allocators = {
-        name: load_method_spec(name, paper_checkpoint if name == "paper" else checkpoint) for name in methods
-    }
+    allocators = {name: load_method_spec(name, checkpoints.of(name)) for name in methods}
     rows = latency_rows(allocators, cases, n_calls=calls, budget_s=budget_s)
     return columns_of_rows(sorted(rows, key=lambda row: row["p50_ms"]))
 
 
-def training(
-    *,
-    change: str,
-    preset: str,
-    steps: int,
-    batch_size: int,
-    layouts: int,
-    targets: int,
-    seed: int,
-    folder: str,
-) -> Columns:
-    """Train with one thing changed and try the network."""
-    cases, budget = make_split("id", layouts, targets, seed), {"steps": steps, "batch_size": batch_size}
-    return train_and_run(change, cases, Path(folder), preset=preset, seed=seed, **budget)
+def training(*, change: str, layouts: int, targets: int, seed: int, folder: str, **budget: Any) -> Columns:
+    """Train with one thing changed and try the network; the budget as in `train_and_run`."""
+    return train_and_run(change, make_split("id", layouts, targets, seed), Path(folder), seed=seed, **budget)
 
 
 def trajectory(*, methods: str, runs: int, seed: int, checkpoint: str | None) -> Columns:

@@ -6,10 +6,11 @@ from pathlib import Path
 import pytest
 
 from finlab.evaluation.experiments.training_study import CHANGES
+from finlab.evaluation.method_specs import Checkpoints
 from finlab.evaluation.report import plan as planning
 from finlab.evaluation.report.jobs import Job
 from finlab.evaluation.report.make import PAGE, PICTURES, TABLES, TWIN, make_report
-from finlab.evaluation.report.plan import Checkpoints, make_plan
+from finlab.evaluation.report.plan import make_plan
 from finlab.evaluation.report.sizes import Sizes
 
 pytest.importorskip("matplotlib")

@@ -75,10 +75,10 @@ def test_a_result_is_made_once(tmp_path: Path) -> None:
     run_jobs(jobs[:1], tmp_path, commit="abc", processes=0)
     run_jobs(jobs[:2], tmp_path, commit="def", processes=0)
     assert MADE == [0, 1]
-    first, second = (job.result(tmp_path) for job in jobs[:2])
-    np.testing.assert_array_equal(first.columns["values"], np.arange(3))
-    assert (first.meta["commit"], second.meta["commit"]) == ("abc", "def")
-    assert first.meta["settings"] == {"work": "_work", "prints": "print", "seed": 0}
+    (columns, made), (_, later) = (job.result(tmp_path) for job in jobs[:2])
+    np.testing.assert_array_equal(columns["values"], np.arange(3))
+    assert (made["commit"], later["commit"]) == ("abc", "def")
+    assert made["settings"] == {"work": "_work", "prints": "print", "seed": 0}
     assert [job.done(tmp_path) for job in jobs] == [True, True, False]
 
 

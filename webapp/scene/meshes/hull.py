@@ -14,6 +14,9 @@ from webapp.scene.meshes.mesh_hull import MeshHull, Triangles
 
 Array = NDArray[np.float64]
 
+STATIONS: Array = np.sin(np.linspace(-np.pi / 2, np.pi / 2, 41))
+"""Positions along a hull of half length 1, closer together towards the ends where it curves most."""
+
 
 @dataclass(frozen=True)
 class Hull:
@@ -40,18 +43,13 @@ class Hull:
         power = {"box": 6.0, "ellipsoid": 2.0, "ucat": 3.0}[self.shape]
         return np.clip(1 - np.abs(s) ** power, 0, 1) ** (1 / power)
 
-    def _stations(self) -> Array:
-        """Positions along the hull, closer together towards the ends where it curves most."""
-        return np.sin(np.linspace(-np.pi / 2, np.pi / 2, 41))
-
     def mesh(self) -> Mesh:
         """The hull's surface."""
-        return self._surface(self._stations(), 1.0)
+        return self._surface(STATIONS, 1.0)
 
     def bow(self) -> Mesh:
         """A dark window over the foremost part, a little proud of the hull: it shows which end is the bow."""
-        s = self._stations()
-        return self._surface(np.concatenate([[0.72], s[s > 0.72]]), 1.012)
+        return self._surface(np.concatenate([[0.72], STATIONS[STATIONS > 0.72]]), 1.012)
 
     def _surface(self, s: Array, swell: float) -> Mesh:
         share = self._profile(s) * swell

@@ -39,9 +39,7 @@ def latency_blocks(results: Results) -> list[Block]:
             "nothing beside it. `trf`, `slsqp` and `ipopt` start from 8 points."
         ),
         Figure.drawn(
-            "latency",
-            latency_dots(rows, paper_ms),
-            "Dots are medians, bars end at the 99th percentile.",
+            "latency", latency_dots(rows, paper_ms), "Dots are medians, bars end at the 99th percentile."
         ),
         Table(columns, [*map(method_row, rows), printed]),
     ]

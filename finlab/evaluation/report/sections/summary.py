@@ -4,14 +4,7 @@ from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.report.document import Block, Card, Column, Fold, Row, Table
 from finlab.evaluation.report.numbers import error, factor, share, three
 from finlab.evaluation.report.results import Results
-from finlab.evaluation.report.verdicts import (
-    LEADS,
-    LEVEL,
-    TRAILS,
-    compare,
-    standings,
-    with_printed,
-)
+from finlab.evaluation.report.verdicts import LEADS, LEVEL, TRAILS, compare, standings, with_printed
 
 OURS = "learned"
 STANDINGS = (
