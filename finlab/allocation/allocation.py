@@ -201,7 +201,8 @@ class Allocation(Answer):
         return (
             f"Allocation(layout={self.layout.name!r:.60}, fins={len(self.fins)}{failed}, "
             f"method={self.method!r}, err_norm={self.err_norm:.2e} by the {self.judged_by}, "
-            f"power={self.power:.3g} W, energy={self.energy:.3f}, reachable={self.reachable}, solve_ms={self.solve_ms:.1f})"
+            f"power={self.power:.3g} W, energy={self.energy:.3f}, reachable={self.reachable}, "
+            f"solve_ms={self.solve_ms:.1f})"
         )
 
     def __str__(self) -> str:

@@ -196,7 +196,9 @@ class Envelopes:
             rim = self.rim(direction)
             wanted = np.where(over, rim.largest, wanted)
         unit = np.stack([np.cos(direction), np.sin(direction)], axis=1)
-        return Projected(unit, direction, np.minimum(np.maximum(wanted, rim.smallest), rim.largest), rim, stopped)
+        return Projected(
+            unit, direction, np.minimum(np.maximum(wanted, rim.smallest), rim.largest), rim, stopped
+        )
 
     def _stopped(self, direction: Array) -> Array:
         """Directions (R, n) [rad] brought within the arcs."""

@@ -10,7 +10,7 @@ and needs no other word about the fin.
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +45,8 @@ POLISHES = 3
 
 AMPLITUDE, FREQUENCY, LEAN, COST, MOBILITY, STIFFNESS, DRIFT, SHAFT = range(8)
 """Columns of a table: amplitude [rad], frequency [Hz], force direction minus zero direction [rad], cost,
-logarithm of the mobility T / (dc/dT), elasticity of dc/dT, dc/dtheta over dc/dT [N], force along the shaft [N]."""
+logarithm of the mobility T / (dc/dT), elasticity of dc/dT, dc/dtheta over dc/dT [N], force along the
+shaft [N]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +66,8 @@ class FinEnvelope:
 
 
 def levels() -> Array:
-    """Shares (LEVELS,) of the range of sizes: dense near zero, where both commands grow like fourth roots, and
-    near the top, where a force that saturates is flat in its commands."""
+    """Shares (LEVELS,) of the range of sizes: dense near zero, where both commands grow like fourth roots,
+    and near the top, where a force that saturates is flat in its commands."""
     share: Array = np.sin(0.5 * np.pi * np.linspace(0.0, 1.0, LEVELS)) ** 4
     return share
 
@@ -240,7 +241,9 @@ def _turns_at(grid: _Grid, frequency: Array) -> Array:
     first = np.minimum(place.astype(np.intp), max(n - 2, 0))
     a, k = np.ogrid[: frequency.shape[0], : frequency.shape[1]]
     a, k, part = a[..., None], k[..., None], place - first
-    found: Array = grid.turn[a, first, k] * (1.0 - part) + grid.turn[a, np.minimum(first + 1, n - 1), k] * part
+    found: Array = (
+        grid.turn[a, first, k] * (1.0 - part) + grid.turn[a, np.minimum(first + 1, n - 1), k] * part
+    )
     return found
 
 
@@ -256,9 +259,7 @@ def _cheapest(command: Array, price: Array) -> Array:
     return np.nan_to_num(found)
 
 
-def _polished(
-    law: FinLaw, command: Array, grid: _Grid, wanted: Array, lower: Array, upper: Array
-) -> Array:
+def _polished(law: FinLaw, command: Array, grid: _Grid, wanted: Array, lower: Array, upper: Array) -> Array:
     """Commands (K, LEVELS, 3) whose frequency and zero direction give the wanted sizes (K, LEVELS) by the law
     itself; where a step does not help, as at a peak, the command stays."""
     low, high = lower.copy(), upper.copy()
@@ -325,5 +326,7 @@ def _around(values: Array, grid: _Grid) -> Array:
         slopes: Array = np.gradient(values, grid.direction, axis=0)
         return slopes
     turn = values[:-1]
-    slopes = (np.roll(turn, -1, axis=0) - np.roll(turn, 1, axis=0)) / (2.0 * (grid.direction[1] - grid.direction[0]))
+    slopes = (np.roll(turn, -1, axis=0) - np.roll(turn, 1, axis=0)) / (
+        2.0 * (grid.direction[1] - grid.direction[0])
+    )
     return np.concatenate([slopes, slopes[:1]])

@@ -2,8 +2,8 @@
 
 Each fin gives a force y_i in its thrust plane (horizontal and vertical component), so the wrench is linear:
 w = sum_i B_i y_i. What a force costs, c_i(y), is known from the compiled fins. Where cost grows faster than
-force, as power does, there is one cheapest allocation; where it grows more slowly, as the paper's effort does,
-the cheapest allocation rests some fins and there are many local minima, each found from seeds of its own.
+force, as power does, there is one cheapest allocation; where it grows more slowly, as the paper's effort
+does, the cheapest allocation rests some fins and there are many local minima, each found from its own seeds.
 
 Either way a seed is driven downhill by solving, again and again, the quadratic problem that stands for the
 costs near the present forces,
@@ -39,7 +39,7 @@ RIDGE = 1e-9
 REST = 1e-5
 """Share of the largest force below which a fin's mobility no longer shrinks; it can still come back."""
 IDLE = 2e-3
-"""Share of its largest force up to which a fin turns to its cheapest direction: refinement makes up for it."""
+"""Share of its largest force up to which a fin turns to its cheapest direction; refinement mends that."""
 LAST_STEPS = 2
 """Semismooth Newton steps at the end."""
 SETTLED = 2e-3
@@ -181,7 +181,8 @@ def polar(problem: PlanarProblem, force: Array) -> Planar:
 def realize(problem: PlanarProblem, planar: Planar) -> tuple[Array, Array]:
     """Commands (R, n, 3) that give planar forces at the least cost, and that cost (R,)."""
     command = np.stack(
-        [planar.row[..., AMPLITUDE], planar.row[..., FREQUENCY], planar.direction - planar.row[..., LEAN]], axis=-1
+        [planar.row[..., AMPLITUDE], planar.row[..., FREQUENCY], planar.direction - planar.row[..., LEAN]],
+        axis=-1,
     )
     cost = planar.row[..., COST].sum(-1)
     # A fin that hardly works turns to where it costs least, or stays where it is.

@@ -14,7 +14,8 @@ Values = Any
 """A numpy array, a tensor or a symbol."""
 
 OWN_INERTIA = 0.0097
-"""Moment of inertia about the shaft of U-CAT's fin, 0.20 m long and 0.10 m wide [kg m^2]."""
+"""Moment of inertia about its shaft of a fin 0.20 m long and 0.10 m wide [kg m^2]: U-CAT's robot description
+has a plate of 0.8 kg, 0.22 x 0.10 x 0.02 m, its centre 0.09 m from the shaft."""
 
 
 class Blade(NamedTuple):
@@ -29,8 +30,18 @@ class Blade(NamedTuple):
     """Along the shaft [m]."""
     density: Any = 1000.0
     """Of the water [kg/m^3]."""
-    drag_coefficient: float = 2.0
+    drag_coefficient: Any = 2.0
     """Of a plate broadside to the flow."""
+
+    @property
+    def virtual_mass(self) -> Any:
+        """Water carried per metre of length [kg/m]: pi/4 rho W^2."""
+        return 0.25 * math.pi * self.density * self.width**2
+
+    @property
+    def drag_per_length(self) -> Any:
+        """Normal force per metre of length and squared speed [N s^2/m^3]: 1/2 rho Cd W."""
+        return 0.5 * self.density * self.drag_coefficient * self.width
 
     @property
     def own_inertia(self) -> Any:
@@ -39,13 +50,13 @@ class Blade(NamedTuple):
 
     @property
     def inertia(self) -> Any:
-        """J [kg m^2]: the blade's own and that of the water it carries, pi/4 rho W^2 per metre."""
-        return self.own_inertia + math.pi / 12.0 * self.density * self.width**2 * self.length**3
+        """J [kg m^2]: the blade's own and that of the water it carries."""
+        return self.own_inertia + self.virtual_mass * self.length**3 / 3.0
 
     @property
     def drag(self) -> Any:
         """K [N m s^2]: 1/8 rho Cd W L^4."""
-        return 0.125 * self.density * self.drag_coefficient * self.width * self.length**4
+        return 0.25 * self.drag_per_length * self.length**4
 
     def power(self, amplitude: Values, frequency: Values) -> Values:
         """Returns the mean mechanical power [W] at half amplitude [rad] and frequency [Hz]."""

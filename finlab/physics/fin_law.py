@@ -27,6 +27,11 @@ class FinLaw(Protocol):
         """Whether the size of the force is the same whatever the zero direction."""
         ...
 
+    @property
+    def blade(self) -> Blade:
+        """The plate whose beating takes power, where nothing better is known."""
+        ...
+
     def force(self, command: Values) -> Values:
         """Returns the mean force (..., n, 3) [N] in the fin frame of commands (..., n, 3) [rad, Hz, rad]."""
         ...

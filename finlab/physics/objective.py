@@ -56,7 +56,11 @@ class Objective:
 
     def meter(self, plant: Plant) -> "CostMeter":
         """Returns what tells the cost of a robot's commands."""
-        return PowerMeter(plant, self.copper_loss) if self.name == "power" else EnergyMeter(plant.upper, self.weights)
+        return (
+            PowerMeter(plant, self.copper_loss)
+            if self.name == "power"
+            else EnergyMeter(plant.upper, self.weights)
+        )
 
 
 class PowerMeter:

@@ -3,7 +3,7 @@
 It judges every allocation method, and the model-based methods optimize over it.
 """
 
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +12,8 @@ from finlab.errors import CommandError
 from finlab.layout.angles import TURN, is_full_turn
 from finlab.layout.arrays import force_columns
 from finlab.layout.layout import Layout
-from finlab.physics.fin_model import file_stamp, stack_laws
+from finlab.physics.blade import Blade
+from finlab.physics.fin_model import file_stamp, make_law, stack_laws
 from finlab.physics.wrench import body_force, wrench_of_forces
 
 Array = NDArray[np.float64]
@@ -61,7 +62,7 @@ class Plant:
         return force
 
     def force(self, command: Array) -> Array:
-        """Returns forces (..., n, 3) [N] in fin frames of commands (..., n, 3) that are known to be finite."""
+        """Returns forces (..., n, 3) [N] in fin frames of commands (..., n, 3) known to be finite."""
         if len(self._laws) == 1:
             alone: Array = self._laws[0][1].force(command)
             return alone
@@ -108,6 +109,13 @@ class Plant:
         for places, law in self._laws:
             slopes[..., places, :] = law.power_slopes(command[..., places, :], copper_loss)
         return slopes
+
+    @cached_property
+    def blade(self) -> Blade:
+        """The plates whose beating takes power, side by side (n,)."""
+        fins = [make_law(fin.model).blade for fin in self.layout.fins]
+        length, width, density, drag = (np.array(values) for values in zip(*fins, strict=True))
+        return Blade(length, width, density, drag)
 
     @property
     def planar(self) -> Array:

@@ -15,7 +15,8 @@ from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
 from finlab.physics import plant_of
-from finlab.sim.fin_motion import FinMotion, FinShape
+from finlab.physics.blade import Blade
+from finlab.sim.fin_motion import FinMotion
 
 Array = NDArray[np.float64]
 
@@ -51,25 +52,25 @@ class MeanForce:
 class RippleForce:
     """The mean force in two pulses per cycle, and a ripple of mean zero on top.
 
-    The ripple is what a rigid plate of `FinShape` feels normal to itself: the momentum of the water that it
+    The ripple is what a rigid plate of `Blade` feels normal to itself: the momentum of the water that it
     carries, m L^2/2 theta', and the drag of its strips, 1/8 rho Cd W L^4 theta' |theta'|. Over a cycle both
     have mean zero, so the mean force stays the fin law's. The fin points away from its thrust.
     """
 
     step_s = 0.01
 
-    def __init__(self, layout: Layout, shape: FinShape | None = None) -> None:
+    def __init__(self, layout: Layout, blade: Blade | None = None) -> None:
         self._mean = MeanForce(layout)
-        self.shape = FinShape() if shape is None else shape
+        self.blade = Blade() if blade is None else blade
         self._momentum = np.zeros((layout.n_fins, 2))
 
     def step(self, motion: FinMotion, dt: float) -> Array:
-        length = self.shape.length
+        length = self.blade.length
         force = self._mean.step(motion, dt) * (1.0 - np.cos(2 * motion.phase))[:, None]
         angle, speed = motion.angle + math.pi, motion.speed
         normal = np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
-        momentum = 0.5 * self.shape.virtual_mass * length**2 * speed[:, None] * normal
-        drag = 0.25 * self.shape.drag_per_length * length**4 * speed * np.abs(speed)
+        momentum = 0.5 * self.blade.virtual_mass * length**2 * speed[:, None] * normal
+        drag = self.blade.drag * speed * np.abs(speed)
         force[:, 1:] -= (momentum - self._momentum) / dt + drag[:, None] * normal
         self._momentum = momentum
         return force
@@ -90,7 +91,7 @@ class SoftFin:
     near the fin law's."""
     damping: float = 0.02
     """Of the tip's spring [N m s/rad]."""
-    shape: FinShape = field(default_factory=FinShape)
+    blade: Blade = field(default_factory=Blade)
     """The whole fin."""
 
 
@@ -106,7 +107,7 @@ class FlexibleForce:
         self._tip_speed = np.zeros(n)
         self._root_angle, self._root_speed = np.zeros(n), np.zeros(n)
         self._momentum = np.zeros((n, 2))
-        tip = self.fin.shape.length - self.fin.root
+        tip = self.fin.blade.length - self.fin.root
         nodes, weights = np.polynomial.legendre.leggauss(4)
         self._arm, self._weight = 0.5 * tip * (nodes + 1.0), 0.5 * tip * weights
 
@@ -132,9 +133,9 @@ class FlexibleForce:
     def _substep(self, angle: Array, speed: Array, acceleration: Array, h: float) -> Array:
         """Moves the tips by `h` [s]; forces (n, 2) [N] along (e_h, e_z) but for the change of momentum."""
         assert self._tip_angle is not None
-        fin, shape = self.fin, self.fin.shape
-        a, b = fin.root, shape.length - fin.root
-        mass, drag = shape.virtual_mass, shape.drag_per_length
+        fin, blade = self.fin, self.fin.blade
+        a, b = fin.root, blade.length - fin.root
+        mass, drag = blade.virtual_mass, blade.drag_per_length
         bend = self._tip_angle - angle
         cosine, sine = np.cos(bend), np.sin(bend)
         across = a * speed * cosine

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from finlab.layout import Layout
 from finlab.layout.angles import is_full_turn
+from finlab.physics.blade import Blade
 
 Array = NDArray[np.float64]
 
@@ -114,34 +115,6 @@ def _follow(value: Array, rate: Array, aim: Array, pole: float, dt: float) -> tu
     return aim + (error + slope * dt) * decay, (rate - pole * slope * dt) * decay
 
 
-FIN_INERTIA = 0.0097
-"""Of a fin about its shaft [kg m^2]: U-CAT's robot description has a plate of 0.8 kg, 0.22 x 0.10 x 0.02 m,
-its centre 0.09 m from the shaft."""
-
-
-class FinShape(NamedTuple):
-    """A fin as a plate; U-CAT's where nothing else is said."""
-
-    length: float = 0.20
-    """From the shaft to the tip [m]; U-CAT's robot description has 0.22, its simulator 0.18."""
-    width: float = 0.10
-    """Along the shaft [m]."""
-    density: float = 1000.0
-    """Of water [kg/m^3]."""
-    drag_coefficient: float = 2.0
-    """Of a plate broadside to the flow."""
-
-    @property
-    def virtual_mass(self) -> float:
-        """Water moved per metre of length [kg/m]: pi/4 rho W^2."""
-        return 0.25 * math.pi * self.density * self.width**2
-
-    @property
-    def drag_per_length(self) -> float:
-        """Normal force per metre of length and squared speed [N s^2/m^3]: 1/2 rho Cd W."""
-        return 0.5 * self.density * self.drag_coefficient * self.width
-
-
 class FinPower(NamedTuple):
     """Power of each fin (n,) [W] at one moment, by two measures."""
 
@@ -151,15 +124,8 @@ class FinPower(NamedTuple):
     """max(tau omega, 0): inertia, carried water and drag together, nothing won back by braking."""
 
 
-def fin_power(motion: FinMotion, shape: FinShape | None = None, inertia: float = FIN_INERTIA) -> FinPower:
-    """The power of fins as they move now.
-
-    The torque is that of a rigid plate in still water:
-    (I + m L^3/3) theta'' + 1/8 rho Cd W L^4 theta' |theta'|.
-    """
-    plate = FinShape() if shape is None else shape
+def fin_power(motion: FinMotion, blade: Blade) -> FinPower:
+    """The power of fins as they move now; the torque is that of a rigid plate in still water."""
     speed, acceleration = motion.speed, motion.acceleration
-    water = plate.virtual_mass * plate.length**3 / 3
-    drag = 0.25 * plate.drag_per_length * plate.length**4 * speed * np.abs(speed)
-    torque = (inertia + water) * acceleration + drag
-    return FinPower(np.abs(inertia * acceleration * speed), np.maximum(torque * speed, 0.0))
+    torque = blade.inertia * acceleration + blade.drag * speed * np.abs(speed)
+    return FinPower(np.abs(blade.own_inertia * acceleration * speed), np.maximum(torque * speed, 0.0))

@@ -9,8 +9,9 @@ from scipy.integrate import solve_ivp
 from finlab.assets import shipped_layouts
 from finlab.layout import Layout, load_layout
 from finlab.physics import Plant
-from finlab.sim.fin_force import FinForce, FinShape, FlexibleForce, MeanForce, RippleForce, SoftFin
-from finlab.sim.fin_motion import FIN_INERTIA, FinMotion, Servo, fin_power
+from finlab.physics.blade import OWN_INERTIA, Blade
+from finlab.sim.fin_force import FinForce, FlexibleForce, MeanForce, RippleForce, SoftFin
+from finlab.sim.fin_motion import FinMotion, Servo, fin_power
 
 DT = 0.01
 
@@ -121,7 +122,7 @@ def test_a_stiff_soft_fin_is_lighthills_rigid_plate(pair: Layout) -> None:
     from scipy.special import j1
 
     amplitude, frequency = 0.5, 1.0
-    shape = FinShape()
+    shape = Blade()
     theory = (
         0.5
         * shape.virtual_mass
@@ -154,9 +155,9 @@ def test_mean_inertial_power_is_what_a_sinusoid_has(pair: Layout) -> None:
     inertial, torque = [], []
     for _ in range(10 * round(1 / (frequency * DT))):
         motion.step(command, DT)
-        power = fin_power(motion)
+        power = fin_power(motion, Blade())
         inertial.append(power.inertial[0])
         torque.append(power.torque[0])
     swing = 2 * math.pi * frequency
-    assert np.mean(inertial) == pytest.approx(FIN_INERTIA * amplitude**2 * swing**3 / math.pi, rel=0.01)
+    assert np.mean(inertial) == pytest.approx(OWN_INERTIA * amplitude**2 * swing**3 / math.pi, rel=0.01)
     assert np.mean(torque) > np.mean(inertial)

@@ -57,7 +57,6 @@ class MdnAllocator(SearchAllocator):
         place = layout.position[None], layout.mounting_angle[None], layout.lower[None], layout.upper[None]
         return geometry(*place, self.normalization.std)
 
-
     def _propose(self, prepared: Prepared, targets: Array, seed: int) -> Proposal:
         """The network's raw candidates for targets (N, 6)."""
         std = self.normalization.std

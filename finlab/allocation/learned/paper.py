@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.judging import costs
 from finlab.allocation.learned.settings import STEPS, PaperSettings
+from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.solution import Candidates, Solution
 from finlab.inference.features import Geometry, fin_frame_features, geometry, raw_features
 from finlab.inference.mixture import MixtureArrays

@@ -1,4 +1,4 @@
-"""What the network proposes: K candidate commands, drawn from its mixture and scored by the fins' own laws."""
+"""What the network proposes: K candidate commands, drawn from its mixture, scored by the fins' own laws."""
 
 import math
 from functools import lru_cache
@@ -85,7 +85,9 @@ def draws_of_one(seed: int, extra: int, n: int) -> tuple[Array, Array]:
     return uniform, normal
 
 
-def propose(mixture: MixtureArrays, prepared: Prepared, target: Array, drawn: tuple[int, float, int]) -> Proposal:
+def propose(
+    mixture: MixtureArrays, prepared: Prepared, target: Array, drawn: tuple[int, float, int]
+) -> Proposal:
     """Sample, clamp and score.
 
     Args:

@@ -9,6 +9,7 @@ from typing import TypedDict
 from finlab.allocation.search.settings import SearchOptions, Settings
 from finlab.errors import AllocationError
 
+
 @dataclass(frozen=True)
 class MdnSettings(Settings):
     """How many candidates the mixture offers, and how they are searched and refined."""

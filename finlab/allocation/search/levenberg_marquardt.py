@@ -98,11 +98,11 @@ class CommandProblem:
         rows, n, _ = command.shape
         return self.fin.force(command).reshape(rows, 3 * n) @ self.columns.reshape(3 * n, 6)
 
-    def clamp(self, command: NDArray[np.floating]) -> NDArray[np.floating]:
+    def clamp(self, command: Array) -> Array:
         """Commands (..., n, 3) inside the limits, zero directions wrapped first; the type is kept."""
         return self.clamp_in_place(command.copy())
 
-    def clamp_in_place(self, command: NDArray[np.floating]) -> NDArray[np.floating]:
+    def clamp_in_place(self, command: Array) -> Array:
         """`clamp` that overwrites its argument."""
         limits = self.float32 if command.dtype == np.float32 else self.float64
         direction = command[..., 2]

@@ -32,7 +32,6 @@ from finlab.allocation.search.turn_limits import TURNS, force_sizes, limit_turn,
 from finlab.allocation.search.weighted_sum import minimize_weighted_sum
 from finlab.errors import AllocationError
 from finlab.forces import force_space
-from finlab.layout import Layout
 from finlab.physics.energy import EnergyMeter
 from finlab.physics.objective import Objective
 
@@ -181,15 +180,15 @@ class Pipeline:
         self, prepared: Prepared, target: Array, candidates: RefinedCandidates, previous: Array | None
     ) -> RefinedCandidates:
         """Trade error for effort, where the settings ask for the weighted sum."""
-        weight = self.settings.energy_tradeoff
-        if weight == 0.0 or not isinstance(prepared.cost, EnergyMeter):
+        weight, effort = self.settings.energy_tradeoff, prepared.cost
+        if weight == 0.0 or not isinstance(effort, EnergyMeter):
             return candidates
         if previous is not None:
             prepared = limit_turn(prepared, previous, candidates.command[0, 0, :, 2], TURNS[0])
         rows, p, n, _ = candidates.command.shape
         start = prepared.commands.clamp(candidates.command.reshape(-1, n, 3))
         found, energy = minimize_weighted_sum(
-            prepared.commands, np.repeat(target, p, axis=0), start, prepared.cost, weight
+            prepared.commands, np.repeat(target, p, axis=0), start, effort, weight
         )
         total = (found.error**2 + weight * energy).reshape(rows, p)
         order = total.argsort(axis=1) + np.arange(0, rows * p, p)[:, None]
@@ -239,7 +238,9 @@ class Pipeline:
         rows, n_seeds, n = seeds.shape
         flat = target if rows == 1 else np.repeat(target, n_seeds, axis=0)
         usual = SEARCH.few_fins_steps if n < 6 else SEARCH.many_fins_steps
-        steps = steps or self.settings.search_steps or (SEARCH.convex_steps if self.objective.convex else usual)
+        steps = (
+            steps or self.settings.search_steps or (SEARCH.convex_steps if self.objective.convex else usual)
+        )
         planar = force_space.descend(prepared.planar, flat, seeds.reshape(-1, n), steps, works)
         command, cost = force_space.realize(prepared.planar, planar)
         if n_seeds == 1:

@@ -41,7 +41,7 @@ class HorizonSettings:
     """Ticks for which the cost of the last tick counts on: what a change of allocation pays in the long
     run."""
     overload_cost: float = 1.0
-    """What a force counts that is twice what a fin can give, beside its own, as a share of its largest cost."""
+    """What a force counts that is twice what a fin can give, as a share of its largest cost."""
     working_share: float = 2e-4
     """Share of its largest thrust from which it matters where a fin points."""
     stay_gain: float = 0.01

@@ -75,14 +75,17 @@ def refine_candidates(
     refined = refine(prepared.commands, repeated, command.reshape(-1, n, 3), steps)
     cost = prepared.cost(refined.command)
     if p == 1:
-        parts = (*refined, cost)
-        return RefinedCandidates(*(values[:, None] for values in parts), origin)
+        command, wrench, error = (values[:, None] for values in refined)
+        return RefinedCandidates(command, wrench, error, cost[:, None], origin)
     score = cost.reshape(rows, p)
     if keep_mode:
         score = score.copy()
         score[:, 0] *= 1.0 - RANKING.switch_gain
     error = refined.error.reshape(rows, p)
-    exact, resolution = RANKING.exact_error * prepared.exactness, RANKING.error_resolution * prepared.exactness
+    exact, resolution = (
+        RANKING.exact_error * prepared.exactness,
+        RANKING.error_resolution * prepared.exactness,
+    )
     order = rank(score, error, exact, resolution).argsort(axis=1)
     order += np.arange(0, rows * p, p)[:, None]
     flat = (*refined, cost, origin.reshape(-1))

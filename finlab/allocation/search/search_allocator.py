@@ -111,9 +111,10 @@ class SearchAllocator(Allocator):
             with self._one_thread():
                 refined = self.pipeline.solve(prepared, targets, previous, fallback=fallback)
             return self._single(prepared, targets, refined)
-        solve: Callable[[int], RefinedCandidates] = lambda start: self.pipeline.solve(  # noqa: E731
-            prepared, targets[start : start + CHUNK], fallback=fallback
-        )
+
+        def solve(start: int) -> RefinedCandidates:
+            return self.pipeline.solve(prepared, targets[start : start + CHUNK], fallback=fallback)
+
         return self._many(solve, len(targets))
 
     def _many(self, solve: Callable[[int], RefinedCandidates], count: int) -> Solution:
@@ -196,9 +197,7 @@ def _within_reach(problem: PlanarProblem, policy: Policy, target: Array) -> Near
         return nearest(sets, target[None], (weights.max() / weights) ** 2)
 
 
-def _candidates(
-    refined: RefinedCandidates, std: Array, layout: Layout, names: tuple[str, ...]
-) -> Candidates:
+def _candidates(refined: RefinedCandidates, std: Array, layout: Layout, names: tuple[str, ...]) -> Candidates:
     """The refined answers to a single target, from seeds of these names."""
     command, wrench, error, _, origin = (values[0] for values in refined)
     source = tuple([names[k] if 0 <= k < len(names) else "another start" for k in origin.tolist()])

@@ -35,9 +35,9 @@ class Settings:
             raise AllocationError(f"energy_tradeoff: expected a number from 0, got {self.energy_tradeoff}")
         if self.n_refined < 1 or self.refine_steps < 0 or (self.search_steps or 1) < 1:
             raise AllocationError(
-                "method 'search' needs at least one refined answer, one step of search and no negative number "
-                f"of refining steps, got n_refined={self.n_refined}, search_steps={self.search_steps}, "
-                f"refine_steps={self.refine_steps}"
+                "method 'search' needs at least one refined answer, one step of search and no negative "
+                f"number of refining steps, got n_refined={self.n_refined}, "
+                f"search_steps={self.search_steps}, refine_steps={self.refine_steps}"
             )
 
 
