@@ -1,43 +1,65 @@
 """The files of a deployment bundle, from a folder or a zip archive that may come from a stranger.
 
 Nothing is unpacked, no link is followed, nothing is read beyond its largest size, and no content is believed
-before its checksum fits. What the files mean is known to the rooms that read them: the layout graph to
-`finlab.layout`, the weights to `finlab.inference`, the settings to `finlab.allocation`.
+before its checksum fits. What the files mean is known to the rooms that read them: layout graph and force
+tables to `finlab.layout` and `finlab.physics`, compiled fins to `finlab.forces`, weights to
+`finlab.inference`, settings to `finlab.allocation`.
 """
 
 import hashlib
+import json
 import os
+import re
 import stat
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from finlab.errors import DataError
 
-VERSION = 2
+VERSION = 3
 """Version of the bundle; a reader knows exactly one."""
 GRAPH, ABOUT = "layout.graph.json", "bundle.json"
+COMPILED = "compiled_fins.safetensors"
+"""What each fin can do, ready for the search."""
+TABLES = "tables/"
+"""Folder of the fins' force tables, each named by the SHA-256 of its content."""
 CHECKPOINT = "checkpoint/"
-"""Folder of the weights, itself a checkpoint."""
+"""Folder of the weights, itself a checkpoint; there for methods with networks."""
 README, CHECKSUMS = "README.md", "SHA256SUMS"
 LARGEST = {
     GRAPH: 1_000_000,
     ABOUT: 100_000,
+    COMPILED: 5_000_000,
     f"{CHECKPOINT}config.json": 1_000_000,
     f"{CHECKPOINT}model.safetensors": 50_000_000,
-    f"{CHECKPOINT}fast/config.json": 1_000_000,
-    f"{CHECKPOINT}fast/model.safetensors": 20_000_000,
     README: 100_000,
     CHECKSUMS: 10_000,
 }
-"""All that a bundle may hold, and the largest size of each file [bytes]."""
-REQUIRED = (GRAPH, ABOUT, f"{CHECKPOINT}config.json", f"{CHECKPOINT}model.safetensors", CHECKSUMS)
+"""All that a bundle may hold beside force tables, and the largest size of each file [bytes]."""
+LARGEST_TABLE = 20_000_000
+"""Largest size of a force table in a bundle [bytes]."""
+LARGEST_BUNDLE = 100_000_000
+"""Largest size of all files together [bytes]."""
+REQUIRED = (GRAPH, ABOUT, COMPILED, CHECKSUMS)
 VERSION_1 = "network.onnx"
 """A file that only bundles of version 1 hold."""
 
 Files = Mapping[str, bytes]
 """Contents by name."""
+
+_TABLE = re.compile(TABLES + r"[0-9a-f]{64}\.csv")
+
+
+def largest(name: str) -> int:
+    """Largest size [bytes] of the file of this name; -1 for names that no bundle holds."""
+    return LARGEST_TABLE if _TABLE.fullmatch(name) else LARGEST.get(name, -1)
+
+
+def table_name(content: bytes) -> str:
+    """The name of a force table in a bundle."""
+    return f"{TABLES}{hashlib.sha256(content).hexdigest()}.csv"
 
 
 def is_bundle(path: str | os.PathLike[str]) -> bool:
@@ -49,6 +71,15 @@ def is_bundle(path: str | os.PathLike[str]) -> bool:
         return place.suffix == ".zip" and place.is_file()
     except (OSError, ValueError):  # a name that is too long, or holds a NUL byte
         return False
+
+
+def archive_around(path: str | os.PathLike[str]) -> str | None:
+    """The zip archive of a bundle that a force table lies in, as in `robot.zip/tables/x.csv`; None for a
+    file that lies in none."""
+    tables = os.path.dirname(path)
+    archive = os.path.dirname(tables)
+    within = archive.endswith(".zip") and os.path.basename(tables) + "/" == TABLES
+    return archive if within and os.path.isfile(archive) else None
 
 
 def read_bundle_files(path: str | os.PathLike[str]) -> dict[str, bytes]:
@@ -64,7 +95,8 @@ def read_bundle_files(path: str | os.PathLike[str]) -> dict[str, bytes]:
 
 
 def check_bundle_files(files: Files, source: str) -> None:
-    """Raise a `DataError` unless all files are there and their checksums fit."""
+    """Raise a `DataError` unless version, files and checksums are right."""
+    _check_version(files, files.get(ABOUT), source)
     for name in REQUIRED:
         if name not in files:
             raise DataError(f"{source}: {name} is missing; a bundle is made by `finlab export LAYOUT -o DIR`")
@@ -84,60 +116,97 @@ def checksums(files: Files) -> bytes:
 
 
 def checkpoint_part(files: Files) -> dict[str, bytes]:
-    """The files of the checkpoint inside a bundle, by their names in it."""
+    """The files of the checkpoint inside a bundle, by their names in it; empty where there is none."""
     return {name.removeprefix(CHECKPOINT): c for name, c in files.items() if name.startswith(CHECKPOINT)}
 
 
+class _Contents(dict[str, bytes]):
+    """Files that are being read, none beyond its largest size, nor all together."""
+
+    def __init__(self, source: str) -> None:
+        super().__init__()
+        self.source, self.left = source, LARGEST_BUNDLE
+
+    def take(self, name: str, read: Callable[[int], bytes]) -> None:
+        """Read one more."""
+        most = largest(name)
+        content = read(min(most, self.left) + 1)
+        if len(content) > most:
+            raise DataError(f"{self.source}: {name} is larger than {most:,} bytes")
+        self.left -= len(content)
+        if self.left < 0:
+            raise DataError(f"{self.source}: its files are larger than {LARGEST_BUNDLE:,} bytes together")
+        self[name] = content
+
+
 def _folder(path: Path, source: str) -> dict[str, bytes]:
-    files = {}
+    files = _Contents(source)
     try:
-        _check_version([VERSION_1] if (path / VERSION_1).exists() else [], source)
-        for name in LARGEST:
+        _check_version([VERSION_1] if (path / VERSION_1).exists() else [], None, source)
+        for name in (ABOUT, *sorted((set(LARGEST) - {ABOUT}) | _tables_in(path))):
             file = path / name
             try:
                 about = file.lstat()
             except FileNotFoundError:
                 continue
-            if not stat.S_ISREG(about.st_mode):
+            if not stat.S_ISREG(about.st_mode) or (file.parent != path and file.parent.is_symlink()):
                 raise DataError(f"{source}: {name} is no regular file")
             with file.open("rb") as stream:
-                files[name] = _bounded(stream.read, name, source)
+                files.take(name, stream.read)
+            if name == ABOUT:
+                _check_version((), files[ABOUT], source)
     except OSError as error:
         raise DataError(f"{source}: cannot be read: {error.strerror}") from None
-    return files
+    return dict(files)
+
+
+def _tables_in(path: Path) -> set[str]:
+    """Names of the force tables in a bundle's folder."""
+    try:
+        return {name for entry in os.scandir(path / TABLES) if _TABLE.fullmatch(name := TABLES + entry.name)}
+    except (FileNotFoundError, NotADirectoryError):
+        return set()
 
 
 def _archive(source: str) -> dict[str, bytes]:
-    files: dict[str, bytes] = {}
+    files = _Contents(source)
     try:
         with zipfile.ZipFile(source) as archive:
-            entries = archive.infolist()
-            _check_version([entry.filename for entry in entries], source)
-            for entry in entries[: len(LARGEST) + 1]:
+            # The version comes first: files of another one are not the news.
+            entries = sorted(archive.infolist(), key=lambda entry: entry.filename != ABOUT)
+            _check_version([entry.filename for entry in entries], None, source)
+            for entry in entries:
                 # Nothing is unpacked, so a name can do no harm; still, a bundle holds these files only.
-                if entry.filename not in LARGEST or entry.filename in files:
+                if largest(entry.filename) < 0 or entry.filename in files:
                     raise DataError(f"{source}: holds {entry.filename!r:.60}, which is no part of a bundle")
                 with archive.open(entry) as stream:
-                    files[entry.filename] = _bounded(stream.read, entry.filename, source)
+                    files.take(entry.filename, stream.read)
+                if entry.filename == ABOUT:
+                    _check_version((), files[ABOUT], source)
     except OSError as error:
         raise DataError(f"{source}: cannot be read: {error.strerror or error}") from None
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, ValueError, zlib.error) as error:
         reason = str(error).splitlines()[0][:80] if str(error) else type(error).__name__
         raise DataError(f"{source}: is neither a bundle's folder nor its zip archive ({reason})") from None
-    return files
+    return dict(files)
 
 
-def _check_version(names: list[str], source: str) -> None:
-    """Refuse bundles of version 1, whose weights were ONNX files."""
+def _check_version(names: Iterable[str], about: bytes | None, source: str) -> None:
+    """Refuse bundles of other versions; what cannot be understood is left to its reader.
+
+    Version 1 held its weights as ONNX files, version 2 knew fins by networks alone.
+    """
+    version: object = VERSION
     if VERSION_1 in names:
+        version = 1
+    elif about is not None:
+        try:
+            document = json.loads(about)
+        except (ValueError, RecursionError):
+            return
+        version = document.get("version") if isinstance(document, dict) else VERSION
+    if version != VERSION or isinstance(version, bool):
         raise DataError(
-            f"{source}: is a bundle of version 1, this finlab reads version {VERSION}; export it again with "
-            "`finlab export LAYOUT -o DIR`, where LAYOUT may be the old bundle's own layout.graph.json"
+            f"{source}: is a bundle of version {version!r:.40}, this finlab reads version {VERSION}; "
+            "export it again with `finlab export LAYOUT -o DIR`"
         )
-
-
-def _bounded(read: Callable[[int], bytes], name: str, source: str) -> bytes:
-    content = read(LARGEST[name] + 1)
-    if len(content) > LARGEST[name]:
-        raise DataError(f"{source}: {name} is larger than {LARGEST[name]:,} bytes")
-    return content

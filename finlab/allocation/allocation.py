@@ -42,7 +42,7 @@ class Answer(PlainData):
     sigma: Array
     """Per-axis standard deviation (6,) of the error measure."""
     judged_by: Judge
-    """Who computed `fin_forces` and `wrench`: the analytic fin models, or the learned surrogate."""
+    """Who computed `fin_forces` and `wrench`: the plant, that is the fins' own laws and tables."""
     method: str
     """Name of the method that answered."""
     checkpoint: str | None = None

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.allocation import Allocation, BatchAllocation
 from finlab.allocation.health import Health
-from finlab.allocation.judging import Verdict, judge, verdict_of
+from finlab.allocation.judging import judge
 from finlab.allocation.method import Method
 from finlab.allocation.policy import CLOSEST, Policy, as_policy
 from finlab.allocation.question import (
@@ -19,8 +19,8 @@ from finlab.allocation.question import (
     check_wrenches,
     usable_fins,
 )
-from finlab.allocation.solution import Candidates, Solution
-from finlab.errors import AllocationError, DataError
+from finlab.allocation.solution import Candidates
+from finlab.errors import AllocationError
 from finlab.layout import FinModelSpec, Layout
 
 Array = NDArray[np.float64]
@@ -63,6 +63,7 @@ class Allocator(Method):
             CommandError: the wrench is not six finite numbers, or `previous` has another shape.
             AllocationError: the method does not know the policy.
             LayoutError: an unknown fin, or none left.
+            DataError: a fin's force table cannot be read.
         """
         target, policy = check_wrenches(wrench, single=True), as_policy(policy)
         check_layout_and_seed(layout, seed)
@@ -73,7 +74,7 @@ class Allocator(Method):
         solution = self._solve_by(policy, fins.healthy, target[None], seed=seed, previous=before)
         solve_ms = (time.perf_counter() - start) * 1e3
         command = fins.among_all(solution.command)
-        verdict, notes = self._judge(fins, solution, command, target[None])
+        verdict = judge(fins.layout, command, target[None], self.normalization.std)
         return Allocation(
             layout=fins.layout,
             failed=fins.failed,
@@ -95,7 +96,7 @@ class Allocator(Method):
             previous=None if before is None else fins.among_all(before),
             wrench_surrogate=None if solution.wrench_surrogate is None else solution.wrench_surrogate[0],
             unknown_fins=self.unknown_fins(fins.healthy),
-            notes=(*self._notes(fins.healthy), *notes),
+            notes=self._notes(fins.healthy),
             candidates=_made(solution.candidates, fins),
             samples=_made(solution.samples, fins),
             _allocator=self,
@@ -121,23 +122,6 @@ class Allocator(Method):
                 "one; hand over the allocator that answered: result.explore(allocator)"
             )
         return _made(solution.alternatives or solution.candidates, fins)
-
-    def _judge(
-        self, fins: Fins, solution: Solution, command: Array, targets: Array
-    ) -> tuple[Verdict, tuple[str, ...]]:
-        """What commands (N, n, 3) give, and a note where it is not the plant that says so."""
-        sigma = self.normalization.std
-        try:
-            return judge(fins.layout, command, targets, sigma), ()
-        except DataError as error:  # a force table that is not here, as on a robot
-            forces = self._surrogate_forces(fins.healthy, solution.command)
-            if forces is None:
-                raise
-            forces = np.nan_to_num(fins.among_all(forces))
-            torques = np.cross(fins.layout.position, forces)
-            wrench = np.concatenate([forces.sum(1), torques.sum(1)], axis=-1)
-            verdict = verdict_of(fins.layout, command, forces, wrench, targets, sigma)
-            return verdict._replace(judged_by="surrogate"), (f"judged by the surrogate: {error}",)
 
     def _notes(self, layout: Layout) -> tuple[str, ...]:
         """Sentences that the user should read before trusting an answer for this layout."""
@@ -169,7 +153,7 @@ class Allocator(Method):
         solution = self._solve_many(policy, fins.healthy, targets, seed=seed)
         elapsed_ms = (time.perf_counter() - start) * 1e3
         command = fins.among_all(solution.command)
-        verdict, notes = self._judge(fins, solution, command, targets)
+        verdict = judge(fins.layout, command, targets, self.normalization.std)
         return BatchAllocation(
             layout=fins.layout,
             failed=fins.failed,
@@ -189,7 +173,7 @@ class Allocator(Method):
             seed=seed,
             wrench_surrogate=solution.wrench_surrogate,
             unknown_fins=self.unknown_fins(fins.healthy),
-            notes=(*self._notes(fins.healthy), *notes),
+            notes=self._notes(fins.healthy),
         )
 
 

@@ -1,41 +1,73 @@
-"""The settings that travel with a bundle, in its `bundle.json`: what the allocator on board is made with."""
+"""What travels with a bundle in its `bundle.json`: the method, its yardstick, and what it is made with."""
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, fields, is_dataclass
-from typing import Any
+from dataclasses import asdict, is_dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
+from finlab.allocation.learned.settings import MdnSettings
 from finlab.allocation.search.settings import Settings
 from finlab.bundle_files import ABOUT, VERSION, Files
 from finlab.errors import DataError
+from finlab.inference.normalization import Normalization
 from finlab.physics.energy import EnergyWeights
 
-FORMAT = "finlab-bundle"
-METHODS_ON_BOARD = ("search",)
-"""Methods that a bundle can answer with; they share their settings."""
+if TYPE_CHECKING:
+    from finlab.allocation.search.search_allocator import SearchAllocator
 
+FORMAT = "finlab-bundle"
+METHODS_ON_BOARD: Mapping[str, type[Settings]] = {"search": Settings, "mdn": MdnSettings}
+"""Methods that a bundle can answer with, and their settings."""
+AIM = {"objective": "power", "copper_loss": 0.0}
+"""What is kept least, beside the weights of the effort."""
+
+_CHOICES = {"objective": ("power", "effort")}
 _LARGEST = {"n_candidates": 4096, "n_seeds": 256, "n_refined": 256, "search_steps": 100, "refine_steps": 100}
 """Largest settings that a robot accepts from a file; more would keep it from answering."""
 
 
-def about_bundle(options: Mapping[str, Any], checkpoint: str, made_by: str) -> bytes:
-    """The contents of `bundle.json`.
+class About(NamedTuple):
+    """What a bundle says of itself."""
 
-    Args:
-        options: those of the allocator, see `Allocator.options`.
-        checkpoint: name of the checkpoint.
-        made_by: version of finlab.
-    """
-    settings = {key: asdict(value) if is_dataclass(value) else value for key, value in options.items()}  # type: ignore[arg-type]
-    document = {"format": FORMAT, "version": VERSION, "finlab": made_by, "checkpoint": checkpoint}
-    return (json.dumps(document | {"settings": settings}, indent=1, allow_nan=False) + "\n").encode()
+    method: str
+    """One of `METHODS_ON_BOARD`."""
+    checkpoint: str | None
+    """Name of the checkpoint that the networks come from; None for methods without."""
+    normalization: Normalization
+    """Yardstick of the error."""
+    settings: dict[str, Any]
+    """Settings of the method, by name."""
+
+    def settings_for(self, method: str) -> dict[str, Any]:
+        """Those settings that another method knows as well; none for methods that do not run on board."""
+        if method not in METHODS_ON_BOARD:
+            return {}
+        known = {"energy_weights", *AIM, *vars(METHODS_ON_BOARD[method]())}
+        return {name: value for name, value in self.settings.items() if name in known}
 
 
-def read_about(files: Files, source: str) -> tuple[str, dict[str, Any]]:
-    """The checkpoint's name in a bundle, and the settings to make the allocator with.
+def about_bundle(allocator: "SearchAllocator", made_by: str) -> bytes:
+    """The contents of `bundle.json` for an allocator, made by a version of finlab."""
+    options = allocator.options.items()
+    document = {
+        "format": FORMAT,
+        "version": VERSION,
+        "finlab": made_by,
+        "method": allocator.name,
+        "checkpoint": allocator.checkpoint,
+        "normalization": {key: value.tolist() for key, value in allocator.normalization._asdict().items()},
+        "settings": {key: asdict(value) if is_dataclass(value) else value for key, value in options},  # type: ignore[arg-type]
+    }
+    return (json.dumps(document, indent=1, allow_nan=False) + "\n").encode()
+
+
+def read_about(files: Files, source: str) -> About:
+    """What the allocator on board is made with.
 
     Raises:
-        DataError: of another format or version, or settings that no robot should try.
+        DataError: of another format, or settings that no robot should try.
     """
     place = f"{source}/{ABOUT}"
     try:
@@ -44,28 +76,40 @@ def read_about(files: Files, source: str) -> tuple[str, dict[str, Any]]:
         raise DataError(f"{place}: not readable as JSON") from None
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise DataError(f"{place}: expected format {FORMAT}; a bundle is made by `finlab export`")
-    if document.get("version") != VERSION:
-        raise DataError(
-            f"{place}: bundle version {document.get('version')!r:.40}, this finlab reads version {VERSION}; "
-            "export it again with `finlab export LAYOUT -o DIR`"
-        )
-    name, values = document.get("checkpoint"), document.get("settings")
-    if not isinstance(name, str) or not isinstance(values, dict):
+    method, checkpoint, values = (document.get(key) for key in ("method", "checkpoint", "settings"))
+    if not isinstance(method, str) or method not in METHODS_ON_BOARD:
+        known = ", ".join(METHODS_ON_BOARD)
+        raise DataError(f"{place}: method must be one of {known}, got {method!r:.40}")
+    if not isinstance(checkpoint, str | None) or not isinstance(values, dict):
         raise DataError(f"{place}: checkpoint must be a name and settings must be keys and values")
-    weights = values.get("energy_weights")
     plain = {key: value for key, value in values.items() if key != "energy_weights"}
-    settings = _checked(Settings(), plain, f"{place}: settings")
-    energy_weights = EnergyWeights(**_checked(EnergyWeights(), weights, f"{place}: energy_weights"))
-    return name, settings | {"energy_weights": energy_weights}
+    settings = _checked({**AIM, **vars(METHODS_ON_BOARD[method]())}, plain, f"{place}: settings")
+    weights = _checked(
+        vars(EnergyWeights()), values.get("energy_weights"), f"{place}: settings: energy_weights"
+    )
+    normalization = _normalization(document.get("normalization"), place)
+    return About(method, checkpoint, normalization, {**settings, "energy_weights": EnergyWeights(**weights)})
 
 
-def _checked(default: Any, values: Any, place: str) -> dict[str, Any]:
-    """Values for the fields of a dataclass, each of the kind that its default is."""
-    usual = {field.name: getattr(default, field.name) for field in fields(default)}
+def _normalization(values: Any, place: str) -> Normalization:
+    try:
+        mean, std = (np.array(values[key], np.float64) for key in Normalization._fields)
+    except (KeyError, TypeError, ValueError):
+        mean = std = np.empty(0)
+    if mean.shape != (6,) or std.shape != (6,) or not (np.isfinite(mean).all() and (std > 0.0).all()):
+        raise DataError(f"{place}: normalization must be six means and six standard deviations above 0")
+    return Normalization(mean, std)
+
+
+def _checked(usual: Mapping[str, Any], values: Any, place: str) -> dict[str, Any]:
+    """Values by the same names as the usual ones, each of the kind that the usual one is."""
     if not isinstance(values, Mapping) or set(values) != set(usual):
         raise DataError(f"{place} must be {', '.join(usual)}")
     for name, value in values.items():
-        if isinstance(usual[name], bool):
+        if name in _CHOICES:
+            if value not in _CHOICES[name]:
+                raise DataError(f"{place}: {name} must be {' or '.join(_CHOICES[name])}, got {value!r:.40}")
+        elif isinstance(usual[name], bool):
             if not isinstance(value, bool):
                 raise DataError(f"{place}: {name} must be true or false, got {value!r:.40}")
         elif value is not None or usual[name] is not None:

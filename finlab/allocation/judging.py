@@ -17,8 +17,8 @@ REACHED = 0.01
 """Normalized error up to which a wrench counts as delivered."""
 
 
-Judge = Literal["plant", "surrogate"]
-"""Who says what commands give: the analytic fin models, or the learned surrogate where those are missing."""
+Judge = Literal["plant"]
+"""Who says what commands give: the fins' own laws and tables."""
 
 
 class Verdict(NamedTuple):
@@ -39,33 +39,30 @@ class Verdict(NamedTuple):
 
 
 def judge(layout: Layout, command: Array, target: Array, sigma: Array) -> Verdict:
-    """Judge commands (N, n, 3), NaN for failed fins, by the analytic fin models.
+    """Judge commands (N, n, 3), NaN for failed fins, by the fins' own models.
 
     Args:
         layout: the robot.
         command: what its fins do.
         target: desired wrenches (N, 6).
         sigma: per-axis standard deviation (6,) of the error measure.
+
+    Raises:
+        DataError: a fin's force table cannot be read.
     """
     plant = plant_of(layout)
     force, columns = plant.forces(command), plant.columns
     # The first half of a column is its fin's axis in the body frame.
-    in_body_frame = np.matmul(force[..., None, :], columns[..., :3])[..., 0, :]
-    return verdict_of(layout, command, in_body_frame, wrench_of_forces(force, columns), target, sigma)
-
-
-def verdict_of(
-    layout: Layout, command: Array, fin_forces: Array, wrench: Array, target: Array, sigma: Array
-) -> Verdict:
-    """The verdict where forces (N, n, 3) and wrenches (N, 6) are known."""
+    fin_forces = np.matmul(force[..., None, :], columns[..., :3])[..., 0, :]
+    wrench = wrench_of_forces(force, columns)
     missing = (target - wrench) / sigma
     err_norm = np.sqrt(np.einsum("ri,ri->r", missing, missing))
     if len(command) == 0:
         return Verdict(fin_forces, wrench, err_norm, np.empty(0), np.empty(0))
-    energy, power = _meter(layout)(command), plant_of(layout).power(command).sum(-1)
+    energy, power = _meter(layout)(command), plant.power(command).sum(-1)
     if np.isnan(energy).any():  # a failed fin costs nothing
         energy = _meter(layout)(np.where(np.isnan(command), 0.0, command))
-        power = np.nansum(plant_of(layout).power(command), axis=-1)
+        power = np.nansum(plant.power(command), axis=-1)
     return Verdict(fin_forces, wrench, err_norm, energy, power)
 
 

@@ -88,10 +88,6 @@ class Method(ABC):
             previous: command (n, 3) of the previous tick, or None.
         """
 
-    def _surrogate_forces(self, layout: Layout, command: Array) -> Array | None:
-        """Forces (N, n, 3) [N] in the body frame by the method's own model, for methods that have one."""
-        return None
-
     def _check_policy(self, policy: Policy) -> None:
         """Refuse a policy that the method does not know; those that know all override this."""
         if not policy.is_plain and policy.kind != "direction":

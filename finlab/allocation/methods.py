@@ -7,10 +7,21 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 
+import numpy as np
+
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.bundle_settings import METHODS_ON_BOARD, read_about
-from finlab.bundle_files import CHECKPOINT, Files, checkpoint_part, is_bundle, read_bundle_files
-from finlab.errors import AllocationError
+from finlab.bundle_files import (
+    ABOUT,
+    CHECKPOINT,
+    COMPILED,
+    Files,
+    checkpoint_part,
+    is_bundle,
+    read_bundle_files,
+)
+from finlab.errors import AllocationError, DataError
+from finlab.forces.compiled_fins import CompiledFins, parse_compiled
 from finlab.inference.checkpoint import (
     parse_checkpoint,
     read_checkpoint,
@@ -86,8 +97,8 @@ def load_allocator(
     """The allocator of a method, ready to answer.
 
     Args:
-        method: one of `METHODS`; or a bundle made by `finlab export`, which is short for method `search`
-            with that bundle as its checkpoint.
+        method: one of `METHODS`; or a bundle made by `finlab export`, which answers by the method that it was
+            made for.
         checkpoint: a checkpoint folder, a bundle, or the name of a shipped checkpoint; by default `paper` for
             the method `paper` and `default` for all others.
         options: passed to the method's class; where a bundle holds settings, they stand for those left out.
@@ -100,7 +111,7 @@ def load_allocator(
     if method not in METHODS:
         if checkpoint is not None or not (isinstance(method, os.PathLike) or is_bundle(method)):
             raise AllocationError(f"method: expected one of {', '.join(METHODS)}, got {str(method)!r}")
-        method, checkpoint = "search", method
+        return allocator_from_bundle(read_bundle_files(method), str(method), None, **options)
     name = str(method)
     if checkpoint is not None and is_bundle(checkpoint):
         return allocator_from_bundle(read_bundle_files(checkpoint), str(checkpoint), name, **options)
@@ -109,21 +120,39 @@ def load_allocator(
 
 
 def allocator_from_bundle(
-    files: Files, source: str = "bundle", method: str = "search", **options: Any
+    files: Files, source: str = "bundle", method: str | None = None, **options: Any
 ) -> Allocator:
-    """The allocator of a method with the weights and settings in a bundle's files; see `load_allocator`."""
-    checkpoint, settings = read_about(files, source)
-    weights = parse_checkpoint(checkpoint_part(files), f"{source}/{CHECKPOINT.rstrip('/')}", checkpoint)
-    options = settings | options if method in METHODS_ON_BOARD else options
-    return _made(method, weights if method in LEARNED else weights.normalization, options)
+    """The allocator of a method, by default the bundle's own, with what a bundle's files hold; see
+    `load_allocator`."""
+    about = read_about(files, source)
+    method, options = method or about.method, about.settings_for(method or about.method) | options
+    compiled = parse_compiled(files[COMPILED], f"{source}/{COMPILED}")
+    if method not in LEARNED:
+        return _made(method, about.normalization, options, compiled)
+    part = checkpoint_part(files)
+    if not part or about.checkpoint is None:
+        raise DataError(
+            f"{source}: holds no networks, which method {method!r} needs; export it again with "
+            "`finlab export LAYOUT -o DIR --method mdn`"
+        )
+    weights = parse_checkpoint(part, f"{source}/{CHECKPOINT.rstrip('/')}", about.checkpoint)
+    if not all(np.array_equal(a, b) for a, b in zip(weights.normalization, about.normalization, strict=True)):
+        raise DataError(f"{source}: {ABOUT} and the networks differ in normalization; export it again")
+    return _made(method, weights, options, compiled)
 
 
-def _made(method: str, model: TrainedWeights | Normalization, options: Mapping[str, Any]) -> Allocator:
+def _made(
+    method: str,
+    model: TrainedWeights | Normalization,
+    options: Mapping[str, Any],
+    compiled: CompiledFins | None = None,
+) -> Allocator:
     module, name = METHODS[method]
     kind = getattr(import_module(module), name)
     kind.check_options(options)
     try:
-        allocator: Allocator = kind(model, **options)
+        known = {"compiled": compiled} if compiled and method in METHODS_ON_BOARD else {}
+        allocator: Allocator = kind(model, **options, **known)
     except (TypeError, AttributeError) as error:  # what a value of the wrong type meets first
         raise AllocationError(f"method {method!r}: a setting has the wrong type ({error})") from error
     return allocator

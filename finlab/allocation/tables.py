@@ -40,10 +40,9 @@ def wrench_rows(result: Allocation) -> list[tuple[str, ...]]:
 def summary(result: Allocation) -> str:
     """The figures of an answer in one line."""
     source = f", checkpoint {result.checkpoint}" if result.checkpoint else ""
-    judge = "" if result.judged_by == "plant" else f"   judged by the {result.judged_by}"
     return (
         f"err_norm {result.err_norm:.2e}   energy {result.energy:.3f}   {result.solve_ms:.1f} ms   "
-        f"method {result.method}{source}{judge}"
+        f"method {result.method}{source}"
     )
 
 

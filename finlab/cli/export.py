@@ -1,7 +1,7 @@
 """`finlab export`: write what a robot takes home, the whole bundle or the layout graph file alone."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
@@ -12,9 +12,11 @@ def export(
     zip: bool = False,
     onnx: bool = False,
     failed: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = (),
+    method: Literal["search", "mdn"] = "search",
+    objective: Literal["power", "effort"] = "power",
     checkpoint: Annotated[str, arg(metavar="NAME|FOLDER")] = "default",
 ) -> None:
-    """Write the deployment bundle: layout graph, trained weights, README and checksums.
+    """Write the deployment bundle: layout graph, the fins' physics, settings, README and checksums.
 
     Args:
         layout: layout file, layout graph file, bundle, or the name of a shipped layout.
@@ -22,7 +24,9 @@ def export(
         zip: write one archive, DIR.zip, instead of a folder.
         onnx: write the networks as ONNX files for other runtimes instead; needs finlab[onnx].
         failed: name of a fin that does not work.
-        checkpoint: trained checkpoint the robot shall use.
+        method: who answers on the robot; the networks of mdn travel with it.
+        objective: what the robot keeps least, power in watts or the paper's effort.
+        checkpoint: checkpoint with the yardstick of errors, and the networks of mdn.
     """
     from finlab.cli.inputs import open_robot
     from finlab.errors import FinlabError
@@ -35,25 +39,25 @@ def export(
         raise FinlabError("--onnx writes a folder of ONNX files; leave out --zip")
     if output.suffix == ".json" and not graph_alone:
         raise FinlabError(f"{output}: expected a file name that ends in {SUFFIX}, or a folder")
-    robot = open_robot(layout)  # before the network is loaded
+    robot = open_robot(layout)  # before a network is loaded
     failed = robot.with_failed(failed)
+    if onnx:
+        from finlab.deploy.onnx_export import write_onnx
+        from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
+
+        names = write_onnx(read_checkpoint(resolve_checkpoint(checkpoint)), output)
+        print(f"{output}: {', '.join(names)}, checkpoint {checkpoint}")
+        return
     from finlab.allocation import load_allocator
 
-    allocator = load_allocator(checkpoint=checkpoint)
+    allocator = load_allocator(method, checkpoint=checkpoint, objective=objective)
     if graph_alone:
         from finlab.deploy.graph import build_graph
         from finlab.deploy.graph_file import write_graph
 
         graph = build_graph(robot.layout, allocator, failed)
         write_graph(graph, output)
-        n_tests = len(graph.self_test)
-        print(f"{output}: {robot.layout.n_fins} fins, {n_tests} self-tests, checkpoint {checkpoint}")
-        return
-    if onnx:
-        from finlab.deploy.onnx_export import write_onnx
-
-        assert allocator.weights is not None
-        print(f"{output}: {', '.join(write_onnx(allocator.weights, output))}, checkpoint {checkpoint}")
+        print(f"{output}: {robot.layout.n_fins} fins, {len(graph.self_test)} self-tests, method {method}")
         return
     from finlab.deploy.bundle import make_bundle
 

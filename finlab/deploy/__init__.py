@@ -1,1 +1,1 @@
-"""What a robot takes home: the layout graph, the bundle with its networks, and the runtime that answers."""
+"""What a robot takes home: layout graph and bundle with the fins' physics, and the runtime that answers."""

@@ -1,10 +1,9 @@
-"""The bundle that a robot takes home: layout graph, trained weights, settings, a README and checksums.
+"""The bundle that a robot takes home: layout graph, the fins' physics, settings, a README and checksums.
 
 `finlab.load_layout` and `finlab.load_allocator` read it, so the robot runs the library itself. The same
-layout, checkpoint and settings give the same bytes, as a folder and as a zip archive.
+layout and settings give the same bytes, as a folder and as a zip archive.
 """
 
-import hashlib
 import io
 import os
 import zipfile
@@ -15,12 +14,27 @@ from pathlib import Path
 import finlab
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.bundle_settings import METHODS_ON_BOARD, about_bundle
-from finlab.bundle_files import ABOUT, CHECKPOINT, CHECKSUMS, GRAPH, LARGEST, README, checksums
+from finlab.allocation.search.search_allocator import SearchAllocator
+from finlab.bundle_files import (
+    ABOUT,
+    CHECKPOINT,
+    CHECKSUMS,
+    COMPILED,
+    GRAPH,
+    LARGEST_BUNDLE,
+    LARGEST_TABLE,
+    README,
+    checksums,
+    largest,
+    table_name,
+)
 from finlab.deploy.graph import LayoutGraph, build_graph
 from finlab.deploy.graph_file import graph_bytes
 from finlab.errors import AllocationError, DataError
-from finlab.inference.checkpoint import WEIGHTS_FILE, checkpoint_files
-from finlab.layout import Layout
+from finlab.forces.compiled_fins import compiled_bytes, compiled_fins
+from finlab.inference.checkpoint import checkpoint_files
+from finlab.layout import FinModelSpec, Layout
+from finlab.physics.table_file import table_bytes
 from finlab.whole_file import write_whole
 
 
@@ -41,7 +55,7 @@ class Bundle:
         try:
             path.mkdir(parents=True, exist_ok=True)
             present = {file.relative_to(path).as_posix() for file in path.rglob("*") if not file.is_dir()}
-            if strangers := sorted(present - set(LARGEST)):
+            if strangers := sorted(name for name in present if largest(name) < 0):
                 raise DataError(
                     f"{path}: holds {strangers[0]!r:.60}, which is no part of a bundle; name an empty folder"
                 )
@@ -65,7 +79,7 @@ class Bundle:
     def zip_bytes(self) -> bytes:
         """The bundle as one zip archive."""
         buffer = io.BytesIO()
-        # Weights hardly shrink, and a compressor's bytes would differ from version to version.
+        # Arrays hardly shrink, and a compressor's bytes would differ from version to version.
         with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
             for name, content in self.files.items():
                 entry = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
@@ -75,38 +89,63 @@ class Bundle:
 
 
 def make_bundle(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = ()) -> Bundle:
-    """Prepare a layout for a robot with the trained networks and settings of an allocator.
+    """Prepare a layout for a robot with the method and settings of an allocator.
 
     Args:
         layout: the robot, failed fins included.
-        allocator: of method `learned` or `fast`.
+        allocator: of method `search` or `mdn`.
         failed: names of fins that do not work.
 
     Raises:
         LayoutError: an unknown failed fin, or none left.
-        AllocationError: the method cannot run on a robot, or its networks do not know the robot's fins.
+        AllocationError: the method cannot run from a bundle.
+        DataError: a force table cannot be read, or is too large to travel.
     """
-    if allocator.weights is None or allocator.name not in METHODS_ON_BOARD:
+    if not isinstance(allocator, SearchAllocator) or allocator.name not in METHODS_ON_BOARD:
         raise AllocationError(
-            f"method {allocator.name!r} cannot be exported; a bundle runs method 'learned', choose that"
+            f"method {allocator.name!r} cannot be exported; a bundle runs {' or '.join(METHODS_ON_BOARD)}"
         )
     graph = build_graph(layout, allocator, failed)
-    checkpoint = checkpoint_files(allocator.weights)
-    graph = replace(graph, checkpoint_sha256=hashlib.sha256(checkpoint[WEIGHTS_FILE]).hexdigest())
+    inside, tables = with_tables_inside(layout)
+    checkpoint = {} if allocator.weights is None else checkpoint_files(allocator.weights)
     files = {
-        GRAPH: graph_bytes(graph),
-        ABOUT: about_bundle(allocator.options, allocator.weights.name, finlab.__version__),
+        GRAPH: graph_bytes(replace(graph, layout=inside)),
+        ABOUT: about_bundle(allocator, finlab.__version__),
+        COMPILED: compiled_bytes(compiled_fins(layout, allocator.objective)),
+        **tables,
         **{CHECKPOINT + name: content for name, content in checkpoint.items()},
         README: readme_text(graph).encode(),
     }
+    if sum(map(len, files.values())) > LARGEST_BUNDLE:
+        raise DataError(f"layout {layout.name!r}: its bundle would be larger than {LARGEST_BUNDLE:,} bytes")
     return Bundle({**files, CHECKSUMS: checksums(files)})
+
+
+def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
+    """A layout whose force tables have the names that they have in a bundle, and their contents by name.
+
+    Raises:
+        DataError: a table cannot be read, or is too large to travel.
+    """
+    tables: dict[str, bytes] = {}
+    fins = []
+    for fin in layout.fins:
+        if fin.model.type == "table":
+            path = str(fin.model.values()["path"])
+            content = table_bytes(path)
+            if len(content) > LARGEST_TABLE:
+                raise DataError(f"{path}: is larger than {LARGEST_TABLE:,} bytes, too large for a bundle")
+            tables[table_name(content)] = content
+            fin = replace(fin, model=FinModelSpec("table", (("path", table_name(content)),)))
+        fins.append(fin)
+    return replace(layout, fins=tuple(fins)), tables
 
 
 _TEXT = """\
 # {name}: control allocation on board
 
-Made by finlab {version} with checkpoint `{checkpoint}`. Target wrench in, one command per fin out, in about a
-millisecond; finlab without its extras is enough, no torch.
+Made by finlab {version} for method `{method}`{networks}. Target wrench in, one command per fin out, in about
+a millisecond; finlab without its extras is enough, no torch.
 
 ## Five lines that run it
 
@@ -143,9 +182,11 @@ fin's horizontal axis, pi/2 up).
 
 | file | what it is |
 |---|---|
-| `layout.graph.json` | fins, node features, normalization, self-tests; networkx reads its part `graph` |
-| `bundle.json` | version of the bundle, and the settings that the allocator is made with |
-| `checkpoint/` | the trained networks: `model.safetensors`, `config.json`; `fast/` for `--fast` |
+| `layout.graph.json` | fins, normalization, self-tests; networkx reads its part `graph` |
+| `bundle.json` | version of the bundle, the method, and the settings that the allocator is made with |
+| `compiled_fins.safetensors` | what each fin can do and at what cost, ready for the search |
+| `tables/` | force tables of fins that have one, each named by its SHA-256 |
+| `checkpoint/` | the trained networks, where the method has any: `model.safetensors`, `config.json` |
 | `SHA256SUMS` | checksums; `sha256sum -c SHA256SUMS` checks them without finlab |
 """
 
@@ -166,7 +207,8 @@ def readme_text(graph: LayoutGraph) -> str:
     return _TEXT.format(
         name=graph.layout.name,
         version=finlab.__version__,
-        checkpoint=graph.checkpoint,
+        method=graph.method,
+        networks="" if graph.checkpoint is None else f" with checkpoint `{graph.checkpoint}`",
         fins="\n".join(rows),
         failed=list(graph.failed),
     )

@@ -26,7 +26,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         arguments.started = time.perf_counter()
         from finlab.deploy.robot import load_robot
 
-        code: int = arguments.run(load_robot(arguments.bundle, arguments.fast), arguments)
+        code: int = arguments.run(load_robot(arguments.bundle), arguments)
         sys.stdout.flush()
         return code
     except FinlabError as error:
@@ -45,7 +45,7 @@ def check(robot: "Robot", arguments: argparse.Namespace) -> int:
 
     print(
         f"{arguments.bundle}: {robot.layout.name}, {robot.layout.n_fins} fins, "
-        f"checkpoint {robot.graph.checkpoint}, ready in {time.perf_counter() - arguments.started:.2f} s"
+        f"method {robot.allocator.name}, ready in {time.perf_counter() - arguments.started:.2f} s"
     )
     findings = self_check(robot)
     for finding in findings:
@@ -73,7 +73,10 @@ def allocate(robot: "Robot", arguments: argparse.Namespace) -> int:
     for name, row in zip(answer.fins, command_rows(answer.command), strict=True):
         values_text = "failed" if row is None else f"{row[0]:7.3f}  {row[1]:6.3f}  {row[2]:20.3f}"
         print(f"{name:<{width}}  {values_text}")
-    print(f"err_norm {answer.err_norm:.2e}   energy {answer.energy:.3f}   {answer.solve_ms:.1f} ms")
+    print(
+        f"err_norm {answer.err_norm:.2e}   power {answer.power:.3f} W   energy {answer.energy:.3f}   "
+        f"{answer.solve_ms:.1f} ms"
+    )
     for note in answer.notes:
         print(note)
     return 0
@@ -99,9 +102,6 @@ def serve(robot: "Robot", arguments: argparse.Namespace) -> int:
     from finlab.deploy.serve import Server, Timing, Transport
     from finlab.deploy.transport import LoopbackUdp, StandardStreams
 
-    if unknown := robot.allocator.unknown_fins(robot.layout):
-        names = ", ".join(unknown)
-        print(f"finlab-runtime: warning: commands are wrong: unknown fins {names}", file=sys.stderr)
     deadline = None if arguments.deadline_ms is None else arguments.deadline_ms / 1e3
     timing = Timing(deadline, arguments.watchdog_s or None)
     transport: Transport
@@ -129,7 +129,6 @@ def _parser() -> argparse.ArgumentParser:
         made = verbs.add_parser(run.__name__, help=text, description=text)
         made.set_defaults(run=run)
         made.add_argument("bundle", metavar="BUNDLE", help="folder or zip archive made by `finlab export`")
-        made.add_argument("--fast", action="store_true", help="let the distilled network answer")
         return made
 
     verb(check, "Run the self-test; do this on the robot before first use.")

@@ -1,4 +1,4 @@
-"""Layout graph files (`*.graph.json`, version 1): written once at the desk, read on a robot. numpy only.
+"""Layout graph files (`*.graph.json`, version 2): written once at the desk, read on a robot. numpy only.
 
 The file is one JSON object; `graph.schema.json` beside this module describes it, and its part `graph` is what
 `networkx.node_link_graph` reads. A SHA-256 over all the rest tells an edited or damaged file from a good one.
@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from finlab.deploy.graph import SELF_TEST_TOLERANCE, LayoutGraph, Row, SelfTest
+from finlab.deploy.graph import SELF_TEST_TOLERANCE, LayoutGraph, SelfTest
 from finlab.errors import LayoutError
 from finlab.inference.normalization import Normalization
 from finlab.layout import layout_to_dict
@@ -63,18 +63,20 @@ def graph_bytes(graph: LayoutGraph) -> bytes:
     return (json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()
 
 
-def parse_graph(content: str, source: str = "graph") -> LayoutGraph:
-    """The graph in the text of a graph file; errors as in `read_graph`."""
+def parse_graph(
+    content: str, source: str = "graph", folder: Path | None = None, tables: frozenset[str] | None = None
+) -> LayoutGraph:
+    """The graph in the text of a graph file; arguments as in `GraphText`, errors as in `read_graph`."""
     data = parse_json(content, source)
     with under(source=source):
-        return graph_of(data, source)
+        return graph_of(data, source, folder, tables)
 
 
 def document_of(graph: LayoutGraph) -> dict[str, Any]:
     """Everything but the checksum, which comes third once it is known."""
     layout = layout_to_dict(graph.layout)
     nodes = []
-    for fin, entry, features in zip(graph.layout.fins, layout["fins"], graph.features, strict=True):
+    for fin, entry in zip(graph.layout.fins, layout["fins"], strict=True):
         node = {
             "id": entry["name"],
             "position_m": entry["position_m"],
@@ -82,7 +84,6 @@ def document_of(graph: LayoutGraph) -> dict[str, Any]:
             "limits": entry["limits"],
             "model": entry["model"],
             "healthy": fin.name not in graph.failed,
-            "features": features,
         }
         nodes.append(node)
     return {
@@ -99,10 +100,10 @@ def document_of(graph: LayoutGraph) -> dict[str, Any]:
             "nodes": nodes,
             "edges": edges_of(graph),
         },
-        "features": {"set": graph.feature_set},
         "normalization": {"mean": graph.normalization.mean.tolist(), "std": graph.normalization.std.tolist()},
         "checkpoint": {"name": graph.checkpoint, "sha256": graph.checkpoint_sha256},
         "self_test": {
+            "method": graph.method,
             "tolerance_err_norm": SELF_TEST_TOLERANCE,
             "cases": [asdict(case) for case in graph.self_test],
         },
@@ -114,7 +115,9 @@ def edges_of(graph: LayoutGraph) -> list[dict[str, str]]:
     return [{"source": a, "target": b} for a, b in graph.edges]
 
 
-def graph_of(data: Any, source: str) -> LayoutGraph:
+def graph_of(
+    data: Any, source: str, folder: Path | None = None, tables: frozenset[str] | None = None
+) -> LayoutGraph:
     """Check and convert the values of a file.
 
     Raises:
@@ -122,23 +125,23 @@ def graph_of(data: Any, source: str) -> LayoutGraph:
     """
     data = check_graph_document(data)
     nodes = graph_nodes(data)
-    layout = graph_layout(data, source)
+    layout = graph_layout(data, source, folder, tables)
     normalization = _section(data, "normalization", "mean", "std")
     checkpoint = _section(data, "checkpoint", "name", "sha256")
-    cases = _section(data, "self_test", "tolerance_err_norm", "cases")["cases"]
+    self_test = _section(data, "self_test", "method", "tolerance_err_norm", "cases")
+    cases = self_test["cases"]
     if not isinstance(cases, list):
         raise LayoutError(f"expected a list, got {shown(cases)}", "self_test.cases")
     graph = LayoutGraph(
         layout=layout,
         failed=tuple(name for name, node in zip(layout.names, nodes, strict=True) if not node["healthy"]),
-        feature_set=text(_section(data, "features", "set")["set"], "features.set", 40),
-        features=tuple(_row(node["features"], f"graph.nodes[{i}].features") for i, node in enumerate(nodes)),
         normalization=Normalization(
             np.array(numbers(normalization["mean"], "normalization.mean", 6)),
             np.array(numbers(normalization["std"], "normalization.std", 6, low=0.0)),
         ),
-        checkpoint=text(checkpoint["name"], "checkpoint.name", 200),
-        checkpoint_sha256=text(checkpoint["sha256"], "checkpoint.sha256", 64),
+        checkpoint=_text_or_none(checkpoint["name"], "checkpoint.name", 200),
+        checkpoint_sha256=_text_or_none(checkpoint["sha256"], "checkpoint.sha256", 64),
+        method=text(self_test["method"], "self_test.method", 40),
         self_test=tuple(_case(case, i, layout.n_fins) for i, case in enumerate(cases)),
     )
     if data["graph"]["edges"] != edges_of(graph):
@@ -152,23 +155,20 @@ def _section(data: Mapping[str, Any], name: str, *keys: str) -> Mapping[str, Any
 
 
 def _case(data: Any, i: int, n_fins: int) -> SelfTest:
-    keys = ("wrench", "command", "predicted_wrench", "features")
+    keys = ("wrench", "command", "delivered_wrench")
     key = f"self_test.cases[{i}]"
     data = mapping(data, key, keys, required=keys)
-    for name in ("command", "features"):
-        if not isinstance(data[name], list) or len(data[name]) != n_fins:
-            raise LayoutError(f"expected a list of {n_fins} rows, one for each fin", f"{key}.{name}")
+    if not isinstance(data["command"], list) or len(data["command"]) != n_fins:
+        raise LayoutError(f"expected a list of {n_fins} rows, one for each fin", f"{key}.command")
     return SelfTest(
         wrench=numbers(data["wrench"], f"{key}.wrench", 6),
-        command=tuple(_row(row, f"{key}.command[{j}]", 3) for j, row in enumerate(data["command"])),
-        predicted_wrench=numbers(data["predicted_wrench"], f"{key}.predicted_wrench", 6),
-        features=tuple(_row(row, f"{key}.features[{j}]") for j, row in enumerate(data["features"])),
+        command=tuple(
+            None if row is None else numbers(row, f"{key}.command[{j}]", 3)
+            for j, row in enumerate(data["command"])
+        ),
+        delivered_wrench=numbers(data["delivered_wrench"], f"{key}.delivered_wrench", 6),
     )
 
 
-def _row(value: Any, key: str, count: int | None = None) -> Row | None:
-    """Numbers of one fin; None for a failed one."""
-    if value is None:
-        return None
-    length = len(value) if isinstance(value, list) else 0
-    return numbers(value, key, length if count is None else count)
+def _text_or_none(value: Any, key: str, max_length: int) -> str | None:
+    return None if value is None else text(value, key, max_length)

@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.allocation import Allocation
-from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import allocator_from_bundle
 from finlab.allocation.policy import CLOSEST, Policy
-from finlab.bundle_files import GRAPH, Files, check_bundle_files, read_bundle_files
+from finlab.allocation.search.search_allocator import SearchAllocator
+from finlab.bundle_files import ABOUT, GRAPH, Files, check_bundle_files, read_bundle_files
 from finlab.deploy.graph import LayoutGraph
 from finlab.deploy.graph_file import parse_graph
 from finlab.errors import AllocationError, DataError
 from finlab.layout import Layout
-from finlab.layout.reading import decode_text
+from finlab.layout.load import bundle_graph_text
 
 Array = NDArray[np.float64]
 
@@ -27,8 +27,8 @@ class Robot:
 
     graph: LayoutGraph
     """The robot, failed fins included, and self-tests."""
-    allocator: Allocator
-    """Made of the bundle's weights and settings."""
+    allocator: SearchAllocator
+    """Made of the bundle's compiled fins, settings and, where there are any, networks."""
 
     @property
     def layout(self) -> Layout:
@@ -51,7 +51,7 @@ class Robot:
         """Commands for one target; arguments and errors as in `finlab.Allocator.allocate`.
 
         Raises:
-            AllocationError: also where the answer is no number, as broken weights give it.
+            AllocationError: also where the answer is no number, as a broken bundle gives it.
         """
         lost = self.lost(failed)
         answer = self.allocator.allocate(
@@ -60,7 +60,7 @@ class Robot:
         works = [name not in lost for name in self.layout.names]
         if not np.isfinite(answer.command[works]).all():
             raise AllocationError(
-                "the bundle's networks answer with NaN; export it again, and run `finlab-runtime check` on it"
+                "the bundle answers with NaN; export it again, and run `finlab-runtime check` on it"
             )
         return answer
 
@@ -73,28 +73,26 @@ class Robot:
         return command
 
 
-def load_robot(path: str | os.PathLike[str], fast: bool = False) -> Robot:
+def load_robot(path: str | os.PathLike[str]) -> Robot:
     """The robot in a bundle, a folder or a zip archive.
-
-    Args:
-        path: the bundle.
-        fast: whether the distilled network answers where it reaches the target.
 
     Raises:
         FinlabError: the bundle is not one, was changed, or cannot be run.
     """
-    return parse_robot(read_bundle_files(path), str(path), fast)
+    return parse_robot(read_bundle_files(path), str(path))
 
 
-def parse_robot(files: Files, source: str = "bundle", fast: bool = False) -> Robot:
-    """The robot in the contents of a bundle's files; see `load_robot`."""
+def parse_robot(files: Files, source: str = "bundle") -> Robot:
+    """The robot in the contents of a bundle's files; see `load_robot`.
+
+    Force tables are read from the folder or archive `source` once they are needed.
+    """
     check_bundle_files(files, source)
-    place = f"{source}/{GRAPH}"
-    graph = parse_graph(decode_text(files[GRAPH], place), place)
-    allocator = allocator_from_bundle(files, source, "fast" if fast else "learned")
-    weights = allocator.weights
-    if weights is None or weights.sha256 != graph.checkpoint_sha256:
+    graph = parse_graph(*bundle_graph_text(files, source))
+    allocator = allocator_from_bundle(files, source)
+    assert isinstance(allocator, SearchAllocator)
+    if (None if allocator.weights is None else allocator.weights.sha256) != graph.checkpoint_sha256:
         raise DataError(f"{source}: {GRAPH} and the weights are of different checkpoints; export again")
-    if not all(np.array_equal(a, b) for a, b in zip(weights.normalization, graph.normalization, strict=True)):
-        raise DataError(f"{source}: {GRAPH} and the weights differ in normalization; export again")
+    if not all(map(np.array_equal, allocator.normalization, graph.normalization)):
+        raise DataError(f"{source}: {GRAPH} and {ABOUT} differ in normalization; export again")
     return Robot(graph, allocator)

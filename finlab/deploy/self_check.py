@@ -1,8 +1,8 @@
 """`finlab-runtime check` and `speed`: does this computer answer as the desk did, truly, and how fast?
 
-To be run on the robot before first use. For each self-test of the graph file: are the node features the same,
-does the surrogate predict the same wrench, does the fins' own model confirm what the surrogate promises, and
-is this computer's own answer as good as the stored one.
+To be run on the robot before first use. Are the fins' laws and tables the same here, are the compiled fins
+what compiling gives here, do the fins' own models confirm this computer's answers, and are these as good as
+the stored ones.
 """
 
 import resource
@@ -14,18 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.judging import REACHED
-from finlab.allocation.learned.learned_allocator import LearnedAllocator
-from finlab.deploy.graph import SELF_TEST_TOLERANCE, NodeFeatures, SelfTest
+from finlab.deploy.graph import SELF_TEST_TOLERANCE, SelfTest
 from finlab.deploy.robot import Robot
 from finlab.errors import DataError
-from finlab.inference.surrogate import surrogate_on
-from finlab.physics.energy import command_energy
+from finlab.forces.compiled_fins import compiled_fins, difference
+from finlab.physics import plant_of
 
 Array = NDArray[np.float64]
 
-FEATURE_TOLERANCE = 1e-6
-"""Largest difference of a node feature; they are written with nine digits."""
-ENERGY_TOLERANCE = 0.01
+COMPILED_TOLERANCE = 1e-3
+"""Largest difference of a compiled fin, as a share; another processor may round to a neighbour on a grid."""
+ERROR_TOLERANCE = 1e-4
+"""Normalized error by which an answer may be worse than the stored one."""
+COST_TOLERANCE = 0.01
 """Largest share by which an answer may cost more than the stored one."""
 
 
@@ -48,55 +49,46 @@ class Finding(NamedTuple):
 def self_check(robot: Robot) -> list[Finding]:
     """Ask everything.
 
-    Own answers are compared with the stored ones by the full pipeline, also where the fast path runs: they
-    are what was stored. The fast path is judged by the fins' own model as well.
-
     Raises:
-        DataError: the bundle has no self-tests, or no weights.
+        DataError: the bundle has no self-tests, or a force table cannot be read.
     """
-    cases, layout, weights = robot.graph.self_test, robot.layout, robot.allocator.weights
-    if not cases or weights is None:
+    cases, layout, failed = robot.graph.self_test, robot.layout, robot.graph.failed
+    if not cases:
         raise DataError("the bundle has no self-tests; export it again")
-    alive = [i for i, name in enumerate(layout.names) if name not in robot.graph.failed]
-    healthy = layout.without(robot.graph.failed) if robot.graph.failed else layout
-    normalization = robot.graph.normalization
-    nodes = NodeFeatures(robot.graph.feature_set, healthy, normalization)
-    full, surrogate = robot, surrogate_on(healthy, weights)
-    if robot.allocator.name != LearnedAllocator.name:
-        full = Robot(robot.graph, LearnedAllocator(weights, **robot.allocator.options))
-    targets = [np.array(case.wrench) for case in cases]
-    answers = [full.allocator.allocate(layout, target, failed=robot.graph.failed) for target in targets]
+    alive = [i for i, name in enumerate(layout.names) if name not in failed]
+    plant, normalization = plant_of(robot.graph.healthy), robot.graph.normalization
+    cost = robot.allocator.objective.meter(plant)
 
-    def features(case: SelfTest) -> float:
-        seen = nodes.of(np.array(case.wrench))
-        stored = np.array([case.features[i] for i in alive])
-        return float(np.abs(seen - stored).max()) if seen.shape == stored.shape else np.inf
+    def stored(case: SelfTest) -> Array:
+        return np.array([case.command[i] for i in alive], dtype=np.float64)
 
     def physics(case: SelfTest) -> float:
-        command = np.array([case.command[i] for i in alive], dtype=np.float64)
-        return float(normalization.error(surrogate.wrench(command), np.array(case.predicted_wrench)))
+        return float(normalization.error(plant.wrench(stored(case)), np.array(case.delivered_wrench)))
 
-    missing, dearer = [], []
-    for case, answer in zip(cases, answers, strict=True):
-        assert answer.wrench_surrogate is not None
-        stored_error = normalization.error(np.array(case.predicted_wrench), np.array(case.wrench))
-        missing.append(float(normalization.error(answer.wrench_surrogate, answer.target) - stored_error))
-        stored = np.array([row or (np.nan,) * 3 for row in case.command])
-        dearer.append(answer.energy / max(float(command_energy(stored, layout.upper)), 1e-9) - 1)
-    judged = "own answers, judged by the fins' own model (err_norm)"
-    findings = [
-        Finding("node features", worst(map(features, cases)), FEATURE_TOLERANCE),
+    errors, worse, dearer = [], [], []
+    for case in cases:
+        answer = robot.allocator.allocate(layout, case.wrench, failed=failed)
+        own = answer.command[alive]
+        errors.append(answer.err_norm)
+        before = normalization.error(np.array(case.delivered_wrench), np.array(case.wrench))
+        worse.append(answer.err_norm - float(before))
+        prices = cost(np.stack([own, stored(case)]))
+        dearer.append(float(prices[0] / max(prices[1], 1e-9)) - 1.0)
+    return [
         Finding("wrench of the stored commands (err_norm)", worst(map(physics, cases)), SELF_TEST_TOLERANCE),
-        Finding("fins that the networks have not learned", len(robot.allocator.unknown_fins(healthy)), 0),
-        Finding(judged, worst(answer.err_norm for answer in answers), REACHED),
-        Finding("own answers, more error than stored (err_norm)", worst(missing), SELF_TEST_TOLERANCE),
-        Finding("own answers, more energy than stored (share)", worst(dearer), ENERGY_TOLERANCE),
+        Finding("compiled fins, beside compiling here (share)", compiled_off(robot), COMPILED_TOLERANCE),
+        Finding("own answers, judged by the fins' own models (err_norm)", worst(errors), REACHED),
+        Finding("own answers, more error than stored (err_norm)", worst(worse), ERROR_TOLERANCE),
+        Finding("own answers, more cost than stored (share)", worst(dearer), COST_TOLERANCE),
     ]
-    if full is not robot:
-        quick = [robot.allocator.allocate(layout, target, failed=robot.graph.failed) for target in targets]
-        errors = worst(answer.err_norm for answer in quick)
-        findings.append(Finding(judged.replace("own answers", "answers of the fast path"), errors, REACHED))
-    return findings
+
+
+def compiled_off(robot: Robot) -> float:
+    """The largest difference between a bundle's compiled fins and what compiling gives here; infinite where
+    one is missing."""
+    here = compiled_fins(robot.layout, robot.allocator.objective)
+    known = robot.allocator.compiled
+    return worst(difference(known[key], fin) if key in known else np.inf for key, fin in here.items())
 
 
 def worst(values: Iterable[float]) -> float:

@@ -115,6 +115,7 @@ class Server:
             "unallocated": answer.unallocated.tolist(),
             "err_norm": answer.err_norm,
             "energy": answer.energy,
+            "power": answer.power,
             "solve_ms": answer.solve_ms,
         }
         self._sent = answer.command

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.forces.compiled_fins import CompiledFins, content_key
 from finlab.forces.fin_envelope import LEAN, LEVELS, SHAFT, FinEnvelope, fin_envelope
 from finlab.layout import Layout
 from finlab.layout.angles import TURN
@@ -217,10 +218,13 @@ def largest_forces(layout: Layout) -> Array:
     return layout_envelopes(layout, Objective()).maximum
 
 
-def layout_envelopes(layout: Layout, objective: Objective) -> Envelopes:
-    """Returns the compiled fins of a layout, by their own laws.
+def layout_envelopes(layout: Layout, objective: Objective, compiled: CompiledFins | None = None) -> Envelopes:
+    """Returns the compiled fins of a layout, by their own laws; those that are `compiled` already are taken.
 
     Raises:
         DataError: a fin's force table cannot be read.
     """
-    return Envelopes.of([fin_envelope(fin.model, fin.limits, objective) for fin in layout.fins])
+    known = compiled or {}
+    asked = [(fin.model, fin.limits, objective) for fin in layout.fins]
+    found = [known.get(content_key(*fin)) if known else None for fin in asked]
+    return Envelopes.of([own or fin_envelope(*fin) for own, fin in zip(found, asked, strict=True)])

@@ -7,10 +7,10 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from finlab.assets import shipped_layouts
-from finlab.bundle_files import GRAPH, is_bundle, read_bundle_files
+from finlab.bundle_files import GRAPH, TABLES, Files, is_bundle, read_bundle_files
 from finlab.errors import LayoutError
 from finlab.layout.file import FORMAT, VERSION, parse_layout
 from finlab.layout.layout import Layout
@@ -20,10 +20,23 @@ from finlab.layout.rules import mapping, number, shown, under
 SUFFIX = ".graph.json"
 """How the name of a graph file ends."""
 GRAPH_FORMAT = "finlab-graph"
-GRAPH_VERSION = 1
+GRAPH_VERSION = 2
 UNITS = {"length": "m", "angle": "rad", "frequency": "Hz", "force": "N", "torque": "N m"}
-_PARTS = ("frame", "units", "layout", "graph", "features", "normalization", "checkpoint", "self_test")
+_PARTS = ("frame", "units", "layout", "graph", "normalization", "checkpoint", "self_test")
 KEYS = ("format", "version", "checksum", *_PARTS)
+
+
+class GraphText(NamedTuple):
+    """A layout graph file that was found somewhere."""
+
+    content: str
+    """Its text."""
+    source: str = "graph"
+    """What to call it in error messages."""
+    folder: Path | None = None
+    """Where relative paths in it start; the working directory when None."""
+    tables: frozenset[str] | None = None
+    """Paths of the force tables that it may name; None for any."""
 
 
 def load_layout(layout: str | os.PathLike[str]) -> Layout:
@@ -81,8 +94,8 @@ def holds_graph(path: Path) -> bool:
     return is_bundle(path) or path.name.endswith(SUFFIX)
 
 
-def read_graph_text(path: Path) -> tuple[str, str]:
-    """The text of a graph file, or of the one in a bundle, and what to call it in error messages.
+def read_graph_text(path: Path) -> GraphText:
+    """The text of a graph file, or of the one in a bundle.
 
     Raises:
         LayoutError: the file cannot be read.
@@ -90,20 +103,28 @@ def read_graph_text(path: Path) -> tuple[str, str]:
     """
     source = str(path)
     if not is_bundle(path):
-        return read_text(path, source), source
-    place = f"{source}/{GRAPH}"
-    return decode_text(read_bundle_files(path)[GRAPH], place), place
+        return GraphText(read_text(path, source), source, path.resolve().parent)
+    return bundle_graph_text(read_bundle_files(path), source)
 
 
-def parse_graph_layout(content: str, source: str = "graph") -> Layout:
-    """Returns the layout in the text of a graph file, failed fins included.
+def bundle_graph_text(files: Files, source: str) -> GraphText:
+    """The graph file among the files of a bundle, a folder or archive at the path `source`."""
+    place, folder = f"{source}/{GRAPH}", Path(os.path.abspath(source))
+    tables = frozenset(str(folder / name) for name in files if name.startswith(TABLES))
+    return GraphText(decode_text(files[GRAPH], place), place, folder, tables)
+
+
+def parse_graph_layout(
+    content: str, source: str = "graph", folder: Path | None = None, tables: frozenset[str] | None = None
+) -> Layout:
+    """Returns the layout in the text of a graph file, failed fins included; arguments as in `GraphText`.
 
     Raises:
         LayoutError: it is of another format or version, was changed after it was written, or holds no layout.
     """
     data = parse_json(content, source)
     with under(source=source):
-        return graph_layout(check_graph_document(data), source)
+        return graph_layout(check_graph_document(data), source, folder, tables)
 
 
 def check_graph_document(data: Any) -> Mapping[str, Any]:
@@ -137,7 +158,7 @@ def graph_nodes(data: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     nodes = mapping(data["graph"], "graph", parts, required=parts)["nodes"]
     if not isinstance(nodes, list):
         raise LayoutError(f"expected a list of fins, got {shown(nodes)}", "graph.nodes")
-    keys = ("id", "position_m", "mounting_angle_rad", "limits", "model", "healthy", "features")
+    keys = ("id", "position_m", "mounting_angle_rad", "limits", "model", "healthy")
     checked = [mapping(node, f"graph.nodes[{i}]", keys, required=keys) for i, node in enumerate(nodes)]
     for i, node in enumerate(checked):
         if not isinstance(node["healthy"], bool):
@@ -146,7 +167,9 @@ def graph_nodes(data: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     return checked
 
 
-def graph_layout(data: Mapping[str, Any], source: str) -> Layout:
+def graph_layout(
+    data: Mapping[str, Any], source: str, folder: Path | None = None, tables: frozenset[str] | None = None
+) -> Layout:
     """Returns the layout of a checked graph document, the shafts' angles exactly as they were."""
     about = mapping(data["layout"], "layout", ("name", "description", "body"), ("name",))
     fins, angles = [], []
@@ -158,6 +181,11 @@ def graph_layout(data: Mapping[str, Any], source: str) -> Layout:
         fin = {"name": node["id"], "mounting_angle_deg": math.degrees(angle)}
         fins.append(fin | {key: node[key] for key in ("position_m", "limits", "model")})
     head = {"format": FORMAT, "version": VERSION, "frame": data["frame"]}
-    layout = parse_layout({**head, **about, "fins": fins}, source)
+    layout = parse_layout({**head, **about, "fins": fins}, source, folder)
+    for i, parsed in enumerate(layout.fins):
+        path = parsed.model.values().get("path")
+        if tables is not None and path is not None and path not in tables:
+            key = f"graph.nodes[{i}].model.path"
+            raise LayoutError("names a force table that is not in the bundle; export it again", key)
     pairs = zip(layout.fins, angles, strict=True)
     return replace(layout, fins=tuple(replace(fin, mounting_angle=angle) for fin, angle in pairs))

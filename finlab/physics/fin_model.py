@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.bundle_files import archive_around
 from finlab.layout.fin import FinModelSpec
 from finlab.physics.drag import Drag
 from finlab.physics.fin_law import FinLaw, PlanarLaw
@@ -56,9 +57,10 @@ def file_stamp(spec: FinModelSpec) -> tuple[int, int] | None:
     """Returns time and size of the file that a model reads, None where it reads none."""
     if spec.type != "table":
         return None
+    path = str(spec.values()["path"])
     try:
-        found = os.stat(str(spec.values()["path"]))
-    except OSError:
+        found = os.stat(archive_around(path) or path)
+    except (OSError, ValueError):
         return 0, 0
     return found.st_mtime_ns, found.st_size
 

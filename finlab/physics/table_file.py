@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.bundle_files import TABLES, archive_around, read_bundle_files
 from finlab.errors import DataError
 from finlab.layout.angles import TURN
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
@@ -62,16 +63,35 @@ def write_table(
         writer.writerows([f"{value:.10g}" for value in row] for row in np.hstack([command, force + 0.0]))
 
 
+def table_bytes(path: str | os.PathLike[str]) -> bytes:
+    """Returns the contents of a table's file, which may lie in the zip archive of a bundle.
+
+    Raises:
+        DataError: there is no such file, or it is too large.
+    """
+    place, archive = Path(path), archive_around(path)
+    content = None
+    try:
+        if archive is not None:
+            content = read_bundle_files(archive).get(TABLES + place.name)
+        elif place.is_file():
+            with place.open("rb") as file:
+                content = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        raise DataError(f"{path}: cannot be read: {error}") from None
+    if content is None:
+        raise DataError(f"{path}: no such file, expected a CSV table of fin forces")
+    if len(content) > MAX_BYTES:
+        raise DataError(f"{path}: is larger than {MAX_BYTES:,} bytes, too large for a force table")
+    return content
+
+
 def _read_rows(path: Path) -> tuple[Array, NDArray[np.intp]]:
     """Returns the table (rows, 6 or 7) in the order of `COLUMNS`, with the power behind, and the line (rows,)
     of the file that each row stands in."""
     try:
-        if not path.is_file():
-            raise DataError(f"{path}: no such file, expected a CSV table of fin forces")
-        if path.stat().st_size > MAX_BYTES:
-            raise DataError(f"{path}: is larger than {MAX_BYTES:,} bytes, too large for a force table")
-        lines = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines()))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        lines = list(csv.reader(table_bytes(path).decode("utf-8-sig").splitlines()))
+    except (UnicodeDecodeError, csv.Error) as error:
         raise DataError(f"{path}: cannot be read as CSV text: {error}") from None
     header = [cell.strip() for cell in lines[0]] if lines else []
     missing = [name for name in COLUMNS if name not in header]

@@ -6,22 +6,44 @@ import json
 import os
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import safetensors.numpy
 
 import finlab
+from finlab import bundle_files
 from finlab.allocation import Allocator
-from finlab.assets import checkpoint_path
-from finlab.bundle_files import ABOUT, CHECKSUMS, GRAPH, LARGEST, README, checksums, read_bundle_files
+from finlab.bundle_files import (
+    ABOUT,
+    CHECKSUMS,
+    COMPILED,
+    GRAPH,
+    README,
+    TABLES,
+    checksums,
+    read_bundle_files,
+    table_name,
+)
 from finlab.cli import main
 from finlab.deploy.bundle import Bundle, make_bundle
 from finlab.deploy.robot import load_robot, parse_robot
 from finlab.errors import AllocationError, DataError, FinlabError
-from finlab.physics.energy import POWER_WEIGHTS
+from finlab.layout import FinModelSpec, Layout
+from finlab.layout.load import checksum_of
+from finlab.physics.energy import EnergyWeights
 
 WEIGHTS = "checkpoint/model.safetensors"
+WRENCH = [1, 0, 0.5, 0, 0, 0.1]
+
+
+@pytest.fixture(scope="module")
+def with_networks(untrained_checkpoint: Path) -> Bundle:
+    """Layout A for method `mdn`, with a small network that has learned nothing."""
+    return make_bundle(finlab.load_layout("A"), finlab.load_allocator("mdn", checkpoint=untrained_checkpoint))
 
 
 def resealed(files: dict[str, bytes]) -> dict[str, bytes]:
@@ -44,23 +66,37 @@ def test_folder_and_archive_hold_the_same_and_come_back(bundle: Bundle, tmp_path
 def test_the_library_reads_it(bundle: Bundle, shipped_allocator: Allocator, tmp_path: Path) -> None:
     bundle.write(tmp_path / "A")
     bundle.write_zip(tmp_path / "A.zip")
-    layout, wrench = finlab.load_layout("A"), [1, 0, 0.5, 0, 0, 0.1]
-    truth = shipped_allocator.allocate(layout, wrench).command
+    layout = finlab.load_layout("A")
+    truth = shipped_allocator.allocate(layout, WRENCH)
     for allocator in (
         finlab.load_allocator(tmp_path / "A"),
         finlab.load_allocator(str(tmp_path / "A.zip")),
-        finlab.load_allocator("learned", checkpoint=tmp_path / "A"),
-        finlab.load_allocator(checkpoint=tmp_path / "A" / "checkpoint"),
+        finlab.load_allocator("search", checkpoint=tmp_path / "A"),
     ):
-        np.testing.assert_array_equal(allocator.allocate(layout, wrench).command, truth)
-    assert finlab.load_allocator(tmp_path / "A").checkpoint == "default"
-    assert finlab.load_allocator("fast", checkpoint=tmp_path / "A.zip").name == "fast"
+        assert allocator.allocate(layout, WRENCH) == truth
     sqp = finlab.load_allocator("sqp", checkpoint=tmp_path / "A.zip")
     np.testing.assert_array_equal(sqp.normalization.std, shipped_allocator.normalization.std)
     with pytest.raises(AllocationError, match="method: expected one of"):
         finlab.load_allocator(tmp_path / "A", checkpoint="default")
     with pytest.raises(AllocationError, match="method: expected one of .* got 'nowhere'"):
         finlab.load_allocator("nowhere")
+    for method in ("mdn", "paper"):
+        with pytest.raises(DataError, match=f"holds no networks, which method '{method}' needs; export it"):
+            finlab.load_allocator(method, checkpoint=tmp_path / "A")
+
+
+def test_networks_travel_for_the_method_that_needs_them(
+    with_networks: Bundle, untrained_checkpoint: Path, tmp_path: Path
+) -> None:
+    with_networks.write(tmp_path)
+    layout, desk = finlab.load_layout("A"), finlab.load_allocator("mdn", checkpoint=untrained_checkpoint)
+    for name in ("config.json", "model.safetensors"):
+        assert with_networks.files[f"checkpoint/{name}"] == (untrained_checkpoint / name).read_bytes()
+    for allocator in (finlab.load_allocator(tmp_path), finlab.load_allocator("mdn", checkpoint=tmp_path)):
+        assert allocator.allocate(layout, WRENCH) == desk.allocate(layout, WRENCH)
+    plain = finlab.load_allocator("search", checkpoint=tmp_path)
+    assert plain.name == "search" and set(plain.options) < set(desk.options)
+    assert load_robot(tmp_path).graph.checkpoint_sha256 == desk.weights.sha256  # type: ignore[union-attr]
 
 
 def test_the_command_line_takes_a_bundle_with_its_lost_fins(
@@ -71,29 +107,47 @@ def test_the_command_line_takes_a_bundle_with_its_lost_fins(
     line = ["allocate", robot, "--checkpoint", robot, "--wrench", "1", "0", "0.5", "0", "0", "0", "--json"]
     assert main(line) == 0
     values = json.loads(capsys.readouterr().out)
-    assert values["failed"] == ["back_left"] and values["checkpoint"] == "default"
+    assert values["failed"] == ["back_left"] and values["method"] == "search"
 
 
 def test_settings_travel_and_can_be_changed(tmp_path: Path) -> None:
-    desk = finlab.load_allocator(n_candidates=32, temperature=0.5, energy_weights=POWER_WEIGHTS)
+    weights = EnergyWeights(1.0, 0.5, 0.0, 0.0, 0.25)
+    desk = finlab.load_allocator(
+        n_refined=2, search_steps=9, objective="effort", energy_weights=weights, copper_loss=0.5
+    )
     make_bundle(finlab.load_layout("octo"), desk).write(tmp_path)
     assert finlab.load_allocator(tmp_path).options == desk.options
-    assert finlab.load_allocator(tmp_path, n_candidates=8).options == desk.options | {"n_candidates": 8}
+    assert finlab.load_allocator(tmp_path, n_refined=8).options == desk.options | {"n_refined": 8}
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         ({"settings": []}, "settings must be keys and values"),
-        ({"settings": {"n_candidates": 3}}, "settings must be n_candidates, "),
-        ({"n_candidates": 10**9}, "n_candidates must lie within 0..4096"),
+        ({"settings": {"n_refined": 3}}, "settings must be objective, copper_loss, n_refined, "),
+        ({"n_refined": 10**9}, "n_refined must lie within 0..256"),
+        ({"n_refined": 0}, "needs at least one refined answer"),
+        ({"search_steps": 10**9}, "search_steps must lie within 0..100"),
         ({"subsets": 3}, "subsets must be true or false"),
-        ({"temperature": "warm"}, "temperature must lie within"),
+        ({"copper_loss": "much"}, "copper_loss must lie within"),
+        ({"copper_loss": float("nan")}, "copper_loss must lie within"),
+        ({"objective": "speed"}, "objective must be power or effort, got 'speed'"),
+        ({"objective": ["power"]}, "objective must be power or effort"),
         ({"energy_weights": {"amplitude": 1.0}}, "energy_weights must be amplitude, "),
-        ({"version": 3}, "bundle version 3, this finlab reads version 2; export it again"),
-        ({"version": 1}, "bundle version 1, this finlab reads version 2; export it again"),
+        ({"version": 4}, "is a bundle of version 4, this finlab reads version 3; export it again"),
+        ({"version": 2}, "is a bundle of version 2, this finlab reads version 3; export it again"),
+        ({"version": 1}, "is a bundle of version 1, this finlab reads version 3; export it again"),
+        ({"version": None}, "is a bundle of version None"),
+        ({"version": True}, "is a bundle of version True"),
         ({"format": "other"}, "expected format finlab-bundle"),
         ({"checkpoint": 7}, "checkpoint must be a name"),
+        ({"method": "sqp"}, "method must be one of search, mdn, got 'sqp'"),
+        ({"method": ["search"]}, "method must be one of search, mdn"),
+        ({"method": "mdn"}, "settings must be objective, copper_loss, .*temperature"),
+        ({"normalization": None}, "normalization must be six means and six standard deviations"),
+        ({"normalization": {"mean": [0] * 6, "std": [1] * 5 + [0]}}, "six standard deviations above 0"),
+        ({"normalization": {"mean": [0] * 6, "std": [1] * 5 + ["x"]}}, "six standard deviations above 0"),
+        ({"normalization": {"mean": [1] * 6, "std": [2] * 6}}, "layout.graph.json and bundle.json differ in"),
     ],
 )
 def test_settings_no_robot_should_try_are_refused(
@@ -102,28 +156,35 @@ def test_settings_no_robot_should_try_are_refused(
     document = json.loads(bundle.files[ABOUT])
     place = document if set(change) & set(document) else document["settings"]
     place.update(change)
-    with pytest.raises(DataError, match=message):
+    with pytest.raises(FinlabError, match=message):
         parse_robot(resealed({**bundle.files, ABOUT: json.dumps(document).encode()}))
 
 
-def test_weights_are_those_of_the_checkpoint(bundle: Bundle) -> None:
-    for name in ("config.json", "model.safetensors", "fast/model.safetensors"):
-        assert bundle.files[f"checkpoint/{name}"] == (checkpoint_path() / name).read_bytes()
-
-
-def test_version_1_is_refused_with_the_way_out(bundle: Bundle, tmp_path: Path) -> None:
-    old = {GRAPH: bundle.files[GRAPH], "network.onnx": b"", "surrogate.onnx": b"", README: b""}
-    (tmp_path / "old").mkdir()
-    for name, content in old.items():
-        (tmp_path / "old" / name).write_bytes(content)
-    archive_of(tmp_path / "old.zip", **old)
-    for place in ("old", "old.zip"):
-        for read in (finlab.load_allocator, finlab.load_layout, load_robot):
-            with pytest.raises(DataError, match="version 1, .* export it again with `finlab export"):
-                read(tmp_path / place)
-    # What the sentence says works.
-    assert main(["export", str(tmp_path / "old" / GRAPH), "-o", str(tmp_path / "new")]) == 0
-    assert load_robot(tmp_path / "new").layout == finlab.load_layout("A")
+def test_earlier_versions_are_refused_with_the_way_out(bundle: Bundle, tmp_path: Path) -> None:
+    about = json.loads(bundle.files[ABOUT]) | {"version": 2}
+    old = {
+        1: {GRAPH: bundle.files[GRAPH], "network.onnx": b"", "surrogate.onnx": b"", README: b""},
+        2: {
+            GRAPH: b"{}",
+            "checkpoint/fast/config.json": b"",
+            ABOUT: json.dumps(about).encode(),
+            CHECKSUMS: b"",
+        },
+    }
+    for version, files in old.items():
+        folder = tmp_path / f"old{version}"
+        for name, content in files.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(content)
+        archive = archive_of(tmp_path / f"old{version}.zip", **files)
+        for place in (folder, archive):
+            for read in (finlab.load_allocator, finlab.load_layout, load_robot):
+                with pytest.raises(DataError) as error:
+                    read(place)
+                assert str(error.value) == (
+                    f"{place}: is a bundle of version {version}, this finlab reads version 3; "
+                    "export it again with `finlab export LAYOUT -o DIR`"
+                )
 
 
 def test_same_input_same_bytes(bundle: Bundle, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -157,27 +218,163 @@ def test_archive_is_plain(bundle: Bundle) -> None:
             assert entry.date_time == (1980, 1, 1, 0, 0, 0) and entry.compress_type == zipfile.ZIP_STORED
 
 
-@pytest.mark.parametrize("name", LARGEST)
-def test_a_changed_file_is_named(name: str, bundle: Bundle) -> None:
-    content = bytearray(bundle.files[name])
-    content[len(content) // 2] ^= 1
-    with pytest.raises(FinlabError, match=f"{name if name != CHECKSUMS else ''}.* does not fit SHA256SUMS"):
-        parse_robot({**bundle.files, name: bytes(content)})
+def test_a_changed_file_is_named(measured_bundle: Bundle, with_networks: Bundle) -> None:
+    for files in (measured_bundle.files, with_networks.files):
+        for name in files:
+            content = bytearray(files[name])
+            content[len(content) // 2] ^= 1
+            named = name if name != CHECKSUMS else ""
+            with pytest.raises(FinlabError, match=f"{named}.* does not fit SHA256SUMS"):
+                parse_robot({**files, name: bytes(content)})
 
 
-def test_forged_weights_are_refused_although_their_checksum_fits(bundle: Bundle) -> None:
-    name = "checkpoint/model.safetensors"
-    content = bytearray(bundle.files[name])
+def test_forged_weights_are_refused_although_their_checksum_fits(with_networks: Bundle) -> None:
+    content = bytearray(with_networks.files[WEIGHTS])
     content[-1] ^= 1
     with pytest.raises(FinlabError, match="its SHA-256 is not the one in config.json"):
-        parse_robot(resealed({**bundle.files, name: bytes(content)}))
+        parse_robot(resealed({**with_networks.files, WEIGHTS: bytes(content)}))
 
 
-def test_parts_of_two_exports_are_refused(bundle: Bundle, untrained_checkpoint: Path) -> None:
-    other = make_bundle(finlab.load_layout("A"), finlab.load_allocator(checkpoint=untrained_checkpoint))
-    mixed = {**bundle.files, GRAPH: other.files[GRAPH]}
+def test_parts_of_two_exports_are_refused(bundle: Bundle, with_networks: Bundle) -> None:
+    mixed = {**with_networks.files, GRAPH: bundle.files[GRAPH]}
     with pytest.raises(DataError, match="are of different checkpoints"):
         parse_robot(resealed(mixed))
+    mixed = {**bundle.files, ABOUT: with_networks.files[ABOUT]}
+    with pytest.raises(DataError, match="holds no networks, which method 'mdn' needs"):
+        parse_robot(resealed(mixed))
+    about = json.loads(with_networks.files[ABOUT])
+    about["normalization"]["std"][0] *= 2.0
+    mixed = {**with_networks.files, ABOUT: json.dumps(about).encode()}
+    with pytest.raises(DataError, match="bundle.json and the networks differ in normalization"):
+        parse_robot(resealed(mixed))
+
+
+def compiled(change: Callable[[dict[str, np.ndarray]], None], files: dict[str, bytes]) -> dict[str, bytes]:
+    """The files with compiled fins that were changed by somebody who mends the checksums."""
+    arrays = safetensors.numpy.load(files[COMPILED])
+    change(arrays)
+    return resealed({**files, COMPILED: safetensors.numpy.save(arrays)})
+
+
+def _all(part: str, value: Any) -> Callable[[dict[str, np.ndarray]], None]:
+    def change(arrays: dict[str, np.ndarray]) -> None:
+        for name in arrays:
+            if name.endswith(part):
+                arrays[name] = value(arrays[name]) if callable(value) else np.full_like(arrays[name], value)
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (_all("table", np.nan), "expected finite numbers"),
+        (_all("table", 1e12), "expected finite numbers of ordinary size"),
+        (_all("table", -1.0), "negative amplitudes or frequencies"),
+        (_all("table", lambda a: a.astype(np.float32)), "double precision"),
+        (_all("table", lambda a: a[:, :-1].copy()), "arrays of shapes"),
+        (_all("table", lambda a: np.array(a[0, 0, 0])), "arrays of shapes"),
+        (_all("sizes", lambda a: np.array(a[0, 0])), "arrays of shapes"),
+        (_all("sizes", lambda a: a[::-1].copy()), "larger at rest than at most"),
+        (_all("sizes", -1.0), "negative"),
+        (_all("sizes", lambda a: np.repeat(a, 3, axis=1)), "arrays of shapes"),
+        (_all("arc", 4.0), "an arc that is none"),
+        (_all("arc", np.inf), "expected finite numbers"),
+        (lambda a: a.pop(next(iter(a))), "holds no compiled fins"),
+        (lambda a: a.update(extra=np.zeros(3)), "'extra' is not expected"),
+        (lambda a: a.update({"0" * 64 + ".arc": np.zeros(2)}), "holds no compiled fins"),
+    ],
+)
+def test_compiled_fins_that_no_search_could_live_with_are_refused(
+    change: Callable[[dict[str, np.ndarray]], None], message: str, bundle: Bundle
+) -> None:
+    with pytest.raises(DataError, match=message):
+        parse_robot(compiled(change, dict(bundle.files)))
+
+
+def test_compiled_fins_of_too_many_fins_are_refused(bundle: Bundle) -> None:
+    def multiply(arrays: dict[str, np.ndarray]) -> None:
+        for name, array in list(arrays.items()):
+            arrays |= {f"{k:064x}{name[64:]}": array for k in range(17)}
+
+    with pytest.raises(DataError, match="expected at most 16 fins, got 18"):
+        parse_robot(compiled(multiply, dict(bundle.files)))
+
+
+def test_force_tables_travel_and_answer_from_folder_and_archive(
+    measured: Layout, measured_bundle: Bundle, shipped_allocator: Allocator, force_table: Path, tmp_path: Path
+) -> None:
+    content = force_table.read_bytes()
+    assert measured_bundle.files[table_name(content)] == content
+    assert str(force_table.parent).encode() not in b"".join(measured_bundle.files.values()), "no path leaks"
+    measured_bundle.write(tmp_path / "robot")
+    measured_bundle.write_zip(tmp_path / "robot.zip")
+    truth = shipped_allocator.allocate(measured, WRENCH, failed=["front_left"])
+    for place in (tmp_path / "robot", tmp_path / "robot.zip"):
+        layout = finlab.load_layout(place)
+        path = Path(str(layout.fins[2].model.values()["path"]))
+        assert path == place / table_name(content)
+        answer = finlab.load_allocator(place).allocate(layout, WRENCH, failed=["front_left"])
+        np.testing.assert_array_equal(answer.command, truth.command)
+        np.testing.assert_array_equal(answer.wrench, truth.wrench)
+        # And out of the bundle another one can be made.
+        again = make_bundle(layout, finlab.load_allocator(place))
+        assert again.zip_bytes() == measured_bundle.zip_bytes()
+
+
+@pytest.mark.parametrize(
+    "path", ["/etc/passwd", "../secret.csv", "tables/../../secret.csv", "secret.csv", GRAPH]
+)
+@pytest.mark.parametrize("archive", [False, True])
+def test_a_force_table_outside_the_bundle_is_refused(
+    path: str, archive: bool, measured_bundle: Bundle, tmp_path: Path
+) -> None:
+    (tmp_path / "secret.csv").write_text("A,f,phi,Fx,Fy,Fz\n")
+    document = json.loads(measured_bundle.files[GRAPH])
+    document["graph"]["nodes"][2]["model"]["path"] = path
+    document["checksum"] = checksum_of(document)
+    forged = Bundle(resealed({**measured_bundle.files, GRAPH: json.dumps(document).encode()}))
+    place = tmp_path / ("x.zip" if archive else "x")
+    (forged.write_zip if archive else forged.write)(place)
+    for read in (finlab.load_layout, load_robot):
+        with pytest.raises(
+            FinlabError, match=r"graph.nodes\[2\].model.path: names a force table that is not in the bundle"
+        ):
+            read(place)
+
+
+def test_a_missing_force_table_is_told(measured_bundle: Bundle, force_table: Path) -> None:
+    left = {name: content for name, content in measured_bundle.files.items() if not name.startswith(TABLES)}
+    with pytest.raises(FinlabError, match="names a force table that is not in the bundle"):
+        parse_robot(resealed(left))
+
+
+def test_force_tables_have_their_limits(
+    measured: Layout, shipped_allocator: Allocator, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("finlab.deploy.bundle.LARGEST_TABLE", 1000)
+    with pytest.raises(DataError, match="soft fin.csv: is larger than 1,000 bytes, too large for a bundle"):
+        make_bundle(measured, shipped_allocator)
+    gone = FinModelSpec("table", (("path", str(tmp_path / "gone.csv")),))
+    robot = replace(measured, fins=(replace(measured.fins[0], model=gone), *measured.fins[1:]))
+    with pytest.raises(DataError, match=r"gone\.csv: no such file"):
+        make_bundle(robot, shipped_allocator)
+
+
+def test_all_files_together_have_a_limit(
+    measured_bundle: Bundle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    measured_bundle.write(tmp_path / "x")
+    measured_bundle.write_zip(tmp_path / "x.zip")
+    size = sum(map(len, measured_bundle.files.values()))
+    for most, good in ((size, True), (size - 1, False)):
+        monkeypatch.setattr(bundle_files, "LARGEST_BUNDLE", most)
+        for place in (tmp_path / "x", tmp_path / "x.zip"):
+            if good:
+                assert read_bundle_files(place) == dict(measured_bundle.files)
+            else:
+                with pytest.raises(DataError, match="its files are larger than .* bytes together"):
+                    read_bundle_files(place)
 
 
 def archive_of(path: Path, **files: bytes) -> Path:
@@ -195,20 +392,48 @@ def archive_of(path: Path, **files: bytes) -> Path:
         (lambda p: archive_of(p / "a.zip", **{"../evil": b"x"}), "'../evil', which is no part of a bundle"),
         (lambda p: archive_of(p / "a.zip", **{GRAPH: b" " * 2_000_000}), "larger than 1,000,000 bytes"),
         (lambda p: archive_of(p / "a.zip", **{WEIGHTS: bytes(50_000_001)}), "larger than 50,000,000 bytes"),
+        (
+            lambda p: archive_of(p / "a.zip", **{table_name(b""): bytes(20_000_001)}),
+            "csv is larger than 20,000,000 bytes",
+        ),
+        (
+            lambda p: archive_of(p / "a.zip", **{TABLES + "x.csv": b""}),
+            "'tables/x.csv', which is no part of a",
+        ),
+        (
+            lambda p: archive_of(p / "a.zip", **{TABLES + "../" + "0" * 64 + ".csv": b""}),
+            "which is no part of a bundle",
+        ),
     ],
-    ids=["missing", "empty", "path out of the archive", "large graph", "zip bomb"],
+    ids=[
+        "missing",
+        "empty",
+        "out of the archive",
+        "large graph",
+        "zip bomb",
+        "table",
+        "name",
+        "out of tables",
+    ],
 )
 def test_what_is_no_bundle_is_refused(make: Callable[[Path], Path], message: str, tmp_path: Path) -> None:
     with pytest.raises(DataError, match=message):
         load_robot(make(tmp_path))
 
 
-def test_a_link_in_a_folder_is_refused(bundle: Bundle, tmp_path: Path) -> None:
-    bundle.write(tmp_path)
-    (tmp_path / WEIGHTS).unlink()
-    os.symlink("/dev/zero", tmp_path / WEIGHTS)
+def test_links_in_a_folder_are_refused(
+    measured_bundle: Bundle, with_networks: Bundle, tmp_path: Path
+) -> None:
+    with_networks.write(tmp_path / "x")
+    (tmp_path / "x" / WEIGHTS).unlink()
+    os.symlink("/dev/zero", tmp_path / "x" / WEIGHTS)
     with pytest.raises(DataError, match="model.safetensors is no regular file"):
-        load_robot(tmp_path)
+        load_robot(tmp_path / "x")
+    measured_bundle.write(tmp_path / "y")
+    (tmp_path / "y" / TABLES).rename(tmp_path / "elsewhere")
+    os.symlink(tmp_path / "elsewhere", tmp_path / "y" / TABLES.rstrip("/"))
+    with pytest.raises(DataError, match="csv is no regular file"):
+        load_robot(tmp_path / "y")
 
 
 def test_a_folder_with_other_things_is_not_written_to(bundle: Bundle, tmp_path: Path) -> None:
@@ -222,15 +447,17 @@ def test_methods_that_do_not_travel_are_refused() -> None:
         make_bundle(finlab.load_layout("A"), finlab.load_allocator("sqp"))
 
 
-def test_fins_that_the_networks_do_not_know_are_refused(
-    shipped_allocator: Allocator, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_the_command_line_chooses_method_and_objective(
+    tmp_path: Path, untrained_checkpoint: Path, with_networks: Bundle, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with pytest.raises(AllocationError, match="has not learned the fins .* so the robot would answer"):
-        make_bundle(finlab.load_layout("mixed"), shipped_allocator)
-    for output in ("robot", "robot.graph.json"):
-        assert main(["export", "mixed", "-o", str(tmp_path / output)]) == 2
-        assert "has not learned the fins" in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
+    line = ["export", "mixed", "-o", str(tmp_path / "mixed"), "--objective", "effort"]
+    assert main(line) == 0
+    robot = finlab.load_allocator(tmp_path / "mixed")
+    assert (robot.name, robot.options["objective"]) == ("search", "effort")
+    line = ["export", "A", "-o", str(tmp_path / "A"), "--method", "mdn", "--checkpoint"]
+    assert main([*line, str(untrained_checkpoint)]) == 0
+    assert read_bundle_files(tmp_path / "A") == dict(with_networks.files)
+    capsys.readouterr()
 
 
 def test_export_refuses_names_that_are_neither(capsys: pytest.CaptureFixture[str]) -> None:
@@ -238,4 +465,3 @@ def test_export_refuses_names_that_are_neither(capsys: pytest.CaptureFixture[str
     assert "a graph file alone is not zipped" in capsys.readouterr().err
     assert main(["export", "A", "-o", "A", "--zip", "--onnx"]) == 2
     assert "leave out --zip" in capsys.readouterr().err
-    assert checkpoint_path().is_dir()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from finlab.deploy.bundle import Bundle
-from finlab.deploy.graph import N_SELF_TEST, _rounded, _rows, random_targets
+from finlab.deploy.graph import N_SELF_TEST, _rounded, build_graph, random_targets
 from finlab.deploy.robot import Robot, parse_robot
 from finlab.deploy.self_check import Finding, self_check, worst
 from finlab.errors import DataError
@@ -38,8 +38,11 @@ def test_random_targets_are_wrenches_of_commands_within_the_limits(robot: Robot)
 
 def test_rows_of_failed_fins_are_empty_and_numbers_have_nine_digits(robot: Robot) -> None:
     names = robot.layout.names
-    rows = _rows(robot.layout, (names[1],), np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 1 / 3]]))
-    assert rows == ((1.0, 2.0), None, (3.0, 4.0), (5.0, 0.333333333))
+    graph = build_graph(robot.layout, robot.allocator, (names[1],))
+    for case in graph.self_test:
+        assert [row is None for row in case.command] == [name == names[1] for name in names]
+        values = [*case.wrench, *case.delivered_wrench, *(v for row in case.command for v in row or ())]
+        assert values == [float(f"{value:.9g}") for value in values]
     assert _rounded(np.array([1234567890123.0, 1e-30 / 3])).tolist() == [1234567890000.0, 3.33333333e-31]
 
 
@@ -58,19 +61,31 @@ def test_each_question_sees_its_own_damage(robot: Robot) -> None:
     """Every finding of a healthy robot is good; a changed number shows up as large as it is."""
     assert all(found.good for found in self_check(robot))
     first, *others = robot.graph.self_test
-    assert first.features[0] is not None
-    off = (first.features[0][0] + 0.25, *first.features[0][1:])
-    cases = (replace(first, features=(off, *first.features[1:])), *others)
-    damaged = Robot(replace(robot.graph, self_test=cases), robot.allocator)
-    assert finding(damaged, "node features").value == pytest.approx(0.25, abs=1e-6)
-    moved = np.array(first.predicted_wrench) + 0.5 * robot.graph.normalization.std
-    cases = (replace(first, predicted_wrench=tuple(moved.tolist())), *others)
+    moved = np.array(first.delivered_wrench) + 0.5 * robot.graph.normalization.std
+    cases = (replace(first, delivered_wrench=tuple(moved.tolist())), *others)
     damaged = Robot(replace(robot.graph, self_test=cases), robot.allocator)
     error = finding(damaged, "wrench of the stored commands").value
     assert error == pytest.approx(
-        float(robot.graph.normalization.error(moved, first.predicted_wrench)), abs=1e-4
+        float(robot.graph.normalization.error(moved, np.array(first.delivered_wrench))), abs=1e-6
     )
     assert not finding(damaged, "wrench of the stored commands").good
+    # Stored answers that were better, and cheaper, than this computer's.
+    away = np.array(first.wrench) + 0.1 * robot.graph.normalization.std
+    cases = (
+        replace(first, wrench=tuple((1e3 * away).tolist()), delivered_wrench=tuple(away.tolist())),
+        *others,
+    )
+    assert not finding(
+        Robot(replace(robot.graph, self_test=cases), robot.allocator), "own answers, judged"
+    ).good
+    idle = tuple(None if row is None else (0.5 * row[0], *row[1:]) for row in first.command)
+    cases = (replace(first, command=idle), *others)
+    damaged = Robot(replace(robot.graph, self_test=cases), robot.allocator)
+    dearer = finding(damaged, "own answers, more cost")
+    assert not dearer.good and dearer.value > 1.0, "half the strokes take less than half the power"
+    first = replace(first, wrench=(90.0, *first.wrench[1:]), delivered_wrench=(90.0, *first.wrench[1:]))
+    damaged = Robot(replace(robot.graph, self_test=(first, *others)), robot.allocator)
+    assert not finding(damaged, "own answers, more error").good
 
 
 def test_without_self_tests_there_is_nothing_to_check(robot: Robot) -> None:

@@ -72,7 +72,7 @@ def test_check_prints_each_finding(
     monkeypatch.setattr("finlab.deploy.self_check.self_check", lambda _: findings)
     assert main(["check", "some.zip"]) == code
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith("some.zip: A, 4 fins, checkpoint default, ready in ")
+    assert lines[0].startswith("some.zip: A, 4 fins, method search, ready in ")
     assert lines[1] == "  ok     first: 0.5, allowed 1"
     assert lines[2] == ("  ok     second: 0.5, allowed 1" if good else "  FAILED second: 1.5, allowed 1")
     assert lines[3].startswith("this computer answers" if good else "do not use this bundle here")

@@ -31,10 +31,11 @@ def make_graph(layout: Layout, failed: tuple[str, ...] = ()) -> LayoutGraph:
     def rows(*values: float) -> tuple[tuple[float, ...] | None, ...]:
         return tuple(None if name in failed else values for name in layout.names)
 
-    case = SelfTest((1.0, 0.0, 0.5, 0.0, 0.0, 0.1), rows(0.3, 1.0, -0.5), (0.9,) * 6, rows(0.1, 0.2, 0.3))
+    case = SelfTest((1.0, 0.0, 0.5, 0.0, 0.0, 0.1), rows(0.3, 1.0, -0.5), (0.9,) * 6)
     normalization = Normalization(np.zeros(6), np.array([1.0, 1.0, 1.0, 0.2, 0.2, 0.3]))
+    checkpoint = ("default", "0" * 64) if failed else (None, None)
     return LayoutGraph(
-        layout, failed, "fin_frame", rows(0.1, 0.2), normalization, "default", "0" * 64, (case, case)
+        layout, failed, normalization, *checkpoint, "mdn" if failed else "search", (case, case)
     )
 
 
@@ -121,7 +122,7 @@ def test_white_space_and_order_of_keys_do_not_matter() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda d: d.update(version=2), "version: this finlab reads version 1, got 2"),
+        (lambda d: d.update(version=1), "version: this finlab reads version 2, got 1"),
         (lambda d: d.update(format="finlab-layout"), "format: expected finlab-graph, got 'finlab-layout'"),
         (lambda d: d.update(surprise=1), "surprise: unknown key"),
         (lambda d: d.pop("normalization"), "normalization: required key is missing"),
@@ -136,7 +137,13 @@ def test_white_space_and_order_of_keys_do_not_matter() -> None:
             lambda d: d["graph"]["nodes"][1].update(healthy=1),
             r"graph.nodes\[1\].healthy: expected true or false",
         ),
-        (lambda d: d["graph"]["nodes"][1].update(features=3), r"graph.nodes\[1\].features: expected"),
+        (lambda d: d["graph"]["nodes"][1].update(features=3), r"graph.nodes\[1\].features: unknown key"),
+        (lambda d: d["checkpoint"].update(name=3), "checkpoint.name: expected text"),
+        (lambda d: d["self_test"].update(method=None), "self_test.method: expected text"),
+        (
+            lambda d: d["self_test"]["cases"][0].update(delivered_wrench=[0.0]),
+            r"cases\[0\].delivered_wrench: expected a list of 6 numbers",
+        ),
         (lambda d: d["graph"]["nodes"][1].update(position_m=[math.nan, 0, 0]), "expected a finite number"),
         (lambda d: d["graph"]["edges"].pop(), "graph.edges: expected every pair of healthy fins"),
         (lambda d: d["self_test"].update(cases={}), "self_test.cases: expected a list"),

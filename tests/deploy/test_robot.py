@@ -11,20 +11,20 @@ import pytest
 
 import finlab
 from finlab.allocation import Allocator
-from finlab.allocation.learned.learned_allocator import LearnedAllocator
+from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.assets import shipped_layouts
 from finlab.deploy.bundle import Bundle, make_bundle
 from finlab.deploy.command import main
-from finlab.deploy.robot import Robot, parse_robot
+from finlab.deploy.robot import Robot, load_robot, parse_robot
 from finlab.deploy.self_check import Finding, self_check, worst
 from finlab.errors import AllocationError, FinlabError
-from finlab.layout import FinModelSpec
-from finlab.physics.energy import POWER_WEIGHTS
+from finlab.forces.compiled_fins import compiled_fins
+from finlab.forces.fin_envelope import FinEnvelope
+from finlab.layout import FinModelSpec, Layout
+from finlab.physics import plant_of
 
 HEAVY = ("torch", "scipy", "viser", "matplotlib", "yaml", "tyro", "tqdm", "threadpoolctl", "onnx")
 WRENCH = ["--wrench", "1", "0", "0.5", "0", "0", "0.1"]
-KNOWN = [name for name in sorted(shipped_layouts()) if name != "mixed"]
-"""Shipped layouts whose fins the shipped checkpoint has learned."""
 
 
 @pytest.fixture(scope="module")
@@ -39,12 +39,15 @@ def folder(bundle: Bundle, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def with_surrogate(robot: Robot, factor: float) -> Robot:
-    """A robot whose learned physics are off by a factor."""
-    weights = robot.allocator.weights
-    assert weights is not None
-    bent = {key: array * np.float32(factor) for key, array in weights.surrogate.items()}
-    return Robot(robot.graph, LearnedAllocator(replace(weights, surrogate=bent)))
+def with_model(robot: Robot, model: FinModelSpec) -> Robot:
+    """The same robot, had all its fins another model than the one that it was exported for."""
+    fins = tuple(replace(fin, model=model) for fin in robot.layout.fins)
+    return Robot(replace(robot.graph, layout=replace(robot.layout, fins=fins)), robot.allocator)
+
+
+def bad(robot: Robot) -> list[str]:
+    """What its self-check complains about."""
+    return [finding.question for finding in self_check(robot) if not finding.good]
 
 
 def test_answer_says_what_is_missing(robot: Robot) -> None:
@@ -68,26 +71,84 @@ def test_failed_fins_of_the_bundle_stay_failed(shipped_allocator: Allocator) -> 
     assert all(finding.good for finding in self_check(robot))
 
 
-def test_fast_path_reaches_the_target(bundle: Bundle) -> None:
-    robot = parse_robot(bundle.files, fast=True)
-    assert robot.allocate([1, 0, 0.5, 0, 0, 0.1]).err_norm < 5e-3
-    findings = self_check(robot)
-    assert all(finding.good for finding in findings)
-    assert findings[-1].question.startswith("answers of the fast path")
+@pytest.mark.parametrize("objective", ["power", "effort"])
+@pytest.mark.parametrize("name", [*sorted(shipped_layouts()), "measured"])
+def test_every_shipped_layout_answers_as_the_library_to_the_last_bit(
+    name: str, objective: str, measured: Layout, tmp_path: Path
+) -> None:
+    """By its own physics, tables included; single, batched and from tick to tick."""
+    layout = measured if name == "measured" else finlab.load_layout(name)
+    desk = finlab.load_allocator(objective=objective)
+    make_bundle(layout, desk).write_zip(tmp_path / "x.zip")
+    robot = load_robot(tmp_path / "x.zip")
+    assert not bad(robot)
+    targets = plant_of(layout).wrench(plant_of(layout).sample(np.random.default_rng(7), (6,)))
+    targets[-1] *= 20.0  # out of reach
+    previous = None
+    for target in targets:
+        truth = desk.allocate(layout, target, previous=previous)
+        answer = robot.allocate(target, previous=previous)
+        for field in ("command", "wrench", "fin_forces", "err_norm", "energy", "power"):
+            np.testing.assert_array_equal(getattr(answer, field), getattr(truth, field), field)
+        assert answer.judged_by == "plant" and answer.notes == ()
+        previous = truth.command
+    batch, many = robot.allocator.allocate_batch(robot.layout, targets), desk.allocate_batch(layout, targets)
+    np.testing.assert_array_equal(batch.command, many.command)
+    assert (many.err_norm[:-1] < 1e-4).all()
 
 
-@pytest.mark.parametrize("name", KNOWN)
-def test_every_shipped_layout_passes_its_self_test(name: str, shipped_allocator: Allocator) -> None:
-    files = make_bundle(finlab.load_layout(name), shipped_allocator).files
-    findings = self_check(parse_robot(files))
-    assert len(findings) == 6
-    assert all(finding.good for finding in findings), findings
+def test_what_was_compiled_at_the_desk_is_not_compiled_again(
+    measured: Layout, measured_bundle: Bundle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    measured_bundle.write(tmp_path)
+    truth = finlab.load_allocator().allocate(measured, [1, 0, 0.5, 0, 0, 0.1]).command
+
+    def never(*_: object) -> FinEnvelope:
+        raise AssertionError("compiled")
+
+    monkeypatch.setattr("finlab.forces.envelopes.fin_envelope", never)
+    robot = load_robot(tmp_path)
+    np.testing.assert_array_equal(robot.allocate([1, 0, 0.5, 0, 0, 0.1]).command, truth)
+    assert robot.allocate([1, 0, 0.5, 0, 0, 0.1], failed=["front_left"]).err_norm < 1e-4
+    # Other settings go on with them; another objective is another compilation.
+    robot.allocator.with_settings(n_refined=2).allocate(robot.layout, [1, 0, 0.5, 0, 0, 0.1])
+    with pytest.raises(AssertionError, match="compiled"):
+        robot.allocator.with_settings(objective="effort").allocate(robot.layout, [1, 0, 0.5, 0, 0, 0.1])
 
 
-def test_self_test_notices_other_physics(robot: Robot) -> None:
-    bad = [finding.question for finding in self_check(with_surrogate(robot, 1.05)) if not finding.good]
-    assert "wrench of the stored commands (err_norm)" in bad
-    assert "own answers, judged by the fins' own model (err_norm)" in bad
+def test_compiled_fins_serve_their_own_allocator_alone(robot: Robot) -> None:
+    """What a bundle says of a fin is no word about that fin elsewhere."""
+    weak = {
+        key: replace(fin, largest=fin.largest * 0.5, smallest=fin.smallest * 0.5)
+        for key, fin in robot.allocator.compiled.items()
+    }
+    layout = robot.layout
+    liar = SearchAllocator(robot.graph.normalization, compiled=weak)
+    hard = 0.9 * plant_of(layout).wrench(np.where([True, True, False], layout.upper, 0.0))
+    honest = finlab.load_allocator().allocate(layout, hard)
+    assert honest.err_norm < 1e-4
+    assert not np.array_equal(liar.allocate(layout, hard).command, honest.command)
+    assert finlab.load_allocator().allocate(layout, hard) == honest
+    assert set(weak) == set(compiled_fins(layout, robot.allocator.objective))
+
+
+def test_self_check_notices_other_physics(robot: Robot) -> None:
+    stronger = with_model(robot, FinModelSpec("drag", (("area", 0.021),)))
+    assert "wrench of the stored commands (err_norm)" in bad(stronger)
+    assert "compiled fins, beside compiling here (share)" in bad(stronger), "none is there for such a fin"
+
+
+def test_self_check_notices_fins_that_were_compiled_wrongly(robot: Robot) -> None:
+    for change in (
+        lambda fin: {"largest": fin.largest * 1.01},
+        lambda fin: {"middle": fin.middle + 0.01},
+        lambda fin: {"table": fin.table * 1.01},
+    ):
+        wrong = {key: replace(fin, **change(fin)) for key, fin in robot.allocator.compiled.items()}
+        other = Robot(robot.graph, SearchAllocator(robot.graph.normalization, compiled=wrong))
+        findings = {finding.question: finding for finding in self_check(other)}
+        finding = findings["compiled fins, beside compiling here (share)"]
+        assert not finding.good and finding.value == pytest.approx(0.01, rel=1e-6, abs=0.009)
 
 
 def test_nan_is_never_good() -> None:
@@ -100,40 +161,18 @@ def test_a_bundle_that_answers_nan_fails_its_check(
     bundle: Bundle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bundle.write(tmp_path)
-    healthy = LearnedAllocator._solve
+    healthy = SearchAllocator._solve
 
-    def broken(self: LearnedAllocator, *arguments: object, **options: object) -> object:
+    def broken(self: SearchAllocator, *arguments: object, **options: object) -> object:
         solution = healthy(self, *arguments, **options)  # type: ignore[arg-type]
         return solution._replace(command=solution.command * np.nan)
 
-    monkeypatch.setattr(LearnedAllocator, "_solve", broken)
+    monkeypatch.setattr(SearchAllocator, "_solve", broken)
     assert main(["check", str(tmp_path)]) == 1
     shown = capsys.readouterr().out
     assert "FAILED own answers" in shown and "nan" in shown and "do not use this bundle" in shown
-    with pytest.raises(AllocationError, match="answer with NaN"):
+    with pytest.raises(AllocationError, match="answers with NaN"):
         parse_robot(bundle.files).allocate([1, 0, 0, 0, 0, 0])
-
-
-def test_check_notices_fins_that_the_networks_do_not_know(
-    robot: Robot, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """As a bundle might say that an earlier finlab wrote: the surrogate's word alone is 2e-8."""
-    fins = [replace(fin, model=FinModelSpec("lighthill")) for fin in robot.layout.fins]
-    layout = replace(robot.layout, fins=tuple(fins))
-    other = Robot(replace(robot.graph, layout=layout), robot.allocator)
-    findings = {finding.question: finding for finding in self_check(other)}
-    assert findings["fins that the networks have not learned"].value == 4
-    assert not findings["fins that the networks have not learned"].good
-    assert findings["own answers, more error than stored (err_norm)"].good
-    assert not findings["own answers, judged by the fins' own model (err_norm)"].good
-
-
-def test_energy_weights_travel() -> None:
-    layout = finlab.load_layout("octo")
-    desk = finlab.load_allocator(energy_weights=POWER_WEIGHTS)
-    robot = parse_robot(make_bundle(layout, desk).files)
-    wrench = [1, 0, 0.5, 0, 0, 0.1]
-    np.testing.assert_array_equal(robot.allocate(wrench).command, desk.allocate(layout, wrench).command)
 
 
 def test_nothing_heavy_is_loaded(folder: Path) -> None:
@@ -142,12 +181,12 @@ def test_nothing_heavy_is_loaded(folder: Path) -> None:
         f"for name in {HEAVY!r}: sys.modules[name] = None\n"
         "from finlab.deploy.command import main\n"
         f"assert main(['check', {str(folder)!r}]) == 0\n"
-        f"assert main(['allocate', {str(folder)!r}, '--fast', *{WRENCH!r}]) == 0\n"
+        f"assert main(['allocate', {str(folder)!r}, *{WRENCH!r}]) == 0\n"
         f"assert main(['speed', {str(folder)!r}, '--targets', '3']) == 0\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
-    assert "learned, 4 fins: p50" in done.stdout
+    assert "search, 4 fins: p50" in done.stdout
 
 
 def test_command_allocates_and_checks(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -158,8 +197,9 @@ def test_command_allocates_and_checks(folder: Path, capsys: pytest.CaptureFixtur
     layout = finlab.load_layout("A")
     truth = finlab.load_allocator().allocate(layout, [1, 0, 0.5, 0, 0, 0.1], failed=["front_right"])
     assert values["command"][0] is None and values["failed"] == ["front_right"] and values["notes"] == []
-    np.testing.assert_allclose(values["command"][1:], truth.command[1:], atol=1e-9)
-    np.testing.assert_allclose(values["wrench_plant"], truth.wrench, atol=1e-12)
+    np.testing.assert_array_equal(values["command"][1:], truth.command[1:])
+    np.testing.assert_array_equal(values["wrench_plant"], truth.wrench)
+    assert (values["energy"], values["power"]) == (truth.energy, truth.power)
     assert main(["allocate", str(folder), *WRENCH]) == 0
     assert "front_left" in capsys.readouterr().out
     assert main(["check", "nowhere"]) == 2

@@ -32,6 +32,7 @@ from finlab.allocation.search.turn_limits import TURNS, force_sizes, limit_turn,
 from finlab.allocation.search.weighted_sum import minimize_weighted_sum
 from finlab.errors import AllocationError
 from finlab.forces import force_space
+from finlab.forces.compiled_fins import CompiledFins
 from finlab.physics.energy import EnergyMeter
 from finlab.physics.objective import Objective
 
@@ -71,11 +72,13 @@ SEARCH = SearchNumbers()
 class Pipeline:
     """Answers targets on layouts without failures; every array is numpy's."""
 
-    def __init__(self, std: Array, settings: Settings, objective: Objective) -> None:
-        """Make it for wrenches normalized by `std` (6,)."""
+    def __init__(
+        self, std: Array, settings: Settings, objective: Objective, compiled: CompiledFins | None = None
+    ) -> None:
+        """Make it for wrenches normalized by `std` (6,), with fins that are `compiled` already."""
         self.std, self.objective = std, objective
         self.settings = self._checked(settings)
-        self.prepare = lru_cache(maxsize=128)(lambda layout: prepare(layout, std, objective))
+        self.prepare = lru_cache(maxsize=128)(lambda layout: prepare(layout, std, objective, compiled))
 
     def with_settings(self, settings: Settings) -> Pipeline:
         """The same layouts prepared, with other settings."""

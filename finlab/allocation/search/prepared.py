@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.search.levenberg_marquardt import CommandProblem
+from finlab.forces.compiled_fins import CompiledFins
 from finlab.forces.envelopes import layout_envelopes
 from finlab.forces.force_space import PlanarProblem, planar_problem
 from finlab.layout import Layout
@@ -41,14 +42,16 @@ class Prepared(NamedTuple):
     beside the error's yardstick."""
 
 
-def prepare(layout: Layout, std: Array, objective: Objective) -> Prepared:
-    """Prepare a layout whose fins are all healthy; `std` (6,) normalizes wrenches.
+def prepare(
+    layout: Layout, std: Array, objective: Objective, compiled: CompiledFins | None = None
+) -> Prepared:
+    """Prepare a layout whose fins are all healthy; `std` (6,) normalizes wrenches, `compiled` saves time.
 
     Raises:
         DataError: a fin's force table cannot be read.
     """
     plant = plant_of(layout)
-    fins = layout_envelopes(layout, objective)
+    fins = layout_envelopes(layout, objective, compiled)
     planar = planar_problem(layout, fins, std, objective)
     rests = ((),) if objective.convex else resting_fins(layout.n_fins)
     strongest = np.tile(fins.maximum, 2)[:, None] * planar.columns

@@ -24,6 +24,7 @@ from finlab.allocation.search.refined_candidates import FallbackForces, RefinedC
 from finlab.allocation.search.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.errors import AllocationError
+from finlab.forces.compiled_fins import CompiledFins
 from finlab.forces.force_space import PlanarProblem
 from finlab.forces.nearest import Nearest, nearest, nearest_along, nearest_in_turn
 from finlab.forces.planar_sets import planar_sets
@@ -52,6 +53,7 @@ class SearchAllocator(Allocator):
         objective: Name = "power",
         energy_weights: EnergyWeights = DEFAULT_WEIGHTS,
         copper_loss: float = 0.0,
+        compiled: CompiledFins | None = None,
         **settings: Any,
     ) -> None:
         """Make it.
@@ -61,6 +63,7 @@ class SearchAllocator(Allocator):
             objective: what is kept least: `power` in watts, or `effort`, the paper's energy proxy.
             energy_weights: weights of the effort.
             copper_loss: heat in a motor's windings [W/(N m)^2] that counts beside the mechanical power.
+            compiled: fins that need not be compiled here, such as those in a bundle.
             settings: fields of `Settings`.
 
         Raises:
@@ -69,7 +72,9 @@ class SearchAllocator(Allocator):
         self.normalization = normalization
         self.objective = _checked_objective(objective, energy_weights, copper_loss)
         self.settings = self.settings_class(**settings)
-        self.pipeline = Pipeline(normalization.std, self.settings, self.objective)
+        self.compiled = compiled or {}
+        """Compiled fins that came with the allocator."""
+        self.pipeline = Pipeline(normalization.std, self.settings, self.objective, self.compiled)
         # All products here are too small to be shared among threads; chunks of targets are not.
         self._one_thread = single_threaded_products()
 
@@ -94,7 +99,7 @@ class SearchAllocator(Allocator):
             other.pipeline = self.pipeline.with_settings(other.settings)
         else:
             other.objective = aim
-            other.pipeline = Pipeline(self.normalization.std, other.settings, aim)
+            other.pipeline = Pipeline(self.normalization.std, other.settings, aim, self.compiled)
         return other
 
     def _solve(
