@@ -180,12 +180,12 @@ def test_front_door_and_layouts_load_no_torch() -> None:
     assert done.stdout.splitlines()[-1] == "[]"
 
 
-def test_the_learned_pipeline_needs_only_numpy() -> None:
+def test_allocating_needs_only_numpy() -> None:
     """What a robot's computer runs; DEVELOPMENT.md promises it."""
     code = (
         "import sys\n"
         "for name in ('torch', 'scipy', 'yaml', 'safetensors', 'threadpoolctl', 'tqdm', 'tyro'):\n"
         "    sys.modules[name] = None\n"
-        "import finlab.allocation.learned.learned_allocator, finlab.deploy.graph_file"
+        "import finlab.allocation.search.search_allocator, finlab.allocation.learned.mdn, finlab.deploy.robot"
     )
     subprocess.run([sys.executable, "-c", code], timeout=60, check=True)

@@ -10,7 +10,7 @@ import pytest
 
 import finlab
 from finlab.assets import shipped_layouts
-from finlab.bundle_files import ABOUT, CHECKSUMS, GRAPH, checksums
+from finlab.bundle_files import ABOUT, CHECKSUMS, COMPILED, GRAPH, TABLES, checksums
 from finlab.deploy.bundle import Bundle, make_bundle
 from finlab.deploy.graph_file import parse_graph
 from finlab.deploy.robot import load_robot, parse_robot
@@ -19,14 +19,15 @@ from finlab.layout import load_layout
 from finlab.layout.load import checksum_of
 
 WEIGHTS, CONFIG = "checkpoint/model.safetensors", "checkpoint/config.json"
-LAYOUTS, GRAPHS, BUNDLES, ARCHIVES = 3000, 3000, 3500, 500
+LAYOUTS, GRAPHS, BUNDLES, ARCHIVES, ANSWERS = 3000, 3000, 3200, 500, 300
+WRENCH = [1, 0, 0.5, 0, 0, 0.1]
 ODD = (b"\xff", b"\0", b"9" * 30, b"1e999", b"NaN", b"[", b"{", b'"', b"\n- ", b"&a *a", b"-1", b"null", b"")
 
 
 @pytest.fixture(scope="module")
 def small(untrained_checkpoint: Path) -> Bundle:
     """A bundle of a small network, so that many fit into a test."""
-    allocator = finlab.load_allocator(checkpoint=untrained_checkpoint)
+    allocator = finlab.load_allocator("mdn", checkpoint=untrained_checkpoint)
     return make_bundle(load_layout("A"), allocator)
 
 
@@ -90,7 +91,7 @@ def test_bundles(small: Bundle) -> None:
     good = 0
     names = sorted(small.files)
     for i in range(BUNDLES):
-        name = (WEIGHTS, CONFIG, ABOUT, names[i % len(names)])[i % 4]
+        name = (WEIGHTS, CONFIG, ABOUT, COMPILED, names[i % len(names)])[i % 5]
         files = {**small.files, name: mutated(rng, small.files[name])}
         if i % 3 and name == WEIGHTS:  # a forger mends this checksum too
             config = json.loads(files[CONFIG])
@@ -119,3 +120,38 @@ def test_archives(small: Bundle, tmp_path: Path) -> None:
         path.write_bytes(mutated(rng, content))
         good += survive(lambda: load_robot(path))
     assert 0 < good < ARCHIVES
+
+
+def _flipped(rng: np.random.Generator, content: bytes) -> bytes:
+    """Compiled fins with some numbers changed at random, the header left as it is."""
+    start = 8 + int.from_bytes(content[:8], "little")
+    numbers = np.frombuffer(content[start:], np.float64).copy()
+    for _ in range(rng.integers(1, 50)):
+        odd = (0.0, -1.0, 1e8, numbers[rng.integers(len(numbers))], rng.normal())
+        numbers[rng.integers(len(numbers))] = odd[rng.integers(len(odd))]
+    return content[:start] + numbers.tobytes()
+
+
+def test_answers_of_what_was_forged(measured_bundle: Bundle, tmp_path: Path) -> None:
+    """Compiled fins, tables and settings whose checksums fit: an answer within the limits that the plant
+    judges, or an error of ours."""
+    rng = np.random.default_rng(4)
+    path = tmp_path / "x.zip"
+    table = next(name for name in measured_bundle.files if name.startswith(TABLES))
+    good = 0
+    for i in range(ANSWERS):
+        name = (COMPILED, table, ABOUT)[i % 3]
+        change = _flipped if name == COMPILED else mutated
+        files = {**measured_bundle.files, name: change(rng, measured_bundle.files[name])}
+        rest = {key: content for key, content in files.items() if key != CHECKSUMS}
+        Bundle({**rest, CHECKSUMS: checksums(rest)}).write_zip(path)
+
+        def answer() -> None:
+            robot = load_robot(path)
+            layout = robot.layout
+            found = robot.allocate(WRENCH)
+            assert (found.command >= layout.lower).all() and (found.command <= layout.upper).all()
+            assert found.judged_by == "plant" and np.isfinite([found.err_norm, found.power]).all()
+
+        good += survive(answer)
+    assert 0 < good < ANSWERS

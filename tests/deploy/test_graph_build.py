@@ -6,27 +6,26 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-import torch
 
 import finlab
 from finlab.allocation import Allocator
 from finlab.assets import shipped_layouts
 from finlab.cli import main
-from finlab.deploy.graph import build_graph
-from finlab.deploy.graph_file import graph_bytes
+from finlab.deploy.graph import N_SELF_TEST, build_graph
+from finlab.deploy.graph_file import graph_bytes, read_graph, write_graph
 from finlab.errors import FinlabError
 from finlab.inference.checkpoint import read_checkpoint
-from finlab.inference.features import fin_frame_features, geometry
-from finlab.layout import stack_layouts
-from finlab.training.saving import surrogate_of
+from finlab.layout import Layout
+from finlab.layout.load import checksum_of
+from finlab.physics import Plant
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "finlab/deploy/graph.schema.json").read_text())
 WRENCH = ["--wrench", "0.5", "0", "0.5", "0", "0", "0"]
 
 
-@pytest.fixture(scope="module")
-def allocator(untrained_checkpoint: Path) -> Allocator:
-    return finlab.load_allocator(checkpoint=untrained_checkpoint)
+@pytest.fixture(scope="module", params=["search", "mdn"])
+def allocator(request: pytest.FixtureRequest, untrained_checkpoint: Path) -> Allocator:
+    return finlab.load_allocator(request.param, checkpoint=untrained_checkpoint)
 
 
 @pytest.mark.parametrize("failed", [(), ("front_left",)], ids=["whole", "one lost"])
@@ -36,44 +35,50 @@ def test_graph_of_an_allocator(
     layout = finlab.load_layout(shipped_layouts()["A"])
     graph = build_graph(layout, allocator, failed)
     jsonschema.validate(json.loads(graph_bytes(graph)), SCHEMA)
-    assert graph.layout == layout and graph.failed == failed
-    assert graph.checkpoint_sha256 == read_checkpoint(untrained_checkpoint).sha256
-    assert [row is None for row in graph.features] == [name in failed for name in layout.names]
+    assert graph.layout == layout and graph.failed == failed and graph.healthy.n_fins == 4 - len(failed)
+    weights = read_checkpoint(untrained_checkpoint)
+    networks = (weights.name, weights.sha256) if allocator.name == "mdn" else (None, None)
+    assert (graph.checkpoint, graph.checkpoint_sha256) == networks
+    assert graph.method == allocator.name and len(graph.self_test) == N_SELF_TEST
 
 
-def test_self_test_holds_on_the_surrogate(allocator: Allocator, untrained_checkpoint: Path) -> None:
-    layout = finlab.load_layout(shipped_layouts()["penta"])
+def test_self_test_holds_by_the_fins_own_models(allocator: Allocator) -> None:
+    layout = finlab.load_layout("mixed")
     graph = build_graph(layout, allocator)
-    surrogate = surrogate_of(read_checkpoint(untrained_checkpoint))
-    arrays = [torch.tensor(a, dtype=torch.float32) for a in stack_layouts([layout])[:4]]
     for case in graph.self_test:
-        command = torch.tensor([case.command])
-        with torch.inference_mode():
-            wrench = surrogate(command, *arrays)[0].numpy()
-        assert graph.normalization.error(wrench, np.array(case.predicted_wrench)) < 1e-3
-
-
-def test_features_are_those_of_training(allocator: Allocator) -> None:
-    layout = finlab.load_layout(shipped_layouts()["penta"])
-    graph = build_graph(layout, allocator)
-    position, angle, lower, upper, _ = stack_layouts([layout])
-    case = graph.self_test[0]
-    scaled = (np.array(case.wrench) - graph.normalization.mean) / graph.normalization.std
-    seen = geometry(position, angle, lower, upper, graph.normalization.std)
-    np.testing.assert_allclose(case.features, fin_frame_features(seen, scaled[None])[0], rtol=1e-7, atol=1e-9)
-    np.testing.assert_allclose(graph.features, seen.static[0], rtol=1e-7, atol=1e-9)
+        wrench = Plant(layout).wrench(case.command)
+        assert graph.normalization.error(wrench, np.array(case.delivered_wrench)) < 1e-7
+        own = allocator.allocate(layout, case.wrench)
+        np.testing.assert_allclose(np.array(case.command, np.float64), own.command, rtol=1e-8)
+    assert len({case.wrench for case in graph.self_test}) == N_SELF_TEST
 
 
 def test_same_input_same_bytes(allocator: Allocator, untrained_checkpoint: Path) -> None:
     layout = finlab.load_layout(shipped_layouts()["ucat"])
-    again = finlab.load_allocator(checkpoint=untrained_checkpoint)
+    again = finlab.load_allocator(allocator.name, checkpoint=untrained_checkpoint)
     assert graph_bytes(build_graph(layout, allocator)) == graph_bytes(build_graph(layout, again))
 
 
-def test_method_without_a_network_is_refused(untrained_checkpoint: Path) -> None:
-    analytic = finlab.load_allocator("analytic", checkpoint=untrained_checkpoint)
-    with pytest.raises(FinlabError, match="method 'analytic' has no trained network"):
-        build_graph(finlab.load_layout(shipped_layouts()["A"]), analytic)
+def test_any_method_has_a_graph(untrained_checkpoint: Path) -> None:
+    layout = finlab.load_layout("A")
+    graph = build_graph(layout, finlab.load_allocator("analytic", checkpoint=untrained_checkpoint))
+    assert graph.method == "analytic" and graph.checkpoint is None
+    jsonschema.validate(json.loads(graph_bytes(graph)), SCHEMA)
+
+
+def test_force_tables_are_found_beside_the_graph_file(
+    measured: Layout, allocator: Allocator, tmp_path: Path
+) -> None:
+    """A graph file alone names its tables by their places; one written relatively starts at the file."""
+    path = tmp_path / "x.graph.json"
+    write_graph(build_graph(measured, allocator), path)
+    assert read_graph(path).layout == finlab.load_layout(path) == measured
+    document = json.loads(path.read_text())
+    document["graph"]["nodes"][2]["model"]["path"] = "tank/soft.csv"
+    document["checksum"] = checksum_of(document)
+    path.write_text(json.dumps(document))
+    for layout in (finlab.load_layout(path), read_graph(path).layout):
+        assert layout.fins[2].model.values() == {"path": str(tmp_path / "tank" / "soft.csv")}
 
 
 def test_unknown_failed_fin_is_refused(allocator: Allocator) -> None:
