@@ -42,6 +42,8 @@ IDLE = 2e-3
 """Share of its largest force up to which a fin turns to its cheapest direction; refinement mends that."""
 LAST_STEPS = 2
 """Semismooth Newton steps at the end."""
+HALF_STEPS = 5
+"""Steps after which forces go only half the way: those that are not settled by then jump to and fro."""
 SETTLED = 2e-3
 """Change of every force, as a share of the fin's largest, from which on another step would change the cost in
 its sixth digit."""
@@ -77,6 +79,8 @@ class Planar(NamedTuple):
     """What the compiled fins say of it (R, n, 8)."""
     residual: Array
     """Target minus wrench, normalized (R, 6)."""
+    multiplier: Array
+    """What each axis of the target costs (R, 6), per unit of normalized wrench."""
 
 
 def planar_problem(layout: Layout, fins: Envelopes, scale: Array, objective: Objective) -> PlanarProblem:
@@ -146,11 +150,15 @@ def descend(
     if works is not None:
         mobility *= works[:, None]
     settled, before = SETTLED * fins.maximum, None
-    for _ in range(steps):
+    for step in range(steps):
         multiplier = _multiplier(problem, target, response)
         force, size = _answer(problem, response, multiplier)
-        if before is not None and (np.abs(force - before) <= settled).all():
-            break
+        if before is not None:
+            if (np.abs(force - before) <= settled).all():
+                break
+            if step >= HALF_STEPS:
+                force = 0.5 * (force + before)
+                size = _size(force)
         before = force
         found = fins.project(force, size)
         cut *= found.rim.largest / size
@@ -167,15 +175,16 @@ def descend(
     row = fins.lookup(found.rim, found.size)
     shaft = row[..., SHAFT] if fins.pushes_sideways else None
     residual = target - _wrench(problem, found.unit * found.size[:, None], shaft)
-    return Planar(found.size, _direction(found), row, residual)
+    return Planar(found.size, _direction(found), row, residual, multiplier)
 
 
 def polar(problem: PlanarProblem, force: Array) -> Planar:
-    """Planar forces (R, n, 2) [N] as sizes and directions within the arcs; without a residual."""
+    """Planar forces (R, n, 2) [N] as sizes and directions within the arcs, the rest unknown."""
     turned = force.swapaxes(1, 2)
     found = problem.fins.project(turned, np.sqrt((turned**2).sum(1)) + LEAST)
     row = problem.fins.lookup(found.rim, found.size)
-    return Planar(found.size, _direction(found), row, np.full((len(force), 6), np.nan))
+    unknown = np.full((len(force), 6), np.nan)
+    return Planar(found.size, _direction(found), row, unknown, unknown)
 
 
 def realize(problem: PlanarProblem, planar: Planar) -> tuple[Array, Array]:
@@ -259,10 +268,15 @@ def _answer(problem: PlanarProblem, response: _Response, multiplier: Array) -> t
     force = response.mobility[:, :2] * pull[:, :1]
     force += response.mobility[:, 1:] * pull[:, 1:]
     force += response.shift
+    return force, _size(force)
+
+
+def _size(force: Array) -> Array:
+    """Sizes (R, n) [N] of forces (R, 2, n), none of them zero."""
     squared = force * force
-    size = np.sqrt(squared[:, 0] + squared[:, 1])
+    size: Array = np.sqrt(squared[:, 0] + squared[:, 1])
     size += LEAST
-    return force, size
+    return size
 
 
 def _wrench(problem: PlanarProblem, force: Array, shaft: Array | None) -> Array:

@@ -33,6 +33,7 @@ from finlab.allocation.search.weighted_sum import minimize_weighted_sum
 from finlab.errors import AllocationError
 from finlab.forces import force_space
 from finlab.forces.compiled_fins import CompiledFins
+from finlab.forces.cost_bound import cost_bound
 from finlab.physics.energy import EnergyMeter
 from finlab.physics.objective import Objective
 
@@ -46,13 +47,15 @@ class SearchNumbers:
     promising_error: float = 0.02
     """Normalized error below which a search in force space counts as successful: refinement removes the
     rest."""
-    convex_steps: int = 12
+    convex_steps: int = 10
     """Most quadratic problems for a cost that grows faster than force; by Newton's method, most forces settle
     after five."""
     few_fins_steps: int = 8
     """The same for other costs with up to five fins."""
     many_fins_steps: int = 12
     """The same from six fins on, where there are more local minima to leave."""
+    bound_steps: int = 30
+    """The same where a lower bound is asked for."""
     wide_seeds: int = 64
     """Random seeds of the wide search for alternatives."""
     wide_steps: int = 40
@@ -149,6 +152,20 @@ class Pipeline:
         )
         found = refine_candidates(prepared, target, command, origin, MISSED.first_lm_steps)
         return found.with_first(answer)
+
+    def bound(self, prepared: Prepared, target: Array, best: float) -> float:
+        """A lower bound on the cost of a wrench (6,) [N, N m]; `best` is that of the answer.
+
+        Raises:
+            AllocationError: the objective is not convex.
+        """
+        if not self.objective.convex:
+            raise AllocationError(
+                f"bound: there is one for objective 'power', got objective {self.objective.name!r}"
+            )
+        wanted = target / self.std
+        planar = force_space.descend(prepared.planar, wanted[None], prepared.seeds[:1], SEARCH.bound_steps)
+        return min(cost_bound(prepared.planar, wanted, planar.multiplier[0]), best)
 
     def _descend_from_previous(
         self, prepared: Prepared, target: Array, seeds: Array, previous: Array, fallback: FallbackForces

@@ -14,9 +14,11 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.judging import costs
 from finlab.allocation.policy import Policy
+from finlab.allocation.question import usable_fins
 from finlab.allocation.search.levenberg_marquardt import refine
 from finlab.allocation.search.pipeline import SEARCH, Pipeline
 from finlab.allocation.search.prepared import Prepared, resting_fins
@@ -147,6 +149,20 @@ class SearchAllocator(Allocator):
             refined.command[:, 0],
             candidates=lambda: _candidates(refined, std, layout, own),
             alternatives=explored,
+        )
+
+    def bound(self, result: Allocation) -> float:
+        """A lower bound on the power [W] of any answer to the question of a result.
+
+        Raises:
+            AllocationError: the objective is not convex, or the wrench is out of reach.
+        """
+        if not result.reachable:
+            raise AllocationError("bound: the wrench is out of reach, so no answer has a cost to bound")
+        fins = usable_fins(result.layout, result.failed)
+        prepared = self.pipeline.prepare(fins.healthy)
+        return self.pipeline.bound(
+            prepared, result.target, float(prepared.cost(result.command[None, fins.alive])[0])
         )
 
     def refined(self, layout: Layout, wrench: ArrayLike, command: Array, n_steps: int) -> Array:
