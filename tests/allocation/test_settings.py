@@ -8,16 +8,18 @@ import pytest
 
 from finlab.allocation import METHODS, load_allocator
 from finlab.allocation.learned.paper import PaperSettings
-from finlab.allocation.learned.settings import LearnedOptions, PaperOptions, Settings
+from finlab.allocation.learned.settings import MdnOptions, MdnSettings, PaperOptions
+from finlab.allocation.search.settings import SearchOptions, Settings
 from finlab.assets import shipped_checkpoints, shipped_layouts
 from finlab.errors import AllocationError
 from finlab.layout import load_layout
-from finlab.physics.energy import POWER_WEIGHTS, EnergyWeights
+from finlab.physics.energy import EnergyWeights
+from finlab.physics.objective import Name
 
 SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
 OTHER: dict[str, dict[str, Any]] = {
-    "learned": {"n_candidates": 8, "refine_steps": 3, "energy_tradeoff": 0.1},
-    "fast": {"energy_tradeoff": 0.1},
+    "search": {"objective": "effort", "n_refined": 2, "refine_steps": 3, "energy_tradeoff": 0.1},
+    "mdn": {"objective": "effort", "n_refined": 2},
     "paper": {"n_candidates": 4, "n_steps": 3},
     "multistart": {"n_candidates": 2, "n_steps": 2, "energy_tradeoff": 0.1},
     "trf": {"n_starts": 1},
@@ -54,12 +56,22 @@ def test_other_settings_answer_as_if_loaded_with_them(method: str) -> None:
 
 
 def test_networks_and_layouts_are_shared() -> None:
-    allocator = load_allocator()
-    assert vars(allocator.with_settings(gamma=1.0))["weights"] is vars(allocator)["weights"]
-    spared = allocator.with_settings(energy_weights=POWER_WEIGHTS)
-    layout = load_layout(shipped_layouts()["A"])
-    expected = load_allocator(energy_weights=POWER_WEIGHTS).allocate(layout, SURGE).command
-    np.testing.assert_array_equal(spared.allocate(layout, SURGE).command, expected)
+    network = load_allocator("mdn")
+    assert vars(network.with_settings(n_refined=1))["weights"] is vars(network)["weights"]
+    layout, allocator = load_layout("A"), load_allocator()
+    allocator.allocate(layout, SURGE)
+    kept = allocator.pipeline.prepare.cache_info().misses
+    allocator.with_settings(n_refined=1).allocate(layout, SURGE)
+    assert allocator.pipeline.prepare.cache_info().misses == kept, (
+        "the objective is the same, so is the layout"
+    )
+    weights = EnergyWeights(1.0, 0.5, 0.0, 0.0, 0.25)
+    other = allocator.with_settings(objective="effort", energy_weights=weights)
+    expected = load_allocator(objective="effort", energy_weights=weights).allocate(layout, SURGE)
+    assert other.allocate(layout, SURGE) == expected
+    assert not np.array_equal(
+        expected.command, allocator.with_settings(objective="effort").allocate(layout, SURGE).command
+    )
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -68,27 +80,44 @@ def test_unknown_settings_are_refused(method: str) -> None:
         load_allocator(method).with_settings(shoe_size=43)
 
 
-def test_impossible_settings_are_refused() -> None:
-    allocator = load_allocator()
-    with pytest.raises(AllocationError, match="n_candidates=0"):
-        allocator.with_settings(n_candidates=0)
-    with pytest.raises(AllocationError, match="energy of squares"):
-        allocator.with_settings(energy_weights=POWER_WEIGHTS).with_settings(energy_tradeoff=0.1)
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"n_refined": 0}, "n_refined=0"),
+        ({"search_steps": 0}, "search_steps=0"),
+        ({"refine_steps": -1}, "refine_steps=-1"),
+        ({"objective": "speed"}, "objective: expected 'power' or 'effort', got 'speed'"),
+        ({"copper_loss": -1.0}, "copper_loss: expected watts"),
+        ({"copper_loss": float("nan")}, "copper_loss: expected watts"),
+        ({"energy_tradeoff": 0.1}, "take objective 'effort', or leave energy_tradeoff at 0"),
+        ({"objective": "effort", "energy_tradeoff": -0.1}, "energy_tradeoff: expected a number from 0"),
+    ],
+)
+def test_impossible_settings_are_refused(wrong: dict[str, Any], message: str) -> None:
+    with pytest.raises(AllocationError, match=message):
+        load_allocator(**wrong)
+    with pytest.raises(AllocationError, match=message):
+        load_allocator().with_settings(**wrong)
 
 
 def test_editors_complete_the_settings_that_there_are() -> None:
+    aim = {"objective": Name, "energy_weights": EnergyWeights, "copper_loss": float}
     for options, settings, others in (
-        (LearnedOptions, Settings, {"energy_weights": EnergyWeights}),
+        (SearchOptions, Settings, aim),
+        (MdnOptions, MdnSettings, aim),
         (PaperOptions, PaperSettings, {}),
     ):
         kinds = get_type_hints(settings)
         assert get_type_hints(options) == others | {f.name: kinds[f.name] for f in fields(settings)}
-    assert list(get_type_hints(LearnedOptions)) == load_allocator("fast").option_names()
+    assert list(get_type_hints(SearchOptions)) == load_allocator().option_names()
 
 
-@pytest.mark.parametrize("wrong", [{"n_candidates": "5"}, {"temperature": None}, {"energy_weights": 3}])
-def test_settings_of_the_wrong_type_are_refused_in_a_sentence(wrong: dict[str, Any]) -> None:
-    with pytest.raises(AllocationError, match="'learned': a setting has the wrong type"):
-        load_allocator("learned", **wrong)
-    with pytest.raises(AllocationError, match="'learned': a setting has the wrong type"):
-        load_allocator().with_settings(**wrong)
+@pytest.mark.parametrize(
+    "wrong", [{"n_refined": "5"}, {"copper_loss": None}, {"energy_weights": 3}, {"search_steps": "many"}]
+)
+@pytest.mark.parametrize("method", ["search", "mdn"])
+def test_settings_of_the_wrong_type_are_refused_in_a_sentence(method: str, wrong: dict[str, Any]) -> None:
+    with pytest.raises(AllocationError, match=f"'{method}': a setting has the wrong type"):
+        load_allocator(method, **wrong)
+    with pytest.raises(AllocationError, match=f"'{method}': a setting has the wrong type"):
+        load_allocator(method).with_settings(**wrong)

@@ -168,7 +168,7 @@ def test_the_longest_request_that_is_read(robot: Robot) -> None:
 
 
 def test_exports_do_not_depend_on_the_order_of_the_fin_model() -> None:
-    weights = read_checkpoint(checkpoint_path())
+    weights = read_checkpoint(checkpoint_path("paper"))
     small = replace(weights, fin_model={"type": "drag", "parameters": {"a": 1.0}})
     turned = replace(weights, fin_model={"parameters": {"a": 1.0}, "type": "drag"})
     assert onnx_files(small) == onnx_files(turned)

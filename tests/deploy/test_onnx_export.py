@@ -1,5 +1,7 @@
 """The exported ONNX files answer, in onnxruntime, as the numpy networks do."""
 
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +12,9 @@ from numpy.typing import NDArray
 
 from finlab.assets import checkpoint_path
 from finlab.cli import main
-from finlab.deploy.onnx_export import FAST, NETWORK, SURROGATE, onnx_files
+from finlab.deploy.onnx_export import NETWORK, SURROGATE, onnx_files
 from finlab.errors import CheckpointError
 from finlab.inference.checkpoint import read_checkpoint
-from finlab.inference.fast_network import NumpyFastNetwork
-from finlab.inference.learned_fin import LearnedFin
 from finlab.inference.network import NumpyNetwork
 from finlab.inference.surrogate import surrogate_on
 from finlab.inference.weights import TrainedWeights
@@ -23,10 +23,22 @@ from finlab.layout import random_layout
 Array = NDArray[np.float32]
 
 
-@pytest.fixture(scope="module", params=["untrained", "default"])
-def weights(request: pytest.FixtureRequest, untrained_checkpoint: Path) -> TrainedWeights:
-    """A small network with random weights, and the shipped one."""
-    return read_checkpoint(untrained_checkpoint if request.param == "untrained" else checkpoint_path())
+def random_state(shapes: Mapping[str, tuple[int, ...]]) -> dict[str, Array]:
+    """Weights of a network that has learned nothing."""
+    rng = np.random.default_rng(0)
+    return {name: (0.3 * rng.normal(size=shape)).astype(np.float32) for name, shape in shapes.items()}
+
+
+@pytest.fixture(scope="module", params=["random", "shipped"])
+def paper(request: pytest.FixtureRequest) -> TrainedWeights:
+    """The paper's networks, with random weights and with the shipped ones."""
+    weights = read_checkpoint(checkpoint_path("paper"))
+    if request.param == "shipped":
+        return weights
+    sizes, surrogate = weights.network_config, weights.surrogate_config
+    assert sizes is not None and surrogate is not None
+    networks = random_state(sizes.shapes()), random_state(surrogate.shapes())
+    return replace(weights, network=networks[0], surrogate=networks[1])
 
 
 def run(content: bytes, **inputs: NDArray[np.floating]) -> list[Array]:
@@ -36,61 +48,52 @@ def run(content: bytes, **inputs: NDArray[np.floating]) -> list[Array]:
 
 
 @pytest.mark.parametrize("n_fins", [1, 2, 5, 8])
-@pytest.mark.parametrize("limits", ["nominal", "mixed"])
-def test_network(weights: TrainedWeights, n_fins: int, limits: str) -> None:
+def test_network_of_the_paper(paper: TrainedWeights, n_fins: int) -> None:
     rng = np.random.default_rng(n_fins)
-    layout = random_layout(rng, n_fins=(n_fins, n_fins), limits=limits)  # type: ignore[arg-type]
-    features = rng.normal(size=(6, n_fins, 25)).astype(np.float32)
+    features = rng.normal(size=(6, n_fins, 10)).astype(np.float32)
     target = rng.normal(size=(6, 6)).astype(np.float32)
-    sizes = weights.check_network()
-    truth = NumpyNetwork(weights.network, sizes.heads, sizes.n_components)(
-        features, target, layout.lower, layout.upper
-    )
-    weight, mean, std = run(
-        onnx_files(weights)[NETWORK], features=features, target=target, lower=layout.lower, upper=layout.upper
-    )
+    sizes = paper.network_config
+    assert sizes is not None
+    limits = np.zeros((n_fins, 3)), np.ones((n_fins, 3))  # the raw features hold the limits
+    truth = NumpyNetwork(paper.network, sizes.heads, sizes.n_components)(features, target, *limits)
+    weight, mean, std = run(onnx_files(paper)[NETWORK], features=features, target=target)
     np.testing.assert_allclose(weight, truth.weight, atol=2e-5)
+    np.testing.assert_allclose(mean, truth.mean, rtol=1e-4, atol=2e-4)
     np.testing.assert_allclose(std, truth.std, rtol=2e-4)
-    apart = np.abs(mean - truth.mean)
-    apart[..., 2] = np.minimum(apart[..., 2], np.abs(2.0 - apart[..., 2]))  # an angle: -1 is 1
-    assert apart.max() < 2e-4
 
 
-def test_surrogate(weights: TrainedWeights) -> None:
-    layout = random_layout(np.random.default_rng(0), n_fins=(5, 5))
+@pytest.mark.parametrize("limits", ["nominal", "mixed"])
+def test_surrogate_of_the_paper(paper: TrainedWeights, limits: str) -> None:
+    layout = random_layout(np.random.default_rng(0), n_fins=(5, 5), limits=limits)
     draws = np.random.default_rng(1).random((40, 5, 3))
     command = layout.lower + draws * (layout.upper - layout.lower)
     force, wrench = run(
-        onnx_files(weights)[SURROGATE],
+        onnx_files(paper)[SURROGATE],
         command=command,
         position=layout.position,
         mounting_angle=layout.mounting_angle,
+        lower=layout.lower,
+        upper=layout.upper,
     )
-    np.testing.assert_allclose(force, LearnedFin(weights.surrogate).force(command), atol=2e-5)
-    np.testing.assert_allclose(wrench, surrogate_on(layout, weights).wrench(command), atol=5e-5)
-
-
-def test_fast_network() -> None:
-    weights = read_checkpoint(checkpoint_path())
-    assert weights.fast is not None
-    features = np.random.default_rng(0).normal(size=(7, 4, 25)).astype(np.float32)
-    (share,) = run(onnx_files(weights)[FAST], features=features)
-    np.testing.assert_allclose(share, NumpyFastNetwork(weights.fast)(features), atol=1e-5)
+    truth = surrogate_on(layout, paper)
+    np.testing.assert_allclose(force, truth.fins.force(command), rtol=1e-4, atol=5e-5)
+    np.testing.assert_allclose(wrench, truth.wrench(command), rtol=1e-4, atol=1e-4)
 
 
 def test_files_are_valid_repeatable_and_say_what_they_are(tmp_path: Path) -> None:
-    weights = read_checkpoint(checkpoint_path())
-    assert main(["export", "A", "-o", str(tmp_path), "--onnx"]) == 0
+    weights = read_checkpoint(checkpoint_path("paper"))
+    assert main(["export", "A", "-o", str(tmp_path), "--onnx", "--checkpoint", "paper"]) == 0
     files = onnx_files(weights)
-    assert {path.name for path in tmp_path.iterdir()} == {NETWORK, SURROGATE, FAST}
+    assert {path.name for path in tmp_path.iterdir()} == {NETWORK, SURROGATE}
     for name, content in files.items():
         assert (tmp_path / name).read_bytes() == content
         model = onnx.load_from_string(content)
         onnx.checker.check_model(model, full_check=True)
         about = {entry.key: entry.value for entry in model.metadata_props}
-        assert about["checkpoint"] == "default" and about["checkpoint_sha256"] == weights.sha256
+        assert about["checkpoint"] == "paper" and about["checkpoint_sha256"] == weights.sha256
 
 
-def test_networks_of_the_paper_have_no_export() -> None:
-    with pytest.raises(CheckpointError, match="only the networks of method `learned` have an export"):
-        onnx_files(read_checkpoint(checkpoint_path("paper")))
+def test_checkpoints_without_a_network_have_no_export() -> None:
+    weights = read_checkpoint(checkpoint_path("paper"))
+    with pytest.raises(CheckpointError, match="only the networks of the methods `mdn` and `paper` have an"):
+        onnx_files(replace(weights, network_config=None, network={}))

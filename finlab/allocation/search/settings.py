@@ -33,7 +33,11 @@ class Settings:
     def __post_init__(self) -> None:
         if not 0.0 <= self.energy_tradeoff < np.inf:
             raise AllocationError(f"energy_tradeoff: expected a number from 0, got {self.energy_tradeoff}")
-        if self.n_refined < 1 or self.refine_steps < 0 or (self.search_steps or 1) < 1:
+        if (
+            self.n_refined < 1
+            or self.refine_steps < 0
+            or (self.search_steps is not None and self.search_steps < 1)
+        ):
             raise AllocationError(
                 "method 'search' needs at least one refined answer, one step of search and no negative "
                 f"number of refining steps, got n_refined={self.n_refined}, "
