@@ -19,6 +19,8 @@ Array = NDArray[Any]
 
 LEAST = 1e-12
 """What sizes are kept above before something is divided by them."""
+RIM = 48
+"""Sides of the polygon around what an uneven fin can push: at most a fifth of a percent too wide."""
 LONGEST_TURN = 0.3
 """Largest turn [rad] from a direction to that of the nearest force on the rim."""
 
@@ -108,6 +110,18 @@ class Envelopes:
     def pushes_sideways(self) -> bool:
         """Whether any fin has a force along its shaft."""
         return bool(np.abs(self.table[:, SHAFT]).max() > 1e-9 * self.maximum.max())
+
+    @cached_property
+    def rim_shares(self) -> Array | None:
+        """How far the convex hulls of what the fins can push reach along `RIM` evenly spaced directions
+        (n, RIM), as shares of their largest forces; None where all fins are the same all round."""
+        count = self.largest.shape[1]
+        if count == 1:
+            return None
+        along = self.domain[0][:, None] + self.domain[1][:, None] * np.linspace(-1.0, 1.0, count)
+        sides = 2.0 * np.pi / RIM * np.arange(RIM)
+        reach = (self.largest[..., None] * np.cos(along[..., None] - sides)).max(axis=1)
+        return np.asarray(np.maximum(reach, 0.0) / self.maximum[:, None])
 
     @cached_property
     def _grid(self) -> tuple[Array, Array, Array, Array, Array]:

@@ -3,6 +3,7 @@
 A fin that may turn a full circle pushes anywhere within a disc whose radius is its largest thrust. A fin with
 stops pushes within a sector of that disc. A sector wider than half a turn is not convex: here it stands for
 its convex hull, the disc cut off along the chord between the stops, unless `convex_parts` has cut it in two.
+Where a fin pushes harder in some directions than in others, the disc is cut down to its convex hull, too.
 Every fin may rest: the tiny thrust that it cannot go below is left out.
 
 Wrenches are scaled: torques are divided by `LEVER`, so that all six entries are in newton.
@@ -17,10 +18,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.forces.envelopes import largest_forces
+from finlab.forces.envelopes import layout_envelopes
 from finlab.layout import Layout
-from finlab.layout.angles import is_full_turn, wrapped
+from finlab.layout.angles import wrapped
 from finlab.layout.arrays import force_columns
+from finlab.physics.objective import Objective
 
 Array = NDArray[np.float64]
 
@@ -45,10 +47,14 @@ class FinSets(NamedTuple):
     """Middle of the arc of zero directions (R, n) [rad]."""
     half: Array
     """Half of the arc (R, n) [rad]; pi for a full circle."""
+    rim: Array | None = None
+    """How far the sets reach along M evenly spaced directions (R, n, M), the first at zero, as shares of the
+    radius; None where every fin is the same all round."""
 
     def take(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> FinSets:
         """Returns some of the robots, in the order asked for, repeated where asked for twice."""
-        return FinSets(*(field[rows] for field in self))
+        known = FinSets(*(field[rows] for field in self[:4]))
+        return known if self.rim is None else known._replace(rim=self.rim[rows])
 
     def repeat(self, times: int) -> FinSets:
         """Returns each robot several times, side by side."""
@@ -82,8 +88,12 @@ class FinSets(NamedTuple):
         share = np.cos(angle - held)
         thrust = np.where(share > 1e-12, self.radius, 0.0)
         direction = self.middle + held
+        reach = thrust * share
+        if self.rim is not None:
+            support, inside = _along_rim(self.rim, self.middle + angle, direction)
+            reach, thrust = np.minimum(reach, self.radius * support), thrust * inside
         force = thrust[..., None] * np.stack([np.cos(direction), np.sin(direction)], axis=-1)
-        return (thrust * size * share).sum(-1), force
+        return (reach * size).sum(-1), force
 
     def full_columns(self) -> Array:
         """Returns the scaled wrenches (R, 2n, m) of each fin's largest thrust along both axes of its plane.
@@ -108,20 +118,34 @@ def fin_sets(layout: Layout, failed: Collection[str] = ()) -> FinSets:
     """
     lost = layout.indices(tuple(failed))
     columns = force_columns(layout.position, layout.mounting_angle)[:, 1:] / SCALE
-    radius = largest_forces(layout)
+    fins = layout_envelopes(layout, Objective())
+    radius = fins.maximum.copy()
     radius[list(lost)] = 0.0
-    lower, upper = layout.lower[:, 2], layout.upper[:, 2]
+    rim = fins.rim_shares
     return FinSets(
         np.ascontiguousarray(columns)[None],
         radius[None],
-        0.5 * (upper + lower)[None],
-        half_arcs(lower, upper)[None],
+        fins.middle[None],
+        fins.half[None],
+        None if rim is None else rim[None],
     )
 
 
-def half_arcs(lower: Array, upper: Array) -> Array:
-    """Returns half of each arc between two zero directions [rad]; pi for a full turn."""
-    return np.where(is_full_turn(upper - lower), np.pi, 0.5 * (upper - lower))
+def _along_rim(rim: Array, pull: Array, direction: Array) -> tuple[Array, Array]:
+    """How far (R, n) sets with rims (R, n, M) reach along the directions `pull` (R, n) [rad], and how far out
+    along `direction` (R, n) they end, both as shares of the radius."""
+    count = rim.shape[-1]
+    gap = 2.0 * np.pi / count
+    place = np.mod(pull, 2.0 * np.pi) / gap
+    before = np.minimum(place.astype(np.intp), count - 1)
+    here = np.take_along_axis(rim, before[..., None], axis=-1)[..., 0]
+    after = np.take_along_axis(rim, (before[..., None] + 1) % count, axis=-1)[..., 0]
+    # The corner between two sides of the polygon.
+    part = (place - before) * gap
+    support = (here * np.sin(gap - part) + after * np.sin(part)) / np.sin(gap)
+    lean = np.cos(direction[..., None] - np.arange(count) * gap)
+    ends = np.where(lean > 0.1, rim / np.where(lean > 0.1, lean, 1.0), np.inf)
+    return support, np.minimum(ends.min(-1), 1.0)
 
 
 def wide_fins(sets: FinSets) -> NDArray[np.intp]:

@@ -37,6 +37,8 @@ KEPT = 0.99
 """Share of the way to the nearest limit that a step goes at most."""
 SLACK, WEIGHT = 3.0, 10.0
 """Slack and multiplier of each limit at the outset; the latter for a wanted wrench that is not far away."""
+THINNEST = 1e-3
+"""Least distance of a polygon's side from the origin, as a share of the radius: the origin stays inside."""
 NARROWEST = 1e-6
 """Half of a sector's angle [rad] below which it has no inside: such a fin only pushes ahead."""
 
@@ -157,8 +159,22 @@ def _sides(sets: FinSets) -> tuple[Array, Array]:
     """Normals (R, K, 2, n) that point out of each sector, and how far out its sides are (R, K, n).
 
     A sector has two sides through the origin. The hull of one wider than half a turn has one, the chord
-    between its stops. Where no fin has any, K is 0.
+    between its stops. An uneven fin has those of the polygon around it. Where no fin has any, K is 0.
     """
+    normals, beyond = _stops(sets)
+    if sets.rim is None:
+        return normals, beyond
+    rows, n, count = sets.rim.shape
+    angle = 2.0 * np.pi / count * np.arange(count)
+    around = np.broadcast_to(
+        np.stack([np.cos(angle), np.sin(angle)], axis=1)[:, :, None], (rows, count, 2, n)
+    )
+    out = np.concatenate([beyond, np.maximum(sets.rim.swapaxes(1, 2), THINNEST)], axis=1)
+    return np.concatenate([normals, around], axis=1), out
+
+
+def _stops(sets: FinSets) -> tuple[Array, Array]:
+    """The sides at the fins' stops, see `_sides`."""
     circle = sets.half >= np.pi
     rows, n = sets.half.shape
     if circle.all():
@@ -244,7 +260,9 @@ def _softness(slope: Array, ratio: Array, stiff: Array) -> tuple[Array, Array, A
     a, b, d = stiff + (x * x).sum(1), (x * y).sum(1), stiff + (y * y).sum(1)
     # The determinant as a sum of squares, which rounding cannot bring to zero where two sides are close.
     determinant = stiff * (a + d - stiff)
-    if x.shape[1] > 1:
+    if x.shape[1] > 3:  # more pairs than neighbours; sides of a polygon are never close
+        determinant = np.maximum(a * d - b * b, determinant)
+    elif x.shape[1] > 1:
         cross = x * np.roll(y, 1, axis=1) - y * np.roll(x, 1, axis=1)
         determinant += (cross * cross).sum(1)
     return d / determinant, -b / determinant, a / determinant

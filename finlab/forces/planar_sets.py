@@ -7,8 +7,13 @@ from finlab.forces.force_space import PlanarProblem
 
 
 def planar_sets(problem: PlanarProblem) -> FinSets:
-    """The fins of a problem as one robot of a batch. A fin that pushes harder in some directions than in
-    others is taken for a disc of its largest force."""
-    fins = problem.fins
+    """The fins of a problem as one robot of a batch."""
+    fins, rim = problem.fins, problem.fins.rim_shares
     columns = np.stack(np.split(problem.columns, 2), axis=1)
-    return FinSets(columns[None], fins.maximum[None], fins.middle[None], fins.half[None])
+    return FinSets(
+        columns[None],
+        fins.maximum[None],
+        fins.middle[None],
+        fins.half[None],
+        None if rim is None else rim[None],
+    )
