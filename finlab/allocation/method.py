@@ -93,7 +93,7 @@ class Method(ABC):
         if not policy.is_plain and policy.kind != "direction":
             raise AllocationError(
                 f"policy: method {self.name!r} minimizes the plain error and knows neither axis weights nor "
-                "priorities; use method 'learned', or policy 'closest' or 'direction'"
+                "priorities; use method 'search', or policy 'closest' or 'direction'"
             )
 
     def insight(self, layout: Layout, wrench: ArrayLike) -> Insight | None:

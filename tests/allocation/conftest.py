@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.allocation.learned.learned_allocator import LearnedAllocator
+from finlab.allocation import load_allocator
+from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.inference.weights import TrainedWeights
 
@@ -35,6 +36,12 @@ def default_checkpoint() -> TrainedWeights:
 
 
 @pytest.fixture(scope="session")
-def learned(default_checkpoint: TrainedWeights) -> LearnedAllocator:
-    """The product's default method with the shipped checkpoint."""
-    return LearnedAllocator(default_checkpoint)
+def search() -> SearchAllocator:
+    """The product's default method."""
+    return load_allocator()
+
+
+@pytest.fixture(scope="session")
+def effort() -> SearchAllocator:
+    """The same with the paper's effort kept least."""
+    return load_allocator(objective="effort")

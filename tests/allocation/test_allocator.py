@@ -14,6 +14,7 @@ from finlab.errors import AllocationError, CommandError, LayoutError
 from finlab.inference.normalization import Normalization
 from finlab.layout import Fin, Layout
 from finlab.physics import Plant
+from finlab.physics.blade import Blade
 
 SIGMA = np.array([1.0, 2.0, 1.0, 0.5, 0.5, 0.5])
 ROBOT = Layout(
@@ -43,7 +44,7 @@ class Drawn(Allocator):
         seeds = [np.random.default_rng([seed, *np.abs(t).view(np.uint64).tolist()]) for t in targets]
         share = np.array([rng.uniform(size=(layout.n_fins, 3)) for rng in seeds])
         command = np.array([0.05, 0.1, -3.0]) + share * [0.5, 1.9, 6.0]
-        few = Candidates(command, targets * 0, np.zeros(1), np.zeros(1), ("drawn",))
+        few = Candidates(command, targets * 0, np.zeros(1), np.zeros(1), np.zeros(1), ("drawn",))
         return Solution(command, 0.5 * targets, lambda: few, None)
 
 
@@ -176,6 +177,10 @@ def test_energy_counts_the_working_fins(method: Drawn) -> None:
     for amplitude, frequency, direction in result.command[[0, 2]] / [0.6, 2.1, math.pi]:
         whole += amplitude**2 + frequency**2 + 0.1 * direction**2 + amplitude * frequency
     assert result.energy == pytest.approx(whole)
+    working = result.command[[0, 2]]
+    assert result.power == pytest.approx(Blade().power(working[:, 0], working[:, 1]).sum())
+    batch = method.allocate_batch(ROBOT, [SURGE], failed=["left"])
+    np.testing.assert_allclose([batch.power[0], batch.energy[0]], [result.power, result.energy])
 
 
 def test_a_method_without_candidates_says_so(method: Drawn) -> None:
@@ -195,7 +200,7 @@ def test_the_method_comes_first_and_the_checkpoint_by_keyword() -> None:
     for name in ("analytic", "qp"):
         assert load_allocator(name).name == name
     with pytest.raises(TypeError):
-        load_allocator("learned", "default")  # type: ignore[misc]
+        load_allocator("search", "default")  # type: ignore[misc]
 
 
 def test_the_time_is_that_of_the_solver_shared_by_its_targets(

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from finlab.allocation import load_allocator
-from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.allocation.modes import (
     ModeSignature,
     cluster,
@@ -15,6 +14,7 @@ from finlab.allocation.modes import (
     same_signature,
     signature_difference,
 )
+from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.allocation.solution import Candidates
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
@@ -27,7 +27,9 @@ PUSH, REST = (0.4, 1.5, 0.0), (0.05, 0.1, 0.0)
 def candidates(*commands: list[tuple[float, ...]]) -> Candidates:
     command = np.array(commands)
     k = len(command)
-    return Candidates(command, np.zeros((k, 6)), np.zeros(k), np.arange(1.0, k + 1), ("",) * k)
+    return Candidates(
+        command, np.zeros((k, 6)), np.zeros(k), np.arange(1.0, k + 1), np.arange(1.0, k + 1) ** 2, ("",) * k
+    )
 
 
 def test_the_same_fins_at_rest_are_the_same_mode_whatever_they_do_there() -> None:
@@ -35,7 +37,12 @@ def test_the_same_fins_at_rest_are_the_same_mode_whatever_they_do_there() -> Non
     modes = find_modes(told, LOWER, UPPER)
     assert [mode.members for mode in modes] == [(0, 1), (2,)]
     assert [mode.resting for mode in modes] == [(1,), (0,)]
-    assert modes[1].energy == 3.0 and modes[0].distance is None and modes[0].turn is None
+    assert (
+        modes[1].energy == 3.0
+        and modes[1].power == 9.0
+        and modes[0].distance is None
+        and modes[0].turn is None
+    )
 
 
 def test_angles_are_compared_the_shorter_way_round() -> None:
@@ -54,17 +61,17 @@ def test_distance_and_saturation() -> None:
     assert lost.distance is None and lost.resting == ()
 
 
-def test_modes_of_an_answer_deliver_the_wrench_in_different_ways(learned: LearnedAllocator) -> None:
+def test_modes_of_an_answer_deliver_the_wrench_in_different_ways(search: SearchAllocator) -> None:
     layout = load_layout(shipped_layouts()["penta"])
     target = np.array([1.0, 0.5, 2.0, 0.0, 0.1, 0.1])
-    before = learned.allocate(layout, 0.9 * target).command
-    result = learned.allocate(layout, target, failed=["bow"], previous=before)
+    before = search.allocate(layout, 0.9 * target).command
+    result = search.allocate(layout, target, failed=["bow"], previous=before)
     modes = result.explore()
     assert len(modes) >= 2
     np.testing.assert_array_equal(modes[0].command, result.command)
-    assert modes[0].energy == pytest.approx(result.energy)
+    assert modes[0].energy == pytest.approx(result.energy) and modes[0].power == pytest.approx(result.power)
     wrench = Plant(layout).wrench(np.array([mode.command for mode in modes]))
-    assert learned.normalization.error(wrench, target).max() < 5e-3
+    assert search.normalization.error(wrench, target).max() < 1e-3
     ways = [mode_signature(mode.command) for mode in modes]
     assert not any(same_signature(a, b) for i, a in enumerate(ways) for b in ways[:i])
     bow = layout.index("bow")

@@ -1,11 +1,10 @@
-"""A method with networks says which fins these have not learned; the others ask every fin's own model."""
+"""The paper's method says which fins its surrogate has not learned; all others ask every fin's own model."""
 
 from dataclasses import replace
 
 import pytest
 
 from finlab.allocation import METHODS
-from finlab.allocation.methods import LEARNED
 from finlab.assets import shipped_checkpoints
 from finlab.layout import FinModelSpec, Layout, load_layout
 from tests.allocation.quick import quick_allocator
@@ -27,7 +26,7 @@ def test_fins_that_no_network_learned_are_named(method: str) -> None:
     allocator = quick_allocator(method)
     wide = FinModelSpec("drag", (("area", 0.03),))
     layout = with_models(front_left=FinModelSpec("lighthill"), back_right=wide)
-    expected = ("front_left", "back_right") if method in LEARNED else ()
+    expected = ("front_left", "back_right") if method == "paper" else ()
     assert allocator.unknown_fins(layout) == expected
     assert allocator.unknown_fins(load_layout("A")) == ()
 
@@ -37,6 +36,6 @@ def test_the_note_names_the_fins_that_work(method: str) -> None:
     layout = with_models(front_left=FinModelSpec("lighthill"))
     allocator = quick_allocator(method)
     notes = allocator.allocate(layout, SURGE).notes
-    assert len(notes) == (method in LEARNED)
+    assert len(notes) == (method == "paper")
     assert all("front_left" in note and "drag" in note for note in notes)
     assert allocator.allocate(layout, SURGE, failed=["front_left"]).notes == ()

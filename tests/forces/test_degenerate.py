@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from finlab.analysis import attainable_set, authority, least_energy
-from finlab.forces.least_energy import plant_problem
+from finlab.analysis import attainable_set, authority, least_power
+from finlab.forces.fin_sets import fin_sets
 from finlab.forces.nearest import nearest, nearest_along, nearest_in_turn
 from finlab.forces.reach import axis_ranges
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
@@ -39,8 +39,8 @@ def test_every_question_has_a_finite_answer(name: str) -> None:
     assert np.isfinite([*held.largest, *held.most_negative, held.weakest, held.isotropy]).all()
     strongest = max(held.singular_values)
     assert held.gap <= 1e-6 * strongest
-    assert least_energy(layout, np.zeros((1, 6)))[0] >= 0.0
-    assert np.isnan(least_energy(layout, [[0, 0, 0, 0, 0, 1e6]], failed=layout.names[1:])).all()
+    assert least_power(layout, np.zeros((1, 6)))[0] >= 0.0
+    assert np.isnan(least_power(layout, [[0, 0, 0, 0, 0, 1e6]], failed=layout.names[1:])).all()
     low, high = axis_ranges(layout, np.zeros(6))
     assert (low <= 1e-6 * strongest).all() and (high >= -1e-6 * strongest).all()
     for alone in (True, False):
@@ -51,7 +51,7 @@ def test_every_question_has_a_finite_answer(name: str) -> None:
 @pytest.mark.parametrize("size", [0.0, 1e-9, 1.0, 1e6])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_policies_answer_whatever_is_asked(name: str, size: float) -> None:
-    sets = plant_problem(ROBOTS[name]).sets
+    sets = fin_sets(ROBOTS[name])
     target = size * np.random.default_rng(0).standard_normal(6)
     groups = [np.arange(6) < 2, np.arange(6) >= 2]
     in_turn = nearest_in_turn(sets, target, groups)

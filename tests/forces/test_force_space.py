@@ -1,146 +1,120 @@
-"""The search in force space: exact where exact is possible, inside the limits, cheaper than least squares."""
+"""The search in force space: exact where exact is possible, inside the limits, at the least cost."""
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from finlab.allocation.learned.learned_allocator import LearnedAllocator
-from finlab.allocation.learned.prepared import Prepared
-from finlab.forces.force_space import Planar, _gram, _project, descend, realize
-from finlab.layout import Layout, random_layout
+from finlab.forces.envelopes import LEAST
+from finlab.forces.force_space import RIDGE, Planar, PlanarProblem, _gram, descend, polar, realize
+from finlab.layout import Layout
+from finlab.physics import Plant
+from finlab.physics.objective import Name, Objective
+from tests.forces.conftest import SIGMA, problem_of
+from tests.random_fins import random_robot
+
+Array = NDArray[np.float64]
+LAWS = ("drag", "lighthill", "soft")
 
 
-def robots(limits: str, n_fins: int | tuple[int, int] = (2, 5)) -> list[Layout]:
+def robots(
+    limits: str, kinds: tuple[str, ...] = ("drag", "lighthill"), n_fins: int | tuple[int, int] = (2, 6)
+) -> list[Layout]:
     return [
-        random_layout(np.random.default_rng(seed), n_fins=n_fins, limits=limits)  # type: ignore[arg-type]
-        for seed in range(5000, 5012)
+        random_robot(np.random.default_rng(seed), kinds, n_fins=n_fins, limits=limits) for seed in range(10)
     ]
 
 
-def reachable(prepared: Prepared, n: int = 20) -> np.ndarray:
+def reachable(layout: Layout, n: int = 20, seed: int = 7) -> Array:
     """Normalized wrenches (n, 6) of random commands."""
-    rng = np.random.default_rng(7)
-    lower, upper = prepared.lower, prepared.upper
-    command = lower + rng.uniform(size=(n, *lower.shape)) * (upper - lower)
-    return np.asarray(prepared.commands.wrench(command))
+    plant = Plant(layout)
+    return plant.wrench(plant.sample(np.random.default_rng(seed), (n,))) / SIGMA
 
 
-def full_thrust(prepared: Prepared, rows: int) -> np.ndarray:
-    return np.tile(prepared.planar.curves.maximum, (rows, 1))
+def full(problem: PlanarProblem, rows: int) -> Array:
+    return np.tile(problem.fins.maximum, (rows, 1))
 
 
-def test_reaches_what_can_be_reached(learned: LearnedAllocator) -> None:
+def forces_of(planar: Planar) -> Array:
+    """Planar forces (R, n, 2)."""
+    unit = np.stack([np.cos(planar.direction), np.sin(planar.direction)], axis=-1)
+    return planar.size[..., None] * unit
+
+
+def wrench_of(problem: PlanarProblem, force: Array) -> Array:
+    return np.einsum("rnc,cni->ri", force, np.stack(np.split(problem.columns, 2)))
+
+
+@pytest.mark.parametrize("objective", ["power", "effort"])
+@pytest.mark.parametrize("kinds", [("drag", "lighthill"), LAWS])
+def test_reaches_what_can_be_reached(kinds: tuple[str, ...], objective: Name) -> None:
     error = []
-    for layout in robots("nominal"):
-        prepared = learned.pipeline.prepare(layout)
-        target = reachable(prepared)
-        planar = descend(prepared.planar, target, full_thrust(prepared, len(target)), 30)
+    for layout in robots("nominal", kinds):
+        problem, target = problem_of(layout, Objective(objective)), reachable(layout)
+        planar = descend(problem, target, full(problem, len(target)), 40)
         error.append(np.linalg.norm(planar.residual, axis=1))
-    assert np.quantile(np.concatenate(error), 0.95) < 1e-3
+    errors = np.concatenate(error)
+    assert np.quantile(errors, 0.9) < 1e-3
+    if objective == "power":
+        assert np.quantile(errors, 0.97) < 1e-6
+        assert "soft" in kinds or errors.max() < 1e-5
 
 
 @pytest.mark.parametrize("limits", ["nominal", "varied"])
-def test_the_residual_is_what_the_forces_leave(limits: str, learned: LearnedAllocator) -> None:
-    for layout in robots(limits):
-        prepared = learned.pipeline.prepare(layout)
-        target = reachable(prepared)
-        planar = descend(prepared.planar, target, full_thrust(prepared, len(target)), 6)
-        unit = np.stack([np.cos(planar.direction), np.sin(planar.direction)], axis=-1)
-        given = np.einsum("rnc,nci->ri", planar.thrust[..., None] * unit, prepared.planar.columns)
-        np.testing.assert_allclose(planar.residual, target - given, atol=1e-7)
+def test_the_residual_is_what_the_forces_leave(limits: str) -> None:
+    for layout in robots(limits, LAWS):
+        problem, target = problem_of(layout), reachable(layout)
+        planar = descend(problem, target, full(problem, len(target)), 6)
+        np.testing.assert_allclose(planar.residual, target - wrench_of(problem, forces_of(planar)), atol=1e-9)
 
 
+@pytest.mark.parametrize("objective", ["power", "effort"])
 @pytest.mark.parametrize("scale", [0.0, 1.0, 50.0])
 @pytest.mark.parametrize("limits", ["nominal", "varied"])
-def test_forces_keep_the_limits_wherever_the_target_lies(
-    limits: str, scale: float, learned: LearnedAllocator
-) -> None:
-    for layout in robots(limits):
-        prepared = learned.pipeline.prepare(layout)
-        problem = prepared.planar
-        target = scale * reachable(prepared)
-        planar = descend(problem, target, full_thrust(prepared, len(target)), 6)
-        assert (planar.thrust >= problem.curves.minimum).all()
-        assert (planar.thrust <= problem.curves.maximum).all()
-        command, energy = realize(problem, planar)
-        assert np.isfinite(command).all() and np.isfinite(energy).all()
-        turned = np.remainder(command[..., 2] - problem.middle + np.pi, 2 * np.pi) - np.pi
-        assert (np.abs(turned) <= problem.half + 1e-9).all()
-        assert (command[..., :2] >= prepared.lower[:, :2] - 1e-9).all()
-        assert (command[..., :2] <= prepared.upper[:, :2] + 1e-9).all()
+def test_forces_keep_the_limits_wherever_the_target_lies(limits: str, scale: float, objective: Name) -> None:
+    for layout in robots(limits, LAWS):
+        problem = problem_of(layout, Objective(objective))
+        target = scale * reachable(layout)
+        planar = descend(problem, target, full(problem, len(target)), 6)
+        rim = problem.fins.rim(planar.direction)
+        assert (planar.size >= rim.smallest - 1e-12).all() and (planar.size <= rim.largest + 1e-12).all()
+        command, cost = realize(problem, planar)
+        assert np.isfinite(command).all() and np.isfinite(cost).all()
+        turned = np.remainder(planar.direction - problem.fins.middle + np.pi, 2 * np.pi) - np.pi
+        assert (np.abs(turned) <= problem.fins.half + 1e-9).all()
+        assert (command[..., :2] >= layout.lower[:, :2] - 1e-9).all()
+        assert (command[..., :2] <= layout.upper[:, :2] + 1e-9).all()
 
 
-def test_is_cheaper_than_the_pseudo_inverse(learned: LearnedAllocator) -> None:
+def test_is_cheaper_than_the_pseudo_inverse() -> None:
     ratio = []
     for layout in robots("nominal", n_fins=(4, 5)):
-        prepared = learned.pipeline.prepare(layout)
-        problem = prepared.planar
-        target = 0.5 * reachable(prepared)
-        columns = problem.columns.reshape(-1, 6)
-        force = (target @ np.linalg.pinv(columns)).reshape(len(target), -1, 2)
-        thrust = np.linalg.norm(force, axis=-1)
-        left = target - force.reshape(len(target), -1) @ columns
-        least_squares = Planar(thrust, np.arctan2(force[..., 1], force[..., 0]), left)
-        planar = descend(problem, target, thrust, 10)
-        inside = ((thrust >= problem.curves.minimum) & (thrust <= problem.curves.maximum)).all(1)
-        exact = np.linalg.norm(planar.residual, axis=1) < 1e-3
-        change = realize(problem, planar)[1] / realize(problem, least_squares)[1]
-        ratio.append(change[inside & exact])
+        for aim, most in ((Objective("power"), 1.004), (Objective("effort"), 1.02)):
+            problem = problem_of(layout, aim)
+            target = 0.5 * reachable(layout)
+            columns = np.stack(np.split(problem.columns, 2), axis=1).reshape(-1, 6)
+            force = (target @ np.linalg.pinv(columns)).reshape(len(target), -1, 2)
+            size = np.linalg.norm(force, axis=-1)
+            planar = descend(problem, target, size, 30)
+            inside = ((size >= problem.fins.minimum) & (size <= problem.fins.maximum)).all(1)
+            exact = np.linalg.norm(planar.residual, axis=1) < 1e-4
+            assert exact[inside].mean() > 0.9
+            change = realize(problem, planar)[1] / realize(problem, polar(problem, force))[1]
+            assert change[inside & exact].max() < most
+            ratio.append(change[inside & exact])
     ratios = np.concatenate(ratio)
-    assert len(ratios) > 100
-    assert ratios.max() < 1.02 and ratios.mean() < 0.9
+    assert len(ratios) > 200 and ratios.mean() < 0.95
 
 
-def test_resting_fins_point_where_it_costs_least(learned: LearnedAllocator) -> None:
-    prepared = learned.pipeline.prepare(robots("varied")[0])
-    low = prepared.planar.curves.minimum[None]
-    command, _ = realize(prepared.planar, Planar(low, np.full_like(low, 1.0), np.zeros((1, 6))))
-    expected = np.clip(0.0, prepared.lower[:, 2], prepared.upper[:, 2])
-    np.testing.assert_allclose(command[0, :, 2], expected)
-
-
-@pytest.mark.parametrize("limits", ["nominal", "varied"])
-def test_the_projection_is_the_nearest_force_and_knows_its_slope(
-    limits: str, learned: LearnedAllocator
-) -> None:
-    rng = np.random.default_rng(1)
-    for layout in robots(limits)[:6]:
-        planar = learned.pipeline.prepare(layout).planar
-        low, high = planar.curves.minimum, planar.curves.maximum
-        wanted = rng.standard_normal((30, len(high), 2)) * high[:, None]
-        target = rng.standard_normal((30, 6))
-        found, slope = _project(planar, wanted, target)
-        unit = np.stack([np.cos(found.direction), np.sin(found.direction)], axis=-1)
-        force = unit * found.thrust[..., None]
-        given = np.einsum("rnd,ndi->ri", force, planar.columns)
-        np.testing.assert_allclose(found.residual, target - given, atol=1e-9)
-        # No force that the fin can give is nearer; where the arc is not convex, none along its ends and rays.
-        share = np.linspace(0.0, 1.0, 21)
-        angle = planar.middle + (2 * share[:, None] - 1) * np.minimum(planar.half, np.pi)
-        size = low + share[:, None] * (high - low)
-        for i in range(len(high)):
-            grid = np.array([[s * np.cos(a), s * np.sin(a)] for s in size[:, i] for a in angle[:, i]])
-            least = np.linalg.norm(wanted[:, i, None] - grid, axis=-1).min(axis=1)
-            assert (np.linalg.norm(wanted[:, i] - force[:, i], axis=-1) <= least + 1e-6 + low[i]).all()
-        for k in range(2):
-            step = np.zeros(2)
-            step[k] = 1e-6
-            ahead, behind = (_project(planar, wanted + sign * step, target)[0] for sign in (1.0, -1.0))
-            moved = [
-                f.thrust[..., None] * np.stack([np.cos(f.direction), np.sin(f.direction)], axis=-1)
-                for f in (ahead, behind)
-            ]
-            difference = (moved[0] - moved[1]) / 2e-6
-            close = np.isclose(slope[..., k], difference, atol=1e-3).all(axis=-1)
-            assert close.mean() > 0.98  # but for the few that stand at a kink
-
-
-def test_systems_are_sums_over_fins(learned: LearnedAllocator) -> None:
-    planar = learned.pipeline.prepare(robots("varied", 4)[0]).planar
+def test_systems_are_sums_over_fins() -> None:
+    problem = problem_of(robots("varied", n_fins=4)[0])
     rng = np.random.default_rng(2)
-    weight, slope = rng.random((5, 4)), rng.standard_normal((5, 4, 2, 2))
-    whole, bent = _gram(planar, weight), _gram(planar, weight, slope)
+    mobility = rng.random((5, 3, 4))
+    gram = _gram(problem, mobility).reshape(5, 6, 6)
+    columns = np.stack(np.split(problem.columns, 2), axis=1)
     for row in range(5):
-        parts = [weight[row, i] * planar.columns[i].T @ planar.columns[i] for i in range(4)]
-        np.testing.assert_allclose(whole[row], sum(parts), rtol=1e-6, atol=1e-7)
-        parts = [weight[row, i] * planar.columns[i].T @ slope[row, i] @ planar.columns[i] for i in range(4)]
-        np.testing.assert_allclose(bent[row], sum(parts), rtol=1e-6, atol=1e-7)
+        whole = np.zeros((6, 6))
+        for i in range(4):
+            a, b, c = mobility[row, :, i]
+            whole += columns[i].T @ np.array([[a, b], [b, c]]) @ columns[i]
+        whole += (RIDGE * np.trace(whole) + LEAST) * np.eye(6)
+        np.testing.assert_allclose(gram[row], whole, rtol=1e-9, atol=1e-12)

@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from finlab.forces import attainable, least_energy, small_systems
+from finlab.forces import attainable, small_systems
 from finlab.forces.attainable import MAX_ROUNDS, N_DIRECTIONS, attainable_set
 from finlab.forces.fin_sets import FinSets
-from finlab.forces.interior_point import minimize
 from finlab.forces.nearest import nearest_in_turn
-from finlab.forces.reach import COARSE, FINE
-from finlab.forces.thrust_curve import plant_curves
 from finlab.layout import Fin, Layout, Limits
+from tests.forces.conftest import THRUST
 
 Array = NDArray[np.float64]
 Layouts = Callable[[str], Layout]
@@ -61,60 +59,13 @@ def test_three_groups_out_of_reach_are_served_one_by_one() -> None:
     assert served.wrench[0, 2] == pytest.approx(served.wrench[0, 3], abs=1e-6)
 
 
-def test_starts_by_hand() -> None:
-    radius = np.array([1.0, 2.0, 4.0])
-    seeds = least_energy.starts(radius, 4000)
-    rest = least_energy.RESTING
-    assert len(seeds) == 1 + 3 + 3 + 4000
-    at_rest = [[]] + [[i] for i in range(3)] + [[0, 1], [0, 2], [1, 2]]
-    for row, fins in zip(seeds, at_rest, strict=False):
-        expected = radius.copy()
-        expected[fins] *= rest
-        assert row == pytest.approx(expected)
-    drawn = seeds[7:] / radius
-    assert (drawn >= 0.0).all() and (drawn <= 1.0).all()
-    # Squares of what is evenly spread: weak thrusts are tried more often.
-    quartiles = np.quantile(drawn, [0.25, 0.5, 0.75], axis=0)
-    assert quartiles == pytest.approx(np.array([[1 / 16, 1 / 4, 9 / 16]] * 3).T, abs=0.03)
-    assert (least_energy.starts(radius, 4000) == seeds).all()
-    assert len(least_energy.starts(radius, 0, most_resting=1)) == 4
-
-
-def test_the_cost_is_touched_twice_coarsely_then_once_exactly(
-    shipped: Layouts, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    gaps: list[float] = []
-
-    def spy(sets: FinSets, wanted: Array, c: Array, bend: Array, gap: float) -> Any:
-        gaps.append(gap)
-        return minimize(sets, wanted, c, bend, gap)
-
-    monkeypatch.setattr(least_energy, "minimize", spy)
-    assert np.isfinite(least_energy.least_energy(shipped("A"), [[1.0, 0.0, 0.5, 0.0, 0.0, 0.0]])).all()
-    assert gaps == [COARSE, COARSE, FINE]
-
-
-def test_least_energy_of_what_no_fin_is_left_for(shipped: Layouts) -> None:
-    layout = shipped("A")
-    energy = least_energy.least_energy(layout, [np.zeros(6), np.eye(6)[0]], failed=layout.names)
-    assert energy[0] == 0.0 and np.isnan(energy[1])
-
-
-def test_within_reach_ends_at_the_edge() -> None:
-    sets = planar(axes_of((0, 1)), np.array([2.0]))
-    shares = np.array([0.0, 0.5, 0.999, 1.001, 2.0])
-    target = np.outer(shares * 2.0, [0.6, 0.8, 0.0, 0.0, 0.0, 0.0])
-    assert least_energy.within_reach(sets.tile(5), target).tolist() == [True, True, True, False, False]
-
-
 @pytest.mark.parametrize("arc", [(-2.0, 2.0), (-1.5, 1.5), (-np.pi, np.pi)])
 def test_one_wide_arc_makes_a_set_a_hull(arc: tuple[float, float]) -> None:
     layout = Layout("one", (Fin("a", (0.2, 0.1, 0.0), 0.7, Limits(zero_direction=arc)),))
     body = attainable_set(layout, "force", alone=False)
     assert body.hull is (arc[0] == -2.0)
     assert body.dimension == 2
-    most = plant_curves(layout).maximum[0]
-    assert np.linalg.norm(body.vertices, axis=1).max() == pytest.approx(most, rel=1e-9)
+    assert np.linalg.norm(body.vertices, axis=1).max() == pytest.approx(THRUST, rel=1e-9)
 
 
 def test_directions_are_added_a_limited_number_of_times(

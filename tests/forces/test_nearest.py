@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.assets import shipped_layouts
 from finlab.forces.force_space import PlanarProblem
 from finlab.forces.nearest import nearest, nearest_along, nearest_in_turn
+from finlab.forces.planar_sets import planar_sets
 from finlab.layout import load_layout, random_layout
+from tests.forces.conftest import problem_of
 
 GROUPS = [
     np.array([False, False, True, False, False, False]),
@@ -16,82 +17,91 @@ GROUPS = [
 ]
 
 
-def problem(learned: LearnedAllocator, seed: int, limits: str) -> tuple[PlanarProblem, np.ndarray]:
+def drawn(seed: int, limits: str) -> tuple[PlanarProblem, np.ndarray]:
     """A layout in force space and a wrench that is mostly out of its reach, normalized."""
     rng = np.random.default_rng(seed)
     layout = random_layout(rng, n_fins=int(rng.integers(2, 8)), limits=limits)  # type: ignore[arg-type]
-    return learned.pipeline.prepare(layout).planar, rng.standard_normal(6) * rng.choice([0.5, 3.0, 8.0])
+    return problem_of(layout), rng.standard_normal(6) * rng.choice([0.5, 3.0, 8.0])
+
+
+def paired(planar: PlanarProblem) -> np.ndarray:
+    """Normalized wrench per newton (n, 2, 6) of each fin's horizontal and vertical force."""
+    return np.stack(np.split(planar.columns, 2), axis=1)
 
 
 def farthest(planar: PlanarProblem, pull: np.ndarray) -> float:
     """How far the fins can push along pulls (n, 2), sectors wider than half a turn taken whole."""
-    angle = np.arctan2(pull[:, 1], pull[:, 0]) - planar.middle
-    excess = np.abs((angle + np.pi) % (2 * np.pi) - np.pi) - planar.half
+    angle = np.arctan2(pull[:, 1], pull[:, 0]) - planar.fins.middle
+    excess = np.abs((angle + np.pi) % (2 * np.pi) - np.pi) - planar.fins.half
     share = np.where(excess > 0.0, np.maximum(np.cos(np.minimum(excess, np.pi / 2)), 0.0), 1.0)
-    return float((planar.curves.maximum * np.linalg.norm(pull, axis=1) * share).sum())
+    return float((planar.fins.maximum * np.linalg.norm(pull, axis=1) * share).sum())
 
 
 @pytest.mark.parametrize("limits", ["nominal", "varied"])
-def test_no_wrench_within_reach_is_nearer(learned: LearnedAllocator, limits: str) -> None:
+def test_no_wrench_within_reach_is_nearer(limits: str) -> None:
     proven = 0
     for seed in range(5000, 5020):
-        planar, target = problem(learned, seed, limits)
-        found = nearest(planar.sets, target[None])
-        assert (np.linalg.norm(found.force[0], axis=1) <= planar.curves.maximum * (1 + 1e-9)).all()
+        planar, target = drawn(seed, limits)
+        found = nearest(planar_sets(planar), target[None])
+        assert (np.linalg.norm(found.force[0], axis=1) <= planar.fins.maximum * (1 + 1e-9)).all()
         missing = target - found.wrench[0]
         # The plane across what is missing separates the target from all that the fins can do.
-        gap = farthest(planar, planar.columns @ missing) - missing @ found.wrench[0]
-        convex = ((planar.half <= np.pi / 2) | (planar.half > 3.14)).all()
+        gap = farthest(planar, paired(planar) @ missing) - missing @ found.wrench[0]
+        convex = ((planar.fins.half <= np.pi / 2) | (planar.fins.half > 3.14)).all()
         if convex:
             assert abs(gap) < 1e-3 * (1.0 + missing @ missing)
             proven += 1
     assert proven >= 8
 
 
-def test_many_targets_are_answered_like_single_ones(learned: LearnedAllocator) -> None:
-    planar, target = problem(learned, 5003, "varied")
-    many = nearest(planar.sets, np.stack([target, -target, 0.1 * target]))
+def test_many_targets_are_answered_like_single_ones() -> None:
+    planar, target = drawn(5003, "varied")
+    many = nearest(planar_sets(planar), np.stack([target, -target, 0.1 * target]))
     for row, wanted in enumerate((target, -target, 0.1 * target)):
-        np.testing.assert_allclose(many.wrench[row], nearest(planar.sets, wanted[None]).wrench[0], atol=1e-4)
+        np.testing.assert_allclose(
+            many.wrench[row], nearest(planar_sets(planar), wanted[None]).wrench[0], atol=1e-4
+        )
 
 
-def test_an_axis_that_is_ignored_costs_nothing(learned: LearnedAllocator) -> None:
-    planar = learned.pipeline.prepare(load_layout(shipped_layouts()["A"])).planar
+def test_an_axis_that_is_ignored_costs_nothing() -> None:
+    planar = problem_of(load_layout(shipped_layouts()["A"]))
     target = np.array([30.0, 0.0, 30.0, 0.0, 0.0, 0.0])
-    heave = nearest(planar.sets, target[None], np.array([np.inf, np.inf, 1.0, np.inf, np.inf, np.inf]))
-    both = nearest(planar.sets, target[None])
+    heave = nearest(
+        planar_sets(planar), target[None], np.array([np.inf, np.inf, 1.0, np.inf, np.inf, np.inf])
+    )
+    both = nearest(planar_sets(planar), target[None])
     assert heave.wrench[0, 2] > both.wrench[0, 2] + 0.1
 
 
 @pytest.mark.parametrize("limits", ["nominal", "varied"])
-def test_groups_are_served_strictly_in_order(learned: LearnedAllocator, limits: str) -> None:
+def test_groups_are_served_strictly_in_order(limits: str) -> None:
     for seed in range(5020, 5035):
-        planar, target = problem(learned, seed, limits)
-        first = nearest(planar.sets, target[None], np.where(GROUPS[0], 1.0, np.inf)).wrench[0]
-        served = nearest_in_turn(planar.sets, target, GROUPS).wrench[0]
+        planar, target = drawn(seed, limits)
+        first = nearest(planar_sets(planar), target[None], np.where(GROUPS[0], 1.0, np.inf)).wrench[0]
+        served = nearest_in_turn(planar_sets(planar), target, GROUPS).wrench[0]
         assert abs(served[2] - target[2]) < abs(first[2] - target[2]) + 2e-3
 
 
 @pytest.mark.parametrize("limits", ["nominal", "varied"])
-def test_the_direction_is_kept_and_no_more_can_be_had(learned: LearnedAllocator, limits: str) -> None:
+def test_the_direction_is_kept_and_no_more_can_be_had(limits: str) -> None:
     out_of_reach = 0
     for seed in range(5040, 5055):
-        planar, target = problem(learned, seed, limits)
-        wrench = nearest_along(planar.sets, target).wrench[0]
+        planar, target = drawn(seed, limits)
+        wrench = nearest_along(planar_sets(planar), target).wrench[0]
         share = float(wrench @ target / (target @ target))
         assert -1e-6 <= share <= 1.0 + 1e-6
         assert np.linalg.norm(wrench - share * target) < 2e-3
         if share < 0.99:
             out_of_reach += 1
             beyond = (share + 0.01) * target
-            assert np.linalg.norm(nearest(planar.sets, beyond[None]).wrench[0] - beyond) > 1e-4
+            assert np.linalg.norm(nearest(planar_sets(planar), beyond[None]).wrench[0] - beyond) > 1e-4
     assert out_of_reach >= 4
 
 
-def test_a_general_solver_finds_nothing_nearer(learned: LearnedAllocator) -> None:
-    planar = learned.pipeline.prepare(load_layout(shipped_layouts()["penta"])).planar
+def test_a_general_solver_finds_nothing_nearer() -> None:
+    planar = problem_of(load_layout(shipped_layouts()["penta"]))
     target = 4.0 * np.array([6.0, -4.0, 5.0, 1.0, 2.0, -3.0])
-    columns, top = planar.columns.reshape(-1, 6), planar.curves.maximum
+    columns, top = paired(planar).reshape(-1, 6), planar.fins.maximum
     found = minimize(
         lambda y: 0.5 * ((y @ columns - target) ** 2).sum(),
         np.zeros(len(columns)),
@@ -100,22 +110,22 @@ def test_a_general_solver_finds_nothing_nearer(learned: LearnedAllocator) -> Non
         method="SLSQP",
         options={"maxiter": 300, "ftol": 1e-12},
     )
-    mine = 0.5 * ((nearest(planar.sets, target[None]).wrench[0] - target) ** 2).sum()
+    mine = 0.5 * ((nearest(planar_sets(planar), target[None]).wrench[0] - target) ** 2).sum()
     assert mine == pytest.approx(found.fun, rel=1e-5)
 
 
-def test_where_forces_are_unique_the_weakest_fin_sets_the_share(learned: LearnedAllocator) -> None:
+def test_where_forces_are_unique_the_weakest_fin_sets_the_share() -> None:
     """Three fins span all six axes: the share of a target is what the most loaded of them can give."""
     checked = 0
     for seed in range(5100, 5140):
         rng = np.random.default_rng(seed)
-        planar = learned.pipeline.prepare(random_layout(rng, n_fins=3)).planar
+        planar = problem_of(random_layout(rng, n_fins=3))
         target = rng.standard_normal(6) * 6.0
-        flat = planar.columns.reshape(6, 6)
+        flat = paired(planar).reshape(6, 6)
         if np.linalg.cond(flat) > 50.0:
             continue
-        load = np.linalg.norm(np.linalg.solve(flat.T, target).reshape(3, 2), axis=1) / planar.curves.maximum
-        found = nearest_along(planar.sets, target).wrench[0]
+        load = np.linalg.norm(np.linalg.solve(flat.T, target).reshape(3, 2), axis=1) / planar.fins.maximum
+        found = nearest_along(planar_sets(planar), target).wrench[0]
         np.testing.assert_allclose(found, target * min(1.0, 1.0 / load.max()), atol=1e-4)
         checked += 1
     assert checked > 20

@@ -1,8 +1,5 @@
 """The parts of the search in force space, hulls and extents, each against values worked out by hand."""
 
-from types import SimpleNamespace
-from typing import Any
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -10,22 +7,13 @@ from numpy.typing import NDArray
 from finlab.forces import extent
 from finlab.forces.attainable import hull_of
 from finlab.forces.extent import singular_values, strongest, weakest
-from finlab.forces.fin_sets import HALF_TURN_TOLERANCE, SCALE, FinSets, half_arcs, wide_fins
-from finlab.forces.force_space import (
-    REST,
-    RIDGE,
-    PlanarProblem,
-    _share_mobility,
-    free_terms,
-    mobility,
-    planar_problem,
-    polar,
-    realize,
-)
+from finlab.forces.fin_sets import HALF_TURN_TOLERANCE, FinSets, half_arcs, wide_fins
+from finlab.forces.force_space import IDLE, REST, PlanarProblem, polar, realize
 from finlab.forces.reach import Largest, max_wrench_along
-from finlab.forces.thrust_curve import plant_curves
 from finlab.layout import Fin, Layout, Limits
-from finlab.physics.energy import EnergyWeights, command_energy
+from finlab.physics import Plant
+from finlab.physics.objective import Name, Objective
+from tests.forces.conftest import SIGMA, problem_of
 
 Array = NDArray[np.float64]
 
@@ -40,9 +28,8 @@ def layout_of(*arcs: tuple[float, float]) -> Layout:
     )
 
 
-def problem(*arcs: tuple[float, float], weights: EnergyWeights | None = None) -> PlanarProblem:
-    layout = layout_of(*arcs)
-    return planar_problem(layout, plant_curves(layout), SCALE, weights or EnergyWeights())
+def problem(*arcs: tuple[float, float], objective: Name = "effort") -> PlanarProblem:
+    return problem_of(layout_of(*arcs), Objective(objective))
 
 
 def test_half_of_an_arc_and_which_are_wide() -> None:
@@ -57,65 +44,53 @@ def test_half_of_an_arc_and_which_are_wide() -> None:
 
 def test_a_problem_by_hand() -> None:
     made = problem((-1.0, 2.0), (0.5, 4.0), (-np.pi, np.pi), (-2.0, -0.5))
-    assert made.middle == pytest.approx([0.5, 2.25, 0.0, -1.25])
-    assert made.half == pytest.approx([1.5, 1.75, np.pi, 0.75])
+    assert made.fins.middle == pytest.approx([0.5, 2.25, 0.0, -1.25])
+    assert made.fins.half == pytest.approx([1.5, 1.75, np.pi, 0.75])
     assert made.idle_direction == pytest.approx([0.0, 0.5, 0.0, -0.5])
     assert made.direction_cost == pytest.approx([0.1 / 4.0, 0.1 / 16.0, 0.1 / np.pi**2, 0.1 / 0.25])
-    assert not made.turns_fully and made.growth == 0.5
-    assert problem((-np.pi, np.pi)).turns_fully
-    assert problem((-1.0, 1.0), weights=EnergyWeights(inertial=1.0)).growth == 1.5
+    assert not made.fins.turns_fully and not made.turning_is_free
+    free = problem((-1.0, 2.0), objective="power")
+    assert free.turning_is_free and free.direction_cost == pytest.approx([0.0])
+    assert problem((-np.pi, np.pi)).fins.turns_fully
     # One newton ahead of the first fin: +y and, 0.2 m in front and 0.05 m above, torques -0.05 and 0.2.
-    assert made.columns[0, 0] == pytest.approx([0.0, 1.0, 0.0, -0.25, 0.0, 1.0])
-    assert made.columns[0, 1] == pytest.approx([0.0, 0.0, 1.0, 0.0, -1.0, 0.0])
-    outer = made.columns[1, 0][:, None] * made.columns[1, 1]
-    assert made.products[1, 0, 1] == pytest.approx(outer)
-
-
-def test_free_terms_are_sums_of_squares() -> None:
-    columns, top = np.random.default_rng(0).standard_normal((3, 2, 6)), np.array([1.0, 2.0, 0.5])
-    gram, full = free_terms(columns, top)
-    for i in range(3):
-        square = top[i] ** 2 * columns[i].T @ columns[i]
-        assert gram[i].reshape(6, 6) == pytest.approx(
-            square + RIDGE * np.trace(square) * np.eye(6), rel=1e-13
-        )
-        assert full[[i, 3 + i]] == pytest.approx(top[i] * columns[i])
-
-
-def test_mobility_is_thrust_over_the_slope_of_its_cost() -> None:
-    made = problem((-1.0, 1.0), (-1.0, 1.0))
-    top = made.curves.maximum
-    thrust = np.array([[0.04, 0.25], [1.0, 0.0], [0.0, 1e-7]]) * top
-    share = np.maximum(thrust / top, REST)
-    for growth in (0.5, 1.5, 1.2):
-        assert mobility(made._replace(growth=growth), thrust) == pytest.approx(share ** (2 - growth) * top**2)
-        assert _share_mobility(thrust / top, growth) == pytest.approx(share ** (2 - growth))
+    assert made.columns[0] * SIGMA == pytest.approx([0.0, 1.0, 0.0, -0.05, 0.0, 0.2])
+    assert made.columns[4] * SIGMA == pytest.approx([0.0, 0.0, 1.0, 0.0, -0.2, 0.0])
+    assert made.along_shaft[0] * SIGMA == pytest.approx([1.0, 0.0, 0.0, 0.0, 0.05, 0.0])
+    x, y = made.columns[1], made.columns[5]
+    products = made.products.reshape(3, 4, 6, 6)
+    assert products[0, 1] == pytest.approx(np.outer(x, x))
+    assert products[1, 1] == pytest.approx(np.outer(x, y) + np.outer(y, x))
+    assert products[2, 1] == pytest.approx(np.outer(y, y))
 
 
 def test_polar_forces_keep_their_arcs_and_limits() -> None:
+    """Across a stop nothing is given of a force but what lies along the stop."""
     made = problem((0.5, 2.5), (-np.pi, np.pi))
-    low, high = made.curves.minimum[0], made.curves.maximum[0]
+    low, high = made.fins.minimum[0], made.fins.maximum[0]
     asked = [(1.0, 0.6), (1.0, 0.2), (1.0, 3.0), (1.0, -1.5), (2 * high, 2.5), (0.5 * low, 0.5)]
-    held = [(1.0, 0.6), (1.0, 0.5), (1.0, 2.5), (1.0, 0.5), (high, 2.5), (low, 0.5)]
+    held = [(1.0, 0.6), (np.cos(0.3), 0.5), (np.cos(0.5), 2.5), (low, 0.5), (high, 2.5), (low, 0.5)]
     force = np.array([[[t * np.cos(a), t * np.sin(a)]] * 2 for t, a in asked])
     found = polar(made, force)
-    assert np.stack([found.thrust[:, 0], found.direction[:, 0]], axis=-1) == pytest.approx(np.array(held))
+    assert np.stack([found.size[:, 0], found.direction[:, 0]], axis=-1) == pytest.approx(np.array(held))
     assert found.direction[:, 1] == pytest.approx([a for _, a in asked])
+    assert found.size[:, 1] == pytest.approx([min(max(t, low), high) for t, _ in asked])
     assert np.isnan(found.residual).all()
 
 
-def test_a_fin_at_rest_points_where_it_costs_least() -> None:
-    made = problem((0.5, 2.5), (-1.0, 1.0))
-    low, high = made.curves.minimum, made.curves.maximum
-    planar: Any = SimpleNamespace(
-        thrust=np.stack([low, low * (1 + 1e-5), high]), direction=np.array([[2.0, 0.8]] * 3)
-    )
-    command, energy = realize(made, planar)
-    assert command[0, :, 2] == pytest.approx([0.5, 0.0])
-    assert command[1:, :, 2] == pytest.approx(np.array([[2.0, 0.8]] * 2))
-    assert energy == pytest.approx(
-        command_energy(command, layout_of((0.5, 2.5), (-1.0, 1.0)).upper), rel=1e-3
-    )
+@pytest.mark.parametrize("objective", ["power", "effort"])
+def test_a_fin_at_rest_points_where_it_costs_least(objective: Name) -> None:
+    """Up to a hair above the least force where turning is free, else up to a share of the largest."""
+    arcs = ((0.5, 2.5), (-1.0, 1.0))
+    made = problem(*arcs, objective=objective)
+    low, high = made.fins.minimum, made.fins.maximum
+    edge = low * (1.0 + REST) + (IDLE * high if objective == "effort" else 0.0)
+    force = np.array([[np.cos(2.0), np.sin(2.0)], [np.cos(0.8), np.sin(0.8)]])
+    sizes = np.stack([low, 0.999999 * edge, 1.000001 * edge, 0.3 * high])
+    command, cost = realize(made, polar(made, sizes[..., None] * force))
+    assert command[:2, :, 2] == pytest.approx(np.array([[0.5, 0.0]] * 2))
+    assert command[2:, :, 2] == pytest.approx(np.array([[2.0, 0.8]] * 2))
+    meter = Objective(objective).meter(Plant(layout_of(*arcs)))
+    assert cost[[0, 3]] == pytest.approx(meter(command[[0, 3]]), rel=4e-3)
 
 
 CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 2) for z in (0, 3)], dtype=float)
@@ -174,9 +149,10 @@ def test_a_fin_with_stops_ends_a_set_behind_it() -> None:
 
 def test_polar_directions_beyond_half_a_turn() -> None:
     made = problem((0.5, 4.0))
-    for asked, held in ((3.95, 3.95), (4.2, 4.0), (0.55, 0.55), (0.3, 0.5)):
+    for asked, held in ((3.95, 3.95), (4.2, 4.0), (0.55, 0.55), (0.3, 0.5), (-1.5, 4.0), (-0.6, 0.5)):
         found = polar(made, np.array([[[np.cos(asked), np.sin(asked)]]]))
-        assert found.direction == pytest.approx(held) and found.thrust == pytest.approx(1.0)
+        off = np.cos(asked - held)
+        assert found.direction == pytest.approx(held) and found.size == pytest.approx(off)
 
 
 def test_the_one_axis_that_no_fin_acts_along_is_weakest() -> None:

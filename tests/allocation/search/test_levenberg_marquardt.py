@@ -6,13 +6,13 @@ import warnings
 import numpy as np
 import pytest
 
-from finlab.allocation.learned.learned_allocator import LearnedAllocator
-from finlab.allocation.learned.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.layout import Fin, Layout, Limits, random_layout
 
 
-def problem_of(learned: LearnedAllocator, layout: Layout) -> CommandProblem:
-    return learned.pipeline.prepare(layout).commands
+def problem_of(search: SearchAllocator, layout: Layout) -> CommandProblem:
+    return search.pipeline.prepare(layout).commands
 
 
 def draw(problem: CommandProblem, rows: int, seed: int) -> np.ndarray:
@@ -47,11 +47,11 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("limits", ["nominal", "varied"])
-def test_never_makes_it_worse_and_mostly_much_better(limits: str, learned: LearnedAllocator) -> None:
+def test_never_makes_it_worse_and_mostly_much_better(limits: str, search: SearchAllocator) -> None:
     before, after = [], []
     for seed in range(5000, 5010):
         layout = random_layout(np.random.default_rng(seed), limits=limits)  # type: ignore[arg-type]
-        problem = problem_of(learned, layout)
+        problem = problem_of(search, layout)
         target, start = problem.wrench(draw(problem, 20, 1)), draw(problem, 20, 2)
         refined = refine(problem, target, start, 30)
         assert keeps_limits(problem, refined.command)
@@ -64,8 +64,8 @@ def test_never_makes_it_worse_and_mostly_much_better(limits: str, learned: Learn
     assert np.median(first) > 0.5 and (last < 0.05 * first).mean() > 0.7
 
 
-def test_finds_the_way_back_from_nearby(learned: LearnedAllocator) -> None:
-    problem = problem_of(learned, random_layout(np.random.default_rng(5003), n_fins=5))
+def test_finds_the_way_back_from_nearby(search: SearchAllocator) -> None:
+    problem = problem_of(search, random_layout(np.random.default_rng(5003), n_fins=5))
     middle = problem.lower + (0.3 + 0.4 * np.random.default_rng(0).uniform(size=(30, 5, 3))) * (
         problem.upper - problem.lower
     )
@@ -79,9 +79,9 @@ def test_finds_the_way_back_from_nearby(learned: LearnedAllocator) -> None:
 @pytest.mark.parametrize("scale", [1.0, 1e6])
 @pytest.mark.parametrize("name", list(HOSTILE))
 def test_hostile_layouts_give_numbers_inside_the_limits(
-    name: str, scale: float, learned: LearnedAllocator
+    name: str, scale: float, search: SearchAllocator
 ) -> None:
-    problem = problem_of(learned, HOSTILE[name])
+    problem = problem_of(search, HOSTILE[name])
     target = scale * np.random.default_rng(0).normal(size=(40, 6))
     starts = draw(problem, 40, 1)
     starts[0], starts[1] = problem.lower, problem.upper
@@ -91,11 +91,11 @@ def test_hostile_layouts_give_numbers_inside_the_limits(
     assert (error(problem, target, refined.command) <= error(problem, target, starts) * (1 + 1e-12)).all()
 
 
-def test_strong_fins_on_long_levers_give_numbers(learned: LearnedAllocator) -> None:
+def test_strong_fins_on_long_levers_give_numbers(search: SearchAllocator) -> None:
     """Their derivatives are large and of too low a rank: without a relative ridge a step is no number."""
     limits = Limits((0.0, 1.5), (0.0, 20.0))
     layout = Layout("far", tuple(Fin(f"f{i}", (8.0, 5.0, 1.0), 0.3 + i, limits) for i in range(3)))
-    problem = problem_of(learned, layout)
+    problem = problem_of(search, layout)
     target = 1e3 * np.random.default_rng(0).normal(size=(200, 6))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -103,25 +103,25 @@ def test_strong_fins_on_long_levers_give_numbers(learned: LearnedAllocator) -> N
     assert np.isfinite(refined.command).all() and np.isfinite(refined.error).all()
 
 
-def test_a_start_a_whole_turn_off_is_the_same_start(learned: LearnedAllocator) -> None:
+def test_a_start_a_whole_turn_off_is_the_same_start(search: SearchAllocator) -> None:
     limits = Limits(zero_direction=(0.0, 2.0 * math.pi))
-    problem = problem_of(learned, Layout("one", (Fin("a", (0.0, 0.0, 0.0), 0.0, limits),)))
+    problem = problem_of(search, Layout("one", (Fin("a", (0.0, 0.0, 0.0), 0.0, limits),)))
     start = np.array([[[0.4, 1.5, -1.0]]])
     refined = refine(problem, problem.wrench(start), start, 0)
     np.testing.assert_allclose(refined.command[0, 0], [0.4, 1.5, 2.0 * math.pi - 1.0])
     assert refined.error[0] < 1e-9
 
 
-def test_commands_without_room_stay_bit_for_bit(learned: LearnedAllocator) -> None:
-    problem = problem_of(learned, HOSTILE["no width"])
+def test_commands_without_room_stay_bit_for_bit(search: SearchAllocator) -> None:
+    problem = problem_of(search, HOSTILE["no width"])
     refined = refine(problem, np.random.default_rng(0).normal(size=(10, 6)), draw(problem, 10, 1), 10)
     assert (refined.command[:, 0] == [0.3, 1.0, 0.5]).all()
     assert (refined.command[:, 1, 1] == 2.0).all()
     assert np.ptp(refined.command[:, 1, 0]) > 0.01  # what has room moves
 
 
-def test_rows_do_not_see_each_other(learned: LearnedAllocator) -> None:
-    problem = problem_of(learned, random_layout(np.random.default_rng(5004), n_fins=4))
+def test_rows_do_not_see_each_other(search: SearchAllocator) -> None:
+    problem = problem_of(search, random_layout(np.random.default_rng(5004), n_fins=4))
     target, start = problem.wrench(draw(problem, 6, 1)), draw(problem, 6, 2)
     together = refine(problem, target, start, 8)
     for row in range(6):
@@ -129,9 +129,9 @@ def test_rows_do_not_see_each_other(learned: LearnedAllocator) -> None:
         np.testing.assert_allclose(together.error[row], alone.error[0], rtol=1e-3, atol=1e-6)
 
 
-def test_a_direction_may_cross_the_seam(learned: LearnedAllocator) -> None:
+def test_a_direction_may_cross_the_seam(search: SearchAllocator) -> None:
     # The answer lies just across +-pi from the start, and nearly a full turn away the other way round.
-    problem = problem_of(learned, Layout("one", (Fin("a", (0.0, 0.0, 0.0), 0.0),)))
+    problem = problem_of(search, Layout("one", (Fin("a", (0.0, 0.0, 0.0), 0.0),)))
     start = np.array([[[0.4, 1.5, math.pi - 0.1]]])
     target = problem.wrench(np.array([[[0.4, 1.5, -math.pi + 0.1]]]))
     refined = refine(problem, target, start, 15)
@@ -140,9 +140,9 @@ def test_a_direction_may_cross_the_seam(learned: LearnedAllocator) -> None:
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
-def test_clamp_wraps_and_clips_in_either_precision(kind: type, learned: LearnedAllocator) -> None:
+def test_clamp_wraps_and_clips_in_either_precision(kind: type, search: SearchAllocator) -> None:
     limits = Limits((0.1, 0.5), (0.2, 1.0), (0.5, 2.0))
-    problem = problem_of(learned, Layout("arc", (Fin("a", SHARED, 0.0, limits), Fin("b", (0, 0, 0), 1.0))))
+    problem = problem_of(search, Layout("arc", (Fin("a", SHARED, 0.0, limits), Fin("b", (0, 0, 0), 1.0))))
     command = np.array([[0.7, 0.0, 1.0 - 2 * math.pi], [0.3, 1.0, 7.0]], dtype=kind)
     clamped = problem.clamp(command)
     assert clamped.dtype == kind
@@ -150,11 +150,11 @@ def test_clamp_wraps_and_clips_in_either_precision(kind: type, learned: LearnedA
 
 
 @pytest.fixture
-def mixed(learned: LearnedAllocator) -> CommandProblem:
+def mixed(search: SearchAllocator) -> CommandProblem:
     """A fin that turns freely and one in an arc."""
     arc = Limits((0.1, 0.5), (0.3, 1.4), (0.3, 1.7))
     return problem_of(
-        learned,
+        search,
         Layout("two", (Fin("a", (0.2, 0.1, 0.0), 0.4), Fin("b", (-0.3, 0.2, 0.1), 2.0, limits=arc))),
     )
 

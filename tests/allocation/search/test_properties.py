@@ -1,4 +1,4 @@
-"""What holds for any layout with the shipped checkpoint: limits, symmetries, repeatability, no NaN."""
+"""What holds for any layout, whichever fins it has: limits, symmetries, repeatability, no NaN."""
 
 import math
 from dataclasses import replace
@@ -9,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from finlab.allocation import Allocation
-from finlab.allocation.learned.learned_allocator import LearnedAllocator
 from finlab.allocation.modes import mode_signature, same_signature
+from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.layout import Fin, Layout, Limits, random_layout
 from finlab.physics import Plant
 
-GOOD = 5e-3
+GOOD = 1e-5
 """Normalized error below which an answer counts as exact here."""
 SEEDS = st.integers(0, 2**32 - 1)
 LIMITS = st.sampled_from(["nominal", "varied"])
@@ -62,37 +62,37 @@ def wrapped(angle: float) -> float:
 
 @few(20)
 @given(seed=SEEDS, limits=LIMITS, size=st.sampled_from([0.0, 1e-6, 0.5, 1.0, 5.0, 1e5]))
-def test_limits_hold_to_the_last_bit(learned: LearnedAllocator, seed: int, limits: str, size: float) -> None:
+def test_limits_hold_to_the_last_bit(search: SearchAllocator, seed: int, limits: str, size: float) -> None:
     layout, target = drawn(seed, limits)
-    assert inside(layout, learned.allocate_batch(layout, [size * target, -size * target]).command[0])
-    first = learned.allocate(layout, size * target)
-    again = learned.allocate(layout, -target, previous=first.command)
+    assert inside(layout, search.allocate_batch(layout, [size * target, -size * target]).command[0])
+    first = search.allocate(layout, size * target)
+    again = search.allocate(layout, -target, previous=first.command)
     assert inside(layout, first.command) and inside(layout, again.command)
 
 
 @few(5)
 @given(seed=SEEDS, limits=LIMITS, policy=st.sampled_from(["direction", "priority"]))
-def test_limits_hold_out_of_reach(learned: LearnedAllocator, seed: int, limits: str, policy: str) -> None:
+def test_limits_hold_out_of_reach(search: SearchAllocator, seed: int, limits: str, policy: str) -> None:
     layout, target = drawn(seed, limits)
-    assert inside(layout, learned.allocate(layout, 20.0 * target, policy=policy).command)
+    assert inside(layout, search.allocate(layout, 20.0 * target, policy=policy).command)
 
 
 @few(20)
 @given(seed=SEEDS)
-def test_the_order_of_the_fins_does_not_matter(learned: LearnedAllocator, seed: int) -> None:
+def test_the_order_of_the_fins_does_not_matter(search: SearchAllocator, seed: int) -> None:
     layout, target = drawn(seed)
     order = np.random.default_rng(seed).permutation(layout.n_fins)
     shuffled = replace(layout, fins=tuple(layout.fins[i] for i in order))
-    one, other = learned.allocate(layout, target), learned.allocate(shuffled, target)
+    one, other = search.allocate(layout, target), search.allocate(shuffled, target)
     assert one.err_norm < GOOD and other.err_norm < GOOD
-    assert learned.normalization.error(one.wrench, other.wrench) < GOOD
+    assert search.normalization.error(one.wrench, other.wrench) < GOOD
     assert same_energy(one, other, 0.01)
 
 
 @few(20)
 @given(seed=SEEDS, limits=LIMITS, yaw=st.floats(-math.pi, math.pi))
 def test_a_turned_robot_gets_the_turned_answer(
-    learned: LearnedAllocator, seed: int, limits: str, yaw: float
+    search: SearchAllocator, seed: int, limits: str, yaw: float
 ) -> None:
     layout, target = drawn(seed, limits)
     c, s = math.cos(yaw), math.sin(yaw)
@@ -106,15 +106,15 @@ def test_a_turned_robot_gets_the_turned_answer(
         for fin in layout.fins
     ]
     turned = replace(layout, fins=tuple(fins))
-    one = learned.allocate(layout, target)
-    other = learned.allocate(turned, np.concatenate([rotation @ target[:3], rotation @ target[3:]]))
+    one = search.allocate(layout, target)
+    other = search.allocate(turned, np.concatenate([rotation @ target[:3], rotation @ target[3:]]))
     assert one.err_norm < GOOD and other.err_norm < GOOD
     assert same_energy(one, other, 0.02)
 
 
 @few(20)
 @given(seed=SEEDS, limits=LIMITS)
-def test_a_mirrored_robot_gets_the_mirrored_answer(learned: LearnedAllocator, seed: int, limits: str) -> None:
+def test_a_mirrored_robot_gets_the_mirrored_answer(search: SearchAllocator, seed: int, limits: str) -> None:
     layout, target = drawn(seed, limits)
     # The thrust axis e_h is mirrored, so zero directions and with them the energy stay what they are.
     fins = [
@@ -125,19 +125,19 @@ def test_a_mirrored_robot_gets_the_mirrored_answer(learned: LearnedAllocator, se
         )
         for fin in layout.fins
     ]
-    one = learned.allocate(layout, target)
-    other = learned.allocate(replace(layout, fins=tuple(fins)), MIRROR * target)
+    one = search.allocate(layout, target)
+    other = search.allocate(replace(layout, fins=tuple(fins)), MIRROR * target)
     assert one.err_norm < GOOD and other.err_norm < GOOD
     assert same_energy(one, other, 0.02)
 
 
 @few(15)
 @given(seed=SEEDS, limits=LIMITS, lost=st.integers(0, 4), policy=st.sampled_from(["closest", "priority"]))
-def test_failed_is_removed(learned: LearnedAllocator, seed: int, limits: str, lost: int, policy: str) -> None:
+def test_failed_is_removed(search: SearchAllocator, seed: int, limits: str, lost: int, policy: str) -> None:
     layout, target = drawn(seed, limits)
     name = layout.names[lost % layout.n_fins]
-    failed = learned.allocate(layout, target, failed=[name], policy=policy)
-    removed = learned.allocate(layout.without([name]), target, policy=policy)
+    failed = search.allocate(layout, target, failed=[name], policy=policy)
+    removed = search.allocate(layout.without([name]), target, policy=policy)
     alive = [i for i, fin in enumerate(layout.names) if fin != name]
     np.testing.assert_array_equal(failed.command[alive], removed.command)
     assert np.isnan(failed.command[layout.index(name)]).all()
@@ -148,18 +148,18 @@ def test_failed_is_removed(learned: LearnedAllocator, seed: int, limits: str, lo
 @few(10)
 @given(seed=SEEDS, draw=st.integers(0, 1000), scale=st.sampled_from([1.0, 10.0]))
 def test_the_same_seed_gives_the_same_answer(
-    learned: LearnedAllocator, seed: int, draw: int, scale: float
+    search: SearchAllocator, seed: int, draw: int, scale: float
 ) -> None:
     layout, target = drawn(seed)
-    first = learned.allocate(layout, scale * target, seed=draw, previous=None)
-    learned.allocate(layout, -target, seed=draw + 1, previous=first.command)
-    again = learned.allocate(layout, scale * target, seed=draw)
+    first = search.allocate(layout, scale * target, seed=draw, previous=None)
+    search.allocate(layout, -target, seed=draw + 1, previous=first.command)
+    again = search.allocate(layout, scale * target, seed=draw)
     np.testing.assert_array_equal(again.command, first.command)
 
 
 @few(15)
 @given(seed=SEEDS)
-def test_a_small_change_of_the_layout_changes_the_answer_little(learned: LearnedAllocator, seed: int) -> None:
+def test_a_small_change_of_the_layout_changes_the_answer_little(search: SearchAllocator, seed: int) -> None:
     layout, target = drawn(seed)
     rng = np.random.default_rng(seed + 1)
     fins = [
@@ -170,8 +170,10 @@ def test_a_small_change_of_the_layout_changes_the_answer_little(learned: Learned
         )
         for fin in layout.fins
     ]
-    one, other = learned.allocate(layout, target), learned.allocate(replace(layout, fins=tuple(fins)), target)
-    assert other.err_norm < GOOD and same_energy(one, other, 0.01)
+    one, other = search.allocate(layout, target), search.allocate(replace(layout, fins=tuple(fins)), target)
+    # A robot of few fins may have been moved away from the target.
+    moved = search.normalization.error(Plant(other.layout).wrench(one.command), target)
+    assert other.err_norm <= max(GOOD, moved) and same_energy(one, other, 0.01)
     if same_signature(mode_signature(one.command), mode_signature(other.command)):
         np.testing.assert_allclose(one.fin_forces, other.fin_forces, atol=0.05)
 
@@ -203,11 +205,11 @@ def degenerate_layouts(draw: st.DrawFn) -> Layout:
 @few(25)
 @given(layout=degenerate_layouts(), seed=SEEDS, size=st.sampled_from([0.0, 1.0, 10.0]))
 def test_degenerate_layouts_get_numbers_inside_the_limits(
-    learned: LearnedAllocator, layout: Layout, seed: int, size: float
+    search: SearchAllocator, layout: Layout, seed: int, size: float
 ) -> None:
     target = size * np.random.default_rng(seed).normal(size=6)
-    first = learned.allocate(layout, target)
-    again = learned.allocate(layout, -target, previous=first.command)
+    first = search.allocate(layout, target)
+    again = search.allocate(layout, -target, previous=first.command)
     for result in (first, again):
         assert inside(layout, result.command)
         assert np.isfinite(result.wrench).all() and math.isfinite(result.energy)
@@ -217,7 +219,7 @@ def test_degenerate_layouts_get_numbers_inside_the_limits(
 @few(5)
 @given(layout=degenerate_layouts(), seed=SEEDS, policy=st.sampled_from(["direction", "priority"]))
 def test_degenerate_layouts_out_of_reach(
-    learned: LearnedAllocator, layout: Layout, seed: int, policy: str
+    search: SearchAllocator, layout: Layout, seed: int, policy: str
 ) -> None:
     target = 10.0 * np.random.default_rng(seed).normal(size=6)
-    assert inside(layout, learned.allocate(layout, target, policy=policy).command)
+    assert inside(layout, search.allocate(layout, target, policy=policy).command)

@@ -1,0 +1,216 @@
+"""The default method: exact by the plant on any fin, inside limits, never NaN."""
+
+import math
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pytest
+
+from finlab.allocation import Allocator, load_allocator
+from finlab.allocation.search.search_allocator import CHUNK, SearchAllocator
+from finlab.assets import shipped_layouts
+from finlab.layout import Fin, Layout, Limits, load_layout, random_layout
+from finlab.physics import Plant
+from finlab.physics.energy import POWER_WEIGHTS, EnergyWeights
+from finlab.physics.objective import Name
+
+GOOD = 1e-5
+"""Normalized error below which an answer counts as exact, as in the search itself."""
+HEAVE = [0.0, 0.0, 2.0, 0.0, 0.0, 0.0]
+
+
+def reachable(layout: Layout, n: int, seed: int = 0) -> np.ndarray:
+    """Wrenches (n, 6) of random commands, by the plant."""
+    lower, upper = bounds(layout)
+    share = np.random.default_rng(seed).uniform(size=(n, layout.n_fins, 3))
+    return Plant(layout).wrench(lower + share * (upper - lower))
+
+
+def bounds(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
+    return (
+        layout.lower,
+        layout.upper,
+    )
+
+
+def keeps_limits(layout: Layout, command: np.ndarray) -> bool:
+    lower, upper = bounds(layout)
+    return bool(np.isfinite(command).all() and (command >= lower).all() and (command <= upper).all())
+
+
+def errors(method: Allocator, layout: Layout, targets: np.ndarray) -> np.ndarray:
+    """Normalized errors by the plant; commands must keep their limits to the last bit."""
+    command = method.allocate_batch(layout, targets).command
+    assert keeps_limits(layout, command)
+    return method.normalization.error(Plant(layout).wrench(command), targets)
+
+
+@pytest.mark.parametrize("name", list(shipped_layouts()))
+def test_exact_on_shipped_layouts(name: str, search: SearchAllocator) -> None:
+    layout = load_layout(shipped_layouts()[name])
+    assert errors(search, layout, reachable(layout, 25)).max() < GOOD
+
+
+@pytest.mark.parametrize("limits", ["nominal", "varied"])
+def test_exact_on_random_layouts(limits: str, search: SearchAllocator) -> None:
+    for seed in range(5000, 5015):
+        layout = random_layout(np.random.default_rng(seed), limits=limits)  # type: ignore[arg-type]
+        assert errors(search, layout, reachable(layout, 20, seed)).max() < GOOD, seed
+
+
+def test_exact_outside_the_training_box_and_with_more_fins(search: SearchAllocator) -> None:
+    for seed in range(5000, 5005):
+        rng = np.random.default_rng(seed)
+        wide = random_layout(rng, box=(0.45, 0.45, 0.2), outside=(0.3, 0.3, 0.1))
+        many = random_layout(rng, n_fins=(6, 8))
+        for layout in (wide, many):
+            assert errors(search, layout, reachable(layout, 10, seed)).max() < GOOD, seed
+
+
+@pytest.mark.parametrize("name", ["A", "B", "C", "D"])
+def test_exact_after_the_loss_of_any_fin(name: str, search: SearchAllocator) -> None:
+    layout = load_layout(shipped_layouts()[name])
+    for fin in layout.names:
+        for target in reachable(layout.without([fin]), 2):
+            result = search.allocate(layout, target, failed=[fin])
+            assert result.err_norm < GOOD
+            assert np.isnan(result.command[layout.index(fin)]).all()
+
+
+SHARED = (0.1, 0.05, 0.0)
+HOSTILE = {
+    "one fin": Layout("one", (Fin("a", (0.0, 0.0, 0.0), 0.0),)),
+    "two at one place": Layout("twins", (Fin("a", SHARED, 0.3), Fin("b", SHARED, 0.3))),
+    "all parallel": Layout("rake", tuple(Fin(f"f{i}", (0.1 * i, 0.0, 0.0), 0.5) for i in range(4))),
+    "no width": Layout(
+        "stiff",
+        (
+            Fin("a", (0.1, 0.0, 0.0), 0.0, Limits((0.3, 0.3), (1.0, 1.0), (0.5, 0.5))),
+            Fin("b", (-0.1, 0.0, 0.0), 1.0, Limits((0.05, 0.6), (2.0, 2.0), (-1.0, 1.0))),
+            Fin("c", (0.0, 0.1, 0.0), 2.0),
+        ),
+    ),
+    "may rest": Layout(
+        "rest", (Fin("a", SHARED, 0.0, Limits((0.0, 0.6), (0.0, 2.1))), Fin("b", (0, 0, 0), 2.0))
+    ),
+    "far out": Layout("far", (Fin("a", (10.0, 10.0, 10.0), 0.0), Fin("b", (-10.0, 0.0, 0.0), 1.0))),
+    "sixteen": Layout("many", tuple(Fin(f"f{i}", (0.1, 0.02 * i, 0.0), 0.4 * i) for i in range(16))),
+}
+
+
+@pytest.mark.parametrize("name", list(HOSTILE))
+def test_hostile_layouts_get_numbers_inside_the_limits(name: str, search: SearchAllocator) -> None:
+    layout = HOSTILE[name]
+    easy = reachable(layout, 5)
+    targets = np.concatenate([easy, -3.0 * easy, np.zeros((1, 6)), np.eye(6) * 1e6])
+    command = search.allocate_batch(layout, targets).command
+    assert keeps_limits(layout, command)
+    for target in (np.array(HEAVE), np.full(6, -1e6)):
+        assert keeps_limits(layout, search.allocate(layout, target).command)
+
+
+@pytest.mark.parametrize("name", ["one fin", "two at one place", "all parallel", "may rest", "sixteen"])
+def test_hostile_layouts_still_get_what_they_can_do(name: str, search: SearchAllocator) -> None:
+    layout = HOSTILE[name]
+    error = errors(search, layout, reachable(layout, 10))
+    assert error.max() < GOOD
+
+
+def test_what_cannot_be_done_is_done_as_far_as_possible(search: SearchAllocator) -> None:
+    result = search.allocate(HOSTILE["one fin"], [0.0, 50.0, 0.0, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(result.command[0], [0.6, 2.1, 0.0], atol=1e-2)
+    assert result.unallocated[1] > 40.0
+
+
+def test_the_same_question_gets_the_same_answer(search: SearchAllocator) -> None:
+    layout = load_layout(shipped_layouts()["A"])
+    target = reachable(layout, 1)[0]
+    first = search.allocate(layout, target, seed=3)
+    search.allocate(layout, -target, seed=9)  # what was asked in between leaves no trace
+    for other in (search, SearchAllocator(search.normalization)):
+        again = other.allocate(layout, target, seed=3)
+        np.testing.assert_array_equal(again.command, first.command)
+        assert again.candidates is not None and first.candidates is not None
+        np.testing.assert_array_equal(again.candidates.command, first.candidates.command)
+
+
+def test_many_targets_are_answered_as_well_as_one(search: SearchAllocator) -> None:
+    layout = load_layout(shipped_layouts()["A"])
+    targets = reachable(layout, CHUNK + 3)
+    batch = search.allocate_batch(layout, targets)
+    error = search.normalization.error(Plant(layout).wrench(batch.command), targets)
+    assert error.max() < GOOD
+    for row in (0, 1, CHUNK - 1, CHUNK, CHUNK + 2):  # around the seam of two chunks
+        assert search.allocate(layout, targets[row]).err_norm < GOOD
+    assert batch.wrench_surrogate is None
+
+
+def test_no_targets_get_no_answers(search: SearchAllocator) -> None:
+    assert search.allocate_batch(HOSTILE["one fin"], np.zeros((0, 6))).command.shape == (0, 1, 3)
+
+
+@pytest.mark.parametrize("objective", ["power", "effort"])
+def test_candidates_are_offered_best_first(objective: Name) -> None:
+    layout, method = load_layout(shipped_layouts()["B"]), load_allocator(objective=objective)
+    result = method.allocate(layout, reachable(layout, 1, seed=4)[0])
+    candidates = result.candidates
+    assert candidates is not None and result.samples is None
+    assert len(candidates.command) == (4 if objective == "effort" else 1)
+    np.testing.assert_array_equal(candidates.command[0], result.command)
+    exact = candidates.err_norm < GOOD
+    cost = getattr(candidates, {"power": "power", "effort": "energy"}[objective])
+    assert exact[0] and (np.diff(cost[exact]) >= 0).all()
+    assert (np.sort(exact)[::-1] == exact).all()  # the exact ones come first
+    for command, wrench, error in zip(
+        candidates.command, candidates.wrench, candidates.err_norm, strict=True
+    ):
+        assert keeps_limits(layout, command)
+        np.testing.assert_allclose(wrench, Plant(layout).wrench(command), atol=1e-12)
+        scored = method.normalization.error(wrench, result.target)
+        assert scored == pytest.approx(error, abs=1e-12)
+    rests = ["all fins", *(f"without {name}" for name in layout.names)]
+    rests += [f"without {a} and {b}" for a, b in combinations(layout.names, 2)]
+    assert set(candidates.source) <= set(rests)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"n_refined": 1},
+        {"n_refined": 50},
+        {"search_steps": 20},
+        {"refine_steps": 4},
+        {"subsets": False},
+        {"copper_loss": 0.5},
+        {"objective": "effort", "subsets": False},
+        {"objective": "effort", "n_refined": 1},
+        {"objective": "effort", "energy_weights": EnergyWeights(2.0, 1.0, 0.0, 0.5)},
+        {"objective": "effort", "energy_weights": POWER_WEIGHTS},
+    ],
+)
+def test_every_option_still_answers_exactly(options: dict[str, Any]) -> None:
+    method = load_allocator(**options)
+    layout = load_layout(shipped_layouts()["A"])
+    result = method.allocate(layout, reachable(layout, 1)[0])
+    assert result.err_norm < GOOD and keeps_limits(layout, result.command)
+    assert result.candidates is not None and len(result.candidates.command) <= options.get("n_refined", 4)
+
+
+def test_turning_the_robot_does_not_make_it_worse(search: SearchAllocator) -> None:
+    layout = load_layout(shipped_layouts()["C"])
+    yaw = 0.8
+    c, s = math.cos(yaw), math.sin(yaw)
+    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    fins = [
+        Fin(fin.name, tuple((rotation @ fin.position).tolist()), fin.mounting_angle + yaw, fin.limits)
+        for fin in layout.fins
+    ]
+    turned = Layout("turned", tuple(fins))
+    targets = reachable(layout, 10)
+    rotated = np.concatenate([targets[:, :3] @ rotation.T, targets[:, 3:] @ rotation.T], axis=1)
+    straight = search.allocate_batch(layout, targets).command
+    again = search.allocate_batch(turned, rotated).command
+    assert search.normalization.error(Plant(turned).wrench(again), rotated).max() < GOOD
+    # Forces in the fins' own frames know nothing of where forward is: the old answer serves the new robot.
+    np.testing.assert_allclose(Plant(turned).wrench(straight), rotated, atol=1e-5)

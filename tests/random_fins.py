@@ -1,0 +1,88 @@
+"""Fins that nobody has seen before: random laws as in the contract's splits, and noisy tables of them."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.layout import FinModelSpec, Layout, Limits, random_layout
+from finlab.physics import FinLaw, make_law
+
+Array = NDArray[np.float64]
+
+KINDS = ("drag", "lighthill", "soft", "table")
+
+
+def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def random_model(rng: np.random.Generator, kind: str) -> FinModelSpec:
+    """A fin of one law with a formula, its numbers spread as in the split `fins`."""
+    if kind == "drag":
+        numbers = {"area": log_uniform(rng, 0.005, 0.04), "lever": log_uniform(rng, 0.05, 0.15)}
+    elif kind == "lighthill":
+        numbers = {"length": log_uniform(rng, 0.1, 0.3), "width": log_uniform(rng, 0.05, 0.15)}
+    else:
+        spread = {"p": (1.0, 2.0), "x0": (0.6, 1.5), "q": (3.0, 6.0), "e": (0.0, 0.2), "phi_e": (-3.0, 3.0)}
+        numbers = {name: float(rng.uniform(*ends)) for name, ends in spread.items()}
+        numbers |= {"k": log_uniform(rng, 1.0, 8.0), "d": float(rng.uniform(-0.15, 0.15))}
+    return FinModelSpec(kind, tuple(sorted(numbers.items())))
+
+
+def write_fin_table(
+    path: Path,
+    law: FinLaw,
+    limits: Limits,
+    *,
+    rng: np.random.Generator | None = None,
+    noise: float = 0.0,
+    sideways: float = 0.0,
+    power: bool = False,
+    points: tuple[int, int, int] = (7, 8, 13),
+) -> FinModelSpec:
+    """A table of a law on a grid that covers the limits: with noise (a share of the largest force), a force
+    along the shaft (a share of the planar one) and a column of power."""
+    ends = zip(limits.lower, limits.upper, points, strict=True)
+    axes = [np.linspace(low, high, n) for low, high, n in ends]
+    command = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    force: Any = law.force(command) + 0.0
+    size = np.hypot(force[:, 1], force[:, 2])
+    force[:, 0] = sideways * size * np.cos(2.0 * command[:, 2])
+    if rng is not None:
+        force += noise * size.max() * rng.standard_normal(force.shape) * [0.2, 1.0, 1.0]
+        if limits.upper[2] - limits.lower[2] > 6.28:  # one turn later is the same direction
+            whole = force.reshape(*points, 3)
+            whole[:, :, -1] = whole[:, :, 0]
+    rows = np.hstack([command, force])
+    header = "A,f,phi,Fx,Fy,Fz"
+    if power:
+        rows = np.hstack([rows, 1.3 * np.asarray(law.power(command))[:, None] + 0.05])
+        header += ",P"
+    np.savetxt(path, rows, delimiter=",", header=header, comments="", fmt="%.12g")
+    return FinModelSpec("table", (("path", str(path)),))
+
+
+def random_robot(
+    rng: np.random.Generator,
+    kinds: tuple[str, ...],
+    folder: Path | None = None,
+    *,
+    n_fins: int | tuple[int, int] = (2, 5),
+    limits: Any = "nominal",
+) -> Layout:
+    """A robot whose fins are each of one of the kinds, with numbers of its own; tables go to a folder."""
+    layout = random_layout(rng, n_fins=n_fins, limits=limits)
+    fins = []
+    for fin in layout.fins:
+        kind = str(rng.choice(kinds))
+        model = random_model(rng, kind if kind != "table" else str(rng.choice(KINDS[:3])))
+        if kind == "table":
+            assert folder is not None
+            path = folder / f"{rng.integers(2**62)}.csv"
+            law = make_law(model)
+            model = write_fin_table(path, law, fin.limits, rng=rng, noise=0.03, sideways=0.1, power=True)
+        fins.append(replace(fin, model=model))
+    return replace(layout, fins=tuple(fins))
