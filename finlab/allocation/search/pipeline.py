@@ -32,6 +32,7 @@ from finlab.allocation.search.turn_limits import TURNS, force_sizes, limit_turn,
 from finlab.allocation.search.weighted_sum import minimize_weighted_sum
 from finlab.errors import AllocationError
 from finlab.forces import force_space
+from finlab.forces.branch_and_bound import bound_by_branching
 from finlab.forces.compiled_fins import CompiledFins
 from finlab.forces.cost_bound import cost_bound
 from finlab.physics.energy import EnergyMeter
@@ -154,16 +155,10 @@ class Pipeline:
         return found.with_first(answer)
 
     def bound(self, prepared: Prepared, target: Array, best: float) -> float:
-        """A lower bound on the cost of a wrench (6,) [N, N m]; `best` is that of the answer.
-
-        Raises:
-            AllocationError: the objective is not convex.
-        """
-        if not self.objective.convex:
-            raise AllocationError(
-                f"bound: there is one for objective 'power', got objective {self.objective.name!r}"
-            )
+        """A lower bound on the cost of a wrench (6,) [N, N m]; `best` is that of the answer."""
         wanted = target / self.std
+        if not self.objective.convex:
+            return bound_by_branching(prepared.planar, wanted, best).bound
         planar = force_space.descend(prepared.planar, wanted[None], prepared.seeds[:1], SEARCH.bound_steps)
         return min(cost_bound(prepared.planar, wanted, planar.multiplier[0]), best)
 

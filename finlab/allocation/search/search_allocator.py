@@ -152,10 +152,13 @@ class SearchAllocator(Allocator):
         )
 
     def bound(self, result: Allocation) -> float:
-        """A lower bound on the power [W] of any answer to the question of a result.
+        """A lower bound on the cost of any answer to the question of a result: on power [W], or effort.
+
+        Power takes milliseconds, by the convex dual; effort seconds, by branch and bound, and from seven fins
+        on little is proven. Both hold as far as the compiled fins do, to about one part in a thousand.
 
         Raises:
-            AllocationError: the objective is not convex, or the wrench is out of reach.
+            AllocationError: the wrench is out of reach, so that there is no exact answer.
         """
         if not result.reachable:
             raise AllocationError("bound: the wrench is out of reach, so no answer has a cost to bound")
