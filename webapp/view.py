@@ -8,7 +8,7 @@ import viser
 
 from webapp.page import Page, Panel
 from webapp.panels.tabs import PANEL_WIDTH, build_panels
-from webapp.session.state import AXIS_WORDS
+from webapp.session.state import AXIS_WORDS, OBJECTIVES
 from webapp.session.targets import PRESETS
 
 
@@ -57,6 +57,8 @@ def add_commands(gui: viser.GuiApi, page: Page) -> None:
         add(f"Ask for: {name}", partial(session.set_preset, name))
     for axis, word in enumerate(AXIS_WORDS):
         add(f"Ask for {word} alone", partial(session.set_only_axis, axis))
+    for objective in OBJECTIVES:
+        add(f"Keep least: {objective}", partial(session.set_setting, "objective", objective))
     add("Compare the methods", lambda: page.comparison.start(session.state))
     add("Play the refinement", page.playback.start)
     add("Stop the sweep", page.sweep.stop)

@@ -109,7 +109,7 @@ class Method(ABC):
         Raises:
             AllocationError: the method refines no candidates.
         """
-        raise AllocationError(f"method {self.name!r} refines no candidates; use method 'learned'")
+        raise AllocationError(f"method {self.name!r} refines no candidates; use method 'mdn'")
 
     def _solve_by(
         self, policy: Policy, layout: Layout, target: Array, *, seed: int, previous: Array | None

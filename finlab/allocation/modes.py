@@ -53,6 +53,8 @@ class Mode(PlainData):
     """Places of the fins that hardly push."""
     members: tuple[int, ...]
     """Places of the alternatives that do the same, best first."""
+    sources: tuple[str, ...]
+    """Where these come from, in words, each once."""
 
 
 class ModeSignature(NamedTuple):
@@ -98,6 +100,7 @@ def find_modes(
                 turn=turn,
                 resting=mode_signature(command).resting,
                 members=tuple(members),
+                sources=tuple(dict.fromkeys(candidates.source[k] for k in members)),
             )
         )
     return tuple(modes)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json as json_format
 import math
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
@@ -22,6 +22,7 @@ def allocate(
     wrench: Annotated[Wrench, arg(metavar="FX FY FZ TX TY TZ")],
     failed: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = (),
     method: Annotated[str, arg(metavar="NAME")] = "search",
+    objective: Literal["power", "effort"] | None = None,
     checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
     policy: Annotated[str, arg(metavar="NAME")] = "closest",
     axis_weights: Annotated[Wrench | None, arg(metavar="W1 ... W6")] = None,
@@ -39,7 +40,8 @@ def allocate(
         layout: layout file, layout graph file, or the name of a shipped layout.
         wrench: target in the body frame [N, N m].
         failed: name of a fin that does not work.
-        method: learned, paper, qp, sqp, analytic, multistart, trf, slsqp or ipopt.
+        method: search, mdn, paper, qp, sqp, analytic, multistart, trf, slsqp or ipopt.
+        objective: what is kept least, power in watts (the default) or the paper's effort.
         checkpoint: trained checkpoint; the shipped one of the method by default.
         policy: for a wrench out of reach: closest, direction (same direction, scaled down) or priority.
         axis_weights: for `closest`: weight of each axis of the error.
@@ -47,7 +49,7 @@ def allocate(
         health: a weak fin: share that is left of its largest amplitude and frequency, such as bow=0.5.
         stuck: a fin that no longer turns: the zero direction at which it stays [deg].
         running: a fin that no longer listens: the command that it keeps [rad, Hz, deg].
-        energy_tradeoff: for `learned` and `fast`: give up some of the wrench for energy, the least
+        energy_tradeoff: with objective effort: give up some of the wrench for it, the least
             err_norm^2 + W J_en; 0 delivers the wrench whole.
         seed: same target, layout and seed, same answer.
         json: print one JSON object instead of a table.
@@ -58,7 +60,9 @@ def allocate(
     from finlab.deploy.record import allocation_record
 
     robot = open_robot(layout)
-    options = {"energy_tradeoff": energy_tradeoff} if energy_tradeoff else {}
+    options: dict[str, Any] = {"energy_tradeoff": energy_tradeoff} if energy_tradeoff else {}
+    if objective is not None:
+        options["objective"] = objective
     allocator = load_allocator(method, checkpoint=checkpoint, **options)
     answer = policy_from(policy, axis_weights, priority)
     damage = health_from(health, stuck, running)

@@ -1,4 +1,4 @@
-"""An allocator that needs no trained network, with candidates and samples as the learned one has them."""
+"""An allocator that needs no trained network, with candidates and samples as method `mdn` has them."""
 
 from typing import Any
 
@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.multistart import Multistart
+from finlab.allocation.judging import costs
 from finlab.allocation.methods import METHODS
 from finlab.allocation.solution import Candidates, Solution
 from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
 from finlab.physics import Plant
-from finlab.physics.energy import command_energy
 
 NORMALIZATION = Normalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.3, 0.3, 0.35]))
 N_REFINED = 4
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 class StandIn(Allocator):
     """Single starts of `multistart` as candidates, noise around them as samples."""
 
-    name = "learned"
+    name = "mdn"
 
     def __init__(
         self,
@@ -33,7 +33,7 @@ class StandIn(Allocator):
         temperature: float = 0.02,
         gamma: float = 0.01,
     ) -> None:
-        """Settings as the learned method has them; the temperature widens the samples."""
+        """Settings as method `mdn` has them; the temperature widens the samples."""
         self.normalization = normalization
         self.n_candidates, self.temperature, self.gamma = n_candidates, temperature, gamma
         self._inner = Multistart(NORMALIZATION, n_candidates=2)
@@ -41,28 +41,28 @@ class StandIn(Allocator):
     def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         starts = [self._inner._solve(layout, targets, seed=seed + k, previous=None) for k in range(N_REFINED)]
         refined = np.concatenate([start.command for start in starts])
-        lower = layout.lower
-        upper = layout.upper
         rng = np.random.default_rng(seed)
-        picks = refined[rng.integers(0, N_REFINED, self.n_candidates)]
-        noise = rng.normal(size=picks.shape) * (0.05 + self.temperature) * [0.5, 1.5, 2.0]
-        samples = _ranked(layout, np.clip(picks + noise, lower, upper), targets[0], upper, "sampled")
-        candidates = _ranked(layout, refined, targets[0], upper, "refined")
+        chosen = rng.integers(0, N_REFINED, self.n_candidates)
+        noise = rng.normal(size=(self.n_candidates, layout.n_fins, 3)) * (0.05 + self.temperature)
+        sampled = np.clip(refined[chosen] + noise * [0.5, 1.5, 2.0], layout.lower, layout.upper)
+        samples = _ranked(layout, sampled, targets[0], chosen)
+        candidates = _ranked(layout, refined, targets[0], np.arange(N_REFINED))
         return Solution(candidates.command[:1], candidates=lambda: candidates, samples=lambda: samples)
 
 
-def _ranked(layout: Layout, command: Array, target: Array, upper: Array, source: str) -> Candidates:
+def _ranked(layout: Layout, command: Array, target: Array, component: NDArray[np.int64]) -> Candidates:
     wrench = Plant(layout).wrench(command)
     error = NORMALIZATION.error(wrench, target)
-    energy = command_energy(command, upper)
-    order = np.argsort(error**2 + 1e-4 * energy)
-    return Candidates(command[order], wrench[order], error[order], energy[order], (source,) * len(command))
+    effort, power = costs(layout, command)
+    order = np.argsort(error**2 + 1e-4 * effort)
+    source = tuple(f"component {k + 1}" for k in component[order].tolist())
+    return Candidates(command[order], wrench[order], error[order], effort[order], power[order], source)
 
 
-def load_stand_in(method: str = "learned", *, checkpoint: Any = None) -> Allocator:
-    """In place of `load_allocator`: `learned` is the stand-in, `slsqp` fails, all others are `multistart`."""
+def load_stand_in(method: str = "search", *, checkpoint: Any = None) -> Allocator:
+    """As `load_allocator`: `search` and `mdn` are the stand-in, `slsqp` fails, the rest is `multistart`."""
     if method == "slsqp":
         raise AllocationError("slsqp is out of order in this test")
     if method not in METHODS:
         raise AllocationError(f"method: expected one of {', '.join(METHODS)}, got {method!r}")
-    return StandIn() if method == "learned" else Multistart(NORMALIZATION)
+    return StandIn() if method in ("search", "mdn") else Multistart(NORMALIZATION)

@@ -150,8 +150,10 @@ def test_html_export_is_one_file(server: viser.ViserServer, view: View) -> None:
     until(lambda: "ucat.html" in view.client.files)
     assert b"__VISER_EMBED_DATA__" in view.client.files["ucat.html"]
     on_loop(server, lambda: view.do(view.exports.graph))
+    until(lambda: "ucat.graph.json" in view.client.files)
+    on_loop(server, lambda: view.do(view.exports.bundle))
     until(lambda: any("Not exported" in note for note in view.client.notes))
-    assert "no trained network" in view.client.notes[-1]
+    assert "cannot be exported" in view.client.notes[-1]
 
 
 def test_sharing_is_off(server: viser.ViserServer, app: App) -> None:

@@ -1,6 +1,9 @@
-"""Methods side by side, and what the network proposes."""
+"""Methods side by side, what they keep least, and what a network proposes."""
 
 import threading
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,13 +14,20 @@ from finlab.assets import shipped_checkpoints, shipped_layouts
 from finlab.errors import AllocationError
 from finlab.layout import load_layout
 from tests.webapp.loops import AtOnce
-from tests.webapp.stand_in import StandIn, load_stand_in
+from tests.webapp.stand_in import load_stand_in
 from webapp.markup.comparison import comparison_table
-from webapp.session.state import COMPARED, State
-from webapp.session.targets import PRESETS
+from webapp.markup.corner import corner
+from webapp.markup.modes import mode_plot
+from webapp.markup.proposals import proposal_discs
+from webapp.markup.snippets import command_line, export_line, python_lines
+from webapp.markup.words import source_words, three_digits
+from webapp.session.state import COMPARED, OBJECTIVES, State, knows_objective
+from webapp.session.swim_plan import SwimSettings
+from webapp.session.targets import PRESETS, full_thrust
 from webapp.tasks.background import Worker
 from webapp.tasks.comparison import Comparison
-from webapp.tasks.solver import STEPS, Solver, densities
+from webapp.tasks.mode_names import known_modes, listed_modes
+from webapp.tasks.solver import STEPS, Solver
 
 UCAT = load_layout(shipped_layouts()["ucat"])
 
@@ -38,7 +48,7 @@ def test_all_methods_answer_one_after_the_other() -> None:
 
 
 def test_a_method_that_fails_keeps_nobody_else_waiting() -> None:
-    def load(method: str = "learned", checkpoint: object = None) -> object:
+    def load(method: str = "search", checkpoint: object = None) -> object:
         return load_stand_in("slsqp" if method == "paper" else method)
 
     worker, done = Worker(), threading.Event()
@@ -50,39 +60,76 @@ def test_a_method_that_fails_keeps_nobody_else_waiting() -> None:
     assert isinstance(comparison.answers["multistart"], Allocation)
 
 
+def test_the_table_tells_what_is_kept_least() -> None:
+    answers = {method: load_stand_in(method).allocate(UCAT, PRESETS["Turn"]) for method in ("mdn", "qp")}
+    answers["search"] = load_allocator().allocate(UCAT, PRESETS["Turn"])
+    comparison: Any = SimpleNamespace(state=State(UCAT), answers=answers)
+    table = comparison_table(comparison, None, False, "here")
+    assert three_digits(answers["search"].power) in table and three_digits(answers["qp"].energy) in table
+    assert "Kept least: power; mdn and qp keep effort least" in table
+
+
 @pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
-def test_densities_of_the_shipped_network() -> None:
-    allocator, failed = load_allocator(), ("front_left",)
-    insight = allocator.insight(UCAT.without(failed), PRESETS["Turn"])
-    assert insight is not None and insight.attention.sum(axis=1) == pytest.approx(np.ones(3))
-    found = densities(insight, UCAT, failed, 0.02)
-    assert found.places[0, -1] == pytest.approx(np.degrees(0.6)) and found.places[2, 0] == pytest.approx(-180)
-    assert np.isnan(found.curves[1]).all()
-    assert found.curves[[0, 2, 3]].max(axis=-1) == pytest.approx(1.0)
-    insight = allocator.insight(UCAT, PRESETS["Turn"])
-    assert insight is not None
-    assert densities(insight, UCAT, (), 1.0).curves.mean() > densities(insight, UCAT, (), 0.0).curves.mean()
-    assert StandIn().insight(UCAT, PRESETS["Turn"]) is None
+def test_each_mode_of_mdn_tells_its_components_and_search_has_no_samples() -> None:
+    solver, state = Solver(), State(UCAT, target=PRESETS["Turn"], method="mdn")
+    reply = solver.reply(state)
+    samples, modes = reply.answer.samples, solver.modes(reply)
+    assert samples is not None and modes.of_samples is not None
+    assert modes.shown[0].mode.sources[0].startswith("component "), "the answer comes from the network"
+    led = {samples.source[k] for k in np.flatnonzero(modes.of_samples == 0)}
+    assert led and led <= set(modes.shown[0].mode.sources)
+    assert reply.attention is not None and reply.attention.weight.sum(axis=1) == pytest.approx(np.ones(4))
+    discs = proposal_discs(reply.answer, reply.modes, full_thrust(UCAT))
+    assert discs.count("<svg") == 4 and discs.count("r='2'") == 4 * len(samples)
+    searched = solver.reply(replace(state, method="search"))
+    found = solver.modes(searched)
+    assert searched.answer.samples is None and searched.attention is None and found.of_samples is None
+    assert not any(s.startswith("component") for mode, _ in found.shown for s in mode.sources)
+    assert {source_words(mode.sources).split(" ")[0] for mode, _ in found.shown} <= {"found", "from"}
+    assert proposal_discs(searched.answer, found, full_thrust(UCAT)) == ""
 
 
 @pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
 def test_refinement_makes_a_raw_candidate_exact() -> None:
-    solver, state = Solver(), State(UCAT, failed=("back_left",), target=PRESETS["Turn"])
+    solver = Solver()
+    state = State(UCAT, failed=("back_left",), target=PRESETS["Turn"], method="mdn")
     reply = solver.reply(state)
     frames = solver.refinement(reply)
     errors = [frame.err_norm for frame in frames]
     assert len(frames) == STEPS + 2 and frames[-1] is reply.answer
     assert errors[0] > 10 * errors[STEPS] and np.isnan(frames[0].command[2]).all()
-    with pytest.raises(AllocationError, match="learned"):
-        Solver(load=load_stand_in).refinement(reply)
+    for method in ("search", "qp"):
+        with pytest.raises(AllocationError, match="'mdn'"):
+            solver.refinement(solver.reply(replace(state, method=method)))
 
 
 def test_what_a_page_tries_out_stays_with_its_own_answers() -> None:
     solver, target = Solver(load=load_stand_in), PRESETS["Turn"]
-    loaded = solver.loaded("learned")
-    few = solver.allocator(State(UCAT, target=target, n_candidates=8, temperature=1.5, gamma=0.5))
-    assert few.options == {"n_candidates": 8, "temperature": 1.5, "gamma": 0.5}
-    assert solver.loaded("learned") is loaded and loaded.options["n_candidates"] == 64
+    loaded = solver.loaded("mdn", "power")
+    state = State(UCAT, target=target, method="mdn", n_candidates=8, temperature=1.5)
+    few = solver.allocator(state)
+    assert few.options["n_candidates"] == 8 and few.options["temperature"] == 1.5
+    assert solver.loaded("mdn", "power") is loaded and loaded.options["n_candidates"] == 64
+    assert solver.allocator(replace(state, n_candidates=None, temperature=None)) is loaded
     assert solver.allocator(State(UCAT, target=target, method="multistart", n_candidates=8)).options == (
-        solver.loaded("multistart").options
+        solver.loaded("multistart", "power").options
     )
+
+
+def test_every_answer_keeps_least_what_is_asked() -> None:
+    solver, state = Solver(), State(UCAT, target=PRESETS["Turn"])
+    power, effort = (solver.solve(replace(state, objective=name)) for name in OBJECTIVES)
+    assert power.power < effort.power and power.energy > effort.energy
+    assert [answer.settings["objective"] for answer in (power, effort)] == ["power", "effort"]
+    assert "least power" in corner(state, "", power, False, None)
+    assert "least effort" in corner(state, "", effort, False, None)
+    assert ">power [W]<" in mode_plot(power, listed_modes(known_modes(power), None), 0, None, 200, "here")
+    assert ">effort<" in mode_plot(effort, listed_modes(known_modes(effort), None), 0, None, 200, "here")
+    plan = SwimSettings().plan(replace(state, objective="effort"), None)
+    assert plan.objective == "effort" and state.drawing == {} and not knows_objective("paper")
+    assert "--objective effort" in command_line(replace(state, objective="effort"))
+    assert "--objective" not in command_line(replace(state, method="paper", objective="effort"))
+    assert "load_allocator('mdn', objective='effort')" in python_lines(
+        replace(state, method="mdn", objective="effort")
+    )
+    assert export_line(replace(state, objective="effort")).endswith("--zip --objective effort")

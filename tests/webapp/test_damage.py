@@ -99,7 +99,7 @@ def test_damage_draft_and_swim_outlive_the_server(session: Session) -> None:
     session.weaken("front_left", 0.5)
     session.jam("back_left", -2.0)
     way = (0.01, 0.02, 0.03, 40.0)
-    draft = session.draft.with_goal("energy of a mission").with_held_toggled("back_right").with_way(ALL, way)
+    draft = session.draft.with_goal("power for a mission").with_held_toggled("back_right").with_way(ALL, way)
     session.set_draft(draft.with_way("front_left", way).with_mission("1 0 0 0 0 0"))
     for key, value in (("path", list(SHIPPED)[-1]), ("rival", "qp"), ("speed", 2.5)):
         session.set_swim(key, value)
@@ -117,8 +117,8 @@ def test_damage_draft_and_swim_outlive_the_server(session: Session) -> None:
 def test_a_plan_is_made_of_the_settings(session: Session) -> None:
     settings = SwimSettings()
     assert settings.rival == ALONE and len(settings.plan(session.state, None).methods) == 1
-    assert settings.with_value("rival", "qp").plan(session.state, None).methods == ("learned", "qp")
-    assert settings.with_value("rival", "learned").plan(session.state, None).methods == ("learned",)
+    assert settings.with_value("rival", "qp").plan(session.state, None).methods == ("search", "qp")
+    assert settings.with_value("rival", "search").plan(session.state, None).methods == ("search",)
     with pytest.raises(FinlabError, match="own"):
         settings.with_value("path", OWN).plan(session.state, None)
     session.jam("front_left", 0.5)

@@ -70,7 +70,7 @@ def test_each_fin_has_its_bounds_and_the_mission_is_the_users() -> None:
     text = "0.5, 0 0 0 0 0.1\n\n0 0 1 0 0 0"
     assert parsed_mission(text) == ((0.5, 0.0, 0.0, 0.0, 0.0, 0.1), (0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
     first, second = NO_YAW.names[:2]
-    request = replace(SearchRequest("energy of a mission", mission=text), held=NO_YAW.names[2:])
+    request = replace(SearchRequest("power for a mission", mission=text), held=NO_YAW.names[2:])
     request = request.with_way(ALL, (0.01, 0.01, 0.0, 0.0)).with_way(second, (0.04, 0.0, 0.0, 20.0))
     bounds = request.bounds(NO_YAW)
     x = NO_YAW.fins[1].position[0]

@@ -21,9 +21,9 @@ from webapp.tasks.mode_names import (
     NO_MODES,
     NamedMode,
     known_modes,
+    led_to,
     listed_modes,
     named_modes,
-    nearest_modes,
     same_mode,
 )
 from webapp.tasks.solver import Solver
@@ -34,7 +34,10 @@ PUSH, REST = (0.3, 1.1, 0.0), (0.05, 0.1, 0.0)
 def candidates(*commands: list[tuple[float, float, float]]) -> Candidates:
     command = np.array(commands)
     k = len(command)
-    return Candidates(command, np.zeros((k, 6)), np.full(k, 1e-6), np.arange(k) + 2.0, ("refined",) * k)
+    source = tuple(f"component {i + 1}" for i in range(k))
+    return Candidates(
+        command, np.zeros((k, 6)), np.full(k, 1e-6), np.arange(k) + 2.0, np.arange(k) + 0.5, source
+    )
 
 
 def modes_of(*commands: list[tuple[float, float, float]]) -> tuple[NamedMode, ...]:
@@ -87,11 +90,13 @@ def test_real_candidates_are_drawn_and_listed() -> None:
     assert answer.candidates is not None and answer.samples is not None
     assert sum(len(mode.members) for mode in found) == len(answer.candidates.energy)
     listed = listed_modes(found, answer.samples)
-    nearest = listed.of_samples
-    assert nearest is not None and len(nearest) == len(answer.samples.energy)
-    raw = replace(answer.samples, command=np.array([mode.command for mode, _ in modes]))
-    again = nearest_modes(raw, modes)
-    assert again is not None and list(again) == list(range(len(modes))), "each mode is nearest to itself"
+    led = listed.of_samples
+    assert led is not None and len(led) == len(answer.samples.energy)
+    for source, place in zip(answer.samples.source, led.tolist(), strict=True):
+        led_here = [k for k, (mode, _) in enumerate(modes) if source in mode.sources]
+        assert place == (led_here[0] if led_here else -1), "the mode that its component led to"
+    strange = replace(answer.samples, source=("sample",) * len(led))
+    assert set(led_to(strange, modes)) == {-1}, "of no component"
     plot = mode_plot(answer, listed, 0, None, 200, "here")
     assert plot.count("onclick") == len(modes) + 1, "one for all samples together"
     assert plot.count("data-k") == len(answer.samples.energy)

@@ -46,7 +46,7 @@ def test_fins_that_were_not_learned_are_told_in_words_of_their_own() -> None:
         assert reach_sentence(answer) == "Not learned: fin 3. Choose another method"
         shown = corner(State(strange), "", answer, False, None)
         assert css(MISSING) in shown and css(DELIVERED) not in shown and "reach" not in shown
-        comparison: Any = SimpleNamespace(state=State(strange), answers={"learned": answer})
+        comparison: Any = SimpleNamespace(state=State(strange), answers={"mdn": answer})
         assert "Not learned: fin 3" in comparison_table(comparison, None, False, "here")
     assert "Not learned" not in reach_sentence(
         allocator.allocate(strange, PRESETS["Turn"], failed=[other.name])
@@ -100,7 +100,7 @@ def test_candidates_as_csv() -> None:
     lines = files.candidates_csv(answer).decode().splitlines()
     assert answer.candidates is not None
     assert len(lines) == 1 + len(answer.candidates.energy)
-    assert lines[0].startswith("err_norm,energy,source,front_right.amplitude_rad")
+    assert lines[0].startswith("err_norm,power_w,energy,source,front_right.amplitude_rad")
     with pytest.raises(Exception, match="no candidates"):
         files.candidates_csv(None)
 

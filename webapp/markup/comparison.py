@@ -6,7 +6,7 @@ from html import escape
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.judging import REACHED
 from webapp.markup.picking import pick
-from webapp.markup.words import small, three_digits, unlearned_sentence
+from webapp.markup.words import listed, objective_of, small, three_digits, unlearned_sentence
 from webapp.session.state import COMPARED
 from webapp.tasks.comparison import Comparison
 
@@ -17,32 +17,38 @@ TIMES = (0.01, 1000.0)
 
 
 def comparison_table(comparison: Comparison, shown: str | None, stale: bool, picker: str) -> str:
-    """Error, energy and time of each method; the one whose arrows are shown is marked."""
+    """Error, power, effort and time of each method; the one whose arrows are shown is marked."""
     if comparison.state is None:
         return (
-            "<div class='fl dim'>Several methods on the same wrench: error, energy, time side by side.</div>"
+            "<div class='fl dim'>Several methods on the same wrench: error, power, effort, time side by side."
+            "</div>"
         )
-    rows = []
+    rows, others = [], []
     for k, method in enumerate(COMPARED):
         answer = comparison.answers.get(method)
         if isinstance(answer, Allocation) and answer.unknown_fins:
             words = unlearned_sentence(answer.layout, answer.unknown_fins)
-            cells = f"<td colspan='3' class='words missing'>{words}</td>"
+            cells = f"<td colspan='4' class='words missing'>{words}</td>"
         elif isinstance(answer, Allocation):
             color = "var(--fl-delivered)" if answer.reachable else "var(--fl-missing)"
             cells = (
                 f"<td>{small(answer.err_norm)}{_bar(answer.err_norm, ERRORS, color)}</td>"
-                f"<td>{three_digits(answer.energy)}</td>"
+                f"<td>{three_digits(answer.power)}</td><td>{three_digits(answer.energy)}</td>"
                 f"<td>{three_digits(answer.solve_ms)}{_bar(answer.solve_ms, TIMES, 'currentColor')}</td>"
             )
         else:
-            cells = f"<td colspan='3' class='words dim'>{'…' if answer is None else escape(answer)}</td>"
+            cells = f"<td colspan='4' class='words dim'>{'…' if answer is None else escape(answer)}</td>"
+        if isinstance(answer, Allocation) and objective_of(answer) != comparison.state.objective:
+            others.append(method)
         kind = "chosen" if method == shown else ""
         rows.append(f"<tr class='{kind} pick' {pick(picker, k + 1)}><td>{method}</td>{cells}</tr>")
-    header = "<tr><th>method</th><th>error [σ]</th><th>energy</th><th>time [ms]</th></tr>"
+    header = "<tr><th>method</th><th>error [σ]</th><th>power [W]</th><th>effort</th><th>time [ms]</th></tr>"
+    kept = f"Kept least: {comparison.state.objective}"
+    if others:
+        kept += f"; {listed(others)} keep{'s' * (len(others) == 1)} effort least whatever is asked"
     said = (
         f"<div class='said'><span class='given'>Green</span>: delivered, up to {REACHED} σ. "
-        "<span class='missing'>Orange</span>: something is missing. Bars are logarithmic.</div>"
+        f"<span class='missing'>Orange</span>: something is missing. Bars are logarithmic. {kept}.</div>"
     )
     note = "<div class='missing'>The question has changed since; compare again.</div>" if stale else ""
     body = "".join(rows)

@@ -5,7 +5,7 @@ from html import escape
 
 from finlab.allocation.allocation import Allocation
 from webapp.markup.swim_card import pace_words
-from webapp.markup.words import reach_sentence, small, three_digits
+from webapp.markup.words import objective_of, reach_sentence, small, three_digits
 from webapp.scene.wrench_nodes import set_scale
 from webapp.session.state import State
 from webapp.tasks.analyst import Findings
@@ -139,10 +139,14 @@ def _status(state: State, allocation: Allocation | None, busy: bool, error: str 
             DEAD if raw else DELIVERED if allocation.reachable and not allocation.unknown_fins else MISSING
         )
         verdict = "Raw, not refined" if raw else reach_sentence(allocation)
-        energy, time = three_digits(allocation.energy), three_digits(allocation.solve_ms)
+        time, costs = three_digits(allocation.solve_ms), []
+        for word, value, unit in (("power", allocation.power, " W"), ("effort", allocation.energy, "")):
+            kept = f"least {word}" if word == objective_of(allocation) and not raw else word
+            cost = f"<b class='{word}'>{three_digits(value)}</b>{unit}"
+            costs.append(f"<span><span class='dim'>{kept}</span> {cost}</span>")
         parts += [
             f"<span><span class='dim'>error</span> <b class='err'>{small(allocation.err_norm)}</b> σ</span>",
-            f"<span><span class='dim'>energy</span> <b class='energy'>{energy}</b></span>",
+            *costs,
             f"<span><span class='dim'>{escape(allocation.method)}</span> {time} ms</span>",
             f"<span class='pill' style='background:{css(color)}'>{escape(verdict)}</span>",
         ]

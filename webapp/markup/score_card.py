@@ -92,7 +92,7 @@ def _axes(card: ScoreCard, before: ScoreCard | None, name: str) -> str:
     head = (
         f"<tr><th>largest on its own</th>{old}<th>{column}</th>"
         "<th title='after the worst loss of a fin'>one lost</th>"
-        "<th title='least power for 1 N, or 0.1 N m [W]'>power</th></tr>"
+        "<th title='least power for 1 N, or 0.1 N m'>power [W]</th></tr>"
     )
     return f"<table>{head}{''.join(rows)}</table>"
 

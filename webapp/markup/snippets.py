@@ -3,8 +3,9 @@
 import math
 import shlex
 
+from finlab.allocation.bundle_settings import METHODS_ON_BOARD
 from webapp.session.files import file_stem, shipped_name
-from webapp.session.state import State
+from webapp.session.state import State, knows_objective
 
 
 def command_line(state: State) -> str:
@@ -18,6 +19,7 @@ def command_line(state: State) -> str:
         words += ["--stuck", f"{name}={math.degrees(angle):g}"]
     if state.method != "search":
         words += ["--method", state.method]
+    words += _objective(state)
     if state.policy != "closest":
         words += ["--policy", state.policy]
     return shlex.join(words)
@@ -25,16 +27,18 @@ def command_line(state: State) -> str:
 
 def export_line(state: State) -> str:
     """What makes the bundle for this robot."""
-    name = _layout_name(state)
-    return shlex.join(
-        ["finlab", "export", name, "-o", file_stem(state.layout.name), "--zip", *_failures(state)]
-    )
+    words = ["finlab", "export", _layout_name(state), "-o", file_stem(state.layout.name), "--zip"]
+    if state.method in METHODS_ON_BOARD and state.method != "search":
+        words += ["--method", state.method]
+    objective = _objective(state) if state.method in METHODS_ON_BOARD else []
+    return shlex.join([*words, *objective, *_failures(state)])
 
 
 def python_lines(state: State) -> str:
     """The same question in Python."""
     name = _layout_name(state)
-    method = "" if state.method == "search" else repr(state.method)
+    chosen = [repr(state.method)] if state.method != "search" else []
+    chosen += [f"objective={state.objective!r}"] if _objective(state) else []
     target = ", ".join(f"{value:g}" for value in state.target)
     options = [f"failed={list(state.failed)!r}"] if state.failed else []
     if state.policy != "closest":
@@ -51,7 +55,7 @@ def python_lines(state: State) -> str:
         "import finlab",
         "",
         f"layout = finlab.load_layout({name!r})",
-        f"allocator = finlab.load_allocator({method})",
+        f"allocator = finlab.load_allocator({', '.join(chosen)})",
         f"wrench = [{target}]",
         f"result = allocator.allocate({', '.join(['layout', 'wrench', *options])})",
         "print(result.command, result.wrench)",
@@ -62,6 +66,12 @@ def python_lines(state: State) -> str:
 def _layout_name(state: State) -> str:
     """A shipped layout by its name, any other by the file that is saved of it."""
     return shipped_name(state.layout) or f"{file_stem(state.layout.name)}.yaml"
+
+
+def _objective(state: State) -> list[str]:
+    """The objective, where it is not the usual one and the method knows it."""
+    asked = state.objective != "power" and knows_objective(state.method)
+    return ["--objective", state.objective] if asked else []
 
 
 def _failures(state: State) -> list[str]:

@@ -27,6 +27,7 @@ def swim_card(swimming: Swimming) -> str:
         return "<div class='fl dim'>making ready …</div>"
     first = swimming.swimmers[0]
     head = f"<b>{first.shown.time:.1f} s</b> of {first.duration_s:.0f} s, {pace_words(swimming)}"
+    head += f"; least {swimming.objective}"
     rows = []
     for swimmer, color in zip(swimming.swimmers, (DELIVERED, OTHER), strict=False):
         cells = "".join(

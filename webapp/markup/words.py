@@ -37,6 +37,22 @@ def three_digits(value: float) -> str:
     return f"{value:.{max(2 - whole, 0)}f}".replace("-", "−")
 
 
+def objective_of(allocation: Allocation) -> str:
+    """What the method that answered keeps least; those that cannot be told keep the paper's effort least."""
+    return str(allocation.settings.get("objective", "effort"))
+
+
+def source_words(sources: Sequence[str]) -> str:
+    """Where a mode comes from: the components of a mixture, or where the search began."""
+    numbers = [s.removeprefix("component ") for s in sources if s.startswith("component ")]
+    if numbers:
+        return f"from component{'s' if len(numbers) > 1 else ''} {listed(numbers)}"
+    first = sources[0]
+    if first == "all fins":
+        return f"found with {first}"
+    return f"found {first}" if first.startswith("without ") else f"from {first}"
+
+
 def missing_part(allocation: Allocation) -> NDArray[np.float64]:
     """The unallocated wrench (6,) [N, N m] without what is too small to matter."""
     rest = allocation.unallocated

@@ -33,7 +33,7 @@ class FilesTab:
         page.add_buttons(
             "For the robot",
             {"Graph file": page.exports.graph, "Bundle (ZIP)": page.exports.bundle},
-            hint="The layout graph alone, or with networks, README and checksums: what finlab export makes.",
+            hint="The layout graph alone, or with the fins' physics and checksums: what finlab export makes.",
         )
         self._command = gui.add_html("")
         self._changes = Changes()

@@ -199,7 +199,7 @@ def _before_and_after(found: Improvement) -> str:
     before, after = (three_digits(abs(v)) for v in (found.value_before, found.value_after))
     goal = next(words for words, name in GOAL_WORDS.items() if name == found.goal)
     stopped = " The search was stopped early." if found.cancelled else ""
-    unit = "" if found.goal == "mission_power" else " N"
+    unit = " W" if found.goal == "mission_power" else " N"
     heading = f"<b>{goal.capitalize()}: {before}{unit} before, {after}{unit} after.</b>{stopped}"
     numbers = listed([str(found.layout.index(name) + 1) for name in found.moved])
     table = score_table(found.layout, found.card_after, found.card_before)

@@ -1,4 +1,4 @@
-"""Why one wrench has many answers: its modes, the mixture's candidates, and the settings that draw them."""
+"""Why one wrench has many answers: who answers, what is kept least, the modes, and where they come from."""
 
 from functools import partial
 from typing import Any
@@ -9,55 +9,87 @@ from finlab.allocation.methods import METHODS
 from webapp.handles import Changes, numbered, on_user_change, put
 from webapp.markup.modes import SAMPLES, mode_plot, mode_table
 from webapp.markup.picking import add_channel, chosen_button, marker
+from webapp.markup.proposals import proposal_discs
 from webapp.markup.words import small, three_digits
 from webapp.page import Page
-from webapp.panels.line_plot import FIN_LINES, LinePlot
-from webapp.session.state import CANDIDATE_RANGE, GAMMA_RANGE, TEMPERATURE_RANGE
-from webapp.tasks.solver import STEPS, Densities
+from webapp.session.state import CANDIDATE_RANGE, GAMMA_RANGE, OBJECTIVES, TEMPERATURE_RANGE, knows_objective
+from webapp.session.targets import full_thrust
+from webapp.tasks.solver import STEPS
 
-TITLES = ("amplitude [°]", "frequency [Hz]", "zero direction [°]")
+OBJECTIVE = "fl-objective"
+"""Marks the buttons for the objective."""
+ORIGINS = {
+    "search": "The search knows each fin's own law and draws nothing. It begins with all fins at work and, "
+    "for other ways, with one or two of them at rest.",
+    "mdn": "A network draws candidates from its mixture; the search, by the fins' own laws, makes them "
+    "exact. A mode names the components that led to it; all others are the wider search's alone.",
+    "paper": "The paper's network draws candidates; the best are refined by Adam on a learned surrogate, "
+    "which leaves an error.",
+}
+"""Where the answer and its modes come from, by method."""
 
 
 class ModesTab:
-    """Plot, table and settings of the candidates."""
+    """Method and objective, plot and table, and what is drawn from a mixture."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
         stray, count = "How far draws stray from the mixture's means.", "Draws from the mixture."
-        weight = "How much energy counts in the ranking."
+        weight = "How much effort counts in the ranking."
+        self._method = gui.add_dropdown("Method", tuple(METHODS), hint="Who answers.")
+        page.on_change(self._method, partial(page.session.set_setting, "method"))
+        self._objective = gui.add_html(marker(OBJECTIVE))
+        page.add_buttons(
+            "Keep least",
+            {name: partial(page.session.set_setting, "objective", name) for name in OBJECTIVES},
+            hint="Power in watts, or the paper's effort: for all answers, comparisons, sweeps and swims.",
+        )
+        self._origin = gui.add_html("")
         self._settings: dict[str, Any] = {
-            "method": gui.add_dropdown("Method", tuple(METHODS), hint="Who answers."),
             "n_candidates": gui.add_slider("Candidates K", *CANDIDATE_RANGE, 1, 64, hint=count),
             "temperature": gui.add_slider("Temperature T", *TEMPERATURE_RANGE, 0.01, 0.02, hint=stray),
-            "gamma": gui.add_slider("Energy weight γ", *GAMMA_RANGE, 0.005, 0.01, hint=weight),
+            "gamma": gui.add_slider("Effort weight γ", *GAMMA_RANGE, 0.005, 0.01, hint=weight),
         }
         for key, widget in self._settings.items():
             page.on_change(widget, partial(page.session.set_setting, key))
         self._picker = ModePicker(gui, page, 250, "fl-modes")
         self._table = gui.add_html("")
-        play = gui.add_button(
+        self._play = gui.add_button(
             "Play the refinement",
             icon=viser.Icon.PLAYER_PLAY,
-            hint="From the best raw candidate, step by step.",
+            hint="Levenberg-Marquardt from the best raw candidate, step by step; then the answer.",
         )
-        page.on_click(play, page.playback.start)
+        page.on_click(self._play, page.playback.start)
         self._step = gui.add_html("")
-        self._density = DensityPanel(gui)
+        self._proposals = ProposalPanel(gui, page)
         self._changes = Changes()
 
     def refresh(self) -> None:
         """Write settings and candidates."""
         page, state = self._page, self._page.session.state
+        put(self._method, value=state.method)
+        put(self._objective, content=chosen_button(OBJECTIVE, OBJECTIVES.index(state.objective)))
+        put(self._origin, content=f"<div class='fl dim'>{_origin_words(state.method)}</div>")
+        drawing = state.drawing
         for key, widget in self._settings.items():
-            put(widget, value=getattr(state, key))
+            put(widget, visible=key in drawing)
+            if key in drawing:
+                put(widget, value=drawing[key])
+        put(self._play, visible=state.method == "mdn")
         self._picker.refresh()
         answering, picker = page.answering, self._picker
         if self._changes(answering.modes, answering.searching, picker.shown):
             table = mode_table(answering.modes, answering.searching, picker.shown, picker.name)
             put(self._table, content=table)
         put(self._step, content=_step_words(page))
-        self._density.refresh(None if answering.reply is None else answering.reply.densities)
+        self._proposals.refresh()
+
+
+def _origin_words(method: str) -> str:
+    """Where the answer and its modes come from, and what is kept least where the user has no say in it."""
+    words = ORIGINS.get(method, "One answer by optimization over the fins' own laws; no candidates.")
+    return words if knows_objective(method) else f"{words} It keeps effort least whatever is chosen."
 
 
 def _step_words(page: Page) -> str:
@@ -66,15 +98,23 @@ def _step_words(page: Page) -> str:
     if shown is None or (frame is None and sample is None):
         return ""
     if frame is not None:
-        words = {0: "Best raw candidate", STEPS + 1: "Answer, the cheapest of all exact ones"}
+        words = {0: "Best raw candidate", STEPS + 1: "Answer, the cheapest that the search found"}
         text = words.get(frame, f"Step {frame} of {STEPS}")
     else:
-        text = f"Raw sample {sample}"
-        nearest = page.answering.modes.of_samples
-        if nearest is not None and sample is not None and sample < len(nearest):
-            text += f", nearest to mode {nearest[sample] + 1}"
-    error, energy = small(shown.err_norm), three_digits(shown.energy)
-    return f"<div class='fl step'><b>{text}</b>: error {error} σ, energy {energy}</div>"
+        text = f"Raw sample {sample}{_sample_words(page, sample or 0)}"
+    error, power, effort = small(shown.err_norm), three_digits(shown.power), three_digits(shown.energy)
+    return f"<div class='fl step'><b>{text}</b>: error {error} σ, power {power} W, effort {effort}</div>"
+
+
+def _sample_words(page: Page, sample: int) -> str:
+    """Of which component a raw sample is, and to which mode that led."""
+    answer, led = page.answering.best, page.answering.modes.of_samples
+    if answer is None or answer.samples is None or led is None or not sample < len(led):
+        return ""
+    source = answer.samples.source[sample]
+    if not source.startswith("component "):
+        return ""
+    return f" of {source}, which led to mode {led[sample] + 1}" if led[sample] >= 0 else f" of {source}"
 
 
 class ModePicker:
@@ -127,27 +167,19 @@ class ModePicker:
         put(self._plot, content=plot)
 
 
-class DensityPanel:
+class ProposalPanel:
     """Widgets of one folder."""
 
-    def __init__(self, gui: viser.GuiApi) -> None:
-        """Build the plots, empty. The number of lines is fixed: lines without a fin hold no numbers."""
-        self._changes = Changes()
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
+        """Build it, empty."""
+        self._page, self._changes = page, Changes()
         with gui.add_folder("What the network proposes", expand_by_default=False) as self._folder:
-            gui.add_html(
-                "<div class='fl dim'>How likely each command is, in the fin's colour; every curve has its "
-                "highest point at the top.</div>"
-            )
-            # Fins that do the same have the same curve: each next line is thinner, so that all are seen.
-            self._plots = [
-                LinePlot(gui, FIN_LINES, "", title, height=112, widths=(6.0, 4.5, 3.0, 1.5), visible=True)
-                for title in TITLES
-            ]
+            self._discs = gui.add_html("")
 
-    def refresh(self, densities: Densities | None) -> None:
-        """Draw densities, or hide the plots where the method has none."""
-        put(self._folder, visible=densities is not None)
-        if densities is None or not self._changes(densities):
-            return
-        for k, plot in enumerate(self._plots):
-            plot.draw(densities.places[k], list(densities.curves[:, k]), (0.0, 1.08))
+    def refresh(self) -> None:
+        """Draw what was sampled, or hide the folder where nothing was."""
+        answering = self._page.answering
+        answer, modes = answering.best, answering.modes
+        put(self._folder, visible=answer is not None and answer.samples is not None)
+        if answer is not None and self._changes(answer, modes):
+            put(self._discs, content=proposal_discs(answer, modes, full_thrust(answer.layout)))

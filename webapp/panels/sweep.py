@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from webapp.handles import hold_kind, on_user_change, option_index, put
-from webapp.markup.words import small
+from webapp.markup.words import small, three_digits
 from webapp.page import Page
 from webapp.panels.line_plot import FIN_LINES, LinePlot, top_of
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS
@@ -82,7 +82,9 @@ def _sentence(sweep: Sweep) -> str:
     if not exact.any():
         return "<span class='missing'>Nowhere along the way is the wrench delivered exactly.</span>"
     if exact[known].all():
-        return f"Exact all the way: the largest error is {small(float(np.nanmax(sweep.error)))} σ."
+        low, high = (three_digits(float(value)) for value in (np.nanmin(sweep.power), np.nanmax(sweep.power)))
+        error = small(float(np.nanmax(sweep.error)))
+        return f"Exact all the way: the largest error is {error} σ; power from {low} to {high} W."
     low, high = (f"{value:.3g}".replace("-", "−") for value in sweep.values[exact][[0, -1]])
     beyond = "<span class='missing'>beyond, something is missing.</span>"
     return f"Exact from {low} to {high} {AXIS_UNITS[sweep.axis]}; {beyond}"

@@ -1,6 +1,7 @@
 """How the robot is shown: motion, what is drawn, theme and camera."""
 
 from functools import partial
+from html import escape
 
 import viser
 
@@ -15,7 +16,7 @@ SWITCHES = {
     "labels": ("Fin numbers", "A number at the root of each fin."),
     "graph": (
         "Fin graph",
-        "Edges between working fins, thick where the network lets one look at another.",
+        "Edges between working fins; with the method mdn, thick where its network lets one look at another.",
     ),
     "dimensions": ("Dimensions", "Coordinates of the selected fin."),
     "ghost": ("Ghost", "Where moved fins stood when the layout was opened or saved."),
@@ -51,6 +52,7 @@ class ViewTab:
         self._switches = {
             key: gui.add_checkbox(label, False, hint=hint) for key, (label, hint) in SWITCHES.items()
         }
+        self._graph = gui.add_html("")
         for key, switch in self._switches.items():
             page.on_change(switch, partial(page.session.set_display, key))
 
@@ -61,3 +63,12 @@ class ViewTab:
         put(self._scale, value=_scale_entry(display.newtons))
         for key, switch in self._switches.items():
             put(switch, value=getattr(display, key))
+        reply = self._page.answering.reply
+        plain = display.graph and reply is not None and reply.attention is None
+        method = "" if reply is None else reply.answer.method
+        put(self._graph, content=f"<div class='fl dim'>{_graph_words(method)}</div>", visible=plain)
+
+
+def _graph_words(method: str) -> str:
+    name = escape(method)
+    return f"Method {name} looks at no graph, so all edges are alike; the network of mdn has attention."

@@ -30,7 +30,7 @@ class Display:
     labels: bool = True
     """Show the numbers of the fins."""
     graph: bool = False
-    """Show the graph that the network sees, its edges as wide as the attention along them."""
+    """Show the graph of the working fins; where a network has answered, edges as wide as its attention."""
     dimensions: bool = True
     """Show the selected fin's distance from the centre of gravity."""
     shadows: bool = True

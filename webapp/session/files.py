@@ -73,10 +73,10 @@ def graph_file(layout: Layout, failed: tuple[str, ...], allocator: Allocator) ->
 
 
 def bundle_bytes(layout: Layout, failed: tuple[str, ...], allocator: Allocator) -> bytes:
-    """The bundle for the robot as a zip file: graph, networks, README and checksums.
+    """The bundle for the robot as a zip file: graph, the fins' physics, README and checksums.
 
     Raises:
-        FinlabError: the allocator has no trained network.
+        FinlabError: no robot can run the allocator's method.
     """
     from finlab.deploy.bundle import make_bundle
 
@@ -86,7 +86,7 @@ def bundle_bytes(layout: Layout, failed: tuple[str, ...], allocator: Allocator) 
 def candidates_csv(allocation: Allocation | None) -> bytes:
     """The refined candidates of an answer, one line each, SI units and radians."""
     if allocation is None or allocation.candidates is None:
-        raise FinlabError("there are no candidates to save; choose the method learned")
+        raise FinlabError("there are no candidates to save; choose the method search, mdn or paper")
     candidates = allocation.candidates
     text = io.StringIO()
     writer = csv.writer(text)
@@ -95,12 +95,11 @@ def candidates_csv(allocation: Allocation | None) -> bytes:
         for name in allocation.layout.names
         for quantity in ("amplitude_rad", "frequency_hz", "zero_direction_rad")
     ]
-    writer.writerow(["err_norm", "energy", "source", *columns])
+    writer.writerow(["err_norm", "power_w", "energy", "source", *columns])
     for k, command in enumerate(candidates.command):
         values = [f"{v:.6g}" for v in command.ravel()]
-        writer.writerow(
-            [f"{candidates.err_norm[k]:.6g}", f"{candidates.energy[k]:.6g}", candidates.source[k], *values]
-        )
+        told = (candidates.err_norm[k], candidates.power[k], candidates.energy[k])
+        writer.writerow([*(f"{value:.6g}" for value in told), candidates.source[k], *values])
     return text.getvalue().encode()
 
 

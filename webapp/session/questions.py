@@ -76,7 +76,7 @@ class Questions(Core):
         self._commit(f"Only {AXIS_WORDS[axis]}", only)
 
     def set_setting(self, key: str, value: Any) -> None:
-        """K, T, gamma or the method; `key` is the field of `State`."""
+        """K, T, gamma, the method or the objective; `key` is the field of `State`."""
         self._commit(f"Set {key.replace('_', ' ')}", self.state.with_setting(key, value), key)
 
     def toggle_failure(self, name: str) -> None:

@@ -3,13 +3,17 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cache
+from importlib import import_module
+from typing import Any, get_args
 
 from finlab.allocation.health import Health
+from finlab.allocation.learned.settings import MdnSettings, PaperSettings
 from finlab.allocation.methods import METHODS
 from finlab.allocation.policy import AXES, KINDS
 from finlab.errors import FinlabError
 from finlab.layout import Layout
+from finlab.physics.objective import Name as Objective
 from webapp.session.links import Links, kept, linked
 
 AXIS_WORDS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
@@ -26,19 +30,23 @@ CANDIDATE_RANGE = (4, 256)
 TEMPERATURE_RANGE = (0.0, 2.0)
 """Temperatures T of the mixture."""
 GAMMA_RANGE = (0.0, 1.0)
-"""Weights gamma of the energy in the ranking."""
+"""Weights gamma of the effort in the ranking."""
 STRENGTH_RANGE = (0.05, 1.0)
 """Shares that may be left of a weak fin's largest amplitude and frequency."""
 COMPARED = ("search", "mdn", "paper", "analytic", "qp", "sqp", "multistart")
 """Methods that answer quickly enough to be compared while one waits."""
-CHOICES: dict[str, tuple[str, ...]] = {"method": tuple(METHODS), "policy": KINDS}
+OBJECTIVES: tuple[str, ...] = get_args(Objective)
+"""What answers may keep least."""
+CHOICES: dict[str, tuple[str, ...]] = {"method": tuple(METHODS), "objective": OBJECTIVES, "policy": KINDS}
 """Settings that are one of some words."""
 RANGES = {
     "n_candidates": ("candidates K", *CANDIDATE_RANGE),
     "temperature": ("temperature T", *TEMPERATURE_RANGE),
-    "gamma": ("energy weight gamma", *GAMMA_RANGE),
+    "gamma": ("effort weight gamma", *GAMMA_RANGE),
 }
-"""Settings that are numbers: what they are called, and their ends."""
+"""Settings that are numbers: what they are called, and their ends. None stands for the method's own value."""
+DRAWING = {"mdn": vars(MdnSettings()), "paper": vars(PaperSettings())}
+"""Methods that draw candidates from a mixture, with their own settings."""
 SETTINGS = (*CHOICES, *RANGES)
 """Fields of `State` that say how the question is answered."""
 
@@ -57,14 +65,16 @@ class State:
     """Fins that no longer turn: name, and the zero direction [rad] at which they stay."""
     target: tuple[float, float, float, float, float, float] = (0.0,) * 6
     """Desired wrench [N, N m], body frame."""
-    n_candidates: int = 64
-    """K, how many candidates are drawn from the mixture."""
-    temperature: float = 0.02
-    """T, how far the draws may stray from the mixture's means."""
-    gamma: float = 0.01
-    """Weight of the energy in the ranking."""
+    n_candidates: int | None = None
+    """K, how many candidates are drawn from the mixture; None for as many as the method itself draws."""
+    temperature: float | None = None
+    """T, how far the draws may stray from the mixture's means; None as above, and so is gamma."""
+    gamma: float | None = None
+    """Weight of the effort in the ranking."""
     method: str = "search"
     """Name of the allocation method."""
+    objective: str = "power"
+    """What answers keep least: one of `OBJECTIVES`."""
     policy: str = "closest"
     """What to do about a wrench that is out of reach: one of `KINDS`."""
     links: Links = ()
@@ -74,6 +84,13 @@ class State:
     def healthy(self) -> tuple[str, ...]:
         """Names of the fins that work."""
         return tuple(name for name in self.layout.names if name not in self.failed)
+
+    @property
+    def drawing(self) -> dict[str, Any]:
+        """K, T and gamma that are in force, those that the method has; none where it draws no candidates."""
+        shipped = DRAWING.get(self.method, {})
+        chosen = {key: getattr(self, key) for key in RANGES if key in shipped}
+        return {key: shipped[key] if value is None else value for key, value in chosen.items()}
 
     @property
     def health(self) -> Health | None:
@@ -138,11 +155,23 @@ class State:
         return replace(self, links=linked(self.links, a, b))
 
     def with_setting(self, key: str, value: Any) -> "State":
-        """K, T, gamma, the method or the policy changed: `key` is one of `SETTINGS`."""
+        """K, T, gamma, the method, the objective or the policy changed: `key` is one of `SETTINGS`."""
         if key not in SETTINGS:
             raise FinlabError(f"there is no setting {key!r:.40}")
-        checked: Any = chosen(value, key, CHOICES[key]) if key in CHOICES else number(value, *RANGES[key])
-        return replace(self, **{key: round(checked) if key == "n_candidates" else checked})
+        checked: Any = value
+        if key in CHOICES:
+            checked = chosen(value, key, CHOICES[key])
+        elif value is not None:
+            checked = number(value, *RANGES[key])
+            checked = round(checked) if key == "n_candidates" else checked
+        return replace(self, **{key: checked})
+
+
+@cache
+def knows_objective(method: str) -> bool:
+    """Whether a method keeps least what is asked; the others keep the paper's effort least."""
+    module, name = METHODS[method]
+    return "objective" in getattr(import_module(module), name).option_names()
 
 
 def chosen(value: Any, name: str, choices: Iterable[str]) -> Any:

@@ -63,7 +63,7 @@ class SwimSettings:
             raise FinlabError("there is no path of your own; open one under More, or choose another path")
         methods = (self.method,) if self.rival in (ALONE, self.method) else (self.method, self.rival)
         path = own if self.path == OWN and own is not None else self.path
-        return Plan(state.able, state.failed, path, methods, self.plant)
+        return Plan(state.able, state.failed, path, methods, self.plant, state.objective)
 
 
 class Plan(NamedTuple):
@@ -79,3 +79,5 @@ class Plan(NamedTuple):
     """Allocation methods, one robot each."""
     plant: str = "mean"
     """How the fins' forces are simulated: one of `PLANTS`."""
+    objective: str = "power"
+    """What the fins keep least."""

@@ -26,20 +26,25 @@ class Step:
     """Fins that have failed."""
     mode: int = 0
     """Which mode is shown."""
+    method: str = "search"
+    """Who answers."""
     graph: bool = False
     """Whether the fin graph is shown."""
     swims: bool = False
     """Whether the robot swims."""
 
     def state(self, now: State) -> State:
-        """The state of this stop, with the settings of the present one."""
-        return State(
-            shipped()[self.layout],
-            self.failed,
+        """The state of this stop, with the objective and the settings of the present one."""
+        return replace(
+            now,
+            layout=shipped()[self.layout],
+            failed=self.failed,
+            weak=(),
+            stuck=(),
             target=self.target,
-            n_candidates=now.n_candidates,
-            temperature=now.temperature,
-            gamma=now.gamma,
+            method=self.method,
+            policy=State.policy,
+            links=(),
         )
 
 
@@ -54,19 +59,19 @@ STEPS = (
     Step(
         "One wrench has many answers",
         "Four fins have twelve numbers, the wrench only six. This is another answer than before. Open Modes: "
-        "each numbered dot is one. Click some: the fins change, the green sum stays.",
+        "each numbered dot is one, with the power that it takes. Click some: the fins change, the green sum "
+        "stays.",
         "ucat",
         PRESETS["Turn"],
         mode=1,
     ),
     Step(
         "A fin fails",
-        "Fin 2 hangs limp and has left the graph. The same network answers at once with the other three. "
-        "Fail another one under Wrench, and read below the bars what is left undone.",
+        "Fin 2 hangs limp. The search leaves it out and answers at once with the other three. Fail another "
+        "one under Wrench, and read below the bars what is left undone.",
         "ucat",
         PRESETS["Turn"],
         failed=("front_left",),
-        graph=True,
     ),
     Step(
         "What a layout cannot do",
@@ -77,18 +82,20 @@ STEPS = (
     ),
     Step(
         "It swims",
-        "Ten times a second the controller asks for a wrench and the network answers. The blue ball is where "
+        "Ten times a second the controller asks for a wrench and the search answers. The blue ball is where "
         "the robot should be. Open Swim, break a fin by its number, and watch the others take over.",
         "ucat",
         PRESETS["Turn"],
         swims=True,
     ),
     Step(
-        "Another robot, the same network",
-        "Six fins now, and nothing was trained again: the network reads the layout as a graph. Drag a fin by "
-        "its arrows, mirror it, save the file. The robot is yours.",
+        "Another robot, and a network",
+        "Six fins now, and the method is mdn: a network that reads the robot as a graph proposes, and the "
+        "search makes each proposal exact. Modes shows both. Drag a fin, mirror it, save the file: the robot "
+        "is yours.",
         "hexa",
         (1.5, 0.5, -1.0, 0.0, 0.0, 0.15),
+        method="mdn",
         graph=True,
     ),
 )

@@ -10,7 +10,9 @@ import imageio.v3 as iio
 import viser
 
 from finlab.allocation.allocation import Allocation
+from finlab.allocation.allocator import Allocator
 from finlab.errors import FinlabError
+from finlab.layout import Layout
 from webapp.scene.robot_scene import RobotScene
 from webapp.session import Session
 from webapp.session.files import bundle_bytes, file_stem, graph_file
@@ -59,7 +61,7 @@ class Exports:
         worker: Worker,
         failed: Callable[[str, str], None],
     ) -> None:
-        """Send what `session` holds to `client`, with the networks of `solver`.
+        """Send what `session` holds to `client`, with the allocators of `solver`.
 
         `failed` is called on the loop with a title and a sentence when there is no file.
         """
@@ -68,16 +70,19 @@ class Exports:
 
     def graph(self) -> None:
         """Send the layout graph file."""
-        state, loaded = self._session.state, self._solver.loaded
-        self._send(".graph.json", lambda: graph_file(state.layout, state.failed, loaded(state.method)))
+        self._send_made(".graph.json", graph_file)
 
     def bundle(self) -> None:
         """Send the bundle for the robot: the same bytes as `finlab export --zip`.
 
         What was tried out with K and T on the page does not go to the robot.
         """
+        self._send_made(".zip", bundle_bytes)
+
+    def _send_made(self, suffix: str, make: Callable[[Layout, tuple[str, ...], Allocator], bytes]) -> None:
+        """Send what is made of the robot and its allocator, as that is shipped but for the objective."""
         state, loaded = self._session.state, self._solver.loaded
-        self._send(".zip", lambda: bundle_bytes(state.layout, state.failed, loaded(state.method)))
+        self._send(suffix, lambda: make(state.layout, state.failed, loaded(state.method, state.objective)))
 
     def html(self, shown: Allocation | None) -> None:
         """Send a standalone page of the 3D view with an answer.

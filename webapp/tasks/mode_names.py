@@ -20,8 +20,6 @@ from finlab.allocation.solution import Candidates
 from webapp.markup.words import listed
 from webapp.theme import MODE_COLORS
 
-Array = NDArray[np.float64]
-
 MAX_SHOWN = len(MODE_COLORS)
 """Modes that are shown, each in its own colour; a robot with many fins has dozens, the last ones dear."""
 
@@ -44,7 +42,8 @@ class Modes:
     count: int
     """How many there are."""
     of_samples: NDArray[np.intp] | None
-    """For each raw sample (K,) the shown mode that is nearest to it; None where there are none."""
+    """For each raw sample (K,) the shown mode that its component led to, -1 where that is none of them; None
+    where there are no samples."""
 
 
 NO_MODES = Modes((), 0, None)
@@ -52,9 +51,9 @@ NO_MODES = Modes((), 0, None)
 
 
 def listed_modes(modes: tuple[Mode, ...], samples: Candidates | None) -> Modes:
-    """Modes with names, and which of them each raw sample is nearest to."""
+    """Modes with names, and which of them each raw sample's component led to."""
     shown = named_modes(modes)
-    return Modes(shown, len(modes), nearest_modes(samples, shown))
+    return Modes(shown, len(modes), None if samples is None else led_to(samples, shown))
 
 
 def known_modes(answer: Allocation) -> tuple[Mode, ...]:
@@ -79,20 +78,13 @@ def same_mode(wanted: Mode, modes: tuple[NamedMode, ...]) -> int:
     )
 
 
-def nearest_modes(samples: Candidates | None, modes: tuple[NamedMode, ...]) -> NDArray[np.intp] | None:
-    """For each raw sample (K,) the mode whose thrusts are nearest to its own; None where there are none."""
-    if samples is None or not modes:
-        return None
-    raw = _push(samples.command)
-    refined = _push(np.array([mode.command for mode, _ in modes]))
-    gap = np.abs(raw[:, None] - refined[None]) ** 2
-    return np.asarray(np.argmin(gap.sum(axis=-1), axis=1))
-
-
-def _push(command: Array) -> NDArray[np.complex128]:
-    """Thrusts (..., n) in each fin's plane as complex numbers, up to a common factor; 0 for failed fins."""
-    strength = np.sin(command[..., 0]) ** 2 * command[..., 1] ** 2
-    return np.asarray(np.nan_to_num(strength * np.exp(1j * command[..., 2])))
+def led_to(samples: Candidates, modes: tuple[NamedMode, ...]) -> NDArray[np.intp]:
+    """For each raw sample (K,) the first mode that its component led to, -1 where it led to none."""
+    places: dict[str, int] = {}
+    for k, (mode, _) in enumerate(modes):
+        for source in mode.sources:
+            places.setdefault(source, k)
+    return np.array([places.get(source, -1) for source in samples.source], dtype=np.intp)
 
 
 def _names(signatures: list[ModeSignature]) -> list[str]:

@@ -42,6 +42,8 @@ class Sweep:
         """Mean force of each fin at each value (n, POINTS) [N]; NaN where it is not known yet."""
         self.error: NDArray[np.float64] = np.full(POINTS, np.nan)
         """Error at each value (POINTS,) [σ]."""
+        self.power: NDArray[np.float64] = np.full(POINTS, np.nan)
+        """Power at each value (POINTS,) [W]."""
 
     @property
     def running(self) -> bool:
@@ -62,7 +64,7 @@ class Sweep:
         self.axis, self.values = axis, np.linspace(low, high, POINTS)
         self.fins = self._session.state.layout.names
         self.force = np.full((len(self.fins), POINTS), np.nan)
-        self.error = np.full(POINTS, np.nan)
+        self.error, self.power = np.full((2, POINTS), np.nan)
         self._place, self._step = 0, 1
         self._session.history.end_merge()
         self._timer = self._loop.later(0.0, self._go)
@@ -99,4 +101,4 @@ class Sweep:
         at = int(np.argmin(np.abs(self.values - answer.target[self.axis])))
         if abs(self.values[at] - answer.target[self.axis]) < 1e-9:
             self.force[:, at] = np.linalg.norm(answer.fin_forces, axis=1)
-            self.error[at] = answer.err_norm
+            self.error[at], self.power[at] = answer.err_norm, answer.power

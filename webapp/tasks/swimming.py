@@ -66,6 +66,11 @@ class Swimming:
         return bool(self.swimmers) and self.swimmers[0].shown.done
 
     @property
+    def objective(self) -> str:
+        """What its fins keep least."""
+        return "" if self._start.question is None else self._start.question.objective
+
+    @property
     def time(self) -> float:
         """Simulated time [s]."""
         return self.swimmers[0].shown.time if self.swimmers else 0.0
@@ -81,7 +86,7 @@ class Swimming:
 
     def _swimmer(self, plan: Plan, method: str) -> Swimmer:
         path = make_trajectory(plan.path) if isinstance(plan.path, str) else plan.path
-        allocator = self._solver.allocator(State(plan.layout, method=method))
+        allocator = self._solver.allocator(State(plan.layout, method=method, objective=plan.objective))
         failures = [(name, 0.0) for name in plan.failed]
         return Swimmer(method, ClosedLoop(plan.layout, allocator, path, plant=plan.plant, failures=failures))
 

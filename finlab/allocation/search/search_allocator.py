@@ -140,14 +140,18 @@ class SearchAllocator(Allocator):
 
         def explored() -> Candidates:
             found = self.pipeline.explore(prepared, targets, refined)
+            # The answer's own candidates come first; the others are what the wider search has found.
+            count = refined.origin.shape[1]
+            wider = _sources(found.origin[0, count:], _seed_names(layout))
+            source = _sources(refined.origin[0], own) + wider
             exact = max(SEARCH.alternative_error * prepared.exactness, 1.01 * found.error[0, 0])
-            kept = found.error[0] <= exact
+            kept = np.flatnonzero(found.error[0] <= exact)
             exact_ones = RefinedCandidates(*(values[:, kept] for values in found))
-            return _candidates(exact_ones, std, layout, _seed_names(layout))
+            return _candidates(exact_ones, std, layout, tuple(source[k] for k in kept))
 
         return Solution(
             refined.command[:, 0],
-            candidates=lambda: _candidates(refined, std, layout, own),
+            candidates=lambda: _candidates(refined, std, layout, _sources(refined.origin[0], own)),
             alternatives=explored,
         )
 
@@ -221,11 +225,17 @@ def _within_reach(problem: PlanarProblem, policy: Policy, target: Array) -> Near
         return nearest(sets, target[None], (weights.max() / weights) ** 2)
 
 
-def _candidates(refined: RefinedCandidates, std: Array, layout: Layout, names: tuple[str, ...]) -> Candidates:
-    """The refined answers to a single target, from seeds of these names."""
-    command, wrench, error, _, origin = (values[0] for values in refined)
-    source = tuple([names[k] if 0 <= k < len(names) else "another start" for k in origin.tolist()])
+def _candidates(
+    refined: RefinedCandidates, std: Array, layout: Layout, source: tuple[str, ...]
+) -> Candidates:
+    """The refined answers to a single target, and where each comes from."""
+    command, wrench, error, _, _ = (values[0] for values in refined)
     return Candidates(command, wrench * std, error, *costs(layout, command), source)
+
+
+def _sources(origin: NDArray[np.intp], names: tuple[str, ...]) -> tuple[str, ...]:
+    """Where answers come from: the names of their seeds."""
+    return tuple([names[k] if 0 <= k < len(names) else "another start" for k in origin.tolist()])
 
 
 @lru_cache(maxsize=128)
