@@ -142,12 +142,12 @@ def difference(found: FinEnvelope, expected: FinEnvelope) -> float:
     largest; infinite where they are of different kinds."""
     if found.table.shape != expected.table.shape:
         return np.inf
-    arc = max(abs(found.middle - expected.middle), abs(found.half - expected.half)) / (2.0 * np.pi)
-    force = float(expected.largest.max())
-    cost = found.table[..., COST], expected.table[..., COST]
+    force, cost = float(expected.largest.max()), float(np.abs(expected.table[..., COST]).max())
     pairs = (
+        (found.middle, expected.middle, 2.0 * np.pi),
+        (found.half, expected.half, 2.0 * np.pi),
         (found.smallest, expected.smallest, force),
         (found.largest, expected.largest, force),
-        (*cost, float(np.abs(cost[1]).max())),
+        (found.table[..., COST], expected.table[..., COST], cost),
     )
-    return max(arc, *(float(np.abs(a - b).max()) / max(scale, 1e-300) for a, b, scale in pairs))
+    return float(np.max([np.abs(a - b).max() / max(scale, 1e-300) for a, b, scale in pairs]))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from finlab.bundle_files import archive_around
 from finlab.layout.fin import FinModelSpec
+from finlab.layout.layout import Layout
 from finlab.physics.drag import Drag
 from finlab.physics.fin_law import FinLaw, PlanarLaw
 from finlab.physics.lighthill import Lighthill
@@ -63,6 +64,11 @@ def file_stamp(spec: FinModelSpec) -> tuple[int, int] | None:
     except (OSError, ValueError):
         return 0, 0
     return found.st_mtime_ns, found.st_size
+
+
+def file_stamps(layout: Layout) -> tuple[tuple[int, int] | None, ...]:
+    """Returns the stamps of all fins of a layout, for what is kept of it until one of its files changes."""
+    return tuple([file_stamp(fin.model) for fin in layout.fins])
 
 
 @lru_cache(maxsize=64)

@@ -13,7 +13,7 @@ from finlab.layout.angles import TURN, is_full_turn
 from finlab.layout.arrays import force_columns
 from finlab.layout.layout import Layout
 from finlab.physics.blade import Blade
-from finlab.physics.fin_model import file_stamp, make_law, stack_laws
+from finlab.physics.fin_model import file_stamps, make_law, stack_laws
 from finlab.physics.wrench import body_force, wrench_of_forces
 
 Array = NDArray[np.float64]
@@ -171,7 +171,7 @@ def plant_of(layout: Layout) -> Plant:
     Raises:
         DataError: a fin's force table cannot be read.
     """
-    return _made(layout, tuple(file_stamp(fin.model) for fin in layout.fins))
+    return _made(layout, file_stamps(layout))
 
 
 @lru_cache(maxsize=256)

@@ -35,7 +35,9 @@ from finlab.forces import force_space
 from finlab.forces.branch_and_bound import bound_by_branching
 from finlab.forces.compiled_fins import CompiledFins
 from finlab.forces.cost_bound import cost_bound
+from finlab.layout import Layout
 from finlab.physics.energy import EnergyMeter
+from finlab.physics.fin_model import file_stamps
 from finlab.physics.objective import Objective
 
 Array = NDArray[Any]
@@ -82,7 +84,11 @@ class Pipeline:
         """Make it for wrenches normalized by `std` (6,), with fins that are `compiled` already."""
         self.std, self.objective = std, objective
         self.settings = self._checked(settings)
-        self.prepare = lru_cache(maxsize=128)(lambda layout: prepare(layout, std, objective, compiled))
+        self._prepared = lru_cache(maxsize=128)(lambda layout, _: prepare(layout, std, objective, compiled))
+
+    def prepare(self, layout: Layout) -> Prepared:
+        """The layout, kept from the last time; force tables whose files have changed are read again."""
+        return self._prepared(layout, file_stamps(layout))
 
     def with_settings(self, settings: Settings) -> Pipeline:
         """The same layouts prepared, with other settings."""

@@ -1,7 +1,10 @@
 """The default method: exact by the plant on any fin, inside limits, never NaN."""
 
 import math
+import os
+from dataclasses import replace
 from itertools import combinations
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,8 +13,8 @@ import pytest
 from finlab.allocation import Allocator, load_allocator
 from finlab.allocation.search.search_allocator import CHUNK, SearchAllocator
 from finlab.assets import shipped_layouts
-from finlab.layout import Fin, Layout, Limits, load_layout, random_layout
-from finlab.physics import Plant
+from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout, random_layout
+from finlab.physics import Plant, make_law, write_table
 from finlab.physics.energy import POWER_WEIGHTS, EnergyWeights
 from finlab.physics.objective import Name
 
@@ -195,6 +198,17 @@ def test_every_option_still_answers_exactly(options: dict[str, Any]) -> None:
     result = method.allocate(layout, reachable(layout, 1)[0])
     assert result.err_norm < GOOD and keeps_limits(layout, result.command)
     assert result.candidates is not None and len(result.candidates.command) <= options.get("n_refined", 4)
+
+
+def test_a_force_table_that_was_measured_again_is_read_again(search: SearchAllocator, tmp_path: Path) -> None:
+    grid = np.linspace(0.0, 0.6, 9), np.linspace(0.0, 2.1, 10), np.linspace(-np.pi, np.pi, 13)
+    table = FinModelSpec("table", (("path", str(tmp_path / "fin.csv")),))
+    layout = load_layout("A")
+    layout = replace(layout, fins=tuple(replace(fin, model=table) for fin in layout.fins))
+    for hour, area in enumerate((0.02, 0.03)):
+        write_table(tmp_path / "fin.csv", make_law(FinModelSpec("drag", (("area", area),))), *grid)
+        os.utime(tmp_path / "fin.csv", (3600 * hour, 3600 * hour))
+        assert search.allocate(layout, [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]).err_norm < GOOD
 
 
 def test_turning_the_robot_does_not_make_it_worse(search: SearchAllocator) -> None:
