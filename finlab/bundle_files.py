@@ -42,6 +42,8 @@ LARGEST_TABLE = 20_000_000
 """Largest size of a force table in a bundle [bytes]."""
 LARGEST_BUNDLE = 100_000_000
 """Largest size of all files together [bytes]."""
+MOST_FILES = len(LARGEST) + 16
+"""Most files; a robot has up to 16 fins, each with a table at most."""
 REQUIRED = (GRAPH, ABOUT, COMPILED, CHECKSUMS)
 VERSION_1 = "network.onnx"
 """A file that only bundles of version 1 hold."""
@@ -134,6 +136,8 @@ class _Contents(dict[str, bytes]):
         if len(content) > most:
             raise DataError(f"{self.source}: {name} is larger than {most:,} bytes")
         self.left -= len(content)
+        if len(self) >= MOST_FILES:
+            raise DataError(f"{self.source}: holds more than {MOST_FILES} files")
         if self.left < 0:
             raise DataError(f"{self.source}: its files are larger than {LARGEST_BUNDLE:,} bytes together")
         self[name] = content

@@ -401,6 +401,10 @@ def archive_of(path: Path, **files: bytes) -> Path:
             "'tables/x.csv', which is no part of a",
         ),
         (
+            lambda p: archive_of(p / "a.zip", **{table_name(b"%d" % k): b"" for k in range(100)}),
+            "holds more than 23 files",
+        ),
+        (
             lambda p: archive_of(p / "a.zip", **{TABLES + "../" + "0" * 64 + ".csv": b""}),
             "which is no part of a bundle",
         ),
@@ -413,6 +417,7 @@ def archive_of(path: Path, **files: bytes) -> Path:
         "zip bomb",
         "table",
         "name",
+        "tables",
         "out of tables",
     ],
 )
