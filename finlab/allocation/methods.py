@@ -129,11 +129,15 @@ def allocator_from_bundle(
     compiled = parse_compiled(files[COMPILED], f"{source}/{COMPILED}")
     if method not in LEARNED:
         return _made(method, about.normalization, options, compiled)
+    if method not in METHODS_ON_BOARD:
+        raise DataError(
+            f"{source}: method {method!r} does not run from a bundle; name its checkpoint in place of that"
+        )
     part = checkpoint_part(files)
     if not part or about.checkpoint is None:
         raise DataError(
             f"{source}: holds no networks, which method {method!r} needs; export it again with "
-            "`finlab export LAYOUT -o DIR --method mdn`"
+            f"`finlab export LAYOUT -o DIR --method {method}`"
         )
     weights = parse_checkpoint(part, f"{source}/{CHECKPOINT.rstrip('/')}", about.checkpoint)
     if not all(np.array_equal(a, b) for a, b in zip(weights.normalization, about.normalization, strict=True)):
