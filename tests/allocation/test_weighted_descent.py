@@ -3,12 +3,15 @@
 import numpy as np
 import pytest
 
+from finlab.allocation.command_cost import Bowl, EffortCost
 from finlab.allocation.weighted_descent import (
     DescentOptions,
+    _bowl,
     _clamped_step,
     _damped_step,
-    _EnergyForm,
+    _inverse,
     _least,
+    _times,
     descend,
 )
 from finlab.layout import Fin, Layout, Limits
@@ -16,7 +19,7 @@ from finlab.physics import Plant, plant_of
 from finlab.physics.energy import EnergyWeights, command_energy
 
 SIGMA = np.array([1.4, 1.4, 2.0, 0.35, 0.3, 0.4])
-OPTIONS = DescentOptions(energy_tradeoff=0.3, energy_weights=EnergyWeights(1.0, 2.0, 0.4, 0.7))
+WEIGHTS, WEIGHT = EnergyWeights(1.0, 2.0, 0.4, 0.7), 0.3
 """Every weight differs from every other."""
 
 
@@ -29,9 +32,19 @@ def plant() -> Plant:
     )
 
 
-def dense(plant: Plant, options: DescentOptions) -> np.ndarray:
+def bowl_at(plant: Plant, position: np.ndarray) -> Bowl:
+    """What stands for the effort at positions (B, 2, 3) between the limits."""
+    return _bowl(plant, plant.lower + position * plant.width, EffortCost(plant.upper, WEIGHTS, WEIGHT))
+
+
+def pull_at(plant: Plant, position: np.ndarray) -> np.ndarray:
+    """Half its gradient (2, 3) at one position (2, 3)."""
+    return np.asarray(bowl_at(plant, position[None]).slope[0])
+
+
+def dense(plant: Plant) -> np.ndarray:
     """Half the Hessian (3 n, 3 n) of the weighted energy by positions, entry by entry."""
-    weights, size = options.energy_weights, 3 * plant.n_fins
+    weights, size = WEIGHTS, 3 * plant.n_fins
     result = np.zeros((size, size))
     for i in range(plant.n_fins):
         a, f, d = plant.width[i] / np.abs(plant.upper[i])
@@ -39,44 +52,42 @@ def dense(plant: Plant, options: DescentOptions) -> np.ndarray:
         result[3 * i + 1, 3 * i + 1] = weights.frequency * f**2
         result[3 * i + 2, 3 * i + 2] = weights.zero_direction * d**2
         result[3 * i, 3 * i + 1] = result[3 * i + 1, 3 * i] = weights.product * a * f / 2
-    return options.energy_tradeoff * result
+    return WEIGHT * result
 
 
 def test_the_energys_gradient_is_half_its_derivative(plant: Plant) -> None:
-    form, at = _EnergyForm(plant, OPTIONS), np.random.default_rng(0).random((4, 2, 3))
+    at = np.random.default_rng(0).random((4, 2, 3))
     for i in range(2):
         for j in range(3):
             offset = np.zeros((2, 3))
             offset[i, j] = 0.5
             more, less = (
-                command_energy(
-                    plant.lower + (at + s * offset) * plant.width, plant.upper, OPTIONS.energy_weights
-                )
+                command_energy(plant.lower + (at + s * offset) * plant.width, plant.upper, WEIGHTS)
                 for s in (1, -1)
             )
             # Central differences of a quadratic form are exact.
             expected = 0.3 * (more - less) / 2
-            np.testing.assert_allclose(form.gradient(at)[:, i, j], expected, rtol=1e-12)
+            np.testing.assert_allclose(bowl_at(plant, at).slope[:, i, j], expected, rtol=1e-12)
 
 
 def test_the_energys_inverse_is_that_of_the_dense_matrix(plant: Plant) -> None:
-    form, damping = _EnergyForm(plant, OPTIONS), np.array([0.01, 2.0])
-    inverse, off = form.inverse(damping, np.zeros((2, 2, 3), dtype=bool))
+    bowl, damping = bowl_at(plant, np.full((2, 2, 3), 0.3)), np.array([0.01, 2.0])
+    inverse, off = _inverse(bowl, damping, np.zeros((2, 2, 3), dtype=bool))
     for row in range(2):
-        expected = np.linalg.inv(dense(plant, OPTIONS) + damping[row] * np.eye(6))
+        expected = np.linalg.inv(dense(plant) + damping[row] * np.eye(6))
         np.testing.assert_allclose(inverse[row].ravel(), np.diag(expected), rtol=1e-12)
         np.testing.assert_allclose(off[row], expected[[0, 3], [1, 4]], rtol=1e-12)
         vector = np.random.default_rng(row).normal(size=(2, 3))
-        applied = form.apply(vector, inverse[row], off[row])
+        applied = _times(vector, inverse[row], off[row])
         np.testing.assert_allclose(applied.ravel(), expected @ vector.ravel(), rtol=1e-12)
 
 
 def test_a_held_variable_leaves_the_inverse_of_the_others(plant: Plant) -> None:
-    form, held = _EnergyForm(plant, OPTIONS), np.zeros((1, 2, 3), dtype=bool)
+    bowl, held = bowl_at(plant, np.full((1, 2, 3), 0.3)), np.zeros((1, 2, 3), dtype=bool)
     held[0, 0, 0] = held[0, 1, 2] = True
-    inverse, off = form.inverse(np.array([0.01]), held)
+    inverse, off = _inverse(bowl, np.array([0.01]), held)
     free = np.flatnonzero(~held.ravel())
-    expected = np.linalg.inv((dense(plant, OPTIONS) + 0.01 * np.eye(6))[np.ix_(free, free)])
+    expected = np.linalg.inv((dense(plant) + 0.01 * np.eye(6))[np.ix_(free, free)])
     np.testing.assert_allclose(inverse.ravel()[free], np.diag(expected), rtol=1e-12)
     assert inverse[held].max() < 1e-20 and abs(off[0, 0]) < 1e-20
 
@@ -84,9 +95,9 @@ def test_a_held_variable_leaves_the_inverse_of_the_others(plant: Plant) -> None:
 def step_of(
     plant: Plant, position: np.ndarray, residual: np.ndarray, slope: np.ndarray, damping: float, passes: int
 ) -> np.ndarray:
-    form = _EnergyForm(plant, OPTIONS)
+    bowl = bowl_at(plant, position[None])
     step = _clamped_step(
-        position[None], residual[None], slope[None], np.array([damping]), form, plant, passes
+        position[None], residual[None], slope[None], np.array([damping]), bowl, plant, passes
     )
     return np.asarray(step[0])
 
@@ -100,9 +111,8 @@ def solved(
     free: np.ndarray,
 ) -> np.ndarray:
     """The damped step over the free variables (3 n,) by one dense solve."""
-    form = _EnergyForm(plant, OPTIONS)
-    gradient = slope.T @ residual + form.gradient(position).ravel()
-    matrix = slope.T @ slope + dense(plant, OPTIONS) + damping * np.eye(6)
+    gradient = slope.T @ residual + pull_at(plant, position).ravel()
+    matrix = slope.T @ slope + dense(plant) + damping * np.eye(6)
     step = np.zeros(6)
     step[free] = np.linalg.solve(matrix[np.ix_(free, free)], -gradient[free])
     return step
@@ -128,16 +138,15 @@ def test_what_would_leave_its_limit_is_held_from_the_first_pass(
     outwards = 1.0 if end else -1.0
     position, slope = np.full((2, 3), 0.5), 0.3 * np.random.default_rng(3).normal(size=(6, 6))
     position[1, 2] = end + outwards * beyond
-    form = _EnergyForm(plant, OPTIONS)
     slope[:, 5] = np.eye(6)[5]
     residual = np.zeros(6)
-    residual[5] = -outwards * pull - form.gradient(position)[1, 2]  # half the gradient is what is asked
+    residual[5] = -outwards * pull - pull_at(plant, position)[1, 2]  # half the gradient is what is asked
     free = np.arange(5)
     step = step_of(plant, position, residual, slope, 20.0, 1)
     np.testing.assert_allclose(step[:5], solved(plant, position, residual, slope, 20.0, free)[:5], rtol=1e-9)
     assert step[5] == pytest.approx(-outwards * beyond, abs=1e-15)
     inwards = residual.copy()
-    inwards[5] = outwards * pull - form.gradient(position)[1, 2]
+    inwards[5] = outwards * pull - pull_at(plant, position)[1, 2]
     step = step_of(plant, position, inwards, slope, 20.0, 1)
     expected = solved(plant, position, inwards, slope, 20.0, np.arange(6))
     np.testing.assert_allclose(step[:5], expected[:5], rtol=1e-9)
@@ -173,14 +182,14 @@ def test_a_crossed_limit_fixes_its_variable_there_and_the_rest_is_solved_anew(pl
 def test_damped_steps_do_not_move_what_is_held(plant: Plant) -> None:
     rng, held = np.random.default_rng(6), np.zeros((3, 2, 3), dtype=bool)
     held[1, 0, 1] = held[2] = True
-    form = _EnergyForm(plant, OPTIONS)
+    bowl = bowl_at(plant, np.full((3, 2, 3), 0.3))
     step = _damped_step(
         rng.normal(size=(3, 6)),
         rng.normal(size=(3, 6, 6)),
         rng.normal(size=(3, 2, 3)),
         np.full(3, 0.1),
         held,
-        form,
+        bowl,
     )
     assert np.abs(step[held]).max() < 1e-20 and np.abs(step[~held]).min() > 1e-6
 
@@ -194,16 +203,21 @@ def test_the_least_damping_grows_with_the_derivatives_from_an_absolute_one() -> 
 
 def test_no_step_leaves_the_start_within_its_limits_and_tells_its_objective(plant: Plant) -> None:
     start, target = plant.sample(np.random.default_rng(1), (3,)), np.ones((3, 6))
-    found = descend(plant, start, target, SIGMA, DescentOptions(n_steps=0, energy_tradeoff=0.5))
+    options = DescentOptions(n_steps=0)
+    found = descend(plant, start, target, SIGMA, options, EffortCost(plant.upper, weight=0.5))
     np.testing.assert_array_equal(found.command, plant.feasible(start))
     np.testing.assert_allclose(found.wrench, plant.wrench(start), rtol=1e-12)
     missing = ((plant.wrench(start) - 1.0) / SIGMA) ** 2
     expected = missing.sum(1) + 0.5 * command_energy(start, plant.upper)
     np.testing.assert_allclose(found.objective, expected, rtol=1e-12)
     other = np.full((2, 3), 7.0)
-    scaled = DescentOptions(n_steps=0, energy_tradeoff=0.5, energy_upper=other)
     expected = missing.sum(1) + 0.5 * command_energy(start, other)
-    np.testing.assert_allclose(descend(plant, start, target, SIGMA, scaled).objective, expected, rtol=1e-12)
+    scaled = EffortCost(other, weight=0.5)
+    found = descend(plant, start, target, SIGMA, options, scaled)
+    np.testing.assert_allclose(found.objective, expected, rtol=1e-12)
+    np.testing.assert_allclose(
+        descend(plant, start, target, SIGMA, options).objective, missing.sum(1), rtol=1e-12
+    )
 
 
 def test_rows_do_not_see_each_other(plant: Plant) -> None:
@@ -211,10 +225,10 @@ def test_rows_do_not_see_each_other(plant: Plant) -> None:
     rng = np.random.default_rng(2)
     start, target = plant.sample(rng, (6,)), 0.4 * plant.wrench(plant.sample(rng, (6,)))
     target[0] = plant.wrench(start[:1])[0]  # done at once
-    options = DescentOptions(n_steps=15, energy_tradeoff=1e-3)
-    together = descend(plant, start, target, SIGMA, options)
+    options, cost = DescentOptions(n_steps=15), EffortCost(plant.upper, weight=1e-3)
+    together = descend(plant, start, target, SIGMA, options, cost)
     for i in range(6):
-        alone = descend(plant, start[i : i + 1], target[i : i + 1], SIGMA, options)
+        alone = descend(plant, start[i : i + 1], target[i : i + 1], SIGMA, options, cost)
         np.testing.assert_allclose(together.command[i], alone.command[0], atol=1e-9)
         np.testing.assert_allclose(together.wrench[i], plant.wrench(together.command[i]), atol=1e-9)
 
@@ -222,7 +236,7 @@ def test_rows_do_not_see_each_other(plant: Plant) -> None:
 def test_it_stops_when_told_with_the_best_so_far(plant: Plant) -> None:
     start, target = plant.sample(np.random.default_rng(4), (2,)), np.full((2, 6), 0.3)
     one = descend(plant, start, target, SIGMA, DescentOptions(n_steps=1))
-    stopped = descend(plant, start, target, SIGMA, DescentOptions(n_steps=20), lambda: True)
+    stopped = descend(plant, start, target, SIGMA, DescentOptions(n_steps=20), is_over=lambda: True)
     np.testing.assert_array_equal(stopped.command, one.command)
     longer = descend(plant, start, target, SIGMA, DescentOptions(n_steps=20))
     assert (longer.objective < one.objective).all()

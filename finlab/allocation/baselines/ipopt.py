@@ -1,12 +1,21 @@
-"""Method `ipopt`: CasADi and IPOPT from random starts; needs the extra `ipopt`."""
+"""Method `ipopt`: CasADi and IPOPT from several starts; needs the extra `ipopt`.
+
+Fins whose laws are formulas become CasADi symbols, with exact first and second derivatives. A robot with a
+force table has no formula: it becomes a CasADi callback that asks the plant (`plant_in_casadi`), with the
+table's exact Jacobian and a Hessian by differences of it.
+"""
+
+from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.baselines.model_based import CACHE_SIZE, ENERGY_TRADEOFF, TIME_LIMIT_S
+from finlab.allocation.aim import Aim
+from finlab.allocation.baselines.model_based import CACHE_SIZE, TIME_LIMIT_S
+from finlab.allocation.baselines.plant_in_casadi import plant_in_casadi
 from finlab.allocation.baselines.single_target import DEFAULT_STARTS, Problem, SingleTarget
 from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
@@ -25,16 +34,34 @@ SOLVER_OPTIONS = {
 }
 
 
-class Ipopt(SingleTarget):
-    """IPOPT on `err_norm^2 + 1e-4 J_en` within the limits, exact derivatives by CasADi.
+class Formulas(NamedTuple):
+    """A robot as CasADi sees it."""
 
-    The program is built once per layout with the target as its parameter. Knows the analytic fin models
-    that have a formula. Of the ends, the lowest objective wins.
+    command: Any
+    """Commands (3 n,)."""
+    target: Any
+    """Wrench that is wanted (6,)."""
+    residual: Any
+    """Normalized error (6,)."""
+    cost: Any
+    """What the commands cost, weighed beside the squared error."""
+    options: dict[str, Any]
+    """What IPOPT must be told."""
+    called: Any
+    """A callback to be kept alive; None where there is none."""
+
+
+class Ipopt(SingleTarget):
+    """IPOPT on `err_norm^2 + cost` within the limits, exact derivatives by CasADi or the plant.
+
+    The program is built once per layout with the target as its parameter. Of the ends, the lowest objective
+    wins.
 
     Args:
         normalization: sigma scales the error.
-        n_starts: uniform random starts per target.
+        n_starts: uniform random starts per target, beside the pseudo-inverse's answer.
         time_limit_s: processor time per target after which no start begins; each may take half as long.
+        aim: see `ModelBased`.
 
     Raises:
         AllocationError: CasADi is not installed.
@@ -48,13 +75,14 @@ class Ipopt(SingleTarget):
         *,
         n_starts: int = DEFAULT_STARTS,
         time_limit_s: float = TIME_LIMIT_S,
+        **aim: Unpack[Aim],
     ) -> None:
-        super().__init__(normalization, n_starts=n_starts, time_limit_s=time_limit_s)
+        super().__init__(normalization, n_starts=n_starts, time_limit_s=time_limit_s, **aim)
         self._casadi = import_casadi()
         self._solver = lru_cache(CACHE_SIZE)(self._build)
 
     def _minimize(self, problem: Problem, start: Array) -> Array:
-        solver = self._solver(problem.plant)
+        solver = self._solver(problem.plant)[0]
         answer = solver(x0=problem.command(start).ravel(), p=problem.target, **self._bounds(problem))
         return problem.position(np.array(answer["x"], np.float64).reshape(-1, 3))
 
@@ -62,34 +90,41 @@ class Ipopt(SingleTarget):
     def _bounds(problem: Problem) -> dict[str, Array]:
         return {"lbx": problem.plant.lower.ravel(), "ubx": problem.plant.upper.ravel()}
 
-    def _build(self, plant: Plant) -> Any:
-        """The solver of one layout; its variables are the commands as they are, its parameter the target."""
-        command, target, residual, energy = self._formulas(plant)
-        objective = self._casadi.sumsqr(residual) + ENERGY_TRADEOFF * energy
-        program = {"x": command, "p": target, "f": objective}
-        options = SOLVER_OPTIONS | {"ipopt.max_cpu_time": 0.5 * self.time_limit_s}
-        return self._casadi.nlpsol("allocation", "ipopt", program, options)
+    def _build(self, plant: Plant) -> tuple[Any, Formulas]:
+        """The solver of one layout, and the formulas, which must live as long; its variables are the commands
+        as they are, its parameter the target."""
+        formulas = self._formulas(plant)
+        objective = self._casadi.sumsqr(formulas.residual) + formulas.cost
+        program = {"x": formulas.command, "p": formulas.target, "f": objective}
+        options = SOLVER_OPTIONS | formulas.options | {"ipopt.max_cpu_time": 0.5 * self.time_limit_s}
+        return self._casadi.nlpsol("allocation", "ipopt", program, options), formulas
 
-    def _formulas(self, plant: Plant) -> tuple[Any, Any, Any, Any]:
-        """Symbolic command (3n), target (6), normalized error (6) and energy."""
-        cs = self._casadi
+    def _formulas(self, plant: Plant) -> Formulas:
+        """What a robot's commands give and cost."""
+        cs, laws = self._casadi, [make_law(fin.model) for fin in plant.layout.fins]
+        sigma = cs.DM(self.normalization.std)
+        if not all(isinstance(law, PlanarLaw) for law in laws):
+            answer, hessian = plant_in_casadi(cs, plant, self._cost(plant), self.normalization.std)
+            command, target = cs.MX.sym("command", 3 * plant.n_fins), cs.MX.sym("target", 6)
+            given = answer(command)
+            options = {"hess_lag": hessian}
+            return Formulas(command, target, (given[:6] - target) / sigma, given[6], options, answer)
         command, target = cs.SX.sym("command", 3 * plant.n_fins), cs.SX.sym("target", 6)
-        wrench, energy = cs.SX.zeros(6), 0
+        wrench, cost = cs.SX.zeros(6), 0
         scale = energy_scale(plant.upper)
-        for i, fin in enumerate(plant.layout.fins):
+        for i, law in enumerate(laws):
+            assert isinstance(law, PlanarLaw)
             amplitude, frequency, direction = (command[3 * i + k] for k in range(3))
-            law = make_law(fin.model)
-            if not isinstance(law, PlanarLaw):
-                raise AllocationError(
-                    f"method ipopt needs a closed formula, fin {fin.name} follows a {fin.model.type}; "
-                    "use trf or multistart"
-                )
             thrust, points = law.thrust(amplitude, frequency, direction), direction + law.offset
             wrench += thrust * cs.cos(points) * cs.DM(plant.columns[i, 1])
             wrench += thrust * cs.sin(points) * cs.DM(plant.columns[i, 2])
-            shares = amplitude / scale[i, 0], frequency / scale[i, 1], direction / scale[i, 2]
-            energy += energy_of_shares(*shares)
-        return command, target, (wrench - target) / cs.DM(self.normalization.std), energy
+            if self.objective == "power":
+                cost += law.blade.driving_power(amplitude, frequency, self.copper_loss)
+            else:
+                shares = amplitude / scale[i, 0], frequency / scale[i, 1], direction / scale[i, 2]
+                cost += energy_of_shares(*shares, self.energy_weights)
+        weight = self._cost(plant).weight
+        return Formulas(command, target, (wrench - target) / sigma, weight * cost, {}, None)
 
 
 def import_casadi() -> Any:

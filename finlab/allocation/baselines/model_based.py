@@ -3,22 +3,27 @@
 import math
 import time
 from abc import abstractmethod
+from functools import lru_cache
+from inspect import Parameter, signature
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.allocation.aim import Aim, checked_objective
 from finlab.allocation.allocator import Allocator
+from finlab.allocation.baselines.pseudo_inverse import PseudoInverse
+from finlab.allocation.command_cost import CommandCost, command_cost
 from finlab.allocation.solution import Solution
 from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
 from finlab.physics import Plant, plant_of
-from finlab.physics.energy import command_energy
 
 Array = NDArray[np.float64]
 
 ENERGY_TRADEOFF = 1e-4
-"""Weight of the energy proxy beside the squared normalized error where a method weighs the two."""
+"""Weight of the cost beside the squared normalized error where a method weighs both; see `command_cost`."""
 TIME_LIMIT_S = 0.6
 """Processor time [s] that a slow method takes for one target unless set otherwise: with what a call does
 besides, less than a second."""
@@ -50,15 +55,27 @@ def check_time_limit(seconds: float) -> float:
 
 
 class ModelBased(Allocator):
-    """A method that optimizes over the layout's own analytic fin models, the ones that score every method.
+    """A method that optimizes over the fins' own laws and tables, those that score every method.
 
     Args:
         normalization: the yardstick of the error; nothing else is taken from a checkpoint.
+        aim: what is kept least, as settings of every such method.
     """
 
-    def __init__(self, normalization: Normalization) -> None:
+    def __init__(self, normalization: Normalization, **aim: Unpack[Aim]) -> None:
         self.normalization = normalization
+        self.aim = checked_objective(**aim)
+        self.objective, self.energy_weights = self.aim.name, self.aim.weights
+        self.copper_loss = self.aim.copper_loss
         self._plant = plant_of
+        self._cost = lru_cache(CACHE_SIZE)(self._weigh)
+        self._inverse = lru_cache(CACHE_SIZE)(lambda plant: PseudoInverse(plant, normalization.std, self.aim))
+
+    @classmethod
+    def option_names(cls) -> list[str]:
+        """Names of what can be set when the method is made."""
+        own = list(signature(cls).parameters.values())[1:]
+        return [each.name for each in own if each.kind != Parameter.VAR_KEYWORD] + list(Aim.__annotations__)
 
     @abstractmethod
     def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
@@ -73,7 +90,13 @@ class ModelBased(Allocator):
         command = self._commands(plant, targets, seed)
         return Solution(plant.feasible(command))
 
-    def _objective(self, plant: Plant, command: Array, target: Array) -> Array:
-        """`J = err_norm^2 + ENERGY_TRADEOFF * J_en` of commands (..., n, 3)."""
-        error = self.normalization.error(plant.wrench(command), target)
-        return error**2 + ENERGY_TRADEOFF * command_energy(command, plant.upper)
+    def _weigh(self, plant: Plant, tradeoff: float = ENERGY_TRADEOFF) -> CommandCost:
+        """What a robot's commands cost, weighed beside the squared normalized error."""
+        return command_cost(plant, self.aim, self.normalization.std, tradeoff)
+
+    def _total(self, plant: Plant, command: Array, target: Array) -> Array:
+        """`J = err_norm^2 + cost` (B,) of commands (B, n, 3)."""
+        total: Array = self.normalization.error(plant.wrench(command), target) ** 2 + self._cost(plant)(
+            command
+        )
+        return total

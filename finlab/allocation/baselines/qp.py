@@ -1,11 +1,13 @@
 """Method `qp`: one linear map per layout, one box-constrained least squares per target, as in the paper."""
 
 from functools import lru_cache
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
+from finlab.allocation.aim import Aim
 from finlab.allocation.baselines.model_based import CACHE_SIZE, ModelBased
 from finlab.inference.normalization import Normalization
 from finlab.physics import Plant
@@ -37,18 +39,21 @@ class Qp(ModelBased):
     """Linearized once per layout, solved per target by SciPy's active-set `lsq_linear(method="bvls")`.
 
     Minimizes `||(w_ref + J du - target) / sigma||^2 + regularization ||du||^2` over commands as positions
-    between their limits, where `w_ref` and `J` belong to the middle of the limits. Knows the analytic fin
-    model.
+    between their limits, where `w_ref` and `J` belong to the middle of the limits. As in the paper,
+    what commands cost plays no part: the answer is the same whatever the objective.
 
     Args:
         normalization: sigma scales the error.
         regularization: weight of the distance from the middle of the limits.
+        aim: see `ModelBased`.
     """
 
     name = "qp"
 
-    def __init__(self, normalization: Normalization, *, regularization: float = 1.0) -> None:
-        super().__init__(normalization)
+    def __init__(
+        self, normalization: Normalization, *, regularization: float = 1.0, **aim: Unpack[Aim]
+    ) -> None:
+        super().__init__(normalization, **aim)
         self.regularization = regularization
         self._map = lru_cache(CACHE_SIZE)(self._prepare)
 

@@ -1,9 +1,12 @@
-"""Methods `trf` and `slsqp`: two solvers of SciPy, from random starts."""
+"""Methods `trf` and `slsqp`: two solvers of SciPy, from several starts."""
+
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares, minimize
 
+from finlab.allocation.aim import Aim
 from finlab.allocation.baselines.model_based import TIME_LIMIT_S
 from finlab.allocation.baselines.single_target import DEFAULT_STARTS, Problem, SingleTarget
 from finlab.inference.normalization import Normalization
@@ -17,13 +20,14 @@ INSIDE = 1e-6
 class Trf(SingleTarget):
     """`scipy.optimize.least_squares(method="trf")` on the normalized error, with the exact Jacobian.
 
-    Knows the analytic fin model. Of the ends, the lowest `err_norm^2 + 1e-4 J_en` wins.
+    Of the ends, the lowest `err_norm^2 + cost` wins.
 
     Args:
         normalization: sigma scales the error.
-        n_starts: uniform random starts per target.
+        n_starts: uniform random starts per target, beside the pseudo-inverse's answer.
         max_evaluations: most evaluations of the error per start.
         time_limit_s: processor time per target after which the best command so far is the answer.
+        aim: see `ModelBased`.
     """
 
     name = "trf"
@@ -35,8 +39,9 @@ class Trf(SingleTarget):
         n_starts: int = DEFAULT_STARTS,
         max_evaluations: int = 100,
         time_limit_s: float = TIME_LIMIT_S,
+        **aim: Unpack[Aim],
     ) -> None:
-        super().__init__(normalization, n_starts=n_starts, time_limit_s=time_limit_s)
+        super().__init__(normalization, n_starts=n_starts, time_limit_s=time_limit_s, **aim)
         self.max_evaluations = max_evaluations
 
     def _minimize(self, problem: Problem, start: Array) -> Array:
@@ -51,15 +56,16 @@ class Trf(SingleTarget):
 
 
 class Slsqp(SingleTarget):
-    """`scipy.optimize.minimize(method="SLSQP")` of `err_norm^2 + 1e-4 J_en` within the limits.
+    """`scipy.optimize.minimize(method="SLSQP")` of `err_norm^2 + cost` within the limits.
 
-    Knows the analytic fin model. Of the ends, the lowest objective wins.
+    Of the ends, the lowest objective wins.
 
     Args:
         normalization: sigma scales the error.
-        n_starts: uniform random starts per target.
+        n_starts: uniform random starts per target, beside the pseudo-inverse's answer.
         max_iterations: most iterations per start.
         time_limit_s: processor time per target after which the best command so far is the answer.
+        aim: see `ModelBased`.
     """
 
     name = "slsqp"
@@ -71,8 +77,9 @@ class Slsqp(SingleTarget):
         n_starts: int = DEFAULT_STARTS,
         max_iterations: int = 200,
         time_limit_s: float = TIME_LIMIT_S,
+        **aim: Unpack[Aim],
     ) -> None:
-        super().__init__(normalization, n_starts=n_starts, time_limit_s=time_limit_s)
+        super().__init__(normalization, n_starts=n_starts, time_limit_s=time_limit_s, **aim)
         self.max_iterations = max_iterations
 
     def _minimize(self, problem: Problem, start: Array) -> Array:

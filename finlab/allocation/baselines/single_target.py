@@ -1,23 +1,24 @@
-"""What the one-target-at-a-time solvers share: free variables, random starts, the winner by J."""
+"""What the one-target-at-a-time solvers share: free variables, starts, the winner by J."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.allocation.aim import Aim
 from finlab.allocation.baselines.model_based import (
-    ENERGY_TRADEOFF,
     TIME_LIMIT_S,
     ModelBased,
     TimeLimit,
     check_time_limit,
 )
+from finlab.allocation.command_cost import CommandCost
 from finlab.inference.normalization import Normalization
 from finlab.physics import Plant
-from finlab.physics.energy import DEFAULT_WEIGHTS, energy_scale
 
 Array = NDArray[np.float64]
 
@@ -37,15 +38,23 @@ class Problem:
         target: desired wrench (6,).
         sigma: per-axis standard deviation (6,).
         limit: when to stop.
+        cost: what counts beside the squared normalized error; nothing where None.
     """
 
-    def __init__(self, plant: Plant, target: Array, sigma: Array, limit: TimeLimit | None = None) -> None:
+    def __init__(
+        self,
+        plant: Plant,
+        target: Array,
+        sigma: Array,
+        limit: TimeLimit | None = None,
+        cost: CommandCost | None = None,
+    ) -> None:
         self.limit = TimeLimit() if limit is None else limit
+        self.cost = cost
         self._best: tuple[float, Array | None] = (np.inf, None)
         self.plant, self.target, self.sigma = plant, target, sigma
         self.free = plant.width.ravel() > 0
         self.n_free = int(self.free.sum())
-        self._scale = energy_scale(plant.upper)
 
     def command(self, x: Array) -> Array:
         """Command (n, 3) at positions (n_free,)."""
@@ -69,20 +78,15 @@ class Problem:
         return (jacobian * self.plant.width.ravel() / self.sigma[:, None])[:, self.free]
 
     def objective(self, x: Array) -> tuple[float, Array]:
-        """`err_norm^2 + ENERGY_TRADEOFF * J_en` and its gradient (n_free,); may raise `OutOfTime`."""
+        """`err_norm^2 + cost` and its gradient (n_free,); may raise `OutOfTime`."""
         command = self.command(x)
         wrench, jacobian = self.plant.linearize(command)
         residual = (wrench - self.target) / self.sigma
-        weights = DEFAULT_WEIGHTS
-        share = command / self._scale
-        diagonal = np.array([weights.amplitude, weights.frequency, weights.zero_direction])
-        half = diagonal * share
-        half[:, :2] += weights.product / 2 * share[:, 1::-1]
-        value = float(residual @ residual + ENERGY_TRADEOFF * (half * share).sum())
+        value, by_command = float(residual @ residual), 2 * (residual / self.sigma) @ jacobian
+        if self.cost is not None:
+            value += float(self.cost(command[None])[0])
+            by_command += self.cost.slopes(command[None])[0].ravel()
         self._keep(x, value)
-        by_command = (
-            2 * (residual / self.sigma) @ jacobian + 2 * ENERGY_TRADEOFF * (half / self._scale).ravel()
-        )
         return value, (by_command * self.plant.width.ravel())[self.free]
 
     def minimized(self, solver: Callable[[Problem, Array], Array], start: Array) -> Array:
@@ -103,12 +107,14 @@ class Problem:
 
 
 class SingleTarget(ModelBased):
-    """A ready-made solver run from several random starts; the end with the lowest J wins.
+    """A ready-made solver run from the pseudo-inverse's answer, which no dead zone holds, and from random
+    starts; the end with the lowest J wins.
 
     Args:
         normalization: sigma scales the error.
-        n_starts: uniform random starts per target.
+        n_starts: uniform random starts per target, beside the pseudo-inverse's answer.
         time_limit_s: processor time per target after which the best command so far is the answer.
+        aim: see `ModelBased`.
     """
 
     def __init__(
@@ -117,8 +123,9 @@ class SingleTarget(ModelBased):
         *,
         n_starts: int = DEFAULT_STARTS,
         time_limit_s: float = TIME_LIMIT_S,
+        **aim: Unpack[Aim],
     ) -> None:
-        super().__init__(normalization)
+        super().__init__(normalization, **aim)
         self.n_starts = n_starts
         self.time_limit_s = check_time_limit(time_limit_s)
 
@@ -127,16 +134,18 @@ class SingleTarget(ModelBased):
         """Positions (n_free,) where the solver ends from a start (n_free,)."""
 
     def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
-        starts = plant.sample(np.random.default_rng(seed), (self.n_starts,))
+        random = plant.sample(np.random.default_rng(seed), (self.n_starts,))
+        first = self._inverse(plant).command(targets)
         result = np.empty((len(targets), plant.n_fins, 3))
         for i, target in enumerate(targets):
-            problem = Problem(plant, target, self.normalization.std, TimeLimit(self.time_limit_s))
+            limit = TimeLimit(self.time_limit_s)
+            problem = Problem(plant, target, self.normalization.std, limit, self._cost(plant))
             if problem.n_free == 0:
                 result[i] = plant.lower
                 continue
-            ends = [self._end(problem, starts[0])]
-            ends += [self._end(problem, start) for start in starts[1:] if not problem.limit.over]
-            result[i] = ends[self._objective(plant, np.array(ends), target).argmin()]
+            ends = [self._end(problem, first[i])]
+            ends += [self._end(problem, start) for start in random if not problem.limit.over]
+            result[i] = ends[self._total(plant, np.array(ends), target).argmin()]
         return result
 
     def _end(self, problem: Problem, start: Array) -> Array:

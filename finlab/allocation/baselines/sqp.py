@@ -1,10 +1,18 @@
 """Method `sqp`: re-linearize at the iterate, box QP on the normalized residual, backtracking line search."""
 
+from typing import Unpack
+
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.allocation.aim import Aim
 from finlab.allocation.baselines.box_least_squares import solve_box_quadratics
-from finlab.allocation.baselines.model_based import TIME_LIMIT_S, ModelBased, TimeLimit, check_time_limit
+from finlab.allocation.baselines.model_based import (
+    TIME_LIMIT_S,
+    ModelBased,
+    TimeLimit,
+    check_time_limit,
+)
 from finlab.inference.normalization import Normalization
 from finlab.physics import Plant
 
@@ -23,15 +31,17 @@ class Sqp(ModelBased):
     """Sequential quadratic programming as the paper describes it, all targets of a layout stepped together.
 
     Each step minimizes `||r + J d||^2 + regularization ||d||^2` exactly within the limits, over commands as
-    positions between their limits. The first start is the middle of the limits; targets that are not met from
-    there get further, random starts, and the smallest error wins. Knows the analytic fin model.
+    positions between their limits. It starts from the pseudo-inverse's answer, whose fins give their forces
+    by the cheapest commands, and from the middle of the limits; of two ends that meet the target the cheaper
+    one wins, else the smaller error. Targets that neither meets get further, random starts.
 
     Args:
         normalization: sigma scales the error.
         n_steps: most steps per start.
-        n_starts: starts per target.
+        n_starts: starts per target beside the pseudo-inverse's answer.
         regularization: weight of a step's length, as a share of the squared error at the iterate.
         time_limit_s: processor time per target after which the best command so far is the answer.
+        aim: see `ModelBased`.
     """
 
     name = "sqp"
@@ -44,34 +54,47 @@ class Sqp(ModelBased):
         n_starts: int = 4,
         regularization: float = 1e-4,
         time_limit_s: float = TIME_LIMIT_S,
+        **aim: Unpack[Aim],
     ) -> None:
-        super().__init__(normalization)
+        super().__init__(normalization, **aim)
         self.n_steps = n_steps
         self.n_starts = n_starts
         self.regularization = regularization
         self.time_limit_s = check_time_limit(time_limit_s)
 
     def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
+        first = self._inverse(plant).command(targets)  # a fin is compiled once, which no target pays for
         limit = TimeLimit(self.time_limit_s * len(targets))
-        best = np.empty((len(targets), plant.n_fins, 3))
-        error = np.full(len(targets), np.inf)
-        middle = (plant.lower + plant.upper) / 2
-        others = plant.sample(np.random.default_rng(seed), (self.n_starts - 1,))
-        for start in (middle, *others):
-            for first in range(0, len(targets), CHUNK):
-                rows = np.arange(first, min(first + CHUNK, len(targets)))
-                rows = rows[error[rows] > SOLVED]
-                if not len(rows) or (limit.over and start is not middle):
-                    continue
-                command, reached = self._descend(plant, start, targets[rows], limit)
-                better = reached < error[rows]
-                best[rows[better]], error[rows[better]] = command[better], reached[better]
+        middle = np.tile((plant.lower + plant.upper) / 2, (len(targets), 1, 1))
+        best, error = self._from(plant, first, targets, limit)
+        if not limit.over:
+            other, reached = self._from(plant, middle, targets, limit)
+            cost = self._cost(plant)
+            both = (error <= SOLVED) & (reached <= SOLVED)
+            better = np.where(both, cost(other) < cost(best), reached < error)
+            best[better], error[better] = other[better], reached[better]
+        for start in plant.sample(np.random.default_rng(seed), (self.n_starts - 1,)):
+            rows = np.flatnonzero(error > SOLVED)
+            if not len(rows) or limit.over:
+                break
+            command, reached = self._from(plant, np.tile(start, (len(rows), 1, 1)), targets[rows], limit)
+            better = reached < error[rows]
+            best[rows[better]], error[rows[better]] = command[better], reached[better]
         return best
 
+    def _from(self, plant: Plant, start: Array, targets: Array, limit: TimeLimit) -> tuple[Array, Array]:
+        """`_descend`, as many rows together as fit the caches."""
+        parts = [
+            self._descend(plant, start[first : first + CHUNK], targets[first : first + CHUNK], limit)
+            for first in range(0, len(targets), CHUNK)
+        ]
+        command, error = zip(*parts, strict=True) if parts else ((start,), (np.empty(0),))
+        return np.concatenate(command), np.concatenate(error)
+
     def _descend(self, plant: Plant, start: Array, targets: Array, limit: TimeLimit) -> tuple[Array, Array]:
-        """Where one start (n, 3) ends for each target (B, 6), and the normalized error (B,) there."""
+        """Where starts (B, n, 3) end for targets (B, 6), and the normalized errors (B,) there."""
         sigma, width = self.normalization.std, plant.width.ravel()
-        command = np.tile(start, (len(targets), 1, 1))
+        command = start.copy()
         busy = np.arange(len(command))
         error = self.normalization.error(plant.wrench(command), targets)
         for _ in range(self.n_steps):

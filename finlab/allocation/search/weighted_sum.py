@@ -1,6 +1,6 @@
 """The paper's weighted sum `err_norm^2 + w J_en`: a little of the wrench given up for a little energy.
 
-It starts from exact answers; `weighted_descent` minimizes the sum on the surrogate and inside the limits.
+It starts from exact answers; `weighted_descent` minimizes the sum inside the limits.
 """
 
 from typing import Any
@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.allocation.command_cost import EffortCost
 from finlab.allocation.search.levenberg_marquardt import CommandProblem, Refined
 from finlab.allocation.weighted_descent import DescentOptions, descend
 from finlab.physics.energy import EnergyMeter
@@ -18,8 +19,8 @@ LM_STEPS = 25
 """Most Levenberg-Marquardt steps; far fewer are needed for small weights."""
 
 
-class SurrogateRobot:
-    """A layout with its learned fins, in normalized wrenches."""
+class NormalizedRobot:
+    """A prepared layout, in normalized wrenches."""
 
     def __init__(self, problem: CommandProblem) -> None:
         self.n_fins = len(problem.lower)
@@ -49,17 +50,11 @@ def minimize_weighted_sum(
         problem: the layout.
         target: normalized wrenches (R, 6).
         command: where to start (R, n, 3), inside the limits.
-        energy: of this robot, without inertial power.
+        energy: of this robot.
         energy_tradeoff: w.
     """
-    options = DescentOptions(
-        n_steps=LM_STEPS,
-        energy_tradeoff=energy_tradeoff,
-        damping=1e-4,
-        tolerance=1e-6,
-        energy_weights=energy.weights,
-        energy_upper=energy.upper,
-    )
-    found = descend(SurrogateRobot(problem), command, target, np.ones(6), options)
+    options = DescentOptions(n_steps=LM_STEPS, damping=1e-4, tolerance=1e-6)
+    cost = EffortCost(energy.upper, energy.weights, energy_tradeoff)
+    found = descend(NormalizedRobot(problem), command, target, np.ones(6), options, cost)
     error = np.linalg.norm(found.wrench - target, axis=-1)
     return Refined(found.command, found.wrench, error), energy(found.command)

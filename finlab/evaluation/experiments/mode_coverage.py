@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, Ipopt
+from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, Formulas, Ipopt
 from finlab.allocation.baselines.single_target import Problem
 from finlab.allocation.modes import cluster, mode_signature, same_signature
 from finlab.evaluation.progress import progress
@@ -44,17 +44,18 @@ class CheapestWays(Ipopt):
 
     def _minimize(self, problem: Problem, start: Array) -> Array:
         end = super()._minimize(problem, start)
-        converged = self._solver(problem.plant).stats()["success"]
+        converged = self._solver(problem.plant)[0].stats()["success"]
         return end if converged else np.full_like(end, np.nan)
 
     @staticmethod
     def _bounds(problem: Problem) -> dict[str, Array]:
         return {**Ipopt._bounds(problem), "lbg": np.full(6, -EXACT), "ubg": np.full(6, EXACT)}
 
-    def _build(self, plant: Plant) -> Any:
-        command, target, residual, energy = self._formulas(plant)
-        program = {"x": command, "p": target, "f": energy, "g": residual}
-        return self._casadi.nlpsol("ways", "ipopt", program, SOLVER_OPTIONS)
+    def _build(self, plant: Plant) -> tuple[Any, Formulas]:
+        formulas = self._formulas(plant)
+        cost = formulas.cost / self._cost(plant).weight
+        program = {"x": formulas.command, "p": formulas.target, "f": cost, "g": formulas.residual}
+        return self._casadi.nlpsol("ways", "ipopt", program, SOLVER_OPTIONS | formulas.options), formulas
 
 
 def mode_rows(
@@ -68,7 +69,7 @@ def mode_rows(
         n_starts: random starts of the ground truth, per target.
         seed: of the starts.
     """
-    truth = CheapestWays(allocator.normalization)
+    truth = CheapestWays(allocator.normalization, objective="effort")
     found: dict[int, list[Row]] = {}
     for case in progress(cases, "layout"):
         layout = case.healthy

@@ -1,18 +1,20 @@
 """Every model-based method on small problems with known answers, at its limits and on degenerate layouts."""
 
 import math
+from typing import Unpack
 
 import numpy as np
 import pytest
 
 from finlab.allocation import Allocator
+from finlab.allocation.aim import Aim
 from finlab.allocation.baselines.analytic import Analytic
 from finlab.allocation.baselines.ipopt import Ipopt
 from finlab.allocation.baselines.multistart import Multistart
 from finlab.allocation.baselines.qp import Qp
 from finlab.allocation.baselines.scipy_solvers import Slsqp, Trf
 from finlab.allocation.baselines.sqp import Sqp
-from finlab.errors import AllocationError, LayoutError
+from finlab.errors import LayoutError
 from finlab.inference.normalization import Normalization
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
 from finlab.physics import Plant
@@ -24,14 +26,14 @@ THRUST = 4.737410112522892
 """Thrust of the default fin over f^2 sin^2(A) [N s^2]."""
 
 
-def make(method: str) -> Allocator:
+def make(method: str, **aim: Unpack[Aim]) -> Allocator:
     """A method, the slow ones with few starts."""
     if method == "ipopt":
         pytest.importorskip("casadi", reason="method ipopt is an optional extra")
     kinds = {"analytic": Analytic, "qp": Qp, "sqp": Sqp, "multistart": Multistart}
     if method in kinds:
-        return kinds[method](NORMALIZATION)
-    return {"trf": Trf, "slsqp": Slsqp, "ipopt": Ipopt}[method](NORMALIZATION, n_starts=4)
+        return kinds[method](NORMALIZATION, **aim)
+    return {"trf": Trf, "slsqp": Slsqp, "ipopt": Ipopt}[method](NORMALIZATION, n_starts=4, **aim)
 
 
 def one_fin(**changes: object) -> Layout:
@@ -143,20 +145,6 @@ def test_other_fin_models_and_mixtures_of_them(method: str) -> None:
     assert make(method).allocate(layout, target).err_norm < 5e-3
 
 
-def test_ipopt_says_which_fin_models_it_knows(force_table: str) -> None:
-    table = one_fin(model=FinModelSpec("table", (("path", force_table),)))
-    with pytest.raises(AllocationError, match="needs a closed formula, fin fin follows a table"):
-        make("ipopt").allocate(table, [0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
-
-
-@pytest.mark.parametrize("method", ["analytic", "qp", "sqp", "multistart", "trf", "slsqp"])
-def test_a_table_of_forces_will_do(method: str, force_table: str) -> None:
-    table = one_fin(model=FinModelSpec("table", (("path", force_table),)))
-    result = make(method).allocate(table, [0.0, 1.0, 0.5, 0.0, 0.0, 0.0])
-    assert within(result.command, table)
-    assert method == "qp" or result.err_norm < 0.02
-
-
 @pytest.mark.parametrize("method", ALL)
 def test_unknown_and_last_fins_cannot_fail(method: str) -> None:
     with pytest.raises(LayoutError):
@@ -171,7 +159,7 @@ def test_multistart_needs_less_energy_than_sqp() -> None:
         np.random.default_rng(22).uniform([0.05, 0.1, -3], [0.6, 2.1, 3], (20, 5, 3))
     )
     cheap, any_ = (
-        np.mean([make(method).allocate(layout, target).energy for target in targets])
+        np.mean([make(method, objective="effort").allocate(layout, target).energy for target in targets])
         for method in ("multistart", "sqp")
     )
     assert cheap < 0.9 * any_

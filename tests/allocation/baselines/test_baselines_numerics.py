@@ -6,10 +6,12 @@ from scipy.optimize import lsq_linear
 
 from finlab.allocation.baselines.box_least_squares import solve_box_quadratics
 from finlab.allocation.baselines.single_target import Problem
+from finlab.allocation.command_cost import EffortCost, command_cost
 from finlab.allocation.weighted_descent import DescentOptions, descend
 from finlab.layout import Fin, FinModelSpec, Layout, random_layout
 from finlab.physics import plant_of
-from finlab.physics.energy import command_energy
+from finlab.physics.energy import EnergyWeights, command_energy
+from finlab.physics.objective import Objective
 
 SIGMA = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35])
 
@@ -83,7 +85,9 @@ def test_descent_lowers_its_objective_and_reports_it(energy_tradeoff: float) -> 
         error = (((plant.wrench(command) - target) / SIGMA) ** 2).sum(-1)
         return error + energy_tradeoff * command_energy(command, plant.upper)
 
-    end = descend(plant, start, target, SIGMA, DescentOptions(energy_tradeoff=energy_tradeoff))
+    end = descend(
+        plant, start, target, SIGMA, DescentOptions(), EffortCost(plant.upper, weight=energy_tradeoff)
+    )
     np.testing.assert_allclose(end.objective, objective(end.command), rtol=1e-9)
     assert (end.objective <= objective(start)).all()
     assert np.median(objective(end.command)) < 0.05 * np.median(objective(start))
@@ -93,17 +97,44 @@ def test_energy_in_the_descent_finds_cheaper_commands() -> None:
     rng = np.random.default_rng(4)
     plant = plant_of(random_layout(rng, n_fins=5))
     start, target = plant.sample(rng, (50,)), plant.wrench(plant.sample(rng, (50,)))
+    costs = None, EffortCost(plant.upper, weight=1e-4)
     plain, cheap = (
-        descend(plant, start, target, SIGMA, DescentOptions(energy_tradeoff=weight, n_steps=60)).command
-        for weight in (0.0, 1e-4)
+        descend(plant, start, target, SIGMA, DescentOptions(n_steps=60), cost).command for cost in costs
     )
     assert command_energy(cheap, plant.upper).mean() < 0.95 * command_energy(plain, plant.upper).mean()
 
 
-def test_single_target_derivatives_match_finite_differences() -> None:
+@pytest.mark.parametrize("copper_loss", [0.0, 0.5])
+def test_power_in_the_descent_finds_sparing_commands(copper_loss: float) -> None:
+    rng = np.random.default_rng(4)
+    plant = plant_of(_layout(FinModelSpec("drag"), FinModelSpec("lighthill"), FinModelSpec("soft")))
+    start, target = plant.sample(rng, (50,)), 0.5 * plant.wrench(plant.sample(rng, (50,)))
+    costs = None, command_cost(plant, Objective(copper_loss=copper_loss), SIGMA, 1e-3)
+    plain, sparing = (
+        descend(plant, start, target, SIGMA, DescentOptions(n_steps=60), cost) for cost in costs
+    )
+    assert costs[1] is not None
+    np.testing.assert_allclose(
+        sparing.objective, (((sparing.wrench - target) / SIGMA) ** 2).sum(-1) + costs[1](sparing.command)
+    )
+    power = [plant.power(end.command, copper_loss).sum(-1).mean() for end in (plain, sparing)]
+    assert power[1] < 0.9 * power[0]
+
+
+AIMS = [
+    Objective("effort"),
+    Objective("effort", EnergyWeights(0.5, 2.0, 0.3, 0.7, 1.5)),
+    Objective("power"),
+    Objective("power", copper_loss=0.4),
+]
+
+
+@pytest.mark.parametrize("aim", AIMS)
+def test_single_target_derivatives_match_finite_differences(aim: Objective) -> None:
     rng = np.random.default_rng(5)
     plant = plant_of(random_layout(rng, n_fins=3, limits="varied"))
-    problem = Problem(plant, rng.normal(size=6), SIGMA)
+    cost = command_cost(plant, aim, SIGMA, 1e-2)
+    problem = Problem(plant, rng.normal(size=6), SIGMA, cost=cost)
     x = rng.uniform(0.2, 0.8, problem.n_free)
     step = 1e-6 * np.eye(problem.n_free)
     numeric = np.array([(problem.residual(x + d) - problem.residual(x - d)) / 2e-6 for d in step]).T
@@ -112,6 +143,6 @@ def test_single_target_derivatives_match_finite_differences() -> None:
     numeric = np.array([(problem.objective(x + d)[0] - problem.objective(x - d)[0]) / 2e-6 for d in step])
     np.testing.assert_allclose(gradient, numeric, rtol=1e-4, atol=1e-5)
     command = problem.command(x)
-    expected = (problem.residual(x) ** 2).sum() + 1e-4 * command_energy(command, plant.upper)
+    expected = (problem.residual(x) ** 2).sum() + cost(command[None])[0]
     assert value == pytest.approx(float(expected))
     np.testing.assert_allclose(problem.position(command), x)

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from finlab.allocation.baselines import multistart, sqp
-from finlab.allocation.baselines.analytic import Analytic, ForceInverse
+from finlab.allocation.baselines.analytic import Analytic
 from finlab.allocation.baselines.box_least_squares import solve_box_quadratics
 from finlab.allocation.baselines.model_based import TimeLimit
 from finlab.allocation.baselines.multistart import Multistart
+from finlab.allocation.baselines.pseudo_inverse import PseudoInverse, _least_change
 from finlab.allocation.baselines.qp import LinearMap, Qp
 from finlab.allocation.baselines.scipy_solvers import Slsqp, Trf
 from finlab.allocation.baselines.sqp import Sqp
@@ -18,6 +19,8 @@ from finlab.allocation.method import Method
 from finlab.inference.normalization import Normalization
 from finlab.layout import Fin, Layout, Limits
 from finlab.physics import Plant, plant_of
+from finlab.physics.energy import EnergyWeights
+from finlab.physics.objective import Name, Objective
 
 SIGMA = np.array([1.4, 1.2, 2.0, 0.35, 0.3, 0.4])
 NORMALIZATION = Normalization(np.zeros(6), SIGMA)
@@ -44,40 +47,40 @@ def plant() -> Plant:
     ],
 )
 def test_published_figures_belong_to_these_settings(method: type[Method], options: dict[str, float]) -> None:
-    assert method(NORMALIZATION).options == options  # type: ignore[call-arg]
+    aim = {"objective": "power", "energy_weights": EnergyWeights(), "copper_loss": 0.0}
+    assert method(NORMALIZATION).options == options | aim  # type: ignore[call-arg]
 
 
 # Analytic.
 
 
-def test_each_fins_inverted_curve_is_its_own(plant: Plant) -> None:
-    inverse = ForceInverse(plant, SIGMA, 1e-3)
-    share = np.linspace(0.0, 1.0, 2049)
-    np.testing.assert_array_equal(inverse.share, share)
-    for i in range(2):
-        amplitude = np.maximum(share * plant.upper[i, 0], plant.lower[i, 0])
-        frequency = np.maximum(share * plant.upper[i, 1], plant.lower[i, 1])
-        root = math.sqrt(4.737410112522892) * np.sin(amplitude) * frequency
-        np.testing.assert_allclose(inverse.root_thrust[i], root, rtol=1e-9)
+def test_each_fin_gives_its_force_by_the_cheapest_command(plant: Plant) -> None:
+    """Of all amplitudes that give the same force within the limits, none costs less."""
+    inverse = PseudoInverse(plant, SIGMA, Objective())
+    target = 0.4 * plant.wrench(0.5 * (plant.lower + plant.upper))
+    command = inverse.command(target[None])[0]
+    force = np.hypot(*plant.force(command)[:, 1:].T)
+    amplitude = np.linspace(plant.lower[:, 0], plant.upper[:, 0], 400)
+    frequency = np.sqrt(force / 4.737410112522892) / np.sin(amplitude)
+    inside = (frequency >= plant.lower[:, 1]) & (frequency <= plant.upper[:, 1])
+    others = np.stack([amplitude, frequency, np.zeros_like(amplitude)], axis=-1)
+    power = np.where(inside, plant.power(others), np.inf).min(axis=0)
+    assert (plant.power(command) <= 1.002 * power).all()
+    assert (plant.lower <= command).all() and (command <= plant.upper).all()
 
 
-def test_a_curve_that_dips_is_inverted_where_it_first_rises() -> None:
-    def thrust(amplitude: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-        return np.where(
-            amplitude < 0.5, 4 * amplitude, np.where(amplitude < 0.75, 1.0, 16 * (amplitude - 0.5))
-        )
-
-    dipping = SimpleNamespace(
-        lower=np.zeros((2, 3)),
-        upper=np.tile([1.0, 1.0, 2 * math.pi], (2, 1)),
-        thrust=thrust,
-        planar=np.random.default_rng(0).normal(size=(6, 4)),
-    )
-    root = ForceInverse(dipping, SIGMA, 1e-3).root_thrust  # type: ignore[arg-type]
-    assert root.shape == (2, 2049) and (np.diff(root, axis=1) >= 0).all()
-    # Between one half and three quarters the curve is below what it reached before.
-    np.testing.assert_allclose(root[:, 1200], math.sqrt(4 * 1023 / 2048))
-    np.testing.assert_allclose(root[:, -1], math.sqrt(8.0))
+@pytest.mark.parametrize("share", [0.2, 0.9])
+@pytest.mark.parametrize("objective", [Objective(), Objective("effort")])
+def test_fins_give_what_the_pseudo_inverse_asks_for(plant: Plant, objective: Objective, share: float) -> None:
+    """The looked-up command is made exact by the fin's own law: each fin alone, whatever its envelope."""
+    inverse = PseudoInverse(plant, SIGMA, objective)
+    direction = np.array([2.0, 1.0])
+    size = share * 4.737410112522892 * (np.sin(plant.upper[:, 0]) * plant.upper[:, 1]) ** 2
+    wanted = size[:, None] * np.stack([np.cos(direction), np.sin(direction)], axis=-1)
+    target = plant.planar @ wanted.ravel()
+    command = inverse.command(target[None])
+    np.testing.assert_allclose(target @ inverse.inverse, wanted.ravel(), atol=1e-9)
+    np.testing.assert_allclose(plant.force(command)[0, :, 1:], wanted, atol=2e-6)
 
 
 @pytest.mark.parametrize(
@@ -87,20 +90,29 @@ def test_a_curve_that_dips_is_inverted_where_it_first_rises() -> None:
         (0.31, 0.31, 1.0),
         (1.9, 1.7, math.cos(0.2)),
         (0.0, 0.3, math.cos(0.3)),
-        (1.0 - 3.0, 0.3, 0.0),
-        (1.0 + math.pi - 0.1, 1.7, 0.0),
         (1.9 - 2 * math.pi, 1.7, math.cos(0.2)),
     ],
 )
 def test_within_an_arc_the_nearest_direction_takes_what_points_there(
     plant: Plant, direction: float, allowed: float, left: float
 ) -> None:
-    inverse = ForceInverse(plant, SIGMA, 1e-3)
-    np.testing.assert_allclose(inverse.middle[1], 1.0)
-    np.testing.assert_allclose(inverse.half_arc, [math.pi, 0.7])
-    thrust, found = inverse._into_arc(np.array([[2.0, 2.0]]), np.array([[0.4, direction]]))
-    np.testing.assert_allclose(found, [[0.4, allowed]], atol=1e-12)
-    np.testing.assert_allclose(thrust, [[2.0, 2.0 * left]], atol=1e-12)
+    point = np.array([math.cos(direction), math.sin(direction)])
+    target = plant.planar @ np.array([0.5, 0.0, *(0.4 * point)])
+    command = PseudoInverse(plant, SIGMA, Objective()).command(target[None])[0]
+    force = plant.force(command)[:, 1:]
+    assert command[1, 2] == pytest.approx(allowed, abs=1e-6)
+    np.testing.assert_allclose(np.hypot(*force.T), [0.5, 0.4 * left], rtol=1e-4)
+
+
+def test_the_least_change_is_that_of_a_general_solver() -> None:
+    rng = np.random.default_rng(0)
+    slopes, missing = rng.normal(size=(20, 3, 2)), rng.normal(size=(20, 2))
+    slopes[0, 1:], slopes[1] = 0.0, 0.0
+    found = _least_change(slopes, missing)
+    for i in range(1, 20):
+        expected = np.linalg.lstsq(slopes[i].T, missing[i], rcond=1e-9)[0]
+        np.testing.assert_allclose(found[i], expected, rtol=1e-6, atol=1e-9)
+    assert np.isfinite(found).all()
 
 
 def test_forces_are_the_weighted_least_ones(plant: Plant) -> None:
@@ -110,7 +122,8 @@ def test_forces_are_the_weighted_least_ones(plant: Plant) -> None:
     target = np.array([0.2, 0.1, 0.3, 0.0, 0.02, 0.01])
     scaled = plant.planar * weight / SIGMA[:, None]
     expected = weight * np.linalg.lstsq(scaled, target / SIGMA, rcond=1e-3)[0]
-    np.testing.assert_allclose(target @ ForceInverse(plant, SIGMA, 1e-3).inverse, expected, atol=1e-12)
+    found = target @ PseudoInverse(plant, SIGMA, Objective()).inverse
+    np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
 # QP.
@@ -141,12 +154,43 @@ def test_qp_linearizes_at_the_middle_of_the_limits(plant: Plant) -> None:
 # SQP.
 
 
-def test_sqp_starts_in_the_middle_of_the_limits(plant: Plant) -> None:
-    for n_starts in (1, 2):
-        command = Sqp(NORMALIZATION, n_steps=0, n_starts=n_starts)._commands(plant, np.zeros((1, 6)), 0)
-        starts = [(plant.lower + plant.upper) / 2, *plant.sample(np.random.default_rng(0), (n_starts - 1,))]
-        errors = [NORMALIZATION.error(plant.wrench(start[None]), np.zeros((1, 6)))[0] for start in starts]
-        np.testing.assert_array_equal(command[0], starts[int(np.argmin(errors))])
+def test_sqp_starts_from_the_pseudo_inverse_the_middle_and_at_random(plant: Plant) -> None:
+    target = np.array([[0.4, 0.1, 0.5, 0.0, 0.0, 0.1]])
+    for n_starts in (1, 3):
+        method = Sqp(NORMALIZATION, n_steps=0, n_starts=n_starts)
+        starts = [
+            PseudoInverse(plant, SIGMA, Objective()).command(target)[0],
+            (plant.lower + plant.upper) / 2,
+        ]
+        starts += [*plant.sample(np.random.default_rng(0), (n_starts - 1,))]
+        errors = [NORMALIZATION.error(plant.wrench(start[None]), target)[0] for start in starts]
+        np.testing.assert_array_equal(method._commands(plant, target, 0)[0], starts[int(np.argmin(errors))])
+
+
+@pytest.mark.parametrize("objective", ["power", "effort"])
+def test_sqp_takes_the_cheaper_of_two_ends_that_meet_the_target(
+    objective: Name, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The target is met from both starts; the answer is the cheaper end, by the objective."""
+    free = plant_of(Layout("free", tuple(Fin(f"f{i}", (0.2, 0.1 * i, 0.0), 2.0 * i) for i in range(4))))
+    method, asked = (
+        Sqp(NORMALIZATION, objective=objective),
+        0.3 * free.wrench(free.sample(np.random.default_rng(1), (6,))),
+    )
+    ends = []
+    descend = method._descend
+
+    def kept(*arguments: object) -> tuple[np.ndarray, np.ndarray]:
+        ends.append(descend(*arguments))  # type: ignore[arg-type]
+        return ends[-1][0].copy(), ends[-1][1].copy()
+
+    monkeypatch.setattr(method, "_descend", kept)
+    answer, meter = method._commands(free, asked, 0), Objective(objective).meter(free)
+    (one, error), (other, reached) = ends[:2]
+    met = (error <= 1e-8) & (reached <= 1e-8)
+    assert met.sum() >= 3
+    np.testing.assert_allclose(meter(answer)[met], np.minimum(meter(one), meter(other))[met])
+    assert (meter(one) < meter(other))[met].any()
 
 
 def test_sqp_knows_how_far_each_command_may_step(plant: Plant) -> None:
@@ -225,7 +269,10 @@ def test_multistart_polishes_the_start_that_ends_lowest(plant: Plant) -> None:
     targets = 0.6 * plant.wrench(plant.sample(np.random.default_rng(2), (3,)))
     together = method._best(plant, start, targets, limit)
     for row, target in zip(together, targets, strict=True):
-        ends = [multistart.descend(plant, one[None], target[None], SIGMA, method._descent) for one in start]
+        ends = [
+            multistart.descend(plant, one[None], target[None], SIGMA, method._descent, method._cost(plant))
+            for one in start
+        ]
         winner = min(ends, key=lambda end: end.objective[0])
         polished = multistart.descend(plant, winner.command, target[None], SIGMA, multistart.POLISH)
         np.testing.assert_allclose(row, polished.command[0], atol=1e-8)

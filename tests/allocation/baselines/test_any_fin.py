@@ -1,0 +1,219 @@
+"""Every model-based method on every fin model, tables that are hard to follow among them."""
+
+import csv
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from finlab.allocation import Allocator, load_allocator
+from finlab.allocation.baselines.ipopt import Ipopt
+from finlab.allocation.baselines.multistart import Multistart
+from finlab.allocation.baselines.single_target import Problem
+from finlab.allocation.command_cost import command_cost
+from finlab.errors import AllocationError
+from finlab.layout import Fin, FinModelSpec, Layout, Limits
+from finlab.physics import make_law, plant_of
+from finlab.physics.objective import Name, Objective
+
+METHODS = ("analytic", "qp", "sqp", "multistart", "trf", "slsqp", "ipopt")
+EXACT = METHODS[2:]
+FEW_STARTS: dict[str, dict[str, Any]] = {
+    name: {"n_starts": 2, "time_limit_s": 1.5} for name in ("trf", "slsqp", "ipopt")
+}
+SOFT = FinModelSpec("soft", (("d", 0.12), ("e", 0.15), ("p", 1.5), ("phi_e", 0.4)))
+FORMULAS = {"drag": FinModelSpec("drag"), "lighthill": FinModelSpec("lighthill"), "soft": SOFT}
+AMPLITUDE, FREQUENCY = np.linspace(0.0, 0.62, 9), np.linspace(0.0, 2.2, 9)
+CIRCLE = np.linspace(-np.pi, np.pi, 25)
+
+Change = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Commands (rows, 3) and columns (rows, 4) of a table to other columns."""
+
+
+def noise(command: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """3 % on force and power, the same at both ends of the circle."""
+    rng = np.random.default_rng(0)
+    factor = 1.0 + 0.03 * rng.normal(size=(len(AMPLITUDE), len(FREQUENCY), len(CIRCLE), 4))
+    factor[:, :, -1] = factor[:, :, 0]
+    return columns * factor.reshape(-1, 4)
+
+
+def beyond_a_peak(command: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Thrust that falls again from half the frequency on, while power grows."""
+    columns[:, :3] *= (np.exp(-((command[:, 1] / 1.3) ** 4)) + 0.1)[:, None]
+    return columns
+
+
+def dead_zone(command: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """No thrust at all for slow or small beats."""
+    columns[command[:, 0] * command[:, 1] < 0.2, :3] = 0.0
+    return columns
+
+
+def along_the_shaft(command: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """A twentieth of the thrust acts along the shaft."""
+    columns[:, 0] = 0.05 * np.hypot(columns[:, 1], columns[:, 2])
+    return columns
+
+
+def never_at_rest(command: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """A fifth of a newton along the zero direction even without a beat."""
+    columns[:, 1] += 0.2 * np.cos(command[:, 2])
+    columns[:, 2] += 0.2 * np.sin(command[:, 2])
+    return columns
+
+
+TABLES: dict[str, tuple[FinModelSpec, tuple[Change, ...], bool]] = {
+    "drag table": (FORMULAS["drag"], (), False),
+    "soft table": (SOFT, (), False),
+    "table with power": (SOFT, (), True),
+    "noisy table with power": (SOFT, (noise,), True),
+    "noisy table": (FORMULAS["drag"], (noise,), False),
+    "falling thrust": (FORMULAS["drag"], (beyond_a_peak,), True),
+    "dead zone": (FORMULAS["drag"], (dead_zone,), False),
+    "force along the shaft": (FORMULAS["lighthill"], (along_the_shaft,), False),
+    "never at rest": (FORMULAS["drag"], (never_at_rest,), True),
+}
+MODELS = (*FORMULAS, *TABLES, "mixed")
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], list[FinModelSpec]]:
+    """Models of the three fins of a robot, by the name of what is tried."""
+    folder = tmp_path_factory.mktemp("tables")
+
+    @lru_cache
+    def made(name: str) -> list[FinModelSpec]:
+        if name in FORMULAS:
+            return [FORMULAS[name]] * 3
+        if name == "mixed":
+            return [FORMULAS["lighthill"], SOFT, made("noisy table with power")[0]]
+        path = folder / f"{name}.csv"
+        write(path, *TABLES[name])
+        return [FinModelSpec("table", (("path", str(path)),))] * 3
+
+    return made
+
+
+def write(path: Path, spec: FinModelSpec, changes: tuple[Change, ...], with_power: bool) -> None:
+    law = make_law(spec)
+    command = np.stack(np.meshgrid(AMPLITUDE, FREQUENCY, CIRCLE, indexing="ij"), axis=-1).reshape(-1, 3)
+    columns = np.column_stack([law.force(command), law.power(command)])
+    for change in changes:
+        columns = change(command, columns)
+    rows = np.hstack([command, columns[:, : 4 if with_power else 3]])
+    with open(path, "w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["A", "f", "phi", "Fx", "Fy", "Fz", *(["P"] if with_power else [])])
+        writer.writerows(rows.tolist())
+
+
+def robot(models: list[FinModelSpec]) -> Layout:
+    places = (0.25, 0.15, 0.05), (-0.2, 0.2, -0.05), (-0.1, -0.25, 0.0)
+    angles = 0.4, 2.3, -1.4
+    limits = Limits(), Limits((0.05, 0.5), (0.1, 1.8)), Limits(zero_direction=(-2.0, 2.4))
+    fins = zip(places, angles, limits, models, strict=True)
+    return Layout("robot", tuple(Fin(f"fin_{i}", *parts) for i, parts in enumerate(fins)))
+
+
+def make(method: str, objective: Name) -> Allocator:
+    if method == "ipopt":
+        pytest.importorskip("casadi", reason="method ipopt is an optional extra")
+    return load_allocator(method, objective=objective, **FEW_STARTS.get(method, {}))
+
+
+@pytest.mark.parametrize("objective", ["power", "effort"])
+@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_on_every_fin(
+    method: str, name: str, objective: Name, model: Callable[[str], list[FinModelSpec]]
+) -> None:
+    layout = robot(model(name))
+    plant, allocator = plant_of(layout), make(method, objective)
+    target = plant.wrench(plant.lower + np.array([0.7, 0.55, 0.4]) * plant.width)
+    for asked in (target, 100.0 * target):
+        answer = allocator.allocate(layout, asked)
+        assert (answer.command >= plant.lower).all() and (answer.command <= plant.upper).all()
+        assert np.isfinite([answer.err_norm, answer.power, answer.energy]).all()
+        if asked is target and method in EXACT:
+            assert answer.err_norm < 6e-3
+        if (
+            asked is target
+            and method == "analytic"
+            and name not in ("never at rest", "force along the shaft")
+        ):
+            # What the pseudo-inverse asks of each fin it gives, unless it cannot.
+            assert answer.err_norm < 0.5
+
+
+@pytest.mark.parametrize("name", ["drag", "soft", "noisy table with power", "mixed"])
+@pytest.mark.parametrize("method", ["analytic", "sqp", "multistart", "trf", "slsqp", "ipopt"])
+def test_each_objective_is_kept_lower_by_its_own_setting(
+    method: str, name: str, model: Callable[[str], list[FinModelSpec]]
+) -> None:
+    """On average over a few targets: less power with `power`, less effort with `effort`."""
+    layout = robot(model(name))
+    plant = plant_of(layout)
+    targets = 0.5 * plant.wrench(plant.sample(np.random.default_rng(1), (3,)))
+    sparing, easy = (
+        make(method, objective).allocate_batch(layout, targets) for objective in ("power", "effort")
+    )
+    assert sparing.power.mean() <= 1.001 * easy.power.mean()
+    assert easy.energy.mean() <= 1.001 * sparing.energy.mean()
+
+
+@pytest.mark.parametrize("copper_loss", [0.0, 0.6])
+@pytest.mark.parametrize("objective", ["power", "effort"])
+@pytest.mark.parametrize("name", ["mixed", "noisy table with power", "lighthill", "soft"])
+def test_ipopt_minimizes_what_the_plant_says(
+    name: str, objective: Name, copper_loss: float, model: Callable[[str], list[FinModelSpec]]
+) -> None:
+    """Objective, gradient and Hessian of the program against the plant's, with and without formulas."""
+    cs = pytest.importorskip("casadi", reason="method ipopt is an optional extra")
+    method = load_allocator("ipopt", objective=objective, copper_loss=copper_loss)
+    assert isinstance(method, Ipopt)
+    plant = plant_of(robot(model(name)))
+    target, at = 0.4 * plant.wrench(plant.upper), plant.sample(np.random.default_rng(4), (2,))
+    cost = command_cost(plant, method.aim, method.normalization.std, 1e-4)
+    problem = Problem(plant, target, method.normalization.std, cost=cost)
+    solver, formulas = method._build(plant)
+    total = cs.sumsqr(formulas.residual) + formulas.cost
+    gradient = cs.gradient(total, formulas.command)
+    asked = cs.Function("asked", [formulas.command, formulas.target], [total, gradient])
+    hessian = solver.get_function("nlp_hess_l")
+    for command in at:
+        value, slopes = asked(command.ravel(), target)
+        expected, by = problem.objective(problem.position(command))
+        assert float(value) == pytest.approx(expected, rel=1e-9)
+        np.testing.assert_allclose(np.array(slopes).ravel() * plant.width.ravel(), by, rtol=1e-6, atol=1e-9)
+        second = np.array(hessian(command.ravel(), target, 1.0, []))
+        second = second + np.triu(second, 1).T
+        for k, offset in enumerate(1e-5 * np.eye(3 * plant.n_fins)):
+            rise = [asked(command.ravel() + sign * offset, target)[1] for sign in (1, -1)]
+            numeric = np.array(rise[0] - rise[1]).ravel() / 2e-5
+            np.testing.assert_allclose(second[k], numeric, rtol=0.02, atol=2e-3 * np.abs(second).max())
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_is_no_objective_is_refused(method: str) -> None:
+    with pytest.raises(AllocationError, match="objective: expected 'power' or 'effort', got 'thrift'"):
+        load_allocator(method, objective="thrift")
+    with pytest.raises(AllocationError, match="copper_loss: expected watts per"):
+        load_allocator(method, copper_loss=-1.0)
+    with pytest.raises(AllocationError, match="wrong type"):
+        load_allocator(method, energy_weights=(1.0, 2.0))
+    with pytest.raises(AllocationError, match="knows the options .*objective, energy_weights, copper_loss"):
+        load_allocator(method, price=1.0)
+
+
+def test_settings_are_told_and_changed_like_any_other() -> None:
+    method = load_allocator("multistart", objective="effort", n_steps=7)
+    assert method.options["objective"] == "effort" and method.options["n_steps"] == 7
+    other = method.with_settings(copper_loss=0.3, objective="power")
+    assert isinstance(other, Multistart) and other.n_steps == 7
+    assert other.aim == Objective("power", copper_loss=0.3)
+    with pytest.raises(AllocationError, match="energy_tradeoff: expected a number from 0, got -1"):
+        load_allocator("multistart", energy_tradeoff=-1.0)
