@@ -28,7 +28,7 @@ from finlab.forces.envelopes import LEAST, Envelopes, Projected
 from finlab.forces.fin_envelope import AMPLITUDE, COST, DRIFT, FREQUENCY, LEAN, MOBILITY, SHAFT, STIFFNESS
 from finlab.forces.small_systems import solve
 from finlab.layout import Layout
-from finlab.layout.angles import TURN
+from finlab.layout.angles import TURN, wrapped
 from finlab.layout.arrays import force_columns
 from finlab.physics.objective import Objective
 
@@ -39,14 +39,14 @@ RIDGE = 1e-9
 REST = 1e-5
 """Share of the largest force below which a fin's mobility no longer shrinks; it can still come back."""
 IDLE = 2e-3
-"""Share of its largest force up to which a fin turns to its cheapest direction; refinement mends that."""
+"""Share of its largest force up to which a fin hardly works."""
 LAST_STEPS = 2
 """Semismooth Newton steps at the end."""
 HALF_STEPS = 5
 """Steps after which forces go only half the way: those that are not settled by then jump to and fro."""
-SETTLED = 2e-3
+SETTLED = (2e-3, 1e-5)
 """Change of every force, as a share of the fin's largest, from which on another step would change the cost in
-its sixth digit."""
+its fifth digit: of a cost that grows faster than force, and of one that grows like its root."""
 
 
 class PlanarProblem(NamedTuple):
@@ -66,6 +66,8 @@ class PlanarProblem(NamedTuple):
     """Whether zero directions cost nothing."""
     idle_direction: Array
     """Zero direction (n,) [rad] to which a fin at rest turns: the cheapest one."""
+    convex: bool
+    """Whether cost grows faster than force."""
 
 
 class Planar(NamedTuple):
@@ -103,6 +105,7 @@ def planar_problem(layout: Layout, fins: Envelopes, scale: Array, objective: Obj
         direction_cost=direction_cost,
         turning_is_free=not direction_cost.any(),
         idle_direction=np.clip(0.0, layout.lower[:, 2], layout.upper[:, 2]),
+        convex=objective.convex,
     )
 
 
@@ -149,7 +152,7 @@ def descend(
     cut = np.ones((rows, n))
     if works is not None:
         mobility *= works[:, None]
-    settled, before = SETTLED * fins.maximum, None
+    settled, before = SETTLED[not problem.convex] * fins.maximum, None
     for step in range(steps):
         multiplier = _multiplier(problem, target, response)
         force, size = _answer(problem, response, multiplier)
@@ -187,20 +190,28 @@ def polar(problem: PlanarProblem, force: Array) -> Planar:
     return Planar(found.size, _direction(found), row, unknown, unknown)
 
 
-def realize(problem: PlanarProblem, planar: Planar) -> tuple[Array, Array]:
-    """Commands (R, n, 3) that give planar forces at the least cost, and that cost (R,)."""
-    command = np.stack(
-        [planar.row[..., AMPLITUDE], planar.row[..., FREQUENCY], planar.direction - planar.row[..., LEAN]],
-        axis=-1,
-    )
-    cost = planar.row[..., COST].sum(-1)
-    # A fin that hardly works turns to where it costs least, or stays where it is.
-    idle = planar.size <= problem.fins.minimum * (1.0 + REST) + IDLE * problem.fins.maximum * (
-        not problem.turning_is_free
-    )
-    command[..., 2] = np.where(idle, problem.idle_direction, command[..., 2])
+def realize(problem: PlanarProblem, planar: Planar, rests: bool = False) -> tuple[Array, Array]:
+    """Commands (R, n, 3) that give planar forces at the least cost, and that cost (R,).
+
+    Args:
+        problem: the layout.
+        planar: the forces.
+        rests: whether a fin that hardly works rests altogether and turns to where that costs least. Refinement
+            has to mend the little force that is then missing, or turned.
+    """
+    fins, row = problem.fins, planar.row
+    least = fins.minimum * (1.0 + REST)
+    idle = planar.size <= least + IDLE * rests * fins.maximum
+    if rests:
+        rest = fins.lookup(fins.rim(planar.direction), np.where(idle, 0.0, planar.size))
+        row = np.where(idle[..., None], rest, row)
+    direction = planar.direction - row[..., LEAN]
+    if rests or problem.turning_is_free:
+        direction = np.where(idle, problem.idle_direction, direction)
+    command = np.stack([row[..., AMPLITUDE], row[..., FREQUENCY], direction], axis=-1)
+    cost = row[..., COST].sum(-1)
     if not problem.turning_is_free:
-        turn = command[..., 2] - TURN * np.rint(command[..., 2] / TURN) * (problem.fins.half >= np.pi)
+        turn = np.where(fins.half >= np.pi, wrapped(direction), direction)
         cost = cost + (problem.direction_cost * turn * turn).sum(-1)
     return command, cost
 

@@ -229,13 +229,15 @@ class Pipeline:
         From tick to tick, `known` are commands (P, n, 3) that answer the single target whatever the turns:
         the search in narrow arcs may miss them where they are within these.
         """
-        keep_mode, steps = known is not None, self.settings.refine_steps
+        # Fins that rest have hardly any slope: two steps where there are such.
+        keep_mode, steps = known is not None, self.settings.refine_steps + (not self.objective.convex)
         command, origin = self._search(prepared, target, seeds, keep_mode)
         if known is not None:
             within = prepared.commands.clamp(unwrap_to_arc(prepared, known))
             command, steps = np.concatenate([command, within[None]], axis=1), steps + 1
             origin = np.concatenate([origin, np.full((1, len(within)), -1)], axis=1)
         candidates = refine_candidates(prepared, target, command, origin, steps, keep_mode)
+        candidates = RefinedCandidates(*(values[:, : self.settings.n_refined] for values in candidates))
         missed = candidates.error[:, 0] > RANKING.exact_error * prepared.exactness
         if missed.any():
             refine_missed(prepared, target, candidates, missed, fallback)
@@ -263,12 +265,19 @@ class Pipeline:
             steps or self.settings.search_steps or (SEARCH.convex_steps if self.objective.convex else usual)
         )
         planar = force_space.descend(prepared.planar, flat, seeds.reshape(-1, n), steps, works)
-        command, cost = force_space.realize(prepared.planar, planar)
-        if n_seeds == 1:
+        rests = not self.objective.convex
+        command, cost = force_space.realize(prepared.planar, planar, rests)
+        if n_seeds == 1 and not rests:
             return command[:, None], np.zeros((rows, 1), np.intp)
         error = np.einsum("ri,ri->r", planar.residual, planar.residual)
         score = rank(cost, error, (SEARCH.promising_error * prepared.exactness) ** 2).reshape(rows, n_seeds)
         if keep_mode:
             score[:, 0] = -1.0
         chosen = score.argsort(axis=1)[:, : keep or self.settings.n_refined]
-        return command.take(chosen + np.arange(0, rows * n_seeds, n_seeds)[:, None], axis=0), chosen
+        place = chosen + np.arange(0, rows * n_seeds, n_seeds)[:, None]
+        kept = command.take(place, axis=0)
+        if rests:  # what resting fins leave undone cannot always be mended: both ways are refined
+            working, _ = force_space.realize(prepared.planar, planar)
+            kept = np.concatenate([kept, working.take(place, axis=0)], axis=1)
+            chosen = np.concatenate([chosen, chosen], axis=1)
+        return kept, chosen

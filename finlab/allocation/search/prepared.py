@@ -16,7 +16,7 @@ from finlab.physics.plant import Plant, plant_of
 
 Array = NDArray[Any]
 
-MAX_SUBSETS = 40
+MAX_SUBSETS = 80
 """Most sub-layouts that are searched."""
 LEAST_WORKING = 2
 """Fewest fins that work in a sub-layout."""
@@ -67,13 +67,17 @@ def prepare(
 
 
 def resting_fins(n: int) -> tuple[tuple[int, ...], ...]:
-    """Which of n fins are tried at rest: none, each, and each pair, while at least two others work.
+    """Which of n fins are tried at rest: none, each, and each pair; then all but each pair.
 
     Where a cost is concave in a fin's force, the cheapest allocation often rests some fins, which a search
     from the whole layout may miss.
     """
+    fins = range(n)
     most = min(2, max(n - LEAST_WORKING, 0))
-    return tuple(c for k in range(most + 1) for c in combinations(range(n), k))[:MAX_SUBSETS]
+    resting = [c for k in range(most + 1) for c in combinations(fins, k)]
+    if n - LEAST_WORKING > most:
+        resting += [tuple(i for i in fins if i not in pair) for pair in combinations(fins, LEAST_WORKING)]
+    return tuple(resting[:MAX_SUBSETS])
 
 
 def resting_seeds(maximum: Array, rests: tuple[tuple[int, ...], ...]) -> Array:
