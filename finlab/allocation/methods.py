@@ -52,6 +52,11 @@ METHODS: dict[str, tuple[str, str]] = {
 }
 """Name -> module and class; modules are loaded only when their method is asked for."""
 
+GONE = {
+    "learned": "is now called 'search'",
+    "fast": "has gone; 'search' is exact on any fin and needs no network",
+}
+"""Earlier names -> what to say to those who ask for them."""
 LEARNED = ("mdn", "paper")
 """Methods that need a trained network; the others take only the normalization from a checkpoint."""
 
@@ -108,6 +113,8 @@ def load_allocator(
         CheckpointError: missing, corrupt or foreign checkpoint.
         DataError: the bundle cannot be read, or was changed.
     """
+    if str(method) in GONE:
+        raise AllocationError(f"method: {str(method)!r} {GONE[str(method)]}")
     if method not in METHODS:
         if checkpoint is not None or not (isinstance(method, os.PathLike) or is_bundle(method)):
             raise AllocationError(f"method: expected one of {', '.join(METHODS)}, got {str(method)!r}")

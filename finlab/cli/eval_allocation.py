@@ -1,33 +1,45 @@
-"""`finlab eval wrench|seeds|ablation|temperature|latency|...`: methods on targets, without a body."""
+"""`finlab eval wrench|cost|ablation|temperature|latency|...`: methods on targets, without a body."""
 
 from dataclasses import asdict
 from typing import Annotated
 
 from tyro.conf import arg
 
-from finlab.cli.eval_arguments import Cases, Count, Folder, Names, Run, check_folders, open_layouts
+from finlab.cli.eval_arguments import (
+    Cases,
+    Count,
+    Folder,
+    MethodRun,
+    Name,
+    Names,
+    Run,
+    check_folders,
+    open_layouts,
+)
 from finlab.cli.inputs import check_positive
 
-RUN = Run()
-MANY, FORTY, TWENTY = Cases(), Cases(layouts=40, targets=25), Cases(layouts=20, targets=100)
+RUN, METHODS = Run(), MethodRun()
+MANY, TWENTY = Cases(), Cases(layouts=20, targets=100)
 FEW, PAIRS = Cases(layouts=20, targets=2), Cases(targets=2)
+EVERYWHERE, WAYS = Cases("all", layouts=20, targets=4), MethodRun(objective="effort")
 SUBSAMPLE = 10
 """Targets of each layout that methods of a tenth of a second solve unless another number is given."""
 
 
 def wrench(
     cases: Annotated[Cases, arg(name="")] = MANY,
-    methods: Names = "learned,paper",
+    methods: Names = "search,paper",
     single: Annotated[int | None, arg(metavar="N")] = None,
     subsample: Count = SUBSAMPLE,
     records: Folder = None,
-    run: Annotated[Run, arg(name="")] = RUN,
+    run: Annotated[MethodRun, arg(name="")] = METHODS,
 ) -> None:
     """Track reachable wrenches on held-out layouts; error, energy and time of each method.
 
     Args:
-        methods: names with commas between: learned, fast, paper, qp, sqp, analytic, multistart, trf, slsqp,
-            ipopt; a number of starts may follow the last three, as in ipopt-32.
+        methods: names with commas between: search, mdn, paper, qp, sqp, analytic, multistart, trf, slsqp,
+            ipopt; a number of starts may follow the last three, as in ipopt-32, an objective the others, as
+            in search-effort.
         single: solve only the first N targets of each layout, one call each, and time the calls.
         subsample: trf, slsqp and ipopt solve only the first N targets of each layout; column n says how many.
         records: folder for the records, one NPZ file for each split and method.
@@ -65,21 +77,36 @@ def wrench(
     run.write(rows=rows, intervals=intervals, energies=energies)
 
 
-def seeds(
-    cases: Annotated[Cases, arg(name="")] = FORTY,
-    candidates: Count = 16,
+def cost(
+    cases: Annotated[Cases, arg(name="")] = EVERYWHERE,
+    methods: Names = "search,mdn",
+    objectives: Names = "power,effort",
+    starts: Count = 32,
     run: Annotated[Run, arg(name="")] = RUN,
 ) -> None:
-    """What learning buys: the network's seeds against random ones, at equal numbers and refinement steps.
+    """Cost under exact tracking over the best of many random starts, by split and number of fins.
+
+    Splits may also be axes (pure axes and their mixes on the symmetric shipped layouts), coincident or
+    stacked (pairs of fins at one place, or one above the other).
 
     Args:
-        candidates: seeds per target, of every kind.
+        methods: names with commas between, as in `eval wrench`.
+        objectives: power, effort or both.
+        starts: random starts of IPOPT per target; robots with tables get twice as many, of SLSQP.
     """
-    from finlab.evaluation.experiments.seeds import seed_report, seed_rows
+    from finlab.evaluation.experiments.cost import cost_report, cost_rows, cost_sets, parse_objectives
+    from finlab.evaluation.method_specs import load_method_specs
 
-    check_positive(candidates=candidates)
-    rows = seed_rows(run.learned(), cases.draw(), n_seeds=candidates, seed=cases.seed)
-    run.show(seed_report(rows, candidates), rows=rows)
+    check_positive(starts=starts)
+    aims, allocators = parse_objectives(objectives), load_method_specs(methods, run.checkpoint)
+    rows = []
+    for number, name in enumerate(cost_sets(cases.split)):
+        drawn = {"layouts": cases.layouts, "targets": cases.targets, "seed": cases.seed}
+        for aim in aims:
+            found = cost_rows(name, allocators, aim, n_starts=starts, **drawn)
+            print(("\n" if number or aim != aims[0] else "") + cost_report(found))
+            rows += found
+    run.write(rows=rows)
 
 
 def ablation(
@@ -119,12 +146,12 @@ def temperature(
 
 
 def latency(
-    methods: Names = "learned,paper,analytic,qp,sqp,multistart,trf,slsqp",
+    methods: Names = "search,mdn,paper,analytic,qp,sqp,multistart,trf,slsqp",
     fins: Count = 4,
     calls: Count = 200,
     budget: Annotated[float, arg(metavar="SECONDS")] = 20.0,
     seed: Count = 0,
-    run: Annotated[Run, arg(name="")] = RUN,
+    run: Annotated[MethodRun, arg(name="")] = METHODS,
 ) -> None:
     """Time single calls of methods side by side in one run.
 
@@ -149,7 +176,7 @@ def steadiness(
     paths: Count = 3,
     ticks: Count = 600,
     seed: Count = 0,
-    run: Annotated[Run, arg(name="")] = RUN,
+    run: Annotated[MethodRun, arg(name="")] = METHODS,
 ) -> None:
     """Follow smooth paths of wrenches at 10 Hz with and without the previous command; turns and energy.
 
@@ -163,26 +190,32 @@ def steadiness(
 
     check_positive(paths=paths, ticks=ticks - 1)
     robots = open_layouts(layouts)
-    rows = steadiness_rows(run.learned(), robots, n_paths=paths, ticks=ticks, seed=seed)
+    rows = steadiness_rows(run.method("search"), robots, n_paths=paths, ticks=ticks, seed=seed)
     run.show(steadiness_report(rows), rows=rows)
 
 
 def modes(
-    cases: Annotated[Cases, arg(name="")] = FEW, starts: Count = 256, run: Annotated[Run, arg(name="")] = RUN
+    cases: Annotated[Cases, arg(name="")] = FEW,
+    method: Name = "search",
+    starts: Count = 256,
+    run: Annotated[MethodRun, arg(name="")] = WAYS,
 ) -> None:
     """Compare the distinct ways that an answer tells with those that many random starts lead to.
 
     Args:
+        method: search or mdn; with power for the objective there is but one way.
         starts: random starts of the ground truth, per target.
     """
     from finlab.evaluation.experiments.mode_coverage import mode_report, mode_rows
 
     check_positive(starts=starts)
-    rows = mode_rows(run.learned(), cases.draw(), n_starts=starts, seed=cases.seed)
+    rows = mode_rows(run.method(method), cases.draw(), n_starts=starts, seed=cases.seed)
     run.show(mode_report(rows, starts), rows=rows)
 
 
-def unreachable(layouts: Count = 50, seed: Count = 0, run: Annotated[Run, arg(name="")] = RUN) -> None:
+def unreachable(
+    layouts: Count = 50, seed: Count = 0, run: Annotated[MethodRun, arg(name="")] = METHODS
+) -> None:
     """Ask for wrenches out of reach; what each policy delivers against the best possible.
 
     Args:
@@ -192,7 +225,7 @@ def unreachable(layouts: Count = 50, seed: Count = 0, run: Annotated[Run, arg(na
     from finlab.evaluation.experiments.unreachable import unreachable_report, unreachable_rows
 
     check_positive(layouts=layouts)
-    rows = unreachable_rows(run.learned(), n_layouts=layouts, seed=seed)
+    rows = unreachable_rows(run.method("search"), n_layouts=layouts, seed=seed)
     run.show(unreachable_report(rows), rows=rows)
 
 
@@ -200,10 +233,10 @@ def fuzz(
     robots: Count = 50,
     targets: Count = 60,
     single: Count = 6,
-    methods: Names = "learned,fast,paper,qp,sqp,analytic,multistart,trf,slsqp",
+    methods: Names = "search,mdn,paper,qp,sqp,analytic,multistart,trf,slsqp",
     seed: Count = 0,
     first: Count = 0,
-    run: Annotated[Run, arg(name="")] = RUN,
+    run: Annotated[MethodRun, arg(name="")] = METHODS,
 ) -> int | None:
     """Look for answers on hostile robots that are not finite, leave their limits, fail or are late.
 

@@ -6,7 +6,7 @@ import json as json_text
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import arg
 
@@ -15,7 +15,6 @@ from finlab.errors import DataError, LayoutError
 
 if TYPE_CHECKING:
     from finlab.allocation import Allocator
-    from finlab.allocation.learned.learned_allocator import LearnedAllocator
     from finlab.evaluation.experiments.closed_loop_runs import Run as LoggedRun
     from finlab.evaluation.experiments.closed_loop_runs import Scenario
     from finlab.evaluation.plots.style import Picture
@@ -28,6 +27,7 @@ Names = Annotated[str, arg(metavar="A,B,...")]
 Checkpoint = Annotated[str | None, arg(metavar="NAME|FOLDER")]
 Folder = Annotated[Path | None, arg(metavar="DIR")]
 Source = Annotated[str, arg(metavar="NAME|FILE")]
+Objective = Literal["power", "effort"]
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,8 @@ class Cases:
     """Held-out layouts with reachable targets."""
 
     split: Name = "id"
-    """One of id, ood, ood-fins, limits, failure, near-singular; `eval wrench` takes all, too."""
+    """One of id, ood, ood-fins, limits, failure, near-singular, fins, fins-mixed, tables, many-fins; `eval
+    wrench` and `eval cost` take all, too."""
     layouts: Count = 100
     """Layouts of the split."""
     targets: Count = 1000
@@ -80,17 +81,25 @@ class Run(Output):
     checkpoint: Checkpoint = None
     """Trained checkpoint, a shipped name or a folder; the shipped one of each method by default."""
 
+
+@dataclass(frozen=True)
+class MethodRun(Run):
+    """The same, for methods that can be told what to keep least."""
+
+    objective: Objective = "power"
+    """What methods that can choose keep least: power in watts, or effort, the paper's J_en."""
+
     def methods(self, names: str) -> dict[str, Allocator]:
         """All methods, loaded before the first one runs so that a wrong name costs no time."""
         from finlab.evaluation.method_specs import load_method_specs
 
-        return load_method_specs(names, self.checkpoint)
+        return load_method_specs(names, self.checkpoint, self.objective)
 
-    def learned(self) -> LearnedAllocator:
-        """The learned method."""
-        from finlab.allocation import load_allocator
+    def method(self, name: str) -> Allocator:
+        """One method."""
+        from finlab.evaluation.method_specs import load_method_spec
 
-        return load_allocator(checkpoint=self.checkpoint)
+        return load_method_spec(name, self.checkpoint, self.objective)
 
 
 @dataclass(frozen=True)
@@ -98,8 +107,8 @@ class ClosedLoopRuns:
     """Runs in simulation."""
 
     methods: Names = "search"
-    """Names with commas between; also on-board, U-CAT's own law at a fixed frequency, and learned-power, the
-    learned method with inertial power for its energy."""
+    """Names with commas between; also on-board, U-CAT's own law at a fixed frequency, and a method with an
+    objective of its own, such as search-effort."""
     runs: Count = 5
     """Runs of each, with other noise."""
     seed: Count = 0
@@ -117,7 +126,7 @@ class ClosedLoopRuns:
         if self.figures is not None and not self.figures.is_dir():
             raise DataError(f"figures: expected a folder that exists, got {self.figures}")
 
-    def swim(self, scenarios: Sequence[Scenario], run: Run) -> list[LoggedRun]:
+    def swim(self, scenarios: Sequence[Scenario], run: MethodRun) -> list[LoggedRun]:
         """Every scenario with every method and seed."""
         from finlab.evaluation.experiments.closed_loop_runs import run_all
 

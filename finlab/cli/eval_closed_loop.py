@@ -4,19 +4,19 @@ from typing import Annotated
 
 from tyro.conf import arg
 
-from finlab.cli.eval_arguments import ClosedLoopRuns, Name, Names, Run, Source, open_layouts
+from finlab.cli.eval_arguments import ClosedLoopRuns, MethodRun, Name, Names, Source, open_layouts
 
-RUN = Run()
+RUN = MethodRun()
 LAYOUT_RUNS = ClosedLoopRuns()
-FAULT_RUNS = ClosedLoopRuns("learned,on-board", runs=3)
-SPEED_RUNS = ClosedLoopRuns("learned-power,learned,analytic,on-board")
+FAULT_RUNS = ClosedLoopRuns("search,on-board", runs=3)
+SPEED_RUNS = ClosedLoopRuns("search,search-effort,analytic,on-board")
 
 
 def trajectory(
     layouts: Names = "A,B,C,D",
     trajectory: Source = "lissajous",
     loop: Annotated[ClosedLoopRuns, arg(name="")] = LAYOUT_RUNS,
-    run: Annotated[Run, arg(name="")] = RUN,
+    run: Annotated[MethodRun, arg(name="")] = RUN,
 ) -> None:
     """Follow a trajectory with several layouts; ATE, RTE and depth error of each method.
 
@@ -39,7 +39,7 @@ def faults(
     layout: Annotated[str, arg(metavar="LAYOUT")] = "A",
     trajectory: Source = "circle",
     loop: Annotated[ClosedLoopRuns, arg(name="")] = FAULT_RUNS,
-    run: Annotated[Run, arg(name="")] = RUN,
+    run: Annotated[MethodRun, arg(name="")] = RUN,
 ) -> None:
     """Lose each fin and each pair of fins, from the start and half-way, and follow a trajectory all the same.
 
@@ -64,7 +64,7 @@ def velocity(
     baseline: Name = "analytic",
     duration: Annotated[float, arg(metavar="SECONDS")] = 30.0,
     loop: Annotated[ClosedLoopRuns, arg(name="")] = SPEED_RUNS,
-    run: Annotated[Run, arg(name="")] = RUN,
+    run: Annotated[MethodRun, arg(name="")] = RUN,
 ) -> None:
     """Keep 0.10, 0.15 and 0.20 m/s at constant depth; power and error of the speed against a baseline.
 

@@ -78,7 +78,7 @@ def report(
         out: folder for the page.
         quick: a look on few cases, about 3 minutes on two cores; the full size takes up to an hour.
         seed: draws layouts, targets and candidates.
-        checkpoint: trained checkpoint of method learned; the shipped one by default.
+        checkpoint: trained checkpoint of method mdn; the shipped one by default.
         paper_checkpoint: trained checkpoint of method paper; the shipped one by default.
         records: folder for the records; DIR/records by default.
         processes: parts that run at once; the number of cores by default.
@@ -111,7 +111,7 @@ verbs = SubcommandApp()
 
 for verb in (
     eval_allocation.wrench,
-    eval_allocation.seeds,
+    eval_allocation.cost,
     eval_allocation.ablation,
     eval_allocation.temperature,
     eval_allocation.latency,

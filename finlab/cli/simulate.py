@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
@@ -18,6 +18,7 @@ def simulate(
     trajectory: Annotated[str, arg(metavar="NAME|FILE")] = "lissajous",
     fail: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME@SECONDS")] = (),
     method: Annotated[str, arg(metavar="NAME")] = "search",
+    objective: Literal["power", "effort"] = "power",
     duration: Annotated[float | None, arg(metavar="SECONDS")] = None,
     plant: Annotated[str, arg(metavar="NAME")] = "mean",
     gains: Annotated[str, arg(metavar="NAME|FILE")] = "waypoint",
@@ -34,7 +35,8 @@ def simulate(
         layout: layout file, layout graph file, or the name of a shipped layout.
         trajectory: circle, lissajous, square, or a CSV file with the columns t, x, y, z.
         fail: a fin and when it is lost, such as front_left@30.
-        method: learned, paper, qp, sqp, analytic, multistart, trf, slsqp, ipopt, on-board or learned-power.
+        method: search, mdn, paper, qp, sqp, analytic, multistart, trf, slsqp, ipopt or on-board.
+        objective: what the method keeps least: power in watts, or effort, the paper's J_en.
         duration: time for a shipped trajectory.
         plant: mean (the fin law), ripple (within the flapping cycle) or flexible (fins with soft tips).
         gains: waypoint, waypoint_paper (proportional terms alone), or a YAML file.
@@ -58,7 +60,7 @@ def simulate(
     _check_folder(output)
     loop = ClosedLoop(
         robot.layout,
-        load_method_spec(method, checkpoint),
+        load_method_spec(method, checkpoint, objective),
         make_trajectory(trajectory, duration),
         WaypointController(load_gains(WaypointGains, gains)),
         plant=plant,

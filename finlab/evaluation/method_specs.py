@@ -1,9 +1,10 @@
-"""Methods as users specify them: a name, with a number of starts where a method has them: `ipopt-32`."""
+"""Methods as users specify them: a name, with a number of starts or an objective behind it: `ipopt-32`."""
 
 import hashlib
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.model_based import TIME_LIMIT_S
@@ -12,29 +13,28 @@ from finlab.allocation.methods import LEARNED, load_allocator
 from finlab.errors import AllocationError
 from finlab.evaluation.on_board import OnBoard
 from finlab.inference.checkpoint import read_checkpoint, read_normalization, resolve_checkpoint
-from finlab.physics.energy import POWER_WEIGHTS
+from finlab.physics.objective import Name
 
 SLOW = ("trf", "slsqp", "ipopt")
 """Methods that take a tenth of a second per target, each from several starts; they run on a subsample."""
-QUICK = ("learned", "fast", "paper", "qp", "sqp", "analytic", "multistart")
+QUICK = ("search", "mdn", "paper", "qp", "sqp", "analytic", "multistart")
 """Methods that run on every target."""
-DISTILLED = "fast"
-"""Folder of the distilled network in a checkpoint."""
 _WITH_STARTS = re.compile(r"(\w+)-(\d+)")
+_WITH_OBJECTIVE = re.compile(r"(\w+)-(power|effort)")
 
 
 @dataclass(frozen=True)
 class Checkpoints:
     """The checkpoints under test: names of shipped ones, or folders."""
 
-    learned: str | None = None
-    """Of method `learned`, which also gives the yardstick of the baselines."""
+    default: str | None = None
+    """Of method `mdn`, which also gives the yardstick of the others."""
     paper: str | None = None
     """Of method `paper`."""
 
     def of(self, method: str) -> str | None:
         """The checkpoint of a method."""
-        return self.paper if method == "paper" else self.learned
+        return self.paper if method == "paper" else self.default
 
 
 def is_slow(name: str) -> bool:
@@ -42,39 +42,47 @@ def is_slow(name: str) -> bool:
     return method_and_starts(name)[0] in SLOW
 
 
-def load_method_specs(names: str, checkpoint: str | Path | None = None) -> dict[str, Allocator]:
+def load_method_specs(
+    names: str, checkpoint: str | Path | None = None, objective: Name | None = None
+) -> dict[str, Allocator]:
     """Allocators by name, from names with commas between; `AllocationError` where there is none."""
     each = dict.fromkeys(name.strip() for name in names.split(",") if name.strip())
     if not each:
-        raise AllocationError(f"methods: expected names with commas between (learned,paper), got {names!r}")
-    return {name: load_method_spec(name, checkpoint) for name in each}
+        raise AllocationError(f"methods: expected names with commas between (search,paper), got {names!r}")
+    return {name: load_method_spec(name, checkpoint, objective) for name in each}
 
 
-def load_method_spec(name: str, checkpoint: str | Path | None = None) -> Allocator:
+def load_method_spec(
+    name: str, checkpoint: str | Path | None = None, objective: Name | None = None
+) -> Allocator:
     """The allocator of a specification, as `finlab.load_allocator` makes it.
 
     Args:
-        name: a method; `ipopt-32`, say, for 32 starts; `on-board`, U-CAT's own method; or `learned-power`,
-            the learned method with the inertial power in place of the paper's energy proxy.
+        name: a method; `ipopt-32`, say, for 32 starts; `search-effort`, say, for an objective of its own; or
+            `on-board`, U-CAT's own method.
         checkpoint: as in `load_allocator`.
+        objective: what the methods that can choose keep least; each one's default where None.
 
     Raises:
-        AllocationError: unknown method, or starts for a method that has none.
+        AllocationError: unknown method, or starts or an objective for a method that has none.
     """
-    if name == "learned-power":
-        return load_allocator("learned", checkpoint=checkpoint, energy_weights=POWER_WEIGHTS)
     if name == OnBoard.name:
         return OnBoard(load_allocator("analytic", checkpoint=checkpoint).normalization)
+    if named := _WITH_OBJECTIVE.fullmatch(name):
+        return load_allocator(named[1], checkpoint=checkpoint, objective=named[2])
     method, starts = method_and_starts(name)
-    if starts is None:
-        return load_allocator(method, checkpoint=checkpoint)
-    if method not in SLOW or starts < 1:
-        raise AllocationError(
-            f"methods: a number of starts, from 1, goes with {', '.join(SLOW)} only, got {name!r}"
-        )
-    # Each start has the time that it has in the method's default.
-    limit = TIME_LIMIT_S * max(1.0, starts / DEFAULT_STARTS)
-    return load_allocator(method, checkpoint=checkpoint, n_starts=starts, time_limit_s=limit)
+    options: dict[str, Any] = {}
+    if starts is not None:
+        if method not in SLOW or starts < 1:
+            raise AllocationError(
+                f"methods: a number of starts, from 1, goes with {', '.join(SLOW)} only, got {name!r}"
+            )
+        # Each start has the time that it has in the method's default.
+        limit = TIME_LIMIT_S * max(1.0, starts / DEFAULT_STARTS)
+        options = {"n_starts": starts, "time_limit_s": limit}
+    allocator = load_allocator(method, checkpoint=checkpoint, **options)
+    chooses = objective is not None and "objective" in allocator.option_names()
+    return allocator.with_settings(objective=objective) if chooses else allocator
 
 
 def fingerprint(name: str, checkpoint: str | Path | None = None) -> str:
@@ -82,17 +90,9 @@ def fingerprint(name: str, checkpoint: str | Path | None = None) -> str:
     a digest of the normalization for the others."""
     method = method_and_starts(name)[0]
     path = resolve_checkpoint(checkpoint or ("paper" if method == "paper" else "default"))
-    if method == "fast":
-        weights = b"".join(file.read_bytes() for file in sorted((path / DISTILLED).iterdir()))
-        return read_checkpoint(path).sha256 + hashlib.sha256(weights).hexdigest()
     if method in LEARNED:
         return read_checkpoint(path).sha256
     return hashlib.sha256(b"".join(values.tobytes() for values in read_normalization(path))).hexdigest()
-
-
-def has_distilled(checkpoint: str | Path | None = None) -> bool:
-    """Whether a checkpoint holds the distilled network of method `fast`."""
-    return (resolve_checkpoint(checkpoint or "default") / DISTILLED).is_dir()
 
 
 def surrogate_fingerprint(checkpoint: str | Path) -> str:

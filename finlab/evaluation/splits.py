@@ -9,21 +9,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.errors import DataError
+from finlab.evaluation.noisy_tables import noisy_table
 from finlab.layout import Layout, random_layout
 from finlab.layout.angles import wrapped
 from finlab.layout.random import TRAINING_BOX
+from finlab.layout.random_fins import random_fin_model
 from finlab.physics import Plant
 
 OOD_BOX = (0.45, 0.45, 0.20)
 """Largest |x|, |y|, |z| of a fin in split `ood` [m]; at least one fin lies outside the training box."""
 OOD_FINS = (6, 8)
 """Least and most fins in split `ood-fins`."""
+MANY_FINS = (9, 12)
+"""Least and most fins in split `many-fins`."""
 NEAR_ANGLE = math.radians(2.0)
 """Nearly parallel shafts of split `near-singular` differ by at most this; opposite counts as parallel."""
 NEAR_POSITION = 0.005
 """Nearly coincident fins of split `near-singular` lie within this of each other along each axis [m]."""
 DOMAIN = 0x7E57
 """Leads the seed of every test case; training seeds begin otherwise."""
+OWN_SIGMA = ("fins", "fins-mixed", "tables")
+"""Splits whose robots are each measured by their own wrenches: their fins are weaker or stronger than those
+that the wrenches of training come from."""
+N_SIGMA = 4096
+"""Uniform commands from which such a robot's yardstick is computed."""
+LEAST_SIGMA = 0.05
+"""Least deviation on an axis, as a share of the largest one among the forces, or among the torques."""
 
 
 class Case(NamedTuple):
@@ -35,6 +46,8 @@ class Case(NamedTuple):
     """Desired wrenches (N, 6) [N, N m], each caused by a command of the healthy fins."""
     failed: tuple[str, ...]
     """Names of the fins that do not work."""
+    sigma: NDArray[np.float64] | None = None
+    """The robot's own yardstick of errors (6,); None where it is that of the training wrenches."""
 
     @property
     def healthy(self) -> Layout:
@@ -67,11 +80,19 @@ def make_split(name: str, n_layouts: int, n_targets: int, seed: int) -> list[Cas
 
 def _make_case(split: str, n_targets: int, seed: int, k: int) -> Case:
     entropy = (DOMAIN, list(SPLITS).index(split), seed, k)
-    layout_seed, target_seed = np.random.SeedSequence(entropy).spawn(2)
+    layout_seed, target_seed, sigma_seed = np.random.SeedSequence(entropy).spawn(3)
     layout, failed = SPLITS[split](np.random.default_rng(layout_seed), f"{split}-{seed}-{k}")
     plant = Plant(layout.without(failed))
     targets = plant.wrench(plant.sample(np.random.default_rng(target_seed), (n_targets,)))
-    return Case(layout, targets, failed)
+    own = own_sigma(plant, np.random.default_rng(sigma_seed)) if split in OWN_SIGMA else None
+    return Case(layout, targets, failed, own)
+
+
+def own_sigma(plant: Plant, rng: np.random.Generator) -> NDArray[np.float64]:
+    """A robot's own yardstick of errors (6,): what its wrenches deviate by under uniform commands."""
+    deviation = plant.wrench(plant.sample(rng, (N_SIGMA,))).std(axis=0).reshape(2, 3)
+    least = LEAST_SIGMA * deviation.max(axis=1, keepdims=True)
+    return np.asarray(np.maximum(deviation, least).reshape(6))
 
 
 Draw = Callable[[np.random.Generator, str], tuple[Layout, tuple[str, ...]]]
@@ -109,6 +130,25 @@ def _near_singular(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[s
     return replace(layout, fins=(first, *fins)), ()
 
 
+def _fins(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
+    """All fins of one random model."""
+    layout, model = random_layout(rng, name), random_fin_model(rng)
+    return replace(layout, fins=tuple(replace(fin, model=model) for fin in layout.fins)), ()
+
+
+def _fins_mixed(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
+    """Each fin of a random model of its own."""
+    layout = random_layout(rng, name)
+    return replace(layout, fins=tuple(replace(fin, model=random_fin_model(rng)) for fin in layout.fins)), ()
+
+
+def _tables(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
+    """The same, each fin known by a noisy table."""
+    layout, _ = _fins_mixed(rng, name)
+    noise = zip(layout.fins, rng.spawn(layout.n_fins), strict=True)
+    return replace(layout, fins=tuple(noisy_table(own, fin, f"{name}-{fin.name}") for fin, own in noise)), ()
+
+
 SPLITS: dict[str, Draw] = {
     "id": _whole(),
     "ood": _whole(box=OOD_BOX, outside=TRAINING_BOX),
@@ -116,5 +156,9 @@ SPLITS: dict[str, Draw] = {
     "limits": _whole(limits="varied"),
     "failure": _failure,
     "near-singular": _near_singular,
+    "fins": _fins,
+    "fins-mixed": _fins_mixed,
+    "tables": _tables,
+    "many-fins": _whole(n_fins=MANY_FINS),
 }
 """Name -> how a layout and its failed fins are drawn. The order is part of the seed: append only."""

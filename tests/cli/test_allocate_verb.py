@@ -3,6 +3,7 @@
 import copy
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -26,6 +27,7 @@ KEYS = [
     "unallocated",
     "err_norm",
     "energy",
+    "power",
     "sigma",
     "solve_ms",
     "method",
@@ -71,7 +73,7 @@ def test_json_has_the_keys_of_the_contract(allocate: Callable[..., tuple[int, st
     assert result["failed"] == []
     assert [len(row) for row in result["command"]] == [3, 3, 3, 3]
     assert result["target"] == [1.0, 0.0, -0.5, 0.0, 0.0, 0.1]
-    assert result["method"] == "learned" and result["checkpoint"] == "untrained"
+    assert result["method"] == "search" and result["checkpoint"] is None
     gap = [t - w for t, w in zip(result["target"], result["wrench_plant"], strict=True)]
     assert result["unallocated"] == pytest.approx(gap)
     scaled = sum((g / s) ** 2 for g, s in zip(gap, result["sigma"], strict=True)) ** 0.5
@@ -95,6 +97,16 @@ def test_methods_without_a_network(allocate: Callable[..., tuple[int, str, str]]
     assert result["method"] == "analytic" and result["wrench_surrogate"] is None
 
 
+def test_the_objective_decides_what_is_kept_least(allocate: Callable[..., tuple[int, str, str]]) -> None:
+    usual, power, effort = (
+        answer(allocate("A", *WRENCH, "--json", *option))
+        for option in ((), ("--objective", "power"), ("--objective", "effort"))
+    )
+    assert usual["command"] == power["command"]
+    assert power["power"] < 0.95 * effort["power"] and effort["energy"] < 0.95 * power["energy"]
+    assert max(power["err_norm"], effort["err_norm"]) < 1e-4
+
+
 def test_table_for_people(allocate: Callable[..., tuple[int, str, str]]) -> None:
     code, out, _ = allocate("A", *WRENCH, "--failed", "front_left")
     assert code == 0
@@ -115,6 +127,7 @@ def test_table_for_people(allocate: Callable[..., tuple[int, str, str]]) -> None
     labels = [line.split()[0] for line in lines if line]
     assert labels[5:10] == ["Fx", "asked", "delivered", "missing", "err_norm"]
     assert "1.000   0.000  -0.500     0.000     0.000     0.100" in out
+    assert re.search(r"err_norm \S+   power \d+\.\d{3} W   effort \d+\.\d{3}   .* ms   method search", out)
 
 
 def test_says_in_words_what_is_not_reached(allocate: Callable[..., tuple[int, str, str]]) -> None:
@@ -152,7 +165,10 @@ def test_shipped_name_works_from_any_folder(
             ["D", *WRENCH, *["--failed", "front_right", "--failed", "back", "--failed", "front_left"]],
             "has no fin left",
         ),
-        (["A", *WRENCH, "--method", "magic"], "method: expected one of learned, fast, paper"),
+        (["A", *WRENCH, "--method", "magic"], "method: expected one of search, mdn, paper"),
+        (["A", *WRENCH, "--method", "learned"], "method: 'learned' is now called 'search'"),
+        (["A", *WRENCH, "--method", "fast"], "method: 'fast' has gone; 'search' is exact on any fin"),
+        (["A", *WRENCH, "--objective", "money"], "--objective"),
         (["A", *WRENCH, "--seed", "x"], "--seed"),
         (["missing.yaml", *WRENCH], "neither a file nor a shipped layout"),
         ([".", *WRENCH], "is a folder"),

@@ -32,6 +32,7 @@ def test_trains_both_and_allocates_with_them(tmp_path: Path, capsys: pytest.Capt
     assert main(["train", "allocator", "-o", whole, "--surrogate", surrogate, *SMOKE]) == 0
     assert f"{whole}: checkpoint whole, preset smoke, sha256 " in capsys.readouterr().out
     command = ["allocate", "A", "--wrench", "1", "0", "0", "0", "0", "0", "--checkpoint", whole, "--json"]
+    command += ["--method", "paper"]
     assert main(command) == 0
     assert json.loads(capsys.readouterr().out)["checkpoint"] == "whole"
 

@@ -1,6 +1,8 @@
 """Splits hold what they promise, and the same numbers give the same cases."""
 
 import math
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from finlab.physics import plant_of
 N = 60
 
 
+@cache
 def _cases(split: str) -> list[Case]:
     return make_split(split, N, 2, 1234)
 
@@ -43,12 +46,12 @@ def test_seeds_and_splits_differ() -> None:
 
 def test_fin_counts() -> None:
     for split in SPLITS:
-        least, most = (6, 8) if split == "ood-fins" else (2, 5)
+        least, most = {"ood-fins": (6, 8), "many-fins": (9, 12)}.get(split, (2, 5))
         assert {case.layout.n_fins for case in _cases(split)} == set(range(least, most + 1))
 
 
 def test_boxes() -> None:
-    for split in ("id", "ood-fins", "limits", "failure"):
+    for split in ("id", "ood-fins", "limits", "failure", "fins", "fins-mixed", "tables", "many-fins"):
         assert not any(_outside(case) for case in _cases(split))
     assert all(_outside(case) for case in _cases("ood"))
     for case in _cases("ood"):
@@ -56,7 +59,7 @@ def test_boxes() -> None:
 
 
 def test_limits() -> None:
-    for split in ("id", "ood", "ood-fins", "failure", "near-singular"):
+    for split in (name for name in SPLITS if name != "limits"):
         assert all(fin.limits == Limits() for case in _cases(split) for fin in case.layout.fins)
     limits = [fin.limits for case in _cases("limits") for fin in case.layout.fins]
     assert all(0.3 <= each.amplitude[1] <= 0.8 and 1.0 <= each.frequency[1] <= 3.0 for each in limits)
@@ -83,6 +86,59 @@ def test_near_singular_layouts_are() -> None:
         assert parallel or (apart <= NEAR_POSITION and abs(turns[1]) <= NEAR_ANGLE)
 
 
+FIN_RANGES = {
+    "drag": {"area": (0.005, 0.04), "lever": (0.05, 0.15)},
+    "lighthill": {"length": (0.1, 0.3), "width": (0.05, 0.15)},
+    "soft": {"k": (1, 8), "p": (1, 2), "x0": (0.6, 1.5), "q": (3, 6), "e": (0, 0.2), "d": (-0.15, 0.15)},
+}
+"""The contract's."""
+
+
+@pytest.mark.parametrize("split", ["fins", "fins-mixed"])
+def test_random_fins_keep_to_the_contract(split: str) -> None:
+    cases = _cases(split)
+    models = [fin.model for case in cases for fin in case.layout.fins]
+    of_kind = {kind: [model for model in models if model.type == kind] for kind in FIN_RANGES}
+    assert sum(map(len, of_kind.values())) == len(models)
+    for kind, ranges in FIN_RANGES.items():
+        assert 0.2 * len(models) < len(of_kind[kind]) < 0.47 * len(models)
+        for name, (low, high) in ranges.items():
+            values = np.array([model.values()[name] for model in of_kind[kind]], float)
+            assert low <= values.min() < low + 0.3 * (high - low)
+            assert high >= values.max() > high - 0.3 * (high - low)
+            middle = math.sqrt(low * high) if kind != "soft" or name == "k" else (low + high) / 2
+            assert 0.25 < (values < middle).mean() < 0.75
+    alone = [len({fin.model for fin in case.layout.fins}) == 1 for case in cases]
+    assert all(alone) if split == "fins" else not any(alone)
+
+
+def test_tables_are_noisy_grids_of_random_fins() -> None:
+    (case,) = make_split("tables", 1, 3, 1234)
+    for fin in case.layout.fins:
+        assert fin.model.type == "table"
+        path = Path(str(fin.model.values()["path"]))
+        rows = np.loadtxt(path, delimiter=",", skiprows=1)
+        around = rows[rows[:, :2].prod(axis=1) == rows[:, :2].prod(axis=1).max()]
+        # All round the circle the noise is what differs from the neighbours of a smooth fin.
+        size, turn = np.hypot(around[:, 4], around[:, 5]), np.exp(2j * np.pi * np.arange(len(around)) / 12)
+        smooth = size.mean() + 2 * np.real((size * turn.conj()).mean() * turn)
+        assert 0.005 < ((size - smooth) / size.mean()).std() < 0.06
+        assert len(rows) == 8 * 9 * 12 and not rows[:, 3].any()
+    stamp = path.stat().st_mtime_ns
+    assert make_split("tables", 1, 3, 1234)[0].layout == case.layout and path.stat().st_mtime_ns == stamp
+
+
+def test_robots_of_other_fins_are_measured_by_their_own_wrenches() -> None:
+    assert all(case.sigma is None for split in ("id", "limits", "many-fins") for case in _cases(split))
+    for case in _cases("fins"):
+        plant = plant_of(case.layout)
+        wrench = plant.wrench(plant.sample(np.random.default_rng(1), (20_000,)))
+        spread = wrench.std(axis=0)
+        floor = 0.05 * np.repeat([spread[:3].max(), spread[3:].max()], 3)
+        assert case.sigma is not None
+        np.testing.assert_allclose(case.sigma, np.maximum(spread, floor), rtol=0.06)
+
+
 @pytest.mark.parametrize("split", SPLITS)
 def test_targets_are_reachable(split: str) -> None:
     sigma = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35])
@@ -90,7 +146,8 @@ def test_targets_are_reachable(split: str) -> None:
     for case in make_split(split, 4, 3, 77):
         plant = plant_of(case.layout.without(case.failed) if case.failed else case.layout)
         start = plant.sample(rng, (30 * len(case.targets),))
-        end = descend(plant, start, np.repeat(case.targets, 30, axis=0), sigma, DescentOptions(n_steps=60))
+        unit = sigma if case.sigma is None else case.sigma
+        end = descend(plant, start, np.repeat(case.targets, 30, axis=0), unit, DescentOptions(n_steps=60))
         assert np.sqrt(end.objective.reshape(len(case.targets), -1).min(axis=1)).max() < 0.02
 
 

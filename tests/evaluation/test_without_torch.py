@@ -35,7 +35,7 @@ def test_the_block_blocks() -> None:
 
 
 def test_eval_wrench() -> None:
-    methods = "learned,analytic,qp,sqp,multistart,trf-1,slsqp-1,on-board"
+    methods = "search,analytic,qp,sqp,multistart,trf-1,slsqp-1,on-board"
     sizes = ("--split", "limits", "--layouts", "2", "--targets", "3", "--subsample", "1")
     shown = _run("eval", "wrench", *sizes, "--methods", methods)
     assert all(name in shown for name in methods.split(","))
@@ -45,7 +45,7 @@ def test_eval_wrench() -> None:
 def test_simulate(plant: str, tmp_path: Path) -> None:
     path = tmp_path / "line.csv"
     path.write_text("t,x,y,z\n0,0,0,-1\n3,0.3,0,-1\n")
-    shown = _run("simulate", "A", "--trajectory", str(path), "--method", "learned", "--plant", plant)
+    shown = _run("simulate", "A", "--trajectory", str(path), "--method", "search", "--plant", plant)
     assert "ATE" in shown and f"plant {plant}" in shown
 
 

@@ -128,7 +128,7 @@ def _try_singles(count: FuzzCount, allocator: Allocator, layout: Layout, targets
     previous = None
     for i, target in enumerate(targets):
         options: dict[str, Any] = {"previous": previous if i % 2 else None, "seed": i}
-        if count.method in ("learned", "fast"):
+        if count.method in ("search", "mdn"):
             options["policy"] = KINDS[i % len(KINDS)]
         if i % 4 == 3 and layout.n_fins > 1:
             options["failed"] = layout.names[:1]

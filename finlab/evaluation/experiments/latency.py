@@ -37,7 +37,7 @@ def latency_cases(fins: int, seed: int) -> list[Case]:
 def latency_rows(
     allocators: Mapping[str, Allocator], cases: Sequence[Case], *, n_calls: int = 200, budget_s: float = 20.0
 ) -> list[Row]:
-    """Median and 99th percentile of whole `allocate` calls [ms], and the ratio to `learned`.
+    """Median and 99th percentile of whole `allocate` calls [ms], and the ratio to `search`.
 
     Args:
         allocators: method name -> method.

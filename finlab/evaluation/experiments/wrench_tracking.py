@@ -21,7 +21,7 @@ from finlab.evaluation.statistics.tables import (
     wrench_row,
 )
 from finlab.layout.arrays import Array
-from finlab.physics import Plant
+from finlab.physics import Plant, plant_of
 from finlab.physics.energy import command_energy
 
 RESTING = 0.01
@@ -70,18 +70,19 @@ def score(
         targets: desired wrenches (N, 6).
         command: the method's answers (N, n, 3).
         solve_ms: what each took (N,) [ms].
-        sigma: per-axis standard deviation (6,).
+        sigma: per-axis standard deviation (6,), where the case has none of its own.
         number: of the layout in its split.
     """
-    plant = Plant(case.layout)
+    plant = plant_of(case.layout)
     difference = plant.wrench(command) - targets
     return Records(
         layout=np.full(len(targets), number, np.int64),
         target=np.arange(len(targets)),
         n_fins=np.full(len(targets), case.layout.n_fins - len(case.failed), np.int64),
-        err_norm=np.linalg.norm(difference / sigma, axis=-1),
+        err_norm=np.linalg.norm(difference / (sigma if case.sigma is None else case.sigma), axis=-1),
         err_phys=np.linalg.norm(difference, axis=-1),
         energy=command_energy(command, plant.upper),
+        power=np.nansum(plant.power(command), axis=-1),
         resting=_count_resting(plant, command),
         solve_ms=np.asarray(solve_ms, np.float64),
     )
@@ -128,7 +129,15 @@ def wrench_report(records: dict[str, Records], split: str, *, single: int | None
     timing = "one call at a time" if single else "the time of all targets of a layout over their number"
     energies = energy_comparison(records)
     beside = [f"energy over that of {energies[0]['reference']}", text_table(energies), ""] if energies else []
-    shown = ("method", "err_norm_mean", "err_norm_median", "err_norm_p95", "success_0.01", "energy_mean")
+    shown = (
+        "method",
+        "err_norm_mean",
+        "err_norm_median",
+        "err_norm_p95",
+        "success_0.01",
+        "energy_mean",
+        "power_mean",
+    )
     return "\n".join(
         [
             text_table([*wrench_rows(records, split), *paper_wrench_rows(split)]),

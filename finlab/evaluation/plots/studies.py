@@ -1,4 +1,4 @@
-"""Times of calls, the ablation, what the network's seeds buy, the small trainings, and the temperature."""
+"""Times of calls, the ablation, the small trainings, and the temperature."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 
 from finlab.evaluation.plots import style
 from finlab.evaluation.plots.style import Picture, picture
-
-SEEDS = {"network": style.BLUE, "random": style.GREY, "quasi-random": style.ORANGE}
 
 
 def latency_dots(rows: Sequence[dict[str, Any]], paper_ms: float) -> Picture:
@@ -25,22 +23,6 @@ def latency_dots(rows: Sequence[dict[str, Any]], paper_ms: float) -> Picture:
         axis.set(xscale="log", xlabel="one call [ms]: median (dot) to 99th percentile")
         axis.set_yticks(range(len(ordered)), [row["method"] for row in ordered])
         axis.invert_yaxis()
-        return view
-
-
-def seed_lines(rows: Sequence[dict[str, Any]]) -> Picture:
-    """Mean error against refinement steps for each number of fins and kind of seed."""
-    fins = sorted({row["fins"] for row in rows})
-    with picture(1, len(fins), height=2.9, sharey=True) as view:
-        for axis, n in zip(view.axes, fins, strict=True):
-            for kind, colour in SEEDS.items():
-                mine = [row for row in rows if (row["fins"], row["seeds"]) == (n, kind)]
-                steps, error = [r["steps"] for r in mine], [max(r["err_norm_mean"], 1e-8) for r in mine]
-                axis.plot(range(len(steps)), error, "o-", color=colour, markersize=4, label=kind)
-                axis.set_xticks(range(len(steps)), [str(step) for step in steps])
-            axis.set(yscale="log", xlabel="refinement steps")
-            axis.set_title(f"{n} fins")
-        view.axes[0].set_ylabel("mean normalized error")
         return view
 
 

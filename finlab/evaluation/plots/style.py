@@ -17,8 +17,8 @@ VERMILION, PURPLE, YELLOW, BLACK, GREY = "#D55E00", "#CC79A7", "#F0E442", "#0000
 INK, SOFT, LINE = "#1c2733", "#5c6b7a", "#e3e8ed"
 
 COLOURS = {
-    "learned": BLUE,
-    "fast": "#004B78",
+    "search": BLUE,
+    "mdn": "#004B78",
     "paper": ORANGE,
     "analytic": GREEN,
     "sqp": PURPLE,
@@ -29,7 +29,7 @@ COLOURS = {
     "ipopt": BLACK,
     "ipopt-32": BLACK,
     "on-board": ORANGE,
-    "learned-power": VERMILION,
+    "search-effort": VERMILION,
 }
 """Method -> colour."""
 DASHES: dict[str, Any] = {"color": GREY, "linestyle": (0, (2, 2)), "linewidth": 1.2}

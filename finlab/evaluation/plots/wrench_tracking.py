@@ -1,4 +1,4 @@
-"""Wrench tracking: how errors are distributed, error and energy by number of fins (the paper's figure B)."""
+"""Wrench tracking: how errors are distributed, error and cost by number of fins (the paper's figure B)."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -7,6 +7,7 @@ import numpy as np
 
 from finlab.evaluation.plots.style import COLOURS, INK, Picture, mark_printed, picture
 from finlab.evaluation.statistics.records import Records
+from finlab.evaluation.statistics.tables import Row
 
 QUANTILES = np.concatenate([np.linspace(0, 0.9, 91), 1 - np.logspace(-1, -5, 60)])
 """At which the distribution is drawn: finer towards the largest errors."""
@@ -27,7 +28,7 @@ def error_distribution(records: Mapping[str, Mapping[str, Records]], printed: Ma
                 n = len(part)
                 level = QUANTILES[1 - 1 / n >= QUANTILES]
                 error = np.maximum(np.quantile(part.err_norm, level), FLOOR)
-                width = 2.6 if method == "learned" else 1.4
+                width = 2.6 if method == "search" else 1.4
                 axis.plot(error, 1 - level, color=COLOURS[method], label=method, linewidth=width)
             if split in printed:
                 mark_printed(axis, printed[split], "paper's printed mean")
@@ -58,30 +59,23 @@ def error_by_fins(records: Mapping[str, Records], order: Sequence[str]) -> Pictu
         return view
 
 
-def energy_by_fins(rows: Sequence[dict[str, Any]], reference: str) -> Picture:
-    """Energy over the reference's, and resting fins, for each number of fins; rows of `energy_rows`."""
+def cost_by_fins(rows: Sequence[Row]) -> Picture:
+    """Cost over the yardstick's for each number of fins, one panel per objective; rows of `cost_rows`."""
+    rows = [row for row in rows if row["fins"] != "all" and row["cost_ratio"] is not None]
+    objectives = list(dict.fromkeys(row["objective"] for row in rows))
     methods = list(dict.fromkeys(row["method"] for row in rows))
-    fins = sorted({row["fins"] for row in rows if row["fins"] != "all"})
-    with picture(1, 2, height=3.3, grid="y") as view:
-        left, right = view.axes
-        for k, method in enumerate(methods):
-            offset = (k - (len(methods) - 1) / 2) * 0.7 / len(methods)
-            mine = [row for row in rows if row["method"] == method and row["fins"] != "all"]
-            known = [row for row in mine if row["energy_ratio"] is not None]
-            place = [row["fins"] + offset for row in known]
-            colour = COLOURS[method]
-            inside = "white" if method == reference else colour
-            style: dict[str, Any] = {"color": colour, "markerfacecolor": inside, "markersize": 5}
-            if method != reference:
-                low = [row["energy_ratio"] - row["energy_ratio_low"] for row in known]
-                high = [row["energy_ratio_high"] - row["energy_ratio"] for row in known]
-                ratio = [row["energy_ratio"] for row in known]
-                left.errorbar(place, ratio, [low, high], fmt="o", elinewidth=1.2, label=method, **style)
-            resting = [row["resting"] for row in known]
-            right.plot(place, resting, "o", label=method, **style)
-        left.axhline(1.0, color=INK, linewidth=0.9)
-        left.set(ylabel=f"energy over {reference}'s", title="energy, below 1 is cheaper")
-        right.set(ylabel="fins at rest, mean", title="fins at rest")
-        for axis in view.axes:
-            axis.set(xlabel="fins", xticks=fins)
+    with picture(1, max(len(objectives), 1), height=3.3, grid="y") as view:
+        for axis, objective in zip(view.axes, objectives, strict=False):
+            for k, method in enumerate(methods):
+                mine = [row for row in rows if (row["objective"], row["method"]) == (objective, method)]
+                place = [row["fins"] + (k - (len(methods) - 1) / 2) * 0.7 / len(methods) for row in mine]
+                ends = np.array([row["cost_ratio_interval"] for row in mine]).reshape(-1, 2)
+                ratio = np.array([row["cost_ratio"] for row in mine])
+                reach = np.maximum([ratio - ends[:, 0], ends[:, 1] - ratio], 0.0)
+                look: dict[str, Any] = {"color": COLOURS[method], "markersize": 5, "elinewidth": 1.2}
+                axis.errorbar(place, ratio, reach, fmt="o", label=method, **look)
+            axis.axhline(1.0, color=INK, linewidth=0.9)
+            axis.set(xlabel="fins", xticks=sorted({row["fins"] for row in rows}))
+            axis.set_title(f"{objective}, below 1 is cheaper")
+        view.axes[0].set_ylabel("cost over the best of the starts")
         return view

@@ -118,8 +118,8 @@ def figures_of(blocks: Sequence[Block]) -> list[Figure]:
 
 
 def method_row(row: Row) -> Row:
-    """A row with its method's name as code, which stands out where it is the learned one."""
-    kind = {"_kind": "ours"} if row["method"].startswith("learned") else {}
+    """A row with its method's name as code, which stands out where it is the default."""
+    kind = {"_kind": "ours"} if row["method"].startswith("search") else {}
     return {**row, "method": f"`{row['method']}`", **kind}
 
 

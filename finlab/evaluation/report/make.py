@@ -11,9 +11,9 @@ from finlab.evaluation.report.pages import to_html, to_markdown
 from finlab.evaluation.report.plan import make_plan
 from finlab.evaluation.report.provenance import Provenance, how_made_blocks, source_commit
 from finlab.evaluation.report.results import Results
-from finlab.evaluation.report.sections import closed_loop, studies, summary, wrench_tracking
+from finlab.evaluation.report.sections import closed_loop, cost, studies, summary, wrench_tracking
 from finlab.evaluation.report.sizes import Sizes
-from finlab.inference.checkpoint import read_checkpoint, read_normalization, resolve_checkpoint
+from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
 
 PAGE, TWIN, TABLES, PICTURES = "index.html", "report.md", "tables.json", "pictures"
 """What a report's folder holds."""
@@ -54,10 +54,10 @@ def make_report(
     else:
         run_jobs(list(plan), records, commit=source_commit(), processes=processes)
     left_out = n_parts - len(list(plan))
-    given = {"learned": checkpoints.learned or "default", "paper": checkpoints.paper or "paper"}
+    given = {"mdn": checkpoints.default or "default", "paper": checkpoints.paper or "paper"}
     paths = {method: resolve_checkpoint(checkpoint) for method, checkpoint in given.items()}
     prints = {f"{path.name} ({name})": read_checkpoint(path).sha256 for name, path in paths.items()}
-    results = Results(plan, records, read_normalization(paths["learned"]).std)
+    results = Results(plan, records)
     provenance = Provenance(prints, seed, command)
     write_report(out, make_document(results, provenance, sizes, left_out), tables_of(results, provenance))
     return out / PAGE
@@ -69,10 +69,9 @@ def make_document(results: Results, provenance: Provenance, sizes: Sizes, left_o
     sections = (
         (summary.summary_blocks, True),
         (wrench_tracking.accuracy_blocks, results.wrench),
-        (wrench_tracking.energy_blocks, results.energy_rows),
+        (cost.cost_blocks, results.cost_rows),
         (studies.latency_blocks, "latency" in tables),
         (closed_loop.closed_loop_blocks, CLOSED_LOOP & tables.keys()),
-        (studies.seed_blocks, "seeds" in tables),
         (studies.ablation_blocks, results.ablation_rows),
         (studies.temperature_blocks, results.temperature_rows and results.plan.scatter),
         (studies.training_blocks, results.training_rows),
@@ -82,8 +81,9 @@ def make_document(results: Results, provenance: Provenance, sizes: Sizes, left_o
     note = "" if sizes.name == "full" else f" A {sizes.name} look on few cases; intervals are wide."
     note += f" {left_out} parts had not been run when this page was made." if left_out else ""
     subtitle = (
-        "Control allocation for robots with fins: the learned allocator beside the paper's method and seven "
-        f"that know the fin law, every answer scored by the analytic fin model.{note}"
+        "Control allocation for robots with fins: the exact search, the same search from a network's "
+        "proposals, the paper's method and seven others, every answer scored by the fins' own models."
+        f"{note}"
     )
     return Document("finlab evaluation", subtitle, tuple(blocks))
 
@@ -96,10 +96,9 @@ def tables_of(results: Results, provenance: Provenance) -> dict[str, Any]:
         "seed": provenance.seed,
         "machine": provenance.machine,
         "wrench": [row for rows in results.wrench_rows.values() for row in rows],
-        "energy": results.energy_rows,
+        "cost": results.cost_rows,
         "latency": results.tables.get("latency", []),
         "closed_loop": {name: rows for name, rows in results.tables.items() if name in CLOSED_LOOP},
-        "seeds": results.tables.get("seeds", []),
         "ablation": results.ablation_rows,
         "temperature": results.temperature_rows,
         "training": results.training_rows,

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from finlab.evaluation.experiments.ablation import REFINEMENTS, VARIANTS
+from finlab.evaluation.experiments.cost import OBJECTIVES, cost_sets
 from finlab.evaluation.experiments.temperature import PAPER_TEMPERATURE, TEMPERATURES
 from finlab.evaluation.experiments.training_study import CHANGES
 from finlab.evaluation.method_specs import (
@@ -15,7 +16,6 @@ from finlab.evaluation.method_specs import (
     SLOW,
     Checkpoints,
     fingerprint,
-    has_distilled,
     is_slow,
     surrogate_fingerprint,
 )
@@ -26,16 +26,14 @@ from finlab.evaluation.report.sizes import Sizes
 from finlab.evaluation.splits import SPLITS
 from finlab.evaluation.statistics.records import Columns
 
-REFERENCE = "ipopt-32"
-"""Whose energies the others are measured by."""
-ENERGY_METHODS = ("learned", "fast", "paper", "analytic", "sqp", "multistart", "trf", "slsqp", "ipopt")
-"""Methods whose energies are compared with it."""
-LATENCY_METHODS = ("learned", "fast", "analytic", "qp", "sqp", "multistart", "paper", "trf", "slsqp", "ipopt")
+COST_METHODS = ("search", "mdn", "analytic", "sqp", "multistart")
+"""Methods whose costs are compared with the best of many starts."""
+N_STARTS = 32
+"""Of that yardstick."""
+LATENCY_METHODS = ("search", "mdn", "analytic", "qp", "sqp", "multistart", "paper", "trf", "slsqp", "ipopt")
 """Methods that are timed side by side."""
 N_CANDIDATES = 64
 """Candidates of the ablation, as in the paper."""
-N_SEEDS = 16
-"""Seeds per target in the comparison of seeds."""
 SCATTER_FINS, SCATTER_TARGETS = 4, 3
 """Fins of the layout, and its targets, whose candidates are drawn before and after refinement."""
 
@@ -48,8 +46,8 @@ WHOLE = ("ablation", "temperature", "scatter")
 class Plan:
     """All jobs of a report."""
 
-    energy: dict[str, Job] = field(default_factory=dict)
-    """By method; the reference is among them where it is installed."""
+    cost: dict[tuple[str, str], Job] = field(default_factory=dict)
+    """By set of cases and objective."""
     wrench: dict[tuple[str, str], Job] = field(default_factory=dict)
     """By split and method."""
     ablation: dict[tuple[str, str], Job] = field(default_factory=dict)
@@ -61,8 +59,8 @@ class Plan:
     training: dict[str, Job] = field(default_factory=dict)
     """By change."""
     tables: dict[str, Job] = field(default_factory=dict)
-    """Jobs that give the rows of one table: `seeds`, the closed-loop experiments `trajectory`, `faults` and
-    `velocity` (none in a tiny report), and `latency`."""
+    """Jobs that give the rows of one table: the closed-loop experiments `trajectory`, `faults` and `velocity`
+    (none in a tiny report), and `latency`."""
 
     def only_done(self, folder: Path) -> "Plan":
         """The jobs whose results are there; a study that lacks a part is left out whole."""
@@ -84,9 +82,11 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
     """The jobs of a report; what needs CasADi or PyTorch is left out where it is not installed. The small
     trainings have their runs in the folder `runs`."""
     casadi, torch = (find_spec(package) is not None for package in ("casadi", "torch"))
-    names = [name for name in QUICK if name != "fast" or has_distilled(checkpoints.learned)]
-    names += [name for name in (*SLOW, REFERENCE) if casadi or "ipopt" not in name]
+    names = [name for name in (*QUICK, *SLOW) if casadi or name != "ipopt"]
     prints = {name: fingerprint(name, checkpoints.of(name)) for name in names}
+
+    def together(methods: list[str]) -> str:
+        return "".join(dict.fromkeys(prints[name] for name in methods))
 
     def job(
         name: str, do: Callable[..., Columns], spec: str, size: tuple[int, int] | None = None, **settings: Any
@@ -94,23 +94,20 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
         settings |= {"seed": seed} | ({} if size is None else {"layouts": size[0], "targets": size[1]})
         return Job(name, do, settings, prints[spec], {"checkpoint": checkpoints.of(spec)})
 
-    energy = {}
-    for name in (REFERENCE, *ENERGY_METHODS):
-        if name in prints:
-            layouts, targets = sizes.energy
-            size = layouts, sizes.energy_slow if is_slow(name) and name != REFERENCE else targets
-            energy[name] = job(f"energy-{name}", work.energy, name, size, method=name)
+    costed = [name for name in COST_METHODS if name in prints]
+    cost: dict[tuple[str, str], Job] = {}
+    for name, objective in product(cost_sets("all"), OBJECTIVES):
+        about = {"split": name, "objective": objective, "starts": N_STARTS, "seed": seed}
+        about |= {"methods": costed, "layouts": sizes.cost[0], "targets": sizes.cost[1]}
+        known = {"checkpoint": checkpoints.default}
+        cost[name, objective] = Job(f"cost-{name}-{objective}", work.cost, about, together(costed), known)
     wrench = {}
     for name in sorted(names, key=lambda name: name != "paper"):
         for split in SPLITS:
-            if is_slow(name) and split == "id":
-                wrench[split, name] = energy[name]  # the same targets, and more of them
-            else:
-                main = split in paper_figures()["wrench_tracking"]
-                size = sizes.of_split(main=main, slow=is_slow(name))
-                wrench[split, name] = job(
-                    f"wrench-{split}-{name}", work.wrench, name, size, split=split, method=name
-                )
+            main = split in paper_figures()["wrench_tracking"]
+            size = sizes.of_split(main=main, slow=is_slow(name))
+            about = {"split": split, "method": name}
+            wrench[split, name] = job(f"wrench-{split}-{name}", work.wrench, name, size, **about)
     drawn = {"candidates": N_CANDIDATES, "temperature": PAPER_TEMPERATURE}
     ablation = {}
     for by, variant in product(REFINEMENTS, VARIANTS):
@@ -123,27 +120,27 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
     scatter = job("scatter", work.scatter, "paper", fins=SCATTER_FINS, targets=SCATTER_TARGETS)
     preset, steps, batch_size = sizes.training
     study = {"preset": preset, "steps": steps, "batch_size": batch_size, "seed": seed}
-    study |= {"layouts": sizes.seeds[0], "targets": sizes.seeds[1]}
-    tables = {"seeds": job("seeds", work.seeds, "learned", sizes.seeds, candidates=N_SEEDS)}
+    study |= {"layouts": sizes.trained[0], "targets": sizes.trained[1]}
+    tables = {}
     for do, n_runs, options in (
-        (work.trajectory, sizes.swims[0], {"methods": "learned,on-board"}),
-        (work.faults, sizes.swims[1], {"methods": "learned,on-board", "pairs": sizes.lost_pairs}),
-        (work.velocity, sizes.swims[2], {"methods": "learned-power,learned,analytic,on-board"}),
+        (work.trajectory, sizes.swims[0], {"methods": "search,on-board"}),
+        (work.faults, sizes.swims[1], {"methods": "search,on-board", "pairs": sizes.lost_pairs}),
+        (work.velocity, sizes.swims[2], {"methods": "search,search-effort,analytic,on-board"}),
     ):
         if n_runs:
-            tables[do.__name__] = job(f"swim-{do.__name__}", do, "learned", runs=n_runs, **options)
+            tables[do.__name__] = job(f"swim-{do.__name__}", do, "search", runs=n_runs, **options)
     calls, budget_s = sizes.latency
     methods = [name for name in LATENCY_METHODS if name in prints]
     tables["latency"] = Job(
         "latency",
         work.latency,
         {"seed": seed, "methods": methods, "calls": calls, "budget_s": budget_s},
-        prints["learned"] + prints["paper"],
+        together(methods),
         {"checkpoints": checkpoints},
         alone=True,
     )
     return Plan(
-        energy=energy,
+        cost=cost,
         wrench=wrench,
         ablation=ablation,
         temperature=temperature,

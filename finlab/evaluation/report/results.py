@@ -11,11 +11,10 @@ from finlab.evaluation.experiments.ablation import variant_rows
 from finlab.evaluation.experiments.temperature import temperature_row
 from finlab.evaluation.experiments.training_study import training_row
 from finlab.evaluation.report.jobs import Job, rows_of_columns
-from finlab.evaluation.report.plan import REFERENCE, Plan
-from finlab.evaluation.splits import SPLITS, make_split
-from finlab.evaluation.statistics.recheck import recheck
-from finlab.evaluation.statistics.records import Columns, Records, records_of_columns, same_targets
-from finlab.evaluation.statistics.tables import Row, energy_rows, wrench_intervals, wrench_row
+from finlab.evaluation.report.plan import Plan
+from finlab.evaluation.splits import SPLITS
+from finlab.evaluation.statistics.records import Columns, Records, records_of_columns
+from finlab.evaluation.statistics.tables import Row, wrench_intervals, wrench_row
 
 
 class Results:
@@ -24,11 +23,10 @@ class Results:
     Args:
         plan: the jobs.
         folder: their results.
-        sigma: the yardstick of the error, per axis (6,).
     """
 
-    def __init__(self, plan: Plan, folder: Path, sigma: NDArray[np.float64]) -> None:
-        self.plan, self.folder, self.sigma = plan, folder, sigma
+    def __init__(self, plan: Plan, folder: Path) -> None:
+        self.plan, self.folder = plan, folder
 
     def columns(self, job: Job) -> Columns:
         """The arrays of a job."""
@@ -57,36 +55,9 @@ class Results:
         }
 
     @cached_property
-    def energy(self) -> dict[str, Records]:
-        """Method -> records on the targets of the comparison of energies."""
-        return {name: records_of_columns(self.columns(job)) for name, job in self.plan.energy.items()}
-
-    @cached_property
-    def energy_rows(self) -> list[Row]:
-        """Rows of the comparison of energies; none where the reference is not installed."""
-        if REFERENCE not in self.energy:
-            return []
-        reference, rows = self.energy[REFERENCE], []
-        for name, part in self.energy.items():
-            for row in energy_rows(part, reference, method=name):
-                known = row["energy_ratio"] is not None
-                ends = [row["energy_ratio_low"], row["energy_ratio_high"]] if known else None
-                rows.append({**row, "energy_ratio_interval": ends})
-        return rows
-
-    @cached_property
-    def recheck_rows(self) -> list[Row]:
-        """Each method's wins over the reference, computed again."""
-        job = self.plan.energy[REFERENCE]
-        cases = make_split("id", job.settings["layouts"], job.settings["targets"], job.settings["seed"])
-        rows = []
-        for name, other in self.plan.energy.items():
-            if name != REFERENCE:
-                # All of a method's targets are among the reference's, in the same order.
-                ours, theirs = same_targets(self.energy[name], self.energy[REFERENCE])
-                found = recheck(cases, ours, self.columns(other)["command"], theirs, self.sigma)
-                rows.append({"method": name, **found})
-        return rows
+    def cost_rows(self) -> list[Row]:
+        """Rows of the comparison of costs, of every set of cases and objective that has run."""
+        return [row for job in self.plan.cost.values() for row in rows_of_columns(self.columns(job))]
 
     @cached_property
     def ablation_rows(self) -> list[Row]:

@@ -15,16 +15,14 @@ class Sizes:
     """Layouts, and targets on each, of the other splits."""
     slow_other: tuple[int, int]
     """Layouts, and first targets of each, for methods of a tenth of a second on the other splits."""
-    energy: tuple[int, int]
-    """Layouts of split `id`, and first targets of each, for the energies beside 32 starts of IPOPT."""
-    energy_slow: int
-    """First targets of each for the methods with 8 starts."""
+    cost: tuple[int, int]
+    """Layouts and targets of each set, for the costs beside the best of 32 starts."""
     ablation: tuple[int, int]
     """Layouts and targets of the ablation."""
     temperature: tuple[int, int]
     """Layouts and targets at each temperature."""
-    seeds: tuple[int, int]
-    """Layouts and targets of the comparison of seeds."""
+    trained: tuple[int, int]
+    """Layouts and targets on which the small trainings are tried."""
     latency: tuple[int, float]
     """Timed calls of each method, and the seconds after which a slow one stops."""
     training: tuple[str, int, int]
@@ -47,11 +45,10 @@ SIZES = {
         main=(30, 30),
         other=(20, 10),
         slow_other=(8, 1),
-        energy=(30, 1),
-        energy_slow=1,
+        cost=(6, 1),
         ablation=(20, 10),
         temperature=(15, 2),
-        seeds=(20, 10),
+        trained=(20, 10),
         latency=(40, 1.5),
         training=("smoke", 240, 128),
         swims=(1, 1, 1),
@@ -62,11 +59,10 @@ SIZES = {
         main=(100, 1000),
         other=(100, 100),
         slow_other=(25, 1),
-        energy=(100, 10),
-        energy_slow=2,
+        cost=(40, 3),
         ablation=(100, 20),
         temperature=(100, 2),
-        seeds=(40, 25),
+        trained=(40, 25),
         latency=(200, 20.0),
         training=("default", 400, 256),
         swims=(2, 1, 5),

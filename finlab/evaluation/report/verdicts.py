@@ -1,4 +1,4 @@
-"""Who leads: the learned allocator against every other method, measure by measure, from the tables' rows.
+"""Who leads: the default method against every other one, measure by measure, from the tables' rows.
 
 A method leads another only where their intervals do not overlap: the interval of each says where a rerun with
 another seed lands. In every measure less is better.
@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping, Sequence
 from finlab.evaluation.statistics.bootstrap import Interval, spread_interval
 from finlab.evaluation.statistics.tables import Row
 
-FAMILY = ("learned", "learned-power", "fast")
-"""The learned allocator in its forms, which are not set against each other."""
+FAMILY = ("search", "search-effort")
+"""The default method in its forms, which are not set against each other."""
 LEADS, TRAILS, LEVEL, UNKNOWN = "leads", "trails", "neither", "one run"
 """Verdicts: intervals apart, apart the other way, overlapping, and not known from a single run."""
 
@@ -20,17 +20,17 @@ def compare(
     rows: Sequence[Row],
     value: str,
     case: Callable[[Row], str] | str,
-    methods: Sequence[str] = ("learned",),
+    methods: Sequence[str] = ("search",),
     name: str = "method",
 ) -> list[Row]:
-    """Every method of a table set against the learned allocator.
+    """Every method of a table set against the default one.
 
     Args:
         measure: what the value is, in words.
         rows: of a table; rows without the value are left out.
         value: its key; the interval stands under `<value>_interval` or follows from `<value>_std` and `runs`.
         case: what a row is about, apart from its method, or all of them; only rows of one case are compared.
-        methods: forms of the learned allocator that the others are set against.
+        methods: forms of the default method that the others are set against.
         name: key of the method's name.
 
     Returns:

@@ -3,14 +3,11 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from finlab.allocation.methods import load_allocator
 from finlab.evaluation.experiments.ablation import ablation_method, run_variant
 from finlab.evaluation.experiments.closed_loop_runs import run_all
+from finlab.evaluation.experiments.cost import cost_rows
 from finlab.evaluation.experiments.faults import all_faults, fault_rows, fault_scenarios
 from finlab.evaluation.experiments.latency import latency_cases, latency_rows
-from finlab.evaluation.experiments.seeds import seed_rows
 from finlab.evaluation.experiments.temperature import refinement_columns, temperature_columns
 from finlab.evaluation.experiments.training_study import train_and_run
 from finlab.evaluation.experiments.trajectory_and_velocity import (
@@ -19,17 +16,16 @@ from finlab.evaluation.experiments.trajectory_and_velocity import (
     velocity_rows,
     velocity_scenarios,
 )
-from finlab.evaluation.experiments.wrench_tracking import run_method, score
+from finlab.evaluation.experiments.wrench_tracking import run_method
 from finlab.evaluation.method_specs import Checkpoints, load_method_spec, load_method_specs
 from finlab.evaluation.plots.closed_loop_experiments import Track, track_of
 from finlab.evaluation.report.jobs import columns_of_rows
 from finlab.evaluation.splits import make_split
-from finlab.evaluation.statistics.records import Columns, columns_of_records, join_records
+from finlab.evaluation.statistics.records import Columns, columns_of_records
 from finlab.layout import load_layout
+from finlab.physics.objective import Name
 from finlab.sim import make_trajectory
 
-MOST_FINS = 8
-"""Commands are padded to so many fins, those that are not there hold NaN."""
 LATENCY_FINS = 4
 """Fins of the layouts whose calls are timed."""
 PAPER_LAYOUTS = ("A", "B", "C", "D")
@@ -46,17 +42,21 @@ def wrench(
     return columns_of_records(run_method(load_method_spec(method, checkpoint), cases))
 
 
-def energy(*, layouts: int, targets: int, method: str, seed: int, checkpoint: str | None) -> Columns:
-    """Records of a method on split `id`, with its commands (N, 8, 3), so that each can be checked again."""
-    allocator, parts, commands = load_method_spec(method, checkpoint), [], []
-    for k, case in enumerate(make_split("id", layouts, targets, seed)):
-        answer = allocator.allocate_batch(case.layout, case.targets)
-        parts.append(
-            score(case, case.targets, answer.command, answer.solve_ms, allocator.normalization.std, number=k)
-        )
-        missing = (0, 0), (0, MOST_FINS - case.layout.n_fins), (0, 0)
-        commands.append(np.pad(answer.command, missing, constant_values=np.nan))
-    return columns_of_records(join_records(parts)) | {"command": np.concatenate(commands)}
+def cost(
+    *,
+    split: str,
+    objective: Name,
+    methods: list[str],
+    starts: int,
+    layouts: int,
+    targets: int,
+    seed: int,
+    checkpoint: str | None,
+) -> Columns:
+    """Rows of the comparison of costs on one set of cases."""
+    allocators = load_method_specs(",".join(methods), checkpoint)
+    drawn = {"layouts": layouts, "targets": targets, "seed": seed}
+    return columns_of_rows(cost_rows(split, allocators, objective, n_starts=starts, **drawn))
 
 
 def ablation(*, layouts: int, targets: int, candidates: int, seed: int, **options: Any) -> Columns:
@@ -75,14 +75,6 @@ def scatter(*, fins: int, targets: int, seed: int, checkpoint: str | None) -> Co
     cases = make_split("id", 40, targets, seed)
     case = next(case for case in cases if case.layout.n_fins == fins)
     return refinement_columns(case, checkpoint=checkpoint, seed=seed)
-
-
-def seeds(*, layouts: int, targets: int, candidates: int, seed: int, checkpoint: str | None) -> Columns:
-    """Rows of the comparison of the network's seeds with random ones."""
-    cases = make_split("id", layouts, targets, seed)
-    return columns_of_rows(
-        seed_rows(load_allocator(checkpoint=checkpoint), cases, n_seeds=candidates, seed=seed)
-    )
 
 
 def latency(

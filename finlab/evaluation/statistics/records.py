@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 Columns = dict[str, NDArray[Any]]
 
-VERSION = 2
+VERSION = 3
 """Of the file format; part of the settings that a file is found by."""
 
 
@@ -39,7 +39,9 @@ class Records:
     err_phys: Array
     """The same without sigma, newton and newton metre mixed, shape (N,)."""
     energy: Array
-    """Energy proxy of the command, shape (N,)."""
+    """Effort of the command, the paper's energy proxy J_en, shape (N,)."""
+    power: Array
+    """Mean mechanical power of the command [W], shape (N,)."""
     resting: Whole
     """Healthy fins that give less than a hundredth of the force they can give, shape (N,)."""
     solve_ms: Array

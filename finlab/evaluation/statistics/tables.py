@@ -20,7 +20,15 @@ SUCCESS_LEVELS = (0.01, 0.05, 0.5, 1.0)
 """Levels t of `success@t`, the share of targets with `err_norm <= t`."""
 MET = 0.05
 """Normalized error up to which a target counts as met when energies are compared."""
-FIN_COUNT_COLUMNS = ("n", "err_norm_mean", "err_norm_median", "err_norm_p95", "success_0.01", "energy_mean")
+FIN_COUNT_COLUMNS = (
+    "n",
+    "err_norm_mean",
+    "err_norm_median",
+    "err_norm_p95",
+    "success_0.01",
+    "energy_mean",
+    "power_mean",
+)
 """Of `wrench_row`, in the table by number of fins."""
 ENERGY_COLUMNS = ("energy_mean", "energy_ratio", "cheaper", "resting")
 """Columns without a value where no target was met by both."""
@@ -42,6 +50,7 @@ def wrench_row(records: Records, *, split: str, method: str) -> Row:
         "err_phys_mean": float(records.err_phys.mean()),
         **shares,
         "energy_mean": float(records.energy.mean()),
+        "power_mean": float(records.power.mean()),
         "solve_ms_p50": float(np.quantile(records.solve_ms, 0.5)),
         "solve_ms_p99": float(np.quantile(records.solve_ms, 0.99)),
     }
@@ -57,6 +66,7 @@ def wrench_intervals(records: Records) -> dict[str, Interval]:
         "err_norm_p95": quantile_interval(error, 0.95, group),
         "err_phys_mean": mean_interval(records.err_phys, group),
         "energy_mean": mean_interval(records.energy, group),
+        "power_mean": mean_interval(records.power, group),
         **shares,
     }
 

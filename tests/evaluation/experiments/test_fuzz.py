@@ -15,7 +15,7 @@ from finlab.evaluation.hostile_cases import hostile_robot, hostile_targets
 from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
 
-QUICK = ("learned", "fast", "paper", "qp", "analytic", "multistart", "sqp")
+QUICK = ("search", "mdn", "paper", "qp", "analytic", "multistart", "sqp")
 
 
 @pytest.mark.parametrize("method", QUICK)

@@ -68,14 +68,14 @@ def test_report_shows_the_papers_figures_beside() -> None:
     assert "one call at a time" in wrench_report(records, "limits", single=3)
 
 
-def test_latency_compares_with_learned() -> None:
+def test_latency_compares_with_search() -> None:
     cases = make_split("id", 3, 4, 11)
     slow, fast = Analytic(NORMALIZATION), Idle()
-    rows = latency_rows({"learned": fast, "analytic": slow}, cases, n_calls=7)
+    rows = latency_rows({"search": fast, "analytic": slow}, cases, n_calls=7)
     assert [row["calls"] for row in rows] == [7, 7]
-    assert rows[0]["p50_over_learned"] == 1.0
+    assert rows[0]["p50_over_search"] == 1.0
     assert all(0 < row["p50_ms"] <= row["p99_ms"] for row in rows)
-    assert "p50_over_learned" not in latency_rows({"analytic": slow}, cases, n_calls=1)[0]
+    assert "p50_over_search" not in latency_rows({"analytic": slow}, cases, n_calls=1)[0]
     assert latency_rows({"analytic": slow}, cases, n_calls=1000, budget_s=0.0)[0]["calls"] == len(cases)
     assert machine()["processor"] in latency_report(rows, machine())
 

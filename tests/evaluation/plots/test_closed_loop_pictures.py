@@ -79,7 +79,7 @@ def test_each_axis_of_the_wrench_has_its_own_place(log: RunLog) -> None:
 
 
 def test_layouts_have_a_column_each(log: RunLog) -> None:
-    runs = (("A", "learned"), ("B", "learned"), ("B", "on-board"))
+    runs = (("A", "search"), ("B", "search"), ("B", "on-board"))
     tracks = [(names, track_of(log)) for names in runs]
     rows = [{"layout": name, "ate": ate} for name, ate in (("A", 0.012), ("B", 0.034))]
     view = draw_layouts(tracks, rows)
@@ -94,7 +94,7 @@ def test_layouts_have_a_column_each(log: RunLog) -> None:
 
 def test_faults_stand_in_order_with_the_allowed_growth_and_the_printed_below() -> None:
     rows = [
-        {"fault": fault, "controllable": controllable, "method": "learned", "ate": ate, "ate_std": 0.01}
+        {"fault": fault, "controllable": controllable, "method": "search", "ate": ate, "ate_std": 0.01}
         for fault, controllable, ate in (("healthy", True, 0.04), ("bow lost", True, 0.05), ("all", False, 9))
     ]
     (axis,) = draw_faults(rows, {"healthy (printed)": 0.13}).axes
@@ -110,10 +110,10 @@ def test_faults_stand_in_order_with_the_allowed_growth_and_the_printed_below() -
 
 
 def test_speed_over_time_and_power_against_error(log: RunLog) -> None:
-    over_time, trade = draw_velocity([((0.1, "learned"), log), ((0.1, "analytic"), log)]).axes
+    over_time, trade = draw_velocity([((0.1, "search"), log), ((0.1, "analytic"), log)]).axes
     speed = log.motion[:, 0]
     assert sum(np.array_equal(line.get_ydata(), speed) for line in over_time.lines) == 2
-    ((error, power),) = _line(trade, "learned, 0.10 m/s")
+    ((error, power),) = _line(trade, "search, 0.10 m/s")
     assert error == pytest.approx(np.abs(speed - log.reference_surge).mean())
     assert power == pytest.approx(log.inertial_power.sum(axis=1).mean())
     assert trade.get_xlim()[0] == trade.get_ylim()[0] == 0.0

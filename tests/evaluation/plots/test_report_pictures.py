@@ -16,12 +16,11 @@ from finlab.evaluation.plots.studies import (  # noqa: E402
     ablation_dots,  # noqa: E402
     figure_a,  # noqa: E402
     latency_dots,
-    seed_lines,
     training_bars,
 )
 from finlab.evaluation.plots.style import COLOURS, Picture, picture  # noqa: E402
 from finlab.evaluation.plots.wrench_tracking import (  # noqa: E402
-    energy_by_fins,  # noqa: E402
+    cost_by_fins,  # noqa: E402
     error_by_fins,
     error_distribution,
 )
@@ -40,29 +39,29 @@ def _legend(view: Picture) -> list[str]:
 def _records(err_norm: np.ndarray, n_fins: np.ndarray) -> Records:
     n = len(err_norm)
     zeros = np.zeros(n, np.int64)
-    return Records(zeros, np.arange(n), n_fins, err_norm, err_norm, err_norm, zeros, err_norm)
+    return Records(zeros, np.arange(n), n_fins, err_norm, err_norm, err_norm, err_norm, zeros, err_norm)
 
 
 def test_a_distribution_falls_from_all_targets_to_none() -> None:
     error = np.logspace(-3, -1, 1000)
     fins = np.full(1000, 3)
-    records = {"id": {"learned": _records(error, fins), "qp": _records(10 * error, fins)}}
+    records = {"id": {"search": _records(error, fins), "qp": _records(10 * error, fins)}}
     view = error_distribution(records, {"id": 0.0857})
     (axis,) = view.axes
-    learned, qp = _line(axis, "learned"), _line(axis, "qp")
-    assert learned[0] == pytest.approx([1e-3, 1.0]) and (np.diff(learned[:, 1]) <= 0).all()
-    half = np.searchsorted(-learned[:, 1], -0.5)
-    assert learned[half, 0] == pytest.approx(1e-2, rel=0.05)
-    assert qp[:, 0] == pytest.approx(10 * learned[:, 0])
+    search, qp = _line(axis, "search"), _line(axis, "qp")
+    assert search[0] == pytest.approx([1e-3, 1.0]) and (np.diff(search[:, 1]) <= 0).all()
+    half = np.searchsorted(-search[:, 1], -0.5)
+    assert search[half, 0] == pytest.approx(1e-2, rel=0.05)
+    assert qp[:, 0] == pytest.approx(10 * search[:, 0])
     assert axis.get_xscale() == axis.get_yscale() == "log"
     assert axis.get_xlabel() == "normalized error" and axis.get_title(loc="left") == "split id"
     assert any(np.allclose(line.get_xdata(), 0.0857) for line in axis.lines)  # the printed mean
-    assert _legend(view) == ["learned", "qp"]
+    assert _legend(view) == ["search", "qp"]
 
 
 def test_errors_by_fins_have_a_dot_at_the_mean_and_a_bar_to_the_tail() -> None:
     error = np.concatenate([np.linspace(0.1, 0.3, 101), np.linspace(1.0, 3.0, 101)])
-    view = error_by_fins({"learned": _records(error, np.repeat([2, 5], 101))}, ("qp", "learned"))
+    view = error_by_fins({"search": _records(error, np.repeat([2, 5], 101))}, ("qp", "search"))
     (axis,) = view.axes
     bars = [line.get_xydata() for line in axis.lines if len(line.get_xdata()) == 2]
     dots = [line.get_xydata()[0] for line in axis.lines if len(line.get_xdata()) == 1]
@@ -71,16 +70,17 @@ def test_errors_by_fins_have_a_dot_at_the_mean_and_a_bar_to_the_tail() -> None:
     assert list(axis.get_xticks()) == [2, 5] and axis.get_xlabel() == "working fins"
 
 
-def test_energies_stand_over_their_fins_with_their_intervals() -> None:
-    def row(method: str, fins: int | str, ratio: float) -> dict[str, object]:
-        ends = {"energy_ratio_low": ratio - 0.1, "energy_ratio_high": ratio + 0.2}
-        return {"method": method, "fins": fins, "energy_ratio": ratio, "resting": ratio - 1, **ends}
+def test_costs_stand_over_their_fins_with_their_intervals() -> None:
+    def row(objective: str, fins: int | str, ratio: float | None) -> dict[str, object]:
+        ends = None if ratio is None else [ratio - 0.1, ratio + 0.2]
+        about = {"objective": objective, "method": "search", "fins": fins}
+        return {**about, "cost_ratio": ratio, "cost_ratio_interval": ends}
 
-    rows = [row(m, f, r) for m, r in (("ipopt-32", 1.0), ("learned", 1.5)) for f in (2, 5, "all")]
-    view = energy_by_fins(rows, "ipopt-32")
-    left, right = view.axes
-    (container,) = left.containers  # the reference has no ratio to itself
-    assert container.get_label() == "learned"
+    rows = [row("power", fins, 1.5) for fins in (2, 5, "all")]
+    rows += [row("effort", 2, 1.2), row("effort", 5, None)]  # five fins: nothing was compared
+    power, effort = cost_by_fins(rows).axes
+    (container,) = power.containers
+    assert container.get_label() == "search"
     points, _, (bars,) = container
     assert points.get_ydata() == pytest.approx([1.5, 1.5])
     assert np.round(points.get_xdata(orig=False)).tolist() == [2, 5]
@@ -88,33 +88,19 @@ def test_energies_stand_over_their_fins_with_their_intervals() -> None:
         pytest.approx([1.4, 1.7]),
         pytest.approx([1.4, 1.7]),
     ]
-    assert "ipopt-32" in left.get_ylabel() and right.get_ylabel() == "fins at rest, mean"
-    assert _line(right, "learned")[:, 1] == pytest.approx([0.5, 0.5])
+    assert effort.containers[0][0].get_ydata() == pytest.approx([1.2])
+    assert power.get_title(loc="left").startswith("power") and "cost" in power.get_ylabel()
 
 
 def test_times_are_sorted_and_reach_from_median_to_tail() -> None:
-    rows = [{"method": m, "p50_ms": t, "p99_ms": 2 * t} for m, t in (("paper", 80.0), ("learned", 1.0))]
+    rows = [{"method": m, "p50_ms": t, "p99_ms": 2 * t} for m, t in (("paper", 80.0), ("search", 1.0))]
     (axis,) = latency_dots(rows, 83.0).axes
-    assert [label.get_text() for label in axis.get_yticklabels()] == ["learned", "paper"]
+    assert [label.get_text() for label in axis.get_yticklabels()] == ["search", "paper"]
     bars = [line for line in axis.lines if line.get_linewidth() == 4]
     assert [list(line.get_xdata()) for line in bars] == [[1.0, 2.0], [80.0, 160.0]]
-    assert [line.get_color() for line in bars] == [COLOURS["learned"], COLOURS["paper"]]
+    assert [line.get_color() for line in bars] == [COLOURS["search"], COLOURS["paper"]]
     assert axis.yaxis_inverted() and axis.get_xscale() == "log" and "[ms]" in axis.get_xlabel()
     assert any(np.allclose(line.get_xdata(), 83.0) for line in axis.lines)
-
-
-def test_seeds_have_a_panel_for_each_number_of_fins() -> None:
-    rows = [
-        {"fins": fins, "seeds": kind, "steps": steps, "err_norm_mean": size / (1 + steps)}
-        for fins in (2, 5)
-        for kind, size in (("network", 0.1), ("random", 1.0), ("quasi-random", 2.0))
-        for steps in (0, 1, 3)
-    ]
-    view = seed_lines(rows)
-    assert [axis.get_title(loc="left") for axis in view.axes] == ["2 fins", "5 fins"]
-    assert [label.get_text() for label in view.axes[0].get_xticklabels()] == ["0", "1", "3"]
-    assert _line(view.axes[1], "random")[:, 1] == pytest.approx([1.0, 0.5, 0.25])
-    assert _legend(view) == ["network", "random", "quasi-random"]
 
 
 def test_trainings_are_drawn_before_and_after_refinement() -> None:

@@ -21,11 +21,10 @@ TINY = Sizes(
     main=(2, 3),
     other=(2, 2),
     slow_other=(1, 1),
-    energy=(2, 1),
-    energy_slow=1,
+    cost=(2, 1),
     ablation=(2, 2),
     temperature=(2, 2),
-    seeds=(2, 2),
+    trained=(2, 2),
     latency=(3, 0.5),
     training=("smoke", 4, 32),
     swims=(0, 0, 0),
@@ -33,14 +32,20 @@ TINY = Sizes(
 )
 
 
+FEW_SPLITS = ("id", "ood", "failure", "fins-mixed")
+
+
 @pytest.fixture(scope="module")
 def few() -> pytest.MonkeyPatch:
     """Fewer methods, temperatures and trainings than a real report has."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(planning, "QUICK", ("learned", "paper", "analytic"))
+        patch.setattr(planning, "QUICK", ("search", "paper", "analytic"))
         patch.setattr(planning, "SLOW", ("ipopt",))
-        patch.setattr(planning, "ENERGY_METHODS", ("learned", "analytic", "ipopt"))
-        patch.setattr(planning, "LATENCY_METHODS", ("learned", "paper", "analytic", "ipopt"))
+        patch.setattr(planning, "SPLITS", FEW_SPLITS)
+        patch.setattr(planning, "COST_METHODS", ("search", "analytic"))
+        patch.setattr(planning, "cost_sets", lambda _: ["id", "axes", "tables"])
+        patch.setattr(planning, "N_STARTS", 4)
+        patch.setattr(planning, "LATENCY_METHODS", ("search", "paper", "analytic", "ipopt"))
         patch.setattr(planning, "TEMPERATURES", (0.01, 1.0))
         patch.setattr(planning, "CHANGES", {name: CHANGES[name] for name in ("recipe", "paper_loss_per_fin")})
         patch.setattr("finlab.evaluation.experiments.ablation.TIMED_CALLS", 1)
@@ -71,14 +76,28 @@ def _make(out: Path, checkpoint: Path) -> None:
 def test_page_twin_pictures_and_rows_say_the_same(folder: Path, untrained_checkpoint: Path) -> None:
     page, twin = (folder / PAGE).read_text("utf-8"), (folder / TWIN).read_text("utf-8")
     tables = json.loads((folder / TABLES).read_text("utf-8"))
-    for words in ("Who leads", "the other leads", "Every comparison", "0.0857", "SHA-256", "ipopt-32"):
+    for words in (
+        "Who leads",
+        "the other leads",
+        "Every comparison",
+        "0.0857",
+        "SHA-256",
+        "random starts of IPOPT",
+    ):
         assert words in page and words in twin
     digest = json.loads((untrained_checkpoint / "config.json").read_text())["sha256"]
     assert digest in page and digest in twin
     names = {path.name for path in (folder / PICTURES).iterdir()}
     assert len(names) == page.count("<svg") == twin.count("](pictures/")
     assert all(f"](pictures/{name})" in twin for name in names)
-    assert len(tables["wrench"]) == 6 * 5 and len(tables["ablation"]) == 20
+    assert len(tables["wrench"]) == len(FEW_SPLITS) * 4 and len(tables["ablation"]) == 20
+    costs = {(row["split"], row["objective"], row["method"]) for row in tables["cost"]}
+    assert costs == {
+        (split, objective, method)
+        for split in ("id", "axes", "tables")
+        for objective in ("power", "effort")
+        for method in ("search", "analytic")
+    }
     assert [row["temperature"] for row in tables["temperature"]] == [0.01, 1.0]
 
 
@@ -107,5 +126,6 @@ def test_without_casadi_and_torch_the_rest_is_planned(
     monkeypatch.setattr(planning, "find_spec", lambda _: None)
     bare = make_plan(TINY, seed=0, checkpoints=Checkpoints(), runs=tmp_path)
     assert whole.training and not bare.training
-    assert {name for name in whole.energy if name not in bare.energy} == {"ipopt", "ipopt-32"}
-    assert bare.ablation == whole.ablation and bare.wrench["id", "learned"] == whole.wrench["id", "learned"]
+    assert {method for _, method in set(whole.wrench) - set(bare.wrench)} == {"ipopt"}
+    assert bare.cost == whole.cost  # SLSQP stands in for IPOPT
+    assert bare.ablation == whole.ablation and bare.wrench["id", "search"] == whole.wrench["id", "search"]

@@ -19,7 +19,7 @@ KEYS = [
     *("split", "method", "n", "scored_by"),
     *("err_norm_mean", "err_norm_median", "err_norm_p95", "err_norm_max", "err_phys_mean"),
     *("success_0.01", "success_0.05", "success_0.5", "success_1.0"),
-    *("energy_mean", "solve_ms_p50", "solve_ms_p99"),
+    *("energy_mean", "power_mean", "solve_ms_p50", "solve_ms_p99"),
 ]
 """Keys of a row, in the order that users rely on."""
 
@@ -34,6 +34,7 @@ def _records(err_norm: list[float], n_fins: int = 3, energy: list[float] | None 
         err_norm=error,
         err_phys=2 * error,
         energy=error + 1 if energy is None else np.array(energy),
+        power=3 * error,
         resting=np.ones(n, np.int64),
         solve_ms=np.arange(n, dtype=float),
     )
@@ -49,7 +50,7 @@ def test_row_of_known_errors() -> None:
     assert row["err_norm_p95"] == pytest.approx(1.0 + 0.8 * 2.44)
     assert row["err_phys_mean"] == pytest.approx(2.0)
     assert [row[f"success_{level}"] for level in (0.01, 0.05, 0.5, 1.0)] == [0.2, 0.4, 0.6, 0.8]
-    assert row["energy_mean"] == pytest.approx(2.0)
+    assert row["energy_mean"] == pytest.approx(2.0) and row["power_mean"] == pytest.approx(3.0)
     assert (row["solve_ms_p50"], row["solve_ms_p99"]) == (2.0, pytest.approx(3.96))
 
 
@@ -70,7 +71,7 @@ def test_intervals_hold_their_means() -> None:
 def test_energy_over_a_reference() -> None:
     reference = _records([0.0, 0.0, 0.2, 0.0], energy=[1.0, 2.0, 9.0, 1.0])
     ours = _records([0.0, 0.0, 0.0, 0.9], energy=[0.5, 2.5, 1.0, 1.0])
-    by_fins, whole = energy_rows(ours, reference, method="learned")
+    by_fins, whole = energy_rows(ours, reference, method="search")
     assert (by_fins["fins"], whole["fins"]) == (3, "all")
     # Only the first two targets are met by both.
     assert (whole["n"], whole["met_by_both"]) == (4, 2)
@@ -109,12 +110,12 @@ def test_cells(value: object, text: str) -> None:
 
 def test_energies_are_compared_with_the_most_starts_of_ipopt() -> None:
     records = {
-        "learned": _records([0.0, 0.0], energy=[2.0, 4.0]),
+        "search": _records([0.0, 0.0], energy=[2.0, 4.0]),
         "ipopt": _records([0.0, 0.0], energy=[1.0, 1.0]),
         "ipopt-32": _records([0.0], energy=[2.5]),
     }
     rows = energy_comparison(records)
     assert {row["reference"] for row in rows} == {"ipopt-32"}
-    ours = next(row for row in rows if (row["method"], row["fins"]) == ("learned", "all"))
+    ours = next(row for row in rows if (row["method"], row["fins"]) == ("search", "all"))
     assert ours["n"] == 1 and ours["energy_ratio"] == pytest.approx(0.8)
-    assert energy_comparison({"learned": records["learned"]}) == []
+    assert energy_comparison({"search": records["search"]}) == []

@@ -23,7 +23,7 @@ from finlab.evaluation.statistics.records import (
 def _records(layout: list[int], target: list[int], error: list[float]) -> Records:
     n = len(layout)
     whole, real = np.array(layout), np.array(error)
-    return Records(whole, np.array(target), np.full(n, 4), real, real, real, np.zeros(n, int), real)
+    return Records(whole, np.array(target), np.full(n, 4), real, real, real, real, np.zeros(n, int), real)
 
 
 def test_a_file_gives_back_what_was_kept(tmp_path: Path) -> None:

@@ -1,10 +1,10 @@
-"""Time per call, ablation, temperature, seeds and training: one table and one picture each."""
+"""Time per call, ablation, temperature and training: one table and one picture each."""
 
 from finlab.evaluation.experiments.ablation import VARIANTS
 from finlab.evaluation.experiments.temperature import PAPER_TEMPERATURE
 from finlab.evaluation.experiments.training_study import CHANGES
 from finlab.evaluation.paper_figures import paper_figures
-from finlab.evaluation.plots.studies import ablation_dots, figure_a, latency_dots, seed_lines, training_bars
+from finlab.evaluation.plots.studies import ablation_dots, figure_a, latency_dots, training_bars
 from finlab.evaluation.report.document import Block, Column, Figure, Fold, Row, Table, method_row, printed_row
 from finlab.evaluation.report.numbers import three
 from finlab.evaluation.report.results import Results
@@ -30,7 +30,7 @@ def latency_blocks(results: Results) -> list[Block]:
         Column("calls", "calls", "count"),
         Column("p50_ms", "median [ms]", "three", "p50_ms_interval"),
         Column("p99_ms", "99th percentile [ms]", "three"),
-        Column("p50_over_learned", "times that of learned", "three"),
+        Column("p50_over_search", "times that of search", "three"),
     )
     return [
         "## Time per call",
@@ -121,31 +121,6 @@ def temperature_blocks(results: Results) -> list[Block]:
             "after 80 steps of Adam.",
         ),
         Fold("The numbers", (Table(columns, rows),)),
-    ]
-
-
-def seed_blocks(results: Results) -> list[Block]:
-    """The network's seeds against random ones."""
-    rows = results.tables["seeds"]
-    columns = (
-        Column("fins", "fins"),
-        Column("steps", "steps"),
-        Column("seeds", "seeds"),
-        Column("n", "targets", "count"),
-        Column("err_norm_mean", "mean error", "error", "err_norm_mean_interval"),
-        Column("success_0.01", "within 0.01", "share"),
-        Column("success_0.05", "within 0.05", "share"),
-        Column("energy_over_network", "energy over the network's", "ratio"),
-    )
-    shown = [{**row, "_kind": "ours"} if row["seeds"] == "network" else row for row in rows]
-    return [
-        "## What learning buys",
-        (
-            "The network's best 16 candidates against 16 random and 16 quasi-random ones, refined by the "
-            "same number of Levenberg-Marquardt steps on the surrogate, scored by the plant."
-        ),
-        Figure.drawn("seeds", seed_lines(rows), "Mean error against refinement steps."),
-        Fold("The numbers", (Table(columns, shown),)),
     ]
 
 

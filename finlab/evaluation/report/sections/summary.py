@@ -1,12 +1,14 @@
 """The first screen: a few numbers, and in which measures and cases each method leads, by their intervals."""
 
+from finlab.evaluation.experiments.cost import OBJECTIVES
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.report.document import Block, Card, Column, Fold, Row, Table
 from finlab.evaluation.report.numbers import error, factor, share, three
+from finlab.evaluation.report.plan import N_STARTS
 from finlab.evaluation.report.results import Results
 from finlab.evaluation.report.verdicts import LEADS, LEVEL, TRAILS, compare, standings, with_printed
 
-OURS = "learned"
+OURS = "search"
 STANDINGS = (
     Column("measure", "less is better"),
     Column("method", "method", "code"),
@@ -33,10 +35,10 @@ def summary_blocks(results: Results) -> list[Block]:
         tuple(_cards(results, results.wrench_rows)),
         "## Who leads",
         (
-            "The learned allocator against every other method. One leads where the intervals in which reruns "
-            "would land do not overlap; a single run has none and no verdict. Figures that the paper prints "
-            "count as exact. `analytic`, `sqp`, `qp`, `multistart`, `trf`, `slsqp` and `ipopt` know the fin "
-            "law itself, the learned allocator knows forward samples only."
+            "The default method, `search`, against every other one. One leads where the intervals in which "
+            "reruns would land do not overlap; a single run has none and no verdict. Figures that the paper "
+            "prints count as exact. All methods but `paper` know each fin's own model; `search` needs no "
+            "network and no training."
         ),
         Table(STANDINGS, standings(found)),
         Fold("Every comparison, with its values", (Table(COMPARISONS, found),)),
@@ -44,7 +46,7 @@ def summary_blocks(results: Results) -> list[Block]:
 
 
 def comparisons(results: Results) -> list[Row]:
-    """Every table's rows against those of the learned allocator."""
+    """Every table's rows against those of the default method."""
     printed, tables = paper_figures(), results.tables
     found: list[Row] = []
     for split, rows in results.wrench_rows.items():
@@ -58,27 +60,20 @@ def comparisons(results: Results) -> list[Row]:
             beside = with_printed([{**row, "method": "paper"}], "err_norm_mean", means)
             where = f"ablation by the {row['scored_by']}"
             found += compare("mean error", beside, "err_norm_mean", where, ("paper",))
-    found += compare("energy", results.energy_rows, "energy_ratio", _fins)
+    for objective in OBJECTIVES:
+        costs = [row for row in results.cost_rows if row["objective"] == objective and row["fins"] == "all"]
+        found += compare(objective, costs, "cost_ratio", lambda row: f"split {row['split']}")
     found += compare("time per call", tables.get("latency", ()), "p50_ms", "4 fins")
     found += compare("ATE", tables.get("trajectory", ()), "ate", lambda row: f"layouts {row['layout']}")
     faults = [row for row in tables.get("faults", ()) if row["controllable"]]
     found += compare("ATE, fins lost", faults, "ate", lambda row: row["fault"])
     for measure, value in (("inertial power", "inertial_w"), ("speed error", "mae")):
-        found += compare(measure, tables.get("velocity", ()), value, _speed, ("learned-power", OURS))
-    seeds = tables.get("seeds", [])
-    for steps in dict.fromkeys(row["steps"] for row in seeds):
-        rows = [row for row in seeds if row["steps"] == steps]
-        measure = f"mean error of seeds, {steps} steps"
-        found += compare(measure, rows, "err_norm_mean", _fins, ("network",), "seeds")
+        found += compare(measure, tables.get("velocity", ()), value, _speed, (OURS, "search-effort"))
     return found
 
 
 def _speed(row: Row) -> str:
     return "all speeds" if row["speed"] is None else f"{row['speed']:.2f} m/s"
-
-
-def _fins(row: Row) -> str:
-    return f"{row['fins']} fins"
 
 
 def _cards(results: Results, tables: dict[str, list[Row]]) -> list[Card]:
@@ -97,16 +92,12 @@ def _cards(results: Results, tables: dict[str, list[Row]]) -> list[Card]:
                 f"{share(row['success_0.01'])} within 0.01",
             )
         )
-    ours = [row for row in results.energy_rows if (row["method"], row["fins"]) == (OURS, "all")]
-    for row in (row for row in ours if row["energy_ratio"] is not None):
-        cards.append(
-            Card(
-                f"{row['energy_ratio']:.3f}",
-                "energy over the best of 32 IPOPT starts",
-                f"reruns: {row['energy_ratio_low']:.3f} to {row['energy_ratio_high']:.3f}; "
-                f"{row['resting']:.2f} fins rest on average",
-            )
-        )
+    ours = [row for row in results.cost_rows if (row["method"], row["fins"]) == (OURS, "all")]
+    for row in (row for row in ours if row["split"] == "id" and row["cost_ratio"] is not None):
+        low, high = row["cost_ratio_interval"]
+        detail = f"reruns: {low:.3f} to {high:.3f}; worst target {row['ratio_max']:.3f}"
+        label = f"{row['objective']} over the best of {N_STARTS} IPOPT starts (`id`)"
+        cards.append(Card(f"{row['cost_ratio']:.3f}", label, detail))
     times = {row["method"]: row for row in results.tables.get("latency", ())}
     if OURS in times:
         mine = times[OURS]

@@ -1,0 +1,150 @@
+"""The yardstick of costs: the cheapest command that tracks a target exactly, from many random starts.
+
+Nothing here knows how the allocators search. Where all fins have a formula and CasADi is installed, IPOPT
+minimizes the cost with the wrench as a constraint and exact second derivatives; else the starts first descend
+onto the target, and SciPy's SLSQP goes on from there with the plant's exact first derivatives. Each end is a
+local minimum; the cheapest one is the yardstick.
+"""
+
+from collections.abc import Callable
+from functools import lru_cache
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+
+from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, import_casadi
+from finlab.allocation.weighted_descent import DescentOptions, descend
+from finlab.layout import Layout
+from finlab.layout.arrays import Array
+from finlab.physics import PlanarLaw, Plant, make_law, plant_of
+from finlab.physics.energy import energy_of_shares, energy_scale
+from finlab.physics.objective import Objective
+
+EXACT = 1e-5
+"""Normalized error up to which an end counts as tracking exactly."""
+SAME_DIRECTION = 1e-6
+"""Singular values of the fins' effectiveness below this share of the largest count as no authority."""
+DESCENT = DescentOptions(n_steps=40)
+"""From a random command onto the target."""
+
+Solve = Callable[[Array, Array], Array]
+"""From a normalized target (6,) and a start (n, 3) to the command (n, 3) where the solver ends."""
+
+
+class CheapestCommands:
+    """Commands of least cost under exact tracking, from starts anywhere within the limits."""
+
+    def __init__(self, objective: Objective, sigma: Array) -> None:
+        """Prepare for an objective.
+
+        Args:
+            objective: what a command costs.
+            sigma: per-axis standard deviation (6,) that errors are divided by.
+        """
+        self.objective, self.sigma = objective, sigma
+        self._solver = lru_cache(16)(self._prepare)
+
+    def ends(self, layout: Layout, target: Array, n_starts: int, seed: int) -> tuple[Array, Array]:
+        """Commands (M, n, 3) that deliver a target (6,), cheapest first, and their costs (M,).
+
+        Args:
+            layout: the robot, all of its fins healthy.
+            target: desired wrench [N, N m].
+            n_starts: random starts; there are as many ends or fewer.
+            seed: of the starts.
+        """
+        plant = plant_of(layout)
+        starts = plant.sample(np.random.default_rng(seed), (n_starts,))
+        solve = self._solver(layout)
+        if not has_formulas(layout):
+            starts = descend(plant, starts, np.tile(target, (n_starts, 1)), self.sigma, DESCENT).command
+        command = np.array([solve(target / self.sigma, start) for start in starts])
+        command = plant.feasible(command[np.isfinite(command).all((1, 2))].reshape(-1, plant.n_fins, 3))
+        error = np.linalg.norm((plant.wrench(command) - target) / self.sigma, axis=-1)
+        command = command[error <= EXACT]
+        cost = np.asarray(self.objective.meter(plant)(command))
+        order = cost.argsort()
+        return command[order], cost[order]
+
+    def _prepare(self, layout: Layout) -> Solve:
+        return (self._by_ipopt if has_formulas(layout) else self._by_slsqp)(plant_of(layout))
+
+    def _independent(self, plant: Plant) -> Array:
+        """Directions (r, 6) of the normalized wrench in which the fins push at all: no constraint says what
+        another one says."""
+        axes, size, _ = np.linalg.svd(plant.planar / self.sigma[:, None])
+        return np.asarray(axes[:, : int((size > SAME_DIRECTION * size[0]).sum())].T)
+
+    def _by_ipopt(self, plant: Plant) -> Solve:
+        casadi: Any = import_casadi()
+        n = plant.n_fins
+        command, target = casadi.SX.sym("command", 3 * n), casadi.SX.sym("target", 6)
+        wrench, cost = casadi.SX.zeros(6), 0
+        scale, aim = energy_scale(plant.upper), self.objective
+        for i, fin in enumerate(plant.layout.fins):
+            amplitude, frequency, direction = (command[3 * i + k] for k in range(3))
+            law: Any = make_law(fin.model)
+            thrust, points = law.thrust(amplitude, frequency, direction), direction + law.offset
+            wrench += thrust * casadi.cos(points) * casadi.DM(plant.columns[i, 1])
+            wrench += thrust * casadi.sin(points) * casadi.DM(plant.columns[i, 2])
+            if aim.name == "power":
+                cost += law.blade.driving_power(amplitude, frequency, aim.copper_loss)
+            else:
+                a, f, d = (command[3 * i + k] / scale[i, k] for k in range(3))
+                cost += energy_of_shares(a, f, d, aim.weights)
+        missing = casadi.DM(self._independent(plant)) @ (wrench / casadi.DM(self.sigma) - target)
+        program = {"x": command, "p": target, "f": cost, "g": missing}
+        solver = casadi.nlpsol("cheapest", "ipopt", program, SOLVER_OPTIONS)
+        limits = {"lbx": plant.lower.ravel(), "ubx": plant.upper.ravel(), "lbg": 0.0, "ubg": 0.0}
+
+        def solve(wanted: Array, start: Array) -> Array:
+            answer = solver(x0=start.ravel(), p=wanted, **limits)
+            return np.array(answer["x"], np.float64).reshape(n, 3)
+
+        return solve
+
+    def _by_slsqp(self, plant: Plant) -> Solve:
+        meter, axes = self.objective.meter(plant), self._independent(plant)
+        free = plant.width.ravel() > 0.0
+        usual = float(meter(plant.sample(np.random.default_rng(0), (16,))).mean())
+
+        def command_at(x: Array) -> Array:
+            share = np.zeros(free.size)
+            share[free] = x
+            return np.asarray(plant.lower + share.reshape(-1, 3) * plant.width)
+
+        def cost(x: Array) -> float:
+            return float(meter(command_at(x)[None])[0]) / usual
+
+        def cost_slopes(x: Array) -> Array:
+            return np.asarray((meter.slopes(command_at(x)[None])[0] * plant.width).ravel()[free]) / usual
+
+        def solve(wanted: Array, start: Array) -> Array:
+            def missing(x: Array) -> Array:
+                return np.asarray(axes @ (plant.wrench(command_at(x)) / self.sigma - wanted))
+
+            def slopes(x: Array) -> Array:
+                _, jacobian = plant.linearize(command_at(x))
+                return np.asarray(axes @ (jacobian / self.sigma[:, None] * plant.width.ravel())[:, free])
+
+            first = ((start - plant.lower) / np.where(plant.width > 0.0, plant.width, 1.0)).ravel()[free]
+            answer = minimize(
+                cost,
+                first,
+                jac=cost_slopes,
+                method="SLSQP",
+                bounds=[(0.0, 1.0)] * len(first),
+                constraints={"type": "eq", "fun": missing, "jac": slopes},
+                options={"maxiter": 100, "ftol": 1e-9},
+            )
+            return command_at(np.clip(answer.x, 0.0, 1.0))
+
+        return solve
+
+
+def has_formulas(layout: Layout) -> bool:
+    """Whether IPOPT can be asked about a robot: all of its fins have a formula, and CasADi is installed."""
+    known = all(isinstance(make_law(fin.model), PlanarLaw) for fin in layout.fins)
+    return known and find_spec("casadi") is not None

@@ -1,0 +1,63 @@
+"""What answers cost, in watts and as the paper's effort, beside the best of many random starts."""
+
+from finlab.evaluation.experiments.cost import OBJECTIVES, TRACKED, UNITS
+from finlab.evaluation.plots.wrench_tracking import cost_by_fins
+from finlab.evaluation.report.document import Block, Column, Figure, Fold, Table, method_row
+from finlab.evaluation.report.plan import N_STARTS
+from finlab.evaluation.report.results import Results
+
+
+def _columns(unit: str) -> tuple[Column, ...]:
+    return (
+        Column("split", "cases", "code"),
+        Column("method", "method"),
+        Column("fins", "fins"),
+        Column("n", "targets", "count"),
+        Column("tracked", "tracked", "share"),
+        Column("cost", f"mean cost [{unit}]", "three"),
+        Column("cost_ratio", "over the best start", "ratio", "cost_ratio_interval"),
+        Column("ratio_p95", "95th percentile", "ratio"),
+        Column("ratio_max", "worst target", "ratio"),
+        Column("cheaper", "cheaper than it", "share"),
+        Column("win_error", "error by hand", "error"),
+    )
+
+
+def cost_blocks(results: Results) -> list[Block]:
+    """The whole section."""
+    rows = results.cost_rows
+    blocks: list[Block] = [
+        "## Cost",
+        (
+            f"The yardstick is the cheapest end of {N_STARTS} random starts of IPOPT with the wrench as a "
+            f"constraint ({2 * N_STARTS} of SLSQP where fins are tables), a solver that knows nothing of how "
+            f"the methods search; compared where both deliver the wrench to {TRACKED:g}. Power grows faster "
+            "than force, so its optimum loads all fins and is next to always unique; effort is the paper's "
+            "proxy J_en, whose cheapest answer often lets some fins rest. `axes`: pure axes on the layouts "
+            "A, B, penta, hexa and octo, `axes-mixed`: two or three of them together; `coincident` and "
+            "`stacked`: pairs of fins at one place, or one above the other."
+        ),
+        Figure.drawn(
+            "cost-by-fins",
+            cost_by_fins([row for row in rows if row["split"] == "id"]),
+            "Cost over that of the best start with the interval of a rerun, split `id`.",
+        ),
+    ]
+    for objective in OBJECTIVES:
+        columns = _columns(UNITS[objective])
+        shown = [row for row in rows if row["objective"] == objective]
+        whole = [method_row(row) for row in shown if row["fins"] == "all"]
+        by_fins = [method_row(row) for row in shown if row["fins"] != "all"]
+        if shown:
+            blocks += [
+                f"### {objective.capitalize()}",
+                Table(columns, whole),
+                Fold("The same by number of fins", (Table(columns, by_fins),)),
+            ]
+    return [
+        *blocks,
+        (
+            "*Error by hand: the largest error of the answers that are cheaper than every start, by the drag "
+            "law written out apart from the plant.*"
+        ),
+    ]

@@ -1,0 +1,53 @@
+"""Symmetric cases hold what they promise."""
+
+import numpy as np
+import pytest
+
+from finlab.allocation import load_allocator
+from finlab.analysis import authority
+from finlab.evaluation.symmetric_cases import LAYOUTS, SETS, SHARES, symmetric_cases
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_all_targets_can_be_delivered_and_runs_can_be_repeated(name: str) -> None:
+    search = load_allocator()
+    for case, again in zip(symmetric_cases(name, 3, 6, 4), symmetric_cases(name, 3, 6, 4), strict=True):
+        assert case.layout == again.layout
+        np.testing.assert_array_equal(case.targets, again.targets)
+        assert search.allocate_batch(case.layout, case.targets).reachable.all()
+
+
+def test_axes_are_pure_and_of_known_sizes() -> None:
+    cases = symmetric_cases("axes", 9, 99, 0)
+    assert [case.layout.name for case in cases] == list(LAYOUTS)
+    for case in cases:
+        held = authority(case.layout)
+        largest = np.minimum(held.largest, held.most_negative)
+        assert ((case.targets != 0.0).sum(axis=1) == 1).all()
+        share = np.abs(case.targets / np.where(largest > 0.0, largest, 1.0)).max(axis=1)
+        assert len(share) == 2 * len(SHARES) * len(held.reachable)
+        assert np.sort(share) == pytest.approx(np.repeat(SHARES, 2 * len(held.reachable)))
+
+
+def test_mixes_ask_for_two_or_three_axes() -> None:
+    for case in symmetric_cases("axes-mixed", 5, 99, 0):
+        assert set((case.targets != 0.0).sum(axis=1)) == {2, 3}
+
+
+def test_coincident_fins_share_their_place_and_their_shafts_line() -> None:
+    turns = set()
+    for case in symmetric_cases("coincident", 12, 1, 0):
+        first, second, *_ = case.layout.fins
+        turn = np.mod(second.mounting_angle - first.mounting_angle, 2 * np.pi)
+        assert first.position == second.position
+        turns.add(round(float(min(turn, 2 * np.pi - turn)), 6))
+    assert turns == {0.0, round(np.pi, 6)}
+
+
+def test_stacked_pairs_are_one_above_the_other() -> None:
+    for case in symmetric_cases("stacked", 6, 1, 0):
+        fins = case.layout.fins
+        assert len(fins) in (4, 6, 8)
+        for up, down in zip(fins[::2], fins[1::2], strict=True):
+            assert up.position[:2] == down.position[:2] and up.position[2] == -down.position[2] > 0.0
+            assert up.mounting_angle == down.mounting_angle
