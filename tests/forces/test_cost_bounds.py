@@ -1,0 +1,114 @@
+"""Lower bounds on cost: never above what some command costs, close to what the search finds."""
+
+import numpy as np
+import pytest
+
+from finlab.allocation import load_allocator
+from finlab.allocation.search.search_allocator import SearchAllocator
+from finlab.errors import AllocationError
+from finlab.forces.branch_and_bound import bound_by_branching
+from finlab.forces.cost_bound import CostDual, cost_bound
+from finlab.forces.envelopes import layout_envelopes
+from finlab.forces.force_space import PlanarProblem, planar_problem
+from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
+from finlab.physics import plant_of
+from finlab.physics.objective import Name, Objective
+
+SIGMA = np.array([1.0, 1.0, 1.0, 0.2, 0.2, 0.2])
+
+
+def uneven(n: int, seed: int) -> Layout:
+    """A robot of soft fins that lean and push harder in one direction, one of them with stops."""
+    rng = np.random.default_rng(4)
+    model = FinModelSpec("soft", (("d", 0.1), ("e", 0.2), ("k", 3.0), ("phi_e", 0.7)))
+    fins = []
+    for i in range(n):
+        x, y, z = rng.uniform(-1.0, 1.0, 3) * [0.3, 0.3, 0.1]
+        limits = Limits(zero_direction=(-1.2, 1.2)) if i == 0 else Limits()
+        fins.append(Fin(f"fin_{i}", (x, y, z), rng.uniform(-3.0, 3.0), limits, model))
+    return Layout(name="uneven", fins=tuple(fins))
+
+
+def problem_of(layout: Layout, name: Name) -> PlanarProblem:
+    objective = Objective(name)
+    return planar_problem(layout, layout_envelopes(layout, objective), SIGMA, objective)
+
+
+@pytest.mark.parametrize(
+    "layout", [load_layout("A"), load_layout("mixed"), load_layout("restricted"), uneven(5, 3)]
+)
+def test_the_dual_is_below_every_command_of_the_same_wrench(layout: Layout) -> None:
+    """Weak duality holds whatever the multipliers: commands drawn at random cost more."""
+    problem, plant = problem_of(layout, "power"), plant_of(layout)
+    rng = np.random.default_rng(0)
+    command = plant.sample(rng, (25,))
+    power = plant.power(command).sum(-1)
+    for target, cost in zip(plant.wrench(command) / SIGMA, power, strict=True):
+        multiplier = rng.normal(size=6) * rng.uniform(0.0, 3.0)
+        assert CostDual(problem, target)(multiplier)[0] <= cost * 1.002 + 1e-6
+
+
+def test_the_dual_tells_its_own_slope() -> None:
+    problem = problem_of(uneven(4, 1), "power")
+    target, at = np.array([0.5, 0.2, -0.3, 0.1, 0.0, 0.2]), np.array([0.4, 0.1, -0.2, 0.3, 0.1, 0.2])
+    dual = CostDual(problem, target)
+    slope = dual(at)[1]
+    # The table's forces move in steps, so slopes are compared over a way that crosses several of them.
+    ahead, behind = (dual(at + s * 0.02 * slope / np.linalg.norm(slope))[0] for s in (1.0, -1.0))
+    assert (ahead - behind) / 0.04 == pytest.approx(np.linalg.norm(slope), rel=0.1)
+
+
+@pytest.mark.parametrize(
+    "layout", [load_layout("A"), load_layout("mixed"), load_layout("octo"), uneven(5, 3)]
+)
+def test_the_search_is_within_a_percent_of_the_bound_of_power(layout: Layout) -> None:
+    allocator, plant = load_allocator(), plant_of(layout)
+    for command in plant.sample(np.random.default_rng(2), (4,)):
+        result = allocator.allocate(layout, plant.wrench(command))
+        bound = allocator.bound(result)
+        assert 0.99 * result.power <= bound <= result.power
+
+
+def test_the_ascent_improves_bad_multipliers() -> None:
+    layout = load_layout("A")
+    result = load_allocator().allocate(layout, [1.0, 0.0, 0.5, 0.0, 0.0, 0.1])
+    problem, target = problem_of(layout, "power"), result.target / SIGMA
+    start = np.full(6, 0.05)
+    assert CostDual(problem, target)(start)[0] < 0.9 * result.power
+    assert cost_bound(problem, target, start) > 0.98 * result.power
+
+
+@pytest.mark.parametrize("layout", [uneven(3, 30), uneven(3, 31), load_layout("D"), load_layout("mixed")])
+def test_branch_and_bound_is_below_what_is_known_and_proves_the_search(layout: Layout) -> None:
+    """From a poor answer on it must not prove more than the good one costs; from the good one, that it is
+    good."""
+    plant, problem = plant_of(layout), problem_of(layout, "effort")
+    allocator = load_allocator(objective="effort")
+    result = allocator.allocate(layout, plant.wrench(plant.sample(np.random.default_rng(4), ())))
+    target = result.target / SIGMA
+    poor = bound_by_branching(problem, target, 1.1 * result.energy, tolerance=0.04, time_limit_s=1.0)
+    assert poor.bound <= result.energy * 1.002
+    good = bound_by_branching(problem, target, result.energy, tolerance=0.04, time_limit_s=2.0)
+    assert good.bound <= result.energy
+    if good.finished:
+        assert good.bound >= 0.959 * result.energy
+    assert good.finished
+
+
+def test_a_lack_of_time_is_told() -> None:
+    layout = load_layout("octo")
+    result = load_allocator(objective="effort").allocate(layout, [1.0, 0.2, 0.5, 0.02, 0.0, 0.1])
+    proof = bound_by_branching(
+        problem_of(layout, "effort"), result.target / SIGMA, result.energy, time_limit_s=0.05
+    )
+    assert not proof.finished
+    assert 0.0 < proof.bound < result.energy
+
+
+@pytest.mark.parametrize("objective", ["power", "effort"])
+def test_no_bound_without_an_answer(objective: Name) -> None:
+    allocator = load_allocator(objective=objective)
+    assert isinstance(allocator, SearchAllocator)
+    result = allocator.allocate(load_layout("A"), [90.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    with pytest.raises(AllocationError, match="out of reach"):
+        allocator.bound(result)
