@@ -11,6 +11,7 @@ from finlab.allocation.allocation import Allocation, BatchAllocation
 from finlab.allocation.health import Health
 from finlab.allocation.judging import judge
 from finlab.allocation.method import Method
+from finlab.allocation.notes import fin_notes
 from finlab.allocation.policy import CLOSEST, Policy, as_policy
 from finlab.allocation.question import (
     Fins,
@@ -125,13 +126,14 @@ class Allocator(Method):
 
     def _notes(self, layout: Layout) -> tuple[str, ...]:
         """Sentences that the user should read before trusting an answer for this layout."""
-        unknown = self.unknown_fins(layout)
+        unknown, notes = self.unknown_fins(layout), fin_notes(layout)
         if not unknown or self.fin_model is None:
-            return ()
+            return notes
         return (
             f"the method does not know these fins: {', '.join(unknown)}; checkpoint {self.checkpoint!r} "
             f"takes them for fins of model {_listed(self.fin_model)}: trust the plant's error or train a "
             "surrogate for them",
+            *notes,
         )
 
     def allocate_batch(

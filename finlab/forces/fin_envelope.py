@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.errors import DataError
 from finlab.layout import FinModelSpec, Limits
 from finlab.layout.angles import is_full_turn, wrapped
 from finlab.physics.fin_law import FinLaw
@@ -76,7 +77,7 @@ def fin_envelope(model: FinModelSpec, limits: Limits, objective: Objective) -> F
     """Returns the compiled fin, kept from the last time it was asked for.
 
     Raises:
-        DataError: the fin's force table cannot be read.
+        DataError: the fin's force table cannot be read, or gives no thrust within the limits.
     """
     return _kept(model, limits, objective, file_stamp(model))
 
@@ -86,7 +87,14 @@ def _kept(
     model: FinModelSpec, limits: Limits, objective: Objective, stamp: tuple[int, int] | None
 ) -> FinEnvelope:
     """An envelope; a table whose file has changed is read again."""
-    return compile_fin(make_law(model), limits, objective)
+    fin = compile_fin(make_law(model), limits, objective)
+    if model.type == "table" and not fin.largest.any():
+        (low, high), (slow, fast) = limits.amplitude, limits.frequency
+        raise DataError(
+            f"{model.values()['path']}: gives no thrust within the fin's limits, amplitudes {low:.4g} to "
+            f"{high:.4g} rad and frequencies {slow:.4g} to {fast:.4g} Hz; widen the limits or leave it out"
+        )
+    return fin
 
 
 def compile_fin(law: FinLaw, limits: Limits, objective: Objective) -> FinEnvelope:

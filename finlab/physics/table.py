@@ -31,6 +31,8 @@ class TableLaw:
         """
         self.periodic = periodic
         turn = np.append(axes[2], axes[2][0] + TURN) if periodic else axes[2]
+        self.covers = tuple((float(axis[0]), float(axis[-1])) for axis in axes)
+        """First and last amplitude [rad], frequency [Hz] and zero direction [rad] of the grid."""
         self._cells = _Cells([axes[0], axes[1], turn], periodic)
         # A view in which each cell holds its own 64 neighbours. At an edge the missing one is the edge
         # itself, which makes its slope one-sided.

@@ -26,7 +26,7 @@ OTHER: dict[str, dict[str, Any]] = {
     "slsqp": {"n_starts": 1},
     "ipopt": {"n_starts": 1},
     "qp": {"regularization": 10.0},
-    "sqp": {"n_steps": 1},
+    "sqp": {"objective": "effort", "n_steps": 1},
     "analytic": {"rcond": 0.5},
 }
 SAME_ANSWER = ("analytic", "trf", "slsqp", "ipopt")
