@@ -86,7 +86,7 @@ def test_installed_package_allocates_from_any_folder(unpacked: Path, tmp_path: P
     wrench = ["--wrench", "1", "0", "0.5", "0", "0", "0.1"]
     done = run(unpacked, tmp_path, "-m", "finlab", "allocate", "A", *wrench, "--json")
     assert done.returncode == 0, done.stderr
-    assert '"checkpoint": "default"' in done.stdout
+    assert '"checkpoint": null' in done.stdout and '"method": "search"' in done.stdout
 
 
 @pytest.fixture(scope="module")
@@ -152,9 +152,9 @@ def test_without_extras_every_method_but_ipopt_allocates(bare: Path, tmp_path: P
 def test_without_extras_it_simulates_evaluates_and_exports(bare: Path, tmp_path: Path) -> None:
     for line in (
         "simulate A --duration 12",
-        "eval wrench --split id --layouts 2 --targets 3 --methods learned,fast,sqp",
+        "eval wrench --split id --layouts 2 --targets 3 --methods search,paper,sqp",
         "layout check ucat",
-        "export A -o robot",
+        "export mixed -o robot --objective effort",
     ):
         done = bare_run(bare, tmp_path, "-m", "finlab", *line.split())
         assert done.returncode == 0, (line, done.stderr)
