@@ -100,16 +100,17 @@ def _hull(page: Page) -> None:
 
 def _modes(page: Page) -> None:
     page.tab("Modes")
-    page.type("Temperature T", "0.5")
-    page.until(lambda: page.session.state.temperature == 0.5 and not page.view.busy)
-    page.page.locator("svg.plot:visible .samples circle").nth(30).dispatch_event("click")
-    page.until(lambda: page.session.sample == 30)
+    page.until(lambda: not page.view.busy and not page.view.answering.searching)
+    page.page.locator("table.modes tr.pick").nth(1).click()
+    page.until(lambda: page.session.mode == 1)
 
 
-def _density(page: Page) -> None:
+def _proposals(page: Page) -> None:
     page.tab("Modes")
-    page.type("Temperature T", "0.5")
+    page.choose("Method", "mdn")
+    page.until(lambda: page.session.state.method == "mdn" and not page.view.busy)
     page.tab("What the network proposes")
+    page.until(lambda: not page.view.answering.searching)
     _scroll(page)
 
 
@@ -167,7 +168,7 @@ SCENES: dict[str, Callable[[Page], object]] = {
     "app-layout": _layout,
     "app-hull": _hull,
     "app-modes": _modes,
-    "app-density": _density,
+    "app-proposals": _proposals,
     "app-limits": _limits,
     "app-improve": _improve,
     "app-compare": _compare,

@@ -1,4 +1,4 @@
-"""The page with the checkpoint that is shipped and the method `learned`, as a user gets it."""
+"""The page with the methods and the checkpoint that are shipped, as a user gets it."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -35,36 +35,56 @@ def trained(browser: Any) -> Iterator[Page]:
     stop_server(server)
 
 
-def test_learned_answers_a_slider_and_a_failure(trained: Page) -> None:
+def test_search_answers_a_slider_and_a_failure(trained: Page) -> None:
     page = trained
-    assert page.view.answering.best.method == "learned" and page.view.answering.best.checkpoint is not None
-    assert "Reachable" in page.text(".fl-status")
+    assert page.view.answering.best.method == "search" and page.view.answering.best.checkpoint is None
+    assert "Reachable" in page.text(".fl-status") and "least power" in page.text(".fl-status")
     page.type("Fy [N]", "0.5")
     page.until(lambda: page.session.state.target[1] == 0.5 and not page.view.busy)
     page.until(lambda: "+0.50" in page.text(".bars"))
     assert page.view.answering.best.err_norm < 0.01
     page.press("2")
     page.until(lambda: page.session.state.failed == ("front_left",) and not page.view.busy)
-    assert page.view.answering.best.method == "learned"
+    assert page.view.answering.best.method == "search"
     page.press("2 ✕")
     page.until(lambda: page.session.state.failed == () and not page.view.busy)
 
 
-def test_its_modes_are_distinct_and_its_densities_are_drawn(trained: Page) -> None:
+def test_power_or_effort_is_kept_least(trained: Page) -> None:
     page = trained
     page.tab("Modes")
+    watts = page.view.answering.best.power
+    page.press("effort")
+    page.until(lambda: page.session.state.objective == "effort" and not page.view.busy)
+    page.until(lambda: "least effort" in page.text(".fl-status"))
+    assert page.view.answering.best.power > watts
+    page.until(lambda: "effort" in str(page.page.locator("svg.plot:visible").text_content()))
+    page.press("power")
+    page.until(lambda: page.session.state.objective == "power" and not page.view.busy)
+    assert page.view.answering.best.power == watts
+
+
+def test_modes_tell_their_components_and_proposals_are_drawn(trained: Page) -> None:
+    page = trained
+    assert page.page.locator("svg.plot:visible .samples").count() == 0, "search draws nothing"
+    assert page.page.get_by_role("button", name="Play the refinement").count() == 0
+    page.choose("Method", "mdn")
+    page.until(lambda: page.session.state.method == "mdn" and not page.view.busy)
+    page.until(lambda: "from component" in page.text("table.modes"))
     page.until(
         lambda: page.page.locator("table.modes tr.pick").count() == len(page.view.answering.modes.shown) > 0
     )
     names = [mode.name for mode in page.view.answering.modes.shown]
     assert len(set(names)) == len(names)
-    assert page.view.answering.reply.densities is not None
+    assert page.view.answering.reply.attention is not None
     page.press("Play the refinement")
     page.page.locator(".step", has_text="Best raw candidate").wait_for()
     page.page.locator(".step", has_text="Answer").wait_for()
     page.until(lambda: page.view.playback.frame is None)
     page.tab("What the network proposes")
-    page.until(lambda: page.page.locator(".uplot").count() == 3)
+    page.until(lambda: page.page.locator(".discs svg").count() == 4)
+    page.choose("Method", "search")
+    page.until(lambda: page.session.state.method == "search" and not page.view.busy)
     assert page.problems == []
 
 

@@ -6,6 +6,8 @@ from typing import Any
 import pytest
 import trimesh
 
+from webapp.session.state import COMPARED
+
 
 def test_linked_pair_follows_the_gizmo(page: Any) -> None:
     page.key("n")
@@ -87,7 +89,7 @@ def test_any_layout_stands_beside(page: Any) -> None:
 def test_search_is_watched_and_accepted(page: Any) -> None:
     page.tab("Limits")
     before = page.session.state.layout
-    page.choose("Goal", "energy of a mission")
+    page.choose("Goal", "power for a mission")
     page.press("Add the present wrench")
     page.page.get_by_role("button", name="4", exact=True).locator("visible=true").last.click()  # holds fin 4
     page.type("Reach ± [m]", "0.03", place=0)
@@ -109,7 +111,7 @@ def test_methods_side_by_side(page: Any) -> None:
     page.tab("Compare")
     page.press("Compare the methods")
     page.until(lambda: page.view.comparison.state is not None and not page.view.comparison.running)
-    page.until(lambda: page.page.locator("table.methods tr").count() == 7)
+    page.until(lambda: page.page.locator("table.methods tr").count() == 1 + len(COMPARED))
     page.page.locator("table.methods tr.pick", has_text="analytic").click()
     page.until(lambda: page.session.overlay == "analytic")
     page.visible("/robot/overlay")

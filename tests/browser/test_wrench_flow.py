@@ -61,6 +61,8 @@ def test_mode_is_picked_in_plot_and_table(page: Any) -> None:
     page.until(lambda: page.session.sample == 7)
     page.until(lambda: "Raw sample 7" in page.text(".step"))
     assert page.view.shown.command.tolist() == best.samples.command[7].tolist()
+    page.choose("Method", "mdn")
+    page.until(lambda: page.session.state.method == "mdn" and not page.view.busy)
     page.type("Candidates K", "16")
     page.until(lambda: page.session.state.n_candidates == 16 and not page.view.busy)
     assert len(page.view.answering.best.samples.energy) == 16
@@ -71,7 +73,7 @@ def test_method_that_fails_says_so_and_the_page_goes_on(page: Any) -> None:
     page.choose("Method", "slsqp")
     page.until(lambda: any("out of order" in note for note in page.notes()))
     page.key("Control+z")
-    page.until(lambda: page.session.state.method == "learned")
+    page.until(lambda: page.session.state.method == "search")
     page.until(lambda: "Reachable" in page.text(".fl-status"))
 
 

@@ -17,13 +17,13 @@ from tests.webapp.loops import AtOnce
 from tests.webapp.stand_in import load_stand_in
 from webapp.markup.comparison import comparison_table
 from webapp.markup.corner import corner
-from webapp.markup.modes import mode_plot
+from webapp.markup.mode_plot import mode_plot
 from webapp.markup.proposals import proposal_discs
 from webapp.markup.snippets import command_line, export_line, python_lines
 from webapp.markup.words import source_words, three_digits
 from webapp.session.state import COMPARED, OBJECTIVES, State, knows_objective
 from webapp.session.swim_plan import SwimSettings
-from webapp.session.targets import PRESETS, full_thrust
+from webapp.session.targets import PRESETS
 from webapp.tasks.background import Worker
 from webapp.tasks.comparison import Comparison
 from webapp.tasks.mode_names import known_modes, listed_modes
@@ -79,14 +79,14 @@ def test_each_mode_of_mdn_tells_its_components_and_search_has_no_samples() -> No
     led = {samples.source[k] for k in np.flatnonzero(modes.of_samples == 0)}
     assert led and led <= set(modes.shown[0].mode.sources)
     assert reply.attention is not None and reply.attention.weight.sum(axis=1) == pytest.approx(np.ones(4))
-    discs = proposal_discs(reply.answer, reply.modes, full_thrust(UCAT))
+    discs = proposal_discs(reply.answer, reply.modes)
     assert discs.count("<svg") == 4 and discs.count("r='2'") == 4 * len(samples)
     searched = solver.reply(replace(state, method="search"))
     found = solver.modes(searched)
     assert searched.answer.samples is None and searched.attention is None and found.of_samples is None
     assert not any(s.startswith("component") for mode, _ in found.shown for s in mode.sources)
     assert {source_words(mode.sources).split(" ")[0] for mode, _ in found.shown} <= {"found", "from"}
-    assert proposal_discs(searched.answer, found, full_thrust(UCAT)) == ""
+    assert proposal_discs(searched.answer, found) == ""
 
 
 @pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
@@ -123,8 +123,9 @@ def test_every_answer_keeps_least_what_is_asked() -> None:
     assert [answer.settings["objective"] for answer in (power, effort)] == ["power", "effort"]
     assert "least power" in corner(state, "", power, False, None)
     assert "least effort" in corner(state, "", effort, False, None)
-    assert ">power [W]<" in mode_plot(power, listed_modes(known_modes(power), None), 0, None, 200, "here")
-    assert ">effort<" in mode_plot(effort, listed_modes(known_modes(effort), None), 0, None, 200, "here")
+    for answer, words in ((power, ("power [W]", "effort")), (effort, ("effort", "power [W]"))):
+        plot = mode_plot(answer, listed_modes(known_modes(answer), None), 0, None, 200, "here")
+        assert plot.index(f">{words[0]}<") < plot.index(f">{words[1]}<"), "what is kept least lies below"
     plan = SwimSettings().plan(replace(state, objective="effort"), None)
     assert plan.objective == "effort" and state.drawing == {} and not knows_objective("paper")
     assert "--objective effort" in command_line(replace(state, objective="effort"))

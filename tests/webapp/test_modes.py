@@ -11,7 +11,8 @@ from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
 from tests.webapp.loops import AtOnce
 from tests.webapp.stand_in import StandIn, load_stand_in
-from webapp.markup.modes import DOT, LEFT, WIDTH, _apart, mode_plot, mode_table
+from webapp.markup.mode_plot import DOT, LEFT, WIDTH, _apart, mode_plot
+from webapp.markup.modes import mode_table
 from webapp.markup.words import small, three_digits
 from webapp.session import Session
 from webapp.session.targets import PRESETS

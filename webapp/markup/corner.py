@@ -82,6 +82,7 @@ def corner(
     busy: bool,
     error: str | None,
     raw: bool = False,
+    least: bool = True,
 ) -> str:
     """Legend and status line in the lower left corner of the page.
 
@@ -92,8 +93,9 @@ def corner(
         busy: whether a newer answer is on its way.
         error: why there is no answer.
         raw: whether it is a raw command on show, of which nobody expects that it is exact.
+        least: whether it is the answer itself, not another way to do the same.
     """
-    return _cards(legend, _status(state, allocation, busy, error, raw))
+    return _cards(legend, _status(state, allocation, busy, error, raw, least))
 
 
 def swim_corner(swimming: Swimming, newtons: float) -> str:
@@ -127,7 +129,9 @@ def _cards(legend: str, status: str) -> str:
     )
 
 
-def _status(state: State, allocation: Allocation | None, busy: bool, error: str | None, raw: bool) -> str:
+def _status(
+    state: State, allocation: Allocation | None, busy: bool, error: str | None, raw: bool, least: bool
+) -> str:
     fins = f"{len(state.healthy)} of {state.layout.n_fins} fins"
     parts = [f"<b>{escape(state.layout.name)}</b>", f"<span>{fins}</span>"]
     if error is not None:
@@ -141,7 +145,7 @@ def _status(state: State, allocation: Allocation | None, busy: bool, error: str 
         verdict = "Raw, not refined" if raw else reach_sentence(allocation)
         time, costs = three_digits(allocation.solve_ms), []
         for word, value, unit in (("power", allocation.power, " W"), ("effort", allocation.energy, "")):
-            kept = f"least {word}" if word == objective_of(allocation) and not raw else word
+            kept = f"least {word}" if word == objective_of(allocation) and least else word
             cost = f"<b class='{word}'>{three_digits(value)}</b>{unit}"
             costs.append(f"<span><span class='dim'>{kept}</span> {cost}</span>")
         parts += [

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from finlab.allocation.allocation import Allocation
 from finlab.physics import plant_of
 from webapp.markup.answer import swatch
-from webapp.markup.modes import sample_colors
+from webapp.markup.mode_plot import sample_colors
+from webapp.session.targets import nice_limit
 from webapp.tasks.mode_names import Modes
 from webapp.theme import css, fin_color
 
@@ -18,35 +19,35 @@ EDGE = 46.0
 """Half of the square around it [px]."""
 SAID = (
     "Each dot is the force that one sample of the mixture asks of the fin, in the fin's own plane: right is "
-    "its horizontal thrust axis, the rim its full thrust. The line is the answer. A sample has the colour of "
-    "the mode that its component led to, and is grey where that led to none."
+    "its horizontal thrust axis. The line is the answer. A sample has the colour of the mode that its "
+    "component led to, and is grey where that led to none."
 )
 
 Array = NDArray[np.float64]
 
 
-def proposal_discs(answer: Allocation, modes: Modes, full: Array) -> str:
+def proposal_discs(answer: Allocation, modes: Modes) -> str:
     """One disc for each working fin; nothing for methods that draw no samples.
 
     Args:
         answer: whose samples are drawn.
         modes: its modes, which give the samples their colours.
-        full: full thrust (n,) of each fin [N], the rim of its disc.
     """
     samples = answer.samples
     if samples is None:
         return ""
     plant = plant_of(answer.layout)
-    scale = (RADIUS / np.maximum(full, 1e-9))[:, None]
-    dots = plant.forces(samples.command)[..., 1:] * scale
-    given = plant.forces(answer.command)[..., 1:] * scale
+    dots, given = (plant.forces(command)[..., 1:] for command in (samples.command, answer.command))
+    rim = nice_limit(float(np.hypot(dots[..., 0], dots[..., 1]).max(initial=0.0)) / 1.2)
+    dots, given = dots * RADIUS / rim, given * RADIUS / rim
     colors = [css(color, 0.6) for color in sample_colors(modes, len(samples))]
     discs = []
     for i, name in enumerate(answer.layout.names):
         if np.isfinite(answer.command[i, 0]):
             label = f"{swatch(i)}<span class='name' title='{escape(name)}'>{escape(name)}</span>"
             discs.append(f"<div>{_disc(dots[:, i], colors, given[i], css(fin_color(i)))}{label}</div>")
-    return f"<div class='fl'><div class='dim'>{SAID}</div><div class='discs'>{''.join(discs)}</div></div>"
+    said = f"{SAID} The rim is {rim:g} N."
+    return f"<div class='fl'><div class='dim'>{said}</div><div class='discs'>{''.join(discs)}</div></div>"
 
 
 def _disc(dots: Array, colors: list[str], given: Array, color: str) -> str:

@@ -7,13 +7,13 @@ import viser
 
 from finlab.allocation.methods import METHODS
 from webapp.handles import Changes, numbered, on_user_change, put
-from webapp.markup.modes import SAMPLES, mode_plot, mode_table
+from webapp.markup.mode_plot import SAMPLES, mode_plot
+from webapp.markup.modes import mode_table
 from webapp.markup.picking import add_channel, chosen_button, marker
 from webapp.markup.proposals import proposal_discs
 from webapp.markup.words import small, three_digits
 from webapp.page import Page
 from webapp.session.state import CANDIDATE_RANGE, GAMMA_RANGE, OBJECTIVES, TEMPERATURE_RANGE, knows_objective
-from webapp.session.targets import full_thrust
 from webapp.tasks.solver import STEPS
 
 OBJECTIVE = "fl-objective"
@@ -182,4 +182,4 @@ class ProposalPanel:
         answer, modes = answering.best, answering.modes
         put(self._folder, visible=answer is not None and answer.samples is not None)
         if answer is not None and self._changes(answer, modes):
-            put(self._discs, content=proposal_discs(answer, modes, full_thrust(answer.layout)))
+            put(self._discs, content=proposal_discs(answer, modes))

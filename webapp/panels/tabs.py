@@ -97,9 +97,8 @@ class Corner:
         if page.swimming.swimmers:
             content = swim_corner(page.swimming, ARROWS_N)
         else:
-            content = corner(
-                page.session.state, page.scenery.legend, page.shown, page.busy, answering.error, raw
-            )
+            state, least = page.session.state, page.shown is answering.best
+            content = corner(state, page.scenery.legend, page.shown, page.busy, answering.error, raw, least)
         put(self._content, content=content)
 
 

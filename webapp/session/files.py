@@ -18,6 +18,7 @@ from finlab.layout.body import Hull
 from finlab.layout.load import SUFFIX, parse_graph_layout
 from finlab.layout.reading import MAX_BYTES, decode_text, parse_json
 from finlab.layout.yaml_file import parse_yaml, yaml_text
+from finlab.physics import plant_of
 from finlab.sim import Trajectory
 from finlab.sim.task import read_trajectory
 from webapp.scene.meshes.mesh_hull import UNITS, read_mesh
@@ -48,15 +49,19 @@ def read_layout(name: str, content: bytes) -> Layout:
 
     Raises:
         LayoutError: the file is too large, no text or no layout; the message names file and key.
+        DataError: a fin's force table is not on this computer, or cannot be read.
     """
     source = Path(str(name)).name[:80] or "upload"
     if len(content) > MAX_BYTES:
         raise LayoutError(f"is larger than {MAX_BYTES:,} bytes, a layout has a few thousand", source=source)
     text = decode_text(content, source)
     if source.lower().endswith(SUFFIX):
-        return parse_graph_layout(text, source)
-    parse = parse_json if source.lower().endswith(".json") else parse_yaml
-    return parse_layout(parse(text, source), source=source)
+        layout = parse_graph_layout(text, source)
+    else:
+        parse = parse_json if source.lower().endswith(".json") else parse_yaml
+        layout = parse_layout(parse(text, source), source=source)
+    plant_of(layout)  # reads the tables of its fins
+    return layout
 
 
 def layout_bytes(layout: Layout) -> bytes:

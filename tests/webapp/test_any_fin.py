@@ -1,0 +1,95 @@
+"""Every layout answers with its own fins' physics, tables included, and only `paper` warns of fins."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finlab.assets import shipped_checkpoints, shipped_layouts
+from finlab.errors import DataError
+from finlab.layout import FinModelSpec, Layout, load_layout
+from finlab.physics import make_law, plant_of
+from finlab.physics.table_file import write_table
+from webapp.markup.snippets import command_line, export_line
+from webapp.markup.words import reach_sentence
+from webapp.session import Session, files
+from webapp.session.session_files import restore, to_dict
+from webapp.session.state import OBJECTIVES, State
+from webapp.tasks.solver import Solver
+
+SOLVER = Solver()
+Target = tuple[float, float, float, float, float, float]
+needs_network = pytest.mark.skipif(
+    not {"default", "paper"} <= set(shipped_checkpoints()), reason="no trained checkpoints in the tree"
+)
+
+
+def reachable(layout: Layout) -> Target:
+    """A wrench that the fins give by their own laws."""
+    plant = plant_of(layout)
+    fx, fy, fz, tx, ty, tz = plant.wrench(plant.sample(np.random.default_rng(1), (1,)))[0].tolist()
+    return fx, fy, fz, tx, ty, tz
+
+
+@pytest.fixture
+def tabled(tmp_path: Path) -> Layout:
+    """U-CAT with fins that follow a table: soft ones, neither aligned nor the same in all directions."""
+    law = make_law(FinModelSpec("soft", (("d", 0.1), ("e", 0.15))))
+    grid = np.linspace(0.05, 0.6, 9), np.linspace(0.1, 2.1, 9), np.linspace(-np.pi, np.pi, 25)
+    write_table(tmp_path / "fin.csv", law, *grid)
+    spec = FinModelSpec("table", (("path", str(tmp_path / "fin.csv")),))
+    ucat = load_layout("ucat")
+    return replace(ucat, name="tabled", fins=tuple(replace(fin, model=spec) for fin in ucat.fins))
+
+
+@pytest.mark.parametrize("name", shipped_layouts())
+def test_every_shipped_layout_is_answered_exactly(name: str) -> None:
+    layout = load_layout(name)
+    for objective in OBJECTIVES:
+        answer = SOLVER.solve(State(layout, target=reachable(layout), objective=objective))
+        assert answer.err_norm < 1e-4 and answer.judged_by == "plant" and answer.power > 0.0
+        assert answer.notes == () and reach_sentence(answer) == "Reachable"
+
+
+@needs_network
+def test_only_paper_warns_of_fins() -> None:
+    state = State(load_layout("mixed"), target=reachable(load_layout("mixed")))
+    for method in ("mdn", "sqp"):
+        answer = SOLVER.solve(replace(state, method=method))
+        assert answer.err_norm < 1e-4 and answer.unknown_fins == ()
+    warned = SOLVER.solve(replace(state, method="paper"))
+    assert reach_sentence(warned) == "Not learned: fins 1, 2, 3 and 4. Choose another method"
+
+
+def test_a_table_fin_goes_through_the_whole_app(tabled: Layout, tmp_path: Path) -> None:
+    session = Session(load_layout("ucat"))
+    session.open_layout(files.read_layout("tabled.yaml", files.layout_bytes(tabled)))
+    for axis, value in enumerate(reachable(tabled)):
+        session.set_target(axis, round(value, 4))
+    reply = SOLVER.reply(session.state)
+    assert reply.answer.err_norm < 1e-4 and reply.answer.notes == () and len(SOLVER.modes(reply).shown) > 0
+    again = Session(load_layout("ucat"))
+    restore(again, json.loads(json.dumps(to_dict(session))))
+    assert again.state == session.state
+    session.undo()
+    while session.history.undo_name is not None:
+        session.undo()
+    assert session.state.layout.name == "ucat"
+    while session.history.redo_name is not None:
+        session.redo()
+    assert session.state == again.state
+    allocator = SOLVER.loaded("search", "power")
+    graph = files.graph_file(tabled, (), allocator)
+    assert files.read_layout("tabled.graph.json", graph).fins[0].model.type == "table"
+    assert len(files.bundle_bytes(tabled, (), allocator)) > len(graph), "the table travels along"
+    assert command_line(session.state).startswith("finlab allocate tabled.yaml --wrench")
+    assert export_line(session.state) == "finlab export tabled.yaml -o tabled --zip"
+
+
+def test_a_table_that_is_not_here_is_told_when_the_layout_is_opened(tabled: Layout, tmp_path: Path) -> None:
+    content = files.layout_bytes(tabled)
+    (tmp_path / "fin.csv").unlink()
+    with pytest.raises(DataError, match="fin.csv"):
+        files.read_layout("other.yaml", content.replace(b"tabled", b"other"))

@@ -1,0 +1,195 @@
+"""The modes of an answer as numbered dots that can be picked: what is kept least against what else counts."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.allocation.allocation import Allocation
+from webapp.markup.picking import pick, send
+from webapp.markup.words import objective_of
+from webapp.tasks.mode_names import Modes
+from webapp.theme import DEAD, Rgb, css, mode_color
+
+WIDTH = 388
+"""Width of the plot [px]."""
+LEFT, RIGHT, TOP, BOTTOM = 54, 8, 24, 34
+"""Margins of the plot [px]."""
+MOST_TICKS = 6
+"""Steps between ticks at most."""
+EXACT = 1e-6
+"""Error [σ] below which all answers are drawn as equally exact."""
+LEGEND = (("refined", 5.0, 6), ("on the robot", 0.0, 72), ("sampled", 2.6, 162))
+"""Word, radius and place of what is drawn; radius 0 is the ring. The last one is for methods that sample."""
+DOT = 9
+"""Radius of the dot of a mode with its rim [px]."""
+SAMPLES = "fl-sample"
+"""Channel that hears which sample is clicked."""
+
+Array = NDArray[np.float64]
+
+
+class Axis(NamedTuple):
+    """One axis of the plot."""
+
+    word: str
+    """What it measures."""
+    low: float
+    """Its value at the lower end."""
+    high: float
+    """At the upper end."""
+    ticks: tuple[tuple[float, str], ...]
+    """Values with a line, and their labels."""
+
+    def share(self, value: float) -> float:
+        """How far along it a value lies, 0 to 1."""
+        return (value - self.low) / (self.high - self.low)
+
+
+def cost_axis(word: str, values: Array) -> Axis:
+    """An axis that shows all of some values, with round ticks."""
+    low, high = float(values.min()), float(values.max())
+    margin = max(0.08 * (high - low), 0.02 * high, 1e-6)
+    low, high = low - margin, high + margin
+    decade = 10.0 ** math.floor(math.log10((high - low) / MOST_TICKS))
+    step = next(s * decade for s in (1.0, 2.0, 5.0, 10.0) if (high - low) / (s * decade) <= MOST_TICKS)
+    places = range(math.ceil(low / step), math.floor(high / step) + 1)
+    return Axis(word, low, high, tuple((k * step, f"{k * step:.3g}") for k in places))
+
+
+def error_axis(logs: Array) -> Axis:
+    """The same for logarithms of errors, in powers of ten."""
+    low = math.floor(logs.min())
+    high = max(math.ceil(logs.max()), low + 1)
+    ticks = []
+    for power in range(low, high + 1, max(1, round((high - low) / 5))):
+        below = "≤" if 10.0**power <= EXACT else ""
+        raised = str(power).replace("-", "−")
+        ticks.append((float(power), f"{below}10<tspan dy='-4' font-size='8'>{raised}</tspan>"))
+    margin = 0.06 * (high - low)
+    return Axis("error [σ]", low - margin, high + margin, tuple(ticks))
+
+
+def mode_plot(
+    answer: Allocation,
+    modes: Modes,
+    shown: int | None,
+    sample: int | None,
+    height: int,
+    picker: str,
+) -> str:
+    """What the method keeps least, against the error where samples are drawn, else against the other cost.
+
+    Samples are small dots, modes numbered ones; all can be clicked.
+
+    Args:
+        answer: what the dots are of.
+        modes: its modes, which give the samples their colours.
+        shown: mode on the robot, None while it is another command.
+        sample: sample on the robot.
+        height: of the plot [px].
+        picker: class of the marker before the buttons that choose a mode, and of the channel for samples.
+    """
+    if not modes.shown:
+        return ""
+    samples = answer.samples
+    words, order = ("power [W]", "effort"), (0, 1) if objective_of(answer) == "power" else (1, 0)
+    costs = np.array([(mode.power, mode.energy) for mode, _ in modes.shown])[:, order]
+    refined = raw = costs
+    if samples is not None:
+        error = np.array([mode.err_norm for mode, _ in modes.shown])
+        refined = np.stack([costs[:, 0], _logarithm(error)], axis=1)
+        raw_cost = (samples.power, samples.energy)[order[0]]
+        raw = np.stack([raw_cost, _logarithm(samples.err_norm)], axis=1)
+    points = np.concatenate([refined, raw])
+    if not np.isfinite(points).all():
+        return ""
+    across = cost_axis(words[order[0]], points[:, 0])
+    up = cost_axis(words[order[1]], points[:, 1]) if samples is None else error_axis(points[:, 1])
+
+    def place(point: Array) -> tuple[float, float]:
+        x = LEFT + across.share(float(point[0])) * (WIDTH - LEFT - RIGHT)
+        return x, height - BOTTOM - up.share(float(point[1])) * (height - BOTTOM - TOP)
+
+    parts = [_legend(samples is not None), _axes(across, up, height)]
+    if samples is not None:
+        parts.append(_sample_dots([place(point) for point in raw], modes, sample, picker))
+    places = _apart([place(point) for point in refined])
+    for k, (x, y) in reversed(list(enumerate(places))):  # the best one on top
+        parts.append(
+            f"<g class='pick' {pick(picker, k)}>"
+            f"<circle cx='{x:.1f}' cy='{y:.1f}' r='8.5' fill='{css(mode_color(k))}'/>"
+            f"<text x='{x:.1f}' y='{y + 3.8:.1f}' class='digit'>{k + 1}</text></g>"
+        )
+        if k == shown:
+            parts.append(_ring(x, y, 11))
+    return f"<div class='fl'><svg class='plot' viewBox='0 0 {WIDTH} {height}'>{''.join(parts)}</svg></div>"
+
+
+def sample_colors(modes: Modes, count: int) -> list[Rgb]:
+    """The colour of each of `count` samples: that of the mode which its component led to, grey for none."""
+    kinds = [-1] * count if modes.of_samples is None else modes.of_samples.tolist()
+    return [DEAD if kind < 0 else mode_color(kind) for kind in kinds]
+
+
+def _logarithm(error: Array) -> Array:
+    return np.asarray(np.log10(np.maximum(error, EXACT)))
+
+
+def _sample_dots(places: list[tuple[float, float]], modes: Modes, sample: int | None, picker: str) -> str:
+    """Raw samples, and a ring around the one on the robot."""
+    colors = sample_colors(modes, len(places))
+    dots = [
+        f"<circle data-k='{k}' cx='{x:.1f}' cy='{y:.1f}' r='3' fill='{css(color, 0.6)}'/>"
+        for k, ((x, y), color) in enumerate(zip(places, colors, strict=True))
+    ]
+    chosen = send(f"{picker}-{SAMPLES}", "event.target.dataset.k + ',' + Date.now()")
+    click = f"if (event.target.dataset.k) {{ {chosen} }}"
+    ring = _ring(*places[sample], 6.5) if sample is not None and sample < len(places) else ""
+    return f'<g class="pick samples" onclick="{click}">{"".join(dots)}</g>{ring}'
+
+
+def _ring(x: float, y: float, radius: float) -> str:
+    return f"<circle class='ring' cx='{x:.1f}' cy='{y:.1f}' r='{radius:g}'/>"
+
+
+def _apart(places: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Dots moved sideways, no further than need be and within the plot, so that each can be clicked."""
+    apart: list[tuple[float, float]] = []
+    for x, y in places:
+        rooms = [x + side * step for step in range(0, WIDTH, 2) for side in (1, -1)]
+        free = (
+            room
+            for room in rooms
+            if LEFT + DOT <= room <= WIDTH - RIGHT - DOT
+            and not any(abs(room - u) < 2 * DOT and abs(y - v) < 2 * DOT for u, v in apart)
+        )
+        apart.append((next(free, x), y))
+    return apart
+
+
+def _legend(sampled: bool) -> str:
+    parts = []
+    for word, radius, place in LEGEND if sampled else LEGEND[:-1]:
+        dot = f"<circle cx='{LEFT + place}' cy='10' r='{radius}' fill='currentColor' opacity='.55'/>"
+        parts.append(dot if radius else _ring(LEFT + place, 10, 5.5))
+        parts.append(f"<text x='{LEFT + place + 9}' y='14'>{word}</text>")
+    return "".join(parts)
+
+
+def _axes(across: Axis, up: Axis, height: int) -> str:
+    """The grid with its labels."""
+    floor, parts = height - BOTTOM, []
+    for value, label in up.ticks:
+        at = floor - up.share(value) * (floor - TOP)
+        parts.append(f"<path d='M{LEFT} {at:.1f}H{WIDTH - RIGHT}' class='grid'/>")
+        parts.append(f"<text x='{LEFT - 5}' y='{at + 4:.1f}' text-anchor='end'>{label}</text>")
+    for value, label in across.ticks:
+        at = LEFT + across.share(value) * (WIDTH - LEFT - RIGHT)
+        parts.append(f"<path d='M{at:.1f} {TOP}V{floor}' class='grid'/>")
+        parts.append(f"<text x='{at:.1f}' y='{floor + 14}' text-anchor='middle'>{label}</text>")
+    turned = f"translate(10 {(TOP + floor) / 2}) rotate(-90)"
+    parts.append(f"<text x='{(LEFT + WIDTH) / 2}' y='{height - 5}' text-anchor='middle'>{across.word}</text>")
+    parts.append(f"<text transform='{turned}' text-anchor='middle'>{up.word}</text>")
+    return "".join(parts)
