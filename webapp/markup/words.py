@@ -48,9 +48,8 @@ def source_words(sources: Sequence[str]) -> str:
     if numbers:
         return f"from component{'s' if len(numbers) > 1 else ''} {listed(numbers)}"
     first = sources[0]
-    if first == "all fins":
-        return f"found with {first}"
-    return f"found {first}" if first.startswith("without ") else f"from {first}"
+    words = {"all fins": "found with all fins", "refined": "a refined sample"}
+    return words.get(first, f"found {first}" if first.startswith("without ") else f"from {first}")
 
 
 def missing_part(allocation: Allocation) -> NDArray[np.float64]:
