@@ -49,6 +49,8 @@ class Projected(NamedTuple):
     """The same as an angle (R, n) [rad]."""
     size: Array
     """Size of the force (R, n) [N]."""
+    wanted: Array
+    """The size (R, n) [N] that is given in that direction where limits of size do not hold."""
     rim: Rim
     """In these directions."""
     stopped: NDArray[np.bool_] | None
@@ -190,7 +192,7 @@ class Envelopes:
         if self.turns_fully and self.largest.shape[1] == 1:
             rim = self.rim(size)
             held = np.minimum(np.maximum(size, rim.smallest), rim.largest)
-            return Projected(unit, size, held, rim, None)
+            return Projected(unit, size, held, size, rim, None)
         direction = np.arctan2(force[:, 1], force[:, 0])
         wanted, stopped = size, None
         if not self.turns_fully:
@@ -200,7 +202,7 @@ class Envelopes:
             stopped = excess > 0.0
             wanted = np.where(excess < 0.5 * np.pi, size * np.cos(excess), 0.0)
             direction = self.middle + held
-        rim = self.rim(direction)
+        asked, rim = wanted, self.rim(direction)
         over = wanted > rim.largest
         if rim.part is not None and over.any():
             # The nearest force on the rim lies where the rim is farther out.
@@ -211,9 +213,8 @@ class Envelopes:
             rim = self.rim(direction)
             wanted = np.where(over, rim.largest, wanted)
         unit = np.stack([np.cos(direction), np.sin(direction)], axis=1)
-        return Projected(
-            unit, direction, np.minimum(np.maximum(wanted, rim.smallest), rim.largest), rim, stopped
-        )
+        size = np.minimum(np.maximum(wanted, rim.smallest), rim.largest)
+        return Projected(unit, direction, size, asked, rim, stopped)
 
     def _stopped(self, direction: Array) -> Array:
         """Directions (R, n) [rad] brought within the arcs."""

@@ -45,8 +45,8 @@ LAST_STEPS = 2
 HALF_STEPS = 5
 """Steps after which forces go only half the way: those that are not settled by then jump to and fro."""
 SETTLED = (2e-3, 1e-5)
-"""Change of every force, as a share of the fin's largest, from which on another step would change the cost in
-its fifth digit: of a cost that grows faster than force, and of one that grows like its root."""
+"""Change of every force, as a share of the row's largest one, from which on another step would change the cost
+in its fifth digit: of a cost that grows faster than force, and of one that grows like its root."""
 
 
 class PlanarProblem(NamedTuple):
@@ -118,7 +118,11 @@ def flat_columns(columns: Array) -> tuple[Array, Array]:
 
 
 class _Response(NamedTuple):
-    """How forces near those of now answer the multipliers: y = shift + M B^T l."""
+    """How forces near those of now answer the multipliers: y = shift + M B^T l.
+
+    A fin at a stop does not turn, whatever is pulled. Whether it leaves the stop is seen from how it would
+    answer if there were none: `free_mobility` and `free_shift`.
+    """
 
     along: Array
     """Mobility along the force (R, n) [N^2 per unit of cost]."""
@@ -128,6 +132,10 @@ class _Response(NamedTuple):
     """M (R, 3, n): horizontal, mixed, vertical."""
     shift: Array
     """a (R, 2, n) [N]."""
+    free_mobility: Array
+    """M (R, 3, n) as if fins had no stops."""
+    free_shift: Array
+    """a (R, 2, n) [N] as if fins had no stops."""
     shaft: Array | None
     """Forces along the shafts (R, n) [N], None where no fin has any."""
 
@@ -148,37 +156,61 @@ def descend(
     start = np.maximum(seeds, REST * fins.maximum)
     mobility = np.zeros((rows, 3, n))
     mobility[:, 0] = mobility[:, 2] = start
-    response = _Response(start, start, mobility, np.zeros((rows, 2, n)), None)
-    cut = np.ones((rows, n))
     if works is not None:
         mobility *= works[:, None]
-    settled, before = SETTLED[not problem.convex] * fins.maximum, None
+    nothing = np.zeros((rows, 2, n))
+    response = _Response(start, start, mobility, nothing, mobility, nothing, None)
+    cut = np.ones((rows, n))
+    settled, before = SETTLED[not problem.convex], None
     for step in range(steps):
         multiplier = _multiplier(problem, target, response)
         force, size = _answer(problem, response, multiplier)
         if before is not None:
-            if (np.abs(force - before) <= settled).all():
+            if (np.abs(force - before).max((1, 2)) <= settled * size.max(1)).all():
                 break
             if step >= HALF_STEPS:
                 force = 0.5 * (force + before)
                 size = _size(force)
         before = force
         found = fins.project(force, size)
-        cut *= found.rim.largest / size
+        cut *= found.rim.largest / np.maximum(found.wanted, LEAST)
         np.minimum(cut, 1.0 if works is None else works, out=cut)
         response = _quadratic(problem, found, cut)
     multiplier = _multiplier(problem, target, response)
     found = fins.project(*_answer(problem, response, multiplier))
     if found.stopped is not None or (cut < 1.0).any():
-        for _ in range(LAST_STEPS):
-            missing = target - _wrench(problem, found.unit * found.size[:, None], response.shaft)
-            gram = _gram(problem, _held(problem, found, response, multiplier))
-            multiplier = multiplier + _solved(gram, missing)
-            found = fins.project(*_answer(problem, response, multiplier))
+        found, multiplier = _mended(problem, target, response, found, multiplier)
     row = fins.lookup(found.rim, found.size)
     shaft = row[..., SHAFT] if fins.pushes_sideways else None
     residual = target - _wrench(problem, found.unit * found.size[:, None], shaft)
     return Planar(found.size, _direction(found), row, residual, multiplier)
+
+
+def _mended(
+    problem: PlanarProblem, target: Array, response: _Response, found: Projected, multiplier: Array
+) -> tuple[Projected, Array]:
+    """Forces after semismooth Newton steps on the multipliers (R, 6), each taken only where less is missing
+    then: where fins are held, a wrench may be out of reach by what they cannot go below."""
+
+    def missing_of(found: Projected) -> tuple[Array, Array]:
+        missing = target - _wrench(problem, found.unit * found.size[:, None], response.shaft)
+        return missing, np.einsum("ri,ri->r", missing, missing)
+
+    missing, squared = missing_of(found)
+    for _ in range(LAST_STEPS):
+        gram = _gram(problem, _held(problem, found, response, multiplier))
+        there = multiplier + _solved(gram, missing)
+        tried = problem.fins.project(*_answer(problem, response, there))
+        after = missing_of(tried)
+        better = after[1] < squared
+        if not better.any():
+            break
+        if not better.all():
+            there = np.where(better[:, None], there, multiplier)
+            tried = problem.fins.project(*_answer(problem, response, there))
+            after = missing_of(tried)
+        found, multiplier, (missing, squared) = tried, there, after
+    return found, multiplier
 
 
 def polar(problem: PlanarProblem, force: Array) -> Planar:
@@ -238,16 +270,20 @@ def _quadratic(problem: PlanarProblem, found: Projected, cut: Array) -> _Respons
     if not problem.turning_is_free:
         turn = _direction(found) - row[..., LEAN]
         turn -= TURN * np.rint(turn / TURN)
-        pull = 2.0 * problem.direction_cost * turn * across / found.size
+        pull = 2.0 * problem.direction_cost * turn * across / np.maximum(found.size, LEAST)
         drift = pull if drift is None else drift + pull
-    if found.stopped is not None:
-        across = np.where(found.stopped, 0.0, across)
-        drift = None if drift is None else np.where(found.stopped, 0.0, drift)
+    free_shift = shift
     if drift is not None:
-        shift[:, 0] += y * drift
-        shift[:, 1] -= x * drift
+        free_shift = shift + np.stack([y * drift, -x * drift], axis=1)
+    free = mobility = _mobility(x, y, along, across)
+    if found.stopped is None:
+        shift = free_shift
+    else:
+        across = np.where(found.stopped, 0.0, across)
+        mobility = _mobility(x, y, along, across)
+        shift = np.where(found.stopped[:, None], shift, free_shift)
     shaft = row[..., SHAFT] if problem.fins.pushes_sideways else None
-    return _Response(along, across, _mobility(x, y, along, across), shift, shaft)
+    return _Response(along, across, mobility, shift, free, free_shift, shaft)
 
 
 def _mobility(x: Array, y: Array, along: Array, across: Array) -> Array:
@@ -276,9 +312,9 @@ def _answer(problem: PlanarProblem, response: _Response, multiplier: Array) -> t
     """Forces (R, 2, n) that answer multipliers (R, 6), whatever the limits, and their sizes (R, n)."""
     rows, _, n = response.shift.shape
     pull = (multiplier @ problem.columns.T).reshape(rows, 2, n)
-    force = response.mobility[:, :2] * pull[:, :1]
-    force += response.mobility[:, 1:] * pull[:, 1:]
-    force += response.shift
+    force = response.free_mobility[:, :2] * pull[:, :1]
+    force += response.free_mobility[:, 1:] * pull[:, 1:]
+    force += response.free_shift
     return force, _size(force)
 
 

@@ -25,6 +25,8 @@ MISSED = 1e-5
 """Normalized error from which a group of axes counts as not served whole."""
 SPOILED = 1e-3
 """Normalized error by which a later group may at most spoil earlier ones."""
+TINY = 1e-12
+"""Largest force [N] of a fin that is not there."""
 UNFELT = 1e-6
 """Share of the largest pull that a fin could feel below which it feels none."""
 
@@ -40,19 +42,22 @@ class Nearest(NamedTuple):
     """What each axis would gain (R, 6): the dual's unknowns."""
 
 
-def nearest(sets: FinSets, target: Array, c: Array | None = None) -> Nearest:
+def nearest(sets: FinSets, target: Array, c: Array | None = None, bend: float = 0.0) -> Nearest:
     """Forces whose wrench is nearest to each target.
 
     Args:
         sets: one robot.
         target: normalized wrenches (R, 6).
         c: what each axis' squared error is divided by (6,), by default one; infinite for one that is ignored.
+        bend: what squared forces count beside that, as shares of the fins' largest, a squared error being
+            one as large as the strongest fin's wrench. A little of it makes small forces the answer where
+            many are as near.
     """
     scale = np.ones(6) if c is None else np.asarray(c, np.float64)
     counts = np.isfinite(scale)
     robots = sets.tile(len(target))
     seen = robots._replace(columns=robots.columns[..., counts])
-    found = _best_part(seen, target[:, counts], scale[counts])
+    found = _best_part(seen, target[:, counts], scale[counts], bend)
     multiplier = np.zeros(target.shape)
     multiplier[:, counts] = found.multiplier
     return Nearest(found.force, robots.wrench(found.force), multiplier)
@@ -107,16 +112,19 @@ def nearest_along(sets: FinSets, target: Array) -> Nearest:
     return Nearest(found.force, wrench, found.multiplier @ frame[0].T)
 
 
-def _best_part(sets: FinSets, target: Array, c: Array) -> Optimum:
+def _best_part(sets: FinSets, target: Array, c: Array, bend: float = 0.0) -> Optimum:
     """Optima of R robots with the same arcs, each in the best of its convex parts."""
+    strongest = (np.sqrt((sets.columns**2).sum((-1, -2))) * sets.radius).max(-1)
+    bent = bend * (strongest[:, None] / np.maximum(sets.radius, TINY)) ** 2
     hulls = None
     if len(wide_fins(sets)) > MAX_CUT:  # of all beyond the first few, the halves that suit the hull are tried
-        hulls = minimize(sets, target, c).force
+        hulls = minimize(sets, target, c, bent).force
     parts = convex_parts(sets, hulls)
-    wanted = np.tile(target, (len(parts.radius) // len(target), 1))
-    found = minimize(parts, wanted, c)
+    count = len(parts.radius) // len(target)
+    wanted, bent = np.tile(target, (count, 1)), np.tile(bent, (count, 1))
+    found = minimize(parts, wanted, c, bent)
     missing = wanted - parts.wrench(found.force)
-    cost = (missing * missing / c).sum(-1).reshape(-1, len(target))
+    cost = ((missing * missing / c).sum(-1) + (bent * (found.force**2).sum(-1)).sum(-1)).reshape(count, -1)
     best = cost.argmin(0) * len(target) + np.arange(len(target))
     return Optimum(found.force[best], found.multiplier[best])
 

@@ -32,7 +32,8 @@ def test_no_force_within_the_sets_gains_more(half: float, scale: float, far: flo
     assert multiplier == pytest.approx((wanted - sets.wrench(force)) / c, abs=1e-5 * (scale + size))
     gain = sets.pull(multiplier) - bend[..., None] * force
     alone = FinSets(
-        np.tile(np.eye(2), (40, 5, 1, 1)).reshape(200, 1, 2, 2), *(f.reshape(200, 1) for f in sets[1:])
+        np.tile(np.eye(2), (40, 5, 1, 1)).reshape(200, 1, 2, 2),
+        *(f.reshape(200, 1) for f in (sets.radius, sets.middle, sets.half)),
     )
     reach, _ = alone.farthest(gain.reshape(200, 2))
     used = (gain * force).sum(-1).reshape(200)

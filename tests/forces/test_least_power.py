@@ -32,7 +32,7 @@ def test_a_pair_shares_heave_evenly(shipped: Layouts) -> None:
     assert np.isnan(power[1:]).all()  # a torque it has not, a force beyond its reach
 
 
-@pytest.mark.parametrize("name", ["A", "mixed", "hexa"])
+@pytest.mark.parametrize("name", ["A", "mixed", "restricted", "hexa"])
 def test_commands_need_no_less_and_hardly_more(shipped: Layouts, name: str) -> None:
     """They cannot rest altogether, which costs next to nothing."""
     layout = shipped(name)
@@ -69,7 +69,8 @@ def test_a_variant_is_the_robot_itself_placed_anew(shipped: Layouts) -> None:
     moved = replace(
         layout, fins=tuple(replace(f, mounting_angle=f.mounting_angle + 0.2) for f in layout.fins)
     )
-    both = FinSets(*(np.concatenate(pair) for pair in zip(fin_sets(layout), fin_sets(moved), strict=True)))
+    pairs = zip(fin_sets(layout)[:4], fin_sets(moved)[:4], strict=True)
+    both = FinSets(*(np.concatenate(pair) for pair in pairs))
     problem = power_problem(layout)
     for row, robot in enumerate((layout, moved)):
         target = WRENCHES / [1.0, 1.0, 1.0, 0.2, 0.2, 0.2]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from finlab.forces import extent
 from finlab.forces.attainable import hull_of
 from finlab.forces.extent import singular_values, strongest, weakest
-from finlab.forces.fin_sets import HALF_TURN_TOLERANCE, FinSets, half_arcs, wide_fins
+from finlab.forces.fin_sets import HALF_TURN_TOLERANCE, FinSets, wide_fins
 from finlab.forces.force_space import IDLE, REST, PlanarProblem, polar, realize
 from finlab.forces.reach import Largest, max_wrench_along
 from finlab.layout import Fin, Layout, Limits
@@ -33,9 +33,8 @@ def problem(*arcs: tuple[float, float], objective: Name = "effort") -> PlanarPro
 
 
 def test_half_of_an_arc_and_which_are_wide() -> None:
-    lower, upper = np.array([-np.pi, -1.0, 0.5, -0.2]), np.array([np.pi, 1.0, 4.9, -0.2])
-    half = half_arcs(lower, upper)
-    assert half == pytest.approx([np.pi, 1.0, 2.2, 0.0])
+    made = problem((-np.pi, np.pi), (-1.0, 1.0), (0.5, 4.9), (-0.2, -0.2))
+    assert made.fins.half == pytest.approx([np.pi, 1.0, 2.2, 0.0])
     edge = np.pi / 2 + HALF_TURN_TOLERANCE
     halves = np.array([[np.pi / 2, edge, np.nextafter(edge, 4.0), 3.0, np.pi, 2.0]])
     sets = FinSets(np.ones((1, 6, 2, 6)), np.array([[1.0, 1.0, 1.0, 1.0, 1.0, 0.0]]), 0.0 * halves, halves)

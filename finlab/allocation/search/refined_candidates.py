@@ -129,6 +129,8 @@ class MissedSettings:
 
     first_lm_steps: int = 5
     """Levenberg-Marquardt steps on the answers that are there, since most need only a few more."""
+    turned: int = 6
+    """Starts in which fins at rest point elsewhere: what little they give may be what is missing."""
     nearest_lm_steps: int = 8
     """Steps from the nearest wrench that the fins can deliver."""
     last_lm_steps: int = 25
@@ -146,13 +148,18 @@ class MissedSettings:
 MISSED = MissedSettings()
 """How long missed targets are refined."""
 
+WEAK = 1e-2
+"""Share of its largest force up to which a fin counts as being at rest."""
+SPARING = 1e-6
+"""What squared forces count where the nearest wrench is sought, see `nearest`."""
+
 FallbackForces = Callable[[PlanarProblem, Array], Array | None]
 """From targets (R, 6) that were missed to planar forces (R, n, 2) [N] that come near them, or None."""
 
 
 def nearest_forces(problem: PlanarProblem, target: Array) -> Array:
-    """The forces (R, n, 2) whose wrench is nearest."""
-    return nearest(planar_sets(problem), target).force
+    """The forces (R, n, 2) whose wrench is nearest, small ones where many are."""
+    return nearest(planar_sets(problem), target, bend=SPARING).force
 
 
 def refine_missed(
@@ -174,7 +181,8 @@ def refine_missed(
         settings: how long to go on.
     """
     exact = RANKING.exact_error * prepared.exactness
-    improve(prepared, target, candidates, missed, None, settings.first_lm_steps)
+    turned = _turned_at_rest(prepared, candidates.command[missed, 0], settings.turned)
+    improve(prepared, target, candidates, missed, turned, settings.first_lm_steps)
     missed = candidates.error[:, 0] > exact
     if not missed.any():
         return
@@ -201,6 +209,16 @@ def reduce_cost(prepared: Prepared, target: Array, candidates: RefinedCandidates
         force = prepared.plant.force(candidates.command[missed, 0])[..., 1:]
         cheap, _ = realize(prepared.planar, polar(prepared.planar, force))
         improve(prepared, target, candidates, missed, cheap[:, None], lm_steps)
+
+
+def _turned_at_rest(prepared: Prepared, command: Array, count: int) -> Array:
+    """Commands (R, count, n, 3): those given (R, n, 3), but with fins at rest at random directions."""
+    force = prepared.plant.force(command)[..., 1:]
+    rests = np.sqrt((force * force).sum(-1)) <= WEAK * prepared.planar.fins.maximum
+    starts = np.repeat(command[:, None], count, axis=1)
+    drawn = _fresh_starts(prepared, len(command), count)[..., 2]
+    starts[..., 2] = np.where(rests[:, None], drawn, starts[..., 2])
+    return starts
 
 
 def _fresh_starts(prepared: Prepared, rows: int, count: int) -> Array:

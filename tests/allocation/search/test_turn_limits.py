@@ -93,7 +93,8 @@ def steady(method: SearchAllocator, penta: Layout) -> Drive:
 def test_fins_turn_much_less_far(method: SearchAllocator, free: Drive, steady: Drive) -> None:
     assert steady.turns.max() <= {"power": 0.3, "effort": 0.2}[method.objective.name] * free.turns.max()
     # Fins at rest turn ahead of need, so the turns need not add up to less; they are spread over the ticks.
-    assert np.square(steady.turns).sum() < 0.5 * np.square(free.turns).sum()
+    share = {"power": 0.75, "effort": 0.5}[method.objective.name]
+    assert np.square(steady.turns).sum() < share * np.square(free.turns).sum()
     assert steady.turns.max() <= TURNS[1] + 1e-6
     assert (steady.turns.max(1) <= TURNS[0] + 1e-6).mean() > 0.95
 
@@ -154,12 +155,12 @@ def test_a_previous_command_that_is_the_answer_stays(
         before = free.command[tick]
         result = method.allocate(penta, smooth_path(0)[tick], previous=before)
         # The search ends where forces settle; asked again, the answer is the same.
-        step = 2.0 * SETTLED * method.pipeline.prepare(penta).planar.fins.maximum.max()
+        step = 2.0 * SETTLED[0] * method.pipeline.prepare(penta).planar.fins.maximum.max()
         np.testing.assert_allclose(result.fin_forces, plant.fin_forces(before), atol=step)
         again = method.allocate(penta, smooth_path(0)[tick], previous=result.command)
         np.testing.assert_allclose(again.fin_forces, result.fin_forces, atol=1e-3)
         cost = result.power if method.objective.name == "power" else result.energy
-        assert cost < 1.001 * free.cost[tick]
+        assert cost < 1.005 * free.cost[tick]
 
 
 def test_the_first_tick_knows_no_past(free: Drive, steady: Drive) -> None:
