@@ -45,7 +45,7 @@ LAST_STEPS = 2
 HALF_STEPS = 5
 """Steps after which forces go only half the way: those that are not settled by then jump to and fro."""
 SETTLED = (2e-3, 1e-5)
-"""Change of every force, as a share of the row's largest one, from which on another step would change the cost
+"""Change of every force, as a share of the row's largest, from which on another step would change the cost
 in its fifth digit: of a cost that grows faster than force, and of one that grows like its root."""
 
 
@@ -228,8 +228,8 @@ def realize(problem: PlanarProblem, planar: Planar, rests: bool = False) -> tupl
     Args:
         problem: the layout.
         planar: the forces.
-        rests: whether a fin that hardly works rests altogether and turns to where that costs least. Refinement
-            has to mend the little force that is then missing, or turned.
+        rests: whether a fin that hardly works rests altogether and turns to where that costs least.
+            Refinement has to mend the little force that is then missing, or turned.
     """
     fins, row = problem.fins, planar.row
     least = fins.minimum * (1.0 + REST)

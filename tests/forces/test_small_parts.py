@@ -76,20 +76,36 @@ def test_polar_forces_keep_their_arcs_and_limits() -> None:
     assert np.isnan(found.residual).all()
 
 
-@pytest.mark.parametrize("objective", ["power", "effort"])
-def test_a_fin_at_rest_points_where_it_costs_least(objective: Name) -> None:
-    """Up to a hair above the least force where turning is free, else up to a share of the largest."""
-    arcs = ((0.5, 2.5), (-1.0, 1.0))
-    made = problem(*arcs, objective=objective)
+ARCS = ((0.5, 2.5), (-1.0, 1.0))
+AHEAD = np.array([[np.cos(2.0), np.sin(2.0)], [np.cos(0.8), np.sin(0.8)]])
+
+
+def test_where_turning_is_free_only_a_fin_at_rest_turns_away() -> None:
+    made = problem(*ARCS, objective="power")
     low, high = made.fins.minimum, made.fins.maximum
-    edge = low * (1.0 + REST) + (IDLE * high if objective == "effort" else 0.0)
-    force = np.array([[np.cos(2.0), np.sin(2.0)], [np.cos(0.8), np.sin(0.8)]])
-    sizes = np.stack([low, 0.999999 * edge, 1.000001 * edge, 0.3 * high])
-    command, cost = realize(made, polar(made, sizes[..., None] * force))
+    sizes = np.stack([low, low * (1.0 + 0.9 * REST), low * (1.0 + 1.1 * REST), 0.3 * high])
+    command, cost = realize(made, polar(made, sizes[..., None] * AHEAD))
     assert command[:2, :, 2] == pytest.approx(np.array([[0.5, 0.0]] * 2))
     assert command[2:, :, 2] == pytest.approx(np.array([[2.0, 0.8]] * 2))
-    meter = Objective(objective).meter(Plant(layout_of(*arcs)))
+    meter = Objective("power").meter(Plant(layout_of(*ARCS)))
     assert cost[[0, 3]] == pytest.approx(meter(command[[0, 3]]), rel=4e-3)
+
+
+@pytest.mark.parametrize("rests", [False, True])
+def test_where_turning_costs_a_fin_that_hardly_works_may_rest(rests: bool) -> None:
+    """Then it goes to its lower limits, and to the direction that costs least."""
+    made, layout = problem(*ARCS, objective="effort"), layout_of(*ARCS)
+    low, high = made.fins.minimum, made.fins.maximum
+    edge = low * (1.0 + REST) + IDLE * high
+    sizes = np.stack([low, 0.999999 * edge, 1.000001 * edge, 0.3 * high])
+    command, cost = realize(made, polar(made, sizes[..., None] * AHEAD), rests)
+    still = 2 if rests else 0
+    assert command[:still, :, 2] == pytest.approx(np.array([[0.5, 0.0]] * still))
+    assert command[:still, :, :2] == pytest.approx(np.array([layout.lower[:, :2]] * still))
+    assert command[still:, :, 2] == pytest.approx(np.array([[2.0, 0.8]] * (4 - still)))
+    size = np.linalg.norm(Plant(layout).force(command), axis=-1)
+    assert size[still:] == pytest.approx(sizes[still:], rel=2e-3)
+    assert cost == pytest.approx(Objective("effort").meter(Plant(layout))(command), rel=5e-3)
 
 
 CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 2) for z in (0, 3)], dtype=float)
