@@ -103,6 +103,14 @@ class Method(ABC):
         """
         return None
 
+    def bound(self, result: Any) -> float:
+        """A lower bound on what any answer to the question of a result costs.
+
+        Raises:
+            AllocationError: the method proves none.
+        """
+        raise AllocationError(f"method {self.name!r} proves no lower bound of the cost; use method 'search'")
+
     def refined(self, layout: Layout, wrench: ArrayLike, command: Array, n_steps: int) -> Array:
         """A command (n, 3) of fins that all work after some steps of the method's own refinement.
 

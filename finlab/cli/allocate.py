@@ -31,6 +31,7 @@ def allocate(
     stuck: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=DEG")] = (),
     running: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=A,F,DEG")] = (),
     energy_tradeoff: Annotated[float, arg(metavar="W")] = 0.0,
+    bound: bool = False,
     seed: Annotated[int, arg(metavar="N")] = 0,
     json: bool = False,
 ) -> None:
@@ -51,6 +52,7 @@ def allocate(
         running: a fin that no longer listens: the command that it keeps [rad, Hz, deg].
         energy_tradeoff: with objective effort: give up some of the wrench for it, the least
             err_norm^2 + W J_en; 0 delivers the wrench whole.
+        bound: tell as well what no answer can cost less than, by the objective; effort may take seconds.
         seed: same target, layout and seed, same answer.
         json: print one JSON object instead of a table.
     """
@@ -69,11 +71,18 @@ def allocate(
     lost = robot.with_failed(failed)
     result = allocator.allocate(robot.layout, wrench, failed=lost, policy=answer, health=damage, seed=seed)
     lost_axes = axes_lost(robot.layout, result.layout, lost) if lost or damage is not None else None
+    least = allocator.bound(result) if bound else None
     if json:
-        axes = {} if lost_axes is None else {"axes": lost_axes}
-        print(json_format.dumps(allocation_record(result) | axes, allow_nan=False))
-    else:
-        print("\n".join([str(result), *([loss_text(lost_axes)] if lost_axes else [])]))
+        extra: dict[str, object] = {} if lost_axes is None else {"axes": lost_axes}
+        extra |= {} if least is None else {"bound": least}
+        print(json_format.dumps(allocation_record(result) | extra, allow_nan=False))
+        return
+    print(result)
+    if lost_axes:
+        print(loss_text(lost_axes))
+    if least is not None:
+        unit = "" if objective == "effort" else " W"
+        print(f"no exact answer has less {objective or 'power'} than {least:.4g}{unit}")
 
 
 def health_from(weak: Sequence[str], stuck: Sequence[str], running: Sequence[str]) -> Health | None:

@@ -271,3 +271,14 @@ def test_json_tells_what_a_damage_costs(allocate: Callable[..., tuple[int, str, 
     stuck = answer(allocate("A", *WRENCH, "--json", "--stuck", "front_left=30"))
     assert stuck["axes"]["before"] == ["surge", "sway", "heave", "roll", "pitch", "yaw"]
     assert stuck["command"][1][2] == pytest.approx(0.5235987755982988)
+
+
+def test_a_bound_is_told_on_request(capsys: pytest.CaptureFixture[str]) -> None:
+    wrench = ["--wrench", "1", "0", "0.5", "0", "0", "0.1"]
+    assert main(["allocate", "A", *wrench, "--bound", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert 0.98 * answer["power"] <= answer["bound"] <= answer["power"]
+    assert main(["allocate", "A", *wrench, "--bound"]) == 0
+    assert f"no exact answer has less power than {answer['bound']:.4g} W" in capsys.readouterr().out
+    assert main(["allocate", "A", *wrench, "--bound", "--method", "qp"]) == 2
+    assert "method 'qp' proves no lower bound" in capsys.readouterr().err
