@@ -8,7 +8,7 @@ HOST_PORT ?= 8080
 THREADS := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup app test test-fast mutate check format checkpoint bench bench-runtime wheel wheel-check clean
+.PHONY: help setup app test test-fast mutate check format checkpoint checkpoint-default checkpoint-paper bench bench-runtime wheel wheel-check clean
 
 help:
 	@echo "make setup        make .venv with everything pinned in constraints.txt"
@@ -60,12 +60,15 @@ format: setup
 # The shipped checkpoints, each by one command: make checkpoint PRESET=default, make checkpoint PRESET=paper.
 # A run that was stopped goes on where it was.
 PRESET ?= default
-TRAIN_default :=
-TRAIN_paper := --batch-size 512 --learning-rate 4e-4 --steps 18000
 
-checkpoint: setup
-	$(BIN)/finlab train surrogate --preset $(PRESET) -o runs/surrogate-$(PRESET)
-	$(BIN)/finlab train allocator --preset $(PRESET) --surrogate runs/surrogate-$(PRESET) -o runs/$(PRESET) $(TRAIN_$(PRESET))
+checkpoint: setup checkpoint-$(PRESET)
+
+checkpoint-default:
+	$(BIN)/finlab train mdn -o runs/default
+
+checkpoint-paper:
+	$(BIN)/finlab train surrogate -o runs/surrogate-paper
+	$(BIN)/finlab train allocator --surrogate runs/surrogate-paper -o runs/paper --batch-size 512 --learning-rate 4e-4 --steps 18000
 
 bench: setup
 	tools/bench

@@ -78,8 +78,8 @@ class Insight(NamedTuple):
     weight: Array
     """Weights of the components (M,)."""
     mean: Array
-    """Their means (n, M, 3), commands normalized to -1..1 within each fin's limits."""
+    """Their means (n, M, 2): horizontal and vertical force of each fin over the largest that it can give."""
     std: Array
-    """Their standard deviations (n, M, 3), in the same units."""
+    """Their standard deviations (n, M), of the square roots of these shares, the same in all directions."""
     attention: Array
     """How much each fin (rows) looks at each (columns), (n, n); rows sum to 1, itself included."""

@@ -19,7 +19,7 @@ OUTPUT = Output()
 
 def training(
     out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")] = Path("runs/training-study"),
-    preset: Name = "default",
+    preset: Name = "paper",
     steps: Count = 600,
     batch_size: Count = 256,
     layouts: Count = 40,
@@ -33,7 +33,7 @@ def training(
 
     Args:
         out: folder for trainings and records.
-        preset: recipe that is changed: default, paper or smoke.
+        preset: recipe that is changed: paper or smoke.
         steps: optimizer steps of each training.
         batch_size: samples per step.
         layouts: layouts of split id on which the networks are tried.
@@ -45,11 +45,11 @@ def training(
     from finlab.evaluation.report.plan import training_jobs
     from finlab.evaluation.report.provenance import source_commit
     from finlab.evaluation.splits import make_split
-    from finlab.training.presets import get_preset
+    from finlab.training.presets import PAPER_RECIPES, get_recipe
 
     check_positive(steps=steps, batch_size=batch_size)
     check_folders(out=out)
-    get_preset(preset)
+    get_recipe(PAPER_RECIPES, preset)
     make_split("id", layouts, targets, seed)
     settings = {"preset": preset, "steps": steps, "batch_size": batch_size}
     settings |= {"layouts": layouts, "targets": targets, "seed": seed}

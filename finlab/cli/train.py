@@ -1,10 +1,10 @@
-"""`finlab train surrogate|allocator|fast`: train the networks of a checkpoint.
+"""`finlab train mdn|surrogate|allocator`: train the networks of a checkpoint.
 
-All go on from the last saved state when they are called again with the same arguments, and the first two
-run on several processes or machines under `torchrun ... -m finlab train ...`.
+All go on from the last saved state when they are called again with the same arguments. `mdn` is the network
+of the method of that name; `surrogate` and `allocator` are the paper's, and run on several processes or
+machines under `torchrun ... -m finlab train ...`.
 """
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -25,19 +25,48 @@ _Count = Annotated[int | None, arg(metavar="N")]
 
 
 @verbs.command
-def surrogate(
+def mdn(
     output: _Output,
     preset: _Preset = "default",
+    seed: Annotated[int, arg(metavar="N")] = 0,
+    minutes: _Count = None,
+    steps: _Count = None,
+    stop_after: _Count = None,
+) -> None:
+    """Train the network of method `mdn` on answers of the exact search, and write a checkpoint folder.
+
+    One process writes the answers, another learns from them: two cores are busy.
+
+    Args:
+        output: folder for checkpoint, answers, log, loss curves and resume state.
+        preset: recipe: default or smoke.
+        seed: seed of the answers and of the first weights.
+        minutes: time after which the training ends, instead of the recipe's.
+        steps: most optimizer steps instead of the recipe's.
+        stop_after: stop after so many steps; call again to go on.
+    """
+    from finlab.training.mdn.train import train_mdn
+
+    check_positive(minutes=minutes, steps=steps, stop_after=stop_after)
+    seconds = None if minutes is None else 60.0 * minutes
+    checkpoint = train_mdn(preset, output, seed=seed, stop_after=stop_after, steps=steps, seconds=seconds)
+    _report(output, checkpoint)
+
+
+@verbs.command
+def surrogate(
+    output: _Output,
+    preset: _Preset = "paper",
     seed: Annotated[int, arg(metavar="N")] = 0,
     steps: _Count = None,
     stop_after: _Count = None,
     fin_model: Annotated[str, arg(metavar="NAME|FILE.csv")] = "drag",
 ) -> None:
-    """Train the learned fin physics and write a checkpoint folder with it alone.
+    """Train the paper's learned fin physics and write a checkpoint folder with it alone.
 
     Args:
         output: folder for checkpoint, log, loss curve and resume state.
-        preset: recipe: default, paper or smoke.
+        preset: recipe: paper or smoke.
         seed: seed of the data and of the first weights.
         steps: optimizer steps instead of the recipe's.
         stop_after: stop after so many steps; call again to go on.
@@ -57,19 +86,19 @@ def surrogate(
 def allocator(
     output: _Output,
     surrogate: Annotated[Path, arg(metavar="NAME|FOLDER")],
-    preset: _Preset = "default",
+    preset: _Preset = "paper",
     seed: Annotated[int, arg(metavar="N")] = 0,
     steps: _Count = None,
     batch_size: _Count = None,
     learning_rate: Annotated[float | None, arg(metavar="X")] = None,
     stop_after: _Count = None,
 ) -> None:
-    """Train the allocator network on a trained surrogate and write a whole checkpoint folder.
+    """Train the paper's network on a trained surrogate and write a whole checkpoint folder.
 
     Args:
         output: folder for checkpoint, log, loss curves and resume state.
         surrogate: checkpoint whose surrogate guides the training.
-        preset: recipe: default, paper or smoke.
+        preset: recipe: paper or smoke.
         seed: seed of the data and of the first weights.
         steps: optimizer steps instead of the recipe's.
         batch_size: samples per step, over all processes, instead of the recipe's.
@@ -90,46 +119,6 @@ def allocator(
         stop_after=stop_after,
     )
     _report(output, checkpoint)
-
-
-@verbs.command
-def fast(
-    output: _Output,
-    checkpoint: Annotated[str, arg(metavar="NAME|FOLDER")] = "default",
-    seed: Annotated[int, arg(metavar="N")] = 0,
-    shards: Annotated[int, arg(metavar="N")] = 80,
-    steps: Annotated[int, arg(metavar="N")] = 20_000,
-    stop_after: _Count = None,
-) -> None:
-    """Train the fast path: a small network that learns the allocator's own best answers.
-
-    Its weights go into the folder `fast` of the checkpoint that they were learned from.
-
-    Args:
-        output: folder for answers, weights, log and resume state.
-        checkpoint: trained checkpoint whose answers are learned.
-        seed: seed of the data and of the first weights.
-        shards: files of 6400 answers to learn from.
-        steps: optimizer steps.
-        stop_after: stop after so many steps; call again to go on.
-    """
-    from finlab.allocation import load_allocator
-    from finlab.training.distill.answers import AnswerSettings
-    from finlab.training.distill.network import FastConfig
-    from finlab.training.distill.train import FAST_TRAINING, train_fast
-
-    check_positive(shards=shards, steps=steps, stop_after=stop_after)
-    allocator = load_allocator(checkpoint=checkpoint)
-    metrics = train_fast(
-        allocator,
-        output,
-        config=FastConfig(),
-        settings=replace(FAST_TRAINING, steps=steps),
-        data=AnswerSettings(n_shards=shards, seed=seed),
-        stop_after=stop_after,
-    )
-    for name, value in metrics.items():
-        print(f"{name} {value:.3g}")
 
 
 def _fin_model(name: str) -> "FinModelSpec":

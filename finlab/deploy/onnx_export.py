@@ -17,6 +17,7 @@ import finlab
 from finlab.deploy.onnx_graph import GraphBuilder
 from finlab.errors import CheckpointError, DataError
 from finlab.inference.features import raw_features
+from finlab.inference.force_network import LEAK, LOG_STD
 from finlab.inference.mixture import LOG_STD_BOUND
 from finlab.inference.surrogate import FORCE_UNIT
 from finlab.inference.weights import State, TrainedWeights
@@ -25,10 +26,6 @@ if TYPE_CHECKING:
     from onnx import ModelProto
 
 NETWORK, SURROGATE = "network.onnx", "surrogate.onnx"
-LEAK = 0.2
-"""Slope of GATv2's leaky rectifier below zero."""
-LOG_STD = (-2.0, 2.0)
-"""Middle and half width of the range of log standard deviations of forces."""
 
 
 def onnx_files(weights: TrainedWeights) -> dict[str, bytes]:

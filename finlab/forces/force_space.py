@@ -148,19 +148,22 @@ def descend(
     Args:
         problem: the layout.
         target: normalized wrenches (R, 6), or one for all rows (1, 6).
-        seeds: sizes of forces (R, n) [N]; directions follow from the target.
+        seeds: sizes of forces (R, n) [N], whose directions follow from the target; or planar forces
+            (R, 2, n) [N], horizontal and vertical, to go on from.
         steps: most quadratic problems that are solved in turn, one or more; fewer where forces settle.
         works: 0 where a fin has to rest (R, n), else 1; by default every fin may work.
     """
-    fins, (rows, n) = problem.fins, seeds.shape
-    start = np.maximum(seeds, REST * fins.maximum)
-    mobility = np.zeros((rows, 3, n))
-    mobility[:, 0] = mobility[:, 2] = start
-    if works is not None:
-        mobility *= works[:, None]
-    nothing = np.zeros((rows, 2, n))
-    response = _Response(start, start, mobility, nothing, mobility, nothing, None)
+    fins, rows, n = problem.fins, len(seeds), seeds.shape[-1]
     cut = np.ones((rows, n))
+    if seeds.ndim == 3:
+        response = _quadratic(problem, fins.project(seeds, np.sqrt((seeds**2).sum(1)) + LEAST), cut)
+    else:
+        start, nothing = np.maximum(seeds, REST * fins.maximum), np.zeros((rows, 2, n))
+        mobility = np.zeros((rows, 3, n))
+        mobility[:, 0] = mobility[:, 2] = start
+        response = _Response(start, start, mobility, nothing, mobility, nothing, None)
+    if works is not None:
+        response.mobility[:] *= works[:, None]
     settled, before = SETTLED[not problem.convex], None
     for step in range(steps):
         multiplier = _multiplier(problem, target, response)

@@ -1,8 +1,8 @@
 """Reads checkpoints: a folder with `model.safetensors` and `config.json`. No torch, no pickle; strict.
 
 `config.json` holds everything needed to rebuild the networks and to trust them: format and version,
-sizes, normalization, fin model, training settings, metrics and the SHA-256 of the weights. A folder `fast`
-inside may hold the distilled network. The weights of a deployment bundle are the same files.
+sizes, normalization, fin model, training settings, metrics and the SHA-256 of the weights. The weights of a
+deployment bundle are the same files.
 """
 
 import hashlib
@@ -17,9 +17,16 @@ import numpy as np
 
 from finlab.assets import checkpoint_path, shipped_checkpoints
 from finlab.errors import CheckpointError
-from finlab.inference.fast_network import check_state, fast_files, parse_fast
 from finlab.inference.normalization import Normalization
-from finlab.inference.weights import NetworkConfig, State, SurrogateConfig, TrainedWeights
+from finlab.inference.weights import (
+    AnyNetworkConfig,
+    ForceNetworkConfig,
+    NetworkConfig,
+    State,
+    SurrogateConfig,
+    TrainedWeights,
+    check_state,
+)
 from finlab.layout import FinModelSpec
 
 FORMAT = "finlab-checkpoint"
@@ -30,15 +37,7 @@ WEIGHTS_FILE = "model.safetensors"
 """Weights, with the prefixes `surrogate.` and `network.`."""
 CONFIG_FILE = "config.json"
 """Everything else."""
-FAST_FOLDER = "fast"
-"""Folder of the distilled network."""
-FAST_CONFIG, FAST_FILE = f"{FAST_FOLDER}/{CONFIG_FILE}", f"{FAST_FOLDER}/{WEIGHTS_FILE}"
-LARGEST = {
-    CONFIG_FILE: 1_000_000,
-    WEIGHTS_FILE: 50_000_000,
-    FAST_CONFIG: 1_000_000,
-    FAST_FILE: 20_000_000,
-}
+LARGEST = {CONFIG_FILE: 1_000_000, WEIGHTS_FILE: 50_000_000}
 """Largest size of each file [bytes]."""
 
 
@@ -65,28 +64,24 @@ def parse_checkpoint(files: Mapping[str, bytes], source: str, name: str) -> Trai
             f"{source}/{WEIGHTS_FILE}: its SHA-256 is not the one in {CONFIG_FILE}; the file was changed or "
             "cut off"
         )
-    fast = None
-    if FAST_CONFIG in files and FAST_FILE in files:
-        fast = parse_fast(files[FAST_CONFIG], files[FAST_FILE], f"{source}/{FAST_FOLDER}")
     try:
         tensors = load(files[WEIGHTS_FILE])
-        FinModelSpec.from_values(config["fin_model"])
-        kind, hidden = config["surrogate"]["kind"], config["surrogate"]["hidden"]
-        surrogate_config = SurrogateConfig(kind, tuple(hidden))
-        sizes = None if config["network"] is None else NetworkConfig(**config["network"])
-        shapes = {f"surrogate.{key}": shape for key, shape in surrogate_config.shapes().items()}
+        surrogate, sizes = _surrogate_config(config["surrogate"]), _network_config(config["network"])
+        shapes = {}
+        if surrogate is not None:
+            FinModelSpec.from_values(config["fin_model"])
+            shapes = {f"surrogate.{key}": shape for key, shape in surrogate.shapes().items()}
         if sizes is not None:
             shapes |= {f"network.{key}": shape for key, shape in sizes.shapes().items()}
         check_state(tensors, shapes)
         return TrainedWeights(
             name=name,
             normalization=_normalization(config),
-            fin_model=dict(config["fin_model"]),
-            surrogate_config=surrogate_config,
-            surrogate=_part("surrogate", tensors),
             network_config=sizes,
             network=_part("network", tensors),
-            fast=fast,
+            surrogate_config=surrogate,
+            surrogate=_part("surrogate", tensors),
+            fin_model=dict(config["fin_model"]),
             preset=str(config["preset"]),
             training=dict(config["training"]),
             metrics=dict(config["metrics"]),
@@ -113,16 +108,38 @@ def checkpoint_files(weights: TrainedWeights) -> dict[str, bytes]:
         "sha256": hashlib.sha256(content).hexdigest(),
         "fin_model": dict(weights.fin_model),
         "normalization": {k: v.tolist() for k, v in weights.normalization._asdict().items()},
-        "surrogate": asdict(weights.surrogate_config),
-        "network": None if weights.network_config is None else asdict(weights.network_config),
+        "surrogate": _written(weights.surrogate_config, "kind"),
+        "network": _written(weights.network_config, "features", "joint"),
         "training": dict(weights.training),
         "metrics": dict(weights.metrics),
     }
-    files = {CONFIG_FILE: (json.dumps(config, indent=2) + "\n").encode(), WEIGHTS_FILE: content}
-    if weights.fast is not None:
-        fast = fast_files(weights.fast, {"checkpoint": weights.name})
-        files |= {f"{FAST_FOLDER}/{name}": part for name, part in fast.items()}
-    return files
+    return {CONFIG_FILE: (json.dumps(config, indent=2) + "\n").encode(), WEIGHTS_FILE: content}
+
+
+def _written(config: SurrogateConfig | AnyNetworkConfig | None, *names: str) -> dict[str, Any] | None:
+    """A network's sizes for a file, and what tells its kind."""
+    return None if config is None else {name: getattr(config, name) for name in names} | asdict(config)
+
+
+def _surrogate_config(values: dict[str, Any] | None) -> SurrogateConfig | None:
+    """The sizes of a surrogate from a file."""
+    if values is None:
+        return None
+    if values["kind"] != SurrogateConfig.kind:
+        raise ValueError(f"a surrogate of kind {values['kind']!r:.40}, of which this finlab knows nothing")
+    return SurrogateConfig(tuple(values["hidden"]))
+
+
+def _network_config(values: dict[str, Any] | None) -> AnyNetworkConfig | None:
+    """The sizes of a network from a file."""
+    if values is None:
+        return None
+    sizes = dict(values)
+    told = sizes.pop("features"), sizes.pop("joint")
+    for kind in (NetworkConfig, ForceNetworkConfig):
+        if told == (kind.features, kind.joint):
+            return kind(**sizes)
+    raise ValueError(f"a network that is fed {told[0]!r:.40}, of which this finlab knows nothing")
 
 
 def read_normalization(folder: Path) -> Normalization:

@@ -1,4 +1,4 @@
-"""The trained allocator network in numpy, for a few targets at a time.
+"""The paper's trained network in numpy, for a few targets at a time.
 
 A network this small spends most of its time on the overhead of each tensor operation; numpy's is a
 few times smaller than a tensor library's, and a robot's computer need not have one. A test holds it
@@ -18,14 +18,10 @@ Array = NDArray[Any]
 
 _LAYER_NORM_EPS = np.float32(1e-5)
 _LOG_STD_BOUND = np.float32(LOG_STD_BOUND)
-_TURN = np.float32(2 * np.pi)
-_PER_FIN = 6
-"""Outputs per component of one mixture per fin: means and standard deviations of three commands. A joint
-mixture has seven, since its directions are vectors."""
 
 
 class NumpyNetwork:
-    """The allocator network, with a joint mixture or one per fin: features and target in, mixture out."""
+    """Features and target in, a mixture per fin out."""
 
     def __init__(self, weights: Mapping[str, NDArray[np.floating]], heads: int, n_components: int) -> None:
         """Take over a trained network.
@@ -46,17 +42,8 @@ class NumpyNetwork:
         self.transformer = [_Transformer(w, f"transformer.layers.{i}", heads) for i in range(n_transformer)]
         self.head, self.weight = (_normed(_linear(w, name), w, "norm") for name in ("head", "weight"))
 
-    def __call__(
-        self, x: Array, target: Array, lower: NDArray[np.floating], upper: NDArray[np.floating]
-    ) -> MixtureArrays:
-        """The mixture.
-
-        Args:
-            x: node features (N, n, F).
-            target: normalized, centred targets (N, 6).
-            lower: lower limits (n, 3).
-            upper: upper limits (n, 3).
-        """
+    def __call__(self, x: Array, target: Array) -> MixtureArrays:
+        """The mixtures for node features (N, n, F) and normalized, centred targets (N, 6)."""
         rows, n, _ = x.shape
         flat = x.reshape(rows * n, -1)
         hidden = flat
@@ -74,27 +61,8 @@ class NumpyNetwork:
             hidden = layer(hidden, rows)
         hidden = _norm(hidden)
         raw = _apply(self.head, hidden).reshape(rows, n, self.n_components, -1)
-        if raw.shape[-1] == _PER_FIN:
-            weight = softmax(_apply(self.weight, hidden)).reshape(rows, n, self.n_components)
-            return MixtureArrays(weight, raw[..., :3], _std(raw[..., 3:]))
-        everyone = np.add.reduce(hidden.reshape(rows, n, width), axis=1)
-        everyone /= np.float32(n)
-        # In memory each component's commands lie together, since that is how they are drawn.
-        mean = np.empty((rows, self.n_components, n, 3), dtype=np.float32).swapaxes(1, 2)
-        np.tanh(raw[..., :2], out=mean[..., :2])
-        _direction(raw[..., 2], raw[..., 3], lower, upper, mean[..., 2])
-        std = np.empty((rows, self.n_components, n, 3), dtype=np.float32).swapaxes(1, 2)
-        _std(raw[..., 4:], std)
-        return MixtureArrays(softmax(_apply(self.weight, everyone)), mean, std)
-
-    def attention(self, x: Array) -> Array:
-        """How much each fin looks at each (N, n, n) in the first layer, mean of its heads; rows sum to 1.
-
-        Args:
-            x: node features (N, n, F).
-        """
-        flat = np.ascontiguousarray(x).reshape(-1, x.shape[-1])
-        return np.asarray(self.graph[0].attention(flat, len(x))[0].mean(-1))
+        weight = softmax(_apply(self.weight, hidden)).reshape(rows, n, self.n_components)
+        return MixtureArrays(weight, raw[..., :3], _std(raw[..., 3:]))
 
 
 class _Graph:
@@ -113,9 +81,8 @@ class _Graph:
             self.score[head * attention.shape[1] : (head + 1) * attention.shape[1], head] = attention[head]
         self.bias = w[f"{name}.bias"]
 
-    def attention(self, x: Array, rows: int) -> tuple[Array, Array]:
-        """For features (N n, F) of N robots: weights (N, n, n, heads) with which each fin looks at each, and
-        what it sees (N, n, width)."""
+    def __call__(self, x: Array, rows: int) -> Array:
+        """Hidden features (N n, width) of features (N n, F) of N robots."""
         both = _apply(self.both, x).reshape(rows, -1, 2 * self.width)
         n = both.shape[1]
         source, target = both[..., : self.width], both[..., self.width :]
@@ -123,12 +90,7 @@ class _Graph:
         leak = pair * np.float32(0.2)
         np.maximum(pair, leak, out=leak)
         score = leak.reshape(-1, self.width).dot(self.score).reshape(rows, n, n, self.heads)
-        return softmax(score, axis=2), source
-
-    def __call__(self, x: Array, rows: int) -> Array:
-        """Hidden features (N n, width) of features (N n, F) of N robots."""
-        weight, source = self.attention(x, rows)
-        n = source.shape[1]
+        weight = softmax(score, axis=2)
         split = source.reshape(rows, n, self.heads, -1).transpose(0, 2, 1, 3)
         out = np.empty((rows, n, self.heads, split.shape[-1]), dtype=np.float32)
         np.matmul(weight.transpose(0, 3, 1, 2), split, out=out.transpose(0, 2, 1, 3))
@@ -204,26 +166,10 @@ def _norm(x: Array) -> Array:
     return normed
 
 
-def _std(raw: Array, out: Array | None = None) -> Array:
-    """Standard deviations of the network's outputs, written to `out` where it is given: their logarithm is a
-    sigmoid between the bounds, which are as far above zero as below."""
-    out = np.multiply(raw, np.float32(0.5), out=out)
+def _std(raw: Array) -> Array:
+    """Standard deviations of the network's outputs: their logarithm is a sigmoid between the bounds, which
+    are as far above zero as below."""
+    out = np.multiply(raw, np.float32(0.5))
     np.tanh(out, out=out)
     out *= _LOG_STD_BOUND
     return np.exp(out, out=out)
-
-
-def _direction(
-    x: Array, y: Array, lower: NDArray[np.floating], upper: NDArray[np.floating], out: Array
-) -> None:
-    """Write zero directions (N, n, M) in normalized coordinates, as in `AllocatorNetwork`, to `out`."""
-    low, high = lower[:, 2:], upper[:, 2:]
-    half = np.maximum(0.5 * (high - low), 1e-6).astype(np.float32)
-    middle = (0.5 * (high + low)).astype(np.float32)
-    offset = np.arctan2(y, x + np.float32(1e-6))
-    offset -= middle
-    offset += _TURN / 2
-    np.mod(offset, _TURN, out=offset)
-    offset -= _TURN / 2
-    np.minimum(np.maximum(offset, -half, out=offset), half, out=offset)
-    np.divide(offset, half, out=out)

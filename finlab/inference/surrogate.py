@@ -1,4 +1,4 @@
-"""Trained surrogates in numpy, on one layout: what the learned methods believe of a robot's fins."""
+"""The paper's trained surrogate in numpy, on one layout: what its method believes of a robot's fins."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol
@@ -6,15 +6,17 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.errors import CheckpointError
 from finlab.inference.activations import silu, silu_and_slope
 from finlab.inference.features import RAW_SIZE, raw_features
-from finlab.inference.learned_fin import FORCE_UNIT, LearnedFin
 from finlab.inference.weights import TrainedWeights
 from finlab.layout import Layout
 from finlab.layout.arrays import force_columns
 
 Array = NDArray[Any]
 
+FORCE_UNIT = 4.0
+"""Force [N] of order one for the perceptron's outputs."""
 BLOCK = 64
 """Robots whose fins are worked on at once: some hundred rows of the hidden layers, half a megabyte."""
 
@@ -134,13 +136,17 @@ class LayoutSurrogate(NamedTuple):
 
 
 def surrogate_on(layout: Layout, weights: TrainedWeights) -> LayoutSurrogate:
-    """The surrogate of a checkpoint, of either kind, on one layout."""
+    """The surrogate of a checkpoint on one layout.
+
+    Raises:
+        CheckpointError: the checkpoint holds none.
+    """
+    if weights.surrogate_config is None:
+        raise CheckpointError(
+            f"checkpoint {weights.name!r} holds no surrogate; train one with `finlab train surrogate`"
+        )
     angle = layout.mounting_angle
-    if weights.surrogate_config.kind == "mlp":
-        limits = layout.lower, layout.upper
-        fins = MlpFins(weights.surrogate, layout.position, angle, *limits)
-        # The perceptron speaks in the body frame, that of a fin whose shaft points forward.
-        columns = force_columns(layout.position, np.zeros_like(angle)) * (1.0 + fins.scale)
-        return LayoutSurrogate(fins, columns, fins.bias)
-    columns = force_columns(layout.position, angle)
-    return LayoutSurrogate(LearnedFin(weights.surrogate), columns, np.zeros(6))
+    fins = MlpFins(weights.surrogate, layout.position, angle, layout.lower, layout.upper)
+    # The perceptron speaks in the body frame, that of a fin whose shaft points forward.
+    columns = force_columns(layout.position, np.zeros_like(angle)) * (1.0 + fins.scale)
+    return LayoutSurrogate(fins, columns, fins.bias)

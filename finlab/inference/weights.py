@@ -3,13 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar, TypeVar
 
+import numpy as np
 from numpy.typing import NDArray
 
 from finlab.errors import CheckpointError
-from finlab.inference.fast_network import FastWeights
-from finlab.inference.features import RAW_SIZE, SIZES
+from finlab.inference.features import RAW_SIZE
+from finlab.inference.force_network import NODE_SIZE, PAIR_SIZE
 from finlab.inference.normalization import Normalization
 
 Array = NDArray[Any]
@@ -19,17 +20,19 @@ Shapes = dict[str, tuple[int, ...]]
 
 LARGEST_SIZE = 4096
 """Largest width or count that a network may have."""
+LARGEST_WEIGHT = 1e6
+"""Largest magnitude of a weight; training stays below 100, and far beyond this answers would be NaN."""
 DESCRIPTOR = 64
-"""Width of the layout descriptor in an `mlp` surrogate."""
+"""Width of the layout descriptor in the surrogate."""
 
 
 @dataclass(frozen=True)
 class SurrogateConfig:
-    """Kind and size of a surrogate."""
+    """Sizes of the paper's surrogate."""
 
-    kind: str = "coefficient"
-    """`coefficient` (force coefficient in the fin's own frame) or `mlp` (the paper's)."""
-    hidden: tuple[int, ...] = (32, 32)
+    kind: ClassVar[str] = "mlp"
+    """What it is called in files."""
+    hidden: tuple[int, ...] = (512, 64)
     """Widths of the hidden layers."""
 
     def shapes(self) -> Shapes:
@@ -38,27 +41,21 @@ class SurrogateConfig:
         Raises:
             ValueError: there is no such surrogate.
         """
-        if self.kind not in ("coefficient", "mlp"):
-            raise ValueError(f"expected a surrogate of kind coefficient or mlp, got {self.kind!r:.40}")
         _check_sizes(*self.hidden)
-        coefficient = self.kind == "coefficient"
-        sizes = [4 if coefficient else RAW_SIZE + 3, *self.hidden, 3]
         shapes: Shapes = {}
-        for i, (n_in, n_out) in enumerate(pairwise(sizes)):
+        for i, (n_in, n_out) in enumerate(pairwise([RAW_SIZE + 3, *self.hidden, 3])):
             shapes |= _linear(f"net.{2 * i}", n_in, n_out)  # activations stand between the layers
-        if coefficient:
-            return shapes
         return shapes | _linear("descriptor.0", RAW_SIZE, DESCRIPTOR) | _linear("affine", DESCRIPTOR, 12)
 
 
 @dataclass(frozen=True)
 class NetworkConfig:
-    """Sizes of the allocator network."""
+    """Sizes of the paper's network: raw features in, a mixture over the commands of each fin out."""
 
-    features: str = "fin_frame"
-    """Which node features it is fed: `raw` (the paper's ten) or `fin_frame`."""
-    joint: bool = True
-    """One mixture component for all fins together (True) or one mixture per fin (False, the paper)."""
+    features: ClassVar[str] = "raw"
+    """What it is fed, by its name in files."""
+    joint: ClassVar[bool] = False
+    """Whether one component is chosen for all fins together."""
     width: int = 128
     """Width of every hidden layer."""
     heads: int = 4
@@ -78,18 +75,13 @@ class NetworkConfig:
         Raises:
             ValueError: there is no such network.
         """
-        if self.features not in SIZES or not isinstance(self.joint, bool):
-            raise ValueError(f"expected features {', '.join(SIZES)} and joint true or false")
-        _check_sizes(*(getattr(self, f.name) for f in fields(self) if f.name not in ("features", "joint")))
-        width, n_features = self.width, SIZES[self.features]
-        if width % self.heads:
-            raise ValueError(f"width {width} is no multiple of heads {self.heads}")
+        width = _checked_width(self)
         shapes: Shapes = {}
         for i in range(self.graph_layers):
-            name, n_in = f"graph.{i}", width if i else n_features
+            name, n_in = f"graph.{i}", width if i else RAW_SIZE
             shapes |= {f"{name}.attention": (self.heads, width // self.heads), f"{name}.bias": (width,)}
             shapes |= _linear(f"{name}.source", n_in, width) | _linear(f"{name}.target", n_in, width)
-        shapes |= _linear("skip", n_features, width) | _linear("join", 2 * width, width)
+        shapes |= _linear("skip", RAW_SIZE, width) | _linear("join", 2 * width, width)
         shapes |= _linear("wrench.0", 6, width) | _linear("wrench.2", width, width)
         for i in range(self.transformer_layers):
             name = f"transformer.layers.{i}"
@@ -101,9 +93,52 @@ class NetworkConfig:
             shapes |= _linear(f"{name}.linear1", width, self.feedforward)
             shapes |= _linear(f"{name}.linear2", self.feedforward, width)
             shapes |= _scale(f"{name}.norm1", width) | _scale(f"{name}.norm2", width)
-        per_component = 7 if self.joint else 6
-        shapes |= _scale("norm", width) | _linear("head", width, self.n_components * per_component)
+        shapes |= _scale("norm", width) | _linear("head", width, self.n_components * 6)
         return shapes | _linear("weight", width, self.n_components)
+
+
+@dataclass(frozen=True)
+class ForceNetworkConfig:
+    """Sizes of the network of method `mdn`: a joint mixture over the planar forces of all fins."""
+
+    features: ClassVar[str] = "forces"
+    """What it is fed, by its name in files."""
+    joint: ClassVar[bool] = True
+    """Whether one component is chosen for all fins together."""
+    width: int = 64
+    """Width of every hidden layer."""
+    heads: int = 4
+    """Attention heads."""
+    layers: int = 4
+    """Number of Transformer layers."""
+    feedforward: int = 128
+    """Hidden width of their feed-forward blocks."""
+    n_components: int = 16
+    """Number M of mixture components."""
+
+    def shapes(self) -> Shapes:
+        """Shape of each array of such a network.
+
+        Raises:
+            ValueError: there is no such network.
+        """
+        width = _checked_width(self)
+        shapes: Shapes = {}
+        for i in range(self.layers):
+            name, look = f"layers.{i}", f"layers.{i}.look"
+            shapes |= {f"{look}.attention": (self.heads, width // self.heads)}
+            shapes |= {f"{look}.target.weight": (width, width), f"{look}.pair.weight": (width, PAIR_SIZE)}
+            shapes |= _linear(f"{look}.source", width, width) | _linear(f"{look}.out", width, width)
+            shapes |= _linear(f"{name}.up", width, self.feedforward)
+            shapes |= _linear(f"{name}.down", self.feedforward, width)
+            shapes |= _scale(f"{name}.norm1", width) | _scale(f"{name}.norm2", width)
+        shapes |= _linear("enter", NODE_SIZE, width) | _scale("norm", width)
+        shapes |= _linear("head", width, 3 * self.n_components)
+        return shapes | _linear("weight", width, self.n_components)
+
+
+AnyNetworkConfig = NetworkConfig | ForceNetworkConfig
+Config = TypeVar("Config", NetworkConfig, ForceNetworkConfig)
 
 
 @dataclass(frozen=True)
@@ -114,18 +149,16 @@ class TrainedWeights:
     """Name shown to users; the checkpoint folder's."""
     normalization: Normalization
     """Per-axis statistics of the wrench."""
-    fin_model: Mapping[str, Any]
-    """Fin model that the surrogate learned, as in a layout file: {type, parameters}."""
-    surrogate_config: SurrogateConfig
-    """Kind and size of the surrogate."""
-    surrogate: State
-    """The surrogate, learned fin physics."""
-    network_config: NetworkConfig | None = None
-    """Sizes of the allocator network; None where only the surrogate was trained."""
+    network_config: AnyNetworkConfig | None = None
+    """Sizes of the network; None where only a surrogate was trained."""
     network: State = field(default_factory=dict)
-    """The allocator network; empty where there is none."""
-    fast: FastWeights | None = None
-    """The distilled network, where one was trained."""
+    """The network; empty where there is none."""
+    surrogate_config: SurrogateConfig | None = None
+    """Sizes of the surrogate; None where there is none."""
+    surrogate: State = field(default_factory=dict)
+    """The paper's surrogate, learned fin physics; empty where there is none."""
+    fin_model: Mapping[str, Any] = field(default_factory=dict)
+    """Fin model that the surrogate learned, as in a layout file: {type, parameters}."""
     preset: str = "default"
     """Name of the training recipe."""
     training: Mapping[str, Any] = field(default_factory=dict)
@@ -135,18 +168,40 @@ class TrainedWeights:
     sha256: str = ""
     """SHA-256 of the file of the weights; empty for what was not read from a file."""
 
-    def check_network(self) -> NetworkConfig:
-        """The sizes of the allocator network, which must be there.
+    def check_network(self, kind: type[Config]) -> Config:
+        """The sizes of the network, which must be there and of one kind.
 
         Raises:
-            CheckpointError: only the surrogate was trained.
+            CheckpointError: it is not.
         """
-        if self.network_config is None:
+        sizes, verb = self.network_config, "mdn" if kind is ForceNetworkConfig else "allocator"
+        if not isinstance(sizes, kind):
+            has = "no network" if sizes is None else f"a network that is fed {sizes.features!r}"
             raise CheckpointError(
-                f"checkpoint {self.name!r} holds a surrogate only; train the allocator with "
-                "`finlab train allocator`"
+                f"checkpoint {self.name!r} holds {has}, expected one that is fed {kind.features!r}; train it "
+                f"with `finlab train {verb}`"
             )
-        return self.network_config
+        return sizes
+
+
+def check_state(state: State, shapes: Shapes) -> None:
+    """Raise a `ValueError` unless a network has exactly these arrays, in float32 and of sane size."""
+    if wrong := sorted(set(shapes) ^ set(state)):
+        raise ValueError(f"{wrong[0]!r:.80} is missing or not expected")
+    for name, shape in shapes.items():
+        array = state[name]
+        if array.shape != shape or array.dtype != np.float32:
+            raise ValueError(f"{name}: expected float32 of shape {shape}, got {array.dtype} {array.shape}")
+        if not (np.abs(array) <= LARGEST_WEIGHT).all():  # false for NaN as well
+            raise ValueError(f"{name}: holds NaN or a number beyond {LARGEST_WEIGHT:g}")
+
+
+def _checked_width(config: AnyNetworkConfig) -> int:
+    """The width of a network of possible sizes."""
+    _check_sizes(*(getattr(config, f.name) for f in fields(config)))
+    if config.width % config.heads:
+        raise ValueError(f"width {config.width} is no multiple of heads {config.heads}")
+    return config.width
 
 
 def _check_sizes(*sizes: object) -> None:

@@ -10,5 +10,5 @@ except ImportError as error:
     ) from error
 
 from finlab.training.allocator import train_allocator as train_allocator
-from finlab.training.presets import PRESETS as PRESETS
+from finlab.training.mdn.train import train_mdn as train_mdn
 from finlab.training.surrogate import train_surrogate as train_surrogate

@@ -9,15 +9,15 @@ import torch
 from torch import Tensor, nn
 
 from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
-from finlab.inference.features import SIZES, fin_frame_features, geometry, raw_features
-from finlab.inference.weights import NetworkConfig, TrainedWeights
+from finlab.inference.features import raw_features
+from finlab.inference.weights import TrainedWeights
 from finlab.layout import FinModelSpec
 from finlab.physics import make_law
 from finlab.training import losses
 from finlab.training.device import autocast_dtype, shared_training
 from finlab.training.loop import Terms, plot_log, train
 from finlab.training.networks.allocator_network import AllocatorNetwork
-from finlab.training.presets import AllocatorTraining, get_preset
+from finlab.training.presets import PAPER_RECIPES, AllocatorTraining, get_recipe
 from finlab.training.sampling import Batch, ForwardSampler, seeded_generator
 from finlab.training.saving import save_checkpoint, state_of, surrogate_of
 from finlab.training.surrogate import TRAIN_SEED
@@ -47,12 +47,12 @@ def train_allocator(
         network: fields of `NetworkConfig` that differ from the preset's.
         training: fields of `AllocatorTraining` that differ from the preset's; None does not.
     """
-    recipe = get_preset(preset)
+    recipe = get_recipe(PAPER_RECIPES, preset)
     base = read_checkpoint(resolve_checkpoint(surrogate))
     config = replace(recipe.network, **(network or {}))
     settings = replace(recipe.allocator_training, **{k: v for k, v in training.items() if v is not None})
     torch.manual_seed(seed)
-    model = AllocatorNetwork(config, SIZES[config.features])
+    model = AllocatorNetwork(config)
     identity: dict[str, Any] = {
         "preset": preset,
         "seed": seed,
@@ -71,14 +71,13 @@ def train_allocator(
         plot_log(out)
 
     with shared_training(settings.batch_size) as share:
-        terms = make_terms(base, config, settings, seed, share.device, share.rows)
+        terms = make_terms(base, settings, seed, share.device, share.rows)
         train(model.to(share.device), terms, settings, out, identity, stop_after=stop_after, on_save=save)
     return read_checkpoint(out) if share.first else base
 
 
 def make_terms(
     base: TrainedWeights,
-    network: NetworkConfig,
     training: AllocatorTraining,
     seed: int,
     device: torch.device,
@@ -97,38 +96,22 @@ def make_terms(
     def terms(net: nn.Module, step: int) -> dict[str, Tensor]:
         batch = Batch(*(t[rows].to(device) for t in sampler.batch(step)))
         target = (batch.wrench - mean) / std
-        x = node_features(network, batch, target, std)
+        x = raw_features(batch.position, batch.mounting_angle, batch.lower, batch.upper)
         with autocast:
-            mixture = net(x, target, batch.lower, batch.upper, batch.mask)
+            mixture = net(x, target, batch.mask)
         result = {
-            "imitation": losses.imitation(mixture, batch, spread_only=training.imitate == "spread").mean(),
+            "imitation": losses.imitation(mixture, batch).mean(),
             "entropy": losses.negative_entropy(mixture, batch.mask).mean(),
         }
         # The surrogate's wrench is compared to the absolute target: mean and std cancel in the difference.
         shifted = target + mean / std
-        if training.guide == "samples":
-            noise = seeded_generator(TRAIN_SEED + seed, step, device)
-            whole = (rows, training.batch_size)
-            guidance = losses.sample_guidance(mixture, surrogate, batch, shifted, std, noise, whole).mean()
-        else:
-            soft, best = losses.mode_guidance(mixture, surrogate, batch, shifted, std, training)
-            guidance, result["best_error"] = soft.mean(), best.mean()
+        noise = seeded_generator(TRAIN_SEED + seed, step, device)
+        whole = (rows, training.batch_size)
+        guidance = losses.sample_guidance(mixture, surrogate, batch, shifted, std, noise, whole).mean()
         result["guidance"] = guidance
         ramp = min(1.0, step / max(1.0, training.ramp * training.steps))
         beta = training.guidance_start + ramp * (training.guidance - training.guidance_start)
-        loss = (
-            training.imitation * result["imitation"] + beta * guidance + training.entropy * result["entropy"]
-        )
+        loss = result["imitation"] + beta * guidance + training.entropy * result["entropy"]
         return {"loss": loss, **result}
 
     return terms
-
-
-def node_features(network: NetworkConfig, batch: Batch, target: Tensor, std: Tensor) -> Tensor:
-    """Node features (B, n, F) of a training batch, as the network's configuration wants them."""
-    layout = (batch.position, batch.mounting_angle, batch.lower, batch.upper)
-    raw = network.features == "raw"
-    features: Tensor = (
-        raw_features(*layout) if raw else fin_frame_features(geometry(*layout, std, batch.mask), target)
-    )
-    return features

@@ -43,6 +43,8 @@ class LoopSettings:
     """Whether it falls to a hundredth along a cosine (True) or stays (the paper)."""
     ema: float = 0.0
     """Decay of the running average of the weights that is shipped; 0 ships the last weights."""
+    seconds: float | None = None
+    """Time after which the run ends whatever step it has come to, all its parts together."""
 
 
 CLIP = 1.0
@@ -53,12 +55,16 @@ SAVE_EVERY_S = 60.0
 """Seconds between saved states."""
 
 
-def learning_rate(settings: LoopSettings, step: int) -> float:
-    """Learning rate of a step, a function of the step alone so that a resumed run goes on exactly."""
+def learning_rate(settings: LoopSettings, step: int, elapsed: float = 0.0) -> float:
+    """Learning rate of a step, a function of the step alone so that a resumed run goes on exactly; of the
+    seconds gone by where the run's time is limited."""
     rise = min(1.0, (step + 1) / max(min(settings.warmup, settings.steps), 1))
     if not settings.cosine:
         return settings.learning_rate * rise
-    fall = 0.5 * (1 + math.cos(math.pi * step / max(settings.steps, 1)))
+    done = step / max(settings.steps, 1)
+    if settings.seconds is not None:
+        done = min(1.0, max(done, elapsed / settings.seconds))
+    fall = 0.5 * (1 + math.cos(math.pi * done))
     return settings.learning_rate * rise * (0.01 + 0.99 * fall)
 
 
@@ -90,9 +96,10 @@ def train(
     first = not dist.is_initialized() or dist.get_rank() == 0
     optimizer = torch.optim.Adam(model.parameters(), lr=settings.learning_rate)
     average = {k: v.detach().clone() for k, v in model.named_parameters()} if settings.ema else {}
-    done = load_state(folder, model, optimizer, average, identity)
+    done, before = load_state(folder, model, optimizer, average, identity)
     wrapped = nn.parallel.DistributedDataParallel(model) if dist.is_initialized() else model
     log = _Log(folder / LOG_FILE, done) if first else None
+    limit = math.inf if settings.seconds is None else settings.seconds
     end = min(settings.steps, stop_after or settings.steps)
     bar = tqdm(
         total=settings.steps,
@@ -103,8 +110,11 @@ def train(
     )
     started = saved = time.monotonic()
     for step in range(done, end):
+        elapsed = before + time.monotonic() - started
+        last = step == end - 1 or elapsed >= limit
+        rate = learning_rate(settings, step, elapsed)
         for group in optimizer.param_groups:
-            group["lr"] = learning_rate(settings, step)
+            group["lr"] = rate
         optimizer.zero_grad(set_to_none=True)
         terms = terms_of_step(wrapped, step)
         terms["loss"].backward()
@@ -117,19 +127,21 @@ def train(
                 for name, parameter in model.named_parameters():
                     average[name].lerp_(parameter, 1 - decay)
         bar.update()
-        if step % LOG_EVERY == 0 or step == end - 1:
+        if step % LOG_EVERY == 0 or last:
             values = _mean_over_processes(terms)
             if log is not None:
                 seconds, samples = time.monotonic() - started, (step + 1) * settings.batch_size
-                rate = (step + 1 - done) * settings.batch_size / seconds
-                log.write(step, samples, seconds, learning_rate(settings, step), values)
-                bar.set_postfix_str(f"loss {values['loss']:.4g}, {rate / 1e3:.1f} k samples/s")
-        if first and (time.monotonic() - saved > SAVE_EVERY_S or step == end - 1):
+                speed = (step + 1 - done) * settings.batch_size / seconds
+                log.write(step, samples, before + seconds, rate, values)
+                bar.set_postfix_str(f"loss {values['loss']:.4g}, {speed / 1e3:.1f} k samples/s")
+        if first and (time.monotonic() - saved > SAVE_EVERY_S or last):
             # The state comes last: a run killed in between repeats a few steps and ships them after all.
             if on_save is not None:
                 on_save(average or _weights(model), step + 1)
-            save_state(folder, step + 1, model, optimizer, average, identity)
             saved = time.monotonic()
+            save_state(folder, (step + 1, before + saved - started), model, optimizer, average, identity)
+        if last:
+            break
     bar.close()
     return average or _weights(model)
 
@@ -153,11 +165,10 @@ class _Log:
         self.path = path
         lines = path.read_text().splitlines(keepends=True) if done and path.exists() else []
         kept = [line for line in lines[1:] if int(line.split(",")[0]) < done]
-        self.offset = float(kept[-1].split(",")[_FIXED.index("seconds")]) if kept else 0.0
         write_whole(path, "".join(lines[:1] + kept), DataError)
 
     def write(self, step: int, samples: int, seconds: float, rate: float, values: dict[str, float]) -> None:
-        fixed = (step, samples, f"{self.offset + seconds:.1f}", f"{rate:.6g}")
+        fixed = (step, samples, f"{seconds:.1f}", f"{rate:.6g}")
         row = dict(zip(_FIXED, fixed, strict=True)) | {name: f"{x:.8g}" for name, x in values.items()}
         with self.path.open("a", newline="") as file:
             writer = csv.DictWriter(file, list(row), lineterminator="\n")

@@ -1,97 +1,120 @@
-"""Named training recipes: `default` (ours), `paper` (as printed) and `smoke` (seconds, for tests)."""
+"""Named training recipes: `default` (method `mdn`), `paper` (as printed) and `smoke` (seconds, for tests)."""
 
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 from finlab.errors import DataError
-from finlab.inference.weights import NetworkConfig, SurrogateConfig
+from finlab.inference.weights import ForceNetworkConfig, NetworkConfig, SurrogateConfig
 from finlab.training.loop import LoopSettings
 
 
 @dataclass(frozen=True)
 class AllocatorTraining(LoopSettings):
-    """How the allocator network is trained: L = imitation NLL + beta guidance + lambda entropy."""
+    """How the paper's network is trained: L = imitation NLL + beta guidance + lambda entropy."""
 
-    imitation: float = 0.01
-    """Weight of the negative log-likelihood of the recorded commands."""
-    imitate: str = "spread"
-    """What that likelihood moves: `all` (the paper) or only the `spread` around the means. Uniformly
-    sampled commands are neither cheap nor sharp to imitate, so in `default` means and weights learn
-    from the physics alone."""
     guidance: float = 1.0
     """Final weight beta of the physics guidance."""
-    guidance_start: float = 1.0
+    guidance_start: float = 0.01
     """Weight beta at the first step."""
-    ramp: float = 0.2
+    ramp: float = 0.5
     """Share of the steps over which beta grows linearly."""
-    guide: str = "modes"
-    """`modes`: the soft best of all components' means; `samples`: samples of the mixture (the paper)."""
-    energy: float = 0.05
-    """Weight gamma of the energy proxy inside the guidance of `modes`."""
-    softness: float = 0.02
-    """Width of the soft minimum over components, in units of the guidance loss."""
-    every_mode: float = 0.05
-    """Weight of the mean over all components beside the soft best one, so that none goes astray."""
-    entropy: float = 0.003
+    entropy: float = 0.01
     """Weight lambda of the entropy of the mixture weights."""
     varied_limits: float = 0.5
     """Share of training layouts with limits of their own."""
 
 
 @dataclass(frozen=True)
-class Preset:
-    """One named recipe."""
+class PaperRecipe:
+    """The paper's surrogate and the network that it guides."""
 
-    name: str
-    """Its name."""
     surrogate_training: LoopSettings
     """How the surrogate is trained."""
     allocator_training: AllocatorTraining
     """How the network is trained."""
     surrogate: SurrogateConfig = field(default_factory=SurrogateConfig)
-    """Kind and size of the surrogate."""
+    """Sizes of the surrogate."""
     network: NetworkConfig = field(default_factory=NetworkConfig)
-    """Sizes of the allocator network."""
+    """Sizes of the network."""
 
 
-_DEFAULT = Preset(
-    "default",
-    LoopSettings(40_000, 4096, 3e-3, warmup=100, ema=0.99),
-    AllocatorTraining(20_000, 1024, 1e-3, warmup=200, ema=0.999),
-    network=NetworkConfig(width=96, transformer_layers=2, feedforward=192, n_components=16),
-)
-_PAPER = Preset(
-    "paper",
+@dataclass(frozen=True)
+class AnswerSettings:
+    """What the teacher answers: files of random targets on random robots."""
+
+    shards: int = 80
+    """Most files; what is not there in time is not learned from."""
+    first: int = 2
+    """Files that must be there to begin, at least two: the first one is held out."""
+    fins: int = 18
+    """Random fins per file with nominal limits, and as many with limits of their own."""
+    robots: int = 240
+    """Robots per file that are made of them."""
+    targets: int = 48
+    """Targets for each robot."""
+    effort_share: float = 0.75
+    """Share of the robots that keep the effort least; the others keep the power least, which has but one
+    way."""
+    sharpness: float = 0.03
+    """By how much dearer a way may be, as a share of the cost, for its weight to fall to a third."""
+
+
+@dataclass(frozen=True)
+class MdnTraining(LoopSettings):
+    """How the network of method `mdn` is trained: the likelihood of the ways that the search has found."""
+
+    anneal: int = 2500
+    """Steps over which components stop sharing what they stand for; at first all of them learn from all."""
+    spread: float = 0.02
+    """Weight of the entropy of the components' mean weights over a batch, so that none is left unused."""
+
+
+@dataclass(frozen=True)
+class MdnRecipe:
+    """The network of method `mdn`, and what it learns from."""
+
+    training: MdnTraining
+    """How it is trained."""
+    answers: AnswerSettings = field(default_factory=AnswerSettings)
+    """What it learns from."""
+    network: ForceNetworkConfig = field(default_factory=ForceNetworkConfig)
+    """Its sizes."""
+
+
+_PAPER = PaperRecipe(
     LoopSettings(30_000, 512, 2e-3, warmup=100, ema=0.99),
-    AllocatorTraining(
-        steps=35_000,  # 115 epochs of 5 M samples
-        batch_size=16_384,
-        learning_rate=1e-4,
-        cosine=False,
-        imitation=1.0,
-        imitate="all",
-        guidance=1.0,
-        guidance_start=0.01,
-        ramp=0.5,
-        guide="samples",
-        entropy=0.01,
+    AllocatorTraining(35_000, 16_384, 1e-4, cosine=False),  # 115 epochs of 5 M samples
+    network=NetworkConfig(n_components=8),
+)
+PAPER_RECIPES = {
+    "paper": _PAPER,
+    "smoke": PaperRecipe(
+        replace(_PAPER.surrogate_training, steps=60, batch_size=256),
+        replace(_PAPER.allocator_training, steps=40, batch_size=128, learning_rate=1e-3),
+        SurrogateConfig(hidden=(16, 16)),
+        NetworkConfig(
+            width=32, heads=2, graph_layers=1, transformer_layers=1, feedforward=32, n_components=4
+        ),
     ),
-    SurrogateConfig(kind="mlp", hidden=(512, 64)),
-    NetworkConfig(features="raw", joint=False, n_components=8),
-)
-_SMOKE = Preset(
-    "smoke",
-    replace(_DEFAULT.surrogate_training, steps=60, batch_size=256),
-    replace(_DEFAULT.allocator_training, steps=40, batch_size=128, warmup=5, ema=0.9),
-    SurrogateConfig(hidden=(16,)),
-    NetworkConfig(width=32, heads=2, graph_layers=1, transformer_layers=1, feedforward=32, n_components=4),
-)
+}
+"""Name -> recipe of `finlab train surrogate` and `finlab train allocator`."""
 
-PRESETS = {preset.name: preset for preset in (_DEFAULT, _PAPER, _SMOKE)}
-"""Name -> recipe."""
+_MDN = MdnRecipe(MdnTraining(100_000, 256, 2e-3, warmup=200, ema=0.999, seconds=5400.0))
+MDN_RECIPES = {
+    "default": _MDN,
+    "smoke": MdnRecipe(
+        replace(_MDN.training, steps=30, batch_size=16, warmup=5, ema=0.9, anneal=10),
+        AnswerSettings(shards=2, fins=2, robots=6, targets=8),
+        ForceNetworkConfig(width=16, heads=2, layers=1, feedforward=16, n_components=4),
+    ),
+}
+"""Name -> recipe of `finlab train mdn`."""
+
+Recipe = TypeVar("Recipe", PaperRecipe, MdnRecipe)
 
 
-def get_preset(name: str) -> Preset:
+def get_recipe(recipes: dict[str, Recipe], name: str) -> Recipe:
     """A recipe by name; `DataError` lists the names that exist."""
-    if name not in PRESETS:
-        raise DataError(f"preset: expected one of {', '.join(PRESETS)}, got {name!r}")
-    return PRESETS[name]
+    if name not in recipes:
+        raise DataError(f"preset: expected one of {', '.join(recipes)}, got {name!r}")
+    return recipes[name]

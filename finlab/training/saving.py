@@ -3,7 +3,6 @@
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,10 +13,9 @@ from torch import Tensor, nn
 
 from finlab.errors import DataError
 from finlab.inference.checkpoint import checkpoint_files, read_checkpoint
-from finlab.inference.features import SIZES
-from finlab.inference.weights import State, TrainedWeights
+from finlab.inference.weights import NetworkConfig, State, SurrogateConfig, TrainedWeights
 from finlab.training.networks.allocator_network import AllocatorNetwork
-from finlab.training.networks.surrogate import Surrogate, make_surrogate
+from finlab.training.networks.surrogate import Surrogate
 
 STATE_FILE = "resume.safetensors"
 """Weights, optimizer moments, running average of the weights and step; in its header, the run's settings."""
@@ -25,14 +23,16 @@ STATE_FILE = "resume.safetensors"
 
 def save_state(
     folder: Path,
-    step: int,
+    done: tuple[int, float],
     model: nn.Module,
     optimizer: torch.optim.Adam,
     average: dict[str, Tensor],
     settings: dict[str, Any],
 ) -> None:
-    """Write the state after `step` steps; a kill at any moment leaves the old or the new one whole."""
-    tensors = {"step": torch.tensor(step)} | {f"average.{name}": value for name, value in average.items()}
+    """Write the state after so many steps and seconds; a kill at any moment leaves the old or the new one
+    whole."""
+    tensors = {"done": torch.tensor(done, dtype=torch.float64)}
+    tensors |= {f"average.{name}": value for name, value in average.items()}
     for name, parameter in model.named_parameters():
         tensors[f"weight.{name}"] = parameter.detach()
         moments = optimizer.state.get(parameter, {})
@@ -49,15 +49,16 @@ def load_state(
     optimizer: torch.optim.Adam,
     average: dict[str, Tensor],
     settings: dict[str, Any],
-) -> int:
-    """Restore a run into `model`, `optimizer` and `average`; returns the number of steps already done.
+) -> tuple[int, float]:
+    """Restore a run into `model`, `optimizer` and `average`; returns the steps already done and their
+    seconds.
 
     Raises:
         DataError: the state was written with other settings.
     """
     path = folder / STATE_FILE
     if not path.exists():
-        return 0
+        return 0, 0.0
     with safe_open(path, "pt") as file:
         saved = json.loads((file.metadata() or {}).get("settings", "{}"))
         tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (not a mapping)
@@ -75,7 +76,8 @@ def load_state(
                 optimizer.state[parameter] = moments
         for name in average:
             average[name].copy_(tensors[f"average.{name}"])
-    return int(tensors["step"])
+    steps, seconds = tensors["done"].tolist()
+    return int(steps), seconds
 
 
 Module = TypeVar("Module", bound=nn.Module)
@@ -83,17 +85,16 @@ Module = TypeVar("Module", bound=nn.Module)
 
 def surrogate_of(weights: TrainedWeights) -> Surrogate:
     """The surrogate as a module, frozen."""
-    return _filled(make_surrogate(weights.surrogate_config), weights.surrogate)
+    return _filled(Surrogate(weights.surrogate_config or SurrogateConfig()), weights.surrogate)
 
 
 def network_of(weights: TrainedWeights) -> AllocatorNetwork:
-    """The allocator network as a module, frozen.
+    """The paper's network as a module, frozen.
 
     Raises:
-        CheckpointError: only the surrogate was trained.
+        CheckpointError: the checkpoint holds another, or none.
     """
-    sizes = weights.check_network()
-    return _filled(AllocatorNetwork(sizes, SIZES[sizes.features]), weights.network)
+    return _filled(AllocatorNetwork(weights.check_network(NetworkConfig)), weights.network)
 
 
 def state_of(tensors: Mapping[str, Tensor]) -> State:
@@ -102,9 +103,9 @@ def state_of(tensors: Mapping[str, Tensor]) -> State:
 
 
 def save_checkpoint(folder: Path, weights: TrainedWeights) -> TrainedWeights:
-    """Write a checkpoint folder, and answer what is in it; a distilled network beside it is left as it is."""
+    """Write a checkpoint folder, and answer what is in it."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, content in checkpoint_files(replace(weights, fast=None)).items():
+    for name, content in checkpoint_files(weights).items():
         (folder / name).write_bytes(content)
     return read_checkpoint(folder)
 

@@ -4,19 +4,17 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
 from torch import Tensor, nn
 
-from finlab.inference.learned_fin import REFERENCE
 from finlab.inference.normalization import Normalization
 from finlab.inference.weights import TrainedWeights
 from finlab.layout import FinModelSpec
 from finlab.physics import FinLaw, make_law
 from finlab.training.device import Share, shared_training
 from finlab.training.loop import Terms, plot_log, train
-from finlab.training.networks.surrogate import CoefficientSurrogate, Surrogate, make_surrogate
-from finlab.training.presets import get_preset
+from finlab.training.networks.surrogate import Surrogate
+from finlab.training.presets import PAPER_RECIPES, get_recipe
 from finlab.training.sampling import Batch, ForwardSampler
 from finlab.training.saving import save_checkpoint, state_of
 
@@ -24,9 +22,6 @@ TRAIN_SEED = 20_000
 """Added to the user's seed, so that no training stream equals one of evaluation."""
 NORMALIZATION_SAMPLES = 200_000
 """Samples with nominal limits over which the wrench statistics are taken."""
-COMMAND_RANGE = ((0.02, 0.85), (0.05, 3.2), (-np.pi, np.pi))
-"""Commands a coefficient surrogate learns: amplitude [rad], frequency [Hz], zero direction [rad]; a
-little wider than every limit of the splits."""
 
 
 def train_surrogate(
@@ -48,12 +43,12 @@ def train_surrogate(
         stop_after: stop (resumable) after so many steps.
         fin_model: fin model to learn; the default `drag` otherwise.
     """
-    recipe = get_preset(preset)
+    recipe = get_recipe(PAPER_RECIPES, preset)
     spec = fin_model or FinModelSpec()
     model, written = make_law(spec), {"type": spec.type, **dict(spec.parameters)}
     training = replace(recipe.surrogate_training, steps=steps or recipe.surrogate_training.steps)
     torch.manual_seed(seed)
-    surrogate = make_surrogate(recipe.surrogate)
+    surrogate = Surrogate(recipe.surrogate)
     normalization = measure_normalization(model, seed)
     identity: dict[str, Any] = {
         "preset": preset,
@@ -64,10 +59,7 @@ def train_surrogate(
     }
     with shared_training(training.batch_size) as share:
         surrogate.to(share.device)
-        if isinstance(surrogate, CoefficientSurrogate):
-            terms = _coefficient_terms(model, training.batch_size, seed, share)
-        else:
-            terms = _wrench_terms(model, training.batch_size, seed, normalization, share)
+        terms = _wrench_terms(model, training.batch_size, seed, normalization, share)
         weights = train(surrogate, terms, training, out, identity, stop_after=stop_after)
     surrogate.load_state_dict(weights, strict=True)
     surrogate.cpu().eval().requires_grad_(False)
@@ -94,45 +86,16 @@ def measure_normalization(model: FinLaw, seed: int) -> Normalization:
 
 
 def surrogate_metrics(surrogate: Surrogate, model: FinLaw, seed: int) -> dict[str, float]:
-    """Accuracy against the fin model on fresh samples, half of them with varied limits.
-
-    `relative_force_error` is RMS(F - F_plant) / RMS(F_plant) per fin and is known only where the
-    surrogate speaks of single fins; `wrench_error_norm` is the mean normalized wrench error.
-    """
+    """Mean normalized error of the wrench by the fin model, on fresh samples, half of them with varied
+    limits."""
     sampler = ForwardSampler(TRAIN_SEED + 7_000 + seed, 50_000, fin_model=model)
     batch = sampler.batch(0)
     std = measure_normalization(model, seed).std
     with torch.inference_mode():
         limits = (batch.lower, batch.upper, batch.mask)
         wrench = surrogate(batch.command, batch.position, batch.mounting_angle, *limits)
-        metrics = {
-            "wrench_error_norm": float(((wrench - batch.wrench) / torch.tensor(std)).norm(dim=-1).mean())
-        }
-        if isinstance(surrogate, CoefficientSurrogate):
-            command = batch.command[batch.mask]
-            truth = model.force(command)
-            rms = (surrogate.fin_force(command) - truth).square().mean().sqrt() / truth.square().mean().sqrt()
-            metrics["relative_force_error"] = float(rms)
-    return metrics
-
-
-def _coefficient_terms(model: FinLaw, batch_size: int, seed: int, share: Share) -> Terms:
-    """Mean squared error of force coefficients over single fins: the same relative weight for all forces."""
-    device = share.device
-    low, high = torch.tensor(COMMAND_RANGE, dtype=torch.float32, device=device).T
-    a0, f0 = REFERENCE
-    # Of a lone fin at the origin, shaft along x, the wrench's force is the force in the fin frame.
-    position, angle = torch.zeros(1, 3, device=device), torch.zeros(1, device=device)
-
-    def terms(net: nn.Module, step: int) -> dict[str, Tensor]:
-        generator = torch.Generator().manual_seed((TRAIN_SEED + seed) * 1_000_003 + step)
-        draw = torch.rand(batch_size, 3, generator=generator)[share.rows]
-        command = low + (high - low) * draw.to(device)
-        scale = (command[:, 0] * command[:, 1] / (a0 * f0)).square()[:, None]
-        force = net(command[:, None], position, angle, low, high)[:, :3]
-        return {"loss": ((force - model.force(command)) / scale).square().sum(-1).mean()}
-
-    return terms
+        error = ((wrench - batch.wrench) / torch.tensor(std)).norm(dim=-1)
+    return {"wrench_error_norm": float(error.mean())}
 
 
 def _wrench_terms(

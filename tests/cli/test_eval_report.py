@@ -30,7 +30,7 @@ def test_temperature(untrained_checkpoint: Path, tmp_path: Path, capsys: pytest.
 def test_training_goes_on_where_it_was(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    few = {name: CHANGES[name] for name in ("recipe", "paper_loss_per_fin")}
+    few = {name: CHANGES[name] for name in ("recipe", "one_component")}
     monkeypatch.setattr("finlab.evaluation.report.plan.CHANGES", few)
     sizes = ["--preset", "smoke", "--steps", "3", "--batch-size", "16", "--layouts", "1", "--targets", "2"]
     file = tmp_path / "rows.json"
@@ -49,7 +49,7 @@ def test_training_goes_on_where_it_was(
         ("temperature --candidates 0", "candidates: expected a number of at least 1, got 0"),
         ("temperature --split nowhere", "split: expected one of id, ood"),
         ("training --steps 0", "steps: expected a number of at least 1, got 0"),
-        ("training --preset nothing", "preset: expected one of default, paper, smoke, got 'nothing'"),
+        ("training --preset nothing", "preset: expected one of paper, smoke, got 'nothing'"),
         ("report -o README.md", "out: expected a folder, got the file README.md"),
         ("report -o somewhere --processes 0", "processes: expected a number of at least 1, got 0"),
         ("report -o somewhere --checkpoint missing/folder", "missing/folder"),

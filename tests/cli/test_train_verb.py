@@ -1,4 +1,4 @@
-"""`finlab train surrogate|allocator`: a few steps, then an allocation with the result."""
+"""`finlab train mdn|surrogate|allocator`: a few steps, then an allocation with the result."""
 
 import json
 import subprocess
@@ -28,7 +28,7 @@ SMOKE = ["--preset", "smoke", "--steps", "3"]
 def test_trains_both_and_allocates_with_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     surrogate, whole = str(tmp_path / "surrogate"), str(tmp_path / "whole")
     assert main(["train", "surrogate", "-o", surrogate, *SMOKE]) == 0
-    assert "surrogate relative_force_error" in capsys.readouterr().out
+    assert "surrogate wrench_error_norm" in capsys.readouterr().out
     assert main(["train", "allocator", "-o", whole, "--surrogate", surrogate, *SMOKE]) == 0
     assert f"{whole}: checkpoint whole, preset smoke, sha256 " in capsys.readouterr().out
     command = ["allocate", "A", "--wrench", "1", "0", "0", "0", "0", "0", "--checkpoint", whole, "--json"]
@@ -37,10 +37,24 @@ def test_trains_both_and_allocates_with_them(tmp_path: Path, capsys: pytest.Capt
     assert json.loads(capsys.readouterr().out)["checkpoint"] == "whole"
 
 
+def test_trains_the_network_over_forces_and_allocates_with_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = str(tmp_path / "mine")
+    assert main(["train", "mdn", "-o", folder, *SMOKE]) == 0
+    assert f"{folder}: checkpoint mine, preset smoke, sha256 " in capsys.readouterr().out
+    command = ["allocate", "A", "--wrench", "1", "0", "0", "0", "0", "0", "--checkpoint", folder, "--json"]
+    assert main([*command, "--method", "mdn"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["checkpoint"] == "mine" and answer["err_norm"] < 1e-4
+
+
 @pytest.mark.parametrize(
     ("argv", "message"),
     [
-        (["surrogate", "--preset", "magic"], "preset: expected one of default, paper, smoke"),
+        (["surrogate", "--preset", "magic"], "preset: expected one of paper, smoke"),
+        (["mdn", "--preset", "paper"], "preset: expected one of default, smoke, got 'paper'"),
+        (["mdn", "--minutes", "0"], "minutes: expected a number of at least 1, got 0"),
         (["surrogate", "--steps", "0"], "steps: expected a number of at least 1, got 0"),
         (
             ["allocator", "--surrogate", "nowhere/", "--batch-size", "-4"],
@@ -57,7 +71,7 @@ def test_refuses_in_one_sentence(
     assert message in err and len(err.splitlines()) == 1
 
 
-@pytest.mark.parametrize("verb", ["surrogate", "allocator --surrogate default", "fast"])
+@pytest.mark.parametrize("verb", ["surrogate", "allocator --surrogate paper", "mdn"])
 def test_says_what_to_install_where_torch_is_missing(verb: str, tmp_path: Path) -> None:
     command = [sys.executable, "-c", WITHOUT_TORCH, "train", *verb.split(), "-o", str(tmp_path / "out")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)

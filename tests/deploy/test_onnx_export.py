@@ -15,9 +15,10 @@ from finlab.cli import main
 from finlab.deploy.onnx_export import NETWORK, SURROGATE, onnx_files
 from finlab.errors import CheckpointError
 from finlab.inference.checkpoint import read_checkpoint
+from finlab.inference.force_network import NODE_SIZE, PAIR_SIZE, NumpyForceNetwork
 from finlab.inference.network import NumpyNetwork
 from finlab.inference.surrogate import surrogate_on
-from finlab.inference.weights import TrainedWeights
+from finlab.inference.weights import ForceNetworkConfig, NetworkConfig, TrainedWeights
 from finlab.layout import random_layout
 
 Array = NDArray[np.float32]
@@ -52,14 +53,28 @@ def test_network_of_the_paper(paper: TrainedWeights, n_fins: int) -> None:
     rng = np.random.default_rng(n_fins)
     features = rng.normal(size=(6, n_fins, 10)).astype(np.float32)
     target = rng.normal(size=(6, 6)).astype(np.float32)
-    sizes = paper.network_config
-    assert sizes is not None
-    limits = np.zeros((n_fins, 3)), np.ones((n_fins, 3))  # the raw features hold the limits
-    truth = NumpyNetwork(paper.network, sizes.heads, sizes.n_components)(features, target, *limits)
+    sizes = paper.check_network(NetworkConfig)
+    truth = NumpyNetwork(paper.network, sizes.heads, sizes.n_components)(features, target)
     weight, mean, std = run(onnx_files(paper)[NETWORK], features=features, target=target)
     np.testing.assert_allclose(weight, truth.weight, atol=2e-5)
     np.testing.assert_allclose(mean, truth.mean, rtol=1e-4, atol=2e-4)
     np.testing.assert_allclose(std, truth.std, rtol=2e-4)
+
+
+@pytest.mark.parametrize("shipped", [True, False])
+@pytest.mark.parametrize("n_fins", [1, 2, 5, 12])
+def test_network_over_forces(n_fins: int, shipped: bool, untrained_mdn: Path) -> None:
+    weights = read_checkpoint(checkpoint_path() if shipped else untrained_mdn)
+    sizes, rng = weights.check_network(ForceNetworkConfig), np.random.default_rng(n_fins)
+    nodes = rng.normal(size=(6, n_fins, NODE_SIZE)).astype(np.float32)
+    pairs = rng.normal(size=(6, n_fins, n_fins, PAIR_SIZE)).astype(np.float32)
+    truth = NumpyForceNetwork(weights.network, sizes.heads)(nodes, pairs)
+    files = onnx_files(weights)
+    assert set(files) == {NETWORK}
+    weight, mean, std = run(files[NETWORK], nodes=nodes, pairs=pairs)
+    np.testing.assert_allclose(weight, truth.weight, atol=2e-5)
+    np.testing.assert_allclose(std, truth.std, rtol=2e-4)
+    np.testing.assert_allclose(mean[..., 0] + 1j * mean[..., 1], truth.mean, atol=2e-4)
 
 
 @pytest.mark.parametrize("limits", ["nominal", "mixed"])

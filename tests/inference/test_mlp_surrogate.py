@@ -7,7 +7,7 @@ import torch
 from finlab.inference.surrogate import BLOCK, MlpFins
 from finlab.inference.weights import SurrogateConfig
 from finlab.layout import Layout, Limits, random_layout
-from finlab.training.networks.surrogate import MlpSurrogate, make_surrogate
+from finlab.training.networks.surrogate import Surrogate
 
 Array = np.ndarray
 
@@ -20,18 +20,17 @@ def robot() -> Layout:
     return layout.replace_fin(layout.names[0], limits=arc).replace_fin(layout.names[1], limits=stiff)
 
 
-def trained(*hidden: int) -> MlpSurrogate:
+def trained(*hidden: int) -> Surrogate:
     """A surrogate with random weights, none of which is without effect."""
     with torch.random.fork_rng():
         torch.manual_seed(3)
-        surrogate = make_surrogate(SurrogateConfig("mlp", hidden))
-        assert isinstance(surrogate, MlpSurrogate)
+        surrogate = Surrogate(SurrogateConfig(hidden))
         torch.nn.init.normal_(surrogate.affine.weight, std=0.1)
         torch.nn.init.normal_(surrogate.affine.bias, std=0.1)
     return surrogate.requires_grad_(False)
 
 
-def copy_of(surrogate: MlpSurrogate, robot: Layout) -> MlpFins:
+def copy_of(surrogate: Surrogate, robot: Layout) -> MlpFins:
     state = {key: value.numpy() for key, value in surrogate.state_dict().items()}
     return MlpFins(state, robot.position, robot.mounting_angle, robot.lower, robot.upper)
 

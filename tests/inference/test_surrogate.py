@@ -1,19 +1,19 @@
-"""A surrogate on a layout against the trained module, for both kinds."""
+"""The paper's surrogate on a layout against the trained module."""
 
 import numpy as np
 import pytest
 import torch
 
+from finlab.errors import CheckpointError
 from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.inference.surrogate import surrogate_on
 from finlab.layout import random_layout
 from finlab.training.saving import surrogate_of
 
 
-@pytest.mark.parametrize("name", ["default", "paper"])
 @pytest.mark.parametrize("seed", range(3))
-def test_wrenches_are_those_of_the_trained_one(name: str, seed: int) -> None:
-    weights = read_checkpoint(resolve_checkpoint(name))
+def test_wrenches_are_those_of_the_trained_one(seed: int) -> None:
+    weights = read_checkpoint(resolve_checkpoint("paper"))
     rng = np.random.default_rng(seed)
     robot = random_layout(rng, limits="varied")
     share = rng.random((4, 5, robot.n_fins, 3))
@@ -26,3 +26,9 @@ def test_wrenches_are_those_of_the_trained_one(name: str, seed: int) -> None:
     force, slopes = surrogate.fins.force_and_slopes(command[1])
     assert slopes.shape == (5, robot.n_fins, 3, 3)
     np.testing.assert_allclose(force, surrogate.fins.force(command[1]), atol=2e-5)
+
+
+def test_a_checkpoint_without_one_says_so() -> None:
+    weights = read_checkpoint(resolve_checkpoint("default"))
+    with pytest.raises(CheckpointError, match="'default' holds no surrogate; train one with"):
+        surrogate_on(random_layout(np.random.default_rng(0)), weights)

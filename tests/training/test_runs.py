@@ -4,22 +4,20 @@ import csv
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 import torch
 from safetensors.torch import load_file
 
 from finlab.errors import CheckpointError, DataError
 from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
-from finlab.inference.features import SIZES
-from finlab.inference.weights import TrainedWeights
+from finlab.inference.weights import NetworkConfig, TrainedWeights
 from finlab.layout import FinModelSpec
 from finlab.physics import make_law
 from finlab.training import train_allocator, train_surrogate
 from finlab.training.allocator import make_terms
 from finlab.training.networks.allocator_network import AllocatorNetwork
-from finlab.training.networks.surrogate import make_surrogate
-from finlab.training.presets import get_preset
+from finlab.training.networks.surrogate import Surrogate
+from finlab.training.presets import PAPER_RECIPES
 from finlab.training.saving import network_of
 from finlab.training.surrogate import surrogate_metrics
 
@@ -47,40 +45,35 @@ def same_weights(folder: Path, expected: Path) -> bool:
 
 def held_out_guidance(base: TrainedWeights, network: AllocatorNetwork) -> float:
     """Physics guidance on samples that no smoke run comes to see."""
-    recipe = get_preset("smoke")
-    training = replace(recipe.allocator_training, batch_size=1024)
+    training = replace(PAPER_RECIPES["smoke"].allocator_training, batch_size=1024)
     with torch.no_grad():
-        return float(
-            make_terms(base, recipe.network, training, 0, torch.device("cpu"))(network, 10_000)["guidance"]
-        )
+        return float(make_terms(base, training, 0, torch.device("cpu"))(network, 10_000)["guidance"])
 
 
 def test_the_surrogate_learns(smoke_surrogate) -> None:
     torch.manual_seed(0)
-    fresh = surrogate_metrics(make_surrogate(get_preset("smoke").surrogate), DRAG, seed=1)
+    fresh = surrogate_metrics(Surrogate(PAPER_RECIPES["smoke"].surrogate), DRAG, seed=1)
     learned = smoke_surrogate.checkpoint.metrics["surrogate"]
-    assert learned["relative_force_error"] < 0.95 * fresh["relative_force_error"]
     assert learned["wrench_error_norm"] < 0.95 * fresh["wrench_error_norm"]
     assert smoke_surrogate.checkpoint.network_config is None
 
 
 def test_the_allocator_learns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("finlab.training.loop.LOG_EVERY", 20)  # other tests log each step
-    base = read_checkpoint(resolve_checkpoint("default"))  # its surrogate knows what a fin can do
-    network = get_preset("smoke").network
+    base = read_checkpoint(resolve_checkpoint("paper"))  # its surrogate knows what a fin can do
+    network = PAPER_RECIPES["smoke"].network
     torch.manual_seed(0)
-    fresh = held_out_guidance(base, AllocatorNetwork(network, SIZES[network.features]))
-    run = train_allocator("smoke", tmp_path, surrogate=Path("default"), steps=100, learning_rate=3e-3)
+    fresh = held_out_guidance(base, AllocatorNetwork(network))
+    run = train_allocator("smoke", tmp_path, surrogate=Path("paper"), steps=100, learning_rate=3e-3)
     assert held_out_guidance(base, network_of(run)) < 0.6 * fresh
     with (tmp_path / "log.csv").open(newline="") as file:
-        loss = [float(row["loss"]) for row in csv.DictReader(file)]
-    # A batch with an arc that ends near zero, by which energies are divided, may cost thrice as much.
-    assert np.median(loss[-3:]) < 0.7 * loss[0]
+        imitation = [float(row["imitation"]) for row in csv.DictReader(file)]
+    assert imitation[-1] < imitation[0] - 1.0  # the loss itself grows with the weight of its guidance
 
 
 def test_the_log_has_a_column_for_each_term(smoke_surrogate, smoke_run) -> None:
     assert list(smoke_surrogate.log[0]) == FIXED
-    assert list(smoke_run.log[0]) == [*FIXED, "imitation", "entropy", "best_error", "guidance"]
+    assert list(smoke_run.log[0]) == [*FIXED, "imitation", "entropy", "guidance"]
     assert [row["step"] for row in smoke_run.log] == list(range(40))
     assert [row["samples"] for row in smoke_run.log] == [128 * (k + 1) for k in range(40)]
     seconds = [row["seconds"] for row in smoke_run.log]
@@ -88,8 +81,12 @@ def test_the_log_has_a_column_for_each_term(smoke_surrogate, smoke_run) -> None:
 
 
 def test_the_loss_is_the_weighted_sum_of_its_terms(smoke_run) -> None:
+    training = PAPER_RECIPES["smoke"].allocator_training
+    start, end = training.guidance_start, training.guidance
     for row in smoke_run.log:
-        expected = 0.01 * row["imitation"] + row["guidance"] + 0.003 * row["entropy"]
+        ramp = min(1.0, row["step"] / (training.ramp * training.steps))
+        beta = start + ramp * (end - start)
+        expected = row["imitation"] + beta * row["guidance"] + training.entropy * row["entropy"]
         assert row["loss"] == pytest.approx(expected, rel=1e-5)
 
 
@@ -195,11 +192,10 @@ def test_refuses_a_missing_surrogate(tmp_path: Path) -> None:
 
 
 def test_the_paper_s_recipe_runs(fewer_samples: None, tmp_path: Path) -> None:
-    """Raw features, a mixture per fin and guidance through samples: the other side of every switch."""
     surrogate = train_surrogate("paper", tmp_path / "surrogate", steps=2)
     assert surrogate.metrics["surrogate"].keys() == {"wrench_error_norm"}
     paper = train_allocator(
         "paper", tmp_path / "paper", surrogate=tmp_path / "surrogate", steps=2, batch_size=32
     )
-    assert not paper.check_network().joint
+    assert paper.check_network(NetworkConfig) == PAPER_RECIPES["paper"].network
     assert (tmp_path / "paper" / "curves.png").exists()

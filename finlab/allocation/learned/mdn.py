@@ -1,7 +1,9 @@
-"""Method `mdn`: a mixture density network proposes, and each proposal is searched and refined.
+"""Method `mdn`: a mixture density network proposes ways to deliver a wrench, and each is searched to its end.
 
-The paper's idea with exact physics behind it: the components of the mixture stand for ways to deliver a
-wrench; the best candidate of each starts a search of its own, and the fins' own laws rank and refine.
+The paper's idea with exact physics behind it. The network tells a joint mixture over the planar forces of all
+fins; its components stand for different ways. Each proposal is where a search in force space of its own
+begins, with the fins' own laws, and so is each answer's name. What no component stands for is not found: that
+is what the method is compared for. The answers are exact because of the search, not because of the network.
 """
 
 from functools import lru_cache
@@ -11,16 +13,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.judging import costs
-from finlab.allocation.learned.proposal import Proposal, predict, propose
+from finlab.allocation.learned.force_features import RobotView, robot_view, see
+from finlab.allocation.learned.proposal import Proposal, propose, shares
 from finlab.allocation.learned.settings import MdnSettings
+from finlab.allocation.search.pipeline import Pipeline
 from finlab.allocation.search.prepared import Prepared
 from finlab.allocation.search.refined_candidates import FallbackForces, RefinedCandidates, nearest_forces
 from finlab.allocation.search.search_allocator import CHUNK, SearchAllocator
 from finlab.allocation.solution import Candidates, Insight, Solution
-from finlab.errors import CheckpointError
-from finlab.inference.features import Geometry, fin_frame_features, geometry
-from finlab.inference.network import NumpyNetwork
-from finlab.inference.weights import TrainedWeights
+from finlab.forces.force_space import polar, realize
+from finlab.inference.force_network import NumpyForceNetwork
+from finlab.inference.weights import ForceNetworkConfig, TrainedWeights
 from finlab.layout import Layout
 
 Array = NDArray[Any]
@@ -45,33 +48,17 @@ class MdnAllocator(SearchAllocator):
             AllocationError: settings that leave nothing to answer with.
             CheckpointError: the checkpoint's network is of another kind.
         """
-        sizes = weights.check_network()
-        if not sizes.joint:
-            raise CheckpointError(f"checkpoint {weights.name!r}: method `mdn` needs a joint-mixture network")
+        sizes = weights.check_network(ForceNetworkConfig)
         super().__init__(weights.normalization, **options)
         self.weights, self.checkpoint = weights, weights.name
-        self.network = NumpyNetwork(weights.network, sizes.heads, sizes.n_components)
-        self._geometry = lru_cache(maxsize=128)(self._place)
-
-    def _place(self, layout: Layout) -> Geometry:
-        place = layout.position[None], layout.mounting_angle[None], layout.lower[None], layout.upper[None]
-        return geometry(*place, self.normalization.std)
+        self.network = NumpyForceNetwork(weights.network, sizes.heads)
+        self._view = lru_cache(maxsize=128)(_view)
 
     def _propose(self, prepared: Prepared, targets: Array, seed: int) -> Proposal:
-        """The network's raw candidates for targets (N, 6)."""
-        std = self.normalization.std
-        target = targets / std
-        centred = target - self.normalization.mean / std
-        mixture = predict(self.network, self._geometry(prepared.plant.layout), prepared, centred)
+        """The network's proposals for targets (N, 6)."""
+        view = self._view(self.pipeline, prepared.plant.layout)
         drawn = self.settings.n_candidates, self.settings.temperature, seed
-        return propose(mixture, prepared, target, drawn)
-
-    def _seeds(self, proposal: Proposal) -> tuple[Array, NDArray[np.int64]]:
-        """Sizes of forces (N, S, n) of the best candidate of each component, and their components (N, S)."""
-        score = proposal.error * proposal.error + self.settings.gamma * proposal.cost
-        chosen = best_of_each_component(proposal.component, score, self.settings.n_seeds)
-        n = proposal.size.shape[-1]
-        return proposal.size.reshape(-1, n).take(chosen, axis=0), proposal.component.reshape(-1).take(chosen)
+        return propose(self.network, view, targets / self.normalization.std, *drawn)
 
     def _solve(
         self,
@@ -87,53 +74,51 @@ class MdnAllocator(SearchAllocator):
 
             def solve(start: int) -> RefinedCandidates:
                 some = targets[start : start + CHUNK]
-                seeds, _ = self._seeds(self._propose(prepared, some, seed + start))
+                seeds = self._propose(prepared, some, seed + start).force
                 return self.pipeline.solve(prepared, some, seeds=seeds, fallback=fallback)
 
             return self._many(solve, len(targets))
         with self._one_thread():
             proposal = self._propose(prepared, targets, seed)
-            seeds, component = self._seeds(proposal)
-            refined = self.pipeline.solve(prepared, targets, previous, seeds=seeds, fallback=fallback)
-        std = self.normalization.std
-        names = tuple(f"component {k + 1}" for k in component[0].tolist())
+            refined = self.pipeline.solve(
+                prepared, targets, previous, seeds=proposal.force, fallback=fallback
+            )
+        names = _names(proposal)
+        if previous is not None:  # its own way is what the search begins with
+            names = ("the way it moves now", *names)
         return self._single(prepared, targets, refined, names)._replace(
-            samples=lambda: _samples(proposal, std, layout)
+            samples=lambda: _samples(prepared, proposal, targets / self.normalization.std)
         )
 
     def insight(self, layout: Layout, wrench: ArrayLike) -> Insight:
         """What the network makes of a target (6,) [N, N m] for a layout whose fins all work."""
-        prepared, place = self.pipeline.prepare(layout), self._geometry(layout)
-        centred = (np.asarray(wrench, dtype=float)[None] - self.normalization.mean) / self.normalization.std
-        mixture = predict(self.network, place, prepared, centred)
-        features = fin_frame_features(place, centred).astype(np.float32)
-        arrays = (mixture.weight, mixture.mean, mixture.std, self.network.attention(features))
-        return Insight(*(np.asarray(values[0], dtype=float) for values in arrays))
+        view = self._view(self.pipeline, layout)
+        seen = see(view, np.asarray(wrench, dtype=float)[None] / self.normalization.std)
+        mixture = self.network(seen.nodes, seen.pairs)
+        mean = shares(mixture.mean[0]) * seen.frame[0]
+        parts = np.stack([mean.real, mean.imag], axis=-1).swapaxes(0, 1)
+        attention = self.network.attention(seen.nodes, seen.pairs)[0]
+        arrays = (mixture.weight[0], parts, mixture.std[0].T, attention)
+        return Insight(*(np.asarray(values, dtype=float) for values in arrays))
 
 
-def best_of_each_component(component: NDArray[np.int64], score: Array, n_seeds: int) -> NDArray[np.int64]:
-    """The best candidates (N, n_seeds) of N rows of K, at most one from each mixture component; counted
-    through all rows.
-
-    At low temperature the samples of one component lie close together and would all descend to the
-    same allocation.
-    """
-    rows, k = score.shape
-    m = int(component.max()) + 1
-    place = np.arange(rows)[:, None]
-    worst_first = (-score).argsort(axis=1)
-    worst_first += place * k
-    best = np.zeros(rows * m, dtype=np.int64)
-    # Later assignments win, so the best candidate of each component is what stays.
-    best[component.take(worst_first) + place * m] = worst_first
-    order = score.take(best.reshape(rows, m)).argsort(axis=1)[:, :n_seeds]
-    order += place * m
-    return best.take(order)
+def _view(pipeline: Pipeline, layout: Layout) -> RobotView:
+    """What the network sees of a layout under a pipeline's objective."""
+    return robot_view(pipeline.prepare(layout).planar, not pipeline.objective.convex)
 
 
-def _samples(proposal: Proposal, std: Array, layout: Layout) -> Candidates:
-    """The raw candidates for a single target."""
-    order = proposal.error[0].argsort()
-    command, component, wrench, error, _, _ = (values[0].take(order, axis=0) for values in proposal)
-    names = tuple(f"component {k + 1}" for k in component.tolist())
-    return Candidates(command, wrench * std, error, *costs(layout, command), names)
+def _names(proposal: Proposal) -> tuple[str, ...]:
+    """What the proposals for a single target are called by the components that they came from."""
+    return tuple(f"component {k + 1}" for k in proposal.component[0].tolist())
+
+
+def _samples(prepared: Prepared, proposal: Proposal, target: Array) -> Candidates:
+    """The proposals for a single target (1, 6), normalized, as the cheapest commands with their forces."""
+    command, _ = realize(prepared.planar, polar(prepared.planar, proposal.force[0].swapaxes(1, 2)))
+    command = prepared.commands.clamp(command)
+    wrench = prepared.commands.wrench(command)
+    error = np.linalg.norm(wrench - target, axis=-1)
+    layout = prepared.plant.layout
+    return Candidates(
+        command, prepared.plant.wrench(command), error, *costs(layout, command), _names(proposal)
+    )

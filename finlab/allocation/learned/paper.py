@@ -12,13 +12,13 @@ from finlab.allocation.judging import costs
 from finlab.allocation.learned.settings import STEPS, PaperSettings
 from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.solution import Candidates, Solution
-from finlab.inference.features import Geometry, fin_frame_features, geometry, raw_features
+from finlab.inference.features import raw_features
 from finlab.inference.mixture import MixtureArrays
 from finlab.inference.network import NumpyNetwork
 from finlab.inference.normalization import clamp_to_limits, to_command, to_normalized
 from finlab.inference.surrogate import LayoutSurrogate, surrogate_on
 from finlab.inference.threads import single_threaded_products
-from finlab.inference.weights import TrainedWeights
+from finlab.inference.weights import NetworkConfig, TrainedWeights
 from finlab.layout import FinModelSpec, Layout
 from finlab.layout.angles import is_full_turn
 from finlab.physics.energy import EnergyMeter
@@ -46,8 +46,8 @@ class _Robot(NamedTuple):
     """The surrogate in normalized wrenches, and the limits."""
     limits: tuple[Array, Array]
     """Lower and upper limits (n, 3), in single precision as all else here."""
-    features: Array | Geometry
-    """The network's raw features (1, n, 10), or what the fin-frame features are made of."""
+    features: Array
+    """The network's node features (1, n, 10)."""
     energy: EnergyMeter
     """J_en."""
 
@@ -59,13 +59,13 @@ class PaperAllocator(Allocator):
     weights: TrainedWeights
 
     def __init__(self, weights: TrainedWeights, **settings: Any) -> None:
-        """Make it from trained weights of any preset; settings are fields of `PaperSettings`.
+        """Make it from trained weights; settings are fields of `PaperSettings`.
 
         Raises:
             AllocationError: a setting is unknown or leaves nothing to answer with.
-            CheckpointError: there is no allocator network.
+            CheckpointError: the checkpoint's network is of another kind.
         """
-        self.weights, self.config = weights, weights.check_network()
+        self.weights, self.config = weights, weights.check_network(NetworkConfig)
         self.checkpoint, self.normalization = weights.name, weights.normalization
         self.fin_model = FinModelSpec.from_values(weights.fin_model)
         self.settings = PaperSettings(**settings)
@@ -104,7 +104,7 @@ class PaperAllocator(Allocator):
         by_likelihood = settings.ranking == "nll" and not settings.mean_only
         if by_likelihood:
             x = to_normalized(sampled, *robot.limits)
-            score = -mixture.log_likelihood(x, robot.problem.wraps)
+            score = -mixture.log_likelihood(x)
         else:
             score = self._score(robot, sampled, wanted)
         chosen = _take(sampled, np.argsort(score, axis=1, kind="stable")[:, : settings.n_refined])
@@ -125,19 +125,13 @@ class PaperAllocator(Allocator):
         turns_fully = np.asarray(is_full_turn(upper[:, 2] - lower[:, 2]))
         problem = CommandProblem(surrogate.fins, surrogate.columns / std, lower, upper, turns_fully)
         place = layout.position[None], layout.mounting_angle[None], lower[None], upper[None]
-        raw = self.config.features == "raw"
-        features = raw_features(*place) if raw else geometry(*place, std)
         limits = lower.astype(np.float32), upper.astype(np.float32)
-        return _Robot(layout, surrogate, problem, limits, features, EnergyMeter(upper))
+        return _Robot(layout, surrogate, problem, limits, raw_features(*place), EnergyMeter(upper))
 
     def _predict(self, robot: _Robot, centred: Array) -> MixtureArrays:
         """The network's mixture for normalized, centred targets (N, 6)."""
-        if isinstance(robot.features, Geometry):
-            x = fin_frame_features(robot.features, centred)
-        else:
-            x = np.repeat(robot.features, len(centred), axis=0)
-        limits = robot.problem.lower, robot.problem.upper
-        return self.network(x.astype(np.float32), centred.astype(np.float32), *limits)
+        x = np.repeat(robot.features, len(centred), axis=0)
+        return self.network(x.astype(np.float32), centred.astype(np.float32))
 
     def _draw(self, mixture: MixtureArrays, seed: int) -> Array:
         """Candidates (N, K, n, 3) in normalized coordinates."""
@@ -147,7 +141,7 @@ class PaperAllocator(Allocator):
             return mixture.expected()[:, None]
         if self.settings.warm_start == "random":
             return np.float32(2.0) * rng.random((rows, k, n, 3), dtype=np.float32) - np.float32(1.0)
-        uniform = rng.random((rows, k) if mixture.joint else (rows, n, k), dtype=np.float32)
+        uniform = rng.random((rows, n, k), dtype=np.float32)
         normal = rng.standard_normal((rows, n, k, 3), dtype=np.float32)
         return mixture.tempered(self.settings.temperature, uniform, normal)
 

@@ -1,4 +1,4 @@
-"""What the network proposes: K candidate commands, drawn from its mixture, scored by the fins' own laws."""
+"""What the network of method `mdn` proposes: K ways to share a target among the fins, as planar forces."""
 
 import math
 from functools import lru_cache
@@ -7,103 +7,72 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.search.prepared import Prepared
-from finlab.inference.features import Geometry, fin_frame_features
-from finlab.inference.mixture import MixtureArrays
-from finlab.inference.network import NumpyNetwork
+from finlab.allocation.learned.force_features import RobotView, see
+from finlab.inference.force_network import ForceMixture, NumpyForceNetwork
 
 Array = NDArray[Any]
 
 
 class Proposal(NamedTuple):
-    """K candidates for each of N targets, inside the limits."""
+    """K proposals for each of N targets, none of them exact yet."""
 
-    command: Array
-    """(N, K, n, 3)."""
-    component: NDArray[np.int64]
-    """Mixture component of each candidate (N, K)."""
-    wrench: Array
-    """Normalized wrench (N, K, 6)."""
-    error: Array
-    """Normalized error (N, K)."""
-    size: Array
-    """Planar force of each fin (N, K, n) [N]."""
-    cost: Array
-    """(N, K)."""
-
-
-def predict(network: NumpyNetwork, place: Geometry, prepared: Prepared, centred: Array) -> MixtureArrays:
-    """The network's mixture for normalized, centred targets (N, 6)."""
-    x = fin_frame_features(place, centred).astype(np.float32)
-    return network(x, centred.astype(np.float32), prepared.plant.lower, prepared.plant.upper)
-
-
-def sample(
-    mixture: MixtureArrays, n_samples: int, temperature: float, seed: int
-) -> tuple[Array, NDArray[np.int64]]:
-    """Normalized commands (N, K, n, 3) and their components (N, K).
-
-    The first M candidates are the components' means. The rest are drawn by the mixture's weights, with
-    the variance of each Gaussian times T. Weights are not sharpened by T: the best component is there
-    anyway, and other modes are what a user wants to compare.
-    """
-    rows, n, m, _ = mixture.mean.shape
-    kept = min(m, n_samples)
-    means = mixture.mean.swapaxes(1, 2)  # (N, M, n, 3)
-    components = np.empty((rows, n_samples), dtype=np.int64)
-    commands = np.empty((rows, n_samples, n, 3), dtype=np.float32)
-    components[:, :kept] = np.arange(kept)
-    commands[:, :kept] = means[:, :kept]
-    extra = n_samples - kept
-    if extra <= 0:
-        return commands, components
-    raw, normal = draws_of_one(seed, extra, n) if rows == 1 else _draws(seed, rows, extra, n)
-    cumulative = mixture.weight.cumsum(1)
-    draw = raw * cumulative[:, None, -1:]
-    drawn = np.add.reduce(draw > cumulative[:, None, :-1], axis=-1, out=components[:, kept:])
-    place = drawn + np.arange(0, rows * m, m)[:, None]
-    noise = commands[:, kept:]
-    np.multiply(normal, mixture.std.swapaxes(1, 2).reshape(rows * m, n, 3).take(place, axis=0), out=noise)
-    noise *= np.float32(math.sqrt(temperature))
-    noise += means.reshape(rows * m, n, 3).take(place, axis=0)
-    return commands, components
-
-
-def _draws(seed: int, rows: int, extra: int, n: int) -> tuple[Array, Array]:
-    """Uniform (rows, extra, 1) and normal (rows, extra, n, 3) random numbers of a seed."""
-    rng = np.random.default_rng(seed)
-    uniform = rng.random((rows, extra, 1), dtype=np.float32)
-    return uniform, rng.standard_normal((rows, extra, n, 3), dtype=np.float32)
-
-
-@lru_cache(maxsize=64)
-def draws_of_one(seed: int, extra: int, n: int) -> tuple[Array, Array]:
-    """The same for a single target, cached: a control loop uses one seed for every tick."""
-    uniform, normal = _draws(seed, 1, extra, n)
-    uniform.setflags(write=False)
-    normal.setflags(write=False)
-    return uniform, normal
+    force: Array
+    """Planar forces (N, K, 2, n) [N], horizontal and vertical."""
+    component: NDArray[np.intp]
+    """Mixture component of each (N, K)."""
 
 
 def propose(
-    mixture: MixtureArrays, prepared: Prepared, target: Array, drawn: tuple[int, float, int]
+    network: NumpyForceNetwork,
+    view: RobotView,
+    target: Array,
+    n_candidates: int,
+    temperature: float,
+    seed: int,
 ) -> Proposal:
-    """Sample, clamp and score.
+    """K proposals for normalized targets (N, 6) on one robot.
 
-    Args:
-        mixture: what the network predicts for N targets.
-        prepared: the layout.
-        target: normalized targets (N, 6).
-        drawn: number K of candidates, temperature, seed of the draw.
+    The components' means come first, by falling weight. Where K exceeds their number M, the rest are drawn by
+    the components' weights, with variances times the temperature.
     """
-    x, component = sample(mixture, *drawn)
-    plant, problem = prepared.plant, prepared.commands
-    command = problem.clamp_in_place(plant.lower + 0.5 * (x + 1.0) * plant.width)
-    rows, k, n, _ = command.shape
-    force = plant.force(command)
-    wrench = force.reshape(rows * k, 3 * n).dot(problem.columns.reshape(3 * n, 6)).reshape(rows, k, 6)
-    missing = wrench - target[:, None]
-    error = np.sqrt(np.einsum("rki,rki->rk", missing, missing))
-    size = np.hypot(force[..., 1], force[..., 2])
-    cost = prepared.cost(command.reshape(rows * k, n, 3)).reshape(rows, k)
-    return Proposal(command, component, wrench, error, size, cost)
+    seen = see(view, target)
+    mixture = network(seen.nodes, seen.pairs)
+    component, root = _drawn(mixture, n_candidates, temperature, seed)
+    force = shares(root) * (seen.frame * view.largest)[:, None]
+    return Proposal(np.stack([force.real, force.imag], axis=2), component)
+
+
+def shares(root: Array) -> Array:
+    """Shares of the largest forces, none above one, from what the mixture tells: their roots."""
+    size = np.abs(root)
+    return np.asarray(root * np.minimum(size, 1.0 / np.maximum(size, 1e-9)))
+
+
+def _drawn(
+    mixture: ForceMixture, count: int, temperature: float, seed: int
+) -> tuple[NDArray[np.intp], Array]:
+    """Components (N, K) and roots of shares (N, K, n), complex."""
+    rows, m, n = mixture.mean.shape
+    place = np.arange(rows)[:, None]
+    component = np.argsort(-mixture.weight, axis=1)[:, :count]
+    mean = mixture.mean[place, component]
+    if count <= m:
+        return component, mean
+    uniform, normal = _draws(seed, rows, count - m, n)
+    cumulative = mixture.weight.cumsum(1)
+    more = (uniform * cumulative[:, None, -1:] > cumulative[:, None, :-1]).sum(-1)
+    drawn = mixture.mean[place, more] + math.sqrt(temperature) * mixture.std[place, more] * normal
+    return np.concatenate([component, more], axis=1), np.concatenate([mean, drawn], axis=1)
+
+
+@lru_cache(maxsize=16)
+def _draws(seed: int, rows: int, count: int, n: int) -> tuple[Array, Array]:
+    """Uniform (rows, count, 1) and complex normal (rows, count, n) random numbers of a seed, kept: a control
+    loop uses one seed for every tick."""
+    rng = np.random.default_rng(seed)
+    uniform = rng.random((rows, count, 1), dtype=np.float32)
+    parts = rng.standard_normal((rows, count, n, 2), dtype=np.float32)
+    normal = parts[..., 0] + 1j * parts[..., 1]
+    for array in (uniform, normal):
+        array.setflags(write=False)
+    return uniform, normal

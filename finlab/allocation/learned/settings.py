@@ -6,29 +6,27 @@ A test holds the typed options against the settings.
 from dataclasses import dataclass
 from typing import TypedDict
 
+import numpy as np
+
 from finlab.allocation.search.settings import SearchOptions, Settings
 from finlab.errors import AllocationError
 
 
 @dataclass(frozen=True)
 class MdnSettings(Settings):
-    """How many candidates the mixture offers, and how they are searched and refined."""
+    """How many ways the mixture proposes; each of them is searched."""
 
-    n_candidates: int = 64
-    """Number K of candidates drawn from the mixture."""
-    temperature: float = 0.02
-    """T of the sampling; 0.02 in the paper."""
-    gamma: float = 1e-2
-    """Weight of the energy in the ranking J = J_norm + gamma J_en."""
-    n_seeds: int = 6
-    """Candidates that enter the search."""
+    n_candidates: int = 8
+    """Number K of proposals: the components' means by falling weight, then samples of the mixture."""
+    temperature: float = 1.0
+    """What the variances of these samples are multiplied by; 1 draws from the mixture itself."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.n_candidates < 1 or self.n_seeds < 1 or not self.temperature >= 0.0:
+        if self.n_candidates < 1 or not 0.0 <= self.temperature < np.inf:
             raise AllocationError(
-                "method 'mdn' needs at least one candidate and one seed and a temperature from 0, got "
-                f"n_candidates={self.n_candidates}, n_seeds={self.n_seeds}, temperature={self.temperature}"
+                "method 'mdn' needs at least one candidate and a temperature from 0, got "
+                f"n_candidates={self.n_candidates}, temperature={self.temperature}"
             )
 
 
@@ -85,8 +83,6 @@ class MdnOptions(SearchOptions, total=False):
 
     n_candidates: int
     temperature: float
-    gamma: float
-    n_seeds: int
 
 
 class PaperOptions(TypedDict, total=False):

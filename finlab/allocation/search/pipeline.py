@@ -28,7 +28,7 @@ from finlab.allocation.search.refined_candidates import (
     refine_missed,
 )
 from finlab.allocation.search.settings import Settings
-from finlab.allocation.search.turn_limits import TURNS, force_sizes, limit_turn, unwrap_to_arc
+from finlab.allocation.search.turn_limits import TURNS, limit_turn, planar_force, unwrap_to_arc
 from finlab.allocation.search.weighted_sum import minimize_weighted_sum
 from finlab.errors import AllocationError
 from finlab.forces import force_space
@@ -119,7 +119,8 @@ class Pipeline:
             prepared: the layout.
             targets: desired wrenches (N, 6).
             previous: command (n, 3) of the previous tick, for a single target.
-            seeds: sizes of forces (N, S, n) [N] to start from, by default those of the layout.
+            seeds: sizes of forces (N, S, n) or planar forces (N, S, 2, n) [N] to start from, by default those
+                of the layout.
             fallback: where to start from when targets were missed; None from it ends their search.
         """
         target = targets / self.std
@@ -177,7 +178,8 @@ class Pipeline:
         """
         free = self._descend(prepared, target, seeds, fallback)
         aim = free.command[0, 0, :, 2]
-        kept = force_sizes(prepared, previous)
+        force = planar_force(prepared, previous)
+        kept = force if seeds.ndim == 4 else np.hypot(*force)
         seeds = np.concatenate([kept[None, None], seeds], axis=1)
         near = limit_turn(prepared, previous, aim, TURNS[0])
         candidates = self._descend(near, target, seeds, fallback, known=free.command[0])
@@ -195,7 +197,8 @@ class Pipeline:
                 break
             near = limit_turn(prepared, previous, aim, width)
             candidates = self._descend(near, target, seeds, fallback, known=free.command[0])
-        return candidates
+        # The first of these seeds was none of those that were given.
+        return candidates._replace(origin=np.maximum(candidates.origin - 1, -1))
 
     def _trade_error_for_energy(
         self, prepared: Prepared, target: Array, candidates: RefinedCandidates, previous: Array | None
@@ -224,7 +227,7 @@ class Pipeline:
         fallback: FallbackForces,
         known: Array | None = None,
     ) -> RefinedCandidates:
-        """Search from seeds (N, S, n), refine, and go on where that did not reach the target.
+        """Search from seeds, refine, and go on where that did not reach the target.
 
         From tick to tick, `known` are commands (P, n, 3) that answer the single target whatever the turns:
         the search in narrow arcs may miss them where they are within these.
@@ -254,17 +257,17 @@ class Pipeline:
         steps: int | None = None,
         works: Array | None = None,
     ) -> tuple[Array, NDArray[np.intp]]:
-        """Cheapest commands (N, P, n, 3) reached from seeds (N, S, n), and whose seeds they are (N, P).
+        """Cheapest commands (N, P, n, 3) reached from seeds, and whose seeds they are (N, P).
 
         With `keep_mode`, the first seed is how the robot moves now; what it leads to stays first.
         """
-        rows, n_seeds, n = seeds.shape
+        (rows, n_seeds), n = seeds.shape[:2], seeds.shape[-1]
         flat = target if rows == 1 else np.repeat(target, n_seeds, axis=0)
         usual = SEARCH.few_fins_steps if n < 6 else SEARCH.many_fins_steps
         steps = (
             steps or self.settings.search_steps or (SEARCH.convex_steps if self.objective.convex else usual)
         )
-        planar = force_space.descend(prepared.planar, flat, seeds.reshape(-1, n), steps, works)
+        planar = force_space.descend(prepared.planar, flat, seeds.reshape(-1, *seeds.shape[2:]), steps, works)
         rests = not self.objective.convex
         command, cost = force_space.realize(prepared.planar, planar, rests)
         if n_seeds == 1 and not rests:

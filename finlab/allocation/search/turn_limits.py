@@ -64,9 +64,8 @@ def unwrap_to_arc(near: Prepared, command: Array) -> Array:
     return turned
 
 
-def force_sizes(prepared: Prepared, command: Array) -> Array:
-    """Sizes (n,) [N] of the planar forces of a command (n, 3); NaN commands count as rest."""
+def planar_force(prepared: Prepared, command: Array) -> Array:
+    """Planar forces (2, n) [N] of a command (n, 3), horizontal and vertical; NaN commands count as rest."""
     problem = prepared.commands
     safe = np.where(np.isfinite(command), command, problem.lower)
-    force = prepared.plant.force(problem.clamp(safe))
-    return np.asarray(np.hypot(force[:, 1], force[:, 2]))
+    return np.asarray(prepared.plant.force(problem.clamp(safe))[:, 1:].T)

@@ -1,8 +1,9 @@
-"""What each part of the training brings: small trainings on equal budgets, one thing changed at a time."""
+"""What each part of the paper's training brings: small trainings on equal budgets, one thing changed at a
+time."""
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.evaluation.statistics.records import Columns, columns_of_records
 from finlab.evaluation.statistics.tables import Row, text_table
-from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
+from finlab.inference.checkpoint import resolve_checkpoint
 
 LM_STEPS = 4
 """Levenberg-Marquardt steps after which the refined error is taken."""
@@ -30,37 +31,15 @@ class Change:
     """Fields of `AllocatorTraining`."""
     network: dict[str, Any] = field(default_factory=dict)
     """Fields of `NetworkConfig`."""
-    surrogate: str = "default"
-    """Shipped checkpoint whose surrogate guides the training."""
 
 
-PAPER_LOSS: dict[str, Any] = {
-    "imitation": 1.0,
-    "imitate": "all",
-    "guide": "samples",
-    "guidance_start": 0.01,
-    "ramp": 0.5,
-    "entropy": 0.01,
-}
-"""The terms as the paper prints them; the recipe's guidance of modes needs a joint mixture."""
 CHANGES = {
-    "recipe": Change("the recipe of the shipped network, at this budget"),
-    "no_guidance": Change(
-        "imitation alone, no physics guidance",
-        {"guidance": 0.0, "guidance_start": 0.0, "imitation": 1.0, "imitate": "all"},
-    ),
-    "paper_loss": Change("the paper's loss: imitation, ramped guidance of one sample, entropy", PAPER_LOSS),
-    "paper_loss_per_fin": Change(
-        "the paper's loss, and one mixture per fin as in the paper instead of a joint one",
-        PAPER_LOSS,
-        {"joint": False},
-    ),
-    "ramped": Change("guidance ramped up over half the steps", {"guidance_start": 0.01, "ramp": 0.5}),
+    "recipe": Change("the recipe of the paper's network, at this budget"),
+    "no_guidance": Change("imitation alone, no physics guidance", {"guidance": 0.0, "guidance_start": 0.0}),
+    "unramped": Change("guidance in full from the first step", {"guidance_start": 1.0}),
     "no_entropy": Change("no entropy term", {"entropy": 0.0}),
-    "no_imitation": Change("no imitation term", {"imitation": 0.0}),
-    "no_energy": Change("no energy in the guidance", {"energy": 0.0}),
-    "raw_features": Change("the paper's ten node features", network={"features": "raw"}),
-    "mlp_surrogate": Change("guided through the paper's surrogate (perceptron)", surrogate="paper"),
+    "nominal_limits": Change("every layout with nominal limits", {"varied_limits": 0.0}),
+    "one_component": Change("one Gaussian per fin instead of a mixture", network={"n_components": 1}),
 }
 """Name -> change; the first one changes nothing."""
 
@@ -72,7 +51,8 @@ def train_and_run(
 
     Columns: those of `Records` for the best of 64 raw candidates by the surrogate, `refined_err_norm` and
     `refined_energy` after a few Levenberg-Marquardt steps, and `train_s`, the seconds of training. All are
-    scored by the plant; in all of them the surrogate of the shipped checkpoint ranks and refines.
+    scored by the plant; in all of them the surrogate of the shipped checkpoint `paper` guides, ranks and
+    refines.
 
     Args:
         name: one of `CHANGES`.
@@ -90,7 +70,7 @@ def train_and_run(
     trained = train_allocator(
         preset,
         folder,
-        surrogate=resolve_checkpoint(change.surrogate),
+        surrogate=resolve_checkpoint("paper"),
         seed=seed,
         network=change.network,
         steps=steps,
@@ -98,10 +78,8 @@ def train_and_run(
         **change.training,
     )
     train_s = time.perf_counter() - start
-    physics = read_checkpoint(resolve_checkpoint("default"))
-    weights = replace(trained, surrogate=physics.surrogate, surrogate_config=physics.surrogate_config)
-    raw = run_method(PaperAllocator(weights, refinement="none"), cases, seed=seed)
-    few_steps = PaperAllocator(weights, refinement="levenberg-marquardt", n_steps=LM_STEPS)
+    raw = run_method(PaperAllocator(trained, refinement="none"), cases, seed=seed)
+    few_steps = PaperAllocator(trained, refinement="levenberg-marquardt", n_steps=LM_STEPS)
     refined = run_method(few_steps, cases, seed=seed)
     after = {"refined_err_norm": refined.err_norm, "refined_energy": refined.energy}
     return columns_of_records(raw) | after | {"train_s": np.array(train_s)}

@@ -157,7 +157,7 @@ def training_jobs(settings: dict[str, Any], folder: Path) -> dict[str, Job]:
         settings: `preset`, `steps`, `batch_size`, `layouts`, `targets` and `seed`.
         folder: for the training runs.
     """
-    prints = "".join(surrogate_fingerprint(name) for name in ("default", "paper"))
+    prints = surrogate_fingerprint("paper")
     size = "{preset}-{steps}x{batch_size}-seed{seed}".format(**settings)
     return {
         change: Job(

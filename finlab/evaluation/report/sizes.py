@@ -64,7 +64,7 @@ SIZES = {
         temperature=(100, 2),
         trained=(40, 25),
         latency=(200, 20.0),
-        training=("default", 400, 256),
+        training=("paper", 400, 256),
         swims=(2, 1, 5),
         lost_pairs=True,
     ),

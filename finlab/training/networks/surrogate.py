@@ -1,7 +1,7 @@
-"""Learned, differentiable models of the fin physics: commands in, wrench out.
+"""The paper's learned, differentiable model of the fin physics: commands in, wrench out.
 
-The allocator never sees the fin model that judges it, only one of these, trained on forward samples.
-Torque is computed from force and position in both.
+Its allocator never sees the fin model that judges it, only this, trained on forward samples. Torque is
+computed from force and position.
 """
 
 from collections.abc import Sequence
@@ -10,8 +10,8 @@ import torch
 from torch import Tensor, nn
 
 from finlab.inference.features import raw_features
-from finlab.inference.learned_fin import FORCE_UNIT, REFERENCE
 from finlab.inference.normalization import to_normalized
+from finlab.inference.surrogate import FORCE_UNIT
 from finlab.inference.weights import DESCRIPTOR, SurrogateConfig
 from finlab.layout.arrays import force_columns
 from finlab.physics.wrench import wrench_of_forces
@@ -26,48 +26,7 @@ def mlp(n_in: int, hidden: Sequence[int], n_out: int, activation: type[nn.Module
     return nn.Sequential(*blocks, nn.Linear(sizes[-1], n_out))
 
 
-class CoefficientSurrogate(nn.Module):
-    """Dimensionless force coefficients of one fin, learned in the frame turned by its zero direction.
-
-    Thrust of an oscillating fin scales with (A f)^2, so the network only learns the slowly varying
-    rest: F = (A f / (A0 f0))^2 R(zero direction) c(A, f, zero direction) * unit. Position and
-    mounting angle are geometry and need not be learned.
-    """
-
-    def __init__(self, config: SurrogateConfig) -> None:
-        """Make it; see `SurrogateConfig`."""
-        super().__init__()
-        self.config = config
-        self.net = mlp(4, config.hidden, 3, nn.Tanh)
-
-    def fin_force(self, command: Tensor) -> Tensor:
-        """Force (..., 3) in the fin frame (shaft, e_h, e_z) [N] of commands (..., 3)."""
-        amplitude, frequency, direction = command.unbind(-1)
-        a0, f0 = REFERENCE
-        c, s = torch.cos(direction), torch.sin(direction)
-        inputs = torch.stack([amplitude / a0 - 0.5, frequency / f0 - 0.5, c, s], dim=-1)
-        shaft, along, across = (self.net(inputs) * FORCE_UNIT).unbind(-1)
-        scale = (amplitude * frequency / (a0 * f0)).square()
-        return scale[..., None] * torch.stack([shaft, c * along - s * across, s * along + c * across], dim=-1)
-
-    def forward(
-        self,
-        command: Tensor,
-        position: Tensor,
-        mounting_angle: Tensor,
-        lower: Tensor,
-        upper: Tensor,
-        mask: Tensor | None = None,
-    ) -> Tensor:
-        """Wrench (..., 6) of commands (..., n, 3) on layouts broadcastable to them."""
-        force = self.fin_force(command)
-        if mask is not None:
-            force = force * mask[..., None]
-        wrench: Tensor = wrench_of_forces(force, force_columns(position, mounting_angle))
-        return wrench
-
-
-class MlpSurrogate(nn.Module):
+class Surrogate(nn.Module):
     """The paper's surrogate: an MLP of the ten node features and the command, and an affine correction.
 
     F_i = f([x_i, u_i]) in the body frame, wrench = sum of (F_i, r_i x F_i), then scale and bias
@@ -109,12 +68,3 @@ class MlpSurrogate(nn.Module):
         scale, bias = self.affine(described.sum(-2) / here.sum(-1, keepdim=True)).chunk(2, dim=-1)
         corrected: Tensor = wrench * (1.0 + scale) + bias
         return corrected
-
-
-Surrogate = CoefficientSurrogate | MlpSurrogate
-
-
-def make_surrogate(config: SurrogateConfig) -> Surrogate:
-    """The surrogate of a configuration."""
-    kinds: dict[str, type[Surrogate]] = {"coefficient": CoefficientSurrogate, "mlp": MlpSurrogate}
-    return kinds[config.kind](config)

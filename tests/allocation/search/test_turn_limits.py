@@ -9,7 +9,7 @@ import pytest
 
 from finlab.allocation import load_allocator
 from finlab.allocation.search.search_allocator import SearchAllocator
-from finlab.allocation.search.turn_limits import TURNS, force_sizes, limit_turn
+from finlab.allocation.search.turn_limits import TURNS, limit_turn, planar_force
 from finlab.assets import shipped_layouts
 from finlab.errors import CommandError
 from finlab.forces.force_space import SETTLED
@@ -233,12 +233,13 @@ def test_a_full_circle_that_starts_elsewhere_is_kept(search: SearchAllocator, pe
         assert result.err_norm < 1e-5
 
 
-def test_sizes_of_the_forces_of_a_command(search: SearchAllocator, penta: Layout) -> None:
+def test_planar_forces_of_a_command(search: SearchAllocator, penta: Layout) -> None:
     command = np.tile([0.6, 2.1, 0.4], (5, 1))
     command[4] = np.nan
-    size = force_sizes(search.pipeline.prepare(penta), command)
+    force = planar_force(search.pipeline.prepare(penta), command)
     least, _ = limits(penta)
     command[4] = least[4]
-    np.testing.assert_allclose(size, np.linalg.norm(Plant(penta).fin_forces(command), axis=1), rtol=1e-12)
+    np.testing.assert_allclose(force.T, Plant(penta).forces(command)[:, 1:], rtol=1e-12)
     beyond = np.tile([9.0, 99.0, 0.4 + 2.0 * math.pi], (5, 1))
-    np.testing.assert_allclose(force_sizes(search.pipeline.prepare(penta), beyond), size[0], rtol=1e-12)
+    strongest = planar_force(search.pipeline.prepare(penta), beyond)
+    np.testing.assert_allclose(strongest, np.tile(force[:, :1], 5), rtol=1e-12)

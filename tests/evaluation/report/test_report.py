@@ -47,7 +47,7 @@ def few() -> pytest.MonkeyPatch:
         patch.setattr(planning, "N_STARTS", 4)
         patch.setattr(planning, "LATENCY_METHODS", ("search", "paper", "analytic", "ipopt"))
         patch.setattr(planning, "TEMPERATURES", (0.01, 1.0))
-        patch.setattr(planning, "CHANGES", {name: CHANGES[name] for name in ("recipe", "paper_loss_per_fin")})
+        patch.setattr(planning, "CHANGES", {name: CHANGES[name] for name in ("recipe", "one_component")})
         patch.setattr("finlab.evaluation.experiments.ablation.TIMED_CALLS", 1)
         yield patch
 

@@ -1,4 +1,4 @@
-"""Random robots and networks of both kinds, small enough to run in milliseconds."""
+"""Random robots and a network of the paper's kind, small enough to run in milliseconds."""
 
 import math
 from typing import NamedTuple
@@ -7,12 +7,10 @@ import pytest
 import torch
 from torch import Tensor
 
-from finlab.inference.features import SIZES, fin_frame_features, geometry, raw_features
+from finlab.inference.features import raw_features
 from finlab.inference.weights import NetworkConfig
 from finlab.training.networks.allocator_network import AllocatorNetwork
 from finlab.training.sampling import ForwardSampler, seeded_generator
-
-STD = torch.tensor([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
 
 
 class Robots(NamedTuple):
@@ -30,12 +28,10 @@ class Robots(NamedTuple):
         per_fin = [tensor[batch][:, fins] for tensor in self[:5]]
         return Robots(*per_fin, self.target[batch])
 
-    def features(self, kind: str) -> Tensor:
-        """Node features (B, n, F)."""
-        layout = (self.position, self.mounting_angle, self.lower, self.upper)
-        if kind == "raw":
-            return raw_features(*layout)
-        return fin_frame_features(geometry(*layout, STD, self.mask), self.target)
+    def features(self) -> Tensor:
+        """Node features (B, n, 10)."""
+        features: Tensor = raw_features(self.position, self.mounting_angle, self.lower, self.upper)
+        return features
 
 
 @pytest.fixture
@@ -49,21 +45,12 @@ def robots() -> Robots:
     return robots
 
 
-@pytest.fixture(params=["joint", "per_fin"])
-def network(request: pytest.FixtureRequest) -> AllocatorNetwork:
-    """Our kind of network (fin-frame features, joint mixture) and the paper's (raw ones, per fin)."""
-    joint = request.param == "joint"
-    config = NetworkConfig(
-        features="fin_frame" if joint else "raw",
-        joint=joint,
-        width=32,
-        heads=2,
-        transformer_layers=2,
-        feedforward=48,
-        n_components=5,
-    )
+@pytest.fixture
+def network() -> AllocatorNetwork:
+    """The paper's network, small."""
+    config = NetworkConfig(width=32, heads=2, transformer_layers=2, feedforward=48, n_components=5)
     torch.manual_seed(1)
-    network = AllocatorNetwork(config, SIZES[config.features]).eval()
+    network = AllocatorNetwork(config).eval()
     # Fresh biases and normalizations are zeros and ones, which would hide one that is misplaced.
     for parameter in network.parameters():
         torch.nn.init.normal_(parameter, std=0.3)

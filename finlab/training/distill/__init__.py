@@ -1,1 +1,0 @@
-"""The fast path: a small network learns what the allocator answers after all its searching."""

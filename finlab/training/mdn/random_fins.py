@@ -1,0 +1,111 @@
+"""Random fins to learn from: laws with a formula over wide ranges, and tables of fins that have none.
+
+Nothing here is a fin that is evaluated: those are drawn by other generators, from other seeds.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from finlab.forces.fin_envelope import FinEnvelope, compile_fin
+from finlab.layout import Limits
+from finlab.layout.arrays import Array
+from finlab.layout.random import random_layout
+from finlab.physics.blade import Blade
+from finlab.physics.drag import Drag
+from finlab.physics.fin_law import FinLaw
+from finlab.physics.lighthill import Lighthill
+from finlab.physics.objective import Objective
+from finlab.physics.soft import Soft
+from finlab.physics.table import TableLaw
+
+DENSITY = 1000.0
+"""[kg/m^3]"""
+WEAKEST = 1e-2
+"""Largest force [N] of the weakest fin worth learning from."""
+GRID = (7, 9, 12)
+"""Amplitudes, frequencies and zero directions of a random table."""
+
+
+@dataclass(frozen=True, eq=False)
+class RandomFin:
+    """One law within its limits, compiled for both objectives."""
+
+    law: FinLaw
+    """What it does."""
+    limits: Limits
+    """Of its commands."""
+    envelopes: dict[str, FinEnvelope]
+    """Objective -> what its forces cost."""
+
+
+def random_fin(rng: np.random.Generator, limits: Limits) -> RandomFin:
+    """Draw a law of a random family and compile it."""
+    family = FAMILIES[int(rng.choice(len(FAMILIES), p=SHARES))]
+    law = family(rng)
+    envelopes = {name: compile_fin(law, limits, Objective(name)) for name in ("power", "effort")}
+    # A fin that hardly pushes at all is drawn again: it has nothing to teach.
+    if envelopes["power"].largest.max() < WEAKEST:
+        return random_fin(rng, limits)
+    return RandomFin(law, limits, envelopes)
+
+
+def varied_limits(rng: np.random.Generator) -> Limits:
+    """Limits of one fin, drawn as in split `limits`."""
+    return random_layout(rng, n_fins=1, limits="varied").fins[0].limits
+
+
+def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(math.exp(rng.uniform(math.log(low), math.log(high))))
+
+
+def _drag(rng: np.random.Generator) -> FinLaw:
+    return Drag(DENSITY, 0.15, _log_uniform(rng, 0.003, 0.06), _log_uniform(rng, 0.04, 0.2))
+
+
+def _lighthill(rng: np.random.Generator) -> FinLaw:
+    return Lighthill(DENSITY, _log_uniform(rng, 0.08, 0.4), _log_uniform(rng, 0.04, 0.2))
+
+
+def _soft(rng: np.random.Generator) -> FinLaw:
+    uneven = rng.uniform(0.0, 0.3) * (rng.random() < 0.5)
+    return Soft(
+        _log_uniform(rng, 0.5, 12.0),
+        rng.uniform(0.7, 2.5),
+        rng.uniform(0.4, 2.0),
+        rng.uniform(2.0, 8.0),
+        uneven,
+        rng.uniform(-math.pi, math.pi),
+        rng.uniform(-0.3, 0.3),
+    )
+
+
+def _table(rng: np.random.Generator) -> FinLaw:
+    """A fin that no formula describes: a dead zone, saturation, decline, unevenness, lean and noise, on a
+    grid that may know the power."""
+    amplitude, frequency = np.linspace(0.03, 0.9, GRID[0]), np.linspace(0.1, 3.2, GRID[1])
+    direction = np.linspace(-math.pi, math.pi, GRID[2], endpoint=False)
+    a, f, d = np.meshgrid(amplitude, frequency, direction, indexing="ij")
+    beat = (a / 0.6) ** rng.uniform(0.6, 1.6) * (f / 2.1) ** rng.uniform(0.6, 1.6)
+    dead = rng.uniform(0.0, 0.25) * (rng.random() < 0.4)
+    beat = np.maximum(beat - dead, 0.02 * beat)
+    saturation = rng.uniform(0.5, 2.0)
+    size = beat ** rng.uniform(0.7, 2.2) / (1.0 + (beat / saturation) ** rng.uniform(1.0, 5.0))
+    for order in (1, 2):
+        size *= 1.0 + rng.uniform(0.0, 0.25) * np.cos(order * d - rng.uniform(-math.pi, math.pi))
+    size *= _log_uniform(rng, 0.3, 10.0) * (1.0 + 0.03 * rng.standard_normal(size.shape))
+    lean = rng.uniform(-0.3, 0.3) + rng.uniform(0.0, 0.2) * np.sin(d - rng.uniform(-math.pi, math.pi))
+    columns = [np.zeros_like(size), size * np.cos(d + lean), size * np.sin(d + lean)]
+    if rng.random() < 0.5:
+        blade = Blade()
+        power = blade.power(a, f) * (0.2 + beat ** rng.uniform(0.0, 1.0))
+        columns.append(power * _log_uniform(rng, 0.3, 3.0))
+    return TableLaw([amplitude, frequency, direction], np.stack(columns, axis=-1), True)
+
+
+FAMILIES: tuple[Callable[[np.random.Generator], FinLaw], ...] = (_drag, _lighthill, _soft, _table)
+"""What fins are drawn from."""
+SHARES: Array = np.array([0.3, 0.2, 0.38, 0.12])
+"""How often each family is drawn."""

@@ -1,0 +1,123 @@
+"""Training of the network of method `mdn`: repeatable answers, batches as seen, a likelihood that is one."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from torch.distributions import Categorical, Independent, MixtureSameFamily, Normal
+
+from finlab.errors import DataError
+from finlab.inference.checkpoint import read_checkpoint
+from finlab.training import train_mdn
+from finlab.training.mdn.batches import MIRRORED, Answers
+from finlab.training.mdn.shards import read_shard, write_shard
+from finlab.training.mdn.train import losses, make_terms
+from finlab.training.networks.force_network import ForceMixture, ForceNetwork
+from finlab.training.presets import MDN_RECIPES
+
+SMOKE = MDN_RECIPES["smoke"]
+STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
+
+
+@pytest.fixture(scope="module")
+def shard(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_shard(tmp_path_factory.mktemp("answers"), SMOKE.answers, STD, 0, 0)
+
+
+def test_a_file_of_answers_depends_on_its_seed_and_number(shard: Path, tmp_path: Path) -> None:
+    again = read_shard(write_shard(tmp_path, SMOKE.answers, STD, 0, 0))
+    other = read_shard(write_shard(tmp_path, SMOKE.answers, STD, 0, 1))
+    first = read_shard(shard)
+    assert first.keys() == again.keys()
+    for n, arrays in first.items():
+        assert all(np.array_equal(values, again[n][name]) for name, values in arrays.items())
+    asked = [np.abs(group["asked"]).sum() for part in (first, other) for group in part.values()]
+    assert len(set(asked)) == len(asked)
+
+
+def test_batches_say_what_a_robot_and_its_mirror_image_are_asked_for(shard: Path) -> None:
+    answers = Answers()
+    answers.read([shard])
+    answers.read([shard])  # nothing joins twice
+    known = sum(int((group["weight"].sum(-1) > 0.5).sum()) for group in read_shard(shard).values())
+    assert len(answers) == known > 0
+    batch = answers.draw(np.random.default_rng(0), 64)
+    assert batch.weight.sum(1) == pytest.approx(torch.ones(64), abs=1e-5)
+    # The ways still solve P x = p: in these frames p is real and not negative.
+    way = torch.view_as_complex(batch.way.contiguous())
+    share = way * way.abs()
+    a, b = torch.view_as_complex(batch.pairs.reshape(*batch.pairs.shape[:-1], 2, 2)).unbind(-1)
+    got = torch.einsum("bij,blj->bli", a, share) + torch.einsum("bij,blj->bli", b, share.conj())
+    asked = batch.nodes[..., 0].square().to(got.dtype)
+    missed = (got - asked[:, None]).abs().amax(-1)
+    assert missed[batch.weight > 0.01].max() < 0.05
+
+
+def test_mirrored_features_are_the_vertical_parts() -> None:
+    from finlab.allocation.learned.force_features import VECTORS
+
+    assert [place + 1 for place in VECTORS] == MIRRORED
+
+
+def mixture(n: int = 3, m: int = 4) -> ForceMixture:
+    draw = torch.Generator().manual_seed(0)
+    sizes = (5, m), (5, n, m, 2), (5, n, m)
+    return ForceMixture(*(torch.randn(size, generator=draw, dtype=torch.float64) for size in sizes))
+
+
+def test_likelihood_is_that_of_one_mixture_over_all_fins() -> None:
+    given = mixture()
+    way = torch.randn(5, 7, 3, 2, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
+    mean = given.mean.transpose(1, 2).flatten(2)
+    std = given.log_std.exp()[..., None].expand(-1, -1, -1, 2).transpose(1, 2).flatten(2)
+    reference = MixtureSameFamily(Categorical(logits=given.logits), Independent(Normal(mean, std), 1))
+    expected = reference.log_prob(way.flatten(2).transpose(0, 1)).T
+    torch.testing.assert_close(given.log_prob(way), expected)
+    # Warm, all components learn from every way; cold, the one that stands for it.
+    warm = given.log_prob(way, 50.0)
+    assert (warm > given.log_prob(way)).all()
+
+
+def test_the_loss_is_per_fin_and_rewards_components_that_are_used(shard: Path) -> None:
+    answers = Answers()
+    answers.read([shard])
+    batch = answers.draw(np.random.default_rng(0), 32)
+    torch.manual_seed(0)
+    network = ForceNetwork(SMOKE.network)
+    found, spread = losses(network, batch, 1.0, 0.0), losses(network, batch, 1.0, 0.5)
+    assert found["loss"] == found["imitation"]
+    given = network(batch.nodes, batch.pairs)
+    expected = -(given.log_prob(batch.way) * batch.weight).sum(-1).mean() / batch.nodes.shape[1]
+    torch.testing.assert_close(found["imitation"], expected)
+    torch.testing.assert_close(spread["loss"], expected - 0.5 * spread["used"].log())
+    assert 1.0 <= spread["used"] <= SMOKE.network.n_components + 1e-4
+
+
+def test_it_learns_and_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    stopped = train_mdn("smoke", tmp_path, stop_after=10)
+    assert stopped.training["mdn"]["steps_done"] == 10
+    finished = train_mdn("smoke", tmp_path)
+    assert finished.training["mdn"]["steps_done"] == 30 and finished.sha256 != stopped.sha256
+    assert read_checkpoint(tmp_path).network_config == SMOKE.network
+    with (tmp_path / "log.csv").open(newline="") as file:
+        rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
+    assert [row["step"] for row in rows] == [0, 9, 20, 29]
+    assert rows[-1]["imitation"] < rows[0]["imitation"]
+    assert rows[-1]["seconds"] >= rows[1]["seconds"] and rows[-1]["targets"] > 0
+    with pytest.raises(DataError, match=r"other settings \(seed\)"):
+        train_mdn("smoke", tmp_path, seed=1)
+
+
+def test_time_that_is_up_ends_the_run(tmp_path: Path) -> None:
+    cut = train_mdn("smoke", tmp_path, seconds=1e-9)
+    assert cut.training["mdn"]["steps_done"] == 1
+
+
+def test_a_writer_that_has_died_ends_the_wait(tmp_path: Path) -> None:
+    class Dead:
+        exitcode = 1
+
+    with pytest.raises(DataError, match="the process that writes answers has ended"):
+        make_terms(tmp_path, SMOKE.answers, SMOKE.training, 0, Dead())  # type: ignore[arg-type]
