@@ -41,9 +41,9 @@ WRENCH = [1, 0, 0.5, 0, 0, 0.1]
 
 
 @pytest.fixture(scope="module")
-def with_networks(untrained_checkpoint: Path) -> Bundle:
+def with_networks(untrained_mdn: Path) -> Bundle:
     """Layout A for method `mdn`, with a small network that has learned nothing."""
-    return make_bundle(finlab.load_layout("A"), finlab.load_allocator("mdn", checkpoint=untrained_checkpoint))
+    return make_bundle(finlab.load_layout("A"), finlab.load_allocator("mdn", checkpoint=untrained_mdn))
 
 
 def resealed(files: dict[str, bytes]) -> dict[str, bytes]:
@@ -89,12 +89,12 @@ def test_the_library_reads_it(bundle: Bundle, shipped_allocator: Allocator, tmp_
 
 
 def test_networks_travel_for_the_method_that_needs_them(
-    with_networks: Bundle, untrained_checkpoint: Path, tmp_path: Path
+    with_networks: Bundle, untrained_mdn: Path, tmp_path: Path
 ) -> None:
     with_networks.write(tmp_path)
-    layout, desk = finlab.load_layout("A"), finlab.load_allocator("mdn", checkpoint=untrained_checkpoint)
+    layout, desk = finlab.load_layout("A"), finlab.load_allocator("mdn", checkpoint=untrained_mdn)
     for name in ("config.json", "model.safetensors"):
-        assert with_networks.files[f"checkpoint/{name}"] == (untrained_checkpoint / name).read_bytes()
+        assert with_networks.files[f"checkpoint/{name}"] == (untrained_mdn / name).read_bytes()
     for allocator in (finlab.load_allocator(tmp_path), finlab.load_allocator("mdn", checkpoint=tmp_path)):
         assert allocator.allocate(layout, WRENCH) == desk.allocate(layout, WRENCH)
     plain = finlab.load_allocator("search", checkpoint=tmp_path)
@@ -456,14 +456,14 @@ def test_methods_that_do_not_travel_are_refused() -> None:
 
 
 def test_the_command_line_chooses_method_and_objective(
-    tmp_path: Path, untrained_checkpoint: Path, with_networks: Bundle, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, untrained_mdn: Path, with_networks: Bundle, capsys: pytest.CaptureFixture[str]
 ) -> None:
     line = ["export", "mixed", "-o", str(tmp_path / "mixed"), "--objective", "effort"]
     assert main(line) == 0
     robot = finlab.load_allocator(tmp_path / "mixed")
     assert (robot.name, robot.options["objective"]) == ("search", "effort")
     line = ["export", "A", "-o", str(tmp_path / "A"), "--method", "mdn", "--checkpoint"]
-    assert main([*line, str(untrained_checkpoint)]) == 0
+    assert main([*line, str(untrained_mdn)]) == 0
     assert read_bundle_files(tmp_path / "A") == dict(with_networks.files)
     capsys.readouterr()
 

@@ -25,9 +25,9 @@ ODD = (b"\xff", b"\0", b"9" * 30, b"1e999", b"NaN", b"[", b"{", b'"', b"\n- ", b
 
 
 @pytest.fixture(scope="module")
-def small(untrained_checkpoint: Path) -> Bundle:
+def small(untrained_mdn: Path) -> Bundle:
     """A bundle of a small network, so that many fit into a test."""
-    allocator = finlab.load_allocator("mdn", checkpoint=untrained_checkpoint)
+    allocator = finlab.load_allocator("mdn", checkpoint=untrained_mdn)
     return make_bundle(load_layout("A"), allocator)
 
 

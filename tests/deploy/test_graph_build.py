@@ -24,19 +24,17 @@ WRENCH = ["--wrench", "0.5", "0", "0.5", "0", "0", "0"]
 
 
 @pytest.fixture(scope="module", params=["search", "mdn"])
-def allocator(request: pytest.FixtureRequest, untrained_checkpoint: Path) -> Allocator:
-    return finlab.load_allocator(request.param, checkpoint=untrained_checkpoint)
+def allocator(request: pytest.FixtureRequest, untrained_mdn: Path) -> Allocator:
+    return finlab.load_allocator(request.param, checkpoint=untrained_mdn)
 
 
 @pytest.mark.parametrize("failed", [(), ("front_left",)], ids=["whole", "one lost"])
-def test_graph_of_an_allocator(
-    failed: tuple[str, ...], allocator: Allocator, untrained_checkpoint: Path
-) -> None:
+def test_graph_of_an_allocator(failed: tuple[str, ...], allocator: Allocator, untrained_mdn: Path) -> None:
     layout = finlab.load_layout(shipped_layouts()["A"])
     graph = build_graph(layout, allocator, failed)
     jsonschema.validate(json.loads(graph_bytes(graph)), SCHEMA)
     assert graph.layout == layout and graph.failed == failed and graph.healthy.n_fins == 4 - len(failed)
-    weights = read_checkpoint(untrained_checkpoint)
+    weights = read_checkpoint(untrained_mdn)
     networks = (weights.name, weights.sha256) if allocator.name == "mdn" else (None, None)
     assert (graph.checkpoint, graph.checkpoint_sha256) == networks
     assert graph.method == allocator.name and len(graph.self_test) == N_SELF_TEST
@@ -53,15 +51,15 @@ def test_self_test_holds_by_the_fins_own_models(allocator: Allocator) -> None:
     assert len({case.wrench for case in graph.self_test}) == N_SELF_TEST
 
 
-def test_same_input_same_bytes(allocator: Allocator, untrained_checkpoint: Path) -> None:
+def test_same_input_same_bytes(allocator: Allocator, untrained_mdn: Path) -> None:
     layout = finlab.load_layout(shipped_layouts()["ucat"])
-    again = finlab.load_allocator(allocator.name, checkpoint=untrained_checkpoint)
+    again = finlab.load_allocator(allocator.name, checkpoint=untrained_mdn)
     assert graph_bytes(build_graph(layout, allocator)) == graph_bytes(build_graph(layout, again))
 
 
-def test_any_method_has_a_graph(untrained_checkpoint: Path) -> None:
+def test_any_method_has_a_graph(untrained_mdn: Path) -> None:
     layout = finlab.load_layout("A")
-    graph = build_graph(layout, finlab.load_allocator("analytic", checkpoint=untrained_checkpoint))
+    graph = build_graph(layout, finlab.load_allocator("analytic", checkpoint=untrained_mdn))
     assert graph.method == "analytic" and graph.checkpoint is None
     jsonschema.validate(json.loads(graph_bytes(graph)), SCHEMA)
 
@@ -87,9 +85,9 @@ def test_unknown_failed_fin_is_refused(allocator: Allocator) -> None:
 
 
 def test_exported_file_stands_in_for_its_layout(
-    untrained_checkpoint: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    untrained_mdn: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    checkpoint = ["--checkpoint", str(untrained_checkpoint)]
+    checkpoint = ["--checkpoint", str(untrained_mdn)]
     path = str(tmp_path / "A.graph.json")
     assert main(["export", "A", "-o", path, "--failed", "back_left", *checkpoint]) == 0
     capsys.readouterr()
@@ -108,10 +106,10 @@ def test_export_refuses_another_file_name(capsys: pytest.CaptureFixture[str]) ->
 
 
 def test_edited_export_is_refused(
-    untrained_checkpoint: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    untrained_mdn: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "A.graph.json"
-    assert main(["export", "A", "-o", str(path), "--checkpoint", str(untrained_checkpoint)]) == 0
+    assert main(["export", "A", "-o", str(path), "--checkpoint", str(untrained_mdn)]) == 0
     path.write_text(path.read_text().replace("0.25753", "0.35753", 1))
     capsys.readouterr()
     assert main(["allocate", str(path), *WRENCH]) == 2
