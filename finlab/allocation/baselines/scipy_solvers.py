@@ -10,17 +10,21 @@ from finlab.allocation.aim import Aim
 from finlab.allocation.baselines.model_based import TIME_LIMIT_S
 from finlab.allocation.baselines.single_target import DEFAULT_STARTS, Problem, SingleTarget
 from finlab.inference.normalization import Normalization
+from finlab.physics import Plant
 
 Array = NDArray[np.float64]
 
 INSIDE = 1e-6
 """How far within the limits the solver starts, which it requires."""
 
+MET = 1e-6
+"""Normalized error up to which an end meets the target."""
+
 
 class Trf(SingleTarget):
     """`scipy.optimize.least_squares(method="trf")` on the normalized error, with the exact Jacobian.
 
-    Of the ends, the lowest `err_norm^2 + cost` wins.
+    Of the ends that meet the target the cheapest wins, else the one with the least error.
 
     Args:
         normalization: sigma scales the error.
@@ -53,6 +57,11 @@ class Trf(SingleTarget):
             method="trf",
             max_nfev=self.max_evaluations,
         ).x
+
+    def _total(self, plant: Plant, command: Array, target: Array) -> Array:
+        missing = np.maximum(self.normalization.error(plant.wrench(command), target) - MET, 0.0)
+        total: Array = missing / MET + self._cost(plant)(command)
+        return total
 
 
 class Slsqp(SingleTarget):
