@@ -111,7 +111,7 @@ def test_real_candidates_are_drawn_and_listed() -> None:
 
 def test_figures_keep_their_width() -> None:
     assert {len(small(v)) for v in (0.0, 3.1e-5, 1.2345, 99.0)} == {8}
-    assert [three_digits(v) for v in (2.319, 0.041, 12.5, 0.0)] == ["2.32", "0.0410", "12.5", "0.00"]
+    assert [three_digits(v) for v in (2.319, 0.041, 0.09996, 0.0)] == ["2.32", "0.0410", "0.100", "0.00"]
     assert three_digits(float("nan")) == small(float("nan")) == "–"
     assert "−" in small(1e-5) and "-" not in three_digits(-2e-9)
 
@@ -144,7 +144,8 @@ def test_another_sample_of_another_answer_is_shown() -> None:
 
 
 def test_dots_do_not_cover_each_other_nor_leave_the_plot() -> None:
-    places = _apart([(375.0, 50.0)] * 8 + [(60.0, 52.0)] * 3)
+    places = _apart([(375.0, 50.0)] * 8 + [(90.0, 52.0)] * 3)
     assert all(LEFT + DOT <= x <= WIDTH - DOT for x, _ in places)
+    assert [x for x, _ in places[8:]] == sorted(x for x, _ in places[8:]), "none looks cheaper than it is"
     for k, (x, y) in enumerate(places):
         assert all(abs(x - u) >= 2 * DOT or abs(y - v) >= 2 * DOT for u, v in places[:k])

@@ -155,10 +155,13 @@ def _ring(x: float, y: float, radius: float) -> str:
 
 
 def _apart(places: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Dots moved sideways, no further than need be and within the plot, so that each can be clicked."""
+    """Dots moved sideways within the plot, so that each can be clicked.
+
+    They go to the right where there is room, since none must look cheaper than it is.
+    """
     apart: list[tuple[float, float]] = []
     for x, y in places:
-        rooms = [x + side * step for step in range(0, WIDTH, 2) for side in (1, -1)]
+        rooms = [x + side * step for side in (1, -1) for step in range(0, WIDTH, 2)]
         free = (
             room
             for room in rooms

@@ -33,7 +33,7 @@ def three_digits(value: float) -> str:
         return "–"
     if value != 0 and not 1e-3 <= abs(value) < 1e4:
         return small(value)
-    whole = math.floor(math.log10(abs(value))) if value else 0
+    whole = math.floor(math.log10(float(f"{abs(value):.2e}"))) if value else 0
     return f"{value:.{max(2 - whole, 0)}f}".replace("-", "−")
 
 
