@@ -123,9 +123,7 @@ def main(changes: int) -> None:
     times = bench.respond(200, rng)
     computing = 1000 * (time.process_time() - computing) / len(times)
     p50, p95 = np.percentile(times, [50, 95])
-    print(
-        f"one page, {LAYOUT}, method search: change to answer on the page: median {p50:.1f} ms, p95 {p95:.1f} ms"
-    )
+    print(f"one page, {LAYOUT}: change to answer on the page: median {p50:.1f} ms, p95 {p95:.1f} ms")
     # What a machine with nothing else to do would need at most; waiting for a processor does not count.
     print(f"computing per change, all threads together: {computing:.1f} ms", flush=True)
     bench.soak(changes // 10, rng)
