@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.judging import REACHED, Judge, judge
-from finlab.allocation.modes import Mode, find_modes
+from finlab.allocation.modes import Mode, find_modes, force_sizes
 from finlab.allocation.policy import CLOSEST, Policy, describe_binding
 from finlab.allocation.solution import Candidates, PlainData
 from finlab.layout import Layout
@@ -165,7 +165,8 @@ class Allocation(Answer):
         found = (allocator or self._allocator or self._loaded()).alternatives(self)
         if found is None:
             return ()
-        return find_modes(found, self.layout.lower, self.layout.upper, self.previous)
+        force = force_sizes(self.layout, found.command)
+        return find_modes(found, force, self.layout.lower, self.layout.upper, self.previous)
 
     def with_command(self, command: Array) -> Allocation:
         """The same question with another command (n, 3) in place of the answer, judged by the plant."""

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.solution import PlainData
+from finlab.layout import Layout
+from finlab.physics import plant_of
 
 if TYPE_CHECKING:
     from finlab.allocation.solution import Candidates
@@ -26,6 +28,19 @@ SAME_DIRECTION = float(np.radians(25.0))
 """Zero directions closer than this are the same [rad]."""
 SAME_SIZE = 0.25
 """Thrusts, and ratios of amplitude to frequency, whose logarithms differ by less are the same."""
+
+
+class ModeSignature(NamedTuple):
+    """What matters of one command: numbers per fin (n,), NaN where the fin rests or has failed."""
+
+    resting: tuple[int, ...]
+    """Places of the fins that rest."""
+    thrust: Array
+    """Logarithm of the force [N]."""
+    direction: Array
+    """Zero direction [rad]."""
+    style: Array
+    """Logarithm of amplitude over frequency."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,40 +64,34 @@ class Mode(PlainData):
     frequency over their ranges, turns over half a circle."""
     turn: float | None
     """Largest turn from the previous command [rad]."""
-    resting: tuple[int, ...]
-    """Places of the fins that hardly push."""
+    signature: ModeSignature
+    """What tells it from other ways."""
     members: tuple[int, ...]
     """Places of the alternatives that do the same, best first."""
     sources: tuple[str, ...]
     """Where these come from, in words, each once."""
 
-
-class ModeSignature(NamedTuple):
-    """What matters of one command: numbers per fin (n,), NaN where the fin rests or has failed."""
-
-    resting: tuple[int, ...]
-    """Places of the fins that rest."""
-    thrust: Array
-    """Logarithm of the thrust, up to a constant."""
-    direction: Array
-    """Zero direction [rad]."""
-    style: Array
-    """Logarithm of amplitude over frequency."""
+    @property
+    def resting(self) -> tuple[int, ...]:
+        """Places of the fins that hardly push, by their own laws."""
+        return self.signature.resting
 
 
 def find_modes(
-    candidates: Candidates, lower: Array, upper: Array, previous: Array | None = None
+    candidates: Candidates, force: Array, lower: Array, upper: Array, previous: Array | None = None
 ) -> tuple[Mode, ...]:
     """The modes among candidates, in their order.
 
     Args:
-        candidates: alternatives, best first.
+        candidates: K alternatives, best first.
+        force: size of each fin's force (K, n) [N] by its own law, as `force_sizes` tells.
         lower: lower limits (n, 3).
         upper: upper limits (n, 3).
         previous: command (n, 3) of the previous tick.
     """
     modes = []
-    for members in cluster([mode_signature(command) for command in candidates.command]):
+    signatures = [mode_signature(*each) for each in zip(candidates.command, force, strict=True)]
+    for members in cluster(signatures):
         first = members[0]
         command = candidates.command[first]
         distance, turn = (None, None) if previous is None else _change(command, previous, lower, upper)
@@ -98,7 +107,7 @@ def find_modes(
                 saturation=float(np.clip(np.nanmax(used), 0.0, 1.0)),
                 distance=distance,
                 turn=turn,
-                resting=mode_signature(command).resting,
+                signature=signatures[first],
                 members=tuple(members),
                 sources=tuple(dict.fromkeys(candidates.source[k] for k in members)),
             )
@@ -118,13 +127,19 @@ def cluster(signatures: list[ModeSignature]) -> list[list[int]]:
     return groups
 
 
-def mode_signature(command: Array) -> ModeSignature:
-    """What matters of a command (n, 3)."""
+def force_sizes(layout: Layout, command: Array) -> Array:
+    """Size of each fin's force (..., n) [N] by its own law for commands (..., n, 3), zero for failed fins."""
+    return np.asarray(np.linalg.norm(plant_of(layout).forces(command), axis=-1))
+
+
+def mode_signature(command: Array, force: Array) -> ModeSignature:
+    """What matters of a command (n, 3) with forces of these sizes (n,) [N]."""
+    works = np.isfinite(command).all(axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        thrust = 2 * np.log(np.sin(command[:, 0])) + 2 * np.log(command[:, 1])  # grows with sin^2(A) f^2
+        thrust = np.log(force)
         style = np.log(command[:, 0]) - np.log(command[:, 1])
-    resting = np.isfinite(thrust) & (thrust < np.nanmax(thrust) + np.log(RESTING))
-    pushes = np.isfinite(thrust) & ~resting
+    resting = works & (force < RESTING * np.where(works, force, 0.0).max(initial=0.0))
+    pushes = works & ~resting & np.isfinite(thrust)
     values = [np.where(pushes, value, np.nan) for value in (thrust, command[:, 2], style)]
     return ModeSignature(tuple(int(i) for i in np.flatnonzero(resting)), *values)
 

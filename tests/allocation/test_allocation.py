@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from finlab.allocation import METHODS, Allocation, Allocator, Health, load_allocator
-from finlab.allocation.modes import mode_signature, same_signature
+from finlab.allocation.modes import same_signature
 from finlab.allocation.solution import equal
 from finlab.assets import shipped_checkpoints
 from finlab.errors import AllocationError, CheckpointError, DataError
@@ -162,7 +162,7 @@ def test_a_copy_explores_like_the_original(search: Allocator) -> None:
         modes = result.explore()
         assert len(modes) > 0
         np.testing.assert_allclose(modes[0].command, result.command, atol=1e-12)
-        signatures = [mode_signature(mode.command) for mode in modes]
+        signatures = [mode.signature for mode in modes]
         assert not any(same_signature(a, b) for i, a in enumerate(signatures) for b in signatures[:i])
         for twin in round_trips(result):
             assert twin.explore() == modes and twin.explore(allocator) == modes

@@ -7,9 +7,11 @@ import pytest
 
 from finlab.allocation import load_allocator
 from finlab.allocation.modes import (
+    Mode,
     ModeSignature,
     cluster,
     find_modes,
+    force_sizes,
     mode_signature,
     same_signature,
     signature_difference,
@@ -32,9 +34,39 @@ def candidates(*commands: list[tuple[float, ...]]) -> Candidates:
     )
 
 
+def drag(command: np.ndarray) -> np.ndarray:
+    """Sizes of forces (..., n) that grow with the squares of sin(A) and f; zero for failed fins."""
+    with np.errstate(invalid="ignore"):
+        return np.nan_to_num((np.sin(command[..., 0]) * command[..., 1]) ** 2)
+
+
+def signature_of(command: np.ndarray) -> ModeSignature:
+    """The signature of a command (n, 3) of such fins."""
+    return mode_signature(command, drag(command))
+
+
+def modes_of(
+    told: Candidates, lower: np.ndarray, upper: np.ndarray, previous: np.ndarray | None = None
+) -> tuple[Mode, ...]:
+    """The modes of such fins."""
+    return find_modes(told, drag(told.command), lower, upper, previous)
+
+
+def test_a_fin_rests_by_its_own_law() -> None:
+    """The same beat is rest for a small fin beside a large one; nothing rests where nothing pushes."""
+    command = np.array([PUSH, PUSH, (math.nan,) * 3])
+    assert mode_signature(command, np.array([2.0, 0.2, 0.0])).resting == (1,)
+    assert mode_signature(command, np.array([2.0, 0.0, 0.0])).resting == (1,)
+    assert mode_signature(command, np.zeros(3)).resting == ()
+    layout = load_layout("mixed")
+    for mode in load_allocator().allocate(layout, [1.2, 0, 0, 0, 0, 0.25]).explore():
+        force = force_sizes(layout, mode.command)
+        assert mode.resting == tuple(np.flatnonzero(force < 0.15 * force.max()))
+
+
 def test_the_same_fins_at_rest_are_the_same_mode_whatever_they_do_there() -> None:
     told = candidates([PUSH, REST], [PUSH, (0.05, 0.1, 2.0)], [REST, PUSH])
-    modes = find_modes(told, LOWER, UPPER)
+    modes = find_modes(told, drag(told.command), LOWER, UPPER)
     assert [mode.members for mode in modes] == [(0, 1), (2,)]
     assert [mode.resting for mode in modes] == [(1,), (0,)]
     assert (
@@ -46,18 +78,18 @@ def test_the_same_fins_at_rest_are_the_same_mode_whatever_they_do_there() -> Non
 
 
 def test_angles_are_compared_the_shorter_way_round() -> None:
-    one = mode_signature(np.array([PUSH, (0.4, 1.5, math.pi - 0.05)]))
-    assert same_signature(one, mode_signature(np.array([PUSH, (0.4, 1.5, 0.05 - math.pi)])))
-    assert not same_signature(one, mode_signature(np.array([PUSH, (0.4, 1.5, 0.6 - math.pi)])))
+    one = signature_of(np.array([PUSH, (0.4, 1.5, math.pi - 0.05)]))
+    assert same_signature(one, signature_of(np.array([PUSH, (0.4, 1.5, 0.05 - math.pi)])))
+    assert not same_signature(one, signature_of(np.array([PUSH, (0.4, 1.5, 0.6 - math.pi)])))
 
 
 def test_distance_and_saturation() -> None:
     previous = np.array([(0.4, 1.5, math.pi - 0.1), REST])
-    (mode,) = find_modes(candidates([(0.4, 2.1, 0.1 - math.pi), REST]), LOWER, UPPER, previous)
+    (mode,) = modes_of(candidates([(0.4, 2.1, 0.1 - math.pi), REST]), LOWER, UPPER, previous)
     assert mode.turn == pytest.approx(0.2)
     assert mode.distance == pytest.approx(math.sqrt(0.5 * ((0.6 / 2.0) ** 2 + (0.2 / math.pi) ** 2)))
     assert mode.saturation == 1.0
-    (lost,) = find_modes(candidates([PUSH, (math.nan,) * 3]), LOWER, UPPER, np.full((2, 3), np.nan))
+    (lost,) = modes_of(candidates([PUSH, (math.nan,) * 3]), LOWER, UPPER, np.full((2, 3), np.nan))
     assert lost.distance is None and lost.resting == ()
 
 
@@ -72,7 +104,7 @@ def test_modes_of_an_answer_deliver_the_wrench_in_different_ways(search: SearchA
     assert modes[0].energy == pytest.approx(result.energy) and modes[0].power == pytest.approx(result.power)
     wrench = Plant(layout).wrench(np.array([mode.command for mode in modes]))
     assert search.normalization.error(wrench, target).max() < 1e-3
-    ways = [mode_signature(mode.command) for mode in modes]
+    ways = [mode.signature for mode in modes]
     assert not any(same_signature(a, b) for i, a in enumerate(ways) for b in ways[:i])
     bow = layout.index("bow")
     assert all(mode.distance is not None and np.isnan(mode.command[bow]).all() for mode in modes)
@@ -86,11 +118,11 @@ def test_a_method_with_one_answer_tells_no_modes() -> None:
 def test_signatures_by_hand() -> None:
     """Thrust grows with the squares of sin(A) and f; a fin below 15 % of the strongest one rests."""
     command = np.array([(0.5, 2.0, 1.0), (0.2, 1.2, -2.0), (0.3, 1.0, 0.4), (0.0, 1.0, 0.0), (math.nan,) * 3])
-    signature = mode_signature(command)
+    signature = signature_of(command)
     thrust = [math.log((math.sin(a) * f) ** 2) for a, f, _ in command[:3]]
     assert math.exp(thrust[1] - thrust[0]) < 0.15 and math.exp(thrust[2] - thrust[0]) < 0.15
-    assert signature.resting == (1, 2)
-    stronger = mode_signature(np.array([*command[:2], (0.3, 1.4, 0.4)]))
+    assert signature.resting == (1, 2, 3), "one that gives nothing rests as well"
+    stronger = signature_of(np.array([*command[:2], (0.3, 1.4, 0.4)]))
     assert stronger.resting == (1,)
     np.testing.assert_allclose(stronger.thrust, [thrust[0], np.nan, math.log((math.sin(0.3) * 1.4) ** 2)])
     np.testing.assert_allclose(stronger.direction, [1.0, np.nan, 0.4])
@@ -99,7 +131,7 @@ def test_signatures_by_hand() -> None:
 
 def test_what_counts_as_different() -> None:
     """A turn of 25 degrees, or a factor of exp(1/4) in thrust or in amplitude over frequency."""
-    a = mode_signature(np.array([(0.3, 1.0, 0.2), (0.3, 1.2, 0.0)]))
+    a = signature_of(np.array([(0.3, 1.0, 0.2), (0.3, 1.2, 0.0)]))
 
     def other(turn: float = 0.0, thrust: float = 0.0, style: float = 0.0) -> ModeSignature:
         return a._replace(
@@ -117,13 +149,13 @@ def test_what_counts_as_different() -> None:
 
 def test_groups_are_led_by_their_first() -> None:
     """The third differs from the first, though not from the second: it leads a group of its own."""
-    ways = [mode_signature(np.array([PUSH, (0.4, 1.5, angle)])) for angle in (0.0, 0.3, 0.6, 0.1, 0.7)]
+    ways = [signature_of(np.array([PUSH, (0.4, 1.5, angle)])) for angle in (0.0, 0.3, 0.6, 0.1, 0.7)]
     assert cluster(ways) == [[0, 1, 3], [2, 4]]
 
 
 @pytest.mark.parametrize(("amplitude", "frequency"), [(0.4, 1.5), (0.5, 1.1), (0.05, 0.1)])
 def test_saturation_is_the_largest_share_of_a_range(amplitude: float, frequency: float) -> None:
-    (mode,) = find_modes(candidates([(amplitude, frequency, 3.0), REST]), LOWER, UPPER)
+    (mode,) = modes_of(candidates([(amplitude, frequency, 3.0), REST]), LOWER, UPPER)
     assert mode.saturation == pytest.approx(max((amplitude - 0.05) / 0.55, (frequency - 0.1) / 2.0))
 
 
@@ -133,6 +165,6 @@ def test_distance_counts_shares_of_each_range() -> None:
     upper[1] = lower[1] = 0.3, 1.0, 0.7  # a fin that cannot move at all
     previous = np.array([(0.2, 1.0, 0.5), (0.3, 1.0, 0.7), (0.4, 2.0, 1.0)])
     command = previous + [(0.1, -0.5, 0.25), (0.0, 0.0, 0.0), (math.nan,) * 3]
-    (mode,) = find_modes(candidates(command.tolist()), lower, upper, previous)
+    (mode,) = modes_of(candidates(command.tolist()), lower, upper, previous)
     squares = (0.1 / 0.4) ** 2 + (0.5 / 2.0) ** 2 + (0.25 / math.pi) ** 2
     assert mode.distance == pytest.approx(math.sqrt(squares / 2)) and mode.turn == pytest.approx(0.25)

@@ -20,7 +20,7 @@ EDGE = 46.0
 SAID = (
     "Each dot is the force that one sample of the mixture asks of the fin, in the fin's own plane: right is "
     "its horizontal thrust axis. The line is the answer. A sample has the colour of the mode that its "
-    "component led to, and is grey where that led to none."
+    "component led to, and is grey where what came of it was not kept."
 )
 
 Array = NDArray[np.float64]

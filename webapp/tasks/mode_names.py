@@ -12,7 +12,7 @@ from finlab.allocation.modes import (
     Mode,
     ModeSignature,
     find_modes,
-    mode_signature,
+    force_sizes,
     same_signature,
     signature_difference,
 )
@@ -60,22 +60,21 @@ def known_modes(answer: Allocation) -> tuple[Mode, ...]:
     """The modes among the candidates that an answer has refined anyway: a few, but they cost no time."""
     if answer.candidates is None:
         return ()
-    return find_modes(answer.candidates, answer.layout.lower, answer.layout.upper)
+    layout, candidates = answer.layout, answer.candidates
+    return find_modes(candidates, force_sizes(layout, candidates.command), layout.lower, layout.upper)
 
 
 def named_modes(modes: tuple[Mode, ...]) -> tuple[NamedMode, ...]:
     """The first `MAX_SHOWN` modes with their names, no two alike."""
     shown = modes[:MAX_SHOWN]
-    names = _names([mode_signature(mode.command) for mode in shown])
+    names = _names([mode.signature for mode in shown])
     return tuple(NamedMode(mode, name) for mode, name in zip(shown, names, strict=True))
 
 
 def same_mode(wanted: Mode, modes: tuple[NamedMode, ...]) -> int:
     """The place of a mode that is known from another list; 0, the best one, where it is not there."""
-    signature = mode_signature(wanted.command)
-    return next(
-        (k for k, (mode, _) in enumerate(modes) if same_signature(mode_signature(mode.command), signature)), 0
-    )
+    places = (k for k, (mode, _) in enumerate(modes) if same_signature(mode.signature, wanted.signature))
+    return next(places, 0)
 
 
 def led_to(samples: Candidates, modes: tuple[NamedMode, ...]) -> NDArray[np.intp]:

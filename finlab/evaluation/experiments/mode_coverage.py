@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.modes import cluster, mode_signature, same_signature
+from finlab.allocation.modes import ModeSignature, cluster, force_sizes, mode_signature, same_signature
 from finlab.evaluation.cheapest_commands import CheapestCommands
 from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case
@@ -74,7 +74,7 @@ def _compare(
     """Counts and coverage for one target; None where no start delivers it."""
     plant = plant_of(layout)
     ends, _ = ways.ends(layout, target, n_starts, seed)
-    truth = ends[[group[0] for group in cluster([mode_signature(one) for one in ends])]]
+    truth = ends[[group[0] for group in cluster(_signatures(layout, ends))]]
     mine = np.array([mode.command for mode in allocator.allocate(layout, target).explore()])
     if not len(truth) or not len(mine):
         return None
@@ -84,7 +84,7 @@ def _compare(
     least = min(truth_cost.min(), cost.min())
     cheap = [command[spent <= CHEAP * least] for command, spent in both]
     forces = (plant.fin_forces(command).reshape(-1, 3 * layout.n_fins) for command in cheap)
-    truth_ways, own_ways = ([mode_signature(one) for one in command] for command in cheap)
+    truth_ways, own_ways = (_signatures(layout, command) for command in cheap)
     return {
         "truth": len(truth_ways),
         "modes": len(own_ways),
@@ -93,6 +93,11 @@ def _compare(
         "best_cost": float(cost.min() / truth_cost.min()),
         "distance": _energy_distance(*forces),
     }
+
+
+def _signatures(layout: Layout, command: Array) -> list[ModeSignature]:
+    """What matters of each of some commands (K, n, 3)."""
+    return [mode_signature(*each) for each in zip(command, force_sizes(layout, command), strict=True)]
 
 
 def _covered(wanted: list[Any], known: list[Any]) -> float:

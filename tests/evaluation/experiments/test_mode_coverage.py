@@ -11,7 +11,8 @@ PUSH, REST = (0.4, 1.5, 0.0), (0.05, 0.1, 0.0)
 
 
 def test_coverage_counts_ways_that_are_the_same() -> None:
-    one, other = mode_signature(np.array([PUSH, REST])), mode_signature(np.array([REST, PUSH]))
+    one = mode_signature(np.array([PUSH, REST]), np.array([1.0, 0.0]))
+    other = mode_signature(np.array([REST, PUSH]), np.array([0.0, 1.0]))
     assert _covered([one, other], [one]) == 0.5
     assert _covered([], [one]) == 1.0 and _covered([one], []) == 0.0
 
