@@ -5,7 +5,7 @@ You will see error, energy and time of five methods on one target.
 
 import finlab
 
-METHODS = ("learned", "paper", "analytic", "qp", "sqp")
+METHODS = ("search", "paper", "analytic", "qp", "sqp")
 
 
 def main() -> None:

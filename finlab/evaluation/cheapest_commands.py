@@ -130,15 +130,10 @@ class CheapestCommands:
                 return np.asarray(axes @ (jacobian / self.sigma[:, None] * plant.width.ravel())[:, free])
 
             first = ((start - plant.lower) / np.where(plant.width > 0.0, plant.width, 1.0)).ravel()[free]
-            answer = minimize(
-                cost,
-                first,
-                jac=cost_slopes,
-                method="SLSQP",
-                bounds=[(0.0, 1.0)] * len(first),
-                constraints={"type": "eq", "fun": missing, "jac": slopes},
-                options={"maxiter": 100, "ftol": 1e-9},
-            )
+            exactly: Any = {"type": "eq", "fun": missing, "jac": slopes}
+            how: dict[str, Any] = {"method": "SLSQP", "options": {"maxiter": 100, "ftol": 1e-9}}
+            limits = [(0.0, 1.0)] * len(first)
+            answer = minimize(cost, first, jac=cost_slopes, bounds=limits, constraints=exactly, **how)
             return command_at(np.clip(answer.x, 0.0, 1.0))
 
         return solve

@@ -32,7 +32,7 @@ TINY = Sizes(
 )
 
 
-FEW_SPLITS = ("id", "ood", "failure", "fins-mixed")
+FEW_SPLITS = ("id", "ood", "failure", "tables")
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,45 @@
+"""Methods as users name them."""
+
+import pytest
+
+from finlab.errors import AllocationError
+from finlab.evaluation.method_specs import fingerprint, is_slow, load_method_spec, load_method_specs
+
+
+@pytest.mark.parametrize("name", ["search", "analytic", "multistart", "slsqp"])
+def test_the_objective_is_a_part_of_the_name_or_given_to_all(name: str) -> None:
+    assert load_method_spec(name).options["objective"] == "power"
+    assert load_method_spec(name, objective="effort").options["objective"] == "effort"
+    assert load_method_spec(f"{name}-effort").options["objective"] == "effort"
+    assert load_method_spec(f"{name}-power", objective="effort").options["objective"] == "power"
+
+
+def test_methods_that_cannot_choose_are_left_as_they_are() -> None:
+    methods = load_method_specs("paper, on-board,search", objective="effort")
+    assert list(methods) == ["paper", "on-board", "search"]
+    assert "objective" not in methods["paper"].options and methods["search"].options["objective"] == "effort"
+
+
+def test_starts() -> None:
+    assert load_method_spec("slsqp-32").options["n_starts"] == 32
+    assert is_slow("slsqp-32") and is_slow("trf") and not is_slow("search-effort")
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        ("learned", "method: 'learned' is now called 'search'"),
+        ("search,fast", "method: 'fast' has gone"),
+        ("search-32", "a number of starts, from 1, goes with trf, slsqp, ipopt only, got 'search-32'"),
+        ("paper-effort", "knows the options .*, got 'objective'"),
+        ("search-money", "method: expected one of search, mdn"),
+        (" , ", "expected names with commas between"),
+    ],
+)
+def test_names_that_are_none(names: str, message: str) -> None:
+    with pytest.raises(AllocationError, match=message):
+        load_method_specs(names)
+
+
+def test_fingerprints_tell_networks_apart_from_yardsticks() -> None:
+    assert fingerprint("search") == fingerprint("analytic") != fingerprint("mdn") != fingerprint("paper")
