@@ -20,10 +20,10 @@ OBJECTIVE = "fl-objective"
 """Marks the buttons for the objective."""
 ORIGINS = {
     "search": "The search knows each fin's own law and draws nothing. It begins with all fins at work and, "
-    "for other ways, with one or two of them at rest.",
+    "for other ways, with some of them at rest.",
     "mdn": "A network proposes ways to share the wrench, drawn from its mixture; the search, by the fins' "
-    "own laws, takes each to its exact end. A mode names the components that led to it; all others are the wider "
-    "search's alone.",
+    "own laws, takes each to its exact end. A mode names the components that led to it; all others are the "
+    "wider search's alone.",
     "paper": "The paper's network draws candidates; the best are refined by Adam on a learned surrogate, "
     "which leaves an error.",
 }
