@@ -14,6 +14,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from finlab.allocation.aim import checked_objective
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.judging import costs
@@ -34,7 +35,7 @@ from finlab.inference.normalization import Normalization
 from finlab.inference.threads import single_threaded_products
 from finlab.layout import Layout
 from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyWeights
-from finlab.physics.objective import Name, Objective
+from finlab.physics.objective import Name
 
 Array = NDArray[Any]
 
@@ -72,7 +73,7 @@ class SearchAllocator(Allocator):
             AllocationError: a setting that no search can work with.
         """
         self.normalization = normalization
-        self.objective = _checked_objective(objective, energy_weights, copper_loss)
+        self.objective = checked_objective(objective, energy_weights, copper_loss)
         self.settings = self.settings_class(**settings)
         self.compiled = compiled or {}
         """Compiled fins that came with the allocator."""
@@ -94,7 +95,7 @@ class SearchAllocator(Allocator):
         return {**chosen, **vars(self.settings)}
 
     def _made_with(self, options: dict[str, Any]) -> Self:
-        aim = _checked_objective(*(options.pop(k) for k in ("objective", "energy_weights", "copper_loss")))
+        aim = checked_objective(*(options.pop(k) for k in ("objective", "energy_weights", "copper_loss")))
         other = copy(self)
         other.settings = self.settings_class(**options)
         if aim == self.objective:  # what is known of layouts does not depend on the other settings
@@ -195,16 +196,6 @@ class SearchAllocator(Allocator):
         return self._solve(
             layout, served.wrench * std, seed=seed, previous=previous, fallback=lambda *_: served.force
         )
-
-
-def _checked_objective(name: Name, weights: EnergyWeights, copper_loss: float) -> Objective:
-    if name not in ("power", "effort"):
-        raise AllocationError(f"objective: expected 'power' or 'effort', got {name!r}")
-    if not isinstance(weights, EnergyWeights):
-        raise TypeError(f"energy_weights: expected EnergyWeights, got {weights!r}")
-    if not 0.0 <= copper_loss < np.inf:
-        raise AllocationError(f"copper_loss: expected watts per (N m)^2, from 0, got {copper_loss!r}")
-    return Objective(name, weights, float(copper_loss))
 
 
 def _within_reach(problem: PlanarProblem, policy: Policy, target: Array) -> Nearest:
