@@ -1,4 +1,4 @@
-"""`finlab eval wrench|cost|ablation|temperature|latency|...`: methods on targets, without a body."""
+"""`finlab eval wrench|cost|network|ablation|temperature|latency|...`: methods on targets, without a body."""
 
 from dataclasses import asdict
 from typing import Annotated
@@ -15,6 +15,7 @@ from finlab.cli.eval_arguments import (
     Run,
     check_folders,
     open_layouts,
+    parse_counts,
 )
 from finlab.cli.inputs import check_positive
 
@@ -106,6 +107,39 @@ def cost(
             found = cost_rows(name, allocators, aim, n_starts=starts, **drawn)
             print(("\n" if number or aim != aims[0] else "") + cost_report(found))
             rows += found
+    run.write(rows=rows)
+
+
+def network(
+    fins: Names = "3,4,5,6,8,10,12",
+    layouts: Count = 20,
+    targets: Count = 20,
+    candidates: Count | None = None,
+    objectives: Names = "power,effort",
+    seed: Count = 0,
+    run: Annotated[Run, arg(name="")] = RUN,
+) -> None:
+    """What the network of method mdn buys: its proposals against as many other seeds of the same search.
+
+    Args:
+        fins: numbers of fins with commas between.
+        layouts: random robots for each number of fins.
+        targets: targets on each robot.
+        candidates: proposals, and seeds of the others; as many as method mdn takes by default.
+        objectives: power, effort or both.
+        seed: of robots, targets and random seeds.
+    """
+    from finlab.allocation.methods import load_allocator
+    from finlab.evaluation.experiments.cost import parse_objectives
+    from finlab.evaluation.experiments.network import network_report, network_rows
+
+    check_positive(layouts=layouts, targets=targets, candidates=candidates)
+    counts, aims = parse_counts(fins), parse_objectives(objectives)
+    options = {} if candidates is None else {"n_candidates": candidates}
+    allocator = load_allocator("mdn", checkpoint=run.checkpoint).with_settings(**options)
+    drawn = {"layouts": layouts, "targets": targets, "seed": seed}
+    rows = [row for aim in aims for row in network_rows(allocator, counts, aim, **drawn)]
+    print(network_report(rows, allocator.settings.n_candidates))
     run.write(rows=rows)
 
 

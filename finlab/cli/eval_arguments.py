@@ -74,6 +74,20 @@ class Output:
         print(text)
 
 
+MOST_FINS = 16
+"""Fins that a layout may have."""
+
+
+def parse_counts(text: str) -> list[int]:
+    """Numbers of fins from a text with commas between; `DataError` for what is none."""
+    words = [word.strip() for word in text.split(",") if word.strip()]
+    wrong = [word for word in words if not word.isdecimal() or not 1 <= int(word) <= MOST_FINS]
+    if wrong or not words:
+        got = wrong[0] if wrong else text
+        raise DataError(f"fins: expected numbers from 1 to {MOST_FINS} with commas between, got {got!r}")
+    return [int(word) for word in words]
+
+
 @dataclass(frozen=True)
 class Run(Output):
     """What is measured, and where the rows go."""

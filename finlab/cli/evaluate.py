@@ -112,6 +112,7 @@ verbs = SubcommandApp()
 for verb in (
     eval_allocation.wrench,
     eval_allocation.cost,
+    eval_allocation.network,
     eval_allocation.ablation,
     eval_allocation.temperature,
     eval_allocation.latency,

@@ -54,7 +54,7 @@ class MdnAllocator(SearchAllocator):
         self.network = NumpyForceNetwork(weights.network, sizes.heads)
         self._view = lru_cache(maxsize=128)(_view)
 
-    def _propose(self, prepared: Prepared, targets: Array, seed: int) -> Proposal:
+    def proposals(self, prepared: Prepared, targets: Array, seed: int) -> Proposal:
         """The network's proposals for targets (N, 6)."""
         view = self._view(self.pipeline, prepared.plant.layout)
         drawn = self.settings.n_candidates, self.settings.temperature, seed
@@ -74,12 +74,12 @@ class MdnAllocator(SearchAllocator):
 
             def solve(start: int) -> RefinedCandidates:
                 some = targets[start : start + CHUNK]
-                seeds = self._propose(prepared, some, seed + start).force
+                seeds = self.proposals(prepared, some, seed + start).force
                 return self.pipeline.solve(prepared, some, seeds=seeds, fallback=fallback)
 
             return self._many(solve, len(targets))
         with self._one_thread():
-            proposal = self._propose(prepared, targets, seed)
+            proposal = self.proposals(prepared, targets, seed)
             refined = self.pipeline.solve(
                 prepared, targets, previous, seeds=proposal.force, fallback=fallback
             )

@@ -16,7 +16,7 @@ from finlab.errors import AllocationError
 class MdnSettings(Settings):
     """How many ways the mixture proposes; each of them is searched."""
 
-    n_candidates: int = 8
+    n_candidates: int = 16
     """Number K of proposals: the components' means by falling weight, then samples of the mixture."""
     temperature: float = 1.0
     """What the variances of these samples are multiplied by; 1 draws from the mixture itself."""
