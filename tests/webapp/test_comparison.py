@@ -81,6 +81,9 @@ def test_each_mode_of_mdn_tells_its_components_and_search_has_no_samples() -> No
     assert reply.attention is not None and reply.attention.weight.sum(axis=1) == pytest.approx(np.ones(4))
     discs = proposal_discs(reply.answer, reply.modes)
     assert discs.count("<svg") == 4 and discs.count("r='2'") == 4 * len(samples)
+    dear = replace(samples, power=np.full(len(samples), 1e4))
+    far = mode_plot(replace(reply.answer, samples=dear), modes, 0, None, 200, "here")
+    assert "1e+04" not in far and "e+" not in far, "samples that are far too dear stand at the edge"
     searched = solver.reply(replace(state, method="search"))
     found = solver.modes(searched)
     assert searched.answer.samples is None and searched.attention is None and found.of_samples is None

@@ -20,6 +20,8 @@ MOST_TICKS = 6
 """Steps between ticks at most."""
 EXACT = 1e-6
 """Error [σ] below which all answers are drawn as equally exact."""
+FAR = 2.0
+"""Samples that cost more than so many times the dearest mode stand at the edge, so that modes keep apart."""
 LEGEND = (("refined", 5.0, 6), ("on the robot", 0.0, 72), ("sampled", 2.6, 162))
 """Word, radius and place of what is drawn; radius 0 is the ring. The last one is for methods that sample."""
 DOT = 9
@@ -100,7 +102,7 @@ def mode_plot(
     if samples is not None:
         error = np.array([mode.err_norm for mode, _ in modes.shown])
         refined = np.stack([costs[:, 0], _logarithm(error)], axis=1)
-        raw_cost = (samples.power, samples.energy)[order[0]]
+        raw_cost = np.minimum((samples.power, samples.energy)[order[0]], FAR * costs[:, 0].max())
         raw = np.stack([raw_cost, _logarithm(samples.err_norm)], axis=1)
     points = np.concatenate([refined, raw])
     if not np.isfinite(points).all():

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from finlab.allocation.allocation import Allocation
 from finlab.physics import plant_of
 from webapp.markup.answer import swatch
-from webapp.markup.mode_plot import sample_colors
+from webapp.markup.mode_plot import FAR, sample_colors
 from webapp.markup.words import three_digits
 from webapp.tasks.mode_names import Modes
 from webapp.theme import css, fin_color
@@ -38,15 +38,17 @@ def proposal_discs(answer: Allocation, modes: Modes) -> str:
         return ""
     plant = plant_of(answer.layout)
     dots, given = (plant.forces(command)[..., 1:] for command in (samples.command, answer.command))
-    rim = 1.05 * max(float(np.hypot(dots[..., 0], dots[..., 1]).max(initial=0.0)), 1e-3)
-    dots, given = dots * RADIUS / rim, given * RADIUS / rim
+    rim = FAR * max(float(np.linalg.norm(given, axis=-1).max()), 1e-3)
+    # What is beyond the rim stands on it.
+    dots, given = dots / np.maximum(np.linalg.norm(dots, axis=-1, keepdims=True), rim), given / rim
+    dots, given = dots * RADIUS, given * RADIUS
     colors = [css(color, 0.6) for color in sample_colors(modes, len(samples))]
     discs = []
     for i, name in enumerate(answer.layout.names):
         if np.isfinite(answer.command[i, 0]):
             label = f"{swatch(i)}<span class='name' title='{escape(name)}'>{escape(name)}</span>"
             discs.append(f"<div>{_disc(dots[:, i], colors, given[i], css(fin_color(i)))}{label}</div>")
-    said = f"{SAID} The rim is {three_digits(rim)} N."
+    said = f"{SAID} The rim is {three_digits(rim)} N; what is beyond stands on it."
     return f"<div class='fl'><div class='dim'>{said}</div><div class='discs'>{''.join(discs)}</div></div>"
 
 
