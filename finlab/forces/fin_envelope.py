@@ -41,6 +41,10 @@ STIFFEST = 10.0
 """Largest elasticity that is told apart."""
 MARGINAL = 1e-3
 """Least marginal cost, as a share of the mean one."""
+NOISY = 0.02
+"""Share of levels whose cost is below that of the one before, from which on a fin counts as measured."""
+WAVES = 4
+"""Waves around the circle, or degree along an arc, that the smooth cost of a measured fin has."""
 POLISHES = 3
 """Newton steps by the law itself."""
 
@@ -113,7 +117,7 @@ def compile_fin(law: FinLaw, limits: Limits, objective: Objective) -> FinEnvelop
     cost = objective.fin_cost(law, upper)
     price = np.where(np.isnan(found), np.inf, cost(np.nan_to_num(command)))
     command = _polished(law, _cheapest(command, price), grid, wanted, lower, upper)
-    table = _table(law, cost(command), command, grid, wanted)
+    table = _table(law, cost(command), command, grid, wanted, objective.convex)
     return FinEnvelope(grid.middle, grid.half, smallest, largest, table)
 
 
@@ -297,8 +301,11 @@ def _polished(law: FinLaw, command: Array, grid: _Grid, wanted: Array, lower: Ar
     return best
 
 
-def _table(law: FinLaw, cost: Array, command: Array, grid: _Grid, wanted: Array) -> Array:
+def _table(law: FinLaw, cost: Array, command: Array, grid: _Grid, wanted: Array, convex: bool) -> Array:
     """The table of an envelope, from its commands (K, LEVELS, 3), their cost and size (K, LEVELS)."""
+    found = cost
+    if convex:
+        cost, wanted = _smooth(cost, wanted, grid)
     marginal, stiffness = np.ones_like(cost), np.ones_like(cost)
     for k, size in enumerate(wanted):
         span = size[-1] - size[0]
@@ -317,13 +324,33 @@ def _table(law: FinLaw, cost: Array, command: Array, grid: _Grid, wanted: Array)
         command[..., 0],
         command[..., 1],
         wrapped(grid.direction[:, None] - command[..., 2]),
-        cost,
+        found,
         np.log(mobility),
         stiffness,
         by_direction / marginal,
         law.force(command)[..., 0],
     )
     return np.stack(columns, axis=-1)
+
+
+def _smooth(cost: Array, wanted: Array, grid: _Grid) -> tuple[Array, Array]:
+    """Cost and size (K, LEVELS) as the search shall see them: those of a measured fin rise and fall with the
+    noise, from which no slope can be told, so they are taken for polynomials of the level and few waves of
+    the direction. The commands stay what they are."""
+    if (np.diff(cost, axis=1) < -1e-9 * np.ptp(cost)).mean() < NOISY or len(cost) == 1:
+        return cost, wanted
+    across = np.linspace(-1.0, 1.0, len(cost))
+    if grid.half < np.pi:
+        waves = np.polynomial.legendre.legvander(across, WAVES)
+    else:
+        turns = np.pi * across[:, None] * np.arange(1, WAVES + 1)
+        waves = np.hstack([np.ones((len(cost), 1)), np.cos(turns), np.sin(turns)])
+    level = np.linspace(0.0, 1.0, LEVELS)[:, None]
+    # Near rest force is like the fourth power of the level, and cost grows no more slowly.
+    powers = level ** np.r_[0, 4:9]
+    around, along = (basis @ np.linalg.pinv(basis) for basis in (waves, powers))
+    ends = around @ wanted[:, [0, -1]]
+    return around @ cost @ along.T, ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * levels()
 
 
 def _around(values: Array, grid: _Grid) -> Array:

@@ -1,0 +1,109 @@
+"""The power of a beating plate, against its torque integrated over a beat."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from finlab.layout import Fin, FinModelSpec, Layout
+from finlab.physics import Plant, make_law
+from finlab.physics.blade import OWN_INERTIA, Blade
+
+Array = NDArray[np.float64]
+
+BLADES = [
+    Blade(),
+    Blade(0.12, 0.05),
+    Blade(0.3, 0.15, 1025.0, 1.2),
+    Blade(0.05, 0.2),
+    Blade(drag_coefficient=1e-6),
+]
+BEATS = [(0.01, 0.1), (0.05, 2.1), (0.3, 1.0), (0.6, 2.1), (1.2, 0.5), (1.5, 3.0)]
+
+
+def integrated(blade: Blade, amplitude: float, frequency: float) -> tuple[float, float]:
+    """Mean of what driving takes [W], and mean squared torque [N^2 m^2], over a beat of A sin(2 pi f t)."""
+    turn = 2.0 * np.pi * (np.arange(400_000) + 0.5) / 400_000
+    rate = 2.0 * np.pi * frequency
+    speed = amplitude * rate * np.cos(turn)
+    torque = -blade.inertia * amplitude * rate**2 * np.sin(turn) + blade.drag * speed * np.abs(speed)
+    return float(np.maximum(torque * speed, 0.0).mean()), float((torque**2).mean())
+
+
+@pytest.mark.parametrize("beat", BEATS)
+@pytest.mark.parametrize("blade", BLADES)
+def test_power_is_what_driving_takes_over_a_beat(blade: Blade, beat: tuple[float, float]) -> None:
+    power, heat = integrated(blade, *beat)
+    assert blade.power(*map(np.float64, beat)) == pytest.approx(power, rel=1e-8)
+    for loss in (0.3, 40.0):
+        driving = blade.driving_power(*map(np.float64, beat), loss)
+        assert driving == pytest.approx(power + loss * heat, rel=1e-8)
+
+
+def test_the_plate_of_the_robot() -> None:
+    """Its own inertia, that of the water within the circle of its width, and drag of a flat plate."""
+    blade = Blade()
+    assert blade.own_inertia == OWN_INERTIA
+    water = np.linspace(0.0, 0.2, 100_001)
+    carried = np.trapezoid(np.pi / 4.0 * 1000.0 * 0.1**2 * water**2, water)
+    assert blade.inertia - OWN_INERTIA == pytest.approx(carried, rel=1e-6)
+    drag = np.trapezoid(0.5 * 1000.0 * 2.0 * 0.1 * water**3, water)
+    assert blade.drag == pytest.approx(drag, rel=1e-6)
+    assert Blade(0.4, 0.3).own_inertia == pytest.approx(24.0 * OWN_INERTIA)
+
+
+@pytest.mark.parametrize("loss", [0.0, 2.0])
+@pytest.mark.parametrize("blade", BLADES)
+def test_slopes_are_differences(blade: Blade, loss: float) -> None:
+    a, f = (np.array(values) for values in zip(*BEATS, strict=True))
+    by_a, by_f = blade.driving_slopes(a, f, loss)
+    h = 1e-6
+    ahead, behind = (blade.driving_power(a * (1.0 + s * h), f, loss) for s in (1, -1))
+    np.testing.assert_allclose(by_a, (ahead - behind) / (2.0 * h * a), rtol=2e-8)
+    ahead, behind = (blade.driving_power(a, f * (1.0 + s * h), loss) for s in (1, -1))
+    np.testing.assert_allclose(by_f, (ahead - behind) / (2.0 * h * f), rtol=2e-8)
+    if not loss:
+        np.testing.assert_array_equal(blade.power_slopes(a, f), blade.driving_slopes(a, f, 0.0))
+
+
+def test_a_fin_at_rest_takes_nothing() -> None:
+    for a, f in ((0.0, 1.0), (0.5, 0.0), (0.0, 0.0)):
+        assert Blade().power(np.float64(a), np.float64(f)) == 0.0
+        assert Blade().driving_slopes(np.float64(a), np.float64(f), 1.0)[1] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("spec", "blade"),
+    [
+        (FinModelSpec(), Blade(0.2, 0.1)),
+        (FinModelSpec("drag", (("area", 0.03), ("lever", 0.12))), Blade(0.24, 0.125)),
+        (FinModelSpec("lighthill", (("length", 0.14), ("width", 0.08))), Blade(0.14, 0.08)),
+        (FinModelSpec("soft"), Blade()),
+    ],
+)
+@pytest.mark.parametrize("loss", [0.0, 0.7])
+def test_each_law_knows_its_plate(spec: FinModelSpec, blade: Blade, loss: float) -> None:
+    """A rectangle of the area whose centre lies at the lever, one edge on the shaft."""
+    law = make_law(spec)
+    command = np.random.default_rng(0).uniform([0.05, 0.1, -3.0], [0.6, 2.1, 3.0], (20, 3))
+    expected = blade.driving_power(command[:, 0], command[:, 1], loss)
+    np.testing.assert_allclose(law.power(command, loss), expected, rtol=1e-12)
+    slopes = law.power_slopes(command, loss)
+    np.testing.assert_array_equal(slopes[:, 2], 0.0)
+    by = blade.driving_slopes(command[:, 0], command[:, 1], loss)
+    np.testing.assert_allclose(slopes[:, :2].T, by, rtol=1e-12)
+
+
+def test_a_plant_asks_each_fin_for_its_own_power() -> None:
+    specs = [FinModelSpec(), FinModelSpec("lighthill"), FinModelSpec("drag", (("area", 0.03),))]
+    fins = tuple(Fin(f"f{i}", (0.1 * i, 0.0, 0.0), 0.0, model=spec) for i, spec in enumerate(specs))
+    plant = Plant(Layout("mixed", fins))
+    command = plant.sample(np.random.default_rng(1), (5,))
+    for i, spec in enumerate(specs):
+        law = make_law(spec)
+        np.testing.assert_allclose(plant.power(command, 0.3)[:, i], law.power(command[:, i], 0.3))
+        np.testing.assert_allclose(
+            plant.power_slopes(command, 0.3)[:, i], law.power_slopes(command[:, i], 0.3)
+        )
+    lost = command.copy()
+    lost[:, 1] = np.nan
+    assert np.isnan(plant.power(lost)[:, 1]).all() and np.isfinite(plant.power(lost)[:, [0, 2]]).all()
