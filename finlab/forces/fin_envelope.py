@@ -41,10 +41,12 @@ STIFFEST = 10.0
 """Largest elasticity that is told apart."""
 MARGINAL = 1e-3
 """Least marginal cost, as a share of the mean one."""
-NOISY = 0.02
+NOISY = 0.004
 """Share of levels whose cost is below that of the one before, from which on a fin counts as measured."""
 WAVES = 4
 """Waves around the circle, or degree along an arc, that the smooth cost of a measured fin has."""
+MEASURED = 0.05
+"""The same of a measured fin, whose weak forces are hardly known."""
 POLISHES = 3
 """Newton steps by the law itself."""
 
@@ -277,7 +279,9 @@ def _polished(law: FinLaw, command: Array, grid: _Grid, wanted: Array, lower: Ar
     low, high = lower.copy(), upper.copy()
     if is_full_turn(upper[2] - lower[2]):
         low[2], high[2] = -np.inf, np.inf
-    longest = np.array([0.1 * (upper[1] - lower[1]), 0.1])
+    # A fin of one frequency has its amplitude to give the size.
+    free = [1, 2] if upper[1] > lower[1] else [0, 2]
+    longest = np.array([0.1 * (upper[free[0]] - lower[free[0]]), 0.1])
     point = np.stack([np.cos(grid.direction), np.sin(grid.direction)], axis=-1)
     goal = wanted[..., None] * point[:, None]
     best = np.clip(command, low, high)
@@ -289,14 +293,14 @@ def _polished(law: FinLaw, command: Array, grid: _Grid, wanted: Array, lower: Ar
         off = np.hypot(missing[..., 0], missing[..., 1])
         better = off < error
         best, error = np.where(better[..., None], trial, best), np.where(better, off, error)
-        jacobian = slopes[..., 1:, 1:]
+        jacobian = slopes[..., free, 1:]
         if grid.uniform:
             jacobian = jacobian * np.array([[1.0], [0.0]])
         gram = jacobian @ jacobian.swapaxes(-1, -2)
         ridge = 1e-8 * np.trace(gram, axis1=-2, axis2=-1)[..., None, None] + 1e-30
         step = np.linalg.solve(gram + ridge * np.eye(2), jacobian @ missing[..., None])[..., 0]
         trial = trial.copy()
-        trial[..., 1:] += np.clip(step, -longest, longest)
+        trial[..., free] += np.clip(step, -longest, longest)
         trial = np.clip(trial, low, high)
     return best
 
@@ -304,7 +308,8 @@ def _polished(law: FinLaw, command: Array, grid: _Grid, wanted: Array, lower: Ar
 def _table(law: FinLaw, cost: Array, command: Array, grid: _Grid, wanted: Array, convex: bool) -> Array:
     """The table of an envelope, from its commands (K, LEVELS, 3), their cost and size (K, LEVELS)."""
     found = cost
-    if convex:
+    noisy = convex and len(cost) > 1 and (np.diff(cost, axis=1) < -1e-9 * np.ptp(cost)).mean() > NOISY
+    if noisy:
         cost, wanted = _smooth(cost, wanted, grid)
     marginal, stiffness = np.ones_like(cost), np.ones_like(cost)
     for k, size in enumerate(wanted):
@@ -312,8 +317,11 @@ def _table(law: FinLaw, cost: Array, command: Array, grid: _Grid, wanted: Array,
         if span <= 1e-12:
             continue
         size = size + np.arange(len(size)) * 1e-15 * size[-1]
-        least = MARGINAL * max(float(cost[k].max() - cost[k].min()), 1e-12) / span
+        share = MEASURED if noisy else MARGINAL
+        least = share * max(float(cost[k].max() - cost[k].min()), 1e-12) / span
         marginal[k] = np.maximum(np.gradient(cost[k], size), least)
+        if noisy:  # what is left of the noise must not look like gifts
+            marginal[k] = np.maximum.accumulate(marginal[k])
         height = np.log(np.maximum(size, 1e-9 * size[-1])) + np.arange(len(size)) * 1e-9
         stiffness[k] = np.gradient(np.log(marginal[k]), height)
     stiffness = np.where(stiffness > CONVEX, np.minimum(stiffness, STIFFEST), 1.0)
@@ -337,8 +345,6 @@ def _smooth(cost: Array, wanted: Array, grid: _Grid) -> tuple[Array, Array]:
     """Cost and size (K, LEVELS) as the search shall see them: those of a measured fin rise and fall with the
     noise, from which no slope can be told, so they are taken for polynomials of the level and few waves of
     the direction. The commands stay what they are."""
-    if (np.diff(cost, axis=1) < -1e-9 * np.ptp(cost)).mean() < NOISY or len(cost) == 1:
-        return cost, wanted
     across = np.linspace(-1.0, 1.0, len(cost))
     if grid.half < np.pi:
         waves = np.polynomial.legendre.legvander(across, WAVES)
@@ -349,7 +355,8 @@ def _smooth(cost: Array, wanted: Array, grid: _Grid) -> tuple[Array, Array]:
     # Near rest force is like the fourth power of the level, and cost grows no more slowly.
     powers = level ** np.r_[0, 4:9]
     around, along = (basis @ np.linalg.pinv(basis) for basis in (waves, powers))
-    ends = around @ wanted[:, [0, -1]]
+    ends = np.maximum(around @ wanted[:, [0, -1]], [0.0, WEAK * float(wanted.max())])
+    ends[:, 0] = np.minimum(ends[:, 0], ends[:, 1])
     return around @ cost @ along.T, ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * levels()
 
 

@@ -1,0 +1,240 @@
+"""Compiled fins against their laws and against a fine grid of commands: true to the force, and as cheap."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from finlab.forces.fin_envelope import (
+    AMPLITUDE,
+    COST,
+    DIRECTIONS,
+    DRIFT,
+    FREQUENCY,
+    LEAN,
+    LEVELS,
+    MOBILITY,
+    SHAFT,
+    STIFFNESS,
+    FinEnvelope,
+    compile_fin,
+    fin_envelope,
+    levels,
+)
+from finlab.layout import FinModelSpec, Limits
+from finlab.physics import FinLaw, make_law
+from finlab.physics.objective import Name, Objective
+from tests.random_fins import write_fin_table
+
+Array = NDArray[np.float64]
+
+FINS: dict[str, tuple[FinModelSpec, Limits]] = {
+    "drag": (FinModelSpec(), Limits()),
+    "weak": (FinModelSpec("drag", (("area", 1e-5),)), Limits((0.0, 0.4), (0.0, 1.0), (0.5, 2.0))),
+    "lighthill": (FinModelSpec("lighthill"), Limits((0.1, 0.8), (0.5, 3.0), (-2.5, 2.5))),
+    "soft": (FinModelSpec("soft"), Limits()),
+    "uneven": (FinModelSpec("soft", (("e", 0.2), ("phi_e", 1.0))), Limits()),
+    "leaning": (FinModelSpec("soft", (("d", 0.15), ("e", 0.1))), Limits(zero_direction=(-1.0, 0.5))),
+    "declining": (
+        FinModelSpec("soft", (("k", 5.0), ("x0", 0.6), ("q", 6.0))),
+        Limits((0.05, 0.8), (0.1, 3.0)),
+    ),
+    "one frequency": (FinModelSpec(), Limits((0.05, 0.6), (1.5, 1.5))),
+    "one amplitude": (FinModelSpec("soft"), Limits((0.4, 0.4), (0.1, 2.1))),
+}
+
+
+def compiled(name: str, objective: Objective) -> tuple[FinLaw, Limits, FinEnvelope]:
+    spec, limits = FINS[name]
+    law = make_law(spec)
+    return law, limits, compile_fin(law, limits, objective)
+
+
+def directions(envelope: FinEnvelope) -> Array:
+    share = np.linspace(-1.0, 1.0, len(envelope.largest)) if len(envelope.largest) > 1 else np.zeros(1)
+    return envelope.middle + envelope.half * share
+
+
+def sizes(envelope: FinEnvelope) -> Array:
+    """What each entry of the table promises (K, LEVELS) [N]."""
+    smallest, largest = envelope.smallest[:, None], envelope.largest[:, None]
+    return smallest + (largest - smallest) * levels()
+
+
+def commands(envelope: FinEnvelope) -> Array:
+    """The command of each entry (K, LEVELS, 3)."""
+    table = envelope.table
+    turn = directions(envelope)[:, None] - table[..., LEAN]
+    return np.stack([table[..., AMPLITUDE], table[..., FREQUENCY], turn], axis=-1)
+
+
+def brute(law: FinLaw, limits: Limits, turn: float) -> tuple[Array, Array]:
+    """Sizes of the force and commands (a, f, 3) at a zero direction, on a fine grid."""
+    axes = [
+        np.linspace(*ends, 401 if ends[1] > ends[0] else 1) for ends in (limits.amplitude, limits.frequency)
+    ]
+    command = np.stack(np.meshgrid(*axes, [turn], indexing="ij"), axis=-1)[:, :, 0]
+    force = law.force(command)
+    return np.hypot(force[..., 1], force[..., 2]), command
+
+
+def test_levels_rise_from_nothing_to_all() -> None:
+    share = levels()
+    assert share.shape == (LEVELS,) and share[0] == 0.0 and share[-1] == pytest.approx(1.0)
+    assert (np.diff(share) > 0.0).all()
+
+
+@pytest.mark.parametrize("objective", ["power", "effort"])
+@pytest.mark.parametrize("name", FINS)
+def test_each_entrys_command_gives_the_promised_force(name: str, objective: Name) -> None:
+    law, limits, envelope = compiled(name, Objective(objective))
+    command, angle = commands(envelope), directions(envelope)
+    force = law.force(command)
+    promised = sizes(envelope)[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)[:, None]
+    missing = np.linalg.norm(force[..., 1:] - promised, axis=-1) / envelope.largest.max()
+    # The last of a force that saturates is flat in its commands, and the ends of an arc lean.
+    assert np.quantile(missing, 0.9) < 1e-7 and missing.max() < 2e-3
+    low, high = np.array(limits.lower), np.array(limits.upper)
+    assert (command[..., :2] >= low[:2]).all() and (command[..., :2] <= high[:2]).all()
+    if high[2] - low[2] < 6.28:
+        assert (command[..., 2] >= low[2] - 1e-9).all() and (command[..., 2] <= high[2] + 1e-9).all()
+    np.testing.assert_allclose(envelope.table[..., SHAFT], 0.0, atol=1e-12)
+    cost = Objective(objective).fin_cost(law, high)
+    np.testing.assert_allclose(envelope.table[..., COST], cost(command), rtol=1e-12)
+
+
+@pytest.mark.parametrize("objective", ["power", "effort"])
+@pytest.mark.parametrize("name", ["drag", "weak", "lighthill", "soft", "uneven", "declining"])
+def test_no_cheaper_command_gives_the_same_force(name: str, objective: Name) -> None:
+    """Brute force: for each amplitude of a fine grid, each frequency at which the force passes the level."""
+    law, limits, envelope = compiled(name, Objective(objective))
+    cost, promised = Objective(objective).fin_cost(law, np.array(limits.upper)), sizes(envelope)
+    gaps: list[float] = []
+    for k in range(0, len(envelope.largest), 12):
+        turn = float(directions(envelope)[k] - envelope.table[k, LEVELS // 2, LEAN])
+        size, command = brute(law, limits, turn)
+        for level in range(4, LEVELS - 2, 6):
+            passed = (size[:, :-1] - promised[k, level]) * (size[:, 1:] - promised[k, level]) <= 0.0
+            part = (promised[k, level] - size[:, :-1]) / np.where(passed, size[:, 1:] - size[:, :-1], 1.0)
+            between = command[:, :-1] + part[..., None] * (command[:, 1:] - command[:, :-1])
+            best = float(cost(between[passed]).min())
+            # Of weak forces the cheapest amplitude lies between few of those that were asked.
+            assert envelope.table[k, level, COST] <= best * 1.02 + 1e-4 * envelope.table[k, -1, COST]
+            gaps.append(envelope.table[k, level, COST] / best - 1.0)
+            assert envelope.table[k, level, COST] >= best * (1.0 - 3e-3)
+    assert np.median(gaps) < 2e-3
+
+
+@pytest.mark.parametrize("name", FINS)
+def test_the_ends_are_those_of_brute_force(name: str) -> None:
+    law, limits, envelope = compiled(name, Objective())
+    for k in range(0, len(envelope.largest), 12):
+        size, _ = brute(law, limits, float(directions(envelope)[k] - envelope.table[k, -1, LEAN]))
+        assert envelope.largest[k] == pytest.approx(size.max(), rel=2e-3, abs=1e-9)
+        at_rest = np.array([*limits.lower[:2], directions(envelope)[k] - envelope.table[k, 0, LEAN]])
+        size = float(np.linalg.norm(law.force(at_rest)))
+        assert envelope.smallest[k] == pytest.approx(size, rel=2e-3, abs=1e-5 * envelope.largest[k])
+
+
+@pytest.mark.parametrize("objective", ["power", "effort"])
+@pytest.mark.parametrize("name", ["drag", "lighthill", "soft", "uneven"])
+def test_marginal_costs_are_differences(name: str, objective: Name) -> None:
+    """Mobility is size over marginal cost; stiffness the elasticity of the latter, where cost is convex."""
+    _, _, envelope = compiled(name, Objective(objective))
+    size, table = sizes(envelope), envelope.table
+    inner = slice(12, LEVELS - 6)
+    marginal = (table[:, 2:, COST] - table[:, :-2, COST]) / (size[:, 2:] - size[:, :-2])
+    assert (marginal[:, inner] > 0.0).all()
+    found = size[:, 1:-1] / np.exp(table[:, 1:-1, MOBILITY])
+    apart = np.abs(found / marginal - 1.0)[:, inner]
+    assert np.median(apart) < 0.02 and np.quantile(apart, 0.9) < 0.1
+    assert (table[..., STIFFNESS] > 0.3).all() and (table[..., STIFFNESS] <= 10.0).all()
+    if objective == "power":
+        elastic = np.diff(np.log(marginal), axis=1) / np.diff(np.log(size[:, 1:-1]), axis=1)
+        between = 0.5 * (table[:, 1:-2, STIFFNESS] + table[:, 2:-1, STIFFNESS])
+        off = np.abs(between / elastic - 1.0)[:, inner][(elastic > 0.35)[:, inner]]
+        assert len(off) > 10 and np.median(off) < 0.03 and np.quantile(off, 0.8) < 0.2
+
+
+def test_drift_is_what_turning_costs() -> None:
+    """Cost at a size by the direction, over the marginal cost; none of a fin that is the same all round."""
+    _, _, plain = compiled("drag", Objective())
+    np.testing.assert_array_equal(plain.table[..., DRIFT], 0.0)
+    _, _, envelope = compiled("uneven", Objective())
+    size, table, angle = sizes(envelope), envelope.table, directions(envelope)
+    level = LEVELS // 2
+    for k in range(1, DIRECTIONS - 1, 5):
+        marginal = size[k, level] / np.exp(table[k, level, MOBILITY])
+        around = [float(np.interp(size[k, level], size[j], table[j, :, COST])) for j in (k - 1, k + 1)]
+        turning = (around[1] - around[0]) / (angle[k + 1] - angle[k - 1])
+        assert table[k, level, DRIFT] * marginal == pytest.approx(
+            turning, rel=0.1, abs=1e-3 * table[k, level, COST]
+        )
+
+
+def test_a_table_is_compiled_like_its_law(tmp_path: Path) -> None:
+    limits = Limits(zero_direction=(-1.0, 2.0))
+    law = make_law(FinModelSpec())
+    spec = write_fin_table(tmp_path / "fin.csv", law, limits, sideways=0.1, points=(21, 21, 21))
+    table, plain = (fin_envelope(s, limits, Objective()) for s in (spec, FinModelSpec()))
+    assert table.largest == pytest.approx(plain.largest[0], rel=5e-3)
+    assert (table.middle, table.half) == pytest.approx((plain.middle, plain.half), abs=2e-2)
+    np.testing.assert_allclose(
+        table.table[5:-5, 10:, COST], np.broadcast_to(plain.table[:, 10:, COST], (39, LEVELS - 10)), rtol=0.05
+    )
+    command = commands(table)
+    force = make_law(spec).force(command)
+    np.testing.assert_allclose(table.table[..., SHAFT], force[..., 0], atol=1e-12)
+    assert np.abs(table.table[..., SHAFT]).max() > 0.05 * table.largest.max()
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("arc", [(-np.pi, np.pi), (-1.0, 2.0), (-2.6, 2.6)])
+@pytest.mark.parametrize("objective", ["power", "effort"])
+def test_noise_gives_finite_tables_that_hold_what_they_promise(
+    objective: Name, arc: tuple[float, float], tmp_path: Path
+) -> None:
+    limits, law = Limits(zero_direction=arc), make_law(FinModelSpec())
+    rng = np.random.default_rng(0)
+    spec = write_fin_table(tmp_path / "fin.csv", law, limits, rng=rng, noise=0.03, sideways=0.1, power=True)
+    measured = make_law(spec)
+    envelope = compile_fin(measured, limits, Objective(objective))
+    assert np.isfinite(envelope.table).all() and (envelope.largest >= envelope.smallest).all()
+    angle = directions(envelope)
+    promised = sizes(envelope)[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)[:, None]
+    missing = np.linalg.norm(measured.force(commands(envelope))[..., 1:] - promised, axis=-1)
+    strong = sizes(envelope) > 0.2 * envelope.largest.max()
+    assert np.quantile(missing[strong], 0.9) < 2e-3 * envelope.largest.max()
+    # No slope is that of the noise.
+    if objective == "power" and arc[1] > 3.0:
+        assert np.abs(np.diff(envelope.table[..., MOBILITY], axis=1))[:, 15:-6].max() < 1.0
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("objective", ["power", "effort"])
+@pytest.mark.parametrize(
+    "limits",
+    [
+        Limits((0.3, 0.3), (1.0, 1.0), (0.5, 0.5)),
+        Limits((0.3, 0.3), (1.0, 1.0)),
+        Limits((0.0, 1e-9), (0.0, 1e-9)),
+        Limits((0.0, 0.6), (0.0, 2.1), (0.5, 0.5)),
+    ],
+)
+@pytest.mark.parametrize("spec", [FinModelSpec(), FinModelSpec("soft", (("e", 0.2), ("d", 0.1)))])
+def test_limits_of_no_width_give_finite_tables(spec: FinModelSpec, limits: Limits, objective: Name) -> None:
+    envelope = compile_fin(make_law(spec), limits, Objective(objective))
+    assert np.isfinite(envelope.table).all()
+    assert np.isfinite(envelope.largest).all() and (envelope.largest >= envelope.smallest).all()
+
+
+def test_a_fin_is_compiled_once_and_a_changed_table_anew(tmp_path: Path) -> None:
+    spec, limits = FINS["soft"]
+    assert fin_envelope(spec, limits, Objective()) is fin_envelope(spec, limits, Objective())
+    assert fin_envelope(spec, limits, Objective()) is not fin_envelope(spec, limits, Objective("effort"))
+    path = tmp_path / "fin.csv"
+    table = write_fin_table(path, make_law(FinModelSpec()), limits)
+    before = fin_envelope(table, limits, Objective())
+    write_fin_table(path, make_law(FinModelSpec("drag", (("area", 0.05),))), limits, points=(6, 8, 13))
+    assert fin_envelope(table, limits, Objective()).largest.max() > 2.0 * before.largest.max()
