@@ -19,7 +19,7 @@ Array = NDArray[Any]
 MAX_SUBSETS = 80
 """Most sub-layouts that are searched."""
 LEAST_WORKING = 2
-"""Fewest fins that work in a sub-layout."""
+"""Fewest fins that work in a sub-layout; of two fins, one."""
 
 
 class Prepared(NamedTuple):
@@ -73,7 +73,7 @@ def resting_fins(n: int) -> tuple[tuple[int, ...], ...]:
     from the whole layout may miss.
     """
     fins = range(n)
-    most = min(2, max(n - LEAST_WORKING, 0))
+    most = min(2, max(n - LEAST_WORKING, n - 1 if n == 2 else 0))
     resting = [c for k in range(most + 1) for c in combinations(fins, k)]
     if n - LEAST_WORKING > most:
         resting += [tuple(i for i in fins if i not in pair) for pair in combinations(fins, LEAST_WORKING)]

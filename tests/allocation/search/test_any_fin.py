@@ -88,18 +88,7 @@ def test_pure_axes_of_symmetric_robots(name: str) -> None:
         assert answer.err_norm < 1e-5 and bound <= answer.power < 1.02 * bound
 
 
-@pytest.mark.parametrize(
-    "objective",
-    [
-        "power",
-        pytest.param(
-            "effort",
-            marks=pytest.mark.xfail(
-                reason="of two fins alone no seed rests one: 1.39 times the least effort"
-            ),
-        ),
-    ],
-)
+@pytest.mark.parametrize("objective", OBJECTIVES)
 def test_coincident_fins_share_or_rest(objective: Name) -> None:
     """Two at one place: for power each gives half, for effort both or one, whichever is cheaper."""
     pair = Layout("twins", tuple(Fin(name, (0.1, 0.05, 0.0), 0.3) for name in "ab"))
