@@ -107,3 +107,21 @@ def test_a_plant_asks_each_fin_for_its_own_power() -> None:
     lost = command.copy()
     lost[:, 1] = np.nan
     assert np.isnan(plant.power(lost)[:, 1]).all() and np.isfinite(plant.power(lost)[:, [0, 2]]).all()
+
+
+@pytest.mark.parametrize(
+    ("spec", "uniform"),
+    [
+        (FinModelSpec(), True),
+        (FinModelSpec("lighthill"), True),
+        (FinModelSpec("soft"), True),
+        (FinModelSpec("soft", (("d", 0.1),)), True),
+        (FinModelSpec("soft", (("e", 0.1),)), False),
+    ],
+)
+def test_a_fin_is_the_same_all_round_or_says_so(spec: FinModelSpec, uniform: bool) -> None:
+    law = make_law(spec)
+    turn = np.linspace(-3.0, 3.0, 13)
+    command = np.stack([np.full(13, 0.4), np.full(13, 1.5), turn], axis=-1)
+    size = np.linalg.norm(law.force(command), axis=-1)
+    assert law.uniform is uniform and bool(np.ptp(size) < 1e-12) is uniform
