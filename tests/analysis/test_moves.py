@@ -42,8 +42,10 @@ def test_sets_are_those_of_the_moved_layout(shipped: Layouts) -> None:
     vectors = np.random.default_rng(0).uniform(moves.lower, moves.upper, (5, len(moves.lower)))
     for row, vector in enumerate(vectors):
         expected = fin_sets(moves.moved(vector))
-        for field, other in zip(moves.sets(vectors), expected, strict=True):
-            assert field[row] == pytest.approx(other[0])
+        sets = moves.sets(vectors)
+        for name in ("columns", "radius", "middle", "half"):
+            assert getattr(sets, name)[row] == pytest.approx(getattr(expected, name)[0])
+        assert sets.rim is expected.rim is None
     still = moves.sets(moves.start[None])
     assert still.columns == pytest.approx(fin_sets(layout).columns)
 
