@@ -63,9 +63,9 @@ def test_mode_is_picked_in_plot_and_table(page: Any) -> None:
     assert page.view.shown.command.tolist() == best.samples.command[7].tolist()
     page.choose("Method", "mdn")
     page.until(lambda: page.session.state.method == "mdn" and not page.view.busy)
-    page.type("Candidates K", "16")
-    page.until(lambda: page.session.state.n_candidates == 16 and not page.view.busy)
-    assert len(page.view.answering.best.samples.energy) == 16
+    page.type("Candidates K", "24")
+    page.until(lambda: page.session.state.n_candidates == 24 and not page.view.busy)
+    assert len(page.view.answering.best.samples.energy) == 24
 
 
 def test_method_that_fails_says_so_and_the_page_goes_on(page: Any) -> None:
