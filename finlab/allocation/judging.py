@@ -68,7 +68,18 @@ def judge(layout: Layout, command: Array, target: Array, sigma: Array) -> Verdic
 
 def costs(layout: Layout, command: Array) -> tuple[Array, Array]:
     """Effort (K,) and power (K,) [W] of commands (K, n, 3) of fins that all work."""
-    return _meter(layout)(command), plant_of(layout).power(command).sum(-1)
+    return effort_of(layout, command), power_of(layout, command)
+
+
+def effort_of(layout: Layout, command: Array) -> Array:
+    """Effort (K,) of commands (K, n, 3) of fins that all work."""
+    return _meter(layout)(command)
+
+
+def power_of(layout: Layout, command: Array) -> Array:
+    """Mean mechanical power (K,) [W] of commands (K, n, 3) of fins that all work."""
+    power: Array = plant_of(layout).power(command).sum(-1)
+    return power
 
 
 @lru_cache(maxsize=256)

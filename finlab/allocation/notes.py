@@ -4,10 +4,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from finlab.layout import Layout
-from finlab.physics import TableLaw, make_law
+from finlab.layout import FinModelSpec, Layout, Limits
+from finlab.physics import FinLaw, TableLaw, make_law
 from finlab.physics.fin_model import file_stamp
-from finlab.physics.plant import plant_of
 
 RESTLESS = 0.05
 """Share of its largest force below which a fin counts as able to rest."""
@@ -22,44 +21,40 @@ def fin_notes(layout: Layout) -> tuple[str, ...]:
 
     Neither is an error: a servo may be stuck, or a fin may have been damaged so that it runs on.
     """
-    return _made(layout, tuple(file_stamp(fin.model) for fin in layout.fins))
+    return tuple(
+        note.replace("{name}", fin.name)
+        for fin in layout.fins
+        for note in _notes_of(fin.model, fin.limits, file_stamp(fin.model))
+    )
 
 
-@lru_cache(maxsize=256)
-def _made(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> tuple[str, ...]:
-    return (*_restless(layout), *_beyond_tables(layout))
+@lru_cache(maxsize=1024)
+def _notes_of(model: FinModelSpec, limits: Limits, stamp: tuple[int, int] | None) -> tuple[str, ...]:
+    """The sentences about any fin of a model within limits, with a place for its name."""
+    law = make_law(model)
+    return (*_restless(law, limits), *_beyond_table(law, limits))
 
 
-def _restless(layout: Layout) -> list[str]:
-    plant = plant_of(layout)
-    grid = np.meshgrid(*(np.linspace(0.0, 1.0, count) for count in STEPS), indexing="ij")
-    share = np.stack(grid, axis=-1).reshape(-1, 1, 3)
-    size = np.linalg.norm(plant.force(plant.lower + share * plant.width), axis=-1)
-    least, most = size.min(axis=0), size.max(axis=0)
+def _restless(law: FinLaw, limits: Limits) -> list[str]:
+    ends = zip(limits.lower, limits.upper, STEPS, strict=True)
+    grid = np.meshgrid(*(np.linspace(low, high, count) for low, high, count in ends), indexing="ij")
+    size = np.linalg.norm(law.force(np.stack(grid, axis=-1)), axis=-1)
+    least, most = float(size.min()), float(size.max())
+    if least <= RESTLESS * most:
+        return []
     return [
-        f"fin {name} cannot rest: within its limits it always pushes with at least {least[i]:.3g} N of at "
-        f"most {most[i]:.3g} N; wrenches that need less of it are out of reach"
-        for i, name in enumerate(layout.names)
-        if least[i] > RESTLESS * most[i]
+        f"fin {{name}} cannot rest: within its limits it always pushes with at least {least:.3g} N of at "
+        f"most {most:.3g} N; wrenches that need less of it are out of reach"
     ]
 
 
-def _beyond_tables(layout: Layout) -> list[str]:
-    notes = []
-    for fin in layout.fins:
-        law = make_law(fin.model)
-        if not isinstance(law, TableLaw):
-            continue
-        for name, unit, limits, covered in zip(
-            ("half amplitudes", "frequencies"),
-            ("rad", "Hz"),
-            (fin.limits.amplitude, fin.limits.frequency),
-            law.covers,
-            strict=False,
-        ):
-            if limits[0] < covered[0] - BEYOND or limits[1] > covered[1] + BEYOND:
-                notes.append(
-                    f"fin {fin.name} may be asked for {name} of {limits[0]:.3g} to {limits[1]:.3g} {unit}, "
-                    f"its table holds {covered[0]:.3g} to {covered[1]:.3g}: beyond, its edge is taken"
-                )
-    return notes
+def _beyond_table(law: FinLaw, limits: Limits) -> list[str]:
+    if not isinstance(law, TableLaw):
+        return []
+    asked = (("half amplitudes", "rad", limits.amplitude), ("frequencies", "Hz", limits.frequency))
+    return [
+        f"fin {{name}} may be asked for {name} of {low:.3g} to {high:.3g} {unit}, "
+        f"its table holds {covered[0]:.3g} to {covered[1]:.3g}: beyond, its edge is taken"
+        for (name, unit, (low, high)), covered in zip(asked, law.covers, strict=False)
+        if low < covered[0] - BEYOND or high > covered[1] + BEYOND
+    ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -242,4 +242,10 @@ def layout_envelopes(layout: Layout, objective: Objective, compiled: CompiledFin
     known = compiled or {}
     asked = [(fin.model, fin.limits, objective) for fin in layout.fins]
     found = [known.get(content_key(*fin)) if known else None for fin in asked]
-    return Envelopes.of([own or fin_envelope(*fin) for own, fin in zip(found, asked, strict=True)])
+    return _stacked(tuple(own or fin_envelope(*fin) for own, fin in zip(found, asked, strict=True)))
+
+
+@lru_cache(maxsize=256)
+def _stacked(fins: tuple[FinEnvelope, ...]) -> Envelopes:
+    """Robots with the same compiled fins share the stack, wherever their fins are."""
+    return Envelopes.of(list(fins))

@@ -69,6 +69,8 @@ class PowerMeter:
     def __init__(self, plant: Plant, copper_loss: float = 0.0) -> None:
         """Make it for the fins of a plant."""
         self._plant, self._copper_loss = plant, copper_loss
+        self.is_power = copper_loss == 0.0
+        """Whether this is the mechanical power and nothing else."""
 
     def __call__(self, command: Array) -> Array:
         """Power (R,) [W] of commands (R, n, 3)."""

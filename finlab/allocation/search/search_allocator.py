@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from finlab.allocation.aim import checked_objective
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.judging import costs
+from finlab.allocation.judging import effort_of, power_of
 from finlab.allocation.policy import Policy
 from finlab.allocation.question import usable_fins
 from finlab.allocation.search.levenberg_marquardt import refine
@@ -148,11 +148,11 @@ class SearchAllocator(Allocator):
             exact = max(SEARCH.alternative_error * prepared.exactness, 1.01 * found.error[0, 0])
             kept = np.flatnonzero(found.error[0] <= exact)
             exact_ones = RefinedCandidates(*(values[:, kept] for values in found))
-            return _candidates(exact_ones, std, layout, tuple(source[k] for k in kept))
+            return _candidates(exact_ones, std, prepared, tuple(source[k] for k in kept))
 
         return Solution(
             refined.command[:, 0],
-            candidates=lambda: _candidates(refined, std, layout, _sources(refined.origin[0], own)),
+            candidates=lambda: _candidates(refined, std, prepared, _sources(refined.origin[0], own)),
             alternatives=explored,
         )
 
@@ -217,11 +217,14 @@ def _within_reach(problem: PlanarProblem, policy: Policy, target: Array) -> Near
 
 
 def _candidates(
-    refined: RefinedCandidates, std: Array, layout: Layout, source: tuple[str, ...]
+    refined: RefinedCandidates, std: Array, prepared: Prepared, source: tuple[str, ...]
 ) -> Candidates:
     """The refined answers to a single target, and where each comes from."""
-    command, wrench, error, _, _ = (values[0] for values in refined)
-    return Candidates(command, wrench * std, error, *costs(layout, command), source)
+    command, wrench, error, cost, _ = (values[0] for values in refined)
+    layout, kept_least = prepared.plant.layout, prepared.cost
+    # What was kept least is known already.
+    power = cost if kept_least.is_power else power_of(layout, command)
+    return Candidates(command, wrench * std, error, effort_of(layout, command), power, source)
 
 
 def _sources(origin: NDArray[np.intp], names: tuple[str, ...]) -> tuple[str, ...]:
