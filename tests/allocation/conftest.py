@@ -9,8 +9,6 @@ import pytest
 
 from finlab.allocation import load_allocator
 from finlab.allocation.search.search_allocator import SearchAllocator
-from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
-from finlab.inference.weights import TrainedWeights
 
 
 @pytest.fixture
@@ -27,12 +25,6 @@ def force_table(tmp_path: Path) -> str:
     path = tmp_path / "forces.csv"
     path.write_text("\n".join(rows) + "\n")
     return str(path)
-
-
-@pytest.fixture(scope="session")
-def default_checkpoint() -> TrainedWeights:
-    """The shipped checkpoint `default`."""
-    return read_checkpoint(resolve_checkpoint("default"))
 
 
 @pytest.fixture(scope="session")
