@@ -6,7 +6,7 @@ import numpy as np
 
 from finlab.layout import FinModelSpec, Layout, Limits
 from finlab.physics import FinLaw, TableLaw, make_law
-from finlab.physics.fin_model import file_stamp
+from finlab.physics.fin_model import file_stamps
 
 RESTLESS = 0.05
 """Share of its largest force below which a fin counts as able to rest."""
@@ -21,10 +21,15 @@ def fin_notes(layout: Layout) -> tuple[str, ...]:
 
     Neither is an error: a servo may be stuck, or a fin may have been damaged so that it runs on.
     """
+    return _made(layout, file_stamps(layout))
+
+
+@lru_cache(maxsize=256)
+def _made(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> tuple[str, ...]:
     return tuple(
         note.replace("{name}", fin.name)
-        for fin in layout.fins
-        for note in _notes_of(fin.model, fin.limits, file_stamp(fin.model))
+        for fin, stamp in zip(layout.fins, stamps, strict=True)
+        for note in _notes_of(fin.model, fin.limits, stamp)
     )
 
 
