@@ -90,7 +90,7 @@ class EnergyMeter:
         if self.weights.inertial:
             beats += self.weights.inertial * ((a * f) ** 2 * f).sum(-1)
         scaled *= scaled
-        beats += scaled.reshape(len(scaled), -1).dot(squares)
+        beats += scaled.reshape(len(scaled), len(squares)).dot(squares)
         return beats
 
     def slopes(self, command: NDArray[np.floating]) -> NDArray[Any]:

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.layout import FinModelSpec, Limits
-from finlab.physics import Plant, make_law
+from finlab.layout import FinModelSpec, Limits, load_layout
+from finlab.physics import Plant, make_law, plant_of
 from finlab.physics.energy import DEFAULT_WEIGHTS, POWER_WEIGHTS, EnergyWeights, command_energy
-from finlab.physics.objective import Objective
+from finlab.physics.objective import Name, Objective
 from tests.random_fins import KINDS, random_robot, write_fin_table
 
 OBJECTIVES = [
@@ -74,3 +74,11 @@ def test_measured_power_is_told_as_it_is(loss: float, tmp_path: Path) -> None:
             step = np.eye(3)[axis] * 1e-6
             difference = (table.power(command + step, loss) - table.power(command - step, loss)) / 2e-6
             np.testing.assert_allclose(slopes[:, axis], difference, rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["power", "effort"])
+def test_no_commands_have_no_costs(name: Name) -> None:
+    plant = plant_of(load_layout("mixed"))
+    meter = Objective(name).meter(plant)
+    assert meter(np.empty((0, 4, 3))).shape == (0,)
+    assert meter.slopes(np.empty((0, 4, 3))).shape == (0, 4, 3)
