@@ -95,7 +95,8 @@ def test_the_loss_is_per_fin_and_rewards_components_that_are_used(shard: Path) -
     assert 1.0 <= spread["used"] <= SMOKE.network.n_components + 1e-4
 
 
-def test_it_learns_and_goes_on_where_it_stopped(tmp_path: Path) -> None:
+def test_it_learns_and_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("finlab.training.loop.LOG_EVERY", 20)
     # All answers are there from the beginning, so that what is learned does not depend on the machine's load.
     scale = read_normalization(resolve_checkpoint("paper")).std
     write_answers(tmp_path / "answers", SMOKE.answers, scale, 0)
