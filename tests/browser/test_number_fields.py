@@ -68,13 +68,17 @@ def test_half_a_degree(page: Any, steps: list[Any], delay: int) -> None:
 def test_three_coordinates_one_after_the_other(page: Any, steps: list[Any], delay: int) -> None:
     page.key("n")
     page.tab("Layout")
+    _, y, z = page.session.state.layout.fins[0].position
     begin(page, "Position [m]", 0)
     for typed, key in (("-0.125", "Tab"), ("0.05", "Tab"), ("-.02", "Enter")):
         page.page.keyboard.type(typed, delay=delay)
         page.page.keyboard.press(key)
     page.until(lambda: page.session.state.layout.fins[0].position == (-0.125, 0.05, -0.02))
     page.page.wait_for_timeout(400)
-    assert len(steps) == 3
+    # A busy page may send two quick coordinates as one change; half a number is in none.
+    whole = [(-0.125, y, z), (-0.125, 0.05, z), (-0.125, 0.05, -0.02)]
+    taken = [whole.index(position) for _, position in steps]
+    assert taken == sorted(set(taken)) and taken[-1] == 2
     assert [page.row("Position [m]").nth(k).input_value() for k in range(3)] == ["-0.125", "0.05", "-0.02"]
 
 
