@@ -56,7 +56,7 @@ class Robot(Protocol):
         """Commands (B, n, 3) brought within the limits."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class DescentOptions:
     """How long and how carefully to descend."""
 

@@ -97,7 +97,7 @@ TOLERANCE = 0.01
 """Gap at which no more directions are added, as a share of the farthest vertex."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class AttainableSet:
     """A convex polytope of attainable forces or torques. Every vertex is attained, by the fins or, where
     `hull` says so, by the convex hulls of what they can push."""

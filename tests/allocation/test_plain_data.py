@@ -1,0 +1,39 @@
+"""What these rooms tell and are told is plain data: it never changes, and comparing it never raises."""
+
+import dataclasses
+import runpy
+from pathlib import Path
+from typing import Any, is_typeddict
+
+import pytest
+
+import finlab
+
+ROOMS = ("allocation", "forces", "physics", "deploy")
+
+
+def classes(room: str) -> dict[str, Any]:
+    """All classes that the modules of a room define, made anew."""
+    found = {}
+    for path in sorted((Path(finlab.__file__).parent / room).rglob("*.py")):
+        module = runpy.run_path(str(path), run_name="anew")
+        found |= {
+            f"{path.stem}.{name}": made
+            for name, made in module.items()
+            if isinstance(made, type) and made.__module__ == "anew"
+        }
+    return found
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_values_do_not_change_and_no_option_is_required(room: str) -> None:
+    """The generated `==` of two arrays is no yes or no: classes with arrays have their own, or none."""
+    made = classes(room)
+    values = {name: each for name, each in made.items() if dataclasses.is_dataclass(each)}
+    assert values
+    for name, each in values.items():
+        assert each.__dataclass_params__.frozen, name
+        arrays = any("array" in str(field.type).lower() for field in dataclasses.fields(each))
+        assert each.__dataclass_params__.eq != arrays, name
+    for name, each in made.items():
+        assert not is_typeddict(each) or not each.__required_keys__, name
