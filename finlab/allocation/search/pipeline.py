@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.search.prepared import Prepared, prepare, resting_fins
+from finlab.allocation.search.prepared import Prepared, prepare, resting_fins, resting_seeds
 from finlab.allocation.search.receding_horizon import plan_ahead
 from finlab.allocation.search.refined_candidates import (
     MISSED,
-    RANKING,
     FallbackForces,
     RefinedCandidates,
+    exact_error,
     nearest_forces,
     rank,
     refine_candidates,
@@ -135,28 +135,21 @@ class Pipeline:
         # Arcs that pass the seam are brought back inside the fin's own limits.
         return candidates._replace(command=prepared.commands.clamp(candidates.command))
 
-    def explore(
-        self, prepared: Prepared, targets: Array, answer: RefinedCandidates, seeds: Array | None = None
-    ) -> RefinedCandidates:
+    def explore(self, prepared: Prepared, targets: Array, answer: RefinedCandidates) -> RefinedCandidates:
         """Many refined answers to one target (1, 6): the answer itself, then all that many seeds lead to.
 
         Fins rest alone and in pairs, for good where the objective would have them all work.
         """
         target, n = targets / self.std, prepared.plant.n_fins
         maximum = prepared.planar.fins.maximum
-        drawn = np.random.default_rng(0).random((SEARCH.wide_seeds, n)) ** 2 * maximum
-        parts = [drawn] if seeds is None else [seeds, drawn]
-        works = None
         if self.objective.convex:
-            rests = resting_fins(n)
-            works = np.ones((len(rests), n))
-            for row, fins in enumerate(rests):
-                works[row, list(fins)] = 0.0
-            drawn = works * maximum
+            works = resting_seeds(np.ones(n), resting_fins(n), 0.0)
+            seeds = works * maximum
         else:
-            drawn = np.concatenate([prepared.seeds, *parts])
+            drawn = np.random.default_rng(0).random((SEARCH.wide_seeds, n)) ** 2 * maximum
+            seeds, works = np.concatenate([prepared.seeds, drawn]), None
         command, origin = self._search(
-            prepared, target, drawn[None], False, keep=len(drawn), steps=SEARCH.wide_steps, works=works
+            prepared, target, seeds[None], False, keep=len(seeds), steps=SEARCH.wide_steps, works=works
         )
         found = refine_candidates(prepared, target, command, origin, MISSED.first_lm_steps)
         return found.with_first(answer)
@@ -183,7 +176,7 @@ class Pipeline:
         seeds = np.concatenate([kept[None, None], seeds], axis=1)
         near = limit_turn(prepared, previous, aim, TURNS[0])
         candidates = self._descend(near, target, seeds, fallback, known=free.command[0])
-        exact = RANKING.exact_error * prepared.exactness
+        exact = exact_error(prepared)
         plan = plan_ahead(prepared, previous, target[0], candidates.command[0, 0], free.command[0])
         if plan is not None:
             near = limit_turn(prepared, previous, plan.ready, TURNS[1])
@@ -241,7 +234,7 @@ class Pipeline:
             origin = np.concatenate([origin, np.full((1, len(within)), -1)], axis=1)
         candidates = refine_candidates(prepared, target, command, origin, steps, keep_mode)
         candidates = RefinedCandidates(*(values[:, : self.settings.n_refined] for values in candidates))
-        missed = candidates.error[:, 0] > RANKING.exact_error * prepared.exactness
+        missed = candidates.error[:, 0] > exact_error(prepared)
         if missed.any():
             refine_missed(prepared, target, candidates, missed, fallback)
         return candidates

@@ -33,8 +33,6 @@ class Prepared(NamedTuple):
     """The layout for the refinement of commands."""
     seeds: Array
     """Sizes of forces (S, n) [N] to start from: all fins, then sub-layouts whose other fins nearly rest."""
-    resting: tuple[tuple[int, ...], ...]
-    """Places of the fins that rest in each seed."""
     cost: CostMeter
     """By which answers are compared."""
     exactness: float
@@ -60,7 +58,6 @@ def prepare(
         planar,
         CommandProblem(plant, plant.columns / std, plant.lower, plant.upper, plant.full_turn),
         resting_seeds(fins.maximum, rests),
-        rests,
         objective.meter(plant),
         min(1.0, float(np.linalg.norm(strongest))),
     )
@@ -80,9 +77,9 @@ def resting_fins(n: int) -> tuple[tuple[int, ...], ...]:
     return tuple(resting[:MAX_SUBSETS])
 
 
-def resting_seeds(maximum: Array, rests: tuple[tuple[int, ...], ...]) -> Array:
-    """Seeds (S, n) [N] from largest forces (n,) in which some fins nearly rest."""
+def resting_seeds(maximum: Array, rests: tuple[tuple[int, ...], ...], left: float = 1e-3) -> Array:
+    """Seeds (S, n) [N] from largest forces (n,) in which some fins nearly rest, at the share that is left."""
     seeds = np.tile(maximum, (len(rests), 1))
     for row, fins in enumerate(rests):
-        seeds[row, list(fins)] *= 1e-3
+        seeds[row, list(fins)] *= left
     return seeds

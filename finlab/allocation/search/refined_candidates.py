@@ -82,14 +82,16 @@ def refine_candidates(
         score = score.copy()
         score[:, 0] *= 1.0 - RANKING.switch_gain
     error = refined.error.reshape(rows, p)
-    exact, resolution = (
-        RANKING.exact_error * prepared.exactness,
-        RANKING.error_resolution * prepared.exactness,
-    )
-    order = rank(score, error, exact, resolution).argsort(axis=1)
+    resolution = RANKING.error_resolution * prepared.exactness
+    order = rank(score, error, exact_error(prepared), resolution).argsort(axis=1)
     order += np.arange(0, rows * p, p)[:, None]
     flat = (*refined, cost, origin.reshape(-1))
     return RefinedCandidates(*(values.take(order, axis=0) for values in flat))
+
+
+def exact_error(prepared: Prepared) -> float:
+    """The normalized error up to which answers for a robot are exact."""
+    return RANKING.exact_error * prepared.exactness
 
 
 def improve(
@@ -180,7 +182,7 @@ def refine_missed(
         fallback: where to start from when more steps do not help; None from it ends the search.
         settings: how long to go on.
     """
-    exact = RANKING.exact_error * prepared.exactness
+    exact = exact_error(prepared)
     turned = _turned_at_rest(prepared, candidates.command[missed, 0], settings.turned)
     improve(prepared, target, candidates, missed, turned, settings.first_lm_steps)
     missed = candidates.error[:, 0] > exact
@@ -204,7 +206,7 @@ def refine_missed(
 
 def reduce_cost(prepared: Prepared, target: Array, candidates: RefinedCandidates, lm_steps: int) -> None:
     """Give inexact answers, in place, the amplitudes and frequencies by which their forces cost least."""
-    missed = candidates.error[:, 0] > RANKING.exact_error * prepared.exactness
+    missed = candidates.error[:, 0] > exact_error(prepared)
     if missed.any():
         force = prepared.plant.force(candidates.command[missed, 0])[..., 1:]
         cheap, _ = realize(prepared.planar, polar(prepared.planar, force))
