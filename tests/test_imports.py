@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 
 LEVELS = (
-    ("errors", "array_library"),
+    ("errors", "arrays"),
     ("assets", "bundle_files", "whole_file"),
     ("layout",),
     ("physics", "exchange"),

@@ -13,13 +13,12 @@ from finlab.allocation.judging import REACHED, Judge, judge
 from finlab.allocation.modes import Mode, find_modes, force_sizes
 from finlab.allocation.policy import CLOSEST, Policy, describe_binding
 from finlab.allocation.solution import Candidates, PlainData
+from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.arrays import layout_effectiveness
 
 if TYPE_CHECKING:
     from finlab.allocation.allocator import Allocator
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from finlab.allocation.allocation import Allocation, BatchAllocation
 from finlab.allocation.health import Health
@@ -23,8 +23,6 @@ from finlab.allocation.question import (
 from finlab.allocation.solution import Candidates
 from finlab.errors import AllocationError
 from finlab.layout import FinModelSpec, Layout
-
-Array = NDArray[np.float64]
 
 SAME_COMMAND = 1e-6
 """Two commands [rad, Hz, rad] that differ by less are one answer, given on two machines."""

@@ -5,16 +5,14 @@ what the robot's strongest fin takes at full load, which is a usual load, so tha
 objectives, and weak fins as well as strong ones.
 """
 
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyMeter, EnergyWeights, energy_scale
 from finlab.physics.objective import Objective
 from finlab.physics.plant import Plant
-
-Array = NDArray[Any]
 
 BEND = 0.4
 """Half the curvature of a cost, over its squared slope divided by it: that of s^5, as power grows with the

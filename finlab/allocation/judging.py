@@ -4,14 +4,12 @@ from functools import lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics.energy import EnergyMeter
 from finlab.physics.plant import plant_of
 from finlab.physics.wrench import wrench_of_forces
-
-Array = NDArray[np.float64]
 
 REACHED = 0.01
 """Normalized error up to which a wrench counts as delivered."""

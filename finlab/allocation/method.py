@@ -12,13 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from finlab.allocation.judging import REACHED
 from finlab.allocation.policy import Policy, largest_share
 from finlab.allocation.solution import Insight, Solution
+from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
 from finlab.inference.weights import TrainedWeights
 from finlab.layout import FinModelSpec, Layout
 from finlab.physics import plant_of
-
-Array = NDArray[np.float64]
 
 
 class Method(ABC):

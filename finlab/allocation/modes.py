@@ -11,16 +11,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.solution import PlainData
+from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics import plant_of
 
 if TYPE_CHECKING:
     from finlab.allocation.solution import Candidates
-
-Array = NDArray[np.float64]
 
 RESTING = 0.15
 """Share of the strongest fin's thrust below which a fin counts as resting."""

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.errors import CommandError
 from finlab.layout.angles import is_full_turn
-
-Array = NDArray[np.float64]
 
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 """The wrench's axes, in order."""

@@ -5,7 +5,8 @@ from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from finlab.arrays import Array
 
 
 class PlainData:
@@ -31,9 +32,6 @@ def equal(a: Any, b: Any) -> bool:
     if isinstance(a, float) and isinstance(b, float):
         return a == b or (a != a and b != b)
     return bool(a == b)
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,14 +12,14 @@ need neither cost nor a record of which rows are done.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.command_cost import Bowl, CommandCost
+from finlab.arrays import Array
 
-Array = NDArray[Any]
 Mask = NDArray[np.bool_]
 
 HELD = 1e30

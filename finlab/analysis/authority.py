@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from finlab.arrays import Array
 from finlab.forces.envelopes import layout_envelopes
 from finlab.forces.extent import RANK_TOLERANCE, singular_values, strongest, weakest
 from finlab.forces.fin_sets import SCALE, fin_sets
 from finlab.forces.reach import max_wrench_along_exactly
 from finlab.layout import Layout
-from finlab.layout.arrays import Array
 from finlab.physics.objective import Objective
 
 AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")

@@ -10,13 +10,13 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.forces.extent import weakest
 from finlab.forces.fin_sets import SCALE, FinSets
 from finlab.forces.least_power import cheapest, power_problem, variant
 from finlab.forces.reach import COARSE, FINE, max_wrench_along
 from finlab.layout import Layout
-from finlab.layout.arrays import Array
 
 GoalName = Literal["weakest_direction", "mission_power", "worst_single_failure"]
 GOALS: tuple[GoalName, ...] = get_args(GoalName)

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.forces.fin_sets import SCALE, FinSets, fin_sets
 from finlab.layout import Fin, Layout
-from finlab.layout.arrays import Array, force_columns
+from finlab.layout.arrays import force_columns
 
 MIRROR_TOLERANCE = 1e-3
 """How far [m, rad] two fins may be from each other's mirror image and still count as a pair."""

@@ -11,9 +11,9 @@ from scipy.optimize import differential_evolution
 from finlab.analysis.goals import MISSION, Goal, make_goal
 from finlab.analysis.moves import Bounds, Moves, mirror_pairs
 from finlab.analysis.score_card import ScoreCard, score_card
+from finlab.arrays import Array
 from finlab.forces.fin_sets import fin_sets
 from finlab.layout import Layout
-from finlab.layout.arrays import Array
 
 CLEARANCE = 0.10
 """Least distance between two fins [m], or what there is now if that is less."""

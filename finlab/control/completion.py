@@ -8,12 +8,10 @@ the impossible spoils what the controller wants, so the open axes are set to wha
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.arrays import layout_effectiveness
-
-Array = NDArray[np.float64]
 
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 LEVER_M = 0.25

@@ -4,13 +4,11 @@ import math
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.control.filters import LowPass, Pid
 from finlab.control.gains import VelocityGains, WaypointGains, load_gains
 from finlab.layout.angles import wrapped
-
-Array = NDArray[np.float64]
 
 
 class Measurement(NamedTuple):

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation import Allocator
+from finlab.arrays import Array
 from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
 from finlab.physics import plant_of
@@ -17,7 +17,6 @@ SELF_TEST_TOLERANCE = 1e-6
 it; both are written with nine digits."""
 
 Row = tuple[float, ...]
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import AnyArray
 from finlab.inference.weights import State
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class GraphBuilder:
     def constant(self, value: Any, name: str = "", dtype: type[Any] = np.float32) -> str:
         from onnx import numpy_helper
 
-        array: NDArray[Any] = np.ascontiguousarray(value, dtype=dtype)
+        array: AnyArray = np.ascontiguousarray(value, dtype=dtype)
         array = array.reshape(np.shape(value))
         name = name or f"{array.dtype} {array.tolist()}"
         self._constants[name] = numpy_helper.from_array(array, name)

@@ -1,9 +1,9 @@
 """An answer as plain values: the JSON object of `finlab allocate` and of `finlab-runtime allocate`."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
+from finlab.arrays import Array
 
 
 def allocation_record(result: Allocation) -> dict[str, object]:
@@ -33,6 +33,6 @@ def allocation_record(result: Allocation) -> dict[str, object]:
     }
 
 
-def command_rows(command: NDArray[np.float64]) -> list[list[float] | None]:
+def command_rows(command: Array) -> list[list[float] | None]:
     """Commands (n, 3) as lists; None for a failed fin, whose row is NaN."""
     return [None if np.isnan(row).any() else row.tolist() for row in command]

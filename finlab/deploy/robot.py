@@ -5,20 +5,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.methods import allocator_from_bundle
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.search.search_allocator import SearchAllocator
+from finlab.arrays import Array
 from finlab.bundle_files import ABOUT, GRAPH, Files, check_bundle_files, read_bundle_files
 from finlab.deploy.graph import LayoutGraph
 from finlab.deploy.graph_file import parse_graph
 from finlab.errors import AllocationError, DataError
 from finlab.layout import Layout
 from finlab.layout.load import bundle_graph_text
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

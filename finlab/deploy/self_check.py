@@ -11,16 +11,14 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.judging import REACHED
+from finlab.arrays import Array
 from finlab.deploy.graph import SELF_TEST_TOLERANCE, SelfTest
 from finlab.deploy.robot import Robot
 from finlab.errors import DataError
 from finlab.forces.compiled_fins import compiled_fins, difference
 from finlab.physics import plant_of
-
-Array = NDArray[np.float64]
 
 COMPILED_TOLERANCE = 1e-3
 """Largest difference of a compiled fin, as a share; another processor may round to a neighbour on a grid."""

@@ -25,14 +25,12 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
+from finlab.arrays import Array
 from finlab.deploy.record import command_rows
 from finlab.deploy.robot import Robot
 from finlab.errors import CommandError, FinlabError
-
-Array = NDArray[np.float64]
 
 MAX_LINE = 65_536
 """Longest request that is read [bytes]."""

@@ -16,8 +16,8 @@ from scipy.optimize import minimize
 
 from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, import_casadi
 from finlab.allocation.weighted_descent import DescentOptions, descend
+from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.layout.arrays import Array
 from finlab.physics import PlanarLaw, Plant, make_law, plant_of
 from finlab.physics.energy import energy_of_shares, energy_scale
 from finlab.physics.objective import Objective

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from finlab.arrays import Array
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
-from finlab.layout.arrays import Array
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY, MAX_POSITION
 from finlab.layout.layout import MAX_FINS
 from finlab.physics import Plant

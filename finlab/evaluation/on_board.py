@@ -9,7 +9,7 @@ thrust law and scaling at the limit are those of the robot's open software.
 import numpy as np
 
 from finlab.allocation.baselines.model_based import ModelBased
-from finlab.layout.arrays import Array
+from finlab.arrays import Array
 from finlab.physics import Plant
 
 FREQUENCY_HZ = 2.0

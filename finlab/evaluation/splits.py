@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.evaluation.noisy_tables import noisy_table
 from finlab.layout import Layout, random_layout
@@ -42,11 +42,11 @@ class Case(NamedTuple):
 
     layout: Layout
     """All fins, failed ones included."""
-    targets: NDArray[np.float64]
+    targets: Array
     """Desired wrenches (N, 6) [N, N m], each caused by a command of the healthy fins."""
     failed: tuple[str, ...]
     """Names of the fins that do not work."""
-    sigma: NDArray[np.float64] | None = None
+    sigma: Array | None = None
     """The robot's own yardstick of errors (6,); None where it is that of the training wrenches."""
 
     @property
@@ -88,7 +88,7 @@ def _make_case(split: str, n_targets: int, seed: int, k: int) -> Case:
     return Case(layout, targets, failed, own)
 
 
-def own_sigma(plant: Plant, rng: np.random.Generator) -> NDArray[np.float64]:
+def own_sigma(plant: Plant, rng: np.random.Generator) -> Array:
     """A robot's own yardstick of errors (6,): what its wrenches deviate by under uniform commands."""
     deviation = plant.wrench(plant.sample(rng, (N_SIGMA,))).std(axis=0).reshape(2, 3)
     least = LEAST_SIGMA * deviation.max(axis=1, keepdims=True)

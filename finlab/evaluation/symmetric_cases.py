@@ -12,9 +12,9 @@ from itertools import combinations
 import numpy as np
 
 from finlab.analysis import AXES, authority
+from finlab.arrays import Array
 from finlab.evaluation.splits import Case
 from finlab.layout import Fin, Layout, load_layout, random_layout
-from finlab.layout.arrays import Array
 from finlab.layout.random import TRAINING_BOX
 from finlab.physics import plant_of
 

@@ -15,14 +15,12 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.layout import Body, Fin, Layout
 from finlab.layout.rules import under
 from finlab.whole_file import write_whole
-
-Array = NDArray[np.float64]
 
 MAX_BYTES = 5_000_000
 """Largest file that is read; meshes are files of their own and are not touched."""

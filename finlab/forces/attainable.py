@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
+from finlab.arrays import Array
 from finlab.forces.fin_sets import SCALE, FinSets, convex_parts, fin_sets, wide_fins
 from finlab.forces.reach import largest
 from finlab.layout import Layout
-
-Array = NDArray[np.float64]
 
 FLAT = 1e-5
 """Thickness, as a share of the size, below which a hull counts as flat."""

@@ -9,16 +9,14 @@ the time is told, which is little.
 """
 
 import time
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.forces.fin_envelope import COST, DRIFT, LEAN, MOBILITY
 from finlab.forces.force_space import PlanarProblem
 from finlab.layout.angles import wrapped
-
-Array = NDArray[Any]
 
 TOLERANCE = 0.015
 """Share of the answer's cost by which it may exceed the bound; boxes this good are not split."""

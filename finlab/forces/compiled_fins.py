@@ -13,8 +13,8 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.forces.fin_envelope import (
     AMPLITUDE,
@@ -33,8 +33,6 @@ from finlab.layout import MAX_FINS, FinModelSpec, Layout, Limits
 from finlab.physics.fin_model import file_stamp
 from finlab.physics.objective import Objective
 from finlab.physics.table_file import table_bytes
-
-Array = NDArray[np.float64]
 
 CompiledFins = Mapping[str, FinEnvelope]
 """Compiled fins by the hash of what they were compiled from."""

@@ -9,15 +9,11 @@ convex, as power is, the multipliers that the search ends with nearly close the 
 further. The bound is as good as the tables: about one part in a thousand.
 """
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.forces.fin_envelope import COST, LEVELS, SHAFT, levels
 from finlab.forces.force_space import PlanarProblem
-
-Array = NDArray[Any]
 
 ROUNDS = 80
 """Most steps of the ascent."""

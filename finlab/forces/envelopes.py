@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.forces.compiled_fins import CompiledFins, content_key
 from finlab.forces.fin_envelope import LEAN, LEVELS, SHAFT, FinEnvelope, fin_envelope
 from finlab.layout import Layout
 from finlab.layout.angles import TURN
 from finlab.physics.objective import Objective
-
-Array = NDArray[Any]
 
 LEAST = 1e-12
 """What sizes are kept above before something is divided by them."""
@@ -34,7 +33,7 @@ class Rim(NamedTuple):
     """Force at rest (R, n) [N]."""
     bend: Array | float
     """Derivative of the largest force by the direction (R, n) [N/rad]."""
-    first: Array
+    first: NDArray[np.intp]
     """Direction (R, n) of the table just before this one, counted through all fins."""
     part: Array | None
     """How far towards the next row (R, n); None where there is but one."""
@@ -126,7 +125,7 @@ class Envelopes:
         return np.asarray(np.maximum(reach, 0.0) / self.maximum[:, None])
 
     @cached_property
-    def _grid(self) -> tuple[Array, Array, Array, Array, Array]:
+    def _grid(self) -> tuple[Array, Array, NDArray[np.intp], Array, Array]:
         """First direction and gap between directions (n,) [rad], first row of each fin (n,), and largest and
         smallest forces of all rows."""
         count = self.largest.shape[1]
@@ -170,7 +169,7 @@ class Envelopes:
         share = (size - rim.smallest) / (rim.largest - rim.smallest + LEAST)
         np.minimum(np.maximum(share, 0.0, out=share), 1.0, out=share)
         np.sqrt(np.sqrt(share, out=share), out=share)
-        place = np.arcsin(share, out=share)
+        place: Array = np.arcsin(share, out=share)
         place *= 2.0 / np.pi * (LEVELS - 1)
         level = place.astype(np.intp)
         np.minimum(level, LEVELS - 2, out=level)
@@ -181,7 +180,7 @@ class Envelopes:
             found += (self._between(level + LEVELS, part) - found) * rim.part[..., None]
         return found
 
-    def _between(self, row: Array, part: Array) -> Array:
+    def _between(self, row: NDArray[np.intp], part: Array) -> Array:
         found: Array = self.table.take(row, axis=0)
         found += (self.table.take(row + 1, axis=0) - found) * part
         return found

@@ -3,12 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.forces.fin_sets import FinSets
 from finlab.forces.reach import COARSE, FINE, max_wrench_along
-
-Array = NDArray[np.float64]
 
 RANK_TOLERANCE = 1e-6
 """Share of the largest singular value below which another counts as zero."""

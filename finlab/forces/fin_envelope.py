@@ -13,16 +13,14 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.layout import FinModelSpec, Limits
 from finlab.layout.angles import is_full_turn, wrapped
 from finlab.physics.fin_law import FinLaw
 from finlab.physics.fin_model import file_stamp, make_law
 from finlab.physics.objective import Objective
-
-Array = NDArray[np.float64]
 
 LEVELS = 49
 """Sizes of force per direction."""

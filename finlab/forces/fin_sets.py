@@ -18,13 +18,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.forces.envelopes import layout_envelopes
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
 from finlab.layout.arrays import force_columns
 from finlab.physics.objective import Objective
-
-Array = NDArray[np.float64]
 
 LEVER = 0.2
 """Length [m] that makes torques comparable to forces: about the distance of a fin from the centre."""

@@ -19,11 +19,11 @@ steps on l remove what error is left.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.forces.envelopes import LEAST, Envelopes, Projected
 from finlab.forces.fin_envelope import AMPLITUDE, COST, DRIFT, FREQUENCY, LEAN, MOBILITY, SHAFT, STIFFNESS
 from finlab.forces.small_systems import solve
@@ -31,8 +31,6 @@ from finlab.layout import Layout
 from finlab.layout.angles import TURN, wrapped
 from finlab.layout.arrays import force_columns
 from finlab.physics.objective import Objective
-
-Array = NDArray[Any]
 
 RIDGE = 1e-9
 """Relative regularization of the 6 x 6 systems."""

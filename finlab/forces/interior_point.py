@@ -6,15 +6,14 @@ for many robots at once. Newton's systems are reduced to the multipliers l = v /
 axis with a tiny c, which must be met, costs no accuracy, and more fins hardly cost time.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.forces.fin_sets import FinSets
 from finlab.forces.small_systems import solve
-
-Array = NDArray[Any]
 
 ITERATIONS = 40
 """Most Newton steps; usually about 10 are taken."""

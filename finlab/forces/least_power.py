@@ -7,16 +7,15 @@ straight to it. Here every fin may rest: the tiny force that it cannot go below 
 from collections.abc import Collection
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from finlab.arrays import Array
 from finlab.forces.envelopes import layout_envelopes
 from finlab.forces.fin_envelope import COST
 from finlab.forces.fin_sets import SCALE, FinSets
 from finlab.forces.force_space import PlanarProblem, descend, flat_columns, planar_problem
 from finlab.layout import Layout
 from finlab.physics.objective import Objective
-
-Array = NDArray[np.float64]
 
 STEPS = 15
 """Most quadratic problems that are solved for each wrench."""

@@ -8,16 +8,15 @@ An axis with a large c_j hardly counts, one with a tiny c_j must be met: policie
 wider than half a turn is not convex; its halves are tried.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.forces.fin_sets import MAX_CUT, FinSets, convex_parts, wide_fins
 from finlab.forces.interior_point import Optimum, minimize
 from finlab.forces.reach import orthogonal_complement
-
-Array = NDArray[Any]
 
 HELD = 1e-9
 """c of an axis that must be met."""

@@ -4,13 +4,12 @@ from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from finlab.arrays import Array
 from finlab.forces.fin_sets import SCALE, FinSets, convex_parts, fin_sets
 from finlab.forces.interior_point import minimize
 from finlab.layout import Layout
-
-Array = NDArray[np.float64]
 
 HELD = 1e-12
 """What the squared error of an entry that must be met is divided by, beside one that is free to grow."""

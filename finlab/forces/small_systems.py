@@ -6,10 +6,9 @@ double precision and regularized, so there is nothing to check. The loop is no p
 another numpy keeps it elsewhere, the public function answers the same, a little later.
 """
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
+
+from finlab.arrays import AnyArray, Array
 
 try:
     from numpy.linalg import _umath_linalg as _lapack
@@ -17,7 +16,7 @@ except ImportError:
     _lapack = np.linalg  # type: ignore[misc]
 
 
-def solve(matrix: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[Any]:
+def solve(matrix: Array, right: Array) -> AnyArray:
     """Solutions (R, 6, 1) of R systems (R, 6, 6) with right sides (R, 6, 1), or (1, 6, 1) for all."""
-    solution: NDArray[Any] = _lapack.solve(matrix, right)
+    solution: AnyArray = _lapack.solve(matrix, right)
     return solution

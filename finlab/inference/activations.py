@@ -1,14 +1,11 @@
 """Activation functions of the trained networks. Sigmoids go by way of a tangent, which never overflows."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from finlab.arrays import AnyArray
 
 
-def softmax(x: Array, axis: int = -1) -> Array:
+def softmax(x: AnyArray, axis: int = -1) -> AnyArray:
     """Softmax, in place."""
     x -= np.maximum.reduce(x, axis=axis, keepdims=True)
     np.exp(x, out=x)
@@ -16,7 +13,7 @@ def softmax(x: Array, axis: int = -1) -> Array:
     return x
 
 
-def elu(x: Array) -> Array:
+def elu(x: AnyArray) -> AnyArray:
     """Exponential linear unit, in place."""
     below = np.minimum(x, 0)
     np.expm1(below, out=below)
@@ -25,7 +22,7 @@ def elu(x: Array) -> Array:
     return x
 
 
-def sigmoid(x: Array) -> Array:
+def sigmoid(x: AnyArray) -> AnyArray:
     """Sigmoid."""
     y = np.tanh(x * np.float32(0.5))
     y += np.float32(1.0)
@@ -33,13 +30,13 @@ def sigmoid(x: Array) -> Array:
     return y
 
 
-def silu(x: Array) -> Array:
+def silu(x: AnyArray) -> AnyArray:
     """Sigmoid linear unit, in place."""
     x *= sigmoid(x)
     return x
 
 
-def silu_and_slope(x: Array) -> tuple[Array, Array]:
+def silu_and_slope(x: AnyArray) -> tuple[AnyArray, AnyArray]:
     """Sigmoid linear unit, in place, and its derivative s + x s (1 - s)."""
     gate = sigmoid(x)
     slope = np.float32(1.0) - gate

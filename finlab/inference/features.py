@@ -5,20 +5,16 @@ kind. What the network of method `mdn` sees is in `finlab.allocation.learned.for
 """
 
 import math
-from typing import Any
 
-from finlab.array_library import library_of
+from finlab.arrays import Values, library_of
 
 RAW_SIZE = 10
 """Number of node features (paper: x_i in R^10)."""
 SCALES = (0.6, 2.1, math.pi)
 """Amplitude [rad], frequency [Hz] and zero direction [rad] of order one."""
 
-Array = Any
-"""A numpy array or a torch tensor."""
 
-
-def raw_features(position: Array, mounting_angle: Array, lower: Array, upper: Array) -> Array:
+def raw_features(position: Values, mounting_angle: Values, lower: Values, upper: Values) -> Values:
     """The node features (..., n, 10) of fins (..., n, 3), (..., n) with limits (..., n, 3), scaled."""
     xp = library_of(position)
     limits = [limit[..., i] / scale for i, scale in enumerate(SCALES) for limit in (lower, upper)]

@@ -4,14 +4,13 @@ A test holds it against `finlab.training.networks.force_network.ForceNetwork`, w
 """
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.arrays import AnyArray
 from finlab.inference.activations import softmax
-
-Array = NDArray[Any]
 
 NODE_SIZE, PAIR_SIZE = 27, 4
 """Numbers of features of a fin and of a pair of fins."""
@@ -29,11 +28,11 @@ class ForceMixture(NamedTuple):
     number.
     """
 
-    weight: Array
+    weight: AnyArray
     """Weights of the components (N, M)."""
-    mean: Array
+    mean: AnyArray
     """(N, M, n), complex."""
-    std: Array
+    std: AnyArray
     """Of both components (N, M, n)."""
 
 
@@ -48,7 +47,7 @@ class NumpyForceNetwork:
         self._layers = [_Layer(w, f"layers.{i}", heads) for i in range(count)]
         self._head, self._weight = (_normed(_linear(w, name), w, "norm") for name in ("head", "weight"))
 
-    def __call__(self, nodes: Array, pairs: Array) -> ForceMixture:
+    def __call__(self, nodes: AnyArray, pairs: AnyArray) -> ForceMixture:
         """The mixture for fins (N, n, 27) and pairs (N, n, n, 4), in single precision."""
         rows, n, _ = nodes.shape
         hidden = _apply(self._enter, nodes.reshape(rows * n, -1))
@@ -65,7 +64,7 @@ class NumpyForceNetwork:
         std += np.float32(LOG_STD[0])
         return ForceMixture(weight, raw[..., 0] + 1j * raw[..., 1], np.exp(std, out=std))
 
-    def attention(self, nodes: Array, pairs: Array) -> Array:
+    def attention(self, nodes: AnyArray, pairs: AnyArray) -> AnyArray:
         """Attention weights (N, n, n) of the first layer, averaged over heads: what it looks at."""
         rows, n, _ = nodes.shape
         hidden = _apply(self._enter, nodes.reshape(rows * n, -1))
@@ -76,7 +75,7 @@ class NumpyForceNetwork:
 class _Layer:
     """One Transformer layer whose attention is GATv2's with features of pairs."""
 
-    def __init__(self, w: dict[str, Array], name: str, heads: int) -> None:
+    def __init__(self, w: dict[str, AnyArray], name: str, heads: int) -> None:
         both = (_linear(w, f"{name}.look.source"), (w[f"{name}.look.target.weight"].T, 0.0))
         joined = np.concatenate([part[0] for part in both], axis=1)
         bias = np.concatenate([both[0][1], np.zeros_like(both[0][1])])
@@ -92,7 +91,7 @@ class _Layer:
         self.up = _normed(_linear(w, f"{name}.up"), w, f"{name}.norm2")
         self.down = _linear(w, f"{name}.down")
 
-    def look(self, x: Array, pairs: Array, rows: int) -> tuple[Array, Array]:
+    def look(self, x: AnyArray, pairs: AnyArray, rows: int) -> tuple[AnyArray, AnyArray]:
         """For features (N n, width) and pairs (N n n, 4): weights (N, n, n, heads) with which each fin looks
         at each, and what it sees (N, n, n, width)."""
         both = _apply(self.both, _norm(x)).reshape(rows, -1, 2 * self.width)
@@ -104,7 +103,7 @@ class _Layer:
         score = hidden.reshape(-1, self.width).dot(self.score).reshape(rows, n, n, self.heads)
         return softmax(score, axis=2), hidden
 
-    def __call__(self, x: Array, pairs: Array, rows: int) -> None:
+    def __call__(self, x: AnyArray, pairs: AnyArray, rows: int) -> None:
         """Change hidden features (N n, width) in place."""
         weight, hidden = self.look(x, pairs, rows)
         n = weight.shape[1]
@@ -115,18 +114,18 @@ class _Layer:
         x += _apply(self.down, np.maximum(up, 0, out=up))
 
 
-def _linear(w: dict[str, Array], name: str) -> tuple[Array, Array]:
+def _linear(w: dict[str, AnyArray], name: str) -> tuple[AnyArray, AnyArray]:
     return w[f"{name}.weight"].T.copy(), w[f"{name}.bias"]
 
 
-def _apply(layer: tuple[Array, Array], x: Array) -> Array:
+def _apply(layer: tuple[AnyArray, AnyArray], x: AnyArray) -> AnyArray:
     # One product of two matrices is much faster than numpy's loop over stacked small ones.
-    y: Array = x.dot(layer[0])
+    y: AnyArray = x.dot(layer[0])
     y += layer[1]
     return y
 
 
-def _normed(layer: tuple[Array, Array], w: dict[str, Array], name: str) -> tuple[Array, Array]:
+def _normed(layer: tuple[AnyArray, AnyArray], w: dict[str, AnyArray], name: str) -> tuple[AnyArray, AnyArray]:
     """A layer that also scales and shifts, as the layer normalization `name` before it does, and takes the
     mean away."""
     weight, bias = (part.astype(np.float64) for part in layer)
@@ -136,7 +135,7 @@ def _normed(layer: tuple[Array, Array], w: dict[str, Array], name: str) -> tuple
     return weight.astype(np.float32), bias.astype(np.float32)
 
 
-def _norm(x: Array) -> Array:
+def _norm(x: AnyArray) -> AnyArray:
     """Layer normalization of features (R, width), without scale and shift."""
     normed = x - np.add.reduce(x, axis=1, keepdims=True) / np.float32(x.shape[1])
     square = np.einsum("ri,ri->r", normed, normed)

@@ -5,12 +5,11 @@ Training has the same in PyTorch, `Mixture`; a test holds the two against each o
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from finlab.arrays import AnyArray
 
 LOG_STD_BOUND = 3.0
 """Largest size of the components' log standard deviation (paper, implementation details)."""
@@ -19,18 +18,18 @@ LOG_STD_BOUND = 3.0
 class MixtureArrays(NamedTuple):
     """A mixture of M diagonal Gaussians over the commands of each of n fins, for N targets."""
 
-    weight: Array
+    weight: AnyArray
     """Weights of the components (N, n, M)."""
-    mean: Array
+    mean: AnyArray
     """Means (N, n, M, 3)."""
-    std: Array
+    std: AnyArray
     """Standard deviations (N, n, M, 3)."""
 
-    def expected(self) -> Array:
+    def expected(self) -> AnyArray:
         """Mean command (N, n, 3) of the whole mixture."""
         return np.asarray((self.weight[..., None] * self.mean).sum(2))
 
-    def tempered(self, temperature: float, uniform: Array, normal: Array) -> Array:
+    def tempered(self, temperature: float, uniform: AnyArray, normal: AnyArray) -> AnyArray:
         """Commands (N, K, n, 3) drawn at a temperature T: weights to the power 1/T, variances times T.
 
         Args:
@@ -48,7 +47,7 @@ class MixtureArrays(NamedTuple):
         mean, std = (np.take_along_axis(part, choice, axis=2) for part in (self.mean, self.std))
         return np.asarray((mean + np.float32(math.sqrt(temperature)) * std * normal).swapaxes(1, 2))
 
-    def log_likelihood(self, x: Array) -> Array:
+    def log_likelihood(self, x: AnyArray) -> AnyArray:
         """Log likelihood (N, K) of commands x (N, K, n, 3); zero directions are numbers as in the paper, no
         angles."""
         deviation = x[:, :, :, None] - self.mean[:, None]  # (N, K, n, M, 3)
@@ -60,7 +59,7 @@ class MixtureArrays(NamedTuple):
         return np.asarray(_log_sum_exp(log_weight + log_normal).sum(2))
 
 
-def _log_sum_exp(x: Array) -> Array:
+def _log_sum_exp(x: AnyArray) -> AnyArray:
     """log sum exp over the last axis."""
     top = x.max(-1, keepdims=True)
     return np.asarray(top[..., 0] + np.log(np.exp(x - top).sum(-1)))

@@ -6,15 +6,13 @@ against `finlab.training.networks.allocator_network.AllocatorNetwork`.
 """
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.arrays import AnyArray
 from finlab.inference.activations import elu, silu, softmax
 from finlab.inference.mixture import LOG_STD_BOUND, MixtureArrays
-
-Array = NDArray[Any]
 
 _LAYER_NORM_EPS = np.float32(1e-5)
 _LOG_STD_BOUND = np.float32(LOG_STD_BOUND)
@@ -42,7 +40,7 @@ class NumpyNetwork:
         self.transformer = [_Transformer(w, f"transformer.layers.{i}", heads) for i in range(n_transformer)]
         self.head, self.weight = (_normed(_linear(w, name), w, "norm") for name in ("head", "weight"))
 
-    def __call__(self, x: Array, target: Array) -> MixtureArrays:
+    def __call__(self, x: AnyArray, target: AnyArray) -> MixtureArrays:
         """The mixtures for node features (N, n, F) and normalized, centred targets (N, 6)."""
         rows, n, _ = x.shape
         flat = x.reshape(rows * n, -1)
@@ -68,7 +66,7 @@ class NumpyNetwork:
 class _Graph:
     """One dense GATv2 layer."""
 
-    def __init__(self, w: dict[str, Array], name: str, heads: int) -> None:
+    def __init__(self, w: dict[str, AnyArray], name: str, heads: int) -> None:
         self.both = (
             np.concatenate([w[f"{name}.source.weight"], w[f"{name}.target.weight"]]).T.copy(),
             np.concatenate([w[f"{name}.source.bias"], w[f"{name}.target.bias"]]),
@@ -81,7 +79,7 @@ class _Graph:
             self.score[head * attention.shape[1] : (head + 1) * attention.shape[1], head] = attention[head]
         self.bias = w[f"{name}.bias"]
 
-    def __call__(self, x: Array, rows: int) -> Array:
+    def __call__(self, x: AnyArray, rows: int) -> AnyArray:
         """Hidden features (N n, width) of features (N n, F) of N robots."""
         both = _apply(self.both, x).reshape(rows, -1, 2 * self.width)
         n = both.shape[1]
@@ -102,7 +100,7 @@ class _Graph:
 class _Transformer:
     """One Transformer encoder layer, normalization first, ReLU."""
 
-    def __init__(self, w: dict[str, Array], name: str, heads: int) -> None:
+    def __init__(self, w: dict[str, AnyArray], name: str, heads: int) -> None:
         self.heads = heads
         self.depth = len(w[f"{name}.self_attn.out_proj.bias"]) // heads
         qkv = w[f"{name}.self_attn.in_proj_weight"].T.copy(), w[f"{name}.self_attn.in_proj_bias"].copy()
@@ -113,7 +111,7 @@ class _Transformer:
         self.up = _normed(_linear(w, f"{name}.linear1"), w, f"{name}.norm2")
         self.down = _centred(_linear(w, f"{name}.linear2"))
 
-    def __call__(self, x: Array, rows: int) -> Array:
+    def __call__(self, x: AnyArray, rows: int) -> AnyArray:
         """Hidden features (N n, width) of hidden features (N n, width) of N robots, which are overwritten."""
         qkv = _apply(self.qkv, _norm(x)).reshape(rows, -1, 3, self.heads, self.depth)
         q, k, v = qkv.transpose(2, 0, 3, 1, 4)
@@ -126,18 +124,18 @@ class _Transformer:
         return x
 
 
-def _linear(w: dict[str, Array], name: str) -> tuple[Array, Array]:
+def _linear(w: dict[str, AnyArray], name: str) -> tuple[AnyArray, AnyArray]:
     return w[f"{name}.weight"].T.copy(), w[f"{name}.bias"]
 
 
-def _apply(layer: tuple[Array, Array], x: Array) -> Array:
+def _apply(layer: tuple[AnyArray, AnyArray], x: AnyArray) -> AnyArray:
     # One product of two matrices is much faster than numpy's loop over stacked small ones.
-    y: Array = x.dot(layer[0])
+    y: AnyArray = x.dot(layer[0])
     y += layer[1]
     return y
 
 
-def _centred(layer: tuple[Array, Array]) -> tuple[Array, Array]:
+def _centred(layer: tuple[AnyArray, AnyArray]) -> tuple[AnyArray, AnyArray]:
     """A layer whose outputs have mean 0.
 
     What adds to the hidden features is only ever seen through a normalization, which takes the mean away; so
@@ -149,7 +147,7 @@ def _centred(layer: tuple[Array, Array]) -> tuple[Array, Array]:
     return weight.astype(np.float32), bias.astype(np.float32)
 
 
-def _normed(layer: tuple[Array, Array], w: dict[str, Array], name: str) -> tuple[Array, Array]:
+def _normed(layer: tuple[AnyArray, AnyArray], w: dict[str, AnyArray], name: str) -> tuple[AnyArray, AnyArray]:
     """A layer that also scales and shifts, as the layer normalization `name` before it does."""
     weight, bias = (part.astype(np.float64) for part in layer)
     scale, shift = w[f"{name}.weight"].astype(np.float64), w[f"{name}.bias"].astype(np.float64)
@@ -158,15 +156,15 @@ def _normed(layer: tuple[Array, Array], w: dict[str, Array], name: str) -> tuple
     return weight.astype(np.float32), bias.astype(np.float32)
 
 
-def _norm(x: Array) -> Array:
+def _norm(x: AnyArray) -> AnyArray:
     """Layer normalization of features (R, width) of mean 0; divided by the root of the width."""
     square = np.einsum("ri,ri->r", x, x)
     square += np.float32(x.shape[-1]) * _LAYER_NORM_EPS
-    normed: Array = x / np.sqrt(square, out=square)[:, None]
+    normed: AnyArray = x / np.sqrt(square, out=square)[:, None]
     return normed
 
 
-def _std(raw: Array) -> Array:
+def _std(raw: AnyArray) -> AnyArray:
     """Standard deviations of the network's outputs: their logarithm is a sigmoid between the bounds, which
     are as far above zero as below."""
     out = np.multiply(raw, np.float32(0.5))

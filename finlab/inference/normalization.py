@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.array_library import library_of
+from finlab.arrays import Array, Values, library_of
 
 STD_FLOOR = 1e-6
 """Smallest standard deviation that is divided by, as in the paper (implementation details)."""
@@ -17,9 +17,9 @@ STD_FLOOR = 1e-6
 class Normalization(NamedTuple):
     """Mean and standard deviation of the wrench over a data set, each of shape (6,) [N, N m]."""
 
-    mean: NDArray[np.float64]
+    mean: Array
     """Per-axis mean."""
-    std: NDArray[np.float64]
+    std: Array
     """Per-axis standard deviation; `sigma` in the error measure."""
 
     @classmethod
@@ -28,14 +28,10 @@ class Normalization(NamedTuple):
         wrenches = np.asarray(wrenches, dtype=np.float64)
         return cls(wrenches.mean(axis=0), np.maximum(wrenches.std(axis=0), STD_FLOOR))
 
-    def error(self, wrench: NDArray[np.floating], target: NDArray[np.floating]) -> NDArray[np.float64]:
+    def error(self, wrench: NDArray[np.floating], target: NDArray[np.floating]) -> Array:
         """`err_norm = ||(wrench - target) / std||`, over the last axis."""
         scaled = (np.asarray(wrench, np.float64) - np.asarray(target, np.float64)) / self.std
         return np.asarray(np.linalg.norm(scaled, axis=-1))
-
-
-Values = Any
-"""An array or a tensor."""
 
 
 def to_normalized(command: Values, lower: Values, upper: Values) -> Values:

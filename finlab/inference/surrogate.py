@@ -1,19 +1,17 @@
 """The paper's trained surrogate in numpy, on one layout: what its method believes of a robot's fins."""
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import AnyArray
 from finlab.errors import CheckpointError
 from finlab.inference.activations import silu, silu_and_slope
 from finlab.inference.features import RAW_SIZE, raw_features
 from finlab.inference.weights import TrainedWeights
 from finlab.layout import Layout
 from finlab.layout.arrays import force_columns
-
-Array = NDArray[Any]
 
 FORCE_UNIT = 4.0
 """Force [N] of order one for the perceptron's outputs."""
@@ -29,11 +27,11 @@ class MlpFins:
 
     def __init__(
         self,
-        weights: Mapping[str, Array],
-        position: Array,
-        mounting_angle: Array,
-        lower: Array,
-        upper: Array,
+        weights: Mapping[str, AnyArray],
+        position: AnyArray,
+        mounting_angle: AnyArray,
+        lower: AnyArray,
+        upper: AnyArray,
     ) -> None:
         """Take over a trained surrogate for fins at `position` (n, 3) with shafts at `mounting_angle` (n,).
 
@@ -60,7 +58,7 @@ class MlpFins:
         self.scale, self.bias = np.split(state["affine.weight"] @ pooled + state["affine.bias"], 2)
         """By how much the sum of the fins' wrenches is stretched, and what is added to it, (6,) each."""
 
-    def force(self, command: Array) -> Array:
+    def force(self, command: AnyArray) -> AnyArray:
         """Forces (R, n, 3) [N] of commands (R, n, 3)."""
         result = np.empty(command.shape, dtype=np.float32)
         for rows in _blocks(len(command)):
@@ -71,13 +69,13 @@ class MlpFins:
             result[rows] = z.reshape(result[rows].shape)
         return result
 
-    def force_and_slopes(self, command: Array) -> tuple[Array, Array]:
+    def force_and_slopes(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
         """Forces (R, n, 3) and, for each of the three commands in turn, their derivatives (R, n, 3, 3)."""
         parts = [self._force_and_slopes(command[rows]) for rows in _blocks(len(command))]
         force, slopes = map(np.concatenate, zip(*parts, strict=True))
         return force, slopes
 
-    def _force_and_slopes(self, command: Array) -> tuple[Array, Array]:
+    def _force_and_slopes(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
         z = self._first(command)
         slopes = None
         for weight, bias in self._layers:
@@ -93,7 +91,7 @@ class MlpFins:
         slopes /= self._half[..., None]
         return z.reshape(command.shape), slopes
 
-    def _first(self, command: Array) -> Array:
+    def _first(self, command: AnyArray) -> AnyArray:
         """What the first hidden layer adds up (R n, width)."""
         # Rounded first: where a range has no width, any remainder would be blown up.
         x = (command.astype(np.float32) - self._middle) / self._half
@@ -110,11 +108,11 @@ def _blocks(rows: int) -> list[slice]:
 class FinForces(Protocol):
     """The forces of one robot's fins, each in a frame of its own choice."""
 
-    def force(self, command: Array) -> Array:
+    def force(self, command: AnyArray) -> AnyArray:
         """Forces (..., n, 3) [N] of commands (..., n, 3)."""
         ...
 
-    def force_and_slopes(self, command: Array) -> tuple[Array, Array]:
+    def force_and_slopes(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
         """Forces and, for each of the three commands in turn, their derivative by it (..., n, 3, 3)."""
         ...
 
@@ -124,12 +122,12 @@ class LayoutSurrogate(NamedTuple):
 
     fins: FinForces
     """What force each fin gives."""
-    columns: Array
+    columns: AnyArray
     """Wrench per newton (n, 3, 6) of each fin's force along the three axes of its frame."""
-    bias: Array
+    bias: AnyArray
     """Wrench (6,) [N, N m] of fins that give no force; the paper's surrogate has one."""
 
-    def wrench(self, command: Array) -> Array:
+    def wrench(self, command: AnyArray) -> AnyArray:
         """Wrenches (..., 6) [N, N m] of commands (..., n, 3)."""
         force = self.fins.force(command)
         return np.asarray(force.reshape(*command.shape[:-2], -1) @ self.columns.reshape(-1, 6) + self.bias)

@@ -6,15 +6,14 @@ from itertools import pairwise
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import AnyArray
 from finlab.errors import CheckpointError
 from finlab.inference.features import RAW_SIZE
 from finlab.inference.force_network import NODE_SIZE, PAIR_SIZE
 from finlab.inference.normalization import Normalization
 
-Array = NDArray[Any]
-State = Mapping[str, Array]
+State = Mapping[str, AnyArray]
 """Arrays of a network by PyTorch's names."""
 Shapes = dict[str, tuple[int, ...]]
 

@@ -4,7 +4,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from finlab.arrays import Array
 
 TURN = 2.0 * math.pi
 """A full turn [rad]."""
@@ -17,6 +19,6 @@ def is_full_turn(arc: Any) -> Any:
     return arc >= TURN - FULL_TURN_TOLERANCE
 
 
-def wrapped(angle: ArrayLike) -> NDArray[np.float64]:
+def wrapped(angle: ArrayLike) -> Array:
     """Returns the same angles within [-pi, pi) [rad]."""
     return np.asarray(np.mod(np.asarray(angle) + math.pi, TURN) - math.pi)

@@ -6,12 +6,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.array_library import library_of
+from finlab.arrays import Array, library_of
 from finlab.errors import LayoutError
 from finlab.layout.fin import Limits
 from finlab.layout.layout import Layout
-
-Array = NDArray[np.float64]
 
 
 class LayoutArrays(NamedTuple):

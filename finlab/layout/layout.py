@@ -6,8 +6,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.layout.body import Body
 from finlab.layout.fin import Fin
@@ -57,22 +58,22 @@ class Layout:
         return {key: self.__dict__[key] for key in ("name", "fins", "description", "body")}
 
     @cached_property
-    def position(self) -> NDArray[np.float64]:
+    def position(self) -> Array:
         """Where each fin's force acts (n, 3), body frame [m]; read-only."""
         return _read_only([fin.position for fin in self.fins])
 
     @cached_property
-    def mounting_angle(self) -> NDArray[np.float64]:
+    def mounting_angle(self) -> Array:
         """Azimuth of each shaft (n,) [rad]; read-only."""
         return _read_only([fin.mounting_angle for fin in self.fins])
 
     @cached_property
-    def lower(self) -> NDArray[np.float64]:
+    def lower(self) -> Array:
         """Least amplitude [rad], frequency [Hz] and zero direction [rad] of each fin (n, 3); read-only."""
         return _read_only([fin.limits.lower for fin in self.fins])
 
     @cached_property
-    def upper(self) -> NDArray[np.float64]:
+    def upper(self) -> Array:
         """Greatest amplitude [rad], frequency [Hz] and zero direction [rad] of each fin (n, 3); read-only."""
         return _read_only([fin.limits.upper for fin in self.fins])
 
@@ -122,7 +123,7 @@ class Layout:
         return replace(self, fins=tuple(fins))
 
 
-def _read_only(values: ArrayLike) -> NDArray[np.float64]:
+def _read_only(values: ArrayLike) -> Array:
     array = np.array(values, dtype=np.float64)
     array.setflags(write=False)
     return array

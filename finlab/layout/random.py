@@ -9,8 +9,9 @@ from typing import Literal
 
 import numpy as np
 
+from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.layout.arrays import Array, LayoutArrays, empty_arrays
+from finlab.layout.arrays import LayoutArrays, empty_arrays
 from finlab.layout.fin import Fin, Limits
 from finlab.layout.layout import Layout
 

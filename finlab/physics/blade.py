@@ -8,10 +8,7 @@ max(torque theta', 0) has the closed form used here: driving ends where sin = s0
 import math
 from typing import Any, NamedTuple
 
-from finlab.array_library import library_of
-
-Values = Any
-"""A numpy array, a tensor or a symbol."""
+from finlab.arrays import Values, library_of
 
 OWN_INERTIA = 0.0097
 """Moment of inertia about its shaft of a fin 0.20 m long and 0.10 m wide [kg m^2]: U-CAT's robot description

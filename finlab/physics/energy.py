@@ -1,12 +1,11 @@
 """The paper's energy proxy `J_en`, a sum of squares and one product of normalized commands, or its power."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.physics.fin_law import Values
+from finlab.arrays import AnyArray, Array, Values
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ def fin_energy(command: Values, upper: Values, weights: EnergyWeights = DEFAULT_
 
 def command_energy(
     command: NDArray[np.floating], upper: NDArray[np.floating], weights: EnergyWeights = DEFAULT_WEIGHTS
-) -> NDArray[Any]:
+) -> AnyArray:
     """`J_en` of whole robots: commands (..., n, 3) to energies (...,). Failed fins (NaN) count nothing."""
     energy = fin_energy(command, upper, weights)
     return np.asarray(np.where(np.isnan(energy), 0.0, energy).sum(-1))
@@ -73,19 +72,19 @@ class EnergyMeter:
     is_power = False
     """See `finlab.physics.objective.PowerMeter`."""
 
-    def __init__(self, upper: NDArray[np.float64], weights: EnergyWeights = DEFAULT_WEIGHTS) -> None:
+    def __init__(self, upper: Array, weights: EnergyWeights = DEFAULT_WEIGHTS) -> None:
         """Make it for upper limits (n, 3)."""
         self.upper, self.weights = upper, weights
         squares = np.tile([weights.amplitude, weights.frequency, weights.zero_direction], len(upper))
         self._float64 = energy_scale(upper), squares
         self._float32 = energy_scale(upper).astype(np.float32), squares.astype(np.float32)
 
-    def __call__(self, command: NDArray[np.floating]) -> NDArray[Any]:
+    def __call__(self, command: NDArray[np.floating]) -> AnyArray:
         """Energies (R,) of commands (R, n, 3)."""
         scale, squares = self._float32 if command.dtype == np.float32 else self._float64
         scaled = command / scale
         a, f = scaled[..., 0], scaled[..., 1]
-        beats: NDArray[Any] = np.einsum("rn,rn->r", a, f)
+        beats: AnyArray = np.einsum("rn,rn->r", a, f)
         beats *= self.weights.product
         if self.weights.inertial:
             beats += self.weights.inertial * ((a * f) ** 2 * f).sum(-1)
@@ -93,12 +92,12 @@ class EnergyMeter:
         beats += scaled.reshape(len(scaled), len(squares)).dot(squares)
         return beats
 
-    def slopes(self, command: NDArray[np.floating]) -> NDArray[Any]:
+    def slopes(self, command: NDArray[np.floating]) -> AnyArray:
         """Derivatives (R, n, 3) of the energies by commands (R, n, 3)."""
         scale, squares = self._float32 if command.dtype == np.float32 else self._float64
         scaled = command / scale
         a, f, w = scaled[..., 0], scaled[..., 1], self.weights
-        slopes: NDArray[Any] = 2 * squares.reshape(scale.shape) * scaled
+        slopes: AnyArray = 2 * squares.reshape(scale.shape) * scaled
         slopes[..., 0] += w.product * f + w.inertial * 2 * a * f**3
         slopes[..., 1] += w.product * a + w.inertial * 3 * (a * f) ** 2
         slopes /= scale

@@ -9,14 +9,9 @@ from abc import ABC, abstractmethod
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from finlab.array_library import library_of
+from finlab.arrays import Array, Values, library_of
 from finlab.physics.blade import Blade
-
-Array = NDArray[np.float64]
-Values = Any
-"""A numpy array, a tensor or a symbol."""
 
 
 class FinLaw(Protocol):

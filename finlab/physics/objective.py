@@ -5,16 +5,14 @@ Both are sums over the fins of a cost of amplitude and frequency; effort adds a 
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyMeter, EnergyWeights, energy_of_shares, energy_scale
 from finlab.physics.fin_law import FinLaw
 from finlab.physics.plant import Plant
-
-Array = NDArray[Any]
 
 Name = Literal["power", "effort"]
 

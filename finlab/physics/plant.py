@@ -8,6 +8,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from finlab.arrays import Array
 from finlab.errors import CommandError
 from finlab.layout.angles import TURN, is_full_turn
 from finlab.layout.arrays import force_columns
@@ -15,8 +16,6 @@ from finlab.layout.layout import Layout
 from finlab.physics.blade import Blade
 from finlab.physics.fin_model import file_stamps, make_law, stack_laws
 from finlab.physics.wrench import body_force, wrench_of_forces
-
-Array = NDArray[np.float64]
 
 
 class Plant:

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from finlab.array_library import library_of
-from finlab.physics.fin_law import Array, PlanarLaw, Values
+from finlab.arrays import Array, Values, library_of
+from finlab.physics.fin_law import PlanarLaw
 
 
 class Soft(PlanarLaw):

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from finlab.array_library import library_of
+from finlab.arrays import Array, Values, library_of
 from finlab.layout.angles import TURN
 from finlab.physics.blade import Blade
-from finlab.physics.fin_law import Array, Values
 
 
 class TableLaw:

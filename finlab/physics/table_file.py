@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.bundle_files import TABLES, archive_around, read_bundle_files
 from finlab.errors import DataError
 from finlab.layout.angles import TURN
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
-from finlab.physics.fin_law import Array, FinLaw
+from finlab.physics.fin_law import FinLaw
 from finlab.physics.table import TableLaw
 
 COLUMNS = ("A", "f", "phi", "Fx", "Fy", "Fz")

@@ -4,9 +4,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
+from finlab.arrays import Array
 from finlab.control import Completion, Controller, Measurement, VelocityController, WaypointController
 from finlab.errors import FinlabError
 from finlab.layout import Layout
@@ -18,8 +18,6 @@ from finlab.sim.log import RunLog, Tick, log_of_ticks
 from finlab.sim.sensors import Sensors, SensorSettings
 from finlab.sim.task import Cruise, Task
 from finlab.sim.vehicle import STATE_SIZE, Vehicle, complete_body, quaternion_of_yaw
-
-Array = NDArray[np.float64]
 
 
 class ClosedLoop:

@@ -9,16 +9,14 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
 from finlab.physics import plant_of
 from finlab.physics.blade import Blade
 from finlab.sim.fin_motion import FinMotion
-
-Array = NDArray[np.float64]
 
 
 class FinForce(Protocol):

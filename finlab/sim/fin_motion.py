@@ -11,13 +11,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.angles import is_full_turn
 from finlab.physics.blade import Blade
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import AnyArray
 from finlab.errors import DataError
-
-Array = NDArray[Any]
 
 FORMAT = "finlab-swim"
 VERSION = 1
@@ -21,35 +19,35 @@ class Tick(NamedTuple):
 
     time: float
     """At the beginning of the period [s]."""
-    position: Array
+    position: AnyArray
     """Position (3,) in the world, z up [m]."""
-    quaternion: Array
+    quaternion: AnyArray
     """Attitude (4,) as w, x, y, z, body to world."""
-    motion: Array
+    motion: AnyArray
     """Velocity (3,) [m/s] and angular rates (3,) [rad/s] in the body frame."""
-    reference: Array
+    reference: AnyArray
     """Where the robot should be at `time` (3,) [m]; NaN where the task does not say."""
     reference_surge: float
     """How fast it should be along x [m/s]."""
-    asked: Array
+    asked: AnyArray
     """Wrench (6,) that the controller asks for [N, N m], body frame."""
-    allocated: Array
+    allocated: AnyArray
     """Wrench (6,) that the commands give once the fins have followed them, by the fin law [N, N m]."""
-    delivered: Array
+    delivered: AnyArray
     """Wrench (6,) of the fins, mean over the period [N, N m]."""
-    command: Array
+    command: AnyArray
     """Command (n, 3): amplitude [rad], frequency [Hz], zero direction [rad]; NaN for a lost fin."""
-    fin_motion: Array
+    fin_motion: AnyArray
     """What the fins did at the end of the period (n, 3), in the same units."""
-    fin_angle: Array
+    fin_angle: AnyArray
     """Angle of each fin (n,) at the end of the period [rad]."""
-    fin_force: Array
+    fin_force: AnyArray
     """Force of each fin (n, 3) in the body frame, mean over the period [N]."""
-    inertial_power: Array
+    inertial_power: AnyArray
     """|I alpha omega| of each fin (n,), mean over the period [W]."""
-    torque_power: Array
+    torque_power: AnyArray
     """max(torque times speed, 0) of each fin (n,), mean over the period [W]."""
-    alive: Array
+    alive: AnyArray
     """Which fins work (n,)."""
     solve_ms: float
     """Time of the allocation [ms]."""
@@ -73,14 +71,14 @@ class RunLog:
     """How the fins' forces were simulated."""
     seed: int
     """Seed of the sensors' noise."""
-    columns: dict[str, Array]
+    columns: dict[str, AnyArray]
     """Column name, as in `Tick`, to array (N, ...)."""
 
-    def __getattr__(self, name: str) -> Array:
+    def __getattr__(self, name: str) -> AnyArray:
         columns = self.__dict__.get("columns", {})
         if name not in columns:
             raise AttributeError(f"a swim log has no column {name!r}; it has {', '.join(columns)}")
-        column: Array = columns[name]
+        column: AnyArray = columns[name]
         return column
 
     @property

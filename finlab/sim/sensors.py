@@ -3,12 +3,10 @@
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.control import Measurement
 from finlab.sim.vehicle import euler
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.control import Setpoint
 from finlab.errors import DataError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

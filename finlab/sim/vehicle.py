@@ -17,13 +17,12 @@ from dataclasses import fields, replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from finlab.arrays import Array
 from finlab.assets import layouts_dir
 from finlab.errors import LayoutError
 from finlab.layout import Body, Layout, load_layout
-
-Array = NDArray[np.float64]
 
 STATE_SIZE = 13
 GRAVITY = 9.81

@@ -7,13 +7,14 @@ enough to draw fresh samples for each step instead of reading them from a disk.
 import functools
 import math
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from finlab.arrays import AnyArray
 from finlab.assets import shipped_layouts
 from finlab.layout.angles import wrapped
 from finlab.layout.arrays import LayoutArrays, stack_layouts
@@ -83,7 +84,7 @@ def seeded_generator(seed: int, stream: int, device: torch.device | str = "cpu")
     return torch.Generator(device=device).manual_seed(int(state >> np.uint64(1)))
 
 
-def _tensor(values: NDArray[Any]) -> Tensor:
+def _tensor(values: AnyArray) -> Tensor:
     """The same values in single precision; truth values as they are."""
     return torch.from_numpy(values if values.dtype == bool else values.astype(np.float32))
 

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES
+from finlab.arrays import Array
 from webapp.markup.words import damage_words, saturated
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, State
 from webapp.session.targets import nice_limit
@@ -84,9 +85,7 @@ def swatch(index: int, failed: bool = False) -> str:
     return f"<span class='swatch' style='background:{color}'>{index + 1}</span>"
 
 
-def fin_table(
-    state: State, allocation: Allocation | None, full: NDArray[np.float64], selected: str | None
-) -> str:
+def fin_table(state: State, allocation: Allocation | None, full: Array, selected: str | None) -> str:
     """All fins with their commands.
 
     Args:
@@ -114,9 +113,7 @@ def fin_table(
     return f"<div class='fl'><table class='fins'>{HEADER}{''.join(rows)}</table></div>"
 
 
-def _cells(
-    command: NDArray[np.float64], limits: NDArray[np.bool_], force: float, full: float, index: int
-) -> str:
+def _cells(command: Array, limits: NDArray[np.bool_], force: float, full: float, index: int) -> str:
     amplitude, frequency, direction = command
     degrees = f"{round(math.degrees(direction)):+d}".replace("-", "−")
     share = min(force / max(full, 1e-9), 1.0)

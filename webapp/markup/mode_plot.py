@@ -4,9 +4,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
+from finlab.arrays import Array
 from webapp.markup.picking import pick, send
 from webapp.markup.words import objective_of
 from webapp.tasks.mode_names import Modes
@@ -28,8 +28,6 @@ DOT = 9
 """Radius of the dot of a mode with its rim [px]."""
 SAMPLES = "fl-sample"
 """Channel that hears which sample is clicked."""
-
-Array = NDArray[np.float64]
 
 
 class Axis(NamedTuple):

@@ -3,9 +3,9 @@
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
+from finlab.arrays import Array
 from finlab.physics import plant_of
 from webapp.markup.answer import swatch
 from webapp.markup.mode_plot import FAR, sample_colors
@@ -22,8 +22,6 @@ SAID = (
     "its horizontal thrust axis. The line is the answer. A sample has the colour of the mode that its "
     "component led to, and is grey where what came of it was not kept."
 )
-
-Array = NDArray[np.float64]
 
 
 def proposal_discs(answer: Allocation, modes: Modes) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
+from finlab.arrays import Array
 from finlab.layout import Layout
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, State
 
@@ -52,7 +53,7 @@ def source_words(sources: Sequence[str]) -> str:
     return words.get(first, f"found {first}" if first.startswith("without ") else f"from {first}")
 
 
-def missing_part(allocation: Allocation) -> NDArray[np.float64]:
+def missing_part(allocation: Allocation) -> Array:
     """The unallocated wrench (6,) [N, N m] without what is too small to matter."""
     rest = allocation.unallocated
     return np.where(np.abs(rest / allocation.sigma) > 2 * SMALL, rest, 0.0)
@@ -101,7 +102,7 @@ def rest_sentence(allocation: Allocation) -> str:
     return f"{listed(parts)} {'is' if len(parts) == 1 else 'are'} left undone."
 
 
-def authority_sentence(layout: Layout, failed: tuple[str, ...], reach: NDArray[np.float64]) -> str | None:
+def authority_sentence(layout: Layout, failed: tuple[str, ...], reach: Array) -> str | None:
     """Which axes the working fins cannot act on at all, given their reach (6,); None if there is none."""
     blind = [AXIS_WORDS[k] for k in range(6) if reach[k] < 1e-6]
     if not blind:

@@ -4,9 +4,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 from viser import uplot
 
+from finlab.arrays import Array
 from finlab.layout.layout import MAX_FINS
 from webapp.handles import put
 from webapp.session.targets import nice_limit
@@ -17,7 +17,6 @@ FIN_LINES = tuple(css(fin_color(i)) for i in range(MAX_FINS))
 """Colours of lines that belong to a fin each."""
 ROOM = 1.08
 """Room above the last tick, so that its number is not cut off."""
-Array = NDArray[np.float64]
 
 
 class LinePlot:

@@ -5,9 +5,9 @@ from html import escape
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
 from finlab.allocation.policy import AXES
+from finlab.arrays import Array
 from webapp.handles import Changes, put
 from webapp.markup.answer import fin_table, wrench_bars
 from webapp.markup.picking import marker
@@ -105,7 +105,7 @@ class TargetPanel:
         self._page.session.set_target(axis, value)
 
     @property
-    def reach(self) -> NDArray[np.float64]:
+    def reach(self) -> Array:
         """Largest size of each component with the others free (6,) [N, N m]."""
         state = self._page.session.state
         return axis_reach(state.able, state.failed)

@@ -8,6 +8,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.layout import Fin
 from webapp.handles import put
 from webapp.scene.gizmos import add_gizmo
@@ -16,8 +17,6 @@ from webapp.scene.meshes.hull import AnyHull
 from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, tube
 from webapp.scene.shape import UNLIT, Shape
 from webapp.theme import DEAD, LIGHT, fin_color
-
-Array = NDArray[np.float64]
 
 APART = 1.9
 """Between the phases of one fin and the next [rad]: different phases look alive, and the mean force does not

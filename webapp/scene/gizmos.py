@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from webapp.handles import put
 from webapp.session import Session
 
-Array = NDArray[np.float64]
 SIZE = 0.16
 """Length of a handle's arrows [m]."""
 LIFT = np.array([0.0, 0.0, 0.16])

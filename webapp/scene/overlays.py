@@ -4,9 +4,9 @@ from itertools import combinations
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
+from finlab.arrays import Array
 from finlab.layout import Fin, Layout
 from webapp.handles import put
 from webapp.scene.meshes import fin as fin_mesh
@@ -121,7 +121,7 @@ class Lines:
         put(self._text, position=np.array([x, y, z - 0.07]))
 
 
-def _edges(place: NDArray[np.float64], weight: NDArray[np.float64]) -> Mesh:
+def _edges(place: Array, weight: Array) -> Mesh:
     """A rod between each two fins; at each end as thick as that fin looks at the other one."""
     off = weight[~np.eye(len(weight), dtype=bool)]
     thick = RADIUS * np.clip(weight / max(float(off.mean()), 1e-9), 0.2, 2.5) ** CONTRAST

@@ -2,8 +2,8 @@
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.layout import Layout
 from webapp.handles import put
 from webapp.scene.fin_node import FinShapes, Flapping, quaternion
@@ -14,7 +14,6 @@ from webapp.scene.shape import Shape
 from webapp.tasks.swimmer import PLACE, Moment
 from webapp.theme import ASKED, DELIVERED, LIGHT, Rgb
 
-Array = NDArray[np.float64]
 TRAIL_POINTS = 250
 """Most pieces of a trail."""
 ABOVE = 0.1

@@ -5,6 +5,7 @@ import viser
 from numpy.typing import NDArray
 
 from finlab.analysis import AttainableSet
+from finlab.arrays import Array
 from webapp.handles import put
 from webapp.scene.meshes.mesh import NOTHING, RING_RADIUS, Mesh, force_arrow, torque_ring, tube
 from webapp.scene.shape import UNLIT, Shape
@@ -17,7 +18,6 @@ LENGTH = 0.1
 LONGEST, SHORTEST = 0.42, 0.14
 """The longest arrow stays within these [m]; between them the scale is left alone, so it seldom jumps."""
 
-Array = NDArray[np.float64]
 HEIGHT = 0.16
 """How far above the hull the arrows begin [m]; inside it they could not be seen."""
 LARGEST = 0.42

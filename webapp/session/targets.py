@@ -4,8 +4,8 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.forces.fin_sets import SCALE, fin_sets
 from finlab.layout import Layout
 
@@ -23,7 +23,7 @@ FIRST = PRESETS["Turn"]
 
 
 @lru_cache(maxsize=64)
-def axis_reach(layout: Layout, failed: tuple[str, ...] = ()) -> NDArray[np.float64]:
+def axis_reach(layout: Layout, failed: tuple[str, ...] = ()) -> Array:
     """Largest size of each wrench component (6,) [N, N m] that the working fins give with the others free."""
     sets = fin_sets(layout, failed)
     both = sets.tile(12).farthest(np.concatenate([np.eye(6), -np.eye(6)]))[0]
@@ -31,7 +31,7 @@ def axis_reach(layout: Layout, failed: tuple[str, ...] = ()) -> NDArray[np.float
 
 
 @lru_cache(maxsize=64)
-def full_thrust(layout: Layout) -> NDArray[np.float64]:
+def full_thrust(layout: Layout) -> Array:
     """Mean thrust (n,) of each fin at its largest amplitude and frequency [N]."""
     return np.asarray(fin_sets(layout).radius[0])
 

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
+from finlab.arrays import Array
 from webapp.session import Session
 from webapp.session.state import State
 from webapp.tasks.background import EventLoop, Newest, Worker
@@ -34,7 +34,7 @@ class Answering:
         """
         self._session, self._changed, self._failed = session, changed, failed
         self._told: str | None = None
-        self._shown: tuple[Allocation, NDArray[np.float64], Allocation] | None = None
+        self._shown: tuple[Allocation, Array, Allocation] | None = None
         self._answer: Newest[State, Reply] = Newest(loop, worker, solver.reply, self._take)
         self._search: Newest[Reply, Modes] = Newest(
             loop, worker, solver.modes, self._take_modes, SEARCH_REST_S
@@ -90,7 +90,7 @@ class Answering:
             return self._variant(best, self.modes.shown[mode].mode.command)
         return best
 
-    def _variant(self, best: Allocation, command: NDArray[np.float64]) -> Allocation:
+    def _variant(self, best: Allocation, command: Array) -> Allocation:
         """The answer with another command; kept, because every refresh asks for it."""
         known = self._shown
         if known is None or known[0] is not best or not np.array_equal(known[1], command, equal_nan=True):

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import load_allocator
+from finlab.arrays import Array
 from finlab.errors import AllocationError
 from webapp.session.state import State
 from webapp.tasks.mode_names import Modes, known_modes, listed_modes
@@ -28,7 +28,7 @@ class Attention(NamedTuple):
 
     fins: tuple[str, ...]
     """The fins in the graph, n of them: those that work."""
-    weight: NDArray[np.float64]
+    weight: Array
     """How much each fin (rows) looks at each (columns), (n, n); rows sum to 1, itself included."""
 
 

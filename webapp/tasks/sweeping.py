@@ -5,8 +5,8 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.errors import FinlabError
 from webapp.session import Session
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_TARGET, number
@@ -34,15 +34,15 @@ class Sweep:
         self._place, self._step, self._revision = 0, 1, -1
         self.axis = 0
         """Which component is moved."""
-        self.values: NDArray[np.float64] = np.zeros(POINTS)
+        self.values: Array = np.zeros(POINTS)
         """Its values [N or N m]."""
         self.fins: tuple[str, ...] = ()
         """Fins that the notes are about."""
-        self.force: NDArray[np.float64] = np.full((0, POINTS), np.nan)
+        self.force: Array = np.full((0, POINTS), np.nan)
         """Mean force of each fin at each value (n, POINTS) [N]; NaN where it is not known yet."""
-        self.error: NDArray[np.float64] = np.full(POINTS, np.nan)
+        self.error: Array = np.full(POINTS, np.nan)
         """Error at each value (POINTS,) [σ]."""
-        self.power: NDArray[np.float64] = np.full(POINTS, np.nan)
+        self.power: Array = np.full(POINTS, np.nan)
         """Power at each value (POINTS,) [W]."""
 
     @property

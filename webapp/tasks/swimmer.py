@@ -6,8 +6,8 @@ from collections import deque
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.sim import ClosedLoop
 from finlab.sim.log import Tick
 from webapp.session.state import number
@@ -17,8 +17,6 @@ LAG_S = 0.25
 """What the swim may be behind the clock [s]; what is more is dropped, so that nothing piles up."""
 WINDOW_S = 2.0
 """Time over which the true speed is measured [s]."""
-
-Array = NDArray[np.float64]
 
 POINTS = 300
 """Most points of a plotted line; a longer record is thinned out."""

@@ -3,16 +3,12 @@
 from functools import lru_cache
 from typing import Unpack
 
-import numpy as np
-from numpy.typing import NDArray
-
 from finlab.allocation.aim import Aim
 from finlab.allocation.baselines.model_based import CACHE_SIZE, ModelBased
 from finlab.allocation.baselines.pseudo_inverse import RCOND, PseudoInverse
+from finlab.arrays import Array
 from finlab.inference.normalization import Normalization
 from finlab.physics import Plant
-
-Array = NDArray[np.float64]
 
 
 class Analytic(ModelBased):

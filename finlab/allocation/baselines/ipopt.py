@@ -11,18 +11,16 @@ from functools import lru_cache
 from typing import Any, NamedTuple, Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.aim import Aim
 from finlab.allocation.baselines.model_based import CACHE_SIZE, TIME_LIMIT_S
 from finlab.allocation.baselines.plant_in_casadi import plant_in_casadi
 from finlab.allocation.baselines.single_target import DEFAULT_STARTS, Problem, SingleTarget
+from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
 from finlab.physics import PlanarLaw, Plant, make_law
 from finlab.physics.energy import energy_of_shares, energy_scale
-
-Array = NDArray[np.float64]
 
 SOLVER_OPTIONS = {
     "ipopt.print_level": 0,

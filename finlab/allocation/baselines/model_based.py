@@ -7,20 +7,16 @@ from functools import lru_cache
 from inspect import Parameter, signature
 from typing import Unpack
 
-import numpy as np
-from numpy.typing import NDArray
-
 from finlab.allocation.aim import Aim, checked_objective
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.pseudo_inverse import PseudoInverse
 from finlab.allocation.command_cost import CommandCost, command_cost
 from finlab.allocation.solution import Solution
+from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
 from finlab.physics import Plant, plant_of
-
-Array = NDArray[np.float64]
 
 ENERGY_TRADEOFF = 1e-4
 """Weight of the cost beside the squared normalized error where a method weighs both; see `command_cost`."""

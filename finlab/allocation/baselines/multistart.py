@@ -4,7 +4,6 @@ from functools import lru_cache
 from typing import Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.aim import Aim
 from finlab.allocation.baselines.model_based import (
@@ -16,11 +15,10 @@ from finlab.allocation.baselines.model_based import (
     check_time_limit,
 )
 from finlab.allocation.weighted_descent import DescentOptions, descend
+from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
 from finlab.physics import Plant
-
-Array = NDArray[np.float64]
 
 CHUNK_ROWS = 2048
 """Commands refined together; more would not fit the caches."""

@@ -3,12 +3,10 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.command_cost import CommandCost
+from finlab.arrays import Array
 from finlab.physics import Plant
-
-Array = NDArray[np.float64]
 
 DIFFERENCE = 1e-4
 """Half width of the differences, as a share of each command's range."""

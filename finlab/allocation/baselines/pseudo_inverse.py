@@ -1,15 +1,13 @@
 """The pseudo-inverse in force space, each fin's force looked up in its own envelope."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.forces.envelopes import layout_envelopes
 from finlab.forces.fin_envelope import AMPLITUDE, FREQUENCY, LEAN
 from finlab.forces.force_space import planar_problem, polar
 from finlab.physics import Plant
 from finlab.physics.objective import Objective
-
-Array = NDArray[np.float64]
 
 RCOND = 1e-3
 """Singular values below this share of the largest count as zero."""

@@ -4,15 +4,13 @@ from functools import lru_cache
 from typing import Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from finlab.allocation.aim import Aim
 from finlab.allocation.baselines.model_based import CACHE_SIZE, ModelBased
+from finlab.arrays import Array
 from finlab.inference.normalization import Normalization
 from finlab.physics import Plant
-
-Array = NDArray[np.float64]
 
 DIFFERENCE_STEP = 1e-4
 """Half width of the central differences, as a share of each command's range."""

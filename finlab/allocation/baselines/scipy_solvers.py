@@ -3,16 +3,14 @@
 from typing import Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares, minimize
 
 from finlab.allocation.aim import Aim
 from finlab.allocation.baselines.model_based import TIME_LIMIT_S
 from finlab.allocation.baselines.single_target import DEFAULT_STARTS, Problem, SingleTarget
+from finlab.arrays import Array
 from finlab.inference.normalization import Normalization
 from finlab.physics import Plant
-
-Array = NDArray[np.float64]
 
 INSIDE = 1e-6
 """How far within the limits the solver starts, which it requires."""

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from typing import Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.aim import Aim
 from finlab.allocation.baselines.model_based import (
@@ -17,10 +16,9 @@ from finlab.allocation.baselines.model_based import (
     check_time_limit,
 )
 from finlab.allocation.command_cost import CommandCost
+from finlab.arrays import Array
 from finlab.inference.normalization import Normalization
 from finlab.physics import Plant
-
-Array = NDArray[np.float64]
 
 DEFAULT_STARTS = 8
 """Random starts per target unless set otherwise."""

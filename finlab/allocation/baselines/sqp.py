@@ -13,10 +13,9 @@ from finlab.allocation.baselines.model_based import (
     TimeLimit,
     check_time_limit,
 )
+from finlab.arrays import Array
 from finlab.inference.normalization import Normalization
 from finlab.physics import Plant
-
-Array = NDArray[np.float64]
 
 CHUNK = 2048
 """Rows stepped together; more would not fit the caches."""

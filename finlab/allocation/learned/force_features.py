@@ -30,16 +30,14 @@ index  meaning
 Pair features are the block (a, b) of P between two fins, in their frames.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import AnyArray
 from finlab.forces.fin_envelope import COST
 from finlab.forces.force_space import PlanarProblem
 from finlab.inference.force_network import NODE_SIZE
-
-Array = NDArray[Any]
 
 SHARES = (0.02, 0.1, 0.3, 0.6)
 """Shares of the largest force at which a fin's cost is looked up."""
@@ -54,24 +52,24 @@ GOLDEN = 0.6180339887498949
 class RobotView(NamedTuple):
     """One robot of n fins as the network sees it, whatever the target."""
 
-    static: Array
+    static: AnyArray
     """Node features 6-26 (n, 21) before their vectors are turned."""
-    blocks: Array
+    blocks: AnyArray
     """a and b (2, n, n) of the blocks of P, complex."""
-    solver: Array
+    solver: AnyArray
     """Normalized wrenches to p (6, n), complex."""
-    largest: Array
+    largest: AnyArray
     """F (n,) [N]."""
 
 
 class Seen(NamedTuple):
     """N targets on one robot as the network sees them."""
 
-    nodes: Array
+    nodes: AnyArray
     """Node features (N, n, 27)."""
-    pairs: Array
+    pairs: AnyArray
     """Pair features (N, n, n, 4), from the last but one axis (seen) to the one before (seeing)."""
-    frame: Array
+    frame: AnyArray
     """Unit vectors (N, n), complex, along each fin's p_i."""
 
 
@@ -122,14 +120,14 @@ def robot_view(problem: PlanarProblem, effort: bool) -> RobotView:
     )
 
 
-def see(view: RobotView, target: Array) -> Seen:
+def see(view: RobotView, target: AnyArray) -> Seen:
     """What the network sees of normalized targets (N, 6) on one robot."""
     asked = target @ view.solver
     many = (np.broadcast_to(part, (len(target), *part.shape)) for part in (view.static, *view.blocks))
     return features(asked, *many)
 
 
-def features(asked: Array, static: Array, a: Array, b: Array) -> Seen:
+def features(asked: AnyArray, static: AnyArray, a: AnyArray, b: AnyArray) -> Seen:
     """The features of N targets, each on a robot of its own.
 
     Args:
@@ -158,5 +156,5 @@ def features(asked: Array, static: Array, a: Array, b: Array) -> Seen:
     return Seen(nodes, pairs, frame)
 
 
-def _parts(values: Array) -> tuple[Array, Array]:
+def _parts(values: AnyArray) -> tuple[AnyArray, AnyArray]:
     return values.real, values.imag

@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from finlab.allocation.judging import costs
 from finlab.allocation.learned.force_features import RobotView, robot_view, see
@@ -21,12 +21,11 @@ from finlab.allocation.search.prepared import Prepared
 from finlab.allocation.search.refined_candidates import FallbackForces, RefinedCandidates, nearest_forces
 from finlab.allocation.search.search_allocator import CHUNK, SearchAllocator
 from finlab.allocation.solution import Candidates, Insight, Solution
+from finlab.arrays import Array
 from finlab.forces.force_space import polar, realize
 from finlab.inference.force_network import NumpyForceNetwork
 from finlab.inference.weights import ForceNetworkConfig, TrainedWeights
 from finlab.layout import Layout
-
-Array = NDArray[Any]
 
 
 class MdnAllocator(SearchAllocator):

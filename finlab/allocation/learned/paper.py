@@ -5,13 +5,13 @@ from functools import lru_cache
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.judging import costs
 from finlab.allocation.learned.settings import STEPS, PaperSettings
 from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
 from finlab.allocation.solution import Candidates, Solution
+from finlab.arrays import AnyArray
 from finlab.inference.features import raw_features
 from finlab.inference.mixture import MixtureArrays
 from finlab.inference.network import NumpyNetwork
@@ -22,8 +22,6 @@ from finlab.inference.weights import NetworkConfig, TrainedWeights
 from finlab.layout import FinModelSpec, Layout
 from finlab.layout.angles import is_full_turn
 from finlab.physics.energy import EnergyMeter
-
-Array = NDArray[Any]
 
 CHUNK = 250
 """Targets that are solved together; keeps memory flat for any number of targets."""
@@ -44,9 +42,9 @@ class _Robot(NamedTuple):
     """Learned fin physics."""
     problem: CommandProblem
     """The surrogate in normalized wrenches, and the limits."""
-    limits: tuple[Array, Array]
+    limits: tuple[AnyArray, AnyArray]
     """Lower and upper limits (n, 3), in single precision as all else here."""
-    features: Array
+    features: AnyArray
     """The network's node features (1, n, 10)."""
     energy: EnergyMeter
     """J_en."""
@@ -86,7 +84,7 @@ class PaperAllocator(Allocator):
     def _made_with(self, options: dict[str, Any]) -> Self:
         return type(self)(self.weights, **options)
 
-    def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
+    def _solve(self, layout: Layout, targets: AnyArray, *, seed: int, previous: AnyArray | None) -> Solution:
         robot = self._prepared(layout)
         if len(targets) == 1:
             with self._one_thread():
@@ -96,7 +94,7 @@ class PaperAllocator(Allocator):
         wrench = [part.wrench_surrogate for part in parts if part.wrench_surrogate is not None]
         return Solution(np.concatenate([part.command for part in parts]), np.concatenate(wrench))
 
-    def _solve_chunk(self, robot: _Robot, targets: Array, seed: int) -> Solution:
+    def _solve_chunk(self, robot: _Robot, targets: AnyArray, seed: int) -> Solution:
         std, settings = self.normalization.std, self.settings
         wanted = ((targets - robot.surrogate.bias) / std).astype(np.float32)
         mixture = self._predict(robot, (targets - self.normalization.mean) / std)
@@ -128,12 +126,12 @@ class PaperAllocator(Allocator):
         limits = lower.astype(np.float32), upper.astype(np.float32)
         return _Robot(layout, surrogate, problem, limits, raw_features(*place), EnergyMeter(upper))
 
-    def _predict(self, robot: _Robot, centred: Array) -> MixtureArrays:
+    def _predict(self, robot: _Robot, centred: AnyArray) -> MixtureArrays:
         """The network's mixture for normalized, centred targets (N, 6)."""
         x = np.repeat(robot.features, len(centred), axis=0)
         return self.network(x.astype(np.float32), centred.astype(np.float32))
 
-    def _draw(self, mixture: MixtureArrays, seed: int) -> Array:
+    def _draw(self, mixture: MixtureArrays, seed: int) -> AnyArray:
         """Candidates (N, K, n, 3) in normalized coordinates."""
         rows, n, k = *mixture.mean.shape[:2], self.settings.n_candidates
         rng = np.random.default_rng(seed)
@@ -145,7 +143,7 @@ class PaperAllocator(Allocator):
         normal = rng.standard_normal((rows, n, k, 3), dtype=np.float32)
         return mixture.tempered(self.settings.temperature, uniform, normal)
 
-    def _score(self, robot: _Robot, command: Array, wanted: Array) -> Array:
+    def _score(self, robot: _Robot, command: AnyArray, wanted: AnyArray) -> AnyArray:
         """J = J_norm + gamma J_en (N, K) of commands (N, K, n, 3), by the surrogate."""
         rows, k, n, _ = command.shape
         flat = command.reshape(-1, n, 3)
@@ -153,7 +151,7 @@ class PaperAllocator(Allocator):
         energy = robot.energy(flat).reshape(rows, k)
         return np.asarray(np.einsum("rki,rki->rk", error, error) + self.settings.gamma * energy)
 
-    def _refine(self, robot: _Robot, command: Array, wanted: Array) -> Array:
+    def _refine(self, robot: _Robot, command: AnyArray, wanted: AnyArray) -> AnyArray:
         """Refined commands (N, K, n, 3), inside the limits."""
         shape, kind = command.shape, self.settings.refinement
         steps = STEPS[kind] if self.settings.n_steps is None else self.settings.n_steps
@@ -164,7 +162,7 @@ class PaperAllocator(Allocator):
             return self._adam(robot, flat, target, steps).reshape(shape)
         return refine(robot.problem, target, flat, steps, damping=LM_DAMPING).command.reshape(shape)
 
-    def _adam(self, robot: _Robot, command: Array, target: Array, steps: int) -> Array:
+    def _adam(self, robot: _Robot, command: AnyArray, target: AnyArray, steps: int) -> AnyArray:
         """Adam on J for commands (R, n, 3) and normalized targets (R, 6); the last step of each.
 
         It works in normalized coordinates, inside the limits, with a step that falls linearly.
@@ -183,17 +181,17 @@ class PaperAllocator(Allocator):
             np.clip(x, -1.0, 1.0, out=x)
         return np.asarray(to_command(x, lower, upper))
 
-    def _gradient(self, robot: _Robot, command: Array, target: Array) -> Array:
+    def _gradient(self, robot: _Robot, command: AnyArray, target: AnyArray) -> AnyArray:
         """Derivatives (R, n, 3) of J by each command."""
         rows, n, _ = command.shape
         columns = robot.problem.columns_float32
         force, slopes = robot.problem.fin.force_and_slopes(command)
         error = force.reshape(rows, -1) @ columns - target
         by_force = (2.0 * error @ columns.T).reshape(rows, n, 3)
-        by_command: Array = (slopes @ by_force[..., None])[..., 0]
+        by_command: AnyArray = (slopes @ by_force[..., None])[..., 0]
         return by_command + np.float32(self.settings.gamma) * robot.energy.slopes(command)
 
-    def _candidates(self, robot: _Robot, command: Array, target: Array, source: str) -> Candidates:
+    def _candidates(self, robot: _Robot, command: AnyArray, target: AnyArray, source: str) -> Candidates:
         """Candidates (K, n, 3) of a single target (6,), best first."""
         wrench = robot.surrogate.wrench(command).astype(np.float64)
         error = self.normalization.error(wrench, target)
@@ -203,11 +201,11 @@ class PaperAllocator(Allocator):
         return Candidates(inside, wrench[order], error[order], *costs(robot.layout, inside), names)
 
 
-def _take(command: Array, index: Array) -> Array:
+def _take(command: AnyArray, index: AnyArray) -> AnyArray:
     """Of commands (N, K, n, 3) those with the numbers (N, k)."""
     return np.asarray(np.take_along_axis(command, index[..., None, None], axis=1))
 
 
-def _inside(robot: _Robot, command: Array) -> Array:
+def _inside(robot: _Robot, command: AnyArray) -> AnyArray:
     """Commands in double precision, inside the limits to the last bit."""
     return np.clip(command.astype(np.float64), robot.problem.lower, robot.problem.upper)

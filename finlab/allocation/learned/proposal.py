@@ -2,21 +2,20 @@
 
 import math
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.learned.force_features import RobotView, see
+from finlab.arrays import AnyArray
 from finlab.inference.force_network import ForceMixture, NumpyForceNetwork
-
-Array = NDArray[Any]
 
 
 class Proposal(NamedTuple):
     """K proposals for each of N targets, none of them exact yet."""
 
-    force: Array
+    force: AnyArray
     """Planar forces (N, K, 2, n) [N], horizontal and vertical."""
     component: NDArray[np.intp]
     """Mixture component of each (N, K)."""
@@ -25,7 +24,7 @@ class Proposal(NamedTuple):
 def propose(
     network: NumpyForceNetwork,
     view: RobotView,
-    target: Array,
+    target: AnyArray,
     n_candidates: int,
     temperature: float,
     seed: int,
@@ -42,7 +41,7 @@ def propose(
     return Proposal(np.stack([force.real, force.imag], axis=2), component)
 
 
-def shares(root: Array) -> Array:
+def shares(root: AnyArray) -> AnyArray:
     """Shares of the largest forces, none above one, from what the mixture tells: their roots."""
     size = np.abs(root)
     return np.asarray(root * np.minimum(size, 1.0 / np.maximum(size, 1e-9)))
@@ -50,7 +49,7 @@ def shares(root: Array) -> Array:
 
 def _drawn(
     mixture: ForceMixture, count: int, temperature: float, seed: int
-) -> tuple[NDArray[np.intp], Array]:
+) -> tuple[NDArray[np.intp], AnyArray]:
     """Components (N, K) and roots of shares (N, K, n), complex."""
     rows, m, n = mixture.mean.shape
     place = np.arange(rows)[:, None]
@@ -66,7 +65,7 @@ def _drawn(
 
 
 @lru_cache(maxsize=16)
-def _draws(seed: int, rows: int, count: int, n: int) -> tuple[Array, Array]:
+def _draws(seed: int, rows: int, count: int, n: int) -> tuple[AnyArray, AnyArray]:
     """Uniform (rows, count, 1) and complex normal (rows, count, n) random numbers of a seed, kept: a control
     loop uses one seed for every tick."""
     rng = np.random.default_rng(seed)

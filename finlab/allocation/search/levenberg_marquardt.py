@@ -11,11 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.arrays import AnyArray
 from finlab.forces.small_systems import solve
 from finlab.inference.surrogate import FinForces
-
-Array = NDArray[Any]
-
 
 AT_LIMIT = 1e-9
 """How near [rad, Hz, rad] to a limit a command counts as being at it."""
@@ -27,15 +25,15 @@ latter those of strong fins on long levers are singular to rounding."""
 class Limits(NamedTuple):
     """The limits of n fins in one floating-point type."""
 
-    lower: Array
+    lower: AnyArray
     """(n, 3)."""
-    upper: Array
+    upper: AnyArray
     """(n, 3)."""
-    seam: Array
+    seam: AnyArray
     """Zero direction (n,) [rad], half a turn before the middle of the arc, from where angles are counted."""
     turn: np.floating[Any]
     """A whole turn [rad]."""
-    half: Array
+    half: AnyArray
     """Half of each range (n, 3)."""
 
 
@@ -45,17 +43,17 @@ class CommandProblem:
 
     fin: FinForces
     """What commands give: the fins' own laws, or a surrogate."""
-    columns: Array
+    columns: AnyArray
     """Normalized wrench per newton (n, 3, 6) of each fin's force along the axes in which it says so."""
-    lower: Array
+    lower: AnyArray
     """Lower limits (n, 3)."""
-    upper: Array
+    upper: AnyArray
     """Upper limits (n, 3)."""
     wraps: NDArray[np.bool_]
     """True (n,) where the zero direction may turn a full circle."""
 
     @cached_property
-    def span(self) -> Array:
+    def span(self) -> AnyArray:
         """Ranges of the limits (n, 3)."""
         return self.upper - self.lower
 
@@ -67,7 +65,7 @@ class CommandProblem:
         return RIDGE[0] + RIDGE[1] * float((largest[:, None, None] ** 2 * self.columns**2).sum())
 
     @cached_property
-    def edges(self) -> tuple[Array, Array]:
+    def edges(self) -> tuple[AnyArray, AnyArray]:
         """Below the first and above the second (n, 3), a command is at its limit; full circles have none."""
         low, high = self.lower + AT_LIMIT, self.upper - AT_LIMIT
         low[self.wraps, 2], high[self.wraps, 2] = -np.inf, np.inf
@@ -89,20 +87,20 @@ class CommandProblem:
         return Limits(lower, upper, middle - kind(np.pi), kind(2 * np.pi), kind(0.5) * (upper - lower))
 
     @cached_property
-    def columns_float32(self) -> Array:
+    def columns_float32(self) -> AnyArray:
         """The columns (3n, 6) in single precision."""
         return self.columns.reshape(-1, 6).astype(np.float32)
 
-    def wrench(self, command: Array) -> Array:
+    def wrench(self, command: AnyArray) -> AnyArray:
         """Normalized wrenches (R, 6) of commands (R, n, 3)."""
         rows, n, _ = command.shape
         return self.fin.force(command).reshape(rows, 3 * n) @ self.columns.reshape(3 * n, 6)
 
-    def clamp(self, command: Array) -> Array:
+    def clamp(self, command: AnyArray) -> AnyArray:
         """Commands (..., n, 3) inside the limits, zero directions wrapped first; the type is kept."""
         return self.clamp_in_place(command.copy())
 
-    def clamp_in_place(self, command: Array) -> Array:
+    def clamp_in_place(self, command: AnyArray) -> AnyArray:
         """`clamp` that overwrites its argument."""
         limits = self.float32 if command.dtype == np.float32 else self.float64
         direction = command[..., 2]
@@ -117,16 +115,16 @@ class CommandProblem:
 class Refined(NamedTuple):
     """R refined commands."""
 
-    command: Array
+    command: AnyArray
     """(R, n, 3), inside the limits."""
-    wrench: Array
+    wrench: AnyArray
     """Normalized wrench (R, 6)."""
-    error: Array
+    error: AnyArray
     """Normalized error (R,) of that wrench."""
 
 
 def refine(
-    problem: CommandProblem, target: Array, command: Array, steps: int, *, damping: float = 1e-6
+    problem: CommandProblem, target: AnyArray, command: AnyArray, steps: int, *, damping: float = 1e-6
 ) -> Refined:
     """Reduce the tracking error of commands (R, n, 3) towards normalized targets (R, 6).
 
@@ -168,22 +166,24 @@ def refine(
 class _Evaluated(NamedTuple):
     """R commands and their errors."""
 
-    command: Array
+    command: AnyArray
     """(R, n, 3)."""
-    wrench: Array
+    wrench: AnyArray
     """(R, 6)."""
-    residual: Array
+    residual: AnyArray
     """Target minus wrench (R, 6)."""
-    error: Array
+    error: AnyArray
     """Its squared size (R,)."""
-    slopes: Array
+    slopes: AnyArray
     """Derivatives of each fin's force by each of its commands (R, n, 3 commands, 3)."""
 
 
 _NO_SLOPES = np.empty((1, 1, 1, 1))
 
 
-def _evaluated(problem: CommandProblem, target: Array, command: Array, slopes: Array | None) -> _Evaluated:
+def _evaluated(
+    problem: CommandProblem, target: AnyArray, command: AnyArray, slopes: AnyArray | None
+) -> _Evaluated:
     """Errors of commands; slopes that are given are not computed anew."""
     rows, n, _ = command.shape
     if slopes is None:
@@ -195,7 +195,7 @@ def _evaluated(problem: CommandProblem, target: Array, command: Array, slopes: A
     return _Evaluated(command, wrench, residual, np.einsum("ri,ri->r", residual, residual), slopes)
 
 
-def _step(problem: CommandProblem, at: _Evaluated, jacobian: Array, damping: Array) -> Array:
+def _step(problem: CommandProblem, at: _Evaluated, jacobian: AnyArray, damping: AnyArray) -> AnyArray:
     """Damped smallest change (R, n, 3), in units of the limit ranges, that leaves no limit."""
     rows, n, _ = at.command.shape
     free = jacobian.reshape(rows, 3 * n, 6)
@@ -211,9 +211,9 @@ def _step(problem: CommandProblem, at: _Evaluated, jacobian: Array, damping: Arr
     return change.reshape(rows, n, 3)
 
 
-def _smallest_change(free: Array, right: Array, damping: Array) -> Array:
+def _smallest_change(free: AnyArray, right: AnyArray, damping: AnyArray) -> AnyArray:
     """The change (R, 3n, 1) that gives the wrenches (R, 6, 1) by a Jacobian (R, 3n, 6)."""
     gram = free.swapaxes(1, 2) @ free
     gram.reshape(-1, 36)[:, ::7] += damping[:, None]
-    change: Array = free @ solve(gram, right)
+    change: AnyArray = free @ solve(gram, right)
     return change

@@ -10,7 +10,6 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +29,7 @@ from finlab.allocation.search.refined_candidates import (
 from finlab.allocation.search.settings import Settings
 from finlab.allocation.search.turn_limits import TURNS, limit_turn, planar_force, unwrap_to_arc
 from finlab.allocation.search.weighted_sum import minimize_weighted_sum
+from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.forces import force_space
 from finlab.forces.branch_and_bound import bound_by_branching
@@ -39,8 +39,6 @@ from finlab.layout import Layout
 from finlab.physics.energy import EnergyMeter
 from finlab.physics.fin_model import file_stamps
 from finlab.physics.objective import Objective
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -210,7 +208,7 @@ class Pipeline:
         total = (found.error**2 + weight * energy).reshape(rows, p)
         order = total.argsort(axis=1) + np.arange(0, rows * p, p)[:, None]
         flat = (*found, energy, candidates.origin.reshape(-1))
-        return RefinedCandidates(*(values.take(order, axis=0) for values in flat))
+        return RefinedCandidates._make(values.take(order, axis=0) for values in flat)
 
     def _descend(
         self,
@@ -233,7 +231,7 @@ class Pipeline:
             command, steps = np.concatenate([command, within[None]], axis=1), steps + 1
             origin = np.concatenate([origin, np.full((1, len(within)), -1)], axis=1)
         candidates = refine_candidates(prepared, target, command, origin, steps, keep_mode)
-        candidates = RefinedCandidates(*(values[:, : self.settings.n_refined] for values in candidates))
+        candidates = RefinedCandidates._make(values[:, : self.settings.n_refined] for values in candidates)
         missed = candidates.error[:, 0] > exact_error(prepared)
         if missed.any():
             refine_missed(prepared, target, candidates, missed, fallback)

@@ -1,20 +1,18 @@
 """What the search needs to know of a layout, computed once and kept."""
 
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.search.levenberg_marquardt import CommandProblem
+from finlab.arrays import Array
 from finlab.forces.compiled_fins import CompiledFins
 from finlab.forces.envelopes import layout_envelopes
 from finlab.forces.force_space import PlanarProblem, planar_problem
 from finlab.layout import Layout
 from finlab.physics.objective import CostMeter, Objective
 from finlab.physics.plant import Plant, plant_of
-
-Array = NDArray[Any]
 
 MAX_SUBSETS = 80
 """Most sub-layouts that are searched."""

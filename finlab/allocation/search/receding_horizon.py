@@ -11,17 +11,16 @@ together, as arrays (M, H, n), in about a millisecond.
 """
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.search.prepared import Prepared
+from finlab.arrays import Array
 from finlab.forces.fin_envelope import AMPLITUDE, COST, FREQUENCY, LEAN
 from finlab.forces.force_space import PlanarProblem
 from finlab.layout.angles import wrapped
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -112,7 +111,7 @@ def plan_ahead(
         # Detours are many: they are tried only where all else turns too fast.
         goals = _detours(planar, now, working, settings)[:, None] + tick * slow
         more = evaluate(prepared, previous, _changes(kept, goals, settings.detours), settings)
-        found = Trajectories(*map(np.concatenate, zip(found, more, strict=True)))
+        found = Trajectories._make(map(np.concatenate, zip(found, more, strict=True)))
     best = choose(found.cost, len(straight), settings)
     if best < len(straight):
         return None

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.search.levenberg_marquardt import refine
 from finlab.allocation.search.prepared import Prepared
+from finlab.arrays import Array
 from finlab.forces.force_space import PlanarProblem, polar, realize
 from finlab.forces.nearest import nearest, wrench_of
 from finlab.forces.planar_sets import planar_sets
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -54,7 +53,7 @@ class RefinedCandidates(NamedTuple):
 
     def with_first(self, other: RefinedCandidates) -> RefinedCandidates:
         """These answers behind those of another search."""
-        return RefinedCandidates(*(np.concatenate(both, axis=1) for both in zip(other, self, strict=True)))
+        return RefinedCandidates._make(np.concatenate(both, axis=1) for both in zip(other, self, strict=True))
 
 
 def refine_candidates(
@@ -86,7 +85,7 @@ def refine_candidates(
     order = rank(score, error, exact_error(prepared), resolution).argsort(axis=1)
     order += np.arange(0, rows * p, p)[:, None]
     flat = (*refined, cost, origin.reshape(-1))
-    return RefinedCandidates(*(values.take(order, axis=0) for values in flat))
+    return RefinedCandidates._make(values.take(order, axis=0) for values in flat)
 
 
 def exact_error(prepared: Prepared) -> float:

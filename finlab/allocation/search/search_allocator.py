@@ -26,6 +26,7 @@ from finlab.allocation.search.prepared import Prepared, resting_fins
 from finlab.allocation.search.refined_candidates import FallbackForces, RefinedCandidates, nearest_forces
 from finlab.allocation.search.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
+from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.forces.compiled_fins import CompiledFins
 from finlab.forces.force_space import PlanarProblem
@@ -36,8 +37,6 @@ from finlab.inference.threads import single_threaded_products
 from finlab.layout import Layout
 from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyWeights
 from finlab.physics.objective import Name
-
-Array = NDArray[Any]
 
 CHUNK = 512
 """Targets that are solved together; keeps memory flat for any number of targets."""
@@ -147,7 +146,7 @@ class SearchAllocator(Allocator):
             source = _sources(refined.origin[0], own) + wider
             exact = max(SEARCH.alternative_error * prepared.exactness, 1.01 * found.error[0, 0])
             kept = np.flatnonzero(found.error[0] <= exact)
-            exact_ones = RefinedCandidates(*(values[:, kept] for values in found))
+            exact_ones = RefinedCandidates._make(values[:, kept] for values in found)
             return _candidates(exact_ones, std, prepared, tuple(source[k] for k in kept))
 
         return Solution(

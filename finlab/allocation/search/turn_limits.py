@@ -6,15 +6,12 @@ of reach so is the arc widened. `receding_horizon` keeps that rare.
 """
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.search.prepared import Prepared
+from finlab.arrays import Array
 from finlab.layout.angles import wrapped
-
-Array = NDArray[Any]
 
 TURNS = (0.5, 0.58, 1.2, np.pi)
 """Largest turns per tick [rad], tried in order. At ten ticks a second, a pole of 3.5 rad/s follows the first

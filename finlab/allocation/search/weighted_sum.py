@@ -3,17 +3,13 @@
 It starts from exact answers; `weighted_descent` minimizes the sum inside the limits.
 """
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.command_cost import EffortCost
 from finlab.allocation.search.levenberg_marquardt import CommandProblem, Refined
 from finlab.allocation.weighted_descent import DescentOptions, descend
+from finlab.arrays import Array
 from finlab.physics.energy import EnergyMeter
-
-Array = NDArray[Any]
 
 LM_STEPS = 25
 """Most Levenberg-Marquardt steps; far fewer are needed for small weights."""

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finlab.allocation.allocator import Allocator
+from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.evaluation.progress import progress
 from finlab.layout import Layout
-from finlab.layout.arrays import Array
 from finlab.sim import ClosedLoop, RunLog, Task
 
 Row = dict[str, Any]

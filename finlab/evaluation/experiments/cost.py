@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
+from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.evaluation.cheapest_commands import CheapestCommands, has_formulas
 from finlab.evaluation.progress import progress
@@ -17,7 +18,6 @@ from finlab.evaluation.statistics.bootstrap import ratio_interval
 from finlab.evaluation.statistics.recheck import known_by_hand, wrench_by_hand
 from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.evaluation.symmetric_cases import SETS, symmetric_cases
-from finlab.layout.arrays import Array
 from finlab.physics import plant_of
 from finlab.physics.objective import Name, Objective
 

@@ -12,13 +12,13 @@ import numpy as np
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.policy import KINDS
+from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.evaluation.hostile_cases import hostile_robot, hostile_targets
 from finlab.evaluation.method_specs import is_slow
 from finlab.evaluation.progress import progress
 from finlab.evaluation.statistics.tables import text_table
 from finlab.layout import FinModelSpec, Layout
-from finlab.layout.arrays import Array
 from finlab.physics import make_law, write_table
 
 LATE_S = 1.0

@@ -13,12 +13,12 @@ import numpy as np
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.modes import ModeSignature, cluster, force_sizes, mode_signature, same_signature
+from finlab.arrays import Array
 from finlab.evaluation.cheapest_commands import CheapestCommands
 from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.layout import Layout
-from finlab.layout.arrays import Array
 from finlab.physics import plant_of
 from finlab.physics.objective import Objective
 

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from finlab.allocation.learned.mdn import MdnAllocator
 from finlab.allocation.search.prepared import Prepared, resting_fins, resting_seeds
+from finlab.arrays import Array
 from finlab.evaluation.progress import progress
 from finlab.evaluation.statistics.bootstrap import ratio_interval
 from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.inference.threads import single_threaded_products
 from finlab.layout import Layout, random_layout
-from finlab.layout.arrays import Array
 from finlab.layout.random_fins import random_fin_model
 from finlab.physics import plant_of
 from finlab.physics.objective import Name

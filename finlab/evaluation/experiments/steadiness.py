@@ -11,12 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.allocation import Allocation, Allocator
+from finlab.arrays import Array
 from finlab.evaluation.progress import progress
 from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.forces.envelopes import largest_forces
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
-from finlab.layout.arrays import Array, layout_effectiveness
+from finlab.layout.arrays import layout_effectiveness
 from finlab.physics import Plant
 from finlab.physics.energy import command_energy
 

@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.learned.settings import PaperOptions
 from finlab.allocation.methods import load_allocator
+from finlab.arrays import Array
 from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
@@ -16,8 +16,6 @@ from finlab.evaluation.statistics.records import Columns
 from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.layout import Layout
 from finlab.layout.angles import is_full_turn
-
-Array = NDArray[Any]
 
 TEMPERATURES = tuple(float(t) for t in np.logspace(-3, 1, 13))
 """From 0.001 to 10, three to a decade."""

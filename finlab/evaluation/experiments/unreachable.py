@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, import_casadi
 from finlab.allocation.policy import KINDS, Policy
+from finlab.arrays import Array
 from finlab.evaluation.progress import progress
 from finlab.evaluation.statistics.tables import Row, text_table
 from finlab.layout import Layout, random_layout
 from finlab.layout.angles import is_full_turn
-from finlab.layout.arrays import Array, layout_effectiveness
+from finlab.layout.arrays import layout_effectiveness
 from finlab.physics import Plant, plant_of
 
 DOMAIN = 0xFA2

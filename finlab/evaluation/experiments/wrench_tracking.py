@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.single_target import DEFAULT_STARTS
+from finlab.arrays import Array
 from finlab.evaluation.method_specs import method_and_starts
 from finlab.evaluation.paper_figures import paper_wrench_rows
 from finlab.evaluation.progress import progress
@@ -20,7 +21,6 @@ from finlab.evaluation.statistics.tables import (
     wrench_intervals,
     wrench_row,
 )
-from finlab.layout.arrays import Array
 from finlab.physics import Plant, plant_of
 from finlab.physics.energy import command_energy
 

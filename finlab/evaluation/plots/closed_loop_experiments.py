@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from finlab.arrays import Array
 from finlab.evaluation.experiments.closed_loop_runs import Row, Run
 from finlab.evaluation.experiments.faults import ALLOWED, HEALTHY
 from finlab.evaluation.plots.style import BLACK, COLOURS, GREY, Picture, picture
-from finlab.layout.arrays import Array
 from finlab.sim import RunLog
 
 Track = tuple[tuple[str, str], Array]

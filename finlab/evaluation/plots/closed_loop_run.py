@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from finlab.arrays import Array
 from finlab.evaluation.plots.style import (
     BLACK,
     BLUE,
@@ -19,7 +20,6 @@ from finlab.evaluation.plots.style import (
     picture,
 )
 from finlab.layout.angles import wrapped
-from finlab.layout.arrays import Array
 from finlab.sim import RunLog
 from finlab.sim.vehicle import euler
 

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import AnyArray
 from finlab.evaluation.plots import style
 from finlab.evaluation.plots.style import Picture, picture
 
@@ -76,7 +76,7 @@ FLOOR = 1e-5
 
 
 def figure_a(
-    rows: Sequence[dict[str, Any]], scatter: Mapping[str, NDArray[Any]], paper_temperature: float
+    rows: Sequence[dict[str, Any]], scatter: Mapping[str, AnyArray], paper_temperature: float
 ) -> Picture:
     """Left: diversity and best J against T, rows of `temperature_row`. Right: columns of
     `refinement_columns`, one target's candidates, energy against error."""

@@ -2,11 +2,10 @@
 
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from finlab.arrays import AnyArray
 from finlab.evaluation.experiments.ablation import variant_rows
 from finlab.evaluation.experiments.temperature import temperature_row
 from finlab.evaluation.experiments.training_study import training_row
@@ -71,7 +70,7 @@ class Results:
         return [temperature_row(value, self.columns(job)) for value, job in self.plan.temperature.items()]
 
     @cached_property
-    def scatter(self) -> dict[str, NDArray[Any]]:
+    def scatter(self) -> dict[str, AnyArray]:
         """Candidates of the middle one of the drawn targets, before and after refinement."""
         columns = self.columns(self.plan.scatter["paper"])
         chosen = columns["target"] == int(np.median(np.unique(columns["target"])))

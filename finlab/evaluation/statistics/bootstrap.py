@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-Array = NDArray[np.float64]
+from finlab.arrays import Array
 
 SPREAD = 2.772
 """sqrt(2) times 1.96, in standard deviations of one run."""

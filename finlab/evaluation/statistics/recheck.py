@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.layout import Layout
-from finlab.layout.arrays import Array
 
 
 def known_by_hand(layout: Layout) -> bool:

@@ -14,11 +14,11 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.arrays import AnyArray, Array
 from finlab.errors import DataError
 
-Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
-Columns = dict[str, NDArray[Any]]
+Columns = dict[str, AnyArray]
 
 VERSION = 3
 """Of the file format; part of the settings that a file is found by."""
@@ -79,12 +79,12 @@ def columns_of_records(records: Records) -> Columns:
     return {field.name: getattr(records, field.name) for field in fields(Records)}
 
 
-def records_of_columns(columns: Mapping[str, NDArray[Any]]) -> Records:
+def records_of_columns(columns: Mapping[str, AnyArray]) -> Records:
     """Inverse of `columns_of_records`; other columns are left aside."""
     return Records(**{field.name: columns[field.name] for field in fields(Records)})
 
 
-def save_columns(path: Path, columns: Mapping[str, NDArray[Any]], meta: Mapping[str, Any]) -> None:
+def save_columns(path: Path, columns: Mapping[str, AnyArray], meta: Mapping[str, Any]) -> None:
     """Write arrays and how they were made; the file appears whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_suffix(".partial")

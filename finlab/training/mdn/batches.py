@@ -1,17 +1,15 @@
 """Batches of what the teacher has answered, all of one number of fins, so that nothing is padded."""
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from finlab.allocation.learned.force_features import features
+from finlab.arrays import AnyArray
 from finlab.training.mdn.shards import read_shard
-
-Array = NDArray[Any]
 
 LEAST_WEIGHT = 1e-3
 """Weight below which a way is not learned from."""
@@ -37,7 +35,7 @@ class Answers:
 
     def __init__(self) -> None:
         """Begin with nothing."""
-        self._groups: dict[int, dict[str, Array]] = {}
+        self._groups: dict[int, dict[str, AnyArray]] = {}
         self._read: set[Path] = set()
 
     def read(self, paths: list[Path]) -> None:
@@ -91,6 +89,6 @@ MIRRORED = [7, 9, 13, 16]
 """Vertical parts of the vectors among the static features."""
 
 
-def _mirrored(values: Array, rows: Array) -> Array:
+def _mirrored(values: AnyArray, rows: AnyArray) -> AnyArray:
     """Complex values (B, ...), conjugate where `rows` (B,) is true."""
     return np.where(rows.reshape(-1, *(1,) * (values.ndim - 1)), values.conj(), values)

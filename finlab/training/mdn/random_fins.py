@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from finlab.arrays import Array
 from finlab.forces.fin_envelope import FinEnvelope, compile_fin
 from finlab.layout import Limits
-from finlab.layout.arrays import Array
 from finlab.layout.random import random_layout
 from finlab.physics.blade import Blade
 from finlab.physics.drag import Drag

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from finlab.arrays import Array
 from finlab.forces.envelopes import Envelopes
 from finlab.forces.force_space import PlanarProblem, planar_problem
 from finlab.layout import Fin, Layout, Limits
 from finlab.layout.angles import wrapped
-from finlab.layout.arrays import Array, force_columns, stack_layouts
+from finlab.layout.arrays import force_columns, stack_layouts
 from finlab.layout.random import TRAINING_BOX
 from finlab.physics.objective import Name, Objective
 from finlab.training.mdn.random_fins import RandomFin, random_fin, varied_limits

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from finlab.allocation.learned.force_features import robot_view
-from finlab.layout.arrays import Array
+from finlab.arrays import Array
 from finlab.physics.objective import Name
 from finlab.training.mdn.random_robots import FIN_COUNTS, FinPool, random_robot, random_targets
 from finlab.training.mdn.teacher import root_share, shares_of_ways, ways_to_deliver

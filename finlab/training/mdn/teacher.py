@@ -3,11 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.search.prepared import resting_fins, resting_seeds
+from finlab.arrays import Array
 from finlab.forces.force_space import Planar, descend, realize
-from finlab.layout.arrays import Array
 from finlab.training.mdn.random_robots import RandomRobot
 
 RANDOM_SEEDS = 24
@@ -89,7 +88,7 @@ def _different(force: Array, cost: Array, largest: Array) -> Ways:
     return Ways(kept, costs)
 
 
-def shares_of_ways(ways: Ways, sharpness: float) -> NDArray[np.float64]:
+def shares_of_ways(ways: Ways, sharpness: float) -> Array:
     """Weights (N, L) of the ways, zero where there are none: exp(-(cost - best) / (sharpness best))."""
     best = ways.cost[:, :1]
     with np.errstate(invalid="ignore"):

@@ -17,10 +17,10 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.inference.checkpoint import read_checkpoint, read_normalization, resolve_checkpoint
 from finlab.inference.weights import TrainedWeights
-from finlab.layout.arrays import Array
 from finlab.training.loop import LOG_EVERY, Terms, plot_log, train
 from finlab.training.mdn.batches import Answers, Batch
 from finlab.training.mdn.shards import write_shard

@@ -6,6 +6,7 @@ A fin that points aft pushes forward, so the blade lies opposite to its thrust.
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from webapp.scene.meshes.mesh import Mesh, joined, triangles, tube
 
 CHORD = 0.18
@@ -59,7 +60,7 @@ def shaft() -> Mesh:
     )
 
 
-def mounting(angle: float) -> NDArray[np.float64]:
+def mounting(angle: float) -> Array:
     """The matrix (3, 3) from the frame of a fin under a mounting angle [rad] to the body frame."""
     cos, sin = np.cos(angle), np.sin(angle)
     return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])

@@ -7,12 +7,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.scene.meshes.mesh import Mesh, revolved
 from webapp.scene.meshes.mesh_hull import MeshHull, Triangles
-
-Array = NDArray[np.float64]
 
 STATIONS: Array = np.sin(np.linspace(-np.pi / 2, np.pi / 2, 41))
 """Positions along a hull of half length 1, closer together towards the ends where it curves most."""

@@ -6,9 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from webapp.theme import TORQUE_SCALE
-
-Array = NDArray[np.float64]
 
 SHORTEST = 1e-3
 """Arrows shorter than this are not drawn [m]."""

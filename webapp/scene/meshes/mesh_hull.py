@@ -10,11 +10,10 @@ import trimesh
 from numpy.typing import NDArray
 from trimesh.triangles import closest_point
 
+from finlab.arrays import Array
 from finlab.errors import FinlabError
 from finlab.layout.body import MESH_SUFFIXES
 from webapp.scene.meshes.mesh import NOTHING, Mesh
-
-Array = NDArray[np.float64]
 
 MAX_BYTES = 20_000_000
 """Largest mesh file that is read."""

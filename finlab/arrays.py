@@ -1,9 +1,17 @@
-"""One formula for numpy's arrays, torch's tensors and CasADi's symbols."""
+"""What arrays are called, and one formula for numpy's arrays, torch's tensors and CasADi's symbols."""
 
 import sys
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+"""Numbers in double precision."""
+AnyArray = NDArray[Any]
+"""Numbers of a type that is told elsewhere: of single precision, complex, whole or truth values, too."""
+Values = Any
+"""A numpy array, a tensor or a symbol."""
 
 
 def library_of(value: Any) -> Any:
