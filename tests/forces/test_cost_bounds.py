@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
 from finlab.allocation import load_allocator
 from finlab.allocation.search.search_allocator import SearchAllocator
@@ -9,6 +10,7 @@ from finlab.errors import AllocationError
 from finlab.forces.branch_and_bound import bound_by_branching
 from finlab.forces.cost_bound import CostDual, cost_bound
 from finlab.forces.envelopes import layout_envelopes
+from finlab.forces.fin_envelope import COST
 from finlab.forces.force_space import PlanarProblem, planar_problem
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import plant_of
@@ -93,6 +95,78 @@ def test_branch_and_bound_is_below_what_is_known_and_proves_the_search(layout: L
     if good.finished:
         assert good.bound >= 0.959 * result.energy
     assert good.finished
+
+
+@pytest.mark.parametrize("layout", [load_layout("A"), load_layout("restricted"), uneven(4, 3)])
+def test_the_dual_is_the_least_of_cost_less_what_is_paid(layout: Layout) -> None:
+    """Each fin's minimum by brute force: all directions of its arc and all sizes, finely looked up."""
+    problem = problem_of(layout, "power")
+    fins, n = problem.fins, layout.n_fins
+    part = np.linspace(-1.0, 1.0, 481)
+    direction = fins.middle + fins.half * part[:, None]
+    rim = fins.rim(direction)
+    sizes = rim.smallest + np.linspace(0.0, 1.0, 161)[:, None, None] ** 2 * (rim.largest - rim.smallest)
+    cost = np.stack([fins.lookup(rim, size)[..., COST] for size in sizes])
+    rng = np.random.default_rng(1)
+    for _ in range(6):
+        multiplier, target = rng.normal(size=(2, 6))
+        pull = (problem.columns @ multiplier).reshape(2, n)
+        gain = sizes * (pull[0] * np.cos(direction) + pull[1] * np.sin(direction))
+        least = (cost - gain).reshape(-1, n).min(0)
+        expected = multiplier @ target + least.sum()
+        found = CostDual(problem, target)(multiplier)[0]
+        assert found == pytest.approx(expected, abs=2e-3 * np.abs(least).sum() + 1e-3)
+
+
+@pytest.mark.parametrize("layout", [load_layout("A"), load_layout("mixed"), uneven(4, 3)])
+def test_the_ascent_ends_where_scipys_does(layout: Layout) -> None:
+    """The dual is concave: from anywhere its top is the same."""
+    problem, plant = problem_of(layout, "power"), plant_of(layout)
+    command = plant.sample(np.random.default_rng(8), ())
+    dual = CostDual(problem, 0.5 * plant.wrench(command) / SIGMA)
+    top = -np.inf
+    for seed in range(2):
+        start = np.random.default_rng(seed).normal(size=6)
+        found = minimize(lambda m: -dual(m)[0], start, method="Powell", options={"maxfev": 4000})
+        top = max(top, -found.fun)
+    for start in (np.full(6, 0.05), np.array([3.0, -2.0, 1.0, 0.5, 0.5, -1.0])):
+        reached = cost_bound(problem, 0.5 * plant.wrench(command) / SIGMA, start)
+        assert reached == pytest.approx(top, rel=0.01)
+
+
+def test_one_set_of_forces_needs_no_branching() -> None:
+    """Two fins ahead of each other give heave and pitch in one way only, and what that costs is the bound."""
+    fins = (Fin("front", (0.3, 0.0, 0.0), 0.5 * np.pi), Fin("back", (-0.3, 0.0, 0.0), 0.0))
+    layout = Layout("two", fins)
+    problem, plant = problem_of(layout, "effort"), plant_of(layout)
+    command = np.array([[0.3, 1.2, 0.4], [0.5, 0.9, -0.7]])
+    target = plant.wrench(command) / SIGMA
+    best = load_allocator(objective="effort").allocate(layout, plant.wrench(command)).energy
+    proof = bound_by_branching(problem, target, best)
+    assert proof.finished and 0.99 * best <= proof.bound <= best
+
+
+@pytest.mark.parametrize("share", [0.3, 0.8])
+def test_the_bound_is_the_best_of_a_grid_over_the_null_space(share: float) -> None:
+    """Three fins whose forces can be shared in one way: the cost of every share, and the least of these."""
+    fins = tuple(Fin(f"fin_{i}", (0.2 * i - 0.2, 0.0, 0.0), 0.0) for i in range(3))
+    layout = Layout("row", fins)
+    problem = problem_of(layout, "effort")
+    force = np.zeros((3, 2))
+    force[:, 1] = share * problem.fins.maximum * [0.9, 0.6, 0.8]
+    target = np.einsum("nc,cni->i", force, np.stack(np.split(problem.columns, 2)))
+    # Heave and pitch: the middle fin takes over what the outer ones give together.
+    moved = np.linspace(-1.0, 1.0, 4001)[:, None] * problem.fins.maximum * [1.0, -2.0, 1.0]
+    size = np.abs(force[:, 1] + moved)
+    possible = (size <= problem.fins.maximum).all(1)
+    direction = np.where(force[:, 1] + moved < 0.0, -0.5, 0.5) * np.pi
+    cost = problem.fins.lookup(problem.fins.rim(direction), size)[..., COST]
+    turned = problem.direction_cost * direction**2 * (size > 2.0 * problem.fins.minimum)
+    least = (cost + turned).sum(1)[possible].min()
+    proof = bound_by_branching(problem, target, least, tolerance=0.04)
+    assert proof.finished and 0.955 * least <= proof.bound <= least
+    loose = bound_by_branching(problem, target, 1.2 * least, tolerance=0.15)
+    assert loose.bound <= 1.002 * least, "a poor answer is not proven"
 
 
 def test_a_lack_of_time_is_told() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from finlab.forces import force_space
 from finlab.forces.fin_envelope import COST, MOBILITY
 from finlab.forces.force_space import Planar, PlanarProblem, descend, realize
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
@@ -192,3 +193,23 @@ def test_the_cost_that_is_told_is_that_of_the_commands(name: str) -> None:
             moved = np.linalg.norm(Plant(layout).force(command), axis=-1)
             working = planar.size > 5e-3 * problem.fins.maximum
             assert np.abs(moved - planar.size)[working].max() < 5e-3 * problem.fins.maximum.max()
+
+
+def test_the_last_steps_deliver_what_fins_at_their_limits_leave(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After two quadratic problems much is missing where fins are held; two of Newton's steps leave a
+    twentieth of that, and no row is worse for them."""
+
+    def missing() -> Array:
+        found = []
+        for seed in range(10):
+            layout = robot(seed, "varied")
+            problem, target = problem_of(layout), reachable(layout, 20)
+            planar = descend(problem, target, np.tile(problem.fins.maximum, (20, 1)), 2)
+            found.append(np.linalg.norm(planar.residual, axis=1))
+        return np.concatenate(found)
+
+    after = missing()
+    monkeypatch.setattr(force_space, "LAST_STEPS", 0)
+    before = missing()
+    assert (after <= before + 1e-9).all()
+    assert np.quantile(after, 0.95) < 0.06 * np.quantile(before, 0.95)
