@@ -1,5 +1,7 @@
 """Lower bounds on cost: never above what some command costs, close to what the search finds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize
@@ -7,13 +9,14 @@ from scipy.optimize import minimize
 from finlab.allocation import load_allocator
 from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.errors import AllocationError
-from finlab.forces.branch_and_bound import bound_by_branching
+from finlab.forces.branch_and_bound import _least, bound_by_branching
 from finlab.forces.cost_bound import CostDual, cost_bound
 from finlab.forces.envelopes import layout_envelopes
-from finlab.forces.fin_envelope import COST
+from finlab.forces.fin_envelope import COST, LEAN
 from finlab.forces.force_space import PlanarProblem, planar_problem
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
-from finlab.physics import plant_of
+from finlab.layout.angles import wrapped
+from finlab.physics import make_law, plant_of
 from finlab.physics.objective import Name, Objective
 
 SIGMA = np.array([1.0, 1.0, 1.0, 0.2, 0.2, 0.2])
@@ -167,6 +170,88 @@ def test_the_bound_is_the_best_of_a_grid_over_the_null_space(share: float) -> No
     assert proof.finished and 0.955 * least <= proof.bound <= least
     loose = bound_by_branching(problem, target, 1.2 * least, tolerance=0.15)
     assert loose.bound <= 1.002 * least, "a poor answer is not proven"
+
+
+ONE = Layout("one", (Fin("a", (0.0, 0.0, 0.0), 0.0, Limits(), FinModelSpec("soft")),))
+UNEVEN = replace(ONE, fins=(replace(ONE.fins[0], model=uneven(1, 0).fins[0].model),))
+
+
+@pytest.mark.parametrize(("layout", "usual"), [(ONE, 2e-4), (UNEVEN, 4e-4)])
+def test_between_the_entries_of_the_table_the_dual_follows_a_parabola(layout: Layout, usual: float) -> None:
+    """The law itself on a fine grid of commands: a fin's least cost, less what its force is paid."""
+    law, limits = make_law(layout.fins[0].model), Limits()
+    command = np.stack(
+        np.meshgrid(
+            np.linspace(*limits.amplitude, 101),
+            np.linspace(*limits.frequency, 141),
+            np.zeros(1) if law.uniform else np.linspace(-np.pi, np.pi, 121),
+            indexing="ij",
+        ),
+        axis=-1,
+    )
+    force, power = law.force(command), law.power(command)
+    problem, rng, off = problem_of(layout, "power"), np.random.default_rng(0), []
+    for size in np.geomspace(0.3, 2.0, 10):
+        angle = rng.uniform(-np.pi, np.pi)
+        multiplier = size * np.array([0.0, np.cos(angle), np.sin(angle), 0.0, 0.0, 0.0])
+        x, y = problem.columns @ multiplier
+        given = np.hypot(x, y) * force[..., 1] if law.uniform else x * force[..., 1] + y * force[..., 2]
+        least = float((power - given).min())
+        off.append(CostDual(problem, np.zeros(6))(multiplier)[0] / least - 1.0)
+    assert np.median(np.abs(off)) < usual and np.abs(off).max() < 1e-3
+
+
+@pytest.mark.parametrize("name", ["power", "effort"])
+@pytest.mark.parametrize(
+    ("layout", "near", "far"), [(load_layout("A"), 6e-4, 5e-3), (uneven(4, 3), 5e-3, 0.025)]
+)
+def test_no_forces_in_a_box_cost_less_than_its_bound(
+    layout: Layout, near: float, far: float, name: Name
+) -> None:
+    """Against forces drawn in boxes of the null space; in small ones little more is allowed for."""
+    problem, n, rng = problem_of(layout, name), layout.n_fins, np.random.default_rng(0)
+    fins, maximum = problem.fins, problem.fins.maximum
+    null = np.linalg.svd((problem.columns * np.tile(maximum, 2)[:, None]).T)[2][6:].T
+    spread = np.sqrt((null.reshape(2, n, -1) ** 2).sum(0))
+    d = null.shape[1]
+    for width, most in ((1e-7, 1e-4), (0.005, near), (0.02, far), (0.2, 1.0)):
+        gaps = []
+        for _ in range(40):
+            angle = fins.middle + fins.half * rng.uniform(-0.95, 0.95, n)
+            force = rng.uniform(0.05, 0.8, n) * np.exp(1j * angle)
+            middle = np.concatenate([force.real, force.imag])
+            centre = rng.normal(size=(1, d))  # what it is about must not matter
+            half = np.full((1, d), width)
+            bound = _least(problem, middle - null @ centre[0], null, spread, centre, half)[0]
+            there = (middle + rng.uniform(-width, width, (200, d)) @ null.T).reshape(200, 2, n) * maximum
+            size, direction = np.hypot(there[:, 0], there[:, 1]), np.arctan2(there[:, 1], there[:, 0])
+            rim = fins.rim(direction)
+            row = fins.lookup(rim, size)
+            turn = wrapped(direction - row[..., LEAN]) * (size > 2.0 * fins.minimum)
+            cost = (row[..., COST] + problem.direction_cost * turn**2).sum(1)
+            stopped = np.abs(wrapped(direction - fins.middle)) > fins.half
+            possible = ~((size > rim.largest) | stopped).any(1)
+            if possible.any():
+                least = cost[possible].min()
+                assert bound <= least * (1.0 + 1e-4)
+                gaps.append(1.0 - bound / least)
+        assert len(gaps) > 30 and np.median(gaps) < most
+
+
+def test_boxes_that_no_fin_reaches_are_dropped() -> None:
+    problem = problem_of(load_layout("restricted"), "effort")
+    fins, n = problem.fins, len(problem.fins.maximum)
+    null = np.linalg.svd((problem.columns * np.tile(fins.maximum, 2)[:, None]).T)[2][6:].T
+    spread = np.sqrt((null.reshape(2, n, -1) ** 2).sum(0))
+    wide = int((fins.half < np.pi).argmax())
+    assert fins.half[wide] < np.pi
+    for share, aside, dropped in ((0.5, 0.0, False), (1.01, 0.0, True), (0.5, 0.05, True)):
+        force = 0.5 * np.exp(1j * fins.middle)
+        force[wide] = share * np.exp(1j * (fins.middle[wide] + (fins.half[wide] + aside) * (aside > 0.0)))
+        middle = np.concatenate([force.real, force.imag])
+        for width, kept in ((1e-4, not dropped), (0.5, True)):
+            box = np.zeros((1, null.shape[1])), np.full((1, null.shape[1]), width)
+            assert np.isfinite(_least(problem, middle, null, spread, *box)[0]) == kept
 
 
 def test_a_lack_of_time_is_told() -> None:

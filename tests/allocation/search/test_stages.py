@@ -242,6 +242,52 @@ def test_exploring_tries_what_may_be_another_way(
     ]
 
 
+def test_random_seeds_of_the_wide_search_are_spread_over_what_fins_can_give(
+    effort: SearchAllocator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Squares of even shares: half of them below a quarter of a fin's largest force."""
+    layout, asked = load_layout(shipped_layouts()["mixed"]), []
+    whole = pipeline.force_space.descend
+
+    def spy(problem: Any, target: Any, seeds: np.ndarray, *rest: Any) -> Any:
+        asked.append(seeds / problem.fins.maximum)
+        return whole(problem, target, seeds, *rest)
+
+    result = effort.allocate(layout, EASY)
+    monkeypatch.setattr(pipeline.force_space, "descend", spy)
+    result.explore()
+    share = asked[-1][-SEARCH.wide_seeds :]
+    assert (share > 0.0).all() and (share < 1.0).all() and share.max() > 0.9
+    np.testing.assert_allclose(np.quantile(share, [0.25, 0.5, 0.75]), [0.0625, 0.25, 0.5625], atol=0.1)
+
+
+def test_a_seed_that_misses_is_left_for_a_dearer_one_that_does_not(
+    effort: SearchAllocator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What misses by less than `promising_error` is judged by its cost, the rest by what is missing."""
+    layout = load_layout("A")
+    prepared = effort.pipeline.prepare(layout)
+    whole = pipeline.force_space.descend
+    missed = SEARCH.promising_error * np.array([0.9, 0.5, 1.1, 1.5])
+
+    def told(*arguments: Any) -> Any:
+        planar = whole(*arguments)
+        residual = np.zeros_like(planar.residual)
+        residual[:, 0] = missed
+        return planar._replace(residual=residual)
+
+    monkeypatch.setattr(pipeline.force_space, "descend", told)
+    seeds = np.repeat(prepared.seeds[:1], 4, axis=0)[None]
+    price = np.array([4.0, 5.0, 1.0, 2.0])
+    realize = pipeline.force_space.realize
+    monkeypatch.setattr(
+        pipeline.force_space, "realize", lambda *a, **k: (realize(*a, **k)[0], price), raising=True
+    )
+    target = np.array([EASY]) / effort.normalization.std
+    _, chosen = effort.pipeline._search(prepared, target, seeds, False, keep=4)
+    assert chosen[0, :4].tolist() == [0, 1, 2, 3]
+
+
 def test_exploring_power_rests_fins_for_good(search: SearchAllocator) -> None:
     result = search.allocate(load_layout("A"), EASY)
     modes = result.explore()
