@@ -1,15 +1,18 @@
 """The self-test's judgement and the graph's small parts, by hand."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from finlab.deploy.bundle import Bundle
+from finlab.bundle_files import CHECKSUMS, checksums
+from finlab.deploy.bundle import COMPILED, Bundle
 from finlab.deploy.graph import N_SELF_TEST, _rounded, build_graph, random_targets
 from finlab.deploy.robot import Robot, parse_robot
 from finlab.deploy.self_check import Finding, self_check, worst
 from finlab.errors import DataError
+from finlab.forces.compiled_fins import compiled_bytes, parse_compiled
 from finlab.physics import Plant
 
 
@@ -86,6 +89,49 @@ def test_each_question_sees_its_own_damage(robot: Robot) -> None:
     first = replace(first, wrench=(90.0, *first.wrench[1:]), delivered_wrench=(90.0, *first.wrench[1:]))
     damaged = Robot(replace(robot.graph, self_test=(first, *others)), robot.allocator)
     assert not finding(damaged, "own answers, more error").good
+
+
+def with_first(robot: Robot, **changes: Any) -> Robot:
+    """The robot with its first self-test changed."""
+    first, *others = robot.graph.self_test
+    return Robot(replace(robot.graph, self_test=(replace(first, **changes), *others)), robot.allocator)
+
+
+@pytest.mark.parametrize(("share", "good"), [(5e-4, True), (2e-3, False)])
+def test_compiled_fins_may_differ_by_a_thousandth(
+    robot: Robot, bundle: Bundle, share: float, good: bool
+) -> None:
+    known = parse_compiled(bundle.files[COMPILED], COMPILED)
+    forged = {key: replace(fin, largest=(1.0 + share) * fin.largest) for key, fin in known.items()}
+    files = {**bundle.files, COMPILED: compiled_bytes(forged)}
+    files[CHECKSUMS] = checksums({name: files[name] for name in files if name != CHECKSUMS})
+    found = finding(parse_robot(files), "compiled fins")
+    assert found.good == good and found.value == pytest.approx(share, rel=1e-2)
+
+
+@pytest.mark.parametrize(("more", "good"), [(5e-5, True), (2e-4, False)])
+def test_answers_may_miss_a_ten_thousandth_more_than_stored(robot: Robot, more: float, good: bool) -> None:
+    """A target out of reach, of which the stored answer missed a little less."""
+    target = np.array([90.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    answer = robot.allocate(target)
+    share = 1.0 - more / answer.err_norm
+    stored = with_first(
+        robot, wrench=tuple(target), delivered_wrench=tuple(target - share * (target - answer.wrench))
+    )
+    assert answer.err_norm > 1.0
+    assert finding(stored, "own answers, more error").good == good
+
+
+@pytest.mark.parametrize(("more", "good"), [(0.005, True), (0.02, False)])
+def test_answers_may_cost_a_hundredth_more_than_stored(robot: Robot, more: float, good: bool) -> None:
+    """The power of a fin grows with the cube of its frequency."""
+    answer = robot.allocate(robot.graph.self_test[0].wrench)
+    cheaper = answer.command * [1.0, (1.0 + more) ** (-1.0 / 3.0), 1.0]
+    stored = with_first(robot, command=tuple(map(tuple, cheaper.tolist())))
+    found = finding(stored, "own answers, more cost")
+    assert found.good == good
+    if not good:
+        assert found.value == pytest.approx(more, rel=0.05)
 
 
 def test_without_self_tests_there_is_nothing_to_check(robot: Robot) -> None:
