@@ -18,6 +18,7 @@ from finlab.deploy.onnx_graph import GraphBuilder
 from finlab.errors import CheckpointError, DataError
 from finlab.inference.features import raw_features
 from finlab.inference.force_network import LEAK, LOG_STD
+from finlab.inference.layers import names_of_layers
 from finlab.inference.mixture import LOG_STD_BOUND
 from finlab.inference.surrogate import FORCE_UNIT
 from finlab.inference.weights import State, TrainedWeights
@@ -111,7 +112,7 @@ def _attend(g: GraphBuilder, x: str, name: str, heads: int, width: int) -> str:
     """One dense GATv2 layer: (N, n, F) to (N, n, width)."""
     source, target = g.linear(x, f"{name}.source"), g.linear(x, f"{name}.target")
     pair = g("Add", g("Unsqueeze", source, g.whole(1)), g("Unsqueeze", target, g.whole(2)))
-    score = g("MatMul", g("LeakyRelu", pair, alpha=LEAK), g.attention(f"{name}.attention", heads, width))
+    score = g("MatMul", g("LeakyRelu", pair, alpha=LEAK), g.attention(f"{name}.attention"))
     share = g("Softmax", g("Transpose", score, perm=[0, 3, 1, 2]), axis=-1)  # (N, heads, i, j)
     seen = g.join_heads(g("MatMul", share, g.split_heads(source, heads, width)), width)
     return g("Add", seen, g.weight(f"{name}.bias"))
@@ -159,7 +160,7 @@ def _look(g: GraphBuilder, x: str, name: str, heads: int, width: int) -> str:
     target = g("Unsqueeze", g("MatMul", seen, g.weight(f"{name}.look.target.weight")), g.whole(2))
     both = g("Add", g("MatMul", "pairs", g.weight(f"{name}.look.pair.weight")), g("Add", source, target))
     pair = g("LeakyRelu", both, alpha=LEAK)  # (N, i, j, width)
-    score = g("MatMul", pair, g.attention(f"{name}.look.attention", heads, width))
+    score = g("MatMul", pair, g.attention(f"{name}.look.attention"))
     share = g("Unsqueeze", g("Softmax", score, axis=2), g.whole(4))
     split = g("Reshape", pair, g.whole(0, 0, 0, heads, width // heads))
     message = g("ReduceSum", g("Mul", share, split), g.whole(2), keepdims=0)
@@ -189,8 +190,8 @@ def _surrogate(state: State) -> ModelProto:
     of_fin, of_command = g.parts(g.weight("net.0.weight"), 10, 3, axis=0)
     fixed = g("Add", g("MatMul", features, of_fin), g.weight("net.0.bias"))
     hidden = g("Add", g("MatMul", command, of_command), fixed)
-    for i in sorted({int(key.split(".")[1]) for key in state if key.startswith("net.")})[1:]:
-        hidden = g.linear(g.silu(hidden), f"net.{i}")
+    for name in names_of_layers(state, "net")[1:]:
+        hidden = g.linear(g.silu(hidden), name)
     force = g("Mul", hidden, g.constant(FORCE_UNIT), name="fin_force")
     x, y, z = g.parts("position", 1, 1, 1)
     fx, fy, fz = g.parts(force, 1, 1, 1)

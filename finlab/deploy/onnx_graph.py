@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from finlab.arrays import AnyArray
+from finlab.inference.layers import head_scores
 from finlab.inference.weights import State
 
 if TYPE_CHECKING:
@@ -83,10 +84,9 @@ class GraphBuilder:
         """The way back."""
         return self("Reshape", self("Transpose", x, perm=[0, 2, 1, 3]), self.whole(0, 0, width))
 
-    def attention(self, name: str, heads: int, width: int) -> str:
-        """Attention vectors in block form (width, heads), so that one product scores all heads."""
-        vectors = self.state[name].reshape(-1, 1)
-        return self.constant(np.repeat(np.eye(heads), width // heads, axis=0) * vectors, name)
+    def attention(self, name: str) -> str:
+        """Attention vectors in block form (width, heads)."""
+        return self.constant(head_scores(self.state[name]), name)
 
     def model(self, name: str, inputs: Shapes, outputs: Shapes) -> ModelProto:
         from onnx import TensorProto, helper

@@ -7,8 +7,8 @@ import numpy as np
 
 from finlab.arrays import AnyArray
 from finlab.errors import CheckpointError
-from finlab.inference.activations import silu, silu_and_slope
 from finlab.inference.features import RAW_SIZE, raw_features
+from finlab.inference.layers import Linear, linear, names_of_layers, silu, silu_and_slope, single_precision
 from finlab.inference.weights import TrainedWeights
 from finlab.layout import Layout
 from finlab.layout.arrays import force_columns
@@ -42,17 +42,15 @@ class MlpFins:
             lower: lower limits (n, 3), which are features as well.
             upper: upper limits (n, 3).
         """
-        state = {name: np.asarray(value, dtype=np.float32) for name, value in weights.items()}
+        state = single_precision(weights)
         features = raw_features(position, mounting_angle, lower, upper).astype(np.float32)
-        indices = sorted({int(name.split(".")[1]) for name in state if name.startswith("net.")})
-        layers = [(state[f"net.{i}.weight"].T.copy(), state[f"net.{i}.bias"]) for i in indices]
-        layers[-1] = FORCE_UNIT * layers[-1][0], FORCE_UNIT * layers[-1][1]
-        (first, bias), self._layers = layers[0], layers[1:]
+        first, *self._layers, last = (linear(state, name) for name in names_of_layers(state, "net"))
+        self._layers.append(Linear(FORCE_UNIT * last.weight, FORCE_UNIT * last.bias))
         half = (0.5 * (upper - lower)).astype(np.float32)
         self._middle, self._half = lower.astype(np.float32) + half, np.maximum(half, np.float32(1e-9))
         # The features of a fin never change, and what follows the first layer is linear in its slopes.
-        self._by_fin, self._by_command = features @ first[:RAW_SIZE] + bias, first[RAW_SIZE:]
-        second = layers[1][0]
+        self._by_fin = features @ first.weight[:RAW_SIZE] + first.bias
+        self._by_command, second = first.weight[RAW_SIZE:], self._layers[0].weight
         self._slopes = (self._by_command.T[:, :, None] * second[:, None]).reshape(len(second), -1)
         pooled = np.tanh(features @ state["descriptor.0.weight"].T + state["descriptor.0.bias"]).mean(0)
         self.scale, self.bias = np.split(state["affine.weight"] @ pooled + state["affine.bias"], 2)
@@ -63,9 +61,8 @@ class MlpFins:
         result = np.empty(command.shape, dtype=np.float32)
         for rows in _blocks(len(command)):
             z = self._first(command[rows])
-            for weight, bias in self._layers:
-                z = silu(z).dot(weight)
-                z += bias
+            for layer in self._layers:
+                z = layer(silu(z))
             result[rows] = z.reshape(result[rows].shape)
         return result
 
@@ -78,10 +75,9 @@ class MlpFins:
     def _force_and_slopes(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
         z = self._first(command)
         slopes = None
-        for weight, bias in self._layers:
+        for layer in self._layers:
             value, slope = silu_and_slope(z)
-            z = value.dot(weight)
-            z += bias
+            z, weight = layer(value), layer.weight
             if slopes is None:
                 slopes = slope.dot(self._slopes).reshape(len(z), 3, -1)
             else:
