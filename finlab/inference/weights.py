@@ -1,7 +1,7 @@
 """Trained networks as numpy arrays: their sizes, the shapes that follow, and what they were trained for."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, ClassVar, TypeVar
 
@@ -74,8 +74,7 @@ class NetworkConfig:
         Raises:
             ValueError: there is no such network.
         """
-        width = _checked_width(self)
-        shapes: Shapes = {}
+        width, shapes = self.width, _ends(self, 6)
         for i in range(self.graph_layers):
             name, n_in = f"graph.{i}", width if i else RAW_SIZE
             shapes |= {f"{name}.attention": (self.heads, width // self.heads), f"{name}.bias": (width,)}
@@ -83,17 +82,11 @@ class NetworkConfig:
         shapes |= _linear("skip", RAW_SIZE, width) | _linear("join", 2 * width, width)
         shapes |= _linear("wrench.0", 6, width) | _linear("wrench.2", width, width)
         for i in range(self.transformer_layers):
-            name = f"transformer.layers.{i}"
-            shapes |= {
-                f"{name}.self_attn.in_proj_weight": (3 * width, width),
-                f"{name}.self_attn.in_proj_bias": (3 * width,),
-            }
-            shapes |= _linear(f"{name}.self_attn.out_proj", width, width)
-            shapes |= _linear(f"{name}.linear1", width, self.feedforward)
-            shapes |= _linear(f"{name}.linear2", self.feedforward, width)
-            shapes |= _scale(f"{name}.norm1", width) | _scale(f"{name}.norm2", width)
-        shapes |= _scale("norm", width) | _linear("head", width, self.n_components * 6)
-        return shapes | _linear("weight", width, self.n_components)
+            name, look = f"transformer.layers.{i}", f"transformer.layers.{i}.self_attn"
+            shapes |= {f"{look}.in_proj_weight": (3 * width, width), f"{look}.in_proj_bias": (3 * width,)}
+            shapes |= _linear(f"{look}.out_proj", width, width)
+            shapes |= _feed_forward(self, name, "linear1", "linear2")
+        return shapes
 
 
 @dataclass(frozen=True)
@@ -121,19 +114,14 @@ class ForceNetworkConfig:
         Raises:
             ValueError: there is no such network.
         """
-        width = _checked_width(self)
-        shapes: Shapes = {}
+        width, shapes = self.width, _ends(self, 3) | _linear("enter", NODE_SIZE, self.width)
         for i in range(self.layers):
             name, look = f"layers.{i}", f"layers.{i}.look"
             shapes |= {f"{look}.attention": (self.heads, width // self.heads)}
             shapes |= {f"{look}.target.weight": (width, width), f"{look}.pair.weight": (width, PAIR_SIZE)}
             shapes |= _linear(f"{look}.source", width, width) | _linear(f"{look}.out", width, width)
-            shapes |= _linear(f"{name}.up", width, self.feedforward)
-            shapes |= _linear(f"{name}.down", self.feedforward, width)
-            shapes |= _scale(f"{name}.norm1", width) | _scale(f"{name}.norm2", width)
-        shapes |= _linear("enter", NODE_SIZE, width) | _scale("norm", width)
-        shapes |= _linear("head", width, 3 * self.n_components)
-        return shapes | _linear("weight", width, self.n_components)
+            shapes |= _feed_forward(self, name, "up", "down")
+        return shapes
 
 
 AnyNetworkConfig = NetworkConfig | ForceNetworkConfig
@@ -195,12 +183,20 @@ def check_state(state: State, shapes: Shapes) -> None:
             raise ValueError(f"{name}: holds NaN or a number beyond {LARGEST_WEIGHT:g}")
 
 
-def _checked_width(config: AnyNetworkConfig) -> int:
-    """The width of a network of possible sizes."""
-    _check_sizes(*(getattr(config, f.name) for f in fields(config)))
-    if config.width % config.heads:
-        raise ValueError(f"width {config.width} is no multiple of heads {config.heads}")
-    return config.width
+def _ends(config: AnyNetworkConfig, outputs: int) -> Shapes:
+    """The last layers of a network of possible sizes, with so many outputs for each component."""
+    _check_sizes(*vars(config).values())
+    width, m = config.width, config.n_components
+    if width % config.heads:
+        raise ValueError(f"width {width} is no multiple of heads {config.heads}")
+    return _norm("norm", width) | _linear("head", width, outputs * m) | _linear("weight", width, m)
+
+
+def _feed_forward(config: AnyNetworkConfig, name: str, up: str, down: str) -> Shapes:
+    """The feed-forward block of a Transformer layer, and both its normalizations."""
+    width, inside = config.width, config.feedforward
+    shapes = _linear(f"{name}.{up}", width, inside) | _linear(f"{name}.{down}", inside, width)
+    return shapes | _norm(f"{name}.norm1", width) | _norm(f"{name}.norm2", width)
 
 
 def _check_sizes(*sizes: object) -> None:
@@ -213,5 +209,5 @@ def _linear(name: str, n_in: int, n_out: int) -> Shapes:
     return {f"{name}.weight": (n_out, n_in), f"{name}.bias": (n_out,)}
 
 
-def _scale(name: str, width: int) -> Shapes:
+def _norm(name: str, width: int) -> Shapes:
     return {f"{name}.weight": (width,), f"{name}.bias": (width,)}

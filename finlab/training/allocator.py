@@ -15,7 +15,7 @@ from finlab.layout import FinModelSpec
 from finlab.physics import make_law
 from finlab.training import losses
 from finlab.training.device import autocast_dtype, shared_training
-from finlab.training.loop import Terms, plot_log, train
+from finlab.training.loop import Terms, train
 from finlab.training.networks.allocator_network import AllocatorNetwork
 from finlab.training.presets import PAPER_RECIPES, AllocatorTraining, get_recipe
 from finlab.training.sampling import Batch, ForwardSampler, seeded_generator
@@ -68,7 +68,6 @@ def train_allocator(
         save_checkpoint(
             out, replace(base, preset=preset, network_config=config, network=state, training=made)
         )
-        plot_log(out)
 
     with shared_training(settings.batch_size) as share:
         terms = make_terms(base, settings, seed, share.device, share.rows)

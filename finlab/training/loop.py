@@ -138,6 +138,7 @@ def train(
             # The state comes last: a run killed in between repeats a few steps and ships them after all.
             if on_save is not None:
                 on_save(average or _weights(model), step + 1)
+            plot_log(folder)
             saved = time.monotonic()
             save_state(folder, (step + 1, before + saved - started), model, optimizer, average, identity)
         if last:

@@ -1,14 +1,11 @@
-"""What runs leave on disk: the state to go on from, as plain tensors, and checkpoints."""
+"""What runs leave on disk: the state to go on from, and checkpoints."""
 
-import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
 import torch
-from safetensors import safe_open
-from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from finlab.errors import DataError
@@ -17,8 +14,8 @@ from finlab.inference.weights import NetworkConfig, State, SurrogateConfig, Trai
 from finlab.training.networks.allocator_network import AllocatorNetwork
 from finlab.training.networks.surrogate import Surrogate
 
-STATE_FILE = "resume.safetensors"
-"""Weights, optimizer moments, running average of the weights and step; in its header, the run's settings."""
+STATE_FILE = "resume.pt"
+"""Steps and seconds done, the run's settings, weights, optimizer and running average of the weights."""
 
 
 def save_state(
@@ -31,15 +28,10 @@ def save_state(
 ) -> None:
     """Write the state after so many steps and seconds; a kill at any moment leaves the old or the new one
     whole."""
-    tensors = {"done": torch.tensor(done, dtype=torch.float64)}
-    tensors |= {f"average.{name}": value for name, value in average.items()}
-    for name, parameter in model.named_parameters():
-        tensors[f"weight.{name}"] = parameter.detach()
-        moments = optimizer.state.get(parameter, {})
-        tensors |= {f"optimizer.{key}.{name}": value for key, value in moments.items()}
+    state = {"done": done, "settings": settings, "average": average}
+    state |= {"model": model.state_dict(), "optimizer": optimizer.state_dict()}
     temporary = folder / (STATE_FILE + ".new")
-    copies = {name: value.contiguous().clone() for name, value in tensors.items()}
-    save_file(copies, temporary, {"settings": json.dumps(settings)})
+    torch.save(state, temporary)
     os.replace(temporary, folder / STATE_FILE)
 
 
@@ -56,28 +48,22 @@ def load_state(
     Raises:
         DataError: the state was written with other settings.
     """
-    path = folder / STATE_FILE
-    if not path.exists():
+    if not (folder / STATE_FILE).exists():
         return 0, 0.0
-    with safe_open(path, "pt") as file:
-        saved = json.loads((file.metadata() or {}).get("settings", "{}"))
-        tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (not a mapping)
-    changed = [k for k in settings if saved.get(k) != json.loads(json.dumps(settings[k]))]
+    # Plain values and tensors only: reading never runs code.
+    state = torch.load(folder / STATE_FILE, map_location="cpu", weights_only=True)
+    changed = [key for key in settings if state["settings"].get(key) != settings[key]]
     if changed:
         raise DataError(
             f"{folder}: holds a run with other settings ({', '.join(changed)}); "
             "resume with the same ones, or train into an empty folder"
         )
-    with torch.no_grad():
-        for name, parameter in model.named_parameters():
-            parameter.copy_(tensors[f"weight.{name}"])
-            moments = {k: tensors.get(f"optimizer.{k}.{name}") for k in ("step", "exp_avg", "exp_avg_sq")}
-            if all(value is not None for value in moments.values()):
-                optimizer.state[parameter] = moments
-        for name in average:
-            average[name].copy_(tensors[f"average.{name}"])
-    steps, seconds = tensors["done"].tolist()
-    return int(steps), seconds
+    model.load_state_dict(state["model"])
+    optimizer.load_state_dict(state["optimizer"])
+    for name, value in average.items():
+        value.copy_(state["average"][name])
+    steps, seconds = state["done"]
+    return steps, seconds
 
 
 Module = TypeVar("Module", bound=nn.Module)

@@ -12,7 +12,7 @@ from finlab.inference.weights import TrainedWeights
 from finlab.layout import FinModelSpec
 from finlab.physics import FinLaw, make_law
 from finlab.training.device import Share, shared_training
-from finlab.training.loop import Terms, plot_log, train
+from finlab.training.loop import Terms, train
 from finlab.training.networks.surrogate import Surrogate
 from finlab.training.presets import PAPER_RECIPES, get_recipe
 from finlab.training.sampling import Batch, ForwardSampler
@@ -73,10 +73,7 @@ def train_surrogate(
         training={"surrogate": identity | {"samples": training.steps * training.batch_size}},
         metrics={"surrogate": surrogate_metrics(surrogate, model, seed + 1)},
     )
-    if not share.first:
-        return checkpoint
-    plot_log(out)
-    return save_checkpoint(out, checkpoint)
+    return save_checkpoint(out, checkpoint) if share.first else checkpoint
 
 
 def measure_normalization(model: FinLaw, seed: int) -> Normalization:

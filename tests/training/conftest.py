@@ -62,7 +62,7 @@ def smoke_run(tmp_path_factory: pytest.TempPathFactory, smoke_surrogate: Run, lo
 @pytest.fixture
 def resume(smoke_surrogate: Run, log_every_step: None, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Run]:
     """Start or go on with the smoke allocator in a folder; no curves are drawn, which takes longest."""
-    monkeypatch.setattr("finlab.training.allocator.plot_log", lambda folder: None)
+    monkeypatch.setattr("finlab.training.loop.plot_log", lambda folder: None)
 
     def go_on(folder: Path, **options: Any) -> Run:
         return Run(folder, train_allocator("smoke", folder, surrogate=smoke_surrogate.folder, **options))

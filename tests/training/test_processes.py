@@ -18,7 +18,7 @@ import sys, time
 from pathlib import Path
 from finlab.training import allocator, loop
 
-allocator.plot_log = lambda folder: time.sleep(0.2)  # leaves time to be killed
+loop.plot_log = lambda folder: time.sleep(0.2)  # leaves time to be killed
 loop.LOG_EVERY, loop.SAVE_EVERY_S = 1, 0.0
 allocator.train_allocator("smoke", Path(sys.argv[1]), surrogate=Path(sys.argv[2]))
 """
@@ -30,8 +30,8 @@ def environment() -> dict[str, str]:
 
 
 def saved_step(folder: Path) -> int:
-    path = folder / "resume.safetensors"
-    return int(load_file(path)["done"][0]) if path.exists() else 0
+    path = folder / "resume.pt"
+    return int(torch.load(path, weights_only=True)["done"][0]) if path.exists() else 0
 
 
 def test_a_killed_run_goes_on_as_if_it_had_not_been(

@@ -13,6 +13,7 @@ from finlab.arrays import Array
 from finlab.forces.fin_envelope import FinEnvelope, compile_fin
 from finlab.layout import Limits
 from finlab.layout.random import random_layout
+from finlab.layout.random_fins import log_uniform
 from finlab.physics.blade import Blade
 from finlab.physics.drag import Drag
 from finlab.physics.fin_law import FinLaw
@@ -57,22 +58,18 @@ def varied_limits(rng: np.random.Generator) -> Limits:
     return random_layout(rng, n_fins=1, limits="varied").fins[0].limits
 
 
-def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    return float(math.exp(rng.uniform(math.log(low), math.log(high))))
-
-
 def _drag(rng: np.random.Generator) -> FinLaw:
-    return Drag(DENSITY, 0.15, _log_uniform(rng, 0.003, 0.06), _log_uniform(rng, 0.04, 0.2))
+    return Drag(DENSITY, 0.15, log_uniform(rng, 0.003, 0.06), log_uniform(rng, 0.04, 0.2))
 
 
 def _lighthill(rng: np.random.Generator) -> FinLaw:
-    return Lighthill(DENSITY, _log_uniform(rng, 0.08, 0.4), _log_uniform(rng, 0.04, 0.2))
+    return Lighthill(DENSITY, log_uniform(rng, 0.08, 0.4), log_uniform(rng, 0.04, 0.2))
 
 
 def _soft(rng: np.random.Generator) -> FinLaw:
     uneven = rng.uniform(0.0, 0.3) * (rng.random() < 0.5)
     return Soft(
-        _log_uniform(rng, 0.5, 12.0),
+        log_uniform(rng, 0.5, 12.0),
         rng.uniform(0.7, 2.5),
         rng.uniform(0.4, 2.0),
         rng.uniform(2.0, 8.0),
@@ -95,13 +92,13 @@ def _table(rng: np.random.Generator) -> FinLaw:
     size = beat ** rng.uniform(0.7, 2.2) / (1.0 + (beat / saturation) ** rng.uniform(1.0, 5.0))
     for order in (1, 2):
         size *= 1.0 + rng.uniform(0.0, 0.25) * np.cos(order * d - rng.uniform(-math.pi, math.pi))
-    size *= _log_uniform(rng, 0.3, 10.0) * (1.0 + 0.03 * rng.standard_normal(size.shape))
+    size *= log_uniform(rng, 0.3, 10.0) * (1.0 + 0.03 * rng.standard_normal(size.shape))
     lean = rng.uniform(-0.3, 0.3) + rng.uniform(0.0, 0.2) * np.sin(d - rng.uniform(-math.pi, math.pi))
     columns = [np.zeros_like(size), size * np.cos(d + lean), size * np.sin(d + lean)]
     if rng.random() < 0.5:
         blade = Blade()
         power = blade.power(a, f) * (0.2 + beat ** rng.uniform(0.0, 1.0))
-        columns.append(power * _log_uniform(rng, 0.3, 3.0))
+        columns.append(power * log_uniform(rng, 0.3, 3.0))
     return TableLaw([amplitude, frequency, direction], np.stack(columns, axis=-1), True)
 
 

@@ -21,7 +21,7 @@ from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.inference.checkpoint import read_checkpoint, read_normalization, resolve_checkpoint
 from finlab.inference.weights import TrainedWeights
-from finlab.training.loop import LOG_EVERY, Terms, plot_log, train
+from finlab.training.loop import LOG_EVERY, Terms, train
 from finlab.training.mdn.batches import Answers, Batch
 from finlab.training.mdn.shards import write_shard
 from finlab.training.networks.force_network import ForceMixture, ForceNetwork
@@ -76,7 +76,6 @@ def train_mdn(
             out.name, normalization, recipe.network, state_of(weights), preset=preset, training=made
         )
         save_checkpoint(out, trained)
-        plot_log(out)
 
     # What takes the search a second takes a network in one process as long: each gets a core.
     threads = torch.get_num_threads()

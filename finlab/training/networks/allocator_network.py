@@ -6,6 +6,7 @@ it against `torch_geometric.nn.GATv2Conv`.
 """
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import torch
@@ -117,9 +118,7 @@ class AllocatorNetwork(nn.Module):
         self.config = config
         width = config.width
         sizes = [RAW_SIZE] + [width] * config.graph_layers
-        self.graph = nn.ModuleList(
-            DenseGATv2(a, b, config.heads) for a, b in zip(sizes, sizes[1:], strict=False)
-        )
+        self.graph = nn.ModuleList(DenseGATv2(*ends, config.heads) for ends in pairwise(sizes))
         self.skip = nn.Linear(RAW_SIZE, width)
         self.wrench = nn.Sequential(nn.Linear(6, width), nn.SiLU(), nn.Linear(width, width))
         self.join = nn.Linear(2 * width, width)

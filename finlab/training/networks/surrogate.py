@@ -4,7 +4,7 @@ Its allocator never sees the fin model that judges it, only this, trained on for
 computed from force and position.
 """
 
-from collections.abc import Sequence
+from itertools import pairwise
 
 import torch
 from torch import Tensor, nn
@@ -15,15 +15,6 @@ from finlab.inference.surrogate import FORCE_UNIT
 from finlab.inference.weights import DESCRIPTOR, SurrogateConfig
 from finlab.layout.arrays import force_columns
 from finlab.physics.wrench import wrench_of_forces
-
-
-def mlp(n_in: int, hidden: Sequence[int], n_out: int, activation: type[nn.Module]) -> nn.Sequential:
-    """Plain perceptron with activations between linear layers."""
-    sizes = [n_in, *hidden]
-    blocks: list[nn.Module] = []
-    for a, b in zip(sizes, sizes[1:], strict=False):
-        blocks += [nn.Linear(a, b), activation()]
-    return nn.Sequential(*blocks, nn.Linear(sizes[-1], n_out))
 
 
 class Surrogate(nn.Module):
@@ -37,7 +28,10 @@ class Surrogate(nn.Module):
         """Make it; see `SurrogateConfig`."""
         super().__init__()
         self.config = config
-        self.net = mlp(13, config.hidden, 3, nn.SiLU)
+        blocks = [
+            part for sizes in pairwise([13, *config.hidden, 3]) for part in (nn.Linear(*sizes), nn.SiLU())
+        ]
+        self.net = nn.Sequential(*blocks[:-1])
         # Angles enter as plain numbers and their sines must be learned; wider first weights start
         # nearer to that (measured: a sixth of the loss after the same minute).
         nn.init.uniform_(next(self.net.parameters()), -0.8, 0.8)
