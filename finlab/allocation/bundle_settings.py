@@ -5,8 +5,6 @@ from collections.abc import Mapping
 from dataclasses import asdict, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from finlab.allocation.learned.settings import MdnSettings
 from finlab.allocation.search.settings import Settings
 from finlab.bundle_files import ABOUT, VERSION, Files
@@ -87,18 +85,11 @@ def read_about(files: Files, source: str) -> About:
     weights = _checked(
         vars(EnergyWeights()), values.get("energy_weights"), f"{place}: settings: energy_weights"
     )
-    normalization = _normalization(document.get("normalization"), place)
-    return About(method, checkpoint, normalization, {**settings, "energy_weights": EnergyWeights(**weights)})
-
-
-def _normalization(values: Any, place: str) -> Normalization:
     try:
-        mean, std = (np.array(values[key], np.float64) for key in Normalization._fields)
-    except (KeyError, TypeError, ValueError):
-        mean = std = np.empty(0)
-    if mean.shape != (6,) or std.shape != (6,) or not (np.isfinite(mean).all() and (std > 0.0).all()):
-        raise DataError(f"{place}: normalization must be six means and six standard deviations above 0")
-    return Normalization(mean, std)
+        normalization = Normalization.parse(document.get("normalization"))
+    except ValueError as error:
+        raise DataError(f"{place}: {error}") from None
+    return About(method, checkpoint, normalization, {**settings, "energy_weights": EnergyWeights(**weights)})
 
 
 def _checked(usual: Mapping[str, Any], values: Any, place: str) -> dict[str, Any]:

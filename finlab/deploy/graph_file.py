@@ -24,13 +24,11 @@ from finlab.layout.load import (
     GRAPH_VERSION,
     SUFFIX,
     UNITS,
-    check_graph_document,
+    GraphDocument,
     checksum_of,
-    graph_layout,
-    graph_nodes,
+    parse_graph_document,
     read_graph_text,
 )
-from finlab.layout.reading import parse_json
 from finlab.layout.rules import mapping, numbers, shown, text, under
 from finlab.whole_file import write_whole
 
@@ -58,7 +56,7 @@ def read_graph(path: str | os.PathLike[str]) -> LayoutGraph:
 
 def graph_bytes(graph: LayoutGraph) -> bytes:
     """The contents of a graph file."""
-    document = document_of(graph)
+    document = _document_of(graph)
     document["checksum"] = checksum_of(document)
     return (json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()
 
@@ -67,12 +65,12 @@ def parse_graph(
     content: str, source: str = "graph", folder: Path | None = None, tables: frozenset[str] | None = None
 ) -> LayoutGraph:
     """The graph in the text of a graph file; arguments as in `GraphText`, errors as in `read_graph`."""
-    data = parse_json(content, source)
+    document = parse_graph_document(content, source, folder, tables)
     with under(source=source):
-        return graph_of(data, source, folder, tables)
+        return _graph(document)
 
 
-def document_of(graph: LayoutGraph) -> dict[str, Any]:
+def _document_of(graph: LayoutGraph) -> dict[str, Any]:
     """Everything but the checksum, which comes third once it is known."""
     layout = layout_to_dict(graph.layout)
     nodes = []
@@ -98,7 +96,7 @@ def document_of(graph: LayoutGraph) -> dict[str, Any]:
             "multigraph": False,
             "graph": {"name": graph.layout.name},
             "nodes": nodes,
-            "edges": edges_of(graph),
+            "edges": _edges(graph),
         },
         "normalization": {"mean": graph.normalization.mean.tolist(), "std": graph.normalization.std.tolist()},
         "checkpoint": {"name": graph.checkpoint, "sha256": graph.checkpoint_sha256},
@@ -110,22 +108,14 @@ def document_of(graph: LayoutGraph) -> dict[str, Any]:
     }
 
 
-def edges_of(graph: LayoutGraph) -> list[dict[str, str]]:
+def _edges(graph: LayoutGraph) -> list[dict[str, str]]:
     """Every pair of healthy fins, and each with itself."""
     return [{"source": a, "target": b} for a, b in graph.edges]
 
 
-def graph_of(
-    data: Any, source: str, folder: Path | None = None, tables: frozenset[str] | None = None
-) -> LayoutGraph:
-    """Check and convert the values of a file.
-
-    Raises:
-        LayoutError: it is of another format or version, was changed, or holds what no graph file holds.
-    """
-    data = check_graph_document(data)
-    nodes = graph_nodes(data)
-    layout = graph_layout(data, source, folder, tables)
+def _graph(document: GraphDocument) -> LayoutGraph:
+    """The graph of a file whose layout is right; all the rest is checked here."""
+    data = document.values
     normalization = _section(data, "normalization", "mean", "std")
     checkpoint = _section(data, "checkpoint", "name", "sha256")
     self_test = _section(data, "self_test", "method", "tolerance_err_norm", "cases")
@@ -133,8 +123,8 @@ def graph_of(
     if not isinstance(cases, list):
         raise LayoutError(f"expected a list, got {shown(cases)}", "self_test.cases")
     graph = LayoutGraph(
-        layout=layout,
-        failed=tuple(name for name, node in zip(layout.names, nodes, strict=True) if not node["healthy"]),
+        layout=document.layout,
+        failed=document.failed,
         normalization=Normalization(
             np.array(numbers(normalization["mean"], "normalization.mean", 6)),
             np.array(numbers(normalization["std"], "normalization.std", 6, low=0.0)),
@@ -142,9 +132,9 @@ def graph_of(
         checkpoint=_text_or_none(checkpoint["name"], "checkpoint.name", 200),
         checkpoint_sha256=_text_or_none(checkpoint["sha256"], "checkpoint.sha256", 64),
         method=text(self_test["method"], "self_test.method", 40),
-        self_test=tuple(_case(case, i, layout.n_fins) for i, case in enumerate(cases)),
+        self_test=tuple(_case(case, i, document.layout.n_fins) for i, case in enumerate(cases)),
     )
-    if data["graph"]["edges"] != edges_of(graph):
+    if data["graph"]["edges"] != _edges(graph):
         raise LayoutError("expected every pair of healthy fins, and each with itself", "graph.edges")
     return graph
 

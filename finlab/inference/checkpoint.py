@@ -67,16 +67,14 @@ def parse_checkpoint(files: Mapping[str, bytes], source: str, name: str) -> Trai
     try:
         tensors = load(files[WEIGHTS_FILE])
         surrogate, sizes = _surrogate_config(config["surrogate"]), _network_config(config["network"])
-        shapes = {}
         if surrogate is not None:
             FinModelSpec.from_values(config["fin_model"])
-            shapes = {f"surrogate.{key}": shape for key, shape in surrogate.shapes().items()}
-        if sizes is not None:
-            shapes |= {f"network.{key}": shape for key, shape in sizes.shapes().items()}
+        parts = (("surrogate", surrogate), ("network", sizes))
+        shapes = {f"{name}.{key}": s for name, part in parts if part for key, s in part.shapes().items()}
         check_state(tensors, shapes)
         return TrainedWeights(
             name=name,
-            normalization=_normalization(config),
+            normalization=Normalization.parse(config["normalization"]),
             network_config=sizes,
             network=_part("network", tensors),
             surrogate_config=surrogate,
@@ -150,8 +148,8 @@ def read_normalization(folder: Path) -> Normalization:
 def parse_normalization(files: Mapping[str, bytes], source: str) -> Normalization:
     """The wrench statistics in a checkpoint's files by name."""
     try:
-        return _normalization(_config(files, source))
-    except (KeyError, TypeError, ValueError) as error:
+        return Normalization.parse(_config(files, source)["normalization"])
+    except (KeyError, ValueError) as error:
         raise CheckpointError(f"{source}/{CONFIG_FILE}: normalization is missing or malformed") from error
 
 
@@ -201,13 +199,6 @@ def _config(files: Mapping[str, bytes], source: str) -> dict[str, Any]:
             "use the finlab that made it, or train again"
         )
     return config
-
-
-def _normalization(config: Mapping[str, Any]) -> Normalization:
-    mean, std = (np.asarray(config["normalization"][key], dtype=np.float64) for key in ("mean", "std"))
-    if mean.shape != (6,) or std.shape != (6,) or not (np.isfinite(mean).all() and (std > 0).all()):
-        raise ValueError("normalization needs six finite means and six positive standard deviations")
-    return Normalization(mean, std)
 
 
 def _part(prefix: str, tensors: State) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,17 @@ class Normalization(NamedTuple):
         """Statistics of wrenches of shape (N, 6)."""
         wrenches = np.asarray(wrenches, dtype=np.float64)
         return cls(wrenches.mean(axis=0), np.maximum(wrenches.std(axis=0), STD_FLOOR))
+
+    @classmethod
+    def parse(cls, values: Any) -> Normalization:
+        """The statistics under the keys `mean` and `std`; a `ValueError` where there are none."""
+        try:
+            mean, std = (np.asarray(values[name], dtype=np.float64) for name in cls._fields)
+        except (KeyError, TypeError, ValueError):
+            mean = std = np.empty(0)
+        if mean.shape != (6,) or std.shape != (6,) or not (np.isfinite(mean).all() and (std > 0.0).all()):
+            raise ValueError("normalization must be six means and six standard deviations above 0")
+        return cls(mean, std)
 
     def error(self, wrench: NDArray[np.floating], target: NDArray[np.floating]) -> Array:
         """`err_norm = ||(wrench - target) / std||`, over the last axis."""

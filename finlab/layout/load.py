@@ -39,6 +39,17 @@ class GraphText(NamedTuple):
     """Paths of the force tables that it may name; None for any."""
 
 
+class GraphDocument(NamedTuple):
+    """What a layout graph file says, checked as far as its layout goes."""
+
+    values: Mapping[str, Any]
+    """Everything in it, with the keys that it must have."""
+    layout: Layout
+    """The layout, failed fins included, the shafts' angles exactly as they were."""
+    failed: tuple[str, ...]
+    """Names of the fins that do not work."""
+
+
 def load_layout(layout: str | os.PathLike[str]) -> Layout:
     """Returns a shipped layout by its bare name, such as "A", or the layout in a file or bundle.
 
@@ -54,7 +65,7 @@ def load_layout(layout: str | os.PathLike[str]) -> Layout:
     file = layout_path(layout)
     source = str(layout)
     if holds_graph(file):
-        return parse_graph_layout(*read_graph_text(file))
+        return parse_graph_document(*read_graph_text(file)).layout
     content = read_text(file, source)
     if file.suffix.lower() == ".json":
         data = parse_json(content, source)
@@ -114,35 +125,29 @@ def bundle_graph_text(files: Files, source: str) -> GraphText:
     return GraphText(decode_text(files[GRAPH], place), place, folder, tables)
 
 
-def parse_graph_layout(
+def parse_graph_document(
     content: str, source: str = "graph", folder: Path | None = None, tables: frozenset[str] | None = None
-) -> Layout:
-    """Returns the layout in the text of a graph file, failed fins included; arguments as in `GraphText`.
+) -> GraphDocument:
+    """What the text of a graph file says; arguments as in `GraphText`.
 
     Raises:
         LayoutError: it is of another format or version, was changed after it was written, or holds no layout.
     """
     data = parse_json(content, source)
     with under(source=source):
-        return graph_layout(check_graph_document(data), source, folder, tables)
-
-
-def check_graph_document(data: Any) -> Mapping[str, Any]:
-    """Returns the values of a graph file once format, version, keys and checksum are right."""
-    # Format and version first: in a file of another kind or version, unknown keys are not the news.
-    if not isinstance(data, dict) or data.get("format") != GRAPH_FORMAT:
-        got = shown(data.get("format")) if isinstance(data, dict) else shown(data)
-        raise LayoutError(f"expected {GRAPH_FORMAT}, got {got}", "format")
-    if data.get("version") != GRAPH_VERSION or data["version"] is True:
-        raise LayoutError(
-            f"this finlab reads version {GRAPH_VERSION}, got {shown(data.get('version'))}", "version"
-        )
-    document: Mapping[str, Any] = mapping(data, "", KEYS, required=KEYS)
-    if document["checksum"] != checksum_of(document):
-        raise LayoutError("does not fit the contents; the file was changed, export it again", "checksum")
-    if document["units"] != UNITS:
-        raise LayoutError(f"expected {UNITS}, got {shown(document['units'])}", "units")
-    return document
+        # Format and version first: in a file of another kind or version, unknown keys are not the news.
+        if not isinstance(data, dict) or data.get("format") != GRAPH_FORMAT:
+            got = shown(data.get("format")) if isinstance(data, dict) else shown(data)
+            raise LayoutError(f"expected {GRAPH_FORMAT}, got {got}", "format")
+        if data.get("version") != GRAPH_VERSION or data["version"] is True:
+            got = shown(data.get("version"))
+            raise LayoutError(f"this finlab reads version {GRAPH_VERSION}, got {got}", "version")
+        mapping(data, "", KEYS, required=KEYS)
+        if data["checksum"] != checksum_of(data):
+            raise LayoutError("does not fit the contents; the file was changed, export it again", "checksum")
+        if data["units"] != UNITS:
+            raise LayoutError(f"expected {UNITS}, got {shown(data['units'])}", "units")
+        return _document(data, source, folder, tables)
 
 
 def checksum_of(document: Mapping[str, Any]) -> str:
@@ -152,34 +157,25 @@ def checksum_of(document: Mapping[str, Any]) -> str:
     return "sha256:" + hashlib.sha256(canonical.encode("utf-8", "surrogatepass")).hexdigest()
 
 
-def graph_nodes(data: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Returns the fins of a checked graph document, each with the keys that it must have."""
+def _document(
+    data: Mapping[str, Any], source: str, folder: Path | None, tables: frozenset[str] | None
+) -> GraphDocument:
+    """The layout of a graph file, read by way of the layout file that it would be."""
     parts = ("directed", "multigraph", "graph", "nodes", "edges")
     nodes = mapping(data["graph"], "graph", parts, required=parts)["nodes"]
     if not isinstance(nodes, list):
         raise LayoutError(f"expected a list of fins, got {shown(nodes)}", "graph.nodes")
     keys = ("id", "position_m", "mounting_angle_rad", "limits", "model", "healthy")
-    checked = [mapping(node, f"graph.nodes[{i}]", keys, required=keys) for i, node in enumerate(nodes)]
-    for i, node in enumerate(checked):
-        if not isinstance(node["healthy"], bool):
-            got = shown(node["healthy"])
-            raise LayoutError(f"expected true or false, got {got}", f"graph.nodes[{i}].healthy")
-    return checked
-
-
-def graph_layout(
-    data: Mapping[str, Any], source: str, folder: Path | None = None, tables: frozenset[str] | None = None
-) -> Layout:
-    """Returns the layout of a checked graph document, the shafts' angles exactly as they were."""
-    about = mapping(data["layout"], "layout", ("name", "description", "body"), ("name",))
-    fins, angles = [], []
-    for i, node in enumerate(graph_nodes(data)):
-        angle = number(
-            node["mounting_angle_rad"], f"graph.nodes[{i}].mounting_angle_rad", -math.tau, math.tau
-        )
-        angles.append(angle)
-        fin = {"name": node["id"], "mounting_angle_deg": math.degrees(angle)}
+    angles, fins = [], []
+    for i, node in enumerate(nodes):
+        with under(f"graph.nodes[{i}]"):
+            mapping(node, "", keys, required=keys)
+            if not isinstance(node["healthy"], bool):
+                raise LayoutError(f"expected true or false, got {shown(node['healthy'])}", "healthy")
+            angles.append(number(node["mounting_angle_rad"], "mounting_angle_rad", -math.tau, math.tau))
+        fin = {"name": node["id"], "mounting_angle_deg": math.degrees(angles[-1])}
         fins.append(fin | {key: node[key] for key in ("position_m", "limits", "model")})
+    about = mapping(data["layout"], "layout", ("name", "description", "body"), ("name",))
     head = {"format": FORMAT, "version": VERSION, "frame": data["frame"]}
     layout = parse_layout({**head, **about, "fins": fins}, source, folder)
     for i, parsed in enumerate(layout.fins):
@@ -187,5 +183,6 @@ def graph_layout(
         if tables is not None and path is not None and path not in tables:
             key = f"graph.nodes[{i}].model.path"
             raise LayoutError("names a force table that is not in the bundle; export it again", key)
-    pairs = zip(layout.fins, angles, strict=True)
-    return replace(layout, fins=tuple(replace(fin, mounting_angle=angle) for fin, angle in pairs))
+    exact = (replace(fin, mounting_angle=angle) for fin, angle in zip(layout.fins, angles, strict=True))
+    failed = tuple(node["id"] for node in nodes if not node["healthy"])
+    return GraphDocument(data, replace(layout, fins=tuple(exact)), failed)
