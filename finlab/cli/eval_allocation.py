@@ -184,25 +184,30 @@ def latency(
     fins: Count = 4,
     calls: Count = 200,
     budget: Annotated[float, arg(metavar="SECONDS")] = 20.0,
+    robots: Count = 3,
     seed: Count = 0,
     run: Annotated[MethodRun, arg(name="")] = METHODS,
 ) -> None:
-    """Time single calls of methods side by side in one run.
+    """Time single calls of methods side by side in one run, and first answers for fins never seen.
 
     Args:
         methods: names with commas between; ipopt needs its extra.
         fins: fins of the layouts, 2 to 5.
         calls: calls of each method.
         budget: a slow method stops after this long.
+        robots: robots with fins that method search has not seen, of each kind of fin.
         seed: draws layouts and targets.
     """
+    from finlab.evaluation.experiments.first_answers import first_answer_report, first_answer_rows
     from finlab.evaluation.experiments.latency import latency_cases, latency_report, latency_rows, machine
 
-    check_positive(calls=calls)
+    check_positive(calls=calls, robots=robots)
     cases = latency_cases(fins, seed)
     rows = latency_rows(run.methods(methods), cases, n_calls=calls, budget_s=budget)
+    first = first_answer_rows(run.method("search"), robots=robots, seed=seed)
     described = machine()
-    run.show(latency_report(rows, described), rows=rows, machine=described)
+    text = f"{latency_report(rows, described)}\n\n{first_answer_report(first)}"
+    run.show(text, rows=rows, first_answers=first, machine=described)
 
 
 def steadiness(

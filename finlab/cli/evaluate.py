@@ -11,7 +11,7 @@ from tyro.conf import arg
 from tyro.extras import SubcommandApp
 
 from finlab.cli import eval_allocation, eval_closed_loop
-from finlab.cli.eval_arguments import Checkpoint, Count, Folder, Name, Output, check_folders
+from finlab.cli.eval_arguments import Checkpoint, Count, Folder, Name, Names, Output, check_folders
 from finlab.cli.inputs import check_positive
 
 OUTPUT = Output()
@@ -55,7 +55,7 @@ def training(
     settings |= {"layouts": layouts, "targets": targets, "seed": seed}
     jobs = training_jobs(settings, out)
     run_jobs(list(jobs.values()), out, commit=source_commit(), processes=0)
-    rows = [training_row(name, job.result(out)[0]) for name, job in jobs.items()]
+    rows = [training_row(change, job.result(out)[0]) for (change,), job in jobs.items()]
     output.show(training_report(rows, preset, steps, batch_size), rows=rows)
 
 
@@ -67,6 +67,7 @@ def report(
     paper_checkpoint: Checkpoint = None,
     records: Folder = None,
     processes: Annotated[int | None, arg(metavar="N")] = None,
+    sections: Names = "all",
     as_is: bool = False,
 ) -> None:
     """Make the whole evaluation: one HTML page, its Markdown twin, pictures and rows.
@@ -82,13 +83,17 @@ def report(
         paper_checkpoint: trained checkpoint of method paper; the shipped one by default.
         records: folder for the records; DIR/records by default.
         processes: parts that run at once; the number of cores by default.
+        sections: run only some: wrench, cost, network, modes, unreachable, steadiness, latency, closed-loop,
+            ablation, temperature, training; the page shows what is there of all.
         as_is: do no work; make the page from what is there.
     """
     from finlab.evaluation.method_specs import Checkpoints
     from finlab.evaluation.report.make import make_report
+    from finlab.evaluation.report.plan import parse_sections
     from finlab.evaluation.report.sizes import SIZES
 
     check_positive(processes=processes)
+    chosen = [] if as_is else parse_sections(sections)
     check_folders(out=out, records=records)
     words = ["finlab", "eval", "report", "-o", str(out), *(["--quick"] if quick else [])]
     words += ["--seed", str(seed)] if seed else []
@@ -102,7 +107,7 @@ def report(
         records=records or out / "records",
         command=shlex.join(words),
         processes=processes,
-        as_is=as_is,
+        sections=chosen,
     )
     print(page)
 

@@ -38,8 +38,8 @@ FAMILIES: dict[str, dict[str, tuple[Draw, Range]]] = {
 """Fin model -> its numbers, how each is drawn and from where; what is not named stays as it is by default."""
 
 
-def random_fin_model(rng: np.random.Generator) -> FinModelSpec:
-    """Returns a fin of a random kind, each kind a third of the time, with random numbers."""
-    kind = str(rng.choice(list(FAMILIES)))
+def random_fin_model(rng: np.random.Generator, kind: str | None = None) -> FinModelSpec:
+    """Returns a fin with random numbers, of a kind in `FAMILIES` or of each a third of the time."""
+    kind = kind or str(rng.choice(list(FAMILIES)))
     numbers = {name: draw(rng, *ends) for name, (draw, ends) in FAMILIES[kind].items()}
     return FinModelSpec(kind, tuple(numbers.items()))

@@ -1,13 +1,11 @@
-"""Wrench tracking: how errors are distributed, error and cost by number of fins (the paper's figure B)."""
+"""Wrench tracking: how errors are distributed, and the error by number of fins (the paper's figure B)."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
-from finlab.evaluation.plots.style import COLOURS, INK, Picture, mark_printed, picture
+from finlab.evaluation.plots.style import COLOURS, Picture, mark_printed, picture
 from finlab.evaluation.statistics.records import Records
-from finlab.evaluation.statistics.tables import Row
 
 QUANTILES = np.concatenate([np.linspace(0, 0.9, 91), 1 - np.logspace(-1, -5, 60)])
 """At which the distribution is drawn: finer towards the largest errors."""
@@ -56,26 +54,4 @@ def error_by_fins(records: Mapping[str, Records], order: Sequence[str]) -> Pictu
                 label = method if n == fins[0] else None
                 axis.plot(n + offset, error.mean(), "o", color=colour, markersize=5.5, label=label)
         axis.set(yscale="log", xlabel="working fins", ylabel="normalized error", xticks=fins)
-        return view
-
-
-def cost_by_fins(rows: Sequence[Row]) -> Picture:
-    """Cost over the yardstick's for each number of fins, one panel per objective; rows of `cost_rows`."""
-    rows = [row for row in rows if row["fins"] != "all" and row["cost_ratio"] is not None]
-    objectives = list(dict.fromkeys(row["objective"] for row in rows))
-    methods = list(dict.fromkeys(row["method"] for row in rows))
-    with picture(1, max(len(objectives), 1), height=3.3, grid="y") as view:
-        for axis, objective in zip(view.axes, objectives, strict=False):
-            for k, method in enumerate(methods):
-                mine = [row for row in rows if (row["objective"], row["method"]) == (objective, method)]
-                place = [row["fins"] + (k - (len(methods) - 1) / 2) * 0.7 / len(methods) for row in mine]
-                ends = np.array([row["cost_ratio_interval"] for row in mine]).reshape(-1, 2)
-                ratio = np.array([row["cost_ratio"] for row in mine])
-                reach = np.maximum([ratio - ends[:, 0], ends[:, 1] - ratio], 0.0)
-                look: dict[str, Any] = {"color": COLOURS[method], "markersize": 5, "elinewidth": 1.2}
-                axis.errorbar(place, ratio, reach, fmt="o", label=method, **look)
-            axis.axhline(1.0, color=INK, linewidth=0.9)
-            axis.set(xlabel="fins", xticks=sorted({row["fins"] for row in rows}))
-            axis.set_title(f"{objective}, below 1 is cheaper")
-        view.axes[0].set_ylabel("cost over the best of the starts")
         return view

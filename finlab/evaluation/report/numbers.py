@@ -35,16 +35,10 @@ def share(value: float) -> str:
     return f"{100 * value:.{digits}f} %"
 
 
-def factor(value: float) -> str:
-    """How many times: 1.4, 12, 300."""
-    return f"{value:.1f}" if value < 9.95 else f"{float(f'{value:.2g}'):,.0f}"
-
-
 FORMATS: dict[str, Callable[[Any], str]] = {
     "error": error,
     "three": three,
     "share": share,
-    "factor": factor,
     "count": "{:,}".format,
     "ratio": "{:.3f}".format,
     "metres": "{:.4f}".format,

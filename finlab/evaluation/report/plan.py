@@ -1,12 +1,14 @@
 """Which jobs a report needs, by table. Sections look their results up here, by method, split or setting."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, fields
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cache
 from importlib.util import find_spec
 from itertools import product
 from pathlib import Path
 from typing import Any
 
+from finlab.errors import DataError
 from finlab.evaluation.experiments.ablation import REFINEMENTS, VARIANTS
 from finlab.evaluation.experiments.cost import OBJECTIVES, cost_sets
 from finlab.evaluation.experiments.temperature import PAPER_TEMPERATURE, TEMPERATURES
@@ -22,9 +24,8 @@ from finlab.evaluation.method_specs import (
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.report import work
 from finlab.evaluation.report.jobs import Job
-from finlab.evaluation.report.sizes import Sizes
+from finlab.evaluation.report.sizes import Settings, Sizes
 from finlab.evaluation.splits import SPLITS
-from finlab.evaluation.statistics.records import Columns
 
 COST_METHODS = ("search", "mdn", "analytic", "sqp", "multistart")
 """Methods whose costs are compared with the best of many starts."""
@@ -36,121 +37,110 @@ N_CANDIDATES = 64
 """Candidates of the ablation, as in the paper."""
 SCATTER_FINS, SCATTER_TARGETS = 4, 3
 """Fins of the layout, and its targets, whose candidates are drawn before and after refinement."""
+SWIMMERS = {
+    "trajectory": "search,on-board",
+    "faults": "search,on-board",
+    "velocity": "search,search-effort,analytic,on-board",
+}
+"""Experiment in closed loop -> methods that swim."""
+SECTIONS = {
+    **{name: (name,) for name in ("wrench", "cost", "network", "modes", "unreachable", "steadiness")},
+    "latency": ("latency", "first_answers"),
+    "closed-loop": ("trajectory", "faults", "velocity"),
+    "ablation": ("ablation",),
+    "temperature": ("temperature", "scatter"),
+    "training": ("training",),
+}
+"""Section of the page -> its tables."""
+WHOLE = ("ablation", "temperature")
+"""Sections that are left out while a part of them is missing."""
 
 
-WHOLE = ("ablation", "temperature", "scatter")
-"""Studies that say something only when all of their jobs are done."""
+def parse_sections(names: str) -> list[str]:
+    """Sections from their names with commas between, or `all`; `DataError` for any other name."""
+    words = [word.strip() for word in names.split(",") if word.strip()]
+    if words == ["all"]:
+        return list(SECTIONS)
+    if not words or (unknown := [word for word in words if word not in SECTIONS]):
+        got = unknown[0] if words else names
+        raise DataError(f"sections: expected all or some of {', '.join(SECTIONS)}, got {got!r}")
+    return words
 
 
 @dataclass(frozen=True)
 class Plan:
-    """All jobs of a report."""
+    """Jobs of a report."""
 
-    cost: dict[tuple[str, str], Job] = field(default_factory=dict)
-    """By set of cases and objective."""
-    wrench: dict[tuple[str, str], Job] = field(default_factory=dict)
-    """By split and method."""
-    ablation: dict[tuple[str, str], Job] = field(default_factory=dict)
-    """By variant and refinement, of the paper's network."""
-    temperature: dict[float, Job] = field(default_factory=dict)
-    """By temperature."""
-    scatter: dict[str, Job] = field(default_factory=dict)
-    """One job, `paper`."""
-    training: dict[str, Job] = field(default_factory=dict)
-    """By change."""
-    tables: dict[str, Job] = field(default_factory=dict)
-    """Jobs that give the rows of one table: the closed-loop experiments `trajectory`, `faults` and `velocity`
-    (none in a tiny report), and `latency`."""
+    tables: dict[str, dict[Any, Job]] = field(default_factory=dict)
+    """Table -> jobs by what tells them apart: `wrench` by (split, method), `cost` by (set of cases,
+    objective), `network` by (fins, objective), `ablation` by (variant, refinement), `temperature` and
+    `training` by what is changed; the others are one job each, under the key ()."""
+
+    def only(self, sections: Collection[str]) -> "Plan":
+        """The jobs of some sections."""
+        wanted = [table for section in sections for table in SECTIONS[section]]
+        return Plan({table: jobs for table, jobs in self.tables.items() if table in wanted})
 
     def only_done(self, folder: Path) -> "Plan":
         """The jobs whose results are there; a study that lacks a part is left out whole."""
-        left: dict[str, Any] = {}
-        for group in fields(self):
-            jobs = getattr(self, group.name)
-            done = {key: job for key, job in jobs.items() if job.done(folder)}
-            whole = group.name in WHOLE and len(done) < len(jobs)
-            left[group.name] = {} if whole else done
-        return Plan(**left)
+        left = {
+            table: {key: job for key, job in jobs.items() if job.done(folder)}
+            for table, jobs in self.tables.items()
+        }
+        for tables in (SECTIONS[section] for section in WHOLE):
+            if any(left.get(table) != self.tables.get(table) for table in tables):
+                left |= {table: {} for table in tables}
+        return Plan({table: jobs for table, jobs in left.items() if jobs})
 
     def __iter__(self) -> Iterator[Job]:
-        """Every job once, the longest kinds first."""
-        jobs = (job for group in fields(self) for job in getattr(self, group.name).values())
-        yield from {job.name: job for job in jobs}.values()
+        """Every job, the longest kinds first."""
+        return (job for jobs in self.tables.values() for job in jobs.values())
 
 
 def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) -> Plan:
     """The jobs of a report; what needs CasADi or PyTorch is left out where it is not installed. The small
     trainings have their runs in the folder `runs`."""
     casadi, torch = (find_spec(package) is not None for package in ("casadi", "torch"))
-    names = [name for name in (*QUICK, *SLOW) if casadi or name != "ipopt"]
-    prints = {name: fingerprint(name, checkpoints.of(name)) for name in names}
+    prints = cache(lambda method: fingerprint(method, checkpoints.of(method)))
+    names, costed, timed = (
+        [name for name in each if casadi or name != "ipopt"]
+        for each in ((*QUICK, *SLOW), COST_METHODS, LATENCY_METHODS)
+    )
+    tables: dict[str, dict[Any, Job]] = {table: {} for tables in SECTIONS.values() for table in tables}
 
-    def together(methods: list[str]) -> str:
-        return "".join(dict.fromkeys(prints[name] for name in methods))
+    def add(table: str, key: tuple[Any, ...], who: Sequence[str], **settings: Any) -> None:
+        parts = (f"{part:.3g}" if isinstance(part, float) else str(part) for part in key)
+        settings = {**sizes.of_table.get(table, {}), **settings, "seed": seed}
+        together = "".join(dict.fromkeys(map(prints, who)))
+        name, do, context = "-".join([table, *parts]), getattr(work, table), {"checkpoints": checkpoints}
+        tables[table][key] = Job(name, do, settings, together, context, alone=table == "latency")
 
-    def job(
-        name: str, do: Callable[..., Columns], spec: str, size: tuple[int, int] | None = None, **settings: Any
-    ) -> Job:
-        settings |= {"seed": seed} | ({} if size is None else {"layouts": size[0], "targets": size[1]})
-        return Job(name, do, settings, prints[spec], {"checkpoint": checkpoints.of(spec)})
-
-    costed = [name for name in COST_METHODS if name in prints]
-    cost: dict[tuple[str, str], Job] = {}
-    for name, objective in product(cost_sets("all"), OBJECTIVES):
-        about = {"split": name, "objective": objective, "starts": N_STARTS, "seed": seed}
-        about |= {"methods": costed, "layouts": sizes.cost[0], "targets": sizes.cost[1]}
-        known = {"checkpoint": checkpoints.default}
-        cost[name, objective] = Job(f"cost-{name}-{objective}", work.cost, about, together(costed), known)
-    wrench = {}
-    for name in sorted(names, key=lambda name: name != "paper"):
-        for split in SPLITS:
-            main = split in paper_figures()["wrench_tracking"]
-            size = sizes.of_split(main=main, slow=is_slow(name))
-            about = {"split": split, "method": name}
-            wrench[split, name] = job(f"wrench-{split}-{name}", work.wrench, name, size, **about)
-    drawn = {"candidates": N_CANDIDATES, "temperature": PAPER_TEMPERATURE}
-    ablation = {}
+    for split, objective in product(cost_sets("all"), OBJECTIVES):
+        about = {"split": split, "objective": objective, "methods": costed, "starts": N_STARTS}
+        add("cost", (split, objective), costed, **about)
+    for method, split in product(sorted(names, key=lambda name: name != "paper"), SPLITS):
+        size = sizes.of_split(main=split in paper_figures()["wrench_tracking"], slow=is_slow(method))
+        add("wrench", (split, method), [method], split=split, method=method, **size)
+    for fins, objective in product(sizes.of_table["network"]["fins"], OBJECTIVES):
+        add("network", (fins, objective), ["mdn"], fins=fins, objective=objective)
     for by, variant in product(REFINEMENTS, VARIANTS):
-        name, change = f"ablation-{variant}-{by}", {"variant": variant, "refinement": by}
-        ablation[variant, by] = job(name, work.ablation, "paper", sizes.ablation, **change, **drawn)
-    temperature = {
-        t: job(f"temperature-{t:.3g}", work.temperature, "paper", sizes.temperature, temperature=t)
-        for t in TEMPERATURES
-    }
-    scatter = job("scatter", work.scatter, "paper", fins=SCATTER_FINS, targets=SCATTER_TARGETS)
-    preset, steps, batch_size = sizes.training
-    study = {"preset": preset, "steps": steps, "batch_size": batch_size, "seed": seed}
-    study |= {"layouts": sizes.trained[0], "targets": sizes.trained[1]}
-    tables = {}
-    for do, n_runs, options in (
-        (work.trajectory, sizes.swims[0], {"methods": "search,on-board"}),
-        (work.faults, sizes.swims[1], {"methods": "search,on-board", "pairs": sizes.lost_pairs}),
-        (work.velocity, sizes.swims[2], {"methods": "search,search-effort,analytic,on-board"}),
-    ):
-        if n_runs:
-            tables[do.__name__] = job(f"swim-{do.__name__}", do, "search", runs=n_runs, **options)
-    calls, budget_s = sizes.latency
-    methods = [name for name in LATENCY_METHODS if name in prints]
-    tables["latency"] = Job(
-        "latency",
-        work.latency,
-        {"seed": seed, "methods": methods, "calls": calls, "budget_s": budget_s},
-        together(methods),
-        {"checkpoints": checkpoints},
-        alone=True,
-    )
-    return Plan(
-        cost=cost,
-        wrench=wrench,
-        ablation=ablation,
-        temperature=temperature,
-        scatter={"paper": scatter},
-        training=training_jobs(study, runs) if torch else {},
-        tables=tables,
-    )
+        drawn = {"candidates": N_CANDIDATES, "temperature": PAPER_TEMPERATURE}
+        add("ablation", (variant, by), ["paper"], variant=variant, refinement=by, **drawn)
+    for value in TEMPERATURES:
+        add("temperature", (value,), ["paper"], temperature=value)
+    add("scatter", (), ["paper"], fins=SCATTER_FINS, targets=SCATTER_TARGETS)
+    add("latency", (), timed, methods=timed)
+    for table in ("modes", "steadiness", "first_answers", *(["unreachable"] if casadi else [])):
+        add(table, (), ["search"])
+    for table, swimmers in SWIMMERS.items():
+        if table in sizes.of_table:
+            add(table, (), ["search"], methods=swimmers)
+    if torch:
+        tables["training"] = training_jobs(sizes.of_table["training"] | {"seed": seed}, runs)
+    return Plan({table: jobs for table, jobs in tables.items() if jobs})
 
 
-def training_jobs(settings: dict[str, Any], folder: Path) -> dict[str, Job]:
+def training_jobs(settings: Settings, folder: Path) -> dict[Any, Job]:
     """The small trainings, by change.
 
     Args:
@@ -160,7 +150,7 @@ def training_jobs(settings: dict[str, Any], folder: Path) -> dict[str, Job]:
     prints = surrogate_fingerprint("paper")
     size = "{preset}-{steps}x{batch_size}-seed{seed}".format(**settings)
     return {
-        change: Job(
+        (change,): Job(
             f"training-{change}",
             work.training,
             {"change": change, **settings},

@@ -2,8 +2,9 @@
 
 import subprocess
 import time
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 import finlab
 from finlab.evaluation.experiments.latency import machine
@@ -44,6 +45,10 @@ class Provenance:
     """Time of day, UTC."""
     machine: dict[str, str] = field(default_factory=machine)
     """Processor, cores and versions."""
+
+    def about(self) -> dict[str, Any]:
+        """What stands above the rows for scripts."""
+        return {key: value for key, value in asdict(self).items() if key not in ("command", "made")}
 
 
 def how_made_blocks(results: Results, provenance: Provenance, sizes: Sizes) -> list[Block]:

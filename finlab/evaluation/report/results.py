@@ -1,5 +1,6 @@
 """What the jobs of a plan gave, as the sections want it."""
 
+from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
 
@@ -14,6 +15,21 @@ from finlab.evaluation.report.plan import Plan
 from finlab.evaluation.splits import SPLITS
 from finlab.evaluation.statistics.records import Columns, Records, records_of_columns
 from finlab.evaluation.statistics.tables import Row, wrench_intervals, wrench_row
+
+
+def _wrench_rows(split: str, method: str, columns: Columns) -> list[Row]:
+    records = records_of_columns(columns)
+    ends = {f"{name}_interval": list(ends) for name, ends in wrench_intervals(records).items()}
+    return [wrench_row(records, split=split, method=method) | ends]
+
+
+ROWS: dict[str, Callable[..., list[Row]]] = {
+    "wrench": _wrench_rows,
+    "ablation": variant_rows,
+    "temperature": lambda *made: [temperature_row(*made)],
+    "training": lambda *made: [training_row(*made)],
+}
+"""Table -> its rows, from what is in a job's key and its arrays; the other tables come finished."""
 
 
 class Results:
@@ -32,56 +48,28 @@ class Results:
         return job.result(self.folder)[0]
 
     @cached_property
+    def tables(self) -> dict[str, list[Row]]:
+        """Rows by table, with intervals under `<column>_interval`; tables without any are missing."""
+        found: dict[str, list[Row]] = {}
+        for table, jobs in self.plan.tables.items():
+            for key, job in jobs.items():
+                columns = self.columns(job)
+                if table != "scatter":
+                    rows = ROWS[table](*key, columns) if table in ROWS else rows_of_columns(columns)
+                    found.setdefault(table, []).extend(rows)
+        return found
+
+    @cached_property
     def wrench(self) -> dict[str, dict[str, Records]]:
         """Split -> method -> records; splits without any are missing."""
         found: dict[str, dict[str, Records]] = {}
-        for (split, method), job in self.plan.wrench.items():
+        for (split, method), job in self.plan.tables.get("wrench", {}).items():
             found.setdefault(split, {})[method] = records_of_columns(self.columns(job))
         return {split: found[split] for split in SPLITS if split in found}
 
     @cached_property
-    def wrench_rows(self) -> dict[str, list[Row]]:
-        """Split -> rows of the wrench table, with intervals under `<column>_interval`."""
-        return {
-            split: [
-                {
-                    **wrench_row(records, split=split, method=method),
-                    **{f"{key}_interval": list(ends) for key, ends in wrench_intervals(records).items()},
-                }
-                for method, records in methods.items()
-            ]
-            for split, methods in self.wrench.items()
-        }
-
-    @cached_property
-    def cost_rows(self) -> list[Row]:
-        """Rows of the comparison of costs, of every set of cases and objective that has run."""
-        return [row for job in self.plan.cost.values() for row in rows_of_columns(self.columns(job))]
-
-    @cached_property
-    def ablation_rows(self) -> list[Row]:
-        """Each variant and refinement, scored by plant and surrogate."""
-        jobs = self.plan.ablation.items()
-        return [row for key, job in jobs for row in variant_rows(*key, self.columns(job))]
-
-    @cached_property
-    def temperature_rows(self) -> list[Row]:
-        """One row per temperature."""
-        return [temperature_row(value, self.columns(job)) for value, job in self.plan.temperature.items()]
-
-    @cached_property
     def scatter(self) -> dict[str, AnyArray]:
         """Candidates of the middle one of the drawn targets, before and after refinement."""
-        columns = self.columns(self.plan.scatter["paper"])
+        columns = self.columns(self.plan.tables["scatter"][()])
         chosen = columns["target"] == int(np.median(np.unique(columns["target"])))
         return {name: values[chosen] for name, values in columns.items()}
-
-    @cached_property
-    def tables(self) -> dict[str, list[Row]]:
-        """Rows of the experiments whose results are finished tables; those that were left out are missing."""
-        return {name: rows_of_columns(self.columns(job)) for name, job in self.plan.tables.items()}
-
-    @cached_property
-    def training_rows(self) -> list[Row]:
-        """One row per small training."""
-        return [training_row(name, self.columns(job)) for name, job in self.plan.training.items()]

@@ -1,6 +1,14 @@
 """How much of everything a report measures: `quick` in minutes, `full` at the paper's size."""
 
 from dataclasses import dataclass
+from typing import Any
+
+Settings = dict[str, Any]
+
+
+def cases(layouts: int, targets: int, **more: Any) -> Settings:
+    """So many layouts, and targets on each."""
+    return {"layouts": layouts, "targets": targets, **more}
 
 
 @dataclass(frozen=True)
@@ -9,64 +17,62 @@ class Sizes:
 
     name: str
     """`quick` or `full`."""
-    main: tuple[int, int]
-    """Layouts, and targets on each, of the splits that the paper has."""
-    other: tuple[int, int]
-    """Layouts, and targets on each, of the other splits."""
-    slow_other: tuple[int, int]
-    """Layouts, and first targets of each, for methods of a tenth of a second on the other splits."""
-    cost: tuple[int, int]
-    """Layouts and targets of each set, for the costs beside the best of 32 starts."""
-    ablation: tuple[int, int]
-    """Layouts and targets of the ablation."""
-    temperature: tuple[int, int]
-    """Layouts and targets at each temperature."""
-    trained: tuple[int, int]
-    """Layouts and targets on which the small trainings are tried."""
-    latency: tuple[int, float]
-    """Timed calls of each method, and the seconds after which a slow one stops."""
-    training: tuple[str, int, int]
-    """Preset, optimizer steps and samples per step of each small training."""
-    swims: tuple[int, int, int]
-    """Closed-loop runs of each case, with other noise: trajectories, faults, speeds; 0 leaves them out."""
-    lost_pairs: bool
-    """Whether pairs of lost fins swim too."""
+    of_table: dict[str, Settings]
+    """Table -> settings of its jobs, as the functions of `work` take them; tables without any are left out.
+    `wrench` has the splits that the paper has, `wrench-other` the others; methods of a tenth of a second per
+    target solve one on each layout of the former, and `wrench-slow` of the latter."""
 
-    def of_split(self, *, main: bool, slow: bool) -> tuple[int, int]:
+    def of_split(self, *, main: bool, slow: bool) -> Settings:
         """Layouts and targets of a split for a quick or a slow method."""
         if main:
-            return (self.main[0], 1) if slow else self.main
-        return self.slow_other if slow else self.other
+            return self.of_table["wrench"] | ({"targets": 1} if slow else {})
+        return self.of_table["wrench-slow" if slow else "wrench-other"]
 
 
+SHIPPED = ["A", "B", "C", "D", "ucat", "asymmetric", "penta", "hexa", "octo", "restricted", "pair"]
+"""Layouts that follow smooth paths in a full report."""
 SIZES = {
     "quick": Sizes(
         "quick",
-        main=(30, 30),
-        other=(20, 10),
-        slow_other=(8, 1),
-        cost=(6, 1),
-        ablation=(20, 10),
-        temperature=(15, 2),
-        trained=(20, 10),
-        latency=(40, 1.5),
-        training=("smoke", 240, 128),
-        swims=(1, 1, 1),
-        lost_pairs=False,
+        {
+            "wrench": cases(30, 30),
+            "wrench-other": cases(20, 10),
+            "wrench-slow": cases(8, 1),
+            "cost": cases(6, 1),
+            "network": cases(4, 4, fins=[4, 8, 12]),
+            "modes": cases(6, 1, starts=32),
+            "unreachable": {"layouts": 8},
+            "steadiness": {"layouts": ["A", "hexa"], "paths": 1, "ticks": 100},
+            "latency": {"calls": 40, "budget_s": 1.5},
+            "first_answers": {"robots": 1},
+            "trajectory": {"runs": 1},
+            "faults": {"runs": 1, "pairs": False},
+            "velocity": {"runs": 1},
+            "ablation": cases(20, 10),
+            "temperature": cases(15, 2),
+            "training": cases(20, 10, preset="smoke", steps=240, batch_size=128),
+        },
     ),
     "full": Sizes(
         "full",
-        main=(100, 1000),
-        other=(100, 100),
-        slow_other=(25, 1),
-        cost=(40, 3),
-        ablation=(100, 20),
-        temperature=(100, 2),
-        trained=(40, 25),
-        latency=(200, 20.0),
-        training=("paper", 400, 256),
-        swims=(2, 1, 5),
-        lost_pairs=True,
+        {
+            "wrench": cases(100, 1000),
+            "wrench-other": cases(100, 100),
+            "wrench-slow": cases(25, 1),
+            "cost": cases(40, 3),
+            "network": cases(20, 15, fins=[3, 4, 5, 6, 8, 10, 12]),
+            "modes": cases(20, 2, starts=256),
+            "unreachable": {"layouts": 50},
+            "steadiness": {"layouts": SHIPPED, "paths": 3, "ticks": 600},
+            "latency": {"calls": 200, "budget_s": 20.0},
+            "first_answers": {"robots": 5},
+            "trajectory": {"runs": 2},
+            "faults": {"runs": 1, "pairs": True},
+            "velocity": {"runs": 5},
+            "ablation": cases(100, 20),
+            "temperature": cases(100, 2),
+            "training": cases(40, 25, preset="paper", steps=400, batch_size=256),
+        },
     ),
 }
 """Name -> sizes."""

@@ -12,6 +12,7 @@ pytest.importorskip("matplotlib")
 
 from matplotlib.axes import Axes  # noqa: E402
 
+from finlab.evaluation.plots.costs import cost_by_fins, cost_by_starts  # noqa: E402
 from finlab.evaluation.plots.studies import (  # noqa: E402
     ablation_dots,  # noqa: E402
     figure_a,  # noqa: E402
@@ -19,11 +20,7 @@ from finlab.evaluation.plots.studies import (  # noqa: E402
     training_bars,
 )
 from finlab.evaluation.plots.style import COLOURS, Picture, picture  # noqa: E402
-from finlab.evaluation.plots.wrench_tracking import (  # noqa: E402
-    cost_by_fins,  # noqa: E402
-    error_by_fins,
-    error_distribution,
-)
+from finlab.evaluation.plots.wrench_tracking import error_by_fins, error_distribution  # noqa: E402
 
 
 def _line(axis: Axes, label: str) -> np.ndarray:
@@ -83,13 +80,31 @@ def test_costs_stand_over_their_fins_with_their_intervals() -> None:
     assert container.get_label() == "search"
     points, _, (bars,) = container
     assert points.get_ydata() == pytest.approx([1.5, 1.5])
-    assert np.round(points.get_xdata(orig=False)).tolist() == [2, 5]
+    assert np.round(points.get_xdata(orig=False)).tolist() == [0, 1]
+    assert [label.get_text() for label in power.get_xticklabels()] == ["2", "5"]
     assert [segment[:, 1].tolist() for segment in bars.get_segments()] == [
         pytest.approx([1.4, 1.7]),
         pytest.approx([1.4, 1.7]),
     ]
     assert effort.containers[0][0].get_ydata() == pytest.approx([1.2])
     assert power.get_title(loc="left").startswith("power") and "cost" in power.get_ylabel()
+
+
+def test_costs_of_each_start_stand_beside_each_other() -> None:
+    about = {"objective": "effort", "cost_ratio_interval": [0.9, 1.2]}
+    rows = [
+        {**about, "seeds": seeds, "fins": fins, "cost_ratio": ratio}
+        for fins in (4, 12)
+        for seeds, ratio in (("network", 1.0), ("one", 1.1), ("all", 1.0))
+    ]
+    (axis,) = cost_by_starts(rows).axes
+    network, one = axis.containers  # `all` is what they are compared with
+    assert (network.get_label(), one.get_label()) == ("network", "one")
+    assert network[0].get_ydata() == pytest.approx([1.0, 1.0]) and one[0].get_ydata() == pytest.approx(
+        [1.1, 1.1]
+    )
+    assert (one[0].get_xdata() > network[0].get_xdata()).all()
+    assert [label.get_text() for label in axis.get_xticklabels()] == ["4", "12"]
 
 
 def test_times_are_sorted_and_reach_from_median_to_tail() -> None:

@@ -1,7 +1,9 @@
 """A whole report at a tiny size, with an untrained network; then again from what was kept."""
 
 import json
+from collections.abc import Collection
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,24 +13,28 @@ from finlab.evaluation.report import plan as planning
 from finlab.evaluation.report.jobs import Job
 from finlab.evaluation.report.make import PAGE, PICTURES, TABLES, TWIN, make_report
 from finlab.evaluation.report.plan import make_plan
-from finlab.evaluation.report.sizes import Sizes
+from finlab.evaluation.report.sizes import Sizes, cases
 
 pytest.importorskip("matplotlib")
 pytest.importorskip("casadi")
 
 TINY = Sizes(
     "tiny",
-    main=(2, 3),
-    other=(2, 2),
-    slow_other=(1, 1),
-    cost=(2, 1),
-    ablation=(2, 2),
-    temperature=(2, 2),
-    trained=(2, 2),
-    latency=(3, 0.5),
-    training=("smoke", 4, 32),
-    swims=(0, 0, 0),
-    lost_pairs=False,
+    {
+        "wrench": cases(2, 3),
+        "wrench-other": cases(2, 2),
+        "wrench-slow": cases(1, 1),
+        "cost": cases(2, 1),
+        "network": cases(1, 2, fins=[4]),
+        "modes": cases(2, 1, starts=4),
+        "unreachable": {"layouts": 4},
+        "steadiness": {"layouts": ["D"], "paths": 1, "ticks": 3},
+        "latency": {"calls": 3, "budget_s": 0.5},
+        "first_answers": {"robots": 1},
+        "ablation": cases(2, 2),
+        "temperature": cases(2, 2),
+        "training": cases(2, 2, preset="smoke", steps=4, batch_size=32),
+    },
 )
 
 
@@ -49,27 +55,32 @@ def few() -> pytest.MonkeyPatch:
         patch.setattr(planning, "TEMPERATURES", (0.01, 1.0))
         patch.setattr(planning, "CHANGES", {name: CHANGES[name] for name in ("recipe", "one_component")})
         patch.setattr("finlab.evaluation.experiments.ablation.TIMED_CALLS", 1)
+        patch.setattr("finlab.evaluation.experiments.first_answers.KINDS", ("drag", "table"))
         yield patch
 
 
 @pytest.fixture(scope="module")
-def folder(
-    few: pytest.MonkeyPatch, untrained_checkpoint: Path, tmp_path_factory: pytest.TempPathFactory
-) -> Path:
+def untrained(untrained_mdn: Path, untrained_checkpoint: Path) -> Checkpoints:
+    return Checkpoints(str(untrained_mdn), str(untrained_checkpoint))
+
+
+@pytest.fixture(scope="module")
+def folder(few: pytest.MonkeyPatch, untrained: Checkpoints, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("report")
-    _make(out, untrained_checkpoint)
+    _make(out, untrained)
     return out
 
 
-def _make(out: Path, checkpoint: Path) -> None:
+def _make(out: Path, checkpoints: Checkpoints, **options: Any) -> None:
     make_report(
         out,
         sizes=TINY,
         seed=0,
-        checkpoints=Checkpoints(str(checkpoint), str(checkpoint)),
+        checkpoints=checkpoints,
         records=out / "records",
         command="finlab eval report -o DIR",
         processes=0,
+        **options,
     )
 
 
@@ -99,6 +110,17 @@ def test_page_twin_pictures_and_rows_say_the_same(folder: Path, untrained_checkp
         for method in ("search", "analytic")
     }
     assert [row["temperature"] for row in tables["temperature"]] == [0.01, 1.0]
+    assert {(row["fins"], row["objective"]) for row in tables["network"]} == {(4, "power"), (4, "effort")}
+    assert [row["fins"] for row in tables["first_answers"]] == ["drag", "drag", "table", "table"]
+    assert [row["layout"] for row in tables["steadiness"]] == ["D"]
+    for section in planning.SECTIONS:
+        assert section == "closed-loop" or section in tables  # nothing swims in a tiny report
+
+
+def test_every_method_says_what_it_was_given(folder: Path) -> None:
+    tables, twin = json.loads((folder / TABLES).read_text("utf-8")), (folder / TWIN).read_text("utf-8")
+    told = twin[twin.index("## Who knows what") : twin.index("## Wrench tracking")]
+    assert all(f"`{row['method']}`" in told for name in ("wrench", "cost", "latency") for row in tables[name])
 
 
 def test_the_page_stands_alone(folder: Path) -> None:
@@ -108,24 +130,47 @@ def test_the_page_stands_alone(folder: Path) -> None:
 
 
 def test_the_second_time_nothing_is_done_again(
-    folder: Path, untrained_checkpoint: Path, monkeypatch: pytest.MonkeyPatch
+    folder: Path, untrained: Checkpoints, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*_: object) -> None:
         raise AssertionError("work was done twice")
 
     monkeypatch.setattr(Job, "run", refuse)
     rows = (folder / TABLES).read_text("utf-8")
-    _make(folder, untrained_checkpoint)
+    _make(folder, untrained)
     assert (folder / TABLES).read_text("utf-8") == rows
+
+
+def test_a_report_can_be_made_section_by_section(few: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def headings(sections: Collection[str]) -> list[str]:
+        _make(tmp_path, Checkpoints(), sections=sections)
+        lines = (tmp_path / TWIN).read_text("utf-8").splitlines()
+        return [line.removeprefix("## ") for line in lines if line.startswith("## ")]
+
+    always = ["Who leads", "Who knows what", "How this was made"]
+    assert headings(["unreachable"]) == [*always[:2], "Out of reach", always[2]]
+    assert headings(["steadiness"]) == [*always[:2], "Out of reach", "From tick to tick", always[2]]
+    assert "parts had not been run when this page was made" in (tmp_path / TWIN).read_text("utf-8")
+
+
+def test_a_study_without_one_of_its_parts_is_left_out(few: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    plan = make_plan(TINY, seed=0, checkpoints=Checkpoints(), runs=tmp_path).only(["temperature"])
+    *parts, last = plan
+    for job in parts:
+        job.path(tmp_path).touch()
+    assert not plan.only_done(tmp_path).tables
+    last.path(tmp_path).touch()
+    assert plan.only_done(tmp_path) == plan
 
 
 def test_without_casadi_and_torch_the_rest_is_planned(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    whole = make_plan(TINY, seed=0, checkpoints=Checkpoints(), runs=tmp_path)
+    whole = make_plan(TINY, seed=0, checkpoints=Checkpoints(), runs=tmp_path).tables
     monkeypatch.setattr(planning, "find_spec", lambda _: None)
-    bare = make_plan(TINY, seed=0, checkpoints=Checkpoints(), runs=tmp_path)
-    assert whole.training and not bare.training
-    assert {method for _, method in set(whole.wrench) - set(bare.wrench)} == {"ipopt"}
-    assert bare.cost == whole.cost  # SLSQP stands in for IPOPT
-    assert bare.ablation == whole.ablation and bare.wrench["id", "search"] == whole.wrench["id", "search"]
+    bare = make_plan(TINY, seed=0, checkpoints=Checkpoints(), runs=tmp_path).tables
+    assert set(whole) - set(bare) == {"training", "unreachable"}
+    assert {method for _, method in set(whole["wrench"]) - set(bare["wrench"])} == {"ipopt"}
+    assert bare["cost"] == whole["cost"]  # SLSQP stands in for IPOPT
+    assert bare["ablation"] == whole["ablation"]
+    assert bare["wrench"]["id", "search"] == whole["wrench"]["id", "search"]

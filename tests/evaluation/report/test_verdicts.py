@@ -1,6 +1,5 @@
 """Who leads, from tables made by hand: intervals apart, overlapping, and not known."""
 
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -111,21 +110,19 @@ def test_the_summary_compares_every_table_it_has() -> None:
     """One row of each table, the default method ahead in all but the time of a call."""
     closed_loop = {"ate_std": 0.001, "runs": 4}
     speed = {"speed": 0.1, "inertial_w_std": 0.01, "mae_std": 1e-4, "runs": 5}
-    results: Any = SimpleNamespace(
-        wrench_rows={
-            "id": [
-                {"method": m, "err_norm_mean": e, "err_norm_mean_interval": (0.9 * e, 1.1 * e)}
-                for m, e in (("search", 3e-4), ("qp", 0.5))
-            ]
-        },
-        cost_rows=[
+    tables: dict[str, list[dict[str, Any]]] = {
+        "wrench": [
+            {"split": "id", "method": m, "err_norm_mean": e, "err_norm_mean_interval": (0.9 * e, 1.1 * e)}
+            for m, e in (("search", 3e-4), ("qp", 0.5))
+        ],
+        "cost": [
             {"split": "id", "objective": objective, "method": m, "fins": fins, "cost_ratio": ratio}
             | {"cost_ratio_interval": None if ratio is None else [0.99 * ratio, 1.01 * ratio]}
             for objective in ("power", "effort")
             for fins in (4, "all")
             for m, ratio in (("search", 1.0), ("qp", 1.5 if objective == "power" else 0.9), ("sqp", None))
         ],
-        ablation_rows=[
+        "ablation": [
             {
                 "variant": "ours",
                 "refinement": "adam",
@@ -134,22 +131,19 @@ def test_the_summary_compares_every_table_it_has() -> None:
                 "err_norm_mean_interval": (0.03, 0.05),
             }
         ],
-        tables={
-            "latency": [
-                {"method": m, "p50_ms": t, "p50_ms_interval": (t, t)}
-                for m, t in (("search", 2.0), ("qp", 0.1))
-            ],
-            "trajectory": [
-                {**closed_loop, "layout": "A", "method": m, "ate": a}
-                for m, a in (("search", 0.03), ("on-board", 0.06))
-            ],
-            "velocity": [
-                {**speed, "method": m, "inertial_w": w, "mae": w / 100}
-                for m, w in (("search-effort", 1.0), ("analytic", 2.0))
-            ],
-        },
-    )
-    found = [(one["measure"], one["case"], one["against"], one["verdict"]) for one in comparisons(results)]
+        "latency": [
+            {"method": m, "p50_ms": t, "p50_ms_interval": (t, t)} for m, t in (("search", 2.0), ("qp", 0.1))
+        ],
+        "trajectory": [
+            {**closed_loop, "layout": "A", "method": m, "ate": a}
+            for m, a in (("search", 0.03), ("on-board", 0.06))
+        ],
+        "velocity": [
+            {**speed, "method": m, "inertial_w": w, "mae": w / 100}
+            for m, w in (("search-effort", 1.0), ("analytic", 2.0))
+        ],
+    }
+    found = [(one["measure"], one["case"], one["against"], one["verdict"]) for one in comparisons(tables)]
     assert found == [
         ("mean error", "id", "qp", LEADS),
         ("mean error", "id", "paper (printed)", LEADS),

@@ -36,8 +36,8 @@ def closed_loop_blocks(results: Results) -> list[Block]:
             "A robot with six degrees of freedom swims in simulation, sensor noise and servo lag included; "
             "the controllers are the paper's. The paper's runs took place in another simulator "
             "(trajectories) and in a pool (faults, speeds), on paths that it does not describe: its "
-            "figures stand beside ours, not against them. `on-board` is the robot's own fixed-frequency "
-            "law."
+            "figures stand beside ours, not against them. All methods here were given the law `drag` by "
+            "which the simulated fins push; `on-board` is the robot's own law at a fixed frequency."
         ),
         *blocks,
     ]
@@ -54,7 +54,7 @@ def _trajectory(rows: Sequence[Row], results: Results) -> list[Block]:
         "### Trajectories",
         Figure.drawn(
             "paths",
-            draw_layouts(tracks_of_columns(results.columns(results.plan.tables["trajectory"])), rows),
+            draw_layouts(tracks_of_columns(results.columns(results.plan.tables["trajectory"][()])), rows),
             "One run on each of the paper's layouts: from above, and its depth over time.",
         ),
         Table(columns, shown),

@@ -1,7 +1,7 @@
 """What answers cost, in watts and as the paper's effort, beside the best of many random starts."""
 
 from finlab.evaluation.experiments.cost import OBJECTIVES, TRACKED, UNITS
-from finlab.evaluation.plots.wrench_tracking import cost_by_fins
+from finlab.evaluation.plots.costs import cost_by_fins
 from finlab.evaluation.report.document import Block, Column, Figure, Fold, Table, method_row
 from finlab.evaluation.report.plan import N_STARTS
 from finlab.evaluation.report.results import Results
@@ -25,7 +25,7 @@ def _columns(unit: str) -> tuple[Column, ...]:
 
 def cost_blocks(results: Results) -> list[Block]:
     """The whole section."""
-    rows = results.cost_rows
+    rows = results.tables["cost"]
     blocks: list[Block] = [
         "## Cost",
         (

@@ -1,6 +1,7 @@
 """Time per call, ablation, temperature and training: one table and one picture each."""
 
 from finlab.evaluation.experiments.ablation import VARIANTS
+from finlab.evaluation.experiments.first_answers import N_FINS
 from finlab.evaluation.experiments.temperature import PAPER_TEMPERATURE
 from finlab.evaluation.experiments.training_study import CHANGES
 from finlab.evaluation.paper_figures import paper_figures
@@ -21,8 +22,8 @@ REFINED_BY = {"adam": "Adam", "levenberg-marquardt": "Levenberg-Marquardt"}
 
 
 def latency_blocks(results: Results) -> list[Block]:
-    """Methods side by side in one run."""
-    rows = results.tables["latency"]
+    """Methods side by side in one run, and fins that nobody has seen."""
+    rows = results.tables.get("latency", ())
     paper_ms = paper_figures()["inference"]["cycle_s"] * 1e3
     printed = printed_row("paper's cycle, printed (Jetson Orin Nano)", {"p50_ms": paper_ms})
     columns = (
@@ -42,13 +43,34 @@ def latency_blocks(results: Results) -> list[Block]:
             "latency", latency_dots(rows, paper_ms), "Dots are medians, bars end at the 99th percentile."
         ),
         Table(columns, [*map(method_row, rows), printed]),
+        *first_answer_blocks(results),
+    ]
+
+
+def first_answer_blocks(results: Results) -> list[Block]:
+    """Robots with fins that nobody has seen."""
+    columns = (
+        Column("fins", "fins", "code"),
+        Column("new_models", "new models on the robot", "count"),
+        Column("robots", "robots", "count"),
+        Column("first_ms", "first answer [ms]", "three"),
+        Column("again_ms", "another robot, same fins [ms]", "three"),
+    )
+    return [
+        "### Fins never seen",
+        (
+            "A fin is compiled once, whatever its law, and kept by content: the first call of a robot with "
+            f"{N_FINS} new fins, and the first call of another robot with the same fins, by method `search`. "
+            "The slowest robot, in the processor's time."
+        ),
+        Table(columns, results.tables.get("first_answers", ())),
     ]
 
 
 def ablation_blocks(results: Results) -> list[Block]:
     """The paper's five rows, twice refined, twice scored."""
     printed = paper_figures()["ablation"]
-    rows = results.ablation_rows
+    rows = results.tables["ablation"]
     blocks: list[Block] = [
         "## Ablation",
         (
@@ -95,7 +117,7 @@ def ablation_blocks(results: Results) -> list[Block]:
 
 def temperature_blocks(results: Results) -> list[Block]:
     """The paper's figure A."""
-    rows = results.temperature_rows
+    rows = results.tables["temperature"]
     best = min(rows, key=lambda row: row["best_j_mean"])
     columns = (
         Column("temperature", "T", "three"),
@@ -126,8 +148,8 @@ def temperature_blocks(results: Results) -> list[Block]:
 
 def training_blocks(results: Results) -> list[Block]:
     """Small trainings with one thing changed."""
-    rows = results.training_rows
-    settings = next(iter(results.plan.training.values())).settings
+    rows = results.tables["training"]
+    settings = next(iter(results.plan.tables["training"].values())).settings
     columns = (
         Column("title", "what is changed"),
         Column("err_norm_mean", "best raw candidate", "error", "err_norm_mean_interval"),
@@ -143,7 +165,8 @@ def training_blocks(results: Results) -> list[Block]:
             f"Trainings of {settings['steps']} steps of {settings['batch_size']} samples each (preset "
             f"`{settings['preset']}`), one thing changed at a time. Such budgets are far below those of the "
             "shipped networks: read the order, not the size. The same surrogate ranks and refines in all "
-            "of them."
+            "of them; the plant, fins of the law `drag`, scores. Nothing here concerns `search`, which "
+            "learns nothing."
         ),
         Figure.drawn("training", training_bars(rows, titles), "Mean error with the interval of a rerun."),
         Table(columns, [{**row, "title": titles[row["change"]]} for row in rows]),

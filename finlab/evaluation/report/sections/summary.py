@@ -1,13 +1,16 @@
 """The first screen: a few numbers, and in which measures and cases each method leads, by their intervals."""
 
+from collections.abc import Mapping, Sequence
+
 from finlab.evaluation.experiments.cost import OBJECTIVES
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.report.document import Block, Card, Column, Fold, Row, Table
-from finlab.evaluation.report.numbers import error, factor, share, three
+from finlab.evaluation.report.numbers import error, share, three
 from finlab.evaluation.report.plan import N_STARTS
-from finlab.evaluation.report.results import Results
 from finlab.evaluation.report.verdicts import LEADS, LEVEL, TRAILS, compare, standings, with_printed
 
+Tables = Mapping[str, Sequence[Row]]
+"""Rows by table; those that have not run are missing."""
 OURS = "search"
 STANDINGS = (
     Column("measure", "less is better"),
@@ -28,40 +31,43 @@ COMPARISONS = (
 )
 
 
-def summary_blocks(results: Results) -> list[Block]:
+def summary_blocks(tables: Tables) -> list[Block]:
     """Cards, who leads where, and every comparison behind it."""
-    found = comparisons(results)
+    found = comparisons(tables)
     return [
-        tuple(_cards(results, results.wrench_rows)),
+        tuple(_cards(tables)),
         "## Who leads",
         (
             "The default method, `search`, against every other one. One leads where the intervals in which "
             "reruns would land do not overlap; a single run has none and no verdict. Figures that the paper "
-            "prints count as exact. All methods but `paper` know each fin's own model; `search` needs no "
-            "network and no training."
+            "prints count as exact. `search` needs no network and no training; next comes what each "
+            "method was given."
         ),
         Table(STANDINGS, standings(found)),
         Fold("Every comparison, with its values", (Table(COMPARISONS, found),)),
     ]
 
 
-def comparisons(results: Results) -> list[Row]:
+def comparisons(tables: Tables) -> list[Row]:
     """Every table's rows against those of the default method."""
-    printed, tables = paper_figures(), results.tables
+    printed, wrench = paper_figures(), tables.get("wrench", ())
     found: list[Row] = []
-    for split, rows in results.wrench_rows.items():
+    for split in dict.fromkeys(row["split"] for row in wrench):
+        rows = [row for row in wrench if row["split"] == split]
         theirs = printed["wrench_tracking"].get(split, {})
         means = {"paper (printed)": theirs["ours"]["err_norm_mean"]} if theirs else {}
         beside = with_printed(rows, "err_norm_mean", means)
         found += compare("mean error", beside, "err_norm_mean", split)
-    for row in results.ablation_rows:
+    for row in tables.get("ablation", ()):
         if (row["variant"], row["refinement"]) == ("ours", "adam"):
             means = {"paper (printed)": printed["ablation"]["ours"]["err_norm_mean"]}
             beside = with_printed([{**row, "method": "paper"}], "err_norm_mean", means)
             where = f"ablation by the {row['scored_by']}"
             found += compare("mean error", beside, "err_norm_mean", where, ("paper",))
     for objective in OBJECTIVES:
-        costs = [row for row in results.cost_rows if row["objective"] == objective and row["fins"] == "all"]
+        costs = [
+            row for row in tables.get("cost", ()) if row["objective"] == objective and row["fins"] == "all"
+        ]
         found += compare(objective, costs, "cost_ratio", lambda row: f"split {row['split']}")
     found += compare("time per call", tables.get("latency", ()), "p50_ms", "4 fins")
     found += compare("ATE", tables.get("trajectory", ()), "ate", lambda row: f"layouts {row['layout']}")
@@ -76,35 +82,27 @@ def _speed(row: Row) -> str:
     return "all speeds" if row["speed"] is None else f"{row['speed']:.2f} m/s"
 
 
-def _cards(results: Results, tables: dict[str, list[Row]]) -> list[Card]:
+def _cards(tables: Tables) -> list[Card]:
     printed = paper_figures()["wrench_tracking"]
     cards = []
-    for split, label in (("id", "mean error, layouts like those of training"), ("ood", "mean error, beyond")):
-        row = next((row for row in tables.get(split, ()) if row["method"] == OURS), None)
-        if row is None:
-            continue
-        theirs = printed[split]["ours"]["err_norm_mean"]
-        cards.append(
-            Card(
-                error(row["err_norm_mean"]),
-                f"{label} (`{split}`)",
-                f"paper: {theirs:.4f}, {factor(theirs / row['err_norm_mean'])} times as much; "
-                f"{share(row['success_0.01'])} within 0.01",
-            )
-        )
-    ours = [row for row in results.cost_rows if (row["method"], row["fins"]) == (OURS, "all")]
+    mine = [row for row in tables.get("wrench", ()) if row["method"] == OURS and row["split"] in printed]
+    for row in mine:
+        theirs = printed[row["split"]]["ours"]["err_norm_mean"]
+        detail = f"{share(row['success_0.01'])} within 0.01; the paper, with learned physics: {theirs:.4f}"
+        cards.append(Card(error(row["err_norm_mean"]), f"mean error, split `{row['split']}`", detail))
+    ours = [row for row in tables.get("cost", ()) if (row["method"], row["fins"]) == (OURS, "all")]
     for row in (row for row in ours if row["split"] == "id" and row["cost_ratio"] is not None):
         low, high = row["cost_ratio_interval"]
         detail = f"reruns: {low:.3f} to {high:.3f}; worst target {row['ratio_max']:.3f}"
         label = f"{row['objective']} over the best of {N_STARTS} IPOPT starts (`id`)"
         cards.append(Card(f"{row['cost_ratio']:.3f}", label, detail))
-    times = {row["method"]: row for row in results.tables.get("latency", ())}
+    times = {row["method"]: row for row in tables.get("latency", ())}
     if OURS in times:
-        mine = times[OURS]
+        own = times[OURS]
         others = [f"`{n}` {three(times[n]['p50_ms'])}" for n in ("paper", "ipopt", "trf") if n in times]
-        detail = f"99th percentile {three(mine['p99_ms'])}; {', '.join(others)} ms"
-        cards.append(Card(f"{three(mine['p50_ms'])} ms", "one call, median, four fins", detail))
-    swum = {r["method"]: r for r in results.tables.get("trajectory", ()) if r["layout"] == "all"}
+        detail = f"99th percentile {three(own['p99_ms'])}; {', '.join(others)} ms"
+        cards.append(Card(f"{three(own['p50_ms'])} ms", "one call, median, four fins", detail))
+    swum = {r["method"]: r for r in tables.get("trajectory", ()) if r["layout"] == "all"}
     if OURS in swum:
         beside = paper_figures()["trajectory"]["all"]["ate"]
         detail = f"in our simulation; paper, in another: {100 * beside:.1f} cm"

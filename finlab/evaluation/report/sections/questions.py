@@ -1,0 +1,82 @@
+"""What else is asked of the default method: all ways, wrenches out of reach, tick after tick."""
+
+from finlab.evaluation.experiments.mode_coverage import CHEAP
+from finlab.evaluation.experiments.steadiness import GOAL, RATE
+from finlab.evaluation.report.document import Block, Column, Table
+from finlab.evaluation.report.results import Results
+
+
+def mode_blocks(results: Results) -> list[Block]:
+    """Distinct ways against a ground truth that knows no search."""
+    starts = results.plan.tables["modes"][()].settings["starts"]
+    columns = (
+        Column("fins", "fins", "count"),
+        Column("n", "targets", "count"),
+        Column("truth", "ways of the starts", "three"),
+        Column("modes", "ways told", "three"),
+        Column("coverage", "of the starts', told", "share"),
+        Column("truth_coverage", "of those told, found by the starts", "share"),
+        Column("best_cost", "least effort over the starts'", "ratio"),
+        Column("distance", "energy distance", "error"),
+    )
+    return [
+        "## Distinct ways",
+        (
+            "With effort kept least, a wrench can often be delivered in several ways (with power there is "
+            "next to always one). `result.explore()` of method `search`, which asks no network, beside what "
+            f"{starts} random starts of IPOPT per target converge to; ways of up to {CHEAP:g} times the "
+            "least effort, exact by the plant, whose law `drag` both were given. Split `id`."
+        ),
+        Table(columns, results.tables["modes"]),
+    ]
+
+
+def unreachable_blocks(results: Results) -> list[Block]:
+    """What is delivered of a wrench out of reach."""
+    columns = (
+        Column("limits", "limits"),
+        Column("policy", "policy", "code"),
+        Column("n", "targets", "count"),
+        Column("excess_median", "excess, median", "error"),
+        Column("excess_max", "excess, largest", "error"),
+        Column("beside_max", "beside, largest", "error"),
+        Column("p50_ms", "ms per call", "three"),
+    )
+    return [
+        "## Out of reach",
+        (
+            "Method `search` under each policy, on random robots of 2 to 8 fins of the law `drag`, beside "
+            "the best that IPOPT proves possible in the fins' forces; scored by the plant. Excess: for "
+            "`closest`, and for the first group of `priority`, normalized error beyond the least possible; "
+            "for `direction`, share of the target lacking to the largest possible. Beside: normalized wrench "
+            "beside that share."
+        ),
+        Table(columns, results.tables["unreachable"]),
+    ]
+
+
+def steadiness_blocks(results: Results) -> list[Block]:
+    """How far fins turn from tick to tick."""
+    columns = (
+        Column("layout", "layout", "code"),
+        Column("fins", "fins", "count"),
+        Column("paths", "paths", "count"),
+        Column("turn_free", "turn without [rad]", "three"),
+        Column("turn_steady", "turn with [rad]", "three"),
+        Column("turn_ratio", "worst ratio", "ratio"),
+        Column("steady", f"paths within {GOAL:g}", "count"),
+        Column("forced", "forced [rad]", "three"),
+        Column("energy_ratio", "effort with / without", "ratio"),
+        Column("energy_ratio_worst", "worst path", "ratio"),
+        Column("err_norm_max", "largest error", "error"),
+    )
+    return [
+        "## From tick to tick",
+        (
+            f"Method `search` follows smooth random paths of wrenches at {RATE:g} Hz, with and without being "
+            "told its previous command; it keeps power least, by each layout's own fins, and the plant "
+            "scores every tick. Turn: the largest of any fin in one tick. Forced: what any answer must "
+            "turn, where the fins' forces are unique."
+        ),
+        Table(columns, results.tables["steadiness"]),
+    ]
