@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from finlab.forces.envelopes import layout_envelopes
+from finlab.forces.envelopes import Envelopes, layout_envelopes
+from finlab.forces.force_space import PlanarProblem
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
 from finlab.layout.arrays import force_columns
@@ -117,13 +118,23 @@ def fin_sets(layout: Layout, failed: Collection[str] = ()) -> FinSets:
     """
     lost = layout.indices(tuple(failed))
     columns = force_columns(layout.position, layout.mounting_angle)[:, 1:] / SCALE
-    fins = layout_envelopes(layout, Objective())
-    radius = fins.maximum.copy()
-    radius[list(lost)] = 0.0
+    sets = _one_robot(columns, layout_envelopes(layout, Objective()))
+    radius = sets.radius.copy()
+    radius[:, list(lost)] = 0.0
+    return sets._replace(radius=radius)
+
+
+def planar_sets(problem: PlanarProblem) -> FinSets:
+    """Returns what the compiled fins of a problem can push, in its normalized wrenches."""
+    return _one_robot(np.stack(np.split(problem.columns, 2), axis=1), problem.fins)
+
+
+def _one_robot(columns: Array, fins: Envelopes) -> FinSets:
+    """Compiled fins with wrenches per newton (n, 2, m) as one robot of a batch."""
     rim = fins.rim_shares
     return FinSets(
         np.ascontiguousarray(columns)[None],
-        radius[None],
+        fins.maximum[None],
         fins.middle[None],
         fins.half[None],
         None if rim is None else rim[None],

@@ -154,7 +154,7 @@ def descend(
     fins, rows, n = problem.fins, len(seeds), seeds.shape[-1]
     cut = np.ones((rows, n))
     if seeds.ndim == 3:
-        response = _quadratic(problem, fins.project(seeds, np.sqrt((seeds**2).sum(1)) + LEAST), cut)
+        response = _quadratic(problem, fins.project(seeds, _size(seeds)), cut)
     else:
         start, nothing = np.maximum(seeds, REST * fins.maximum), np.zeros((rows, 2, n))
         mobility = np.zeros((rows, 3, n))
@@ -222,7 +222,7 @@ def _mended(
 def polar(problem: PlanarProblem, force: Array) -> Planar:
     """Planar forces (R, n, 2) [N] as sizes and directions within the arcs, the rest unknown."""
     turned = force.swapaxes(1, 2)
-    found = problem.fins.project(turned, np.sqrt((turned**2).sum(1)) + LEAST)
+    found = problem.fins.project(turned, _size(turned))
     row = problem.fins.lookup(found.rim, found.size)
     unknown = np.full((len(force), 6), np.nan)
     return Planar(found.size, _direction(found), row, unknown, unknown)

@@ -19,7 +19,7 @@ from finlab.forces.fin_envelope import (
     SHAFT,
     STIFFNESS,
 )
-from finlab.forces.planar_sets import planar_sets
+from finlab.forces.fin_sets import planar_sets
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.layout.angles import wrapped
 from finlab.physics import make_law

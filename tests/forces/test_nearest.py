@@ -5,9 +5,9 @@ import pytest
 from scipy.optimize import minimize
 
 from finlab.assets import shipped_layouts
+from finlab.forces.fin_sets import planar_sets
 from finlab.forces.force_space import PlanarProblem
 from finlab.forces.nearest import nearest, nearest_along, nearest_in_turn
-from finlab.forces.planar_sets import planar_sets
 from finlab.layout import load_layout, random_layout
 from tests.forces.conftest import problem_of
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from finlab.allocation.search.levenberg_marquardt import refine
 from finlab.allocation.search.prepared import Prepared
 from finlab.arrays import Array
+from finlab.forces.fin_sets import planar_sets
 from finlab.forces.force_space import PlanarProblem, polar, realize
 from finlab.forces.nearest import nearest, wrench_of
-from finlab.forces.planar_sets import planar_sets
 
 
 @dataclass(frozen=True)

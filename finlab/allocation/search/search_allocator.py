@@ -29,9 +29,9 @@ from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.forces.compiled_fins import CompiledFins
+from finlab.forces.fin_sets import planar_sets
 from finlab.forces.force_space import PlanarProblem
 from finlab.forces.nearest import Nearest, nearest, nearest_along, nearest_in_turn
-from finlab.forces.planar_sets import planar_sets
 from finlab.inference.normalization import Normalization
 from finlab.inference.threads import single_threaded_products
 from finlab.layout import Layout

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from finlab.forces.fin_sets import planar_sets
 from finlab.forces.nearest import nearest
-from finlab.forces.planar_sets import planar_sets
 from finlab.layout import Limits, stack_layouts
 from finlab.training.mdn.random_fins import FAMILIES, random_fin, varied_limits
 from finlab.training.mdn.random_robots import FIN_COUNTS, FinPool, RandomRobot, random_robot, random_targets
