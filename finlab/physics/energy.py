@@ -69,9 +69,6 @@ def command_energy(
 class EnergyMeter:
     """The energy proxy of one robot whose fins are all healthy, ready for many commands."""
 
-    is_power = False
-    """See `finlab.physics.objective.PowerMeter`."""
-
     def __init__(self, upper: Array, weights: EnergyWeights = DEFAULT_WEIGHTS) -> None:
         """Make it for upper limits (n, 3)."""
         self.upper, self.weights = upper, weights

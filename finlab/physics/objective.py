@@ -34,6 +34,11 @@ class Objective:
         be tried."""
         return self.name == "power"
 
+    @property
+    def is_power(self) -> bool:
+        """Whether cost is the mechanical power and nothing else."""
+        return self.name == "power" and self.copper_loss == 0.0
+
     def fin_cost(self, law: FinLaw, upper: Array) -> Callable[[Array], Array]:
         """Returns the cost of commands (..., 3) of one fin with upper limits (3,), its direction left out."""
         if self.name == "power":
@@ -54,11 +59,9 @@ class Objective:
 
     def meter(self, plant: Plant) -> "CostMeter":
         """Returns what tells the cost of a robot's commands."""
-        return (
-            PowerMeter(plant, self.copper_loss)
-            if self.name == "power"
-            else EnergyMeter(plant.upper, self.weights)
-        )
+        if self.name == "power":
+            return PowerMeter(plant, self.copper_loss)
+        return EnergyMeter(plant.upper, self.weights)
 
 
 class PowerMeter:
@@ -67,12 +70,14 @@ class PowerMeter:
     def __init__(self, plant: Plant, copper_loss: float = 0.0) -> None:
         """Make it for the fins of a plant."""
         self._plant, self._copper_loss = plant, copper_loss
-        self.is_power = copper_loss == 0.0
-        """Whether this is the mechanical power and nothing else."""
+
+    def fins(self, command: Array) -> Array:
+        """Power (R, n) [W] of each fin under commands (R, n, 3)."""
+        return self._plant.power(command, self._copper_loss)
 
     def __call__(self, command: Array) -> Array:
         """Power (R,) [W] of commands (R, n, 3)."""
-        total: Array = self._plant.power(command, self._copper_loss).sum(-1)
+        total: Array = self.fins(command).sum(-1)
         return total
 
     def slopes(self, command: Array) -> Array:

@@ -18,9 +18,8 @@ from finlab.allocation.learned.proposal import Proposal, propose, shares
 from finlab.allocation.learned.settings import MdnSettings
 from finlab.allocation.search.pipeline import Pipeline
 from finlab.allocation.search.prepared import Prepared
-from finlab.allocation.search.refined_candidates import FallbackForces, RefinedCandidates, nearest_forces
-from finlab.allocation.search.search_allocator import CHUNK, SearchAllocator
-from finlab.allocation.solution import Candidates, Insight, Solution
+from finlab.allocation.search.search_allocator import Beginning, SearchAllocator
+from finlab.allocation.solution import Candidates, Insight
 from finlab.arrays import Array
 from finlab.forces.force_space import polar, realize
 from finlab.inference.force_network import NumpyForceNetwork
@@ -59,34 +58,13 @@ class MdnAllocator(SearchAllocator):
         drawn = self.settings.n_candidates, self.settings.temperature, seed
         return propose(self.network, view, targets / self.normalization.std, *drawn)
 
-    def _solve(
-        self,
-        layout: Layout,
-        targets: Array,
-        *,
-        seed: int,
-        previous: Array | None,
-        fallback: FallbackForces = nearest_forces,
-    ) -> Solution:
-        prepared = self.pipeline.prepare(layout)
-        if len(targets) > 1:
-
-            def solve(start: int) -> RefinedCandidates:
-                some = targets[start : start + CHUNK]
-                seeds = self.proposals(prepared, some, seed + start).force
-                return self.pipeline.solve(prepared, some, seeds=seeds, fallback=fallback)
-
-            return self._many(solve, len(targets))
-        with self._one_thread():
-            proposal = self.proposals(prepared, targets, seed)
-            refined = self.pipeline.solve(
-                prepared, targets, previous, seeds=proposal.force, fallback=fallback
-            )
-        names = _names(proposal)
-        if previous is not None:  # its own way is what the search begins with
-            names = ("the way it moves now", *names)
-        return self._single(prepared, targets, refined, names)._replace(
-            samples=lambda: _samples(prepared, proposal, targets / self.normalization.std)
+    def _beginning(self, prepared: Prepared, targets: Array, seed: int) -> Beginning:
+        proposal = self.proposals(prepared, targets, seed)
+        names = tuple(f"component {k + 1}" for k in proposal.component[0].tolist())
+        return Beginning(
+            proposal.force,
+            names,
+            lambda: _samples(prepared, proposal.force[0], targets / self.normalization.std, names),
         )
 
     def insight(self, layout: Layout, wrench: ArrayLike) -> Insight:
@@ -106,18 +84,12 @@ def _view(pipeline: Pipeline, layout: Layout) -> RobotView:
     return robot_view(pipeline.prepare(layout).planar, not pipeline.objective.convex)
 
 
-def _names(proposal: Proposal) -> tuple[str, ...]:
-    """What the proposals for a single target are called by the components that they came from."""
-    return tuple(f"component {k + 1}" for k in proposal.component[0].tolist())
-
-
-def _samples(prepared: Prepared, proposal: Proposal, target: Array) -> Candidates:
-    """The proposals for a single target (1, 6), normalized, as the cheapest commands with their forces."""
-    command, _ = realize(prepared.planar, polar(prepared.planar, proposal.force[0].swapaxes(1, 2)))
+def _samples(prepared: Prepared, force: Array, target: Array, names: tuple[str, ...]) -> Candidates:
+    """Proposed forces (K, 2, n) [N] for a single target (1, 6), normalized, as the cheapest commands with
+    them."""
+    command, _ = realize(prepared.planar, polar(prepared.planar, force.swapaxes(1, 2)))
     command = prepared.commands.clamp(command)
     wrench = prepared.commands.wrench(command)
     error = np.linalg.norm(wrench - target, axis=-1)
     layout = prepared.plant.layout
-    return Candidates(
-        command, prepared.plant.wrench(command), error, *costs(layout, command), _names(proposal)
-    )
+    return Candidates(command, prepared.plant.wrench(command), error, *costs(layout, command), names)

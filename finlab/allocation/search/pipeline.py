@@ -116,7 +116,8 @@ class Pipeline:
         Args:
             prepared: the layout.
             targets: desired wrenches (N, 6).
-            previous: command (n, 3) of the previous tick, for a single target.
+            previous: command (n, 3) of the previous tick, for a single target; its forces are then the first
+                seed, before all others.
             seeds: sizes of forces (N, S, n) or planar forces (N, S, 2, n) [N] to start from, by default those
                 of the layout.
             fallback: where to start from when targets were missed; None from it ends their search.
@@ -188,8 +189,7 @@ class Pipeline:
                 break
             near = limit_turn(prepared, previous, aim, width)
             candidates = self._descend(near, target, seeds, fallback, known=free.command[0])
-        # The first of these seeds was none of those that were given.
-        return candidates._replace(origin=np.maximum(candidates.origin - 1, -1))
+        return candidates
 
     def _trade_error_for_energy(
         self, prepared: Prepared, target: Array, candidates: RefinedCandidates, previous: Array | None

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import fields
 from functools import lru_cache
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,6 +40,17 @@ from finlab.physics.objective import Name
 
 CHUNK = 512
 """Targets that are solved together; keeps memory flat for any number of targets."""
+
+
+class Beginning(NamedTuple):
+    """Where a search begins, other than from all fins and the sub-layouts; and how that is told."""
+
+    seeds: Array | None = None
+    """Planar forces (N, S, 2, n) [N]; None for sizes of forces that all targets share."""
+    names: tuple[str, ...] | None = None
+    """What the seeds of a single target are called; None for the fins that rest."""
+    samples: Callable[[], Candidates] | None = None
+    """The seeds of a single target as candidates, where they were drawn."""
 
 
 class SearchAllocator(Allocator):
@@ -116,44 +127,59 @@ class SearchAllocator(Allocator):
         prepared = self.pipeline.prepare(layout)
         if len(targets) == 1:
             with self._one_thread():
-                refined = self.pipeline.solve(prepared, targets, previous, fallback=fallback)
-            return self._single(prepared, targets, refined)
+                beginning = self._beginning(prepared, targets, seed)
+                refined = self.pipeline.solve(
+                    prepared, targets, previous, seeds=beginning.seeds, fallback=fallback
+                )
+            names = beginning.names or _seed_names(layout)
+            if previous is not None:  # its own way is what the search begins with
+                names = ("the way it moves now", *names)
+            return self._single(prepared, targets, refined, names)._replace(samples=beginning.samples)
 
         def solve(start: int) -> RefinedCandidates:
-            return self.pipeline.solve(prepared, targets[start : start + CHUNK], fallback=fallback)
+            some = targets[start : start + CHUNK]
+            seeds = self._beginning(prepared, some, seed + start).seeds
+            return self.pipeline.solve(prepared, some, seeds=seeds, fallback=fallback)
 
-        return self._many(solve, len(targets))
-
-    def _many(self, solve: Callable[[int], RefinedCandidates], count: int) -> Solution:
-        """Answers to many targets, of which `solve` answers the chunk that begins at a place."""
         with self._one_thread(), ThreadPoolExecutor(os.cpu_count()) as executor:
-            parts = list(executor.map(solve, range(0, count, CHUNK)))
+            parts = list(executor.map(solve, range(0, len(targets), CHUNK)))
         return Solution(np.concatenate([part.command[:, 0] for part in parts]))
 
+    def _beginning(self, prepared: Prepared, targets: Array, seed: int) -> Beginning:
+        """Where the search for targets (N, 6) begins."""
+        return Beginning()
+
     def _single(
-        self, prepared: Prepared, targets: Array, refined: RefinedCandidates, names: tuple[str, ...] = ()
+        self, prepared: Prepared, targets: Array, refined: RefinedCandidates, names: tuple[str, ...]
     ) -> Solution:
         """The answer to one target (1, 6), and what may be asked about it; `names` of the seeds."""
-        std = self.normalization.std
-        layout = prepared.plant.layout
-        own = names or _seed_names(layout)
+        own = _sources(refined.origin[0], names)
 
         def explored() -> Candidates:
             found = self.pipeline.explore(prepared, targets, refined)
             # The answer's own candidates come first; the others are what the wider search has found.
-            count = refined.origin.shape[1]
-            wider = _sources(found.origin[0, count:], _seed_names(layout))
-            source = _sources(refined.origin[0], own) + wider
+            wider = found.origin[0, refined.origin.shape[1] :]
+            source = own + _sources(wider, _seed_names(prepared.plant.layout))
             exact = max(SEARCH.alternative_error * prepared.exactness, 1.01 * found.error[0, 0])
             kept = np.flatnonzero(found.error[0] <= exact)
             exact_ones = RefinedCandidates._make(values[:, kept] for values in found)
-            return _candidates(exact_ones, std, prepared, tuple(source[k] for k in kept))
+            return self._candidates(prepared, exact_ones, tuple(source[k] for k in kept))
 
         return Solution(
             refined.command[:, 0],
-            candidates=lambda: _candidates(refined, std, prepared, _sources(refined.origin[0], own)),
+            candidates=lambda: self._candidates(prepared, refined, own),
             alternatives=explored,
         )
+
+    def _candidates(
+        self, prepared: Prepared, refined: RefinedCandidates, source: tuple[str, ...]
+    ) -> Candidates:
+        """The refined answers to a single target, and where each comes from."""
+        command, wrench, error, cost, _ = (values[0] for values in refined)
+        layout, std = prepared.plant.layout, self.normalization.std
+        # What was kept least is known already.
+        power = cost if self.objective.is_power else power_of(layout, command)
+        return Candidates(command, wrench * std, error, effort_of(layout, command), power, source)
 
     def bound(self, result: Allocation) -> float:
         """A lower bound on the cost of any answer to the question of a result: on power [W], or effort.
@@ -213,17 +239,6 @@ def _within_reach(problem: PlanarProblem, policy: Policy, target: Array) -> Near
     weights = np.array(policy.axis_weights, np.float64)
     with np.errstate(divide="ignore"):
         return nearest(sets, target[None], (weights.max() / weights) ** 2)
-
-
-def _candidates(
-    refined: RefinedCandidates, std: Array, prepared: Prepared, source: tuple[str, ...]
-) -> Candidates:
-    """The refined answers to a single target, and where each comes from."""
-    command, wrench, error, cost, _ = (values[0] for values in refined)
-    layout, kept_least = prepared.plant.layout, prepared.cost
-    # What was kept least is known already.
-    power = cost if kept_least.is_power else power_of(layout, command)
-    return Candidates(command, wrench * std, error, effort_of(layout, command), power, source)
 
 
 def _sources(origin: NDArray[np.intp], names: tuple[str, ...]) -> tuple[str, ...]:
