@@ -5,13 +5,14 @@ what the robot's strongest fin takes at full load, which is a usual load, so tha
 objectives, and weak fins as well as strong ones.
 """
 
-from typing import NamedTuple, Protocol
+from abc import ABC, abstractmethod
+from typing import NamedTuple
 
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyMeter, EnergyWeights, energy_scale
-from finlab.physics.objective import Objective
+from finlab.physics.energy import EnergyMeter, energy_scale
+from finlab.physics.objective import CostMeter, Objective, PowerMeter
 from finlab.physics.plant import Plant
 
 BEND = 0.4
@@ -35,51 +36,45 @@ class Bowl(NamedTuple):
     """Half those by amplitude and frequency (B, n)."""
 
 
-class CommandCost(Protocol):
+class CommandCost(ABC):
     """The weighted cost of a robot's commands."""
 
-    weight: float
-    """What the cost in its own unit is multiplied by."""
+    def __init__(self, meter: CostMeter, weight: float) -> None:
+        """Make it of what tells the cost in its own unit."""
+        self._told = meter
+        self.weight = weight
+        """What the cost in its own unit is multiplied by."""
 
     def __call__(self, command: Array) -> Array:
         """Returns costs (B,) of commands (B, n, 3)."""
-        ...
+        return self.weight * self._told(command)
 
     def slopes(self, command: Array) -> Array:
         """Returns their derivatives (B, n, 3) by the commands."""
-        ...
+        return self.weight * self._told.slopes(command)
 
+    @abstractmethod
     def bowl(self, command: Array) -> Bowl:
         """Returns a quadratic that stands for the cost near the commands."""
-        ...
 
 
-class EffortCost:
+class EffortCost(CommandCost):
     """The paper's effort `J_en`: all of it but the inertial part is a quadratic form itself."""
 
-    def __init__(self, upper: Array, weights: EnergyWeights = DEFAULT_WEIGHTS, weight: float = 1.0) -> None:
-        """Make it for upper limits (n, 3)."""
-        self._meter, self.weight, self.weights = EnergyMeter(upper, weights), weight, weights
-        self._scale = energy_scale(upper)
+    def __init__(self, meter: EnergyMeter, weight: float = 1.0) -> None:
+        super().__init__(meter, weight)
+        scale, weights = energy_scale(meter.upper), meter.weights
         squares = np.array([weights.amplitude, weights.frequency, weights.zero_direction])
-        self._diagonal = weight * squares / self._scale**2
-        self._mixed = 0.5 * weight * weights.product / (self._scale[:, 0] * self._scale[:, 1])
-
-    def __call__(self, command: Array) -> Array:
-        """See `CommandCost`."""
-        return self.weight * self._meter(command)
-
-    def slopes(self, command: Array) -> Array:
-        """See `CommandCost`."""
-        return self.weight * self._meter.slopes(command)
+        self._scale, self._inertial = scale, weight * weights.inertial
+        self._diagonal = weight * squares / scale**2
+        self._mixed = 0.5 * weight * weights.product / (scale[:, 0] * scale[:, 1])
 
     def bowl(self, command: Array) -> Bowl:
         """See `CommandCost`."""
         diagonal = np.broadcast_to(self._diagonal, command.shape)
         mixed = np.broadcast_to(self._mixed, command.shape[:-1])
-        inertial = self.weight * self.weights.inertial
-        if inertial:
-            scale = self._scale
+        if self._inertial:
+            scale, inertial = self._scale, self._inertial
             a, f = command[..., 0] / scale[:, 0], command[..., 1] / scale[:, 1]
             bend = BEND * inertial * np.stack([4.0 * f**3, 9.0 * a * a * f, np.zeros_like(a)], axis=-1)
             diagonal = diagonal + bend / scale**2
@@ -87,26 +82,16 @@ class EffortCost:
         return Bowl(0.5 * self.slopes(command), diagonal, mixed)
 
 
-class PowerCost:
+class PowerCost(CommandCost):
     """Mean mechanical power by each fin's own model."""
 
-    def __init__(self, plant: Plant, copper_loss: float = 0.0, weight: float = 1.0) -> None:
-        """Make it for the fins of a plant."""
-        self.weight = weight
-        self._plant, self._copper_loss = plant, copper_loss
-
-    def __call__(self, command: Array) -> Array:
-        """See `CommandCost`."""
-        total: Array = self._plant.power(command, self._copper_loss).sum(-1)
-        return self.weight * total
-
-    def slopes(self, command: Array) -> Array:
-        """See `CommandCost`."""
-        return self.weight * self._plant.power_slopes(command, self._copper_loss)
+    def __init__(self, meter: PowerMeter, weight: float = 1.0) -> None:
+        super().__init__(meter, weight)
+        self._meter = meter
 
     def bowl(self, command: Array) -> Bowl:
         """See `CommandCost`."""
-        power, slopes = self._plant.power(command, self._copper_loss), self.slopes(command)
+        power, slopes = self._meter.fins(command), self.slopes(command)
         bend = BEND / np.maximum(self.weight * power, 1e-12 * self.weight)
         diagonal = bend[..., None] * slopes * slopes
         return Bowl(0.5 * slopes, diagonal, bend * slopes[..., 0] * slopes[..., 1])
@@ -127,10 +112,11 @@ def command_cost(plant: Plant, objective: Objective, sigma: Array, weight: float
     loads = _full_loads(plant)
     largest = np.linalg.norm((plant.force(loads)[..., None, :] @ (plant.columns / sigma))[..., 0, :], axis=-1)
     weight *= min(1.0, float((largest.max(axis=0) ** 2).sum()))
-    if objective.name == "effort":
-        return EffortCost(plant.upper, objective.weights, weight)
-    usual = USUAL_LOAD * float(plant.power(loads, objective.copper_loss).max())
-    return PowerCost(plant, objective.copper_loss, weight / usual if usual > 0.0 else weight)
+    meter = objective.meter(plant)
+    if isinstance(meter, EnergyMeter):
+        return EffortCost(meter, weight)
+    usual = USUAL_LOAD * float(meter.fins(loads).max())
+    return PowerCost(meter, weight / usual if usual > 0.0 else weight)
 
 
 def _full_loads(plant: Plant) -> Array:

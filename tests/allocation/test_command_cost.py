@@ -8,7 +8,7 @@ import pytest
 from finlab.allocation.command_cost import EffortCost, command_cost
 from finlab.layout import FinModelSpec, Layout, random_layout
 from finlab.physics import Plant, plant_of
-from finlab.physics.energy import EnergyWeights, command_energy
+from finlab.physics.energy import EnergyMeter, EnergyWeights, command_energy
 from finlab.physics.objective import Objective
 
 SIGMA = np.array([1.4, 1.4, 2.0, 0.35, 0.3, 0.4])
@@ -76,7 +76,9 @@ def test_effort_counts_as_it_is() -> None:
     at = plant.sample(np.random.default_rng(0), (4,))
     cost = command_cost(plant, Objective("effort"), SIGMA, 1e-4)
     np.testing.assert_allclose(cost(at), 1e-4 * command_energy(at, plant.upper))
-    np.testing.assert_allclose(EffortCost(plant.upper, weight=0.5)(at), 0.5 * command_energy(at, plant.upper))
+    np.testing.assert_allclose(
+        EffortCost(EnergyMeter(plant.upper), 0.5)(at), 0.5 * command_energy(at, plant.upper)
+    )
 
 
 @pytest.mark.parametrize("copper_loss", [0.0, 0.3])

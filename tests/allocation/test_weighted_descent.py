@@ -16,7 +16,7 @@ from finlab.allocation.weighted_descent import (
 )
 from finlab.layout import Fin, Layout, Limits
 from finlab.physics import Plant, plant_of
-from finlab.physics.energy import EnergyWeights, command_energy
+from finlab.physics.energy import EnergyMeter, EnergyWeights, command_energy
 
 SIGMA = np.array([1.4, 1.4, 2.0, 0.35, 0.3, 0.4])
 WEIGHTS, WEIGHT = EnergyWeights(1.0, 2.0, 0.4, 0.7), 0.3
@@ -34,7 +34,9 @@ def plant() -> Plant:
 
 def bowl_at(plant: Plant, position: np.ndarray) -> Bowl:
     """What stands for the effort at positions (B, 2, 3) between the limits."""
-    return _bowl(plant, plant.lower + position * plant.width, EffortCost(plant.upper, WEIGHTS, WEIGHT))
+    return _bowl(
+        plant, plant.lower + position * plant.width, EffortCost(EnergyMeter(plant.upper, WEIGHTS), WEIGHT)
+    )
 
 
 def pull_at(plant: Plant, position: np.ndarray) -> np.ndarray:
@@ -204,7 +206,7 @@ def test_the_least_damping_grows_with_the_derivatives_from_an_absolute_one() -> 
 def test_no_step_leaves_the_start_within_its_limits_and_tells_its_objective(plant: Plant) -> None:
     start, target = plant.sample(np.random.default_rng(1), (3,)), np.ones((3, 6))
     options = DescentOptions(n_steps=0)
-    found = descend(plant, start, target, SIGMA, options, EffortCost(plant.upper, weight=0.5))
+    found = descend(plant, start, target, SIGMA, options, EffortCost(EnergyMeter(plant.upper), 0.5))
     np.testing.assert_array_equal(found.command, plant.feasible(start))
     np.testing.assert_allclose(found.wrench, plant.wrench(start), rtol=1e-12)
     missing = ((plant.wrench(start) - 1.0) / SIGMA) ** 2
@@ -212,7 +214,7 @@ def test_no_step_leaves_the_start_within_its_limits_and_tells_its_objective(plan
     np.testing.assert_allclose(found.objective, expected, rtol=1e-12)
     other = np.full((2, 3), 7.0)
     expected = missing.sum(1) + 0.5 * command_energy(start, other)
-    scaled = EffortCost(other, weight=0.5)
+    scaled = EffortCost(EnergyMeter(other), 0.5)
     found = descend(plant, start, target, SIGMA, options, scaled)
     np.testing.assert_allclose(found.objective, expected, rtol=1e-12)
     np.testing.assert_allclose(
@@ -225,7 +227,7 @@ def test_rows_do_not_see_each_other(plant: Plant) -> None:
     rng = np.random.default_rng(2)
     start, target = plant.sample(rng, (6,)), 0.4 * plant.wrench(plant.sample(rng, (6,)))
     target[0] = plant.wrench(start[:1])[0]  # done at once
-    options, cost = DescentOptions(n_steps=15), EffortCost(plant.upper, weight=1e-3)
+    options, cost = DescentOptions(n_steps=15), EffortCost(EnergyMeter(plant.upper), 1e-3)
     together = descend(plant, start, target, SIGMA, options, cost)
     for i in range(6):
         alone = descend(plant, start[i : i + 1], target[i : i + 1], SIGMA, options, cost)

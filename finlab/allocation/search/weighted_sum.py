@@ -50,7 +50,7 @@ def minimize_weighted_sum(
         energy_tradeoff: w.
     """
     options = DescentOptions(n_steps=LM_STEPS, damping=1e-4, tolerance=1e-6)
-    cost = EffortCost(energy.upper, energy.weights, energy_tradeoff)
+    cost = EffortCost(energy, energy_tradeoff)
     found = descend(NormalizedRobot(problem), command, target, np.ones(6), options, cost)
     error = np.linalg.norm(found.wrench - target, axis=-1)
     return Refined(found.command, found.wrench, error), energy(found.command)

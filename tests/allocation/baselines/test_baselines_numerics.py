@@ -10,7 +10,7 @@ from finlab.allocation.command_cost import EffortCost, command_cost
 from finlab.allocation.weighted_descent import DescentOptions, descend
 from finlab.layout import Fin, FinModelSpec, Layout, random_layout
 from finlab.physics import plant_of
-from finlab.physics.energy import EnergyWeights, command_energy
+from finlab.physics.energy import EnergyMeter, EnergyWeights, command_energy
 from finlab.physics.objective import Objective
 
 SIGMA = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35])
@@ -86,7 +86,7 @@ def test_descent_lowers_its_objective_and_reports_it(energy_tradeoff: float) -> 
         return error + energy_tradeoff * command_energy(command, plant.upper)
 
     end = descend(
-        plant, start, target, SIGMA, DescentOptions(), EffortCost(plant.upper, weight=energy_tradeoff)
+        plant, start, target, SIGMA, DescentOptions(), EffortCost(EnergyMeter(plant.upper), energy_tradeoff)
     )
     np.testing.assert_allclose(end.objective, objective(end.command), rtol=1e-9)
     assert (end.objective <= objective(start)).all()
@@ -97,7 +97,7 @@ def test_energy_in_the_descent_finds_cheaper_commands() -> None:
     rng = np.random.default_rng(4)
     plant = plant_of(random_layout(rng, n_fins=5))
     start, target = plant.sample(rng, (50,)), plant.wrench(plant.sample(rng, (50,)))
-    costs = None, EffortCost(plant.upper, weight=1e-4)
+    costs = None, EffortCost(EnergyMeter(plant.upper), 1e-4)
     plain, cheap = (
         descend(plant, start, target, SIGMA, DescentOptions(n_steps=60), cost).command for cost in costs
     )
