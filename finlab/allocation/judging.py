@@ -57,11 +57,11 @@ def judge(layout: Layout, command: Array, target: Array, sigma: Array) -> Verdic
     err_norm = np.sqrt(np.einsum("ri,ri->r", missing, missing))
     if len(command) == 0:
         return Verdict(fin_forces, wrench, err_norm, np.empty(0), np.empty(0))
-    energy, power = _meter(layout)(command), plant.power(command).sum(-1)
-    if np.isnan(energy).any():  # a failed fin costs nothing
-        energy = _meter(layout)(np.where(np.isnan(command), 0.0, command))
-        power = np.nansum(plant.power(command), axis=-1)
-    return Verdict(fin_forces, wrench, err_norm, energy, power)
+    power = plant.power(command)
+    failed = np.isnan(power)
+    if failed.any():  # a failed fin costs nothing
+        command, power = np.where(failed[..., None], 0.0, command), np.where(failed, 0.0, power)
+    return Verdict(fin_forces, wrench, err_norm, effort_of(layout, command), power.sum(-1))
 
 
 def costs(layout: Layout, command: Array) -> tuple[Array, Array]:
