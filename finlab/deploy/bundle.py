@@ -101,7 +101,7 @@ def make_bundle(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = 
         AllocationError: the method cannot run from a bundle.
         DataError: a force table cannot be read, or is too large to travel.
     """
-    if not isinstance(allocator, SearchAllocator) or allocator.name not in METHODS_ON_BOARD:
+    if not isinstance(allocator, SearchAllocator):
         raise AllocationError(
             f"method {allocator.name!r} cannot be exported; a bundle runs {' or '.join(METHODS_ON_BOARD)}"
         )

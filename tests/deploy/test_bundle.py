@@ -214,6 +214,40 @@ def test_readme_runs_it_in_five_lines(bundle: Bundle) -> None:
     assert "front_right" in text and finlab.__version__ in text
 
 
+def test_the_readme_names_the_networks_where_there_are_any(bundle: Bundle, with_networks: Bundle) -> None:
+    first = [
+        files.files[README].decode().split("\n\n")[1].replace("\n", " ") for files in (bundle, with_networks)
+    ]
+    assert first[0].startswith(f"Made by finlab {finlab.__version__} for method `search`. Target wrench in")
+    name = parse_robot(with_networks.files).graph.checkpoint
+    assert f"for method `mdn` with checkpoint `{name}`. Target wrench in" in first[1]
+
+
+def test_the_readme_has_a_row_for_each_fin(shipped_allocator: Allocator) -> None:
+    layout = finlab.load_layout("restricted")
+    lost = layout.names[1]
+    text = make_bundle(layout, shipped_allocator, (lost,)).files[README].decode()
+    rows = [line.split(" | ") for line in text.splitlines() if line.startswith("| ") and ".." in line]
+    assert [row[0].removeprefix("| ") for row in rows] == list(layout.names)
+    for fin, row in zip(layout.fins, rows, strict=True):
+        assert [float(x) for x in row[1].split(", ")] == pytest.approx(fin.position, rel=1e-5)
+        assert float(row[2]) == pytest.approx(fin.mounting_angle, abs=1e-4)
+        ends = [[float(end) for end in cell.split("..")] for cell in row[3:6]]
+        assert np.array(ends) == pytest.approx(np.array([fin.limits.lower, fin.limits.upper]).T, rel=1e-3)
+        assert row[6] == ("no |" if fin.name == lost else "yes |")
+    assert f"failed=['{lost}'])" in text
+
+
+def test_what_an_earlier_bundle_had_more_is_gone(
+    bundle: Bundle, with_networks: Bundle, measured_bundle: Bundle, tmp_path: Path
+) -> None:
+    for files in (with_networks, measured_bundle, bundle):
+        files.write(tmp_path)
+        assert read_bundle_files(tmp_path) == dict(files.files)
+        present = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file()}
+        assert present == set(files.files)
+
+
 def test_archive_is_plain(bundle: Bundle) -> None:
     with zipfile.ZipFile(io.BytesIO(bundle.zip_bytes())) as archive:
         assert archive.testzip() is None
