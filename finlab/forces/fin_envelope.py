@@ -105,12 +105,11 @@ def compile_fin(law: FinLaw, limits: Limits, objective: Objective) -> FinEnvelop
     """Returns the envelope of a fin of one law within its limits."""
     lower, upper = np.array(limits.lower), np.array(limits.upper)
     grid = _force_grid(law, lower, upper)
-    frequency = np.broadcast_to(grid.frequency[None, :, None], grid.size.shape)
-    frequency, size = _with_peaks(frequency, grid.size)
+    size = _with_peaks(grid.size)
     largest = size.max(axis=(0, 1))
     smallest = np.minimum(grid.size[0, 0], largest)
     wanted = smallest[:, None] + (largest - smallest)[:, None] * levels()
-    found = _frequencies(frequency, size, wanted)
+    found = _frequencies(grid.frequency, size, wanted)
     turn = _turns_at(grid, found)
     amplitude = np.broadcast_to(grid.amplitude[:, None, None], found.shape)
     command = np.stack([amplitude, found, turn], axis=-1)
@@ -196,21 +195,19 @@ def _along_turns(values: Array, turns: Array, at: Array, full: bool) -> Array:
     return found
 
 
-def _with_peaks(frequency: Array, size: Array) -> tuple[Array, Array]:
-    """Frequencies and sizes (a, f, K) where a size that falls again has a grid point at its very peak."""
+def _with_peaks(size: Array) -> Array:
+    """Sizes (a, f, K); of one that falls again the largest is that of its very peak, between grid points."""
     n = size.shape[1]
     if n < 3:
-        return frequency, size
+        return size
     peak = size.argmax(axis=1)
     inner = (peak > 0) & (peak < n - 1)
     peak = np.clip(peak, 1, n - 2)
     a, k = np.ogrid[: size.shape[0], : size.shape[2]]
-    offset, top = _vertex(size[a, peak - 1, k], size[a, peak, k], size[a, peak + 1, k])
-    frequency, size = frequency.copy(), size.copy()
+    _, top = _vertex(size[a, peak - 1, k], size[a, peak, k], size[a, peak + 1, k])
+    size = size.copy()
     size[a, peak, k] = np.where(inner, top, size[a, peak, k])
-    step = frequency[a, peak + 1, k] - frequency[a, peak, k]
-    frequency[a, peak, k] += np.where(inner, offset, 0.0) * step
-    return frequency, size
+    return size
 
 
 def _vertex(before: Array, at: Array, after: Array) -> tuple[Array, Array]:
@@ -238,7 +235,7 @@ def _frequencies(frequency: Array, size: Array, wanted: Array) -> Array:
     found = np.empty((a, k, wanted.shape[1]))
     for i in range(a):
         for j in range(k):
-            found[i, j] = np.interp(level[j], rising[i, :, j], frequency[i, :, j])
+            found[i, j] = np.interp(level[j], rising[i, :, j], frequency)
     found[level[None] > rising[:, -1, :, None] * (1.0 + FLAT) + 1e-15] = np.nan
     return found
 

@@ -41,6 +41,7 @@ FINS: dict[str, tuple[FinModelSpec, Limits]] = {
         Limits((0.05, 0.8), (0.1, 3.0)),
     ),
     "one frequency": (FinModelSpec(), Limits((0.05, 0.6), (1.5, 1.5))),
+    "one slow frequency": (FinModelSpec(), Limits((0.05, 0.6), (0.3, 0.3))),
     "one amplitude": (FinModelSpec("soft"), Limits((0.4, 0.4), (0.1, 2.1))),
 }
 
