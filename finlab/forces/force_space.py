@@ -184,7 +184,8 @@ def descend(
         response = _quadratic(problem, found, cut)
     multiplier = _multiplier(problem, target, response)
     found = fins.project(*_answer(problem, response, multiplier))
-    if found.stopped is not None or (cut < 1.0).any():
+    rests = not problem.turning_is_free and (found.size <= found.rim.smallest).any()
+    if rests or found.stopped is not None or (cut < 1.0).any():
         found, multiplier = _mended(problem, target, response, found, multiplier)
     row = fins.lookup(found.rim, found.size)
     shaft = row[..., SHAFT] if fins.pushes_sideways else None
@@ -276,8 +277,13 @@ def _quadratic(problem: PlanarProblem, found: Projected, cut: Array) -> _Respons
     if not problem.turning_is_free:
         turn = _direction(found) - row[..., LEAN]
         turn -= TURN * np.rint(turn / TURN)
-        pull = 2.0 * problem.direction_cost * turn * across / np.maximum(found.size, LEAST)
-        drift = pull if drift is None else drift + pull
+        size = np.maximum(found.size, LEAST)
+        pull = 2.0 * problem.direction_cost * across / size
+        drift = pull * turn if drift is None else drift + pull * turn
+        # The weaker the force, the less of it turns the fin to where that costs nothing.
+        held = 1.0 / (1.0 + pull / size)
+        across = across * held
+        drift = drift * held
     free_shift = shift
     if drift is not None:
         free_shift = shift + np.stack([y * drift, -x * drift], axis=1)

@@ -55,6 +55,8 @@ class SearchNumbers:
     """The same for other costs with up to five fins."""
     many_fins_steps: int = 12
     """The same from six fins on, where there are more local minima to leave."""
+    same_cost: float = 2e-4
+    """Share by which costs differ at least of forces that are refined as two."""
     bound_steps: int = 30
     """The same where a lower bound is asked for."""
     wide_seeds: int = 64
@@ -225,6 +227,7 @@ class Pipeline:
         """
         # Fins that rest have hardly any slope: two steps where there are such.
         keep_mode, steps = known is not None, self.settings.refine_steps + (not self.objective.convex)
+        steps += prepared.arcs is not None  # fins at stops are slower to mend
         command, origin = self._search(prepared, target, seeds, keep_mode)
         if known is not None:
             within = prepared.commands.clamp(unwrap_to_arc(prepared, known))
@@ -252,26 +255,45 @@ class Pipeline:
 
         With `keep_mode`, the first seed is how the robot moves now; what it leads to stays first.
         """
-        (rows, n_seeds), n = seeds.shape[:2], seeds.shape[-1]
-        flat = target if rows == 1 else np.repeat(target, n_seeds, axis=0)
+        (rows, n_seeds), n, problem = seeds.shape[:2], seeds.shape[-1], prepared.planar
+        if prepared.arcs is not None:
+            n_arcs = len(prepared.arcs[0])
+            arcs = (np.tile(values, (rows * n_seeds, 1)) for values in prepared.arcs)
+            problem = problem._replace(fins=problem.fins.within(*arcs))
+            seeds = np.repeat(seeds, n_arcs, axis=1)
+            works = None if works is None else np.repeat(works, n_arcs, axis=0)
+        n_starts = seeds.shape[1]
+        flat = target if rows == 1 else np.repeat(target, n_starts, axis=0)
         usual = SEARCH.few_fins_steps if n < 6 else SEARCH.many_fins_steps
         steps = (
             steps or self.settings.search_steps or (SEARCH.convex_steps if self.objective.convex else usual)
         )
-        planar = force_space.descend(prepared.planar, flat, seeds.reshape(-1, *seeds.shape[2:]), steps, works)
+        planar = force_space.descend(problem, flat, seeds.reshape(-1, *seeds.shape[2:]), steps, works)
         rests = not self.objective.convex
-        command, cost = force_space.realize(prepared.planar, planar, rests)
-        if n_seeds == 1 and not rests:
+        command, cost = force_space.realize(problem, planar, rests)
+        if n_starts == 1 and not rests:
             return command[:, None], np.zeros((rows, 1), np.intp)
         error = np.einsum("ri,ri->r", planar.residual, planar.residual)
-        score = rank(cost, error, (SEARCH.promising_error * prepared.exactness) ** 2).reshape(rows, n_seeds)
+        score = rank(cost, error, (SEARCH.promising_error * prepared.exactness) ** 2).reshape(rows, n_starts)
         if keep_mode:
             score[:, 0] = -1.0
-        chosen = score.argsort(axis=1)[:, : keep or self.settings.n_refined]
-        place = chosen + np.arange(0, rows * n_seeds, n_seeds)[:, None]
+        # With fins at rest, what refinement mends changes the order of the costs: twice as many are tried.
+        chosen = _distinct(score)[:, : keep or self.settings.n_refined * (1 + rests)]
+        place = chosen + np.arange(0, rows * n_starts, n_starts)[:, None]
         kept = command.take(place, axis=0)
         if rests:  # what resting fins leave undone cannot always be mended: both ways are refined
-            working, _ = force_space.realize(prepared.planar, planar)
+            working, _ = force_space.realize(problem, planar)
             kept = np.concatenate([kept, working.take(place, axis=0)], axis=1)
             chosen = np.concatenate([chosen, chosen], axis=1)
-        return kept, chosen
+        return kept, chosen // (n_starts // n_seeds)
+
+
+def _distinct(score: Array) -> NDArray[np.intp]:
+    """Places (N, S) of scores, the least first, those that hardly differ from one before them last: several
+    starts mostly lead to the same forces."""
+    order = score.argsort(axis=1)
+    ranked = np.take_along_axis(score, order, axis=1)
+    again = np.zeros(order.shape, bool)
+    again[:, 1:] = np.diff(ranked) <= SEARCH.same_cost * ranked[:, :-1]
+    found: NDArray[np.intp] = np.take_along_axis(order, again.argsort(axis=1, kind="stable"), axis=1)
+    return found

@@ -8,6 +8,7 @@ import numpy as np
 from finlab.allocation.search.levenberg_marquardt import CommandProblem
 from finlab.arrays import Array
 from finlab.forces.compiled_fins import CompiledFins
+from finlab.forces.convex_parts import arcs_to_search
 from finlab.forces.envelopes import layout_envelopes
 from finlab.forces.force_space import PlanarProblem, planar_problem
 from finlab.layout import Layout
@@ -33,6 +34,9 @@ class Prepared(NamedTuple):
     """Sizes of forces (S, n) [N] to start from: all fins, then sub-layouts whose other fins nearly rest."""
     cost: CostMeter
     """By which answers are compared."""
+    arcs: tuple[Array, Array] | None
+    """Middles and halves (P, n) [rad] of arcs of force directions in which the search is repeated; None where
+    those of the fins will do."""
     exactness: float
     """What thresholds on the normalized error are multiplied by: less than one for a robot that is weak
     beside the error's yardstick."""
@@ -57,6 +61,7 @@ def prepare(
         CommandProblem(plant, plant.columns / std, plant.lower, plant.upper, plant.full_turn),
         resting_seeds(fins.maximum, rests),
         objective.meter(plant),
+        arcs_to_search(fins, len(rests)),
         min(1.0, float(np.linalg.norm(strongest))),
     )
 

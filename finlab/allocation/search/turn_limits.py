@@ -50,7 +50,7 @@ def limit_turn(prepared: Prepared, previous: Array, aim: Array, width: float) ->
         idle_direction=np.clip(ahead, lower[:, 2], upper[:, 2]),
     )
     commands = replace(prepared.commands, lower=lower, upper=upper, wraps=wraps)
-    return prepared._replace(planar=planar, commands=commands)
+    return prepared._replace(planar=planar, commands=commands, arcs=None)
 
 
 def unwrap_to_arc(near: Prepared, command: Array) -> Array:
