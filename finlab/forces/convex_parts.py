@@ -9,7 +9,8 @@ from itertools import product
 
 import numpy as np
 
-from finlab.forces.envelopes import Array, Envelopes
+from finlab.arrays import Array
+from finlab.forces.envelopes import Envelopes
 
 MOST_SPLIT = 4
 """Most arcs that are split, the widest first: each doubles the parts."""

@@ -5,8 +5,9 @@ from itertools import product
 import numpy as np
 import pytest
 
+from finlab.arrays import Array
 from finlab.forces.convex_parts import MOST_SPLIT, MOST_STARTS, arcs_to_search
-from finlab.forces.envelopes import Array, layout_envelopes
+from finlab.forces.envelopes import layout_envelopes
 from finlab.layout import load_layout
 from finlab.physics.objective import Objective
 
