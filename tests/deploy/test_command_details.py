@@ -128,6 +128,20 @@ def test_deadlines_are_positive_and_finite(
     assert timings[1] == Timing(None, 1.0)
 
 
+@pytest.mark.parametrize(("stopped", "code"), [(KeyboardInterrupt, 130), (BrokenPipeError, 141)])
+def test_an_end_from_outside_has_the_shells_code(
+    stopped: type[BaseException], code: int, monkeypatch: pytest.MonkeyPatch, capfd: Any
+) -> None:
+    """128 plus the signal: 2 for Ctrl-C, 13 for a pipe that nobody reads."""
+
+    def load(*_: Any) -> Robot:
+        raise stopped
+
+    monkeypatch.setattr("finlab.deploy.robot.load_robot", load)
+    assert main(["check", "bundle"]) == code
+    assert capfd.readouterr().err == ""
+
+
 class Busy(Future[Any]):
     """Work that never ends, and how long it is waited for."""
 

@@ -158,11 +158,12 @@ def test_marginal_costs_are_differences(name: str, objective: Name) -> None:
         assert len(off) > 10 and np.median(off) < 0.03 and np.quantile(off, 0.8) < 0.2
 
 
-def test_drift_is_what_turning_costs() -> None:
+@pytest.mark.parametrize("name", ["uneven", "leaning"])
+def test_drift_is_what_turning_costs(name: str) -> None:
     """Cost at a size by the direction, over the marginal cost; none of a fin that is the same all round."""
     _, _, plain = compiled("drag", Objective())
     np.testing.assert_array_equal(plain.table[..., DRIFT], 0.0)
-    _, _, envelope = compiled("uneven", Objective())
+    _, _, envelope = compiled(name, Objective())
     size, table, angle = sizes(envelope), envelope.table, directions(envelope)
     level = LEVELS // 2
     for k in range(1, DIRECTIONS - 1, 5):

@@ -41,6 +41,39 @@ def test_farthest_is_the_farthest_point_of_the_sector(half: float) -> None:
         assert best - 1e-9 <= reach[row] <= best + 1e-3
 
 
+@pytest.mark.parametrize("count", [12, 48])
+def test_an_uneven_fin_reaches_as_far_as_the_polygon_around_it(count: int) -> None:
+    """Ellipses off their centres, by their polygons' corners; what is pushed lies on the polygon itself."""
+    side = 2.0 * np.pi / count * np.arange(count)
+    normals = np.stack([np.cos(side), np.sin(side)], axis=-1)
+    rng, sets, pull = np.random.default_rng(4), fins(np.pi), pulls()
+    long, short, tilt = rng.uniform(0.6, 0.8, 200), rng.uniform(0.3, 0.6, 200), rng.uniform(0.0, 3.0, 200)
+    ahead = np.hypot(
+        long[:, None] * np.cos(side - tilt[:, None]), short[:, None] * np.sin(side - tilt[:, None])
+    )
+    rim = ahead + 0.15 * np.cos(side - 1.0)
+    uneven = sets._replace(rim=rim[:, None])
+    reach, force = uneven.farthest(np.pad(pull[:, 0], ((0, 0), (0, 4))))
+    corners = np.linalg.solve(
+        np.stack([normals, np.roll(normals, -1, axis=0)], axis=1)[None],
+        3.0 * np.stack([rim, np.roll(rim, -1, axis=1)], axis=2)[..., None],
+    )[..., 0]
+    np.testing.assert_allclose(reach, np.einsum("rkc,rc->rk", corners, pull[:, 0]).max(1), rtol=1e-9)
+    outward = (force[:, 0] @ normals.T) / (3.0 * rim)
+    np.testing.assert_allclose(outward.max(1), 1.0, rtol=1e-9)
+    np.testing.assert_allclose(
+        np.arctan2(force[:, 0, 1], force[:, 0, 0]), np.arctan2(pull[:, 0, 1], pull[:, 0, 0]), atol=1e-9
+    )
+    # A polygon farther out than the disc leaves the disc.
+    plain = sets._replace(rim=np.full((200, 1, count), 1.5))
+    for found, known in zip(
+        plain.farthest(np.pad(pull[:, 0], ((0, 0), (0, 4)))),
+        sets.farthest(np.pad(pull[:, 0], ((0, 0), (0, 4)))),
+        strict=True,
+    ):
+        np.testing.assert_allclose(found, known)
+
+
 def five_fins(half: float) -> FinSets:
     """Two robots of five fins with the same arcs."""
     columns = np.random.default_rng(2).standard_normal((2, 5, 2, 6))
