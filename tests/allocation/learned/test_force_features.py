@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finlab.allocation.learned.force_features import RobotView, robot_view, see
+from finlab.allocation.learned.force_features import VECTORS, RobotView, features, robot_view, see
 from finlab.forces.envelopes import layout_envelopes
 from finlab.forces.force_space import PlanarProblem, planar_problem
 from finlab.inference.force_network import NODE_SIZE
@@ -51,6 +51,26 @@ def seen(layout: Layout, target: np.ndarray, std: np.ndarray = STD) -> list[np.n
     """What is seen of a target (6,) [N, N m]."""
     found = see(robot_view(problem_of(layout, std=std), True), target[None] / std)
     return [found.nodes[0], found.pairs[0]]
+
+
+def test_a_fins_own_vectors_are_turned_to_its_force() -> None:
+    """Two fins by hand: what is asked of them, and what they are, in the frame of that."""
+    rng, angle, size = np.random.default_rng(1), np.array([0.5, -2.0]), np.array([2.0, 0.3])
+    static, none = rng.normal(size=(1, 2, NODE_SIZE - 6)), np.zeros((1, 2, 2), complex)
+    found = features((size * np.exp(1j * angle))[None], static, none, none)
+    np.testing.assert_allclose(found.frame[0], np.exp(1j * angle))
+    nodes, own = found.nodes[0].astype(np.float64), static[0]
+    np.testing.assert_allclose(nodes[:, 0], np.sqrt(size), rtol=1e-6)
+    np.testing.assert_allclose(nodes[:, 1], size / (1.0 + size), rtol=1e-6)
+    np.testing.assert_allclose(nodes[:, 2], np.log(size + 1e-3) / 7.0, rtol=1e-6)
+    plain = np.ones(NODE_SIZE - 6, bool)
+    for place in VECTORS:
+        plain[[place, place + 1]] = False
+        x, y = own[:, place], own[:, place + 1]
+        turned = np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x
+        np.testing.assert_allclose(nodes[:, 6 + place], turned[0], atol=1e-6)
+        np.testing.assert_allclose(nodes[:, 7 + place], turned[1], atol=1e-6)
+    np.testing.assert_allclose(nodes[:, 6:][:, plain], own[:, plain], rtol=1e-6)
 
 
 def test_turning_the_robot_changes_nothing(layout: Layout) -> None:
