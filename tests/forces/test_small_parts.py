@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from finlab.forces import extent
-from finlab.forces.attainable import hull_of
+from finlab.forces.attainable import FLAT, hull_of
 from finlab.forces.extent import singular_values, strongest, weakest
 from finlab.forces.fin_sets import HALF_TURN_TOLERANCE, FinSets, wide_fins
 from finlab.forces.force_space import IDLE, REST, PlanarProblem, polar, realize
@@ -131,6 +131,14 @@ def test_hulls_of_every_dimension() -> None:
         assert np.linalg.norm(hull.normals, axis=1) == pytest.approx(1.0)
         beyond = points @ hull.normals.T - hull.offsets
         assert beyond.max(axis=0) == pytest.approx(0.0, abs=1e-9)  # every plane touches, none cuts
+
+
+@pytest.mark.parametrize("size", [0.01, 1.0, 300.0])
+@pytest.mark.parametrize(("thickness", "dimension"), [(0.5, 2), (2.0, 3)])
+def test_a_hull_is_flat_up_to_a_share_of_its_size(size: float, thickness: float, dimension: int) -> None:
+    slab = size * CUBE / 3.0
+    slab[:, 0] *= 3.0 * FLAT * thickness
+    assert hull_of(slab).dimension == dimension
 
 
 def pair_per_axis(radius: Array) -> FinSets:

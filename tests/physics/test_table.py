@@ -249,6 +249,15 @@ def test_one_turn_apart_noise_may_be_a_twentieth_of_the_largest_force(share, goo
         read_table(tmp_path / "t.csv")
 
 
+def test_of_several_holes_the_first_is_named(tmp_path):
+    grid = [(a, f, d) for a in (0.1, 0.2, 0.3) for f in (1, 2) for d in (0, 1)]
+    kept = [row for row in grid if row not in ((0.1, 2, 1), (0.3, 1, 0))]
+    (tmp_path / "t.csv").write_text("\n".join([HEADER, *(f"{a},{f},{d},0,1,2" for a, f, d in kept)]))
+    with pytest.raises(DataError, match="10 rows do not fill the grid of 3 amplitudes, 2 ") as caught:
+        read_table(tmp_path / "t.csv")
+    assert "A = 0.1, f = 2, phi = 1" in str(caught.value)
+
+
 def test_a_missing_or_binary_file_is_refused(tmp_path):
     with pytest.raises(DataError, match="no such file"):
         read_table(tmp_path / "missing.csv")

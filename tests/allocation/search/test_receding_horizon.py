@@ -101,6 +101,22 @@ def test_a_turn_costs_energy_and_a_late_one_less(one: Prepared) -> None:
     assert costs == pytest.approx([dear, dear * (1 - 8 / 17)])
 
 
+@pytest.mark.parametrize("direction", [0.6, -1.2, 2.0])
+def test_where_a_fin_points_costs_its_square_while_it_works(one: Prepared, direction: float) -> None:
+    share, ahead = straight()
+    cost = [
+        evaluate(one, previous(angle), trajectory(one, share, ahead + angle)).cost[0]
+        for angle in (0.0, direction)
+    ]
+    assert cost[1] - cost[0] == pytest.approx(one.planar.direction_cost[0] * direction**2)
+    idle = np.full(TICKS, 1e-6)
+    rest = [
+        evaluate(one, previous(angle), trajectory(one, idle, ahead + angle)).cost[0]
+        for angle in (0.0, direction)
+    ]
+    assert rest[1] == pytest.approx(rest[0])
+
+
 def test_power_grows_faster_than_force(search: SearchAllocator) -> None:
     """A quarter of the thrust takes an eighth of the power, and half of the effort."""
     layout = Layout("one", (Fin("a", (0.0, 0.0, 0.0), 0.0),))
