@@ -91,9 +91,19 @@ def read_bundle_files(path: str | os.PathLike[str]) -> dict[str, bytes]:
         DataError: it cannot be read, is of another version, was changed, or holds what no bundle holds.
     """
     source = str(path)
-    files = _folder(Path(path), source) if os.path.isdir(source) else _archive(source)
+    files = _Contents(source)
+    try:
+        if os.path.isdir(source):
+            _read_folder(Path(path), files)
+        else:
+            _read_archive(files)
+    except OSError as error:
+        raise DataError(f"{source}: cannot be read: {error.strerror or error}") from None
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, ValueError, zlib.error) as error:
+        reason = str(error).splitlines()[0][:80] if str(error) else type(error).__name__
+        raise DataError(f"{source}: is neither a bundle's folder nor its zip archive ({reason})") from None
     check_bundle_files(files, source)
-    return files
+    return dict(files)
 
 
 def check_bundle_files(files: Files, source: str) -> None:
@@ -123,7 +133,7 @@ def checkpoint_part(files: Files) -> dict[str, bytes]:
 
 
 class _Contents(dict[str, bytes]):
-    """Files that are being read, none beyond its largest size, nor all together."""
+    """Files that are being read, of this version, none beyond its largest size, nor all together."""
 
     def __init__(self, source: str) -> None:
         super().__init__()
@@ -141,27 +151,22 @@ class _Contents(dict[str, bytes]):
         if self.left < 0:
             raise DataError(f"{self.source}: its files are larger than {LARGEST_BUNDLE:,} bytes together")
         self[name] = content
+        if name == ABOUT:
+            _check_version((), content, self.source)
 
 
-def _folder(path: Path, source: str) -> dict[str, bytes]:
-    files = _Contents(source)
-    try:
-        _check_version([VERSION_1] if (path / VERSION_1).exists() else [], None, source)
-        for name in (ABOUT, *sorted((set(LARGEST) - {ABOUT}) | _tables_in(path))):
-            file = path / name
-            try:
-                about = file.lstat()
-            except FileNotFoundError:
-                continue
-            if not stat.S_ISREG(about.st_mode) or (file.parent != path and file.parent.is_symlink()):
-                raise DataError(f"{source}: {name} is no regular file")
-            with file.open("rb") as stream:
-                files.take(name, stream.read)
-            if name == ABOUT:
-                _check_version((), files[ABOUT], source)
-    except OSError as error:
-        raise DataError(f"{source}: cannot be read: {error.strerror}") from None
-    return dict(files)
+def _read_folder(path: Path, files: _Contents) -> None:
+    _check_version([VERSION_1] if (path / VERSION_1).exists() else [], None, files.source)
+    for name in (ABOUT, *sorted((set(LARGEST) - {ABOUT}) | _tables_in(path))):
+        file = path / name
+        try:
+            about = file.lstat()
+        except FileNotFoundError:
+            continue
+        if not stat.S_ISREG(about.st_mode) or (file.parent != path and file.parent.is_symlink()):
+            raise DataError(f"{files.source}: {name} is no regular file")
+        with file.open("rb") as stream:
+            files.take(name, stream.read)
 
 
 def _tables_in(path: Path) -> set[str]:
@@ -172,27 +177,17 @@ def _tables_in(path: Path) -> set[str]:
         return set()
 
 
-def _archive(source: str) -> dict[str, bytes]:
-    files = _Contents(source)
-    try:
-        with zipfile.ZipFile(source) as archive:
-            # The version comes first: files of another one are not the news.
-            entries = sorted(archive.infolist(), key=lambda entry: entry.filename != ABOUT)
-            _check_version([entry.filename for entry in entries], None, source)
-            for entry in entries:
-                # Nothing is unpacked, so a name can do no harm; still, a bundle holds these files only.
-                if largest(entry.filename) < 0 or entry.filename in files:
-                    raise DataError(f"{source}: holds {entry.filename!r:.60}, which is no part of a bundle")
-                with archive.open(entry) as stream:
-                    files.take(entry.filename, stream.read)
-                if entry.filename == ABOUT:
-                    _check_version((), files[ABOUT], source)
-    except OSError as error:
-        raise DataError(f"{source}: cannot be read: {error.strerror or error}") from None
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, ValueError, zlib.error) as error:
-        reason = str(error).splitlines()[0][:80] if str(error) else type(error).__name__
-        raise DataError(f"{source}: is neither a bundle's folder nor its zip archive ({reason})") from None
-    return dict(files)
+def _read_archive(files: _Contents) -> None:
+    with zipfile.ZipFile(files.source) as archive:
+        # The version comes first: files of another one are not the news.
+        entries = sorted(archive.infolist(), key=lambda entry: entry.filename != ABOUT)
+        _check_version([entry.filename for entry in entries], None, files.source)
+        for entry in entries:
+            # Nothing is unpacked, so a name can do no harm; still, a bundle holds these files only.
+            if largest(entry.filename) < 0 or entry.filename in files:
+                raise DataError(f"{files.source}: holds {entry.filename!r:.60}, which is no part of a bundle")
+            with archive.open(entry) as stream:
+                files.take(entry.filename, stream.read)
 
 
 def _check_version(names: Iterable[str], about: bytes | None, source: str) -> None:

@@ -141,58 +141,8 @@ def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
     return replace(layout, fins=tuple(fins)), tables
 
 
-_TEXT = """\
-# {name}: control allocation on board
-
-Made by finlab {version} for method `{method}`{networks}. Target wrench in, one command per fin out, in about
-a millisecond; finlab without its extras is enough, no torch.
-
-## Five lines that run it
-
-```
-python3 -m venv robot
-robot/bin/pip install numpy safetensors
-robot/bin/pip install --no-deps finlab-{version}-py3-none-any.whl
-robot/bin/finlab-runtime check .
-robot/bin/finlab-runtime allocate . --wrench 1 0 0.5 0 0 0.1
-```
-
-`check` compares this computer's answers with those of the computer that made the bundle; run it before first
-use. `robot/bin/finlab-runtime serve .` reads targets as JSON lines and writes commands. In Python:
-
-```python
-import finlab
-
-robot, allocator = finlab.load_layout("."), finlab.load_allocator(".")
-answer = allocator.allocate(robot, [1, 0, 0.5, 0, 0, 0.1], failed={failed})
-print(answer.fins, answer.command)
-```
-
-## The robot
-
-Body frame: x forward, y left, z up, origin at the centre of gravity. A wrench is `[Fx, Fy, Fz, Tx, Ty, Tz]`
-in N and N m. A command is half amplitude [rad], frequency [Hz] and zero direction [rad] (0 pushes along the
-fin's horizontal axis, pi/2 up).
-
-| fin | position [m] | shaft [rad] | amplitude [rad] | frequency [Hz] | zero direction [rad] | works |
-|---|---|---|---|---|---|---|
-{fins}
-
-## The files
-
-| file | what it is |
-|---|---|
-| `layout.graph.json` | fins, normalization, self-tests; networkx reads its part `graph` |
-| `bundle.json` | version of the bundle, the method, and the settings that the allocator is made with |
-| `compiled_fins.safetensors` | what each fin can do and at what cost, ready for the search |
-| `tables/` | force tables of fins that have one, each named by its SHA-256 |
-| `checkpoint/` | the trained networks, where the method has any: `model.safetensors`, `config.json` |
-| `SHA256SUMS` | checksums; `sha256sum -c SHA256SUMS` checks them without finlab |
-"""
-
-
 def readme_text(graph: LayoutGraph) -> str:
-    """The README of a bundle with this graph."""
+    """The README of a bundle with this graph: `bundle_readme.md`, beside this module, filled in."""
     rows = []
     for fin in graph.layout.fins:
         x, y, z = fin.position
@@ -204,7 +154,8 @@ def readme_text(graph: LayoutGraph) -> str:
         rows.append(
             f"| {name} | {x:g}, {y:g}, {z:g} | {fin.mounting_angle:.4f} | {' | '.join(ranges)} | {works} |"
         )
-    return _TEXT.format(
+    template = Path(__file__).with_name("bundle_readme.md").read_text("utf-8")
+    return template.format(
         name=graph.layout.name,
         version=finlab.__version__,
         method=graph.method,

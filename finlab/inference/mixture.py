@@ -56,10 +56,4 @@ class MixtureArrays(NamedTuple):
         log_normal -= np.float32(1.5 * math.log(2.0 * math.pi))
         with np.errstate(divide="ignore"):
             log_weight = np.log(self.weight)[:, None]
-        return np.asarray(_log_sum_exp(log_weight + log_normal).sum(2))
-
-
-def _log_sum_exp(x: AnyArray) -> AnyArray:
-    """log sum exp over the last axis."""
-    top = x.max(-1, keepdims=True)
-    return np.asarray(top[..., 0] + np.log(np.exp(x - top).sum(-1)))
+        return np.asarray(np.logaddexp.reduce(log_weight + log_normal, axis=-1).sum(2))

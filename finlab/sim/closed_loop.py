@@ -79,7 +79,6 @@ class ClosedLoop:
         self.seed = seed
         self.vehicle = Vehicle(complete_body(layout), current)
         self.fins = FinMotion(layout, servo)
-        self._blade = plant_of(layout).blade
         """The fins' motion: amplitude, frequency, zero direction and phase of each."""
         self._fin_force = make_plant(plant, layout)
         self._plant = plant_of(layout)
@@ -194,7 +193,7 @@ class ClosedLoop:
             self.state = self.vehicle.step(self.state, wrench.tolist(), dt)
             if k + 1 < n_steps:  # the sample at the end belongs to the next period
                 self._sensors.measure(time + (k + 1) * dt, self.state)
-            power = fin_power(self.fins, self._blade)
+            power = fin_power(self.fins, self._plant.blade)
             mean += wrenches / n_steps
             inertial += power.inertial / n_steps
             torque += power.torque / n_steps

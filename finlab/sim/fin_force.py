@@ -57,9 +57,10 @@ class RippleForce:
 
     step_s = 0.01
 
-    def __init__(self, layout: Layout, blade: Blade | None = None) -> None:
+    blade = Blade()
+
+    def __init__(self, layout: Layout) -> None:
         self._mean = MeanForce(layout)
-        self.blade = Blade() if blade is None else blade
         self._momentum = np.zeros((layout.n_fins, 2))
 
     def step(self, motion: FinMotion, dt: float) -> Array:

@@ -18,10 +18,10 @@ def imitation(mixture: Mixture, batch: Batch) -> Tensor:
 def tracking_error(
     surrogate: Surrogate, command: Tensor, batch: Batch, target: Tensor, std: Tensor
 ) -> Tensor:
-    """Normalized wrench residual (B, K, 6) of commands (B, K, n, 3), by the surrogate."""
-    one = (t[:, None] for t in (batch.position, batch.mounting_angle, batch.lower, batch.upper, batch.mask))
-    wrench: Tensor = surrogate(command, *one)
-    return wrench / std - target[:, None]
+    """Normalized wrench residual (B, 6) of commands (B, n, 3), by the surrogate."""
+    limits = (batch.lower, batch.upper, batch.mask)
+    wrench: Tensor = surrogate(command, batch.position, batch.mounting_angle, *limits)
+    return wrench / std - target
 
 
 def sample_guidance(
@@ -34,12 +34,10 @@ def sample_guidance(
     share: tuple[slice, int] | None = None,
 ) -> Tensor:
     """The paper's L_guide: squared normalized error of one sample; `share` as in `Mixture.sample`."""
-    x = mixture.sample(1, 1.0, noise, share=share)
-    lower, upper = batch.lower[:, None], batch.upper[:, None]
-    raw = to_command(x, lower, upper)
+    raw = to_command(mixture.sample(noise, share), batch.lower, batch.upper)
     # The gradient passes the clamp, or samples outside the limits would teach nothing.
-    command = raw + (clamp_to_limits(raw, lower, upper) - raw).detach()
-    return tracking_error(surrogate, command, batch, target, std).square().sum(-1).mean(1)
+    command = raw + (clamp_to_limits(raw, batch.lower, batch.upper) - raw).detach()
+    return tracking_error(surrogate, command, batch, target, std).square().sum(-1)
 
 
 def negative_entropy(mixture: Mixture, mask: Tensor) -> Tensor:

@@ -7,7 +7,7 @@ it against `torch_geometric.nn.GATv2Conv`.
 
 import math
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -77,36 +77,24 @@ class Mixture(NamedTuple):
         return (torch.logsumexp(self.logits.log_softmax(-1) + log_normal, dim=-1) * mask).sum(1)
 
     def sample(
-        self,
-        n_samples: int,
-        temperature: float,
-        generator: torch.Generator | None = None,
-        *,
-        share: tuple[slice, int] | None = None,
+        self, generator: torch.Generator | None = None, share: tuple[slice, int] | None = None
     ) -> Tensor:
-        """Draw normalized commands (B, n_samples, n, 3).
-
-        Temperature T sharpens the choice of component (weights to the power 1/T) and scales the
-        variance of each Gaussian by T, as usual for mixture density networks; T = 1 samples the
-        density itself.
+        """Draw normalized commands (B, n, 3).
 
         Args:
-            n_samples: how many.
-            temperature: T, from 0.
             generator: source of randomness.
             share: which rows of a larger batch these are, and its size; the noise is that of the larger
                 batch, however it is shared among processes.
         """
         batch, n, m, _ = self.mean.shape
         rows, total = share or (slice(0, batch), batch)
-        dtype, device = self.mean.dtype, self.mean.device
-        draw = torch.rand((total, n, n_samples), generator=generator, dtype=dtype, device=device)[rows]
-        noise = torch.randn((total, n, n_samples, 3), generator=generator, dtype=dtype, device=device)[rows]
-        cumulative = (self.logits / max(temperature, 1e-6)).softmax(-1).cumsum(-1)
-        choice = (draw[..., None] > cumulative[..., None, :]).sum(-1).clamp(max=m - 1)
-        index = choice[..., None].expand(-1, -1, -1, 3)
-        mean, std = self.mean.gather(2, index), self.log_std.gather(2, index).exp()
-        return (mean + math.sqrt(temperature) * std * noise).transpose(1, 2)
+        kind: dict[str, Any] = {"dtype": self.mean.dtype, "device": self.mean.device}
+        draw = torch.rand((total, n, 1), generator=generator, **kind)[rows]
+        noise = torch.randn((total, n, 3), generator=generator, **kind)[rows]
+        choice = (draw > self.logits.softmax(-1).cumsum(-1)).sum(-1).clamp(max=m - 1)
+        index = choice[..., None, None].expand(-1, -1, 1, 3)
+        mean, log_std = (part.gather(2, index)[:, :, 0] for part in (self.mean, self.log_std))
+        return mean + log_std.exp() * noise
 
 
 class AllocatorNetwork(nn.Module):
