@@ -1,6 +1,5 @@
 """How the server's lines travel: over standard input and output, or as UDP datagrams on this machine."""
 
-import queue
 import socket
 import threading
 from typing import BinaryIO
@@ -15,27 +14,19 @@ class StandardStreams:
     def __init__(self, source: BinaryIO, sink: BinaryIO) -> None:
         """Start to read `source` in a thread of its own."""
         self._sink = sink
-        self._lines: queue.Queue[bytes | None] = queue.Queue()
+        self._news = threading.Condition()
+        self._line: bytes | None = None
+        self._ended = False
         threading.Thread(target=self._read, args=(source,), daemon=True).start()
 
     def newest(self, timeout: float | None) -> bytes | None:
         """See `Transport`."""
-        try:
-            line = self._lines.get(timeout=timeout)
-        except queue.Empty:
-            return None
-        while line is not None:
-            try:
-                following = self._lines.get_nowait()
-            except queue.Empty:
-                break
-            if following is None:  # the end waits until the last request is answered
-                self._lines.put(None)
-                break
-            line = following
-        if line is None:
-            raise EOFError
-        return line
+        with self._news:
+            self._news.wait_for(lambda: self._line is not None or self._ended, timeout)
+            line, self._line = self._line, None
+            if line is None and self._ended:  # the end waits until the last request is answered
+                raise EOFError
+            return line
 
     def send(self, line: bytes) -> None:
         """See `Transport`."""
@@ -45,8 +36,12 @@ class StandardStreams:
     def _read(self, source: BinaryIO) -> None:
         while line := source.readline(MAX_LINE + 1):
             if line.strip():
-                self._lines.put(line)
-        self._lines.put(None)
+                with self._news:
+                    self._line = line
+                    self._news.notify()
+        with self._news:
+            self._ended = True
+            self._news.notify()
 
 
 class LoopbackUdp:

@@ -142,15 +142,11 @@ def _network_config(values: dict[str, Any] | None) -> AnyNetworkConfig | None:
 
 def read_normalization(folder: Path) -> Normalization:
     """Only the wrench statistics of a checkpoint, for methods that need no network."""
-    return parse_normalization(_files(folder, (CONFIG_FILE,)), str(folder))
-
-
-def parse_normalization(files: Mapping[str, bytes], source: str) -> Normalization:
-    """The wrench statistics in a checkpoint's files by name."""
+    config = _config(_files(folder, (CONFIG_FILE,)), str(folder))
     try:
-        return Normalization.parse(_config(files, source)["normalization"])
-    except (KeyError, ValueError) as error:
-        raise CheckpointError(f"{source}/{CONFIG_FILE}: normalization is missing or malformed") from error
+        return Normalization.parse(config.get("normalization"))
+    except ValueError as error:
+        raise CheckpointError(f"{folder}/{CONFIG_FILE}: normalization is missing or malformed") from error
 
 
 def resolve_checkpoint(checkpoint: str | os.PathLike[str]) -> Path:

@@ -1,27 +1,20 @@
 """Keeps the small matrix products of one answer on one thread."""
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
 
-class _OneThread:
-    """Lets libraries work on one thread in a `with` block; costs next to nothing where they already do."""
-
-    def __init__(self, libraries: list[Any]) -> None:
-        """Take the controllers of threadpoolctl."""
-        self._libraries = libraries
-        self._changed: list[tuple[Any, int]] = []
-
-    def __enter__(self) -> None:
-        for library in self._libraries:
-            threads = library.num_threads
-            if threads != 1:
-                self._changed.append((library, threads))
-                library.set_num_threads(1)
-
-    def __exit__(self, *error: object) -> None:
-        for library, threads in self._changed:
+@contextmanager
+def _one_thread(libraries: list[Any]) -> Iterator[None]:
+    """Libraries work on one thread in this block; costs next to nothing where they already do."""
+    changed = [(library, threads) for library in libraries if (threads := library.num_threads) != 1]
+    try:
+        for library, _ in changed:
+            library.set_num_threads(1)
+        yield
+    finally:
+        for library, threads in changed:
             library.set_num_threads(threads)
 
 
@@ -36,4 +29,4 @@ def single_threaded_products() -> Callable[[], AbstractContextManager[object]]:
     except ImportError:
         return nullcontext
     libraries = ThreadpoolController().select(user_api="blas").lib_controllers
-    return lambda: _OneThread(libraries)
+    return lambda: _one_thread(libraries)

@@ -3,15 +3,14 @@
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import torch
 from torch import Tensor, nn
 
 from finlab.errors import DataError
 from finlab.inference.checkpoint import checkpoint_files, read_checkpoint
-from finlab.inference.weights import NetworkConfig, State, SurrogateConfig, TrainedWeights
-from finlab.training.networks.allocator_network import AllocatorNetwork
+from finlab.inference.weights import State, SurrogateConfig, TrainedWeights
 from finlab.training.networks.surrogate import Surrogate
 
 STATE_FILE = "resume.pt"
@@ -66,21 +65,11 @@ def load_state(
     return steps, seconds
 
 
-Module = TypeVar("Module", bound=nn.Module)
-
-
 def surrogate_of(weights: TrainedWeights) -> Surrogate:
     """The surrogate as a module, frozen."""
-    return _filled(Surrogate(weights.surrogate_config or SurrogateConfig()), weights.surrogate)
-
-
-def network_of(weights: TrainedWeights) -> AllocatorNetwork:
-    """The paper's network as a module, frozen.
-
-    Raises:
-        CheckpointError: the checkpoint holds another, or none.
-    """
-    return _filled(AllocatorNetwork(weights.check_network(NetworkConfig)), weights.network)
+    surrogate = Surrogate(weights.surrogate_config or SurrogateConfig())
+    surrogate.load_state_dict({key: torch.tensor(value) for key, value in weights.surrogate.items()})
+    return surrogate.eval().requires_grad_(False)
 
 
 def state_of(tensors: Mapping[str, Tensor]) -> State:
@@ -94,8 +83,3 @@ def save_checkpoint(folder: Path, weights: TrainedWeights) -> TrainedWeights:
     for name, content in checkpoint_files(weights).items():
         (folder / name).write_bytes(content)
     return read_checkpoint(folder)
-
-
-def _filled(module: Module, state: State) -> Module:
-    module.load_state_dict({key: torch.tensor(value) for key, value in state.items()}, strict=True)
-    return module.eval().requires_grad_(False)

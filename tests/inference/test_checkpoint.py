@@ -26,7 +26,8 @@ from finlab.inference.checkpoint import (
     resolve_checkpoint,
 )
 from finlab.training.presets import MDN_RECIPES
-from finlab.training.saving import network_of, save_checkpoint, state_of, surrogate_of
+from finlab.training.saving import save_checkpoint, state_of, surrogate_of
+from tests.paper_network import network_of
 
 
 def file_sha256(path: Path) -> str:

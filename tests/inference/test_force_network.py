@@ -8,7 +8,7 @@ from finlab.assets import checkpoint_path
 from finlab.inference.checkpoint import read_checkpoint
 from finlab.inference.force_network import NODE_SIZE, PAIR_SIZE, NumpyForceNetwork
 from finlab.inference.weights import ForceNetworkConfig
-from finlab.training.networks.force_network import ForceNetwork
+from finlab.training.networks.force_network import ForceLayer, ForceNetwork
 
 RANDOM = ForceNetworkConfig(width=32, heads=4, layers=2, feedforward=40, n_components=6)
 
@@ -54,7 +54,10 @@ def test_mixture_is_that_of_the_trained_one(n: int, network: ForceNetwork) -> No
 def test_attention_is_that_of_the_trained_one(network: ForceNetwork) -> None:
     nodes, pairs = inputs(5)
     attention = copy_of(network).attention(nodes, pairs)
-    expected = network.attention(torch.tensor(nodes), torch.tensor(pairs)).numpy()
+    first = network.layers[0]
+    assert isinstance(first, ForceLayer)
+    seen = first.norm1(network.enter(torch.tensor(nodes)))
+    expected = first.look(seen, torch.tensor(pairs))[1].mean(-1).numpy()
     np.testing.assert_allclose(attention, expected, atol=1e-5)
     np.testing.assert_allclose(attention.sum(-1), 1.0, atol=1e-5)
 

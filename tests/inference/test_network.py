@@ -9,7 +9,7 @@ from finlab.inference.features import RAW_SIZE
 from finlab.inference.network import NumpyNetwork
 from finlab.inference.weights import NetworkConfig
 from finlab.training.networks.allocator_network import AllocatorNetwork
-from finlab.training.saving import network_of
+from tests.paper_network import network_of
 
 RANDOM = NetworkConfig(width=32, heads=4, transformer_layers=2, feedforward=40, n_components=6)
 

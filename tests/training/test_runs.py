@@ -18,8 +18,8 @@ from finlab.training.allocator import make_terms
 from finlab.training.networks.allocator_network import AllocatorNetwork
 from finlab.training.networks.surrogate import Surrogate
 from finlab.training.presets import PAPER_RECIPES
-from finlab.training.saving import network_of
 from finlab.training.surrogate import surrogate_metrics
+from tests.paper_network import network_of
 
 DRAG = make_law(FinModelSpec())
 

@@ -104,10 +104,3 @@ class ForceNetwork(nn.Module):
         raw = self.head(hidden).unflatten(-1, (self.config.n_components, 3)).float()
         log_std = LOG_STD[0] + LOG_STD[1] * torch.tanh(raw[..., 2])
         return ForceMixture(self.weight(hidden.mean(1)).float(), raw[..., :2], log_std)
-
-    def attention(self, nodes: Tensor, pairs: Tensor) -> Tensor:
-        """Attention weights (B, n, n) of the first layer, averaged over heads: what it looks at."""
-        first = self.layers[0]
-        assert isinstance(first, ForceLayer)
-        weights: Tensor = first.look(first.norm1(self.enter(nodes)), pairs)[1]
-        return weights.mean(-1)
