@@ -7,9 +7,9 @@ import numpy as np
 
 from finlab.layout.fin import FinModelSpec
 
-Range = tuple[float, float]
-
 Draw = Callable[[np.random.Generator, float, float], float]
+Numbers = dict[str, tuple[Draw, tuple[float, float]]]
+"""Names of a fin model's numbers, how each is drawn and from where."""
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
@@ -22,7 +22,7 @@ def uniform(rng: np.random.Generator, low: float, high: float) -> float:
     return float(rng.uniform(low, high))
 
 
-FAMILIES: dict[str, dict[str, tuple[Draw, Range]]] = {
+FAMILIES: dict[str, Numbers] = {
     "drag": {"area": (log_uniform, (0.005, 0.04)), "lever": (log_uniform, (0.05, 0.15))},
     "lighthill": {"length": (log_uniform, (0.1, 0.3)), "width": (log_uniform, (0.05, 0.15))},
     "soft": {
@@ -35,11 +35,13 @@ FAMILIES: dict[str, dict[str, tuple[Draw, Range]]] = {
         "d": (uniform, (-0.15, 0.15)),
     },
 }
-"""Fin model -> its numbers, how each is drawn and from where; what is not named stays as it is by default."""
+"""Fin model -> its numbers; what is not named stays as it is by default."""
 
 
-def random_fin_model(rng: np.random.Generator, kind: str | None = None) -> FinModelSpec:
-    """Returns a fin with random numbers, of a kind in `FAMILIES` or of each a third of the time."""
-    kind = kind or str(rng.choice(list(FAMILIES)))
-    numbers = {name: draw(rng, *ends) for name, (draw, ends) in FAMILIES[kind].items()}
-    return FinModelSpec(kind, tuple(numbers.items()))
+def random_fin_model(
+    rng: np.random.Generator, kind: str | None = None, families: dict[str, Numbers] = FAMILIES
+) -> FinModelSpec:
+    """Returns a fin with random numbers, of one kind or of each equally often."""
+    kind = kind or str(rng.choice(list(families)))
+    drawn = {name: draw(rng, *ends) for name, (draw, ends) in families[kind].items()}
+    return FinModelSpec(kind, tuple(drawn.items()))

@@ -4,30 +4,48 @@ Nothing here is a fin that is evaluated: those are drawn by other generators, fr
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from finlab.arrays import Array
 from finlab.forces.fin_envelope import FinEnvelope, compile_fin
 from finlab.layout import Limits
 from finlab.layout.random import random_layout
-from finlab.layout.random_fins import log_uniform
+from finlab.layout.random_fins import Numbers, log_uniform, random_fin_model, uniform
 from finlab.physics.blade import Blade
-from finlab.physics.drag import Drag
 from finlab.physics.fin_law import FinLaw
-from finlab.physics.lighthill import Lighthill
+from finlab.physics.fin_model import make_law
 from finlab.physics.objective import Objective
-from finlab.physics.soft import Soft
 from finlab.physics.table import TableLaw
 
-DENSITY = 1000.0
-"""[kg/m^3]"""
 WEAKEST = 1e-2
 """Largest force [N] of the weakest fin worth learning from."""
 GRID = (7, 9, 12)
 """Amplitudes, frequencies and zero directions of a random table."""
+
+
+SHARES = {"drag": 0.3, "lighthill": 0.2, "soft": 0.38, "table": 0.12}
+"""How often each family is drawn."""
+
+
+def _half_the_time(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(rng.uniform(low, high) * (rng.random() < 0.5))
+
+
+NUMBERS: dict[str, Numbers] = {
+    "drag": {"area": (log_uniform, (0.003, 0.06)), "lever": (log_uniform, (0.04, 0.2))},
+    "lighthill": {"length": (log_uniform, (0.08, 0.4)), "width": (log_uniform, (0.04, 0.2))},
+    "soft": {
+        "e": (_half_the_time, (0.0, 0.3)),
+        "k": (log_uniform, (0.5, 12.0)),
+        "p": (uniform, (0.7, 2.5)),
+        "x0": (uniform, (0.4, 2.0)),
+        "q": (uniform, (2.0, 8.0)),
+        "phi_e": (uniform, (-math.pi, math.pi)),
+        "d": (uniform, (-0.3, 0.3)),
+    },
+}
+"""Families with a formula: wider than any fin that is evaluated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +62,7 @@ class RandomFin:
 
 def random_fin(rng: np.random.Generator, limits: Limits) -> RandomFin:
     """Draw a law of a random family and compile it."""
-    family = FAMILIES[int(rng.choice(len(FAMILIES), p=SHARES))]
-    law = family(rng)
+    law = random_law(rng, str(rng.choice(list(SHARES), p=list(SHARES.values()))))
     envelopes = {name: compile_fin(law, limits, Objective(name)) for name in ("power", "effort")}
     # A fin that hardly pushes at all is drawn again: it has nothing to teach.
     if envelopes["power"].largest.max() < WEAKEST:
@@ -58,25 +75,9 @@ def varied_limits(rng: np.random.Generator) -> Limits:
     return random_layout(rng, n_fins=1, limits="varied").fins[0].limits
 
 
-def _drag(rng: np.random.Generator) -> FinLaw:
-    return Drag(DENSITY, 0.15, log_uniform(rng, 0.003, 0.06), log_uniform(rng, 0.04, 0.2))
-
-
-def _lighthill(rng: np.random.Generator) -> FinLaw:
-    return Lighthill(DENSITY, log_uniform(rng, 0.08, 0.4), log_uniform(rng, 0.04, 0.2))
-
-
-def _soft(rng: np.random.Generator) -> FinLaw:
-    uneven = rng.uniform(0.0, 0.3) * (rng.random() < 0.5)
-    return Soft(
-        log_uniform(rng, 0.5, 12.0),
-        rng.uniform(0.7, 2.5),
-        rng.uniform(0.4, 2.0),
-        rng.uniform(2.0, 8.0),
-        uneven,
-        rng.uniform(-math.pi, math.pi),
-        rng.uniform(-0.3, 0.3),
-    )
+def random_law(rng: np.random.Generator, family: str) -> FinLaw:
+    """Draw a law of one of the families in `SHARES`."""
+    return _table(rng) if family == "table" else make_law(random_fin_model(rng, family, NUMBERS))
 
 
 def _table(rng: np.random.Generator) -> FinLaw:
@@ -100,9 +101,3 @@ def _table(rng: np.random.Generator) -> FinLaw:
         power = blade.power(a, f) * (0.2 + beat ** rng.uniform(0.0, 1.0))
         columns.append(power * log_uniform(rng, 0.3, 3.0))
     return TableLaw([amplitude, frequency, direction], np.stack(columns, axis=-1), True)
-
-
-FAMILIES: tuple[Callable[[np.random.Generator], FinLaw], ...] = (_drag, _lighthill, _soft, _table)
-"""What fins are drawn from."""
-SHARES: Array = np.array([0.3, 0.2, 0.38, 0.12])
-"""How often each family is drawn."""

@@ -6,7 +6,7 @@ import pytest
 from finlab.forces.fin_sets import planar_sets
 from finlab.forces.nearest import nearest
 from finlab.layout import Limits, stack_layouts
-from finlab.training.mdn.random_fins import FAMILIES, random_fin, varied_limits
+from finlab.training.mdn.random_fins import SHARES, random_fin, random_law, varied_limits
 from finlab.training.mdn.random_robots import FIN_COUNTS, FinPool, RandomRobot, random_robot, random_targets
 from finlab.training.sampling import find_reserved, shipped_reserved
 
@@ -18,10 +18,10 @@ def pool() -> FinPool:
     return FinPool(np.random.default_rng(4), 3)
 
 
-@pytest.mark.parametrize("family", FAMILIES)
-def test_every_family_pushes_and_takes_power(family) -> None:
+@pytest.mark.parametrize("family", SHARES)
+def test_every_family_pushes_and_takes_power(family: str) -> None:
     for seed in range(5):
-        law = family(np.random.default_rng(seed))
+        law = random_law(np.random.default_rng(seed), family)
         command = np.array([[0.3, 1.2, 0.4], [0.6, 2.1, -2.0]])
         force = law.force(command)
         assert np.isfinite(force).all() and np.hypot(force[..., 1], force[..., 2]).min() > 0.0
