@@ -115,9 +115,10 @@ def check_bundle_files(files: Files, source: str) -> None:
     rest = {name: content for name, content in files.items() if name != CHECKSUMS}
     if checksums(rest) == files[CHECKSUMS]:
         return
-    listed = {line[66:]: line[:64] for line in files[CHECKSUMS].decode("utf-8", "replace").splitlines()}
-    actual = {line[66:]: line[:64] for line in checksums(rest).decode().splitlines()}
-    wrong = next((name for name in actual if listed.get(name) != actual[name]), CHECKSUMS)
+    listed = files[CHECKSUMS].decode("utf-8", "replace").splitlines()
+    wrong = next(
+        (line[66:] for line in checksums(rest).decode().splitlines() if line not in listed), CHECKSUMS
+    )
     raise DataError(f"{source}: {wrong} does not fit {CHECKSUMS}; it was changed; copy the bundle again")
 
 

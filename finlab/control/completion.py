@@ -24,12 +24,7 @@ class Completion:
     """Wanted axes to whole wrenches, for one layout with some fins lost. Linear in the wanted axes."""
 
     def __init__(self, layout: Layout, failed: Sequence[str], axes: Sequence[str]) -> None:
-        """Prepares for the working fins.
-
-        Args:
-            layout: the robot, lost fins included.
-            failed: names of lost fins; at least one is left.
-            axes: names of the wanted axes.
+        """Prepares for the fins that work, at least one, and the wanted axes, by their names.
 
         Raises:
             LayoutError: an unknown name, or no fin is left.

@@ -62,13 +62,7 @@ class Server:
     """Answers requests until they end."""
 
     def __init__(self, robot: Robot, timing: Timing, steady: bool = False) -> None:
-        """Make it.
-
-        Args:
-            robot: the robot.
-            timing: deadline and watchdog.
-            steady: whether fins turn slowly from one answer to the next (`previous`).
-        """
+        """Make it; `steady` lets fins turn slowly from one answer to the next (`previous`)."""
         self._robot, self._timing, self._steady = robot, timing, steady
         self._worker = ThreadPoolExecutor(1)
         self._sent: Array | None = None  # the last commands, None while the fins rest

@@ -48,10 +48,7 @@ class LoopbackUdp:
     """Datagrams on 127.0.0.1; answers go to whoever sent last."""
 
     def __init__(self, port: int) -> None:
-        """Listen.
-
-        Args:
-            port: UDP port; 0 takes a free one.
+        """Listen on a port; 0 takes a free one.
 
         Raises:
             FinlabError: the port is taken.

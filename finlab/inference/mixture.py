@@ -30,12 +30,9 @@ class MixtureArrays(NamedTuple):
         return np.asarray((self.weight[..., None] * self.mean).sum(2))
 
     def tempered(self, temperature: float, uniform: AnyArray, normal: AnyArray) -> AnyArray:
-        """Commands (N, K, n, 3) drawn at a temperature T: weights to the power 1/T, variances times T.
+        """Commands (N, K, n, 3) drawn at a temperature T from 0: weights to the power 1/T, variances times T.
 
-        Args:
-            temperature: T, from 0; 1 draws from the mixture itself.
-            uniform: numbers in [0, 1) (N, n, K); they choose components.
-            normal: standard normal numbers (N, n, K, 3).
+        Uniform numbers in [0, 1) (N, n, K) choose components, standard normal ones (N, n, K, 3) the rest.
         """
         m = self.weight.shape[-1]
         with np.errstate(divide="ignore"):

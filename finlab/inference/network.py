@@ -17,13 +17,7 @@ class NumpyNetwork:
     """Features and target in, a mixture per fin out."""
 
     def __init__(self, weights: Mapping[str, NDArray[np.floating]], heads: int, n_components: int) -> None:
-        """Take over a trained network.
-
-        Args:
-            weights: its state by PyTorch's names.
-            heads: attention heads.
-            n_components: number M of mixture components.
-        """
+        """Take over a trained network: its state by PyTorch's names, and its sizes as in `NetworkConfig`."""
         w = layers.single_precision(weights)
         self.n_components = n_components
         self.graph = [_Graph(w, name, heads) for name in layers.names_of_layers(w, "graph")]

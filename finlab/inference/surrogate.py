@@ -33,15 +33,8 @@ class MlpFins:
         lower: AnyArray,
         upper: AnyArray,
     ) -> None:
-        """Take over a trained surrogate for fins at `position` (n, 3) with shafts at `mounting_angle` (n,).
-
-        Args:
-            weights: its state by PyTorch's names.
-            position: [m].
-            mounting_angle: [rad].
-            lower: lower limits (n, 3), which are features as well.
-            upper: upper limits (n, 3).
-        """
+        """Take over a trained surrogate, its state by PyTorch's names, for fins at `position` (n, 3) [m] with
+        shafts at `mounting_angle` (n,) [rad] and limits (n, 3), which are features as well."""
         state = single_precision(weights)
         features = raw_features(position, mounting_angle, lower, upper).astype(np.float32)
         first, *self._layers, last = (linear(state, name) for name in names_of_layers(state, "net"))

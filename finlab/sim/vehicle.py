@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.arrays import Array
-from finlab.assets import layouts_dir
 from finlab.errors import LayoutError
 from finlab.layout import Body, Layout, load_layout
 
@@ -32,7 +31,7 @@ GRAVITY = 9.81
 @cache
 def ucat_body() -> Body:
     """The body of the shipped layout `ucat`, where U-CAT's numbers stand, each with its source."""
-    body = load_layout(layouts_dir() / "ucat.yaml").body
+    body = load_layout("ucat").body
     assert body is not None
     return body
 

@@ -136,11 +136,7 @@ def make_terms(
 def losses(net: Callable[..., ForceMixture], batch: Batch, temper: float, spread: float) -> dict[str, Tensor]:
     """The loss and its parts, means over a batch; per fin, so that robots of many fins count no more.
 
-    Args:
-        net: the network.
-        batch: targets with ways to deliver them.
-        temper: see `ForceMixture.log_prob`.
-        spread: weight of the entropy of the components' mean weights.
+    For `temper` see `ForceMixture.log_prob`; `spread` weighs the entropy of the components' mean weights.
     """
     mixture = net(batch.nodes, batch.pairs)
     likelihood = (mixture.log_prob(batch.way, temper) * batch.weight).sum(-1).mean() / batch.nodes.shape[1]

@@ -21,13 +21,7 @@ class DenseGATv2(nn.Module):
     """One GATv2 layer on complete graphs with self loops; heads are concatenated."""
 
     def __init__(self, in_features: int, out_features: int, heads: int) -> None:
-        """Make the layer.
-
-        Args:
-            in_features: width of the node features.
-            out_features: width of the result, all heads together.
-            heads: number of attention heads; must divide `out_features`.
-        """
+        """Make it; `out_features` is the width of all heads together, a multiple of their number."""
         super().__init__()
         if out_features % heads:
             raise ValueError(f"out_features {out_features} must be a multiple of heads {heads}")
@@ -39,15 +33,8 @@ class DenseGATv2(nn.Module):
         nn.init.xavier_uniform_(self.attention)
 
     def forward(self, x: Tensor, mask: Tensor | None = None) -> Tensor:
-        """Attend over all nodes of each graph.
-
-        Args:
-            x: node features (B, n, in_features).
-            mask: True where a node exists (B, n); None where all do.
-
-        Returns:
-            New features (B, n, out_features).
-        """
+        """New features (B, n, out_features) of nodes (B, n, in_features) that attend to all of their graph;
+        `mask` (B, n) is True where a node exists, None where all do."""
         batch, n, _ = x.shape
         source = self.source(x).view(batch, 1, n, self.heads, -1)
         target = self.target(x).view(batch, n, 1, self.heads, -1)
@@ -81,10 +68,8 @@ class Mixture(NamedTuple):
     ) -> Tensor:
         """Draw normalized commands (B, n, 3).
 
-        Args:
-            generator: source of randomness.
-            share: which rows of a larger batch these are, and its size; the noise is that of the larger
-                batch, however it is shared among processes.
+        `share` says which rows of a larger batch these are, and its size; the noise is that of the larger
+        batch, however it is shared among processes.
         """
         batch, n, m, _ = self.mean.shape
         rows, total = share or (slice(0, batch), batch)
@@ -118,8 +103,9 @@ class AllocatorNetwork(nn.Module):
         self.head = nn.Linear(width, config.n_components * 6)
         self.weight = nn.Linear(width, config.n_components)
 
-    def encode(self, x: Tensor, target: Tensor, mask: Tensor | None) -> Tensor:
-        """Per-fin embeddings (B, n, width) of features (B, n, F) and normalized targets (B, 6)."""
+    def forward(self, x: Tensor, target: Tensor, mask: Tensor | None = None) -> Mixture:
+        """The mixture for node features (B, n, 10) and normalized targets (B, 6); `mask` (B, n) is True where
+        a fin exists, None where all do."""
         hidden = x
         for layer in self.graph:
             hidden = nn.functional.elu(layer(hidden, mask))
@@ -127,18 +113,7 @@ class AllocatorNetwork(nn.Module):
         wrench = self.wrench(target)[:, None].expand(-1, x.shape[1], -1)
         hidden = self.join(torch.cat([hidden, wrench], dim=-1))
         padding = None if mask is None else ~mask
-        embedded: Tensor = self.norm(self.transformer(hidden, src_key_padding_mask=padding))
-        return embedded
-
-    def forward(self, x: Tensor, target: Tensor, mask: Tensor | None = None) -> Mixture:
-        """The mixture for B robots.
-
-        Args:
-            x: node features (B, n, 10).
-            target: normalized target wrench (B, 6).
-            mask: True where a fin exists (B, n); None where all do.
-        """
-        hidden = self.encode(x, target, mask)
+        hidden = self.norm(self.transformer(hidden, src_key_padding_mask=padding))
         raw = self.head(hidden).float().unflatten(-1, (self.config.n_components, 6))
         log_std = LOG_STD_BOUND * torch.tanh(0.5 * raw[..., 3:])
         return Mixture(self.weight(hidden).float(), raw[..., :3], log_std)
