@@ -14,14 +14,15 @@ import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
-from finlab.forces.reach import Ranges
 from webapp.handles import Changes, on_user_change
 from webapp.scene.scenery import Scenery
 from webapp.session import Session
-from webapp.tasks.analyst import REST_S, Beside, Findings, Question, find, find_ranges
+from webapp.session.state import State
+from webapp.tasks.analyst import REST_S, Question, find, find_ranges
 from webapp.tasks.answering import Answering
 from webapp.tasks.background import EventLoop, Newest, Workers
 from webapp.tasks.comparison import Comparison
+from webapp.tasks.context import Context
 from webapp.tasks.exports import Exports
 from webapp.tasks.improving import Improver
 from webapp.tasks.playback import Playback
@@ -60,29 +61,27 @@ class Page(ABC):
         self._loop = page = EventLoop(loop, self.fault)
         self._robot = _robot(session)
         self._faults: set[str] = set()
-        answers, changed = workers.answers, self._refresh
-        refused = partial(self.notify, "Not possible")
-        self.answering = Answering(
-            session, solver, page, answers, self._answered, partial(self.notify, "No answer")
-        )
+        changed = self._refresh
+        context = Context(client, session, solver, workers, page, self.do, changed, self.notify)
+        self.answering = Answering(context)
         """The newest answer, its modes and what of it is on the robot."""
-        self.playback = Playback(self.answering, solver, page, answers, changed, refused)
+        self.playback = Playback(context, self.answering)
         """The refinement, step by step."""
-        self.ranging: Newest[Beside, Ranges] = Newest(page, workers.marks, find_ranges, changed, REST_S)
+        self.ranging = Newest(page, workers.marks, find_ranges, changed, REST_S)
         """How far each component of the target can go."""
-        self.analyst: Newest[Question, Findings] = Newest(page, workers.cards, find, changed, CARD_REST_S)
+        self.analyst = Newest(page, workers.cards, find, changed, CARD_REST_S)
         """What the layout can do."""
-        self.improver = Improver(page, workers.searches, changed)
+        self.improver = Improver(context)
         """The search for a better layout."""
-        self.comparison = Comparison(solver, page, answers, changed)
+        self.comparison = Comparison(context)
         """Other methods on the same question."""
-        self.swimming = Swimming(solver.aside, page, workers.swims, self._swam, refused)
+        self.swimming = Swimming(context, self._swam)
         """A robot that swims."""
-        self.sweep = Sweep(session, page, self.do)
+        self.sweep = Sweep(context)
         """A component of the target on its way through a range."""
-        self.exports = Exports(client, session, solver, page, answers, self.notify)
+        self.exports = Exports(context)
         """Files to take home."""
-        self.scenery = Scenery(client, session, self.swimming, self.do)
+        self.scenery = Scenery(context, self.swimming)
         """What is seen beside the panel."""
         self._panels: list[Panel] = []
         self._panels, self._swim_panels = self._build()
@@ -156,6 +155,7 @@ class Page(ABC):
     # From the session to the page.
 
     def _refresh(self) -> None:
+        self.sweep.note(self.answering)
         with self.client.atomic():
             # First: it settles the scale that the legend tells.
             try:
@@ -178,7 +178,7 @@ class Page(ABC):
             for task in (self.answering, self.analyst, self.ranging):
                 task.forget()
         self.analyst.ask(Question(state.able, state.failed, session.reference, display.drawn, display.alone))
-        self.ranging.ask(Beside(state.able, state.failed, state.target))
+        self.ranging.ask(State(state.able, state.failed, target=state.target))
         self.answering.ask()
 
     def _swam(self) -> None:
@@ -190,10 +190,6 @@ class Page(ABC):
             self.scenery.refresh_swim()
             for panel in self._swim_panels:
                 panel.refresh()
-
-    def _answered(self) -> None:
-        self.sweep.note(self.answering)
-        self._refresh()
 
     def fault(self, error: Exception) -> None:
         """Something that we have got wrong: it is told, and nothing that was drawn before is trusted."""

@@ -1,10 +1,14 @@
-"""Event loops for tests without one."""
+"""Event loops for tests without one, and pages without a browser."""
 
 import asyncio
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
+from tests.webapp.stand_in import load_stand_in
 from webapp.tasks.background import EventLoop
+from webapp.tasks.context import Context
+from webapp.tasks.solver import Solver
 
 
 class AtOnce(EventLoop):
@@ -32,3 +36,17 @@ def raised(error: Exception) -> None:
 def running() -> EventLoop:
     """The loop that runs, as a page uses it."""
     return EventLoop(asyncio.get_running_loop(), raised)
+
+
+def page_of(worker: Any, session: Any = None, **options: Any) -> Context:
+    """A page that does all its work on one worker, with the stand-in allocator unless told otherwise."""
+    workers: Any = SimpleNamespace(answers=worker, swims=worker, searches=worker)
+    silent: dict[str, Any] = {
+        "client": None,
+        "solver": Solver(load=load_stand_in),
+        "loop": AtOnce(),
+        "do": lambda act: act(),
+        "changed": lambda: None,
+        "notify": lambda title, text: None,
+    }
+    return Context(session=session, workers=workers, **{**silent, **options})

@@ -13,7 +13,7 @@ from finlab.allocation.methods import load_allocator
 from finlab.assets import shipped_checkpoints, shipped_layouts
 from finlab.errors import AllocationError
 from finlab.layout import load_layout
-from tests.webapp.loops import AtOnce
+from tests.webapp.loops import page_of
 from tests.webapp.stand_in import load_stand_in
 from webapp.markup.comparison import comparison_table
 from webapp.markup.corner import corner
@@ -34,9 +34,7 @@ UCAT = load_layout(shipped_layouts()["ucat"])
 
 def test_all_methods_answer_one_after_the_other() -> None:
     worker, done = Worker(), threading.Event()
-    comparison = Comparison(
-        Solver(load=load_stand_in), AtOnce(), worker, lambda: comparison.running or done.set()
-    )
+    comparison = Comparison(page_of(worker, changed=lambda: comparison.running or done.set()))
     assert "side by side" in comparison_table(comparison, None, False, "here")
     comparison.start(State(UCAT, target=PRESETS["Turn"]))
     assert done.wait(60)
@@ -52,7 +50,8 @@ def test_a_method_that_fails_keeps_nobody_else_waiting() -> None:
         return load_stand_in("slsqp" if method == "paper" else method)
 
     worker, done = Worker(), threading.Event()
-    comparison = Comparison(Solver(load=load), AtOnce(), worker, lambda: comparison.running or done.set())
+    context = page_of(worker, solver=Solver(load=load), changed=lambda: comparison.running or done.set())
+    comparison = Comparison(context)
     comparison.start(State(UCAT, target=PRESETS["Turn"]))
     assert done.wait(60)
     worker.stop()

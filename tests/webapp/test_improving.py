@@ -11,7 +11,7 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from tests.webapp.loops import AtOnce, running
+from tests.webapp.loops import page_of, running
 from webapp.session import Session
 from webapp.session.search_request import ALL, SearchRequest, parsed_mission
 from webapp.tasks.analyst import Findings, Question, find
@@ -30,7 +30,7 @@ def until(condition: Callable[[], bool]) -> None:
 
 def test_search_is_cancelled_and_what_it_found_is_offered() -> None:
     worker = Worker()
-    improver: Improver = Improver(AtOnce(), worker, lambda: None)
+    improver = Improver(page_of(worker))
     request = SearchRequest("weakest direction")
     improver.start(NO_YAW, request)
     with pytest.raises(FinlabError, match="running already"):
@@ -66,7 +66,7 @@ def test_bad_searches_are_refused() -> None:
 
 def test_each_fin_has_its_bounds_and_the_mission_is_the_users() -> None:
     worker = Worker()
-    improver: Improver = Improver(AtOnce(), worker, lambda: None)
+    improver = Improver(page_of(worker))
     text = "0.5, 0 0 0 0 0.1\n\n0 0 1 0 0 0"
     assert parsed_mission(text) == ((0.5, 0.0, 0.0, 0.0, 0.0, 0.1), (0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
     first, second = NO_YAW.names[:2]

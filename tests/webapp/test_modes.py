@@ -9,8 +9,8 @@ from finlab.allocation.modes import find_modes
 from finlab.allocation.solution import Candidates
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
-from tests.webapp.loops import AtOnce
-from tests.webapp.stand_in import StandIn, load_stand_in
+from tests.webapp.loops import AtOnce, page_of
+from tests.webapp.stand_in import StandIn
 from webapp.markup.mode_plot import DOT, LEFT, WIDTH, _apart, mode_plot
 from webapp.markup.modes import mode_table
 from webapp.markup.words import small, three_digits
@@ -27,7 +27,6 @@ from webapp.tasks.mode_names import (
     named_modes,
     same_mode,
 )
-from webapp.tasks.solver import Solver
 
 PUSH, REST = (0.3, 1.1, 0.0), (0.05, 0.1, 0.0)
 
@@ -124,7 +123,7 @@ def test_another_sample_of_another_answer_is_shown() -> None:
     jobs: list[Any] = []
     worker: Any = type("Ready", (), {"submit": lambda _, key, job, failed: jobs.append(job)})()
     loop = AtOnce()
-    answering = Answering(session, Solver(load=load_stand_in), loop, worker, lambda: None, lambda _: None)
+    answering = Answering(page_of(worker, session, loop=loop))
     shown = []
     for value in (0.5, 0.8):
         session.set_target(1, value)

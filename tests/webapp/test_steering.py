@@ -9,12 +9,10 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from tests.webapp.loops import AtOnce, running
-from tests.webapp.stand_in import load_stand_in
+from tests.webapp.loops import AtOnce, page_of, running
 from webapp.session import Session
 from webapp.tasks import sweeping
 from webapp.tasks.answering import Answering
-from webapp.tasks.solver import Solver
 from webapp.tasks.sweeping import POINTS, Sweep
 
 
@@ -57,10 +55,8 @@ def test_a_sweep_is_one_step_and_ends_when_someone_else_steers(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sweeping, "STEP_S", 0.001)
-    solver = Solver(load=load_stand_in)
 
     async def run() -> Sweep:
-        loop = running()
         answering: Any = None
 
         class Ready:
@@ -77,8 +73,8 @@ def test_a_sweep_is_one_step_and_ends_when_someone_else_steers(
             answering.ask()
 
         worker: Any = Ready()
-        answering = Answering(session, solver, AtOnce(), worker, changed, lambda _: None)
-        sweep = Sweep(session, loop, do)
+        answering = Answering(page_of(worker, session, changed=changed))
+        sweep = Sweep(page_of(worker, session, loop=running(), do=do))
         with pytest.raises(FinlabError, match="smaller end first"):
             sweep.start(0, 2.0, -2.0)
         sweep.start(0, -2.0, 2.0)
@@ -106,7 +102,7 @@ def test_a_sweep_goes_to_and_fro(session: Session, monkeypatch: pytest.MonkeyPat
         act()
         seen.append(session.state.target[5])
 
-    sweep = Sweep(session, loop, do)
+    sweep = Sweep(page_of(None, session, loop=loop, do=do))
     sweep.start(5, -0.1, 0.2)
     for _ in range(11):
         loop.ring()

@@ -10,7 +10,7 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
-from tests.webapp.loops import AtOnce
+from tests.webapp.loops import page_of
 from tests.webapp.stand_in import load_stand_in
 from webapp.markup.corner import swim_corner
 from webapp.markup.swim_card import swim_card
@@ -37,7 +37,7 @@ def until(condition: Callable[[], bool]) -> None:
 def swimming() -> Iterator[Swimming]:
     worker = Worker()
     notes: list[str] = []
-    swim = Swimming(Solver(load=load_stand_in), AtOnce(), worker, lambda: None, notes.append)
+    swim = Swimming(page_of(worker, notify=lambda _, text: notes.append(text)), lambda: None)
     swim.notes = notes  # type: ignore[attr-defined]
     yield swim
     swim.stop()

@@ -1,10 +1,8 @@
 """The whole 3D view of one browser."""
 
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.layout import Fin, Layout
@@ -16,9 +14,9 @@ from webapp.scene.meshes.hull import hull_of
 from webapp.scene.overlays import Ghost, Lines, Overlay, moved_fins
 from webapp.scene.stage import Stage
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, WrenchNodes, fitting_newtons
-from webapp.session import Session
 from webapp.session.state import State
 from webapp.tasks.analyst import Findings
+from webapp.tasks.context import Context
 from webapp.tasks.solver import Attention
 from webapp.theme import ASKED
 
@@ -34,15 +32,10 @@ CAMERAS = {
 class RobotScene:
     """Draws a session, and makes intents of clicks and drags."""
 
-    def __init__(
-        self,
-        client: viser.ClientHandle,
-        session: Session,
-        do: Callable[[Callable[[], object]], None],
-    ) -> None:
-        """Build the nodes of the scene of `client`, a browser; `do` carries out an intent of its user."""
-        self._client, self._session, self._do = client, session, do
-        scene = client.scene
+    def __init__(self, context: Context) -> None:
+        """Build the nodes of the scene of a page's browser."""
+        self._client, self._session, self._do = context.client, context.session, context.do
+        scene, session = self._client.scene, self._session
         self._root = scene.add_frame("/robot", show_axes=False)
         self.shown = True
         """Whether it is on the screen; else a robot swims."""
@@ -53,7 +46,7 @@ class RobotScene:
         self._landing = Ghost(scene, "/robot/landing", ASKED, 0.45)
         self._overlay = Overlay(scene)
         self._attainable = AttainableNodes(scene)
-        self._grips = Grips(scene, session, do)
+        self._grips = Grips(scene, session, self._do)
         self._fins: list[FinNode] = []
         self._dragged: int | None = None
         self._flapping = Flapping()

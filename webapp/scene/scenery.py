@@ -1,19 +1,15 @@
 """What is seen beside the panel: the robot that is designed, or those that swim."""
 
-from collections.abc import Callable
-
-import viser
-
 from finlab.allocation.allocation import Allocation
 from webapp.markup.corner import graph_row, legend, overlay_row, set_rows
 from webapp.scene.robot_scene import RobotScene
 from webapp.scene.swim_scene import SwimScene
-from webapp.session import Session
 from webapp.session.swim_plan import SwimSettings
 from webapp.session.tour import STEPS
 from webapp.tasks.analyst import Findings
 from webapp.tasks.answering import Answering
 from webapp.tasks.comparison import Comparison
+from webapp.tasks.context import Context
 from webapp.tasks.improving import Improver
 from webapp.tasks.swimming import Swimming
 from webapp.theme import BRAND
@@ -22,19 +18,13 @@ from webapp.theme import BRAND
 class Scenery:
     """Both scenes of one page, of which one is shown, and the theme."""
 
-    def __init__(
-        self,
-        client: viser.ClientHandle,
-        session: Session,
-        swimming: Swimming,
-        do: Callable[[Callable[[], object]], None],
-    ) -> None:
-        """Build the nodes of the scene of `client`, a browser; `do` carries out an intent of its user."""
-        self._client, self._session, self._swimming = client, session, swimming
+    def __init__(self, context: Context, swimming: Swimming) -> None:
+        """Build the nodes of the scene of a page's browser."""
+        self._client, self._session, self._swimming = context.client, context.session, swimming
         self._dark: bool | None = None
         self._stop: int | None = None
-        self.robot = RobotScene(client, session, do)
-        self.swim = SwimScene(client, swimming)
+        self.robot = RobotScene(context)
+        self.swim = SwimScene(self._client, swimming)
         self.swims = False
         """Whether the robots that swim are on the screen."""
         self.legend = ""

@@ -6,6 +6,7 @@ from finlab.analysis import AttainableSet, ScoreCard, attainable_set, score_card
 from finlab.forces.reach import Ranges, axis_ranges
 from finlab.layout import Layout
 from webapp.session.display import DRAWN
+from webapp.session.state import State
 
 REST_S = 0.12
 """How long the target may not change before the marks are worked out again [s]."""
@@ -66,18 +67,6 @@ def find(question: Question) -> Findings:
     return Findings(question, card, before, now, whole)
 
 
-@dataclass(frozen=True)
-class Beside:
-    """A robot and what is asked of it."""
-
-    layout: Layout
-    """The robot."""
-    failed: tuple[str, ...]
-    """Names of failed fins."""
-    target: tuple[float, float, float, float, float, float]
-    """Wrench [N, N m]."""
-
-
-def find_ranges(question: Beside) -> Ranges:
-    """The range of each component."""
+def find_ranges(question: State) -> Ranges:
+    """The range of each component of the target."""
     return axis_ranges(question.layout, question.target, question.failed)

@@ -1,16 +1,13 @@
 """Keeps one page's answer up to date: asks for the newest state, and knows what of the answer is shown."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
-from webapp.session import Session
-from webapp.session.state import State
-from webapp.tasks.background import EventLoop, Newest, Worker
+from webapp.tasks.background import Newest
+from webapp.tasks.context import Context
 from webapp.tasks.mode_names import NO_MODES, Modes, same_mode
-from webapp.tasks.solver import Reply, Solver
+from webapp.tasks.solver import Reply
 
 SEARCH_REST_S = 0.2
 """How long there must be no newer answer before all its modes are searched for [s]: that takes a while."""
@@ -19,26 +16,14 @@ SEARCH_REST_S = 0.2
 class Answering:
     """The newest answer, its modes, and the part of it that is on the robot."""
 
-    def __init__(
-        self,
-        session: Session,
-        solver: Solver,
-        loop: EventLoop,
-        worker: Worker,
-        changed: Callable[[], None],
-        failed: Callable[[str], None],
-    ) -> None:
-        """Answer for `session` on the thread of `worker`.
-
-        On the loop, `changed` is called when there is a new answer or none, `failed` with a sentence why not.
-        """
-        self._session, self._changed, self._failed = session, changed, failed
+    def __init__(self, context: Context) -> None:
+        """Answer what the page's session asks."""
+        self._session, self._changed, self._notify = context.session, context.changed, context.notify
         self._told: str | None = None
         self._shown: tuple[Allocation, Array, Allocation] | None = None
-        self._answer: Newest[State, Reply] = Newest(loop, worker, solver.reply, self._take)
-        self._search: Newest[Reply, Modes] = Newest(
-            loop, worker, solver.modes, self._take_modes, SEARCH_REST_S
-        )
+        loop, worker, solver = context.loop, context.workers.answers, context.solver
+        self._answer = Newest(loop, worker, solver.reply, self._take)
+        self._search = Newest(loop, worker, solver.modes, self._take_modes, SEARCH_REST_S)
         self.frames: tuple[Allocation, ...] = ()
         """Steps of a refinement that are still to be played, the present one first."""
 
@@ -115,7 +100,7 @@ class Answering:
         else:
             self._search.forget()
             if error is not None and error != self._told:
-                self._failed(error)
+                self._notify("No answer", error)
         self._told = error
         self._changed()
 

@@ -1,12 +1,11 @@
 """Several methods on the same question, one after the other, while the page stays alive."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 from finlab.allocation.allocation import Allocation
 from webapp.session.state import COMPARED, State
-from webapp.tasks.background import EventLoop, Newest, Worker
-from webapp.tasks.solver import Solver
+from webapp.tasks.background import Newest
+from webapp.tasks.context import Context
 
 TRIES = 3
 """Answers of each method, of whose times the shortest counts: the first one may have to load a network, and
@@ -19,11 +18,11 @@ Answer = Allocation | str
 class Comparison:
     """The answers of one run."""
 
-    def __init__(self, solver: Solver, loop: EventLoop, worker: Worker, changed: Callable[[], None]) -> None:
-        """`changed` is called on the event loop after every answer of the solver on the worker's thread."""
-        self._solver, self._changed = solver, changed
+    def __init__(self, context: Context) -> None:
+        """The page is written anew after every answer."""
+        self._solver, self._changed = context.solver, context.changed
         # One question per method: those of this and other pages are answered in between.
-        self._asked: Newest[State, Allocation] = Newest(loop, worker, self._quickest, self._take)
+        self._asked = Newest(context.loop, context.workers.answers, self._quickest, self._take)
         self.state: State | None = None
         """The question, None before the first run."""
         self.answers: dict[str, Answer] = {}

@@ -2,22 +2,20 @@
 
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
 import imageio.v3 as iio
-import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.scene.robot_scene import RobotScene
-from webapp.session import Session
 from webapp.session.files import bundle_bytes, file_stem, graph_file
-from webapp.tasks.background import EventLoop, Worker
-from webapp.tasks.solver import Solver
+from webapp.tasks.context import Context
 from webapp.viser_internals import start_server, stop_server
 
 SECONDS = 4.0
@@ -28,8 +26,8 @@ PICTURE_SIZE = (1080, 1620)
 """Height and width of an exported picture [px]."""
 
 
-def recorded_html(session: Session, allocation: Allocation) -> bytes:
-    """The robot of a session as it flaps with an answer.
+def recorded_html(context: Context, allocation: Allocation) -> bytes:
+    """The robot of a page's session as it flaps with an answer.
 
     Takes a second and must not run on the event loop: viser records shared scenes only, so the robot is
     built once more on a server of its own.
@@ -38,13 +36,13 @@ def recorded_html(session: Session, allocation: Allocation) -> bytes:
     try:
         server.scene.world_axes.visible = False
         studio: Any = SimpleNamespace(scene=server.scene, camera=server.initial_camera, atomic=server.atomic)
-        robot = RobotScene(studio, session, lambda _: None)
+        robot = RobotScene(replace(context, client=studio, do=lambda _: None))
         robot.refresh(allocation)
         recording = server.get_scene_serializer()
         for _ in range(int(SECONDS * FRAMES_PER_SECOND)):
             robot.animate(1 / FRAMES_PER_SECOND)
             recording.insert_sleep(1 / FRAMES_PER_SECOND)
-        return recording.as_html(dark_mode=session.display.dark).encode()
+        return recording.as_html(dark_mode=context.session.display.dark).encode()
     finally:
         stop_server(server)
 
@@ -52,21 +50,9 @@ def recorded_html(session: Session, allocation: Allocation) -> bytes:
 class Exports:
     """Makes files beside the event loop and sends them to one browser."""
 
-    def __init__(
-        self,
-        client: viser.ClientHandle,
-        session: Session,
-        solver: Solver,
-        loop: EventLoop,
-        worker: Worker,
-        failed: Callable[[str, str], None],
-    ) -> None:
-        """Send what `session` holds to `client`, with the allocators of `solver`.
-
-        `failed` is called on the loop with a title and a sentence when there is no file.
-        """
-        self._client, self._session, self._solver = client, session, solver
-        self._loop, self._worker, self._failed = loop, worker, failed
+    def __init__(self, context: Context) -> None:
+        """Send what the page's session holds to its browser."""
+        self._context, self._session = context, context.session
 
     def graph(self) -> None:
         """Send the layout graph file."""
@@ -81,7 +67,7 @@ class Exports:
 
     def _send_made(self, suffix: str, make: Callable[[Layout, tuple[str, ...], Allocator], bytes]) -> None:
         """Send what is made of the robot and its allocator, as that is shipped but for the objective."""
-        state, loaded = self._session.state, self._solver.loaded
+        state, loaded = self._session.state, self._context.solver.loaded
         self._send(suffix, lambda: make(state.layout, state.failed, loaded(state.method, state.objective)))
 
     def html(self, shown: Allocation | None) -> None:
@@ -92,8 +78,8 @@ class Exports:
         """
         if shown is None:
             raise FinlabError("there is no answer yet; wait for one")
-        twin = self._session.twin()
-        self._send(".html", lambda: recorded_html(twin, shown))
+        frozen = replace(self._context, session=self._session.twin())
+        self._send(".html", lambda: recorded_html(frozen, shown))
 
     def picture(self) -> None:
         """Send a picture of the 3D view; the page has to make it, so not on the event loop."""
@@ -103,21 +89,23 @@ class Exports:
     def _send(self, suffix: str, make: Callable[[], bytes]) -> None:
         """Have the worker make a file, and send it; of each kind only the newest that is asked for."""
         name = f"{file_stem(self._session.state.layout.name)}{suffix}"
-        self._worker.submit(
+        loop, notify = self._context.loop, self._context.notify
+        self._context.workers.answers.submit(
             (id(self), suffix),
-            lambda: self._loop.post(partial(self.download, name, make())),
-            lambda text: self._loop.post(partial(self._failed, "Not exported", text)),
+            lambda: loop.post(partial(self.download, name, make())),
+            lambda text: loop.post(partial(notify, "Not exported", text)),
         )
 
     def download(self, name: str, content: bytes) -> None:
         """Send a file that is there already."""
-        self._client.send_file_download(name, content, save_immediately=True)
+        self._context.client.send_file_download(name, content, save_immediately=True)
 
     def _take_picture(self, name: str) -> None:
+        client, loop = self._context.client, self._context.loop
         try:
-            picture = self._client.get_render(*PICTURE_SIZE, transport_format="png", timeout=30.0)
+            picture = client.get_render(*PICTURE_SIZE, transport_format="png", timeout=30.0)
         except (RuntimeError, TimeoutError) as error:
-            self._loop.post(partial(self._failed, "No picture", str(error)))
+            loop.post(partial(self._context.notify, "No picture", str(error)))
             return
         content = iio.imwrite("<bytes>", picture, extension=".png")
-        self._loop.post(partial(self.download, name, content))
+        loop.post(partial(self.download, name, content))

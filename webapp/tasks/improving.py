@@ -1,7 +1,7 @@
 """A search for a better layout that can be watched, stopped, and taken or left."""
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -10,7 +10,8 @@ from finlab.analysis.goals import MISSION
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.session.search_request import GOAL_WORDS, SearchRequest, parsed_mission
-from webapp.tasks.background import EventLoop, Newest, Worker
+from webapp.tasks.background import Newest
+from webapp.tasks.context import Context
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,9 +33,9 @@ class Search:
 class Improver(Newest[Search, Improvement]):
     """One search at a time for one page."""
 
-    def __init__(self, loop: EventLoop, worker: Worker, changed: Callable[[], None]) -> None:
-        """`changed` is called on the event loop when there is progress on the worker's thread."""
-        super().__init__(loop, worker, self._improve, changed)
+    def __init__(self, context: Context) -> None:
+        """The page is written anew when there is progress."""
+        super().__init__(context.loop, context.workers.searches, self._improve, context.changed)
         self.progress: Progress | None = None
         """How far it is."""
 

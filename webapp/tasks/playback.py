@@ -1,12 +1,11 @@
 """Plays the refinement of an answer step by step on the robot."""
 
-from collections.abc import Callable
-
 from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
 from webapp.tasks.answering import Answering
-from webapp.tasks.background import EventLoop, Newest, Worker
-from webapp.tasks.solver import STEPS, Reply, Solver
+from webapp.tasks.background import Newest
+from webapp.tasks.context import Context
+from webapp.tasks.solver import STEPS
 
 FRAME_S = 0.9
 """How long each step of a refinement is shown [s]."""
@@ -17,18 +16,11 @@ Frames = tuple[Allocation, ...]
 class Playback:
     """Puts one frame after another in the place of the answer; a change of the state ends it."""
 
-    def __init__(
-        self,
-        answering: Answering,
-        solver: Solver,
-        loop: EventLoop,
-        worker: Worker,
-        changed: Callable[[], None],
-        failed: Callable[[str], None],
-    ) -> None:
-        """Prepare; `changed` and `failed` are called on the event loop."""
-        self._answering, self._loop, self._changed, self._failed = answering, loop, changed, failed
-        self._steps: Newest[Reply, Frames] = Newest(loop, worker, solver.refinement, self._begin)
+    def __init__(self, context: Context, answering: Answering) -> None:
+        """Play on the robot that shows the answers of `answering`."""
+        self._context, self._answering = context, answering
+        worker, refine = context.workers.answers, context.solver.refinement
+        self._steps = Newest(context.loop, worker, refine, self._begin)
 
     @property
     def frame(self) -> int | None:
@@ -51,15 +43,15 @@ class Playback:
     def _begin(self) -> None:
         steps = self._steps
         if steps.error is not None:
-            self._failed(steps.error)
+            self._context.notify("Not possible", steps.error)
         elif steps.answered is self._answering.reply and not self._answering.busy:
             self._play(steps.findings or ())
 
     def _play(self, frames: Frames) -> None:
         self._answering.frames = frames
-        self._changed()
+        self._context.changed()
         if frames:
-            self._loop.later(FRAME_S, lambda: self._next(frames))
+            self._context.loop.later(FRAME_S, lambda: self._next(frames))
 
     def _next(self, frames: Frames) -> None:
         if self._answering.frames is frames:  # else it was ended, or started again

@@ -1,17 +1,15 @@
 """Plays one component of the target through a range, and notes what the fins do at each value."""
 
 import asyncio
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import FinlabError
-from webapp.session import Session
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_TARGET, number
 from webapp.tasks.answering import Answering
-from webapp.tasks.background import EventLoop
+from webapp.tasks.context import Context
 
 POINTS = 61
 """Values of a range, ends included."""
@@ -22,14 +20,9 @@ STEP_S = 1 / 15
 class Sweep:
     """Goes to and fro through a range until it is stopped; the target stays where it then is."""
 
-    def __init__(
-        self,
-        session: Session,
-        loop: EventLoop,
-        do: Callable[[Callable[[], object]], None],
-    ) -> None:
-        """Move the target of `session`; everything here runs on `loop`, `do` carries out an intent."""
-        self._session, self._loop, self._do = session, loop, do
+    def __init__(self, context: Context) -> None:
+        """Move the target of the page's session; everything here runs on the loop."""
+        self._session, self._loop, self._do = context.session, context.loop, context.do
         self._timer: asyncio.TimerHandle | None = None
         self._place, self._step, self._revision = 0, 1, -1
         self.axis = 0

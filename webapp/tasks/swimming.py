@@ -9,8 +9,8 @@ from finlab.errors import FinlabError
 from finlab.sim import ClosedLoop, make_trajectory
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan
-from webapp.tasks.background import EventLoop, Newest, Worker
-from webapp.tasks.solver import Solver
+from webapp.tasks.background import Newest
+from webapp.tasks.context import Context
 from webapp.tasks.swimmer import Moment, Pace, Swimmer
 
 BUDGET_S = 0.06
@@ -30,23 +30,13 @@ class Stretch:
 class Swimming:
     """The swim of one page. All methods but `_made` and `_advance` run on the event loop."""
 
-    def __init__(
-        self,
-        solver: Solver,
-        loop: EventLoop,
-        worker: Worker,
-        changed: Callable[[], None],
-        failed: Callable[[str], None],
-    ) -> None:
-        """Use the allocators of `solver` on the thread of `worker` alone.
-
-        On the loop, `changed` is called when the run has changed, `failed` with a sentence why it ends.
-        """
-        self._solver, self._changed, self._failed = solver, changed, failed
-        self._start: Newest[Plan, tuple[Swimmer, ...]] = Newest(loop, worker, self._made, self._begin)
-        self._stretch: Newest[Stretch, tuple[int, tuple[Moment, ...]]] = Newest(
-            loop, worker, self._advance, self._take
-        )
+    def __init__(self, context: Context, changed: Callable[[], None]) -> None:
+        """`changed` is called on the loop when the run has changed."""
+        # An allocator of its own, for it is used on the thread that swims.
+        self._solver, self._changed, self._notify = context.solver.aside, changed, context.notify
+        loop, worker = context.loop, context.workers.swims
+        self._start = Newest(loop, worker, self._made, self._begin)
+        self._stretch = Newest(loop, worker, self._advance, self._take)
         self.swimmers: tuple[Swimmer, ...] = ()
         """The robots; none while they are being made."""
         self.running = False
@@ -99,7 +89,7 @@ class Swimming:
 
     def _give_up(self, text: str) -> None:
         self.stop()
-        self._failed(f"the swim cannot go on: {text}")
+        self._notify("Not possible", f"the swim cannot go on: {text}")
 
     def stop(self) -> None:
         """Give up and forget."""

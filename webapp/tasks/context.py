@@ -1,0 +1,32 @@
+"""What everything that works for one page is made with."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import viser
+
+from webapp.session import Session
+from webapp.tasks.background import EventLoop, Workers
+from webapp.tasks.solver import Solver
+
+
+@dataclass(frozen=True)
+class Context:
+    """One page, as its tasks and its scene see it."""
+
+    client: viser.ClientHandle
+    """The browser."""
+    session: Session
+    """What it shows."""
+    solver: Solver
+    """Answers its questions."""
+    workers: Workers
+    """On whose threads all is computed."""
+    loop: EventLoop
+    """Where all else runs."""
+    do: Callable[[Callable[[], object]], None]
+    """Carries out an intent of the user."""
+    changed: Callable[[], None]
+    """Writes the page anew; called on the loop when there is something new to show."""
+    notify: Callable[[str, str], None]
+    """Shows a note: title and sentence; called on the loop."""
