@@ -6,15 +6,16 @@ Everything here runs on viser's event loop; what takes time is handed to the wor
 import asyncio
 import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import viser
 
 from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
-from webapp.handles import Changes, on_user_change
+from webapp.handles import Changes, on_user_change, put
+from webapp.markup.picking import chosen_button
 from webapp.scene.scenery import Scenery
 from webapp.session import Session
 from webapp.session.state import State
@@ -33,6 +34,8 @@ from webapp.theme import GREEN, VERMILLION
 
 CARD_REST_S = 0.35
 """How long a layout may not change before its card is worked out [s]: that takes a second."""
+
+Input = TypeVar("Input")
 
 
 class Panel(Protocol):
@@ -83,6 +86,8 @@ class Page(ABC):
         """Files to take home."""
         self.scenery = Scenery(context, self.swimming)
         """What is seen beside the panel."""
+        self.bound: list[Callable[[], None]] = []
+        """Each writes what the session holds into a widget; the panel that is being built takes them."""
         self._panels: list[Panel] = []
         self._panels, self._swim_panels = self._build()
         self._refresh()
@@ -120,6 +125,17 @@ class Page(ABC):
         """Carry out `act(value)` when the user changes an input."""
         on_user_change(handle, lambda value: self.do(partial(act, value)))
 
+    def bind(self, handle: Input, act: Callable[[Any], object], value: Callable[[], object]) -> Input:
+        """An input that carries out `act(value)` when the user changes it, and else shows `value()`."""
+        self.on_change(handle, act)
+        self.bound.append(lambda: put(handle, value=value()))
+        return handle
+
+    def bind_display(self, handle: Input, key: str) -> Input:
+        """An input for a field of the session's `Display`."""
+        session = self.session
+        return self.bind(handle, partial(session.set_display, key), lambda: getattr(session.display, key))
+
     def on_click(self, button: viser.GuiButtonHandle, act: Callable[[], object]) -> None:
         """Carry out an intent when the user presses a button."""
 
@@ -143,6 +159,20 @@ class Page(ABC):
         group = self.client.gui.add_button_group(label, tuple(acts), **options)
         on_user_change(group, lambda button: self.do(acts[button]) if button in acts else None)
         return group
+
+    def add_choice(
+        self,
+        label: str,
+        name: str,
+        choices: Sequence[str],
+        act: Callable[[str], object],
+        chosen: Callable[[], str],
+        hint: str,
+    ) -> None:
+        """A group of buttons, of which that of `chosen()` is filled; `name` is theirs in the markup."""
+        style = self.client.gui.add_html("")
+        self.bound.append(lambda: put(style, content=chosen_button(name, choices.index(chosen()))))
+        self.on_change(self.client.gui.add_button_group(label, tuple(choices), hint=hint), act)
 
     def notify(self, title: str, body: str, *, good: bool = False) -> None:
         """Show a note to the user."""

@@ -4,7 +4,6 @@ import viser
 
 from webapp.handles import put
 from webapp.markup.comparison import comparison_table
-from webapp.markup.picking import chosen_button, marker
 from webapp.page import Page
 from webapp.session.state import COMPARED
 
@@ -21,13 +20,14 @@ class CompareTab:
             "Compare the methods", icon=viser.Icon.SCALE, hint="On the wrench and the failures of now."
         )
         page.on_click(self._run, lambda: page.comparison.start(page.session.state))
-        self._chosen = gui.add_html(marker(PICKER))
-        overlay = gui.add_button_group(
+        page.add_choice(
             "Overlay",
+            PICKER,
             ("none", *COMPARED),
+            self._choose,
+            lambda: page.session.overlay or "none",
             hint="The fins' forces by that method, as plain arrows over those of the robot.",
         )
-        page.on_change(overlay, self._choose)
         self._table = gui.add_html("")
 
     def _choose(self, method: str) -> None:
@@ -39,6 +39,4 @@ class CompareTab:
         session, comparison = self._page.session, self._page.comparison
         stale = comparison.state is not None and comparison.state != session.state
         put(self._run, disabled=comparison.running)
-        entries = (None, *COMPARED)
-        put(self._chosen, content=chosen_button(PICKER, entries.index(session.overlay)))
         put(self._table, content=comparison_table(comparison, session.overlay, stale, PICKER))

@@ -54,33 +54,25 @@ class DamagePanel:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
+        left = "What is left of its largest amplitude and frequency: a worn motor, a torn fin."
+        flaps = "It no longer turns: it flaps about one direction only."
+        stays = "Zero direction at which it stays."
         with gui.add_folder("Damage a fin", expand_by_default=False):
             self._fin = gui.add_dropdown(
                 "Which fin", ("1",), hint="Also the one that is selected in the view."
             )
             page.on_change(self._fin, page.session.select)
-            self._strength = gui.add_slider(
-                "Strength [%]",
-                100 * STRENGTH_RANGE[0],
-                100.0,
-                5.0,
-                100.0,
-                hint="What is left of its largest amplitude and frequency: a worn motor, a torn fin.",
+            page.bind(
+                gui.add_slider("Strength [%]", 100 * STRENGTH_RANGE[0], 100.0, 5.0, 100.0, hint=left),
+                lambda share: page.session.weaken(self._name, share / 100.0),
+                lambda: round(100.0 * dict(page.session.state.weak).get(self._name, 1.0), 1),
             )
-            page.on_change(self._strength, lambda share: page.session.weaken(self._name, share / 100.0))
-            self._stuck = gui.add_checkbox(
-                "Stuck", False, hint="It no longer turns: it flaps about one direction only."
+            page.bind(
+                gui.add_checkbox("Stuck", False, hint=flaps),
+                lambda stuck: self._jam(stuck, self._angle.value),
+                lambda: self._stop is not None,
             )
-            page.on_change(self._stuck, lambda stuck: self._jam(stuck, self._angle.value))
-            self._angle = gui.add_slider(
-                "Stuck at [°]",
-                -180.0,
-                180.0,
-                5.0,
-                0.0,
-                hint="Zero direction at which it stays.",
-                visible=False,
-            )
+            self._angle = gui.add_slider("Stuck at [°]", -180.0, 180.0, 5.0, 0.0, hint=stays, visible=False)
             page.on_change(self._angle, partial(self._jam, True))
             mends = {"This fin": lambda: page.session.mend(self._name), "All fins": page.session.mend_all}
             page.add_buttons("Repair", mends, hint="Whole again; can be undone like all else.")
@@ -91,16 +83,17 @@ class DamagePanel:
         session = self._page.session
         return session.selected or session.state.layout.names[0]
 
+    @property
+    def _stop(self) -> float | None:
+        """The zero direction [rad] at which that fin is stuck."""
+        return dict(self._page.session.state.stuck).get(self._name)
+
     def _jam(self, stuck: bool, degrees: float) -> None:
         self._page.session.jam(self._name, math.radians(degrees) if stuck else None)
 
     def refresh(self) -> None:
         """Write the damage of the fin."""
-        state, name = self._page.session.state, self._name
-        put(self._fin, options=state.layout.names, value=name)
-        put(self._strength, value=round(100.0 * dict(state.weak).get(name, 1.0), 1))
-        angle = dict(state.stuck).get(name)
-        put(self._stuck, value=angle is not None)
-        put(self._angle, visible=angle is not None)
-        if angle is not None:
-            put(self._angle, value=round(math.degrees(angle), 1))
+        put(self._fin, options=self._page.session.state.layout.names, value=self._name)
+        put(self._angle, visible=self._stop is not None)
+        if self._stop is not None:
+            put(self._angle, value=round(math.degrees(self._stop), 1))

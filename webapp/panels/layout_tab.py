@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from functools import partial
 from html import escape
+from typing import Any
 
 import viser
 
@@ -38,8 +39,8 @@ class LayoutTab:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page, session = page, page.session
-        self._layouts = gui.add_dropdown("Layout", (*shipped(), OWN), hint="Shipped layouts to start from.")
-        page.on_change(self._layouts, self._open)
+        layouts = gui.add_dropdown("Layout", (*shipped(), OWN), hint="Shipped layouts to start from.")
+        page.bind(layouts, self._open, lambda: shipped_name(session.state.layout) or OWN)
         self._about = gui.add_html("")
         self._fins = gui.add_dropdown("Fin", (NONE,), hint="Or click one in the view; N is next, X none.")
         page.on_change(self._fins, lambda name: session.select(None if name == NONE else name))
@@ -53,14 +54,12 @@ class LayoutTab:
             )
             self._angle.precision = 1  # typed more finely than dragged
             page.on_change(self._angle, self._turn)
-            self._snap_m = gui.add_dropdown("Snap place", tuple(POSITION_STEPS), hint="Grid for positions.")
-            page.on_change(self._snap_m, partial(session.set_display, "position_snap"))
-            self._snap_deg = gui.add_dropdown("Snap turn", tuple(ANGLE_STEPS), hint="Grid for the shaft.")
-            page.on_change(self._snap_deg, partial(session.set_display, "angle_snap"))
-            self._stick = gui.add_checkbox(
-                "Stick to hull", False, hint="Fins slide on the hull's surface, shafts along its normal."
-            )
-            page.on_change(self._stick, partial(session.set_display, "stick"))
+            slides = "Fins slide on the hull's surface, shafts along its normal."
+            snap_m = gui.add_dropdown("Snap place", tuple(POSITION_STEPS), hint="Grid for positions.")
+            snap_deg = gui.add_dropdown("Snap turn", tuple(ANGLE_STEPS), hint="Grid for the shaft.")
+            page.bind_display(snap_m, "position_snap")
+            page.bind_display(snap_deg, "angle_snap")
+            page.bind_display(gui.add_checkbox("Stick to hull", False, hint=slides), "stick")
         edits: dict[str, Callable[[], object]] = {
             "Mirror": session.mirror_fin,
             "Mirror once": partial(session.mirror_fin, linked=False),
@@ -109,7 +108,6 @@ class LayoutTab:
     def refresh(self) -> None:
         """Write the layout and the selected fin."""
         session, layout = self._page.session, self._page.session.state.layout
-        put(self._layouts, value=shipped_name(layout) or OWN)
         put(self._fins, options=(NONE, *layout.names), value=session.selected or NONE)
         selected = session.selected is not None
         put(self._position, disabled=not selected)
@@ -119,9 +117,6 @@ class LayoutTab:
             put(self._position, value=tuple(round(v, 4) for v in fin.position))
             put(self._angle, value=round(math.degrees(fin.mounting_angle), 1))
         self._hull.refresh()
-        put(self._stick, value=session.display.stick)
-        put(self._snap_m, value=session.display.position_snap)
-        put(self._snap_deg, value=session.display.angle_snap)
         first = layout.description.strip().split("\n")[0]
         pairs = "".join(
             f"<div>{escape(a)} ⇄ {escape(b)} move together.</div>" for a, b in session.state.links
@@ -140,24 +135,21 @@ class HullPanel:
         """Build the widgets."""
         self._page = page
         with gui.add_folder("Hull", expand_by_default=False):
-            self._shape = gui.add_dropdown("Shape", (*HULL_SHAPES, MESH), hint="For looks and for sticking.")
-            page.on_change(self._shape, self._choose_shape)
-            self._size = gui.add_vector3(
-                "Size [m]",
-                (0.5, 0.3, 0.2),
-                min=(0.02,) * 3,
-                max=(5.0,) * 3,
-                step=0.01,
-                hint="Length, width and height of a shape.",
+            shapes = gui.add_dropdown("Shape", (*HULL_SHAPES, MESH), hint="For looks and for sticking.")
+            page.bind(shapes, self._choose_shape, lambda: self._shape or MESH)
+            ends: dict[str, Any] = {"min": (0.02,) * 3, "max": (5.0,) * 3, "step": 0.01}
+            sides = "Length, width and height of a shape."
+            self._size = page.bind(
+                gui.add_vector3("Size [m]", (0.5, 0.3, 0.2), **ends, hint=sides),
+                self._resize,
+                lambda: tuple(round(2 * v, 4) for v in hull_of(page.session.state.layout).half),
             )
-            page.on_change(self._size, self._resize)
-            self._center = gui.add_vector3(
-                "Gravity [m]",
-                (0.0, 0.0, 0.0),
-                step=0.005,
-                hint="Centre of gravity as seen from the hull's middle. Torques are about it.",
+            about = "Centre of gravity as seen from the hull's middle. Torques are about it."
+            page.bind(
+                gui.add_vector3("Gravity [m]", (0.0, 0.0, 0.0), step=0.005, hint=about),
+                page.session.set_center_of_gravity,
+                lambda: tuple(round(v, 4) for v in center_of_gravity(page.session.state.layout)),
             )
-            page.on_change(self._center, page.session.set_center_of_gravity)
             self._unit = gui.add_dropdown("Unit of file", tuple(UNITS), hint="What 1 means in the mesh file.")
             hold_kind(self._unit)
             upload = gui.add_upload_button(
@@ -171,21 +163,21 @@ class HullPanel:
     def _import(self, name: str, content: bytes) -> None:
         self._page.session.import_hull(stored_hull(name, content, self._unit.value))
 
+    @property
+    def _shape(self) -> str | None:
+        """The hull's parametric shape; None where it comes from a file."""
+        shape = hull_of(self._page.session.state.layout).shape
+        return shape if shape in HULL_SHAPES else None
+
     def _choose_shape(self, shape: str) -> None:
         if shape != MESH:
             x, y, z = hull_of(self._page.session.state.layout).half
             self._page.session.set_hull(shape, (2 * x, 2 * y, 2 * z))
 
     def _resize(self, size: tuple[float, float, float]) -> None:
-        shape = hull_of(self._page.session.state.layout).shape
-        if shape in HULL_SHAPES:
-            self._page.session.set_hull(shape, size)
+        if self._shape is not None:
+            self._page.session.set_hull(self._shape, size)
 
     def refresh(self) -> None:
         """Write the hull."""
-        layout = self._page.session.state.layout
-        hull = hull_of(layout)
-        put(self._shape, value=hull.shape if hull.shape in HULL_SHAPES else MESH)
-        put(self._size, disabled=hull.shape not in HULL_SHAPES)
-        put(self._size, value=tuple(round(2 * v, 4) for v in hull.half))
-        put(self._center, value=tuple(round(v, 4) for v in center_of_gravity(layout)))
+        put(self._size, disabled=self._shape is None)

@@ -8,7 +8,7 @@ import viser
 
 from finlab.analysis import Improvement
 from webapp.handles import Changes, on_user_change, put
-from webapp.markup.picking import chosen_button, marker
+from webapp.markup.picking import chosen_button
 from webapp.markup.score_card import score_table
 from webapp.markup.words import listed, three_digits
 from webapp.page import Page
@@ -18,8 +18,6 @@ from webapp.session.files import shipped
 from webapp.session.looking import PINNED
 from webapp.session.search_request import ALL, GOAL_WORDS, WAY, SearchRequest
 
-PICKER = "fl-drawn"
-"""Marks the buttons for the set that is drawn."""
 SAVED = "saved state"
 """Entry of the list of layouts for the one that was opened or saved last."""
 
@@ -30,15 +28,16 @@ class LimitsTab:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
-        self._chosen = gui.add_html(marker(PICKER))
-        drawn = gui.add_button_group(
-            "Draw the set of", tuple(DRAWN), hint="Everything that the fins can give, as a body in the view."
+        page.add_choice(
+            "Draw the set of",
+            "fl-drawn",
+            tuple(DRAWN),
+            partial(page.session.set_display, "drawn"),
+            lambda: page.session.display.drawn,
+            hint="Everything that the fins can give, as a body in the view.",
         )
-        page.on_change(drawn, partial(page.session.set_display, "drawn"))
-        self._alone = gui.add_checkbox(
-            "Alone", True, hint="Forces without any torque, torques without any force; else they are free."
-        )
-        page.on_change(self._alone, partial(page.session.set_display, "alone"))
+        free = "Forces without any torque, torques without any force; else they are free."
+        self._alone = page.bind_display(gui.add_checkbox("Alone", True, hint=free), "alone")
         self._beside = gui.add_dropdown(
             "Beside", (SAVED, *shipped()), hint="The layout that stands next to this one on the card."
         )
@@ -59,8 +58,7 @@ class LimitsTab:
         put(self._beside, options=names, value=session.beside or SAVED)
         self._improve.refresh()
         analyst, display = self._page.analyst, self._page.session.display
-        put(self._chosen, content=chosen_button(PICKER, list(DRAWN).index(display.drawn)))
-        put(self._alone, value=display.alone, visible=display.drawn != "none")
+        put(self._alone, visible=display.drawn != "none")
         found = analyst.findings
         if not self._changes(found, analyst.busy, analyst.error, session.beside):
             return
@@ -86,8 +84,8 @@ class ImprovePanel:
         """Build the widgets."""
         self._page = page
         with gui.add_folder("Improve this layout"):
-            self._goal = gui.add_dropdown("Goal", tuple(GOAL_WORDS), hint="What to raise.")
-            page.on_change(self._goal, partial(self._draft, SearchRequest.with_goal))
+            goals = gui.add_dropdown("Goal", tuple(GOAL_WORDS), hint="What to raise.")
+            page.bind(goals, partial(self._draft, SearchRequest.with_goal), lambda: page.session.draft.goal)
             self._fins = FinButtons(
                 page,
                 "May move",
@@ -107,14 +105,12 @@ class ImprovePanel:
                 "Turn ± [°]", 0.0, 180.0, 5.0, WAY[3], hint="How far its shaft may turn either way."
             )
             page.on_change(self._turn, lambda turn: self._bound((*self._reach.value, turn)))
-            self._mission = gui.add_text(
-                "Mission",
-                "",
-                multiline=True,
-                hint="Wrenches, one line each: Fx Fy Fz Tx Ty Tz [N, N m]. Empty: the common ones.",
-                visible=False,
+            lines = "Wrenches, one line each: Fx Fy Fz Tx Ty Tz [N, N m]. Empty: the common ones."
+            self._mission = page.bind(
+                gui.add_text("Mission", "", multiline=True, hint=lines, visible=False),
+                partial(self._draft, SearchRequest.with_mission),
+                lambda: page.session.draft.mission,
             )
-            page.on_change(self._mission, partial(self._draft, SearchRequest.with_mission))
             takes = {"Add the present wrench": self._add_wrench}
             self._take = page.add_buttons(" ", takes, hint="To the mission.", visible=False)
             self._start = gui.add_button(
@@ -182,14 +178,13 @@ class ImprovePanel:
     def _refresh_request(self) -> None:
         """Write which fins may move, and how far."""
         names, draft = self._page.session.state.layout.names, self._page.session.draft
-        put(self._goal, value=draft.goal)
         self._fins.refresh(names, held=draft.held)
         put(self._whose, options=(ALL, *names))
         way = draft.way(self._whose.value)
         put(self._reach, value=way[:3])
         put(self._turn, value=way[3])
         mission = draft.goal == "power for a mission"
-        put(self._mission, visible=mission, value=draft.mission)
+        put(self._mission, visible=mission)
         put(self._take, visible=mission)
 
 

@@ -16,8 +16,6 @@ from webapp.page import Page
 from webapp.session.state import CANDIDATE_RANGE, GAMMA_RANGE, OBJECTIVES, TEMPERATURE_RANGE, knows_objective
 from webapp.tasks.solver import STEPS
 
-OBJECTIVE = "fl-objective"
-"""Marks the buttons for the objective."""
 ORIGINS = {
     "search": "The search knows each fin's own law and draws nothing. It begins with all fins at work and, "
     "for other ways, with some of them at rest.",
@@ -38,12 +36,15 @@ class ModesTab:
         self._page = page
         stray, count = "How far draws stray from the mixture's means.", "Draws from the mixture."
         weight = "How much effort counts in the ranking."
-        self._method = gui.add_dropdown("Method", tuple(METHODS), hint="Who answers.")
-        page.on_change(self._method, partial(page.session.set_setting, "method"))
-        self._objective = gui.add_html(marker(OBJECTIVE))
-        page.add_buttons(
+        session = page.session
+        methods = gui.add_dropdown("Method", tuple(METHODS), hint="Who answers.")
+        page.bind(methods, partial(session.set_setting, "method"), lambda: session.state.method)
+        page.add_choice(
             "Keep least",
-            {name: partial(page.session.set_setting, "objective", name) for name in OBJECTIVES},
+            "fl-objective",
+            OBJECTIVES,
+            partial(session.set_setting, "objective"),
+            lambda: session.state.objective,
             hint="Power in watts, or the paper's effort: for all answers, comparisons, sweeps and swims.",
         )
         self._origin = gui.add_html("")
@@ -53,7 +54,7 @@ class ModesTab:
             "gamma": gui.add_slider("Effort weight γ", *GAMMA_RANGE, 0.005, 0.01, hint=weight),
         }
         for key, widget in self._settings.items():
-            page.on_change(widget, partial(page.session.set_setting, key))
+            page.on_change(widget, partial(session.set_setting, key))
         self._picker = ModePicker(gui, page, 250, "fl-modes")
         self._table = gui.add_html("")
         self._play = gui.add_button(
@@ -69,8 +70,6 @@ class ModesTab:
     def refresh(self) -> None:
         """Write settings and candidates."""
         page, state = self._page, self._page.session.state
-        put(self._method, value=state.method)
-        put(self._objective, content=chosen_button(OBJECTIVE, OBJECTIVES.index(state.objective)))
         put(self._origin, content=f"<div class='fl dim'>{_origin_words(state.method)}</div>")
         drawing = state.drawing
         for key, widget in self._settings.items():

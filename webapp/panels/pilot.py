@@ -87,6 +87,7 @@ class PilotPanel:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
+        policies = "Come closest, keep the direction, or serve axes by priority, heave first."
         with gui.add_folder("Steer by hand", expand_by_default=False):
             self._axes = gui.add_dropdown("Stick for", tuple(PADS), hint="What up and sideways mean.")
             on_user_change(self._axes, lambda _: self.refresh())
@@ -96,18 +97,13 @@ class PilotPanel:
             on_user_change(self._spring, lambda _: self.refresh())
             self._pad = gui.add_html("")
             add_channel(gui, CHANNEL, self._steer)
-            self._grips = gui.add_checkbox(
-                "Drag in 3D (G)",
-                False,
-                hint="Handles on the blue arrows in the view, for the force and the torque.",
+            grips = "Handles on the blue arrows in the view, for the force and the torque."
+            page.bind_display(gui.add_checkbox("Drag in 3D (G)", False, hint=grips), "grips")
+            page.bind(
+                gui.add_dropdown("Out of reach", KINDS, hint=policies),
+                partial(page.session.set_setting, "policy"),
+                lambda: page.session.state.policy,
             )
-            page.on_change(self._grips, partial(page.session.set_display, "grips"))
-            self._policy = gui.add_dropdown(
-                "Out of reach",
-                KINDS,
-                hint="Come closest, keep the direction, or serve axes by priority, heave first.",
-            )
-            page.on_change(self._policy, partial(page.session.set_setting, "policy"))
 
     def _steer(self, word: list[str]) -> None:
         """`left,up` as shares of the stick's way, or `off`."""
@@ -130,9 +126,6 @@ class PilotPanel:
         self._page.do(partial(session.steer, values))
 
     def refresh(self) -> None:
-        """Write the stick and the switches."""
-        state, display = self._page.session.state, self._page.session.display
+        """Write the stick."""
         name = self._axes.value if self._axes.value in PADS else next(iter(PADS))
         put(self._pad, content=pad(PADS[name], CHANNEL, bool(self._spring.value)))
-        put(self._policy, value=state.policy)
-        put(self._grips, value=display.grips)

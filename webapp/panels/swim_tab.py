@@ -35,11 +35,12 @@ class SwimTab:
         """Build the widgets."""
         self._page = page
         self._own: Trajectory | None = None
-        where, rival = "Where to swim.", "A second robot on the same path, with another method."
+        rival = "A second robot on the same path, with another method."
         forces = "Mean forces, forces with their ripple, or flexible fins."
         speed = "Simulated time per real time; a slow machine falls short of it."
-        self._settings: dict[str, Any] = {
-            "path": gui.add_dropdown("Path", tuple(SHIPPED), initial_value="lissajous", hint=where),
+        self._path = gui.add_dropdown("Path", tuple(SHIPPED), hint="Where to swim.")
+        settings: dict[str, Any] = {
+            "path": self._path,
             "method": gui.add_dropdown("Method", COMPARED, hint="Who allocates, ten times a second."),
             "rival": gui.add_dropdown("Beside", (ALONE, *COMPARED), hint=rival),
             "plant": gui.add_dropdown("Fin forces", tuple(PLANTS), hint=forces),
@@ -52,9 +53,9 @@ class SwimTab:
             "End": page.scenery.end_swim,
         }
         self._run = page.add_buttons("Run", runs, hint="Step swims for 0.1 s; B pauses or goes on.")
-        self._settings["speed"] = gui.add_slider("Speed", *SPEEDS, 0.1, 1.0, hint=speed)
-        for key, widget in self._settings.items():
-            page.on_change(widget, partial(page.session.set_swim, key))
+        settings["speed"] = gui.add_slider("Speed", *SPEEDS, 0.1, 1.0, hint=speed)
+        for key, widget in settings.items():
+            page.bind(widget, partial(page.session.set_swim, key), partial(self._setting, key))
         follow = gui.add_checkbox("Follow", False, hint="The camera goes along with the first robot.")
         page.on_change(follow, page.scenery.look_after_swim)
         self._fins = FinButtons(
@@ -78,8 +79,12 @@ class SwimTab:
             hold_kind(self._axis)
             page.on_upload(upload, self._take_path)
 
+    def _setting(self, key: str) -> object:
+        return getattr(self._page.session.swim, key)
+
     def _take_path(self, name: str, content: bytes) -> None:
         self._own = read_path(name, content)
+        put(self._path, options=(*SHIPPED, OWN))
         self._page.session.set_swim("path", OWN)
 
     def _hold(self) -> None:
@@ -91,12 +96,9 @@ class SwimTab:
 
     def refresh(self) -> None:
         """Write how the swim goes."""
-        swimming, settings = self._page.swimming, self._page.session.swim
-        put(self._settings["path"], options=tuple(SHIPPED) if self._own is None else (*SHIPPED, OWN))
-        for key, widget in self._settings.items():
-            put(widget, value=getattr(settings, key))
-        if swimming.pace.speed != settings.speed:
-            swimming.pace.set_speed(settings.speed)
+        swimming, speed = self._page.swimming, self._page.session.swim.speed
+        if swimming.pace.speed != speed:
+            swimming.pace.set_speed(speed)
         swimmers = swimming.swimmers
         names = swimmers[0].fins if swimmers else self._page.session.state.layout.names
         failed = swimmers[0].shown.failed if swimmers else self._page.session.state.failed

@@ -49,15 +49,18 @@ class Guarded:
     """A panel that gives way to a sentence when it cannot be shown: no old figure stands under a new name."""
 
     def __init__(self, gui: viser.GuiApi, page: Page, make: Callable[[viser.GuiApi, Page], Panel]) -> None:
-        """Build the panel."""
+        """Build the panel, and take over the widgets that it binds to the session."""
         self._page = page
         self._sentence = gui.add_html("", visible=False)
         with gui.add_folder(None) as self._folder:
             self._panel = make(gui, page)
+        self._bound, page.bound = page.bound, []
 
     def refresh(self) -> None:
         """Write the session and the answer into it."""
         try:
+            for write in self._bound:
+                write()
             self._panel.refresh()
         except Exception as error:
             name = escape(self._page.session.state.layout.name)

@@ -43,28 +43,21 @@ class ViewTab:
         self._page = page
         looks = {view: partial(page.scenery.robot.look_from, view) for view in CAMERAS}
         page.add_buttons("Camera", looks, hint="Keys 1, 2, 3, 4.")
-        self._speed = gui.add_slider("Motion speed", 0.05, 1.0, 0.05, 0.5, hint="1 is real time.")
-        page.on_change(self._speed, partial(page.session.set_display, "speed"))
-        self._scale = gui.add_dropdown(
-            "Arrow scale", tuple(SCALES), initial_value=next(iter(SCALES)), hint="Force of an arrow of 0.1 m."
+        speed = gui.add_slider("Motion speed", 0.05, 1.0, 0.05, 0.5, hint="1 is real time.")
+        page.bind_display(speed, "speed")
+        page.bind(
+            gui.add_dropdown("Arrow scale", tuple(SCALES), hint="Force of an arrow of 0.1 m."),
+            lambda entry: page.session.set_display("newtons", SCALES.get(entry)),
+            lambda: _scale_entry(page.session.display.newtons),
         )
-        page.on_change(self._scale, lambda entry: page.session.set_display("newtons", SCALES.get(entry)))
-        self._switches = {
-            key: gui.add_checkbox(label, False, hint=hint) for key, (label, hint) in SWITCHES.items()
-        }
+        for key, (label, hint) in SWITCHES.items():
+            page.bind_display(gui.add_checkbox(label, False, hint=hint), key)
         self._graph = gui.add_html("")
-        for key, switch in self._switches.items():
-            page.on_change(switch, partial(page.session.set_display, key))
 
     def refresh(self) -> None:
-        """Write the switches."""
-        display = self._page.session.display
-        put(self._speed, value=display.speed)
-        put(self._scale, value=_scale_entry(display.newtons))
-        for key, switch in self._switches.items():
-            put(switch, value=getattr(display, key))
+        """Say what the graph shows."""
         reply = self._page.answering.reply
-        plain = display.graph and reply is not None and reply.attention is None
+        plain = self._page.session.display.graph and reply is not None and reply.attention is None
         method = "" if reply is None else reply.answer.method
         put(self._graph, content=f"<div class='fl dim'>{_graph_words(method)}</div>", visible=plain)
 
