@@ -13,7 +13,7 @@ import numpy as np
 
 from tests.browser.conftest import CHROMIUM, FLAGS, Served
 from tests.browser.page import Page
-from webapp.bench import memory
+from tests.webapp.bench import memory
 
 BROWSERS = 8
 SIZE = {"width": 820, "height": 420}

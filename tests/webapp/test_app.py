@@ -19,6 +19,7 @@ from viser import _messages
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
+from tests.webapp.bench import SilentClient
 from tests.webapp.stand_in import load_stand_in
 from webapp.app import App, _session_keys
 from webapp.serving import serve
@@ -26,22 +27,6 @@ from webapp.session import Session
 from webapp.session.store import SessionStore
 from webapp.tasks.solver import Solver
 from webapp.view import View
-
-
-class FakeClient:
-    """A browser that takes everything: real viser scene and panel, and a list of what it was sent."""
-
-    def __init__(self, server: viser.ViserServer) -> None:
-        self.scene, self.gui, self.atomic = server.scene, server.gui, server.atomic
-        self.camera = type("Camera", (), {})()
-        self.notes: list[str] = []
-        self.files: dict[str, bytes] = {}
-
-    def add_notification(self, title: str, body: str, **_: Any) -> None:
-        self.notes.append(f"{title}: {body}")
-
-    def send_file_download(self, name: str, content: bytes, **_: Any) -> None:
-        self.files[name] = content
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +45,7 @@ def app(server: viser.ViserServer) -> Iterator[App]:
 
 @pytest.fixture
 def view(server: viser.ViserServer, app: App) -> Iterator[View]:
-    client: Any = FakeClient(server)
+    client: Any = SilentClient(server)
     loop = server.get_event_loop()
     session = Session(load_layout(shipped_layouts()["ucat"]))
     view = on_loop(server, lambda: View(client, session, app._solver, app._workers, loop))

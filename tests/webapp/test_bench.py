@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from tests.webapp.bench import Bench
 from tests.webapp.stand_in import load_stand_in
-from webapp.bench import Bench
 from webapp.tasks.solver import Solver
 
 

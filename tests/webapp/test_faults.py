@@ -16,8 +16,8 @@ import viser
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
+from tests.webapp.bench import SilentClient
 from tests.webapp.stand_in import load_stand_in
-from webapp.bench import SilentClient
 from webapp.session import Display, Session
 from webapp.tasks.background import Workers
 from webapp.tasks.solver import Solver

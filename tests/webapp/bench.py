@@ -1,7 +1,7 @@
-"""Load and soak: `python -m webapp.bench [changes]` on a real server, with pages that take everything.
+"""Load and soak: `python -m tests.webapp.bench [changes]` on a real server, with pages that take everything.
 
-Measures what the server does: from a change of the wrench to the new page contents being handed to viser.
-What a browser adds depends on its graphics card.
+Not a test. It measures what the server does: from a change of the wrench to the new page contents being handed
+to viser. What a browser adds depends on its graphics card.
 """
 
 import asyncio
@@ -33,13 +33,18 @@ class SilentClient:
     """Stands for a browser: the server's own scene and panel, and a camera that takes everything."""
 
     def __init__(self, server: viser.ViserServer) -> None:
-        self.scene, self.gui, self.atomic = server.scene, server.gui, contextlib.nullcontext
+        self.scene, self.gui, self.atomic = server.scene, server.gui, server.atomic
         self.camera = type("Camera", (), {})()
         self.notes: list[str] = []
+        self.files: dict[str, bytes] = {}
 
     def add_notification(self, title: str, body: str, **_: Any) -> None:
         """Note what the user would have been told."""
         self.notes.append(f"{title}: {body}")
+
+    def send_file_download(self, name: str, content: bytes, **_: Any) -> None:
+        """Keep what the user would have saved."""
+        self.files[name] = content
 
 
 class Bench:
