@@ -1,7 +1,7 @@
 """Load and soak: `python -m tests.webapp.bench [changes]` on a real server, with pages that take everything.
 
-Not a test. It measures what the server does: from a change of the wrench to the new page contents being handed
-to viser. What a browser adds depends on its graphics card.
+Not a test. It measures what the server does: from a change of the wrench to the new page contents being
+handed to viser. What a browser adds depends on its graphics card.
 """
 
 import asyncio

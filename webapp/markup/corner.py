@@ -95,7 +95,33 @@ def corner(
         raw: whether it is a raw command on show, of which nobody expects that it is exact.
         least: whether it is the answer itself, not another way to do the same.
     """
-    return _cards(legend, _status(state, allocation, busy, error, raw, least))
+    fins = f"{len(state.healthy)} of {state.layout.n_fins} fins"
+    parts = [f"<b>{escape(state.layout.name)}</b>", f"<span>{fins}</span>"]
+    if error is not None:
+        parts.append(f"<span class='missing'>{escape(error)}</span>")
+    elif allocation is not None:
+        parts += _figures(allocation, raw, least)
+    if error is None and (busy or allocation is None):
+        parts.append("<span class='dim'>computing …</span>")
+    return _cards(legend, parts)
+
+
+def _figures(allocation: Allocation, raw: bool, least: bool) -> list[str]:
+    """Error, costs, time and verdict of what is on the robot."""
+    color = DEAD if raw else DELIVERED if allocation.reachable and not allocation.unknown_fins else MISSING
+    verdict = "Raw, not refined" if raw else reach_sentence(allocation)
+    costs = []
+    for word, value, unit in (("power", allocation.power, " W"), ("effort", allocation.energy, "")):
+        kept = f"least {word}" if word == objective_of(allocation) and least else word
+        cost = f"<b class='{word}'>{three_digits(value)}</b>{unit}"
+        costs.append(f"<span><span class='dim'>{kept}</span> {cost}</span>")
+    method, time = escape(allocation.method), three_digits(allocation.solve_ms)
+    return [
+        f"<span><span class='dim'>error</span> <b class='err'>{small(allocation.err_norm)}</b> σ</span>",
+        *costs,
+        f"<span><span class='dim'>{method}</span> {time} ms</span>",
+        f"<span class='pill' style='background:{css(color)}'>{escape(verdict)}</span>",
+    ]
 
 
 def swim_corner(swimming: Swimming, newtons: float) -> str:
@@ -111,49 +137,19 @@ def swim_corner(swimming: Swimming, newtons: float) -> str:
     )
     alive = len(first.fins) - len(first.shown.failed)
     off = f"{100 * float(first.shown.record[-1, ERROR]):.1f}" if len(first.shown.record) else "–"
-    parts = (
+    parts = [
         f"<b>{escape(first.swim.layout.name)}</b>",
         f"<span>{alive} of {len(first.fins)} fins</span>",
         f"<span><b>{first.shown.time:.1f}</b> s of {first.duration_s:.0f} s</span>",
         f"<span><span class='dim'>off the path</span> <b>{off}</b> cm</span>",
         f"<span>{pace_words(swimming)}</span>",
-    )
+    ]
     scale = f"<div class='dim scales'>arrow 0.1 m = {newtons:g} N</div>"
-    return _cards(f"<div class='fl-legend'>{trails}</div>{scale}", "".join(parts))
+    return _cards(f"<div class='fl-legend'>{trails}</div>{scale}", parts)
 
 
-def _cards(legend: str, status: str) -> str:
+def _cards(legend: str, status: list[str]) -> str:
     return (
         f"<div class='fl-corner'><div class='fl fl-card fl-legend-card'>{legend}</div>"
-        f"<div class='fl fl-card fl-status'>{status}</div></div>"
+        f"<div class='fl fl-card fl-status'>{''.join(status)}</div></div>"
     )
-
-
-def _status(
-    state: State, allocation: Allocation | None, busy: bool, error: str | None, raw: bool, least: bool
-) -> str:
-    fins = f"{len(state.healthy)} of {state.layout.n_fins} fins"
-    parts = [f"<b>{escape(state.layout.name)}</b>", f"<span>{fins}</span>"]
-    if error is not None:
-        parts.append(f"<span class='missing'>{escape(error)}</span>")
-    elif allocation is None:
-        parts.append("<span class='dim'>computing …</span>")
-    else:
-        color = (
-            DEAD if raw else DELIVERED if allocation.reachable and not allocation.unknown_fins else MISSING
-        )
-        verdict = "Raw, not refined" if raw else reach_sentence(allocation)
-        time, costs = three_digits(allocation.solve_ms), []
-        for word, value, unit in (("power", allocation.power, " W"), ("effort", allocation.energy, "")):
-            kept = f"least {word}" if word == objective_of(allocation) and least else word
-            cost = f"<b class='{word}'>{three_digits(value)}</b>{unit}"
-            costs.append(f"<span><span class='dim'>{kept}</span> {cost}</span>")
-        parts += [
-            f"<span><span class='dim'>error</span> <b class='err'>{small(allocation.err_norm)}</b> σ</span>",
-            *costs,
-            f"<span><span class='dim'>{escape(allocation.method)}</span> {time} ms</span>",
-            f"<span class='pill' style='background:{css(color)}'>{escape(verdict)}</span>",
-        ]
-        if busy:
-            parts.append("<span class='dim'>computing …</span>")
-    return "".join(parts)

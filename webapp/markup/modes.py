@@ -23,7 +23,6 @@ def mode_table(modes: Modes, searching: bool, shown: int | None, picker: str) ->
     for k, (mode, name) in enumerate(modes.shown):
         kind = "chosen" if k == shown else ""
         origin = f"<div class='dim'>{escape(source_words(mode.sources))}</div>"
-        origin = f"<div class='dim'>{escape(source_words(mode.sources))}</div>"
         rows.append(
             f"<tr class='{kind} pick' {pick(picker, k)}><td>{_swatch(k)}</td>"
             f"<td class='words'>{escape(name)}{origin}</td>"
