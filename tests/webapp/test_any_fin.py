@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 from finlab.assets import shipped_checkpoints, shipped_layouts
+from finlab.deploy.bundle import make_bundle
+from finlab.deploy.graph import build_graph
+from finlab.deploy.graph_file import graph_bytes
 from finlab.errors import DataError
 from finlab.layout import FinModelSpec, Layout, load_layout
 from finlab.physics import make_law, plant_of
@@ -81,9 +84,9 @@ def test_a_table_fin_goes_through_the_whole_app(tabled: Layout, tmp_path: Path) 
         session.redo()
     assert session.state == again.state
     allocator = SOLVER.loaded("search", "power")
-    graph = files.graph_file(tabled, (), allocator)
+    graph = graph_bytes(build_graph(tabled, allocator))
     assert files.read_layout("tabled.graph.json", graph).fins[0].model.type == "table"
-    assert len(files.bundle_bytes(tabled, (), allocator)) > len(graph), "the table travels along"
+    assert len(make_bundle(tabled, allocator).zip_bytes()) > len(graph), "the table travels along"
     assert command_line(session.state).startswith("finlab allocate tabled.yaml --wrench")
     assert export_line(session.state) == "finlab export tabled.yaml -o tabled --zip"
 

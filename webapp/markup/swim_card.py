@@ -2,7 +2,7 @@
 
 from html import escape
 
-from webapp.markup.words import listed, unlearned_sentence
+from webapp.markup.words import fins_words, unlearned_sentence
 from webapp.tasks.swimming import Swimming
 from webapp.theme import DELIVERED, OTHER, css
 
@@ -46,9 +46,9 @@ def swim_card(swimming: Swimming) -> str:
         if s.unknown_fins
     )
     if not first.shown.controllable:
-        numbers = listed([str(first.fins.index(name) + 1) for name in first.shown.failed])
+        lost = fins_words([first.fins.index(name) for name in first.shown.failed])
         warning += (
-            f"<div class='missing'>Without fin {numbers} surge, heave and yaw are not free of each other: "
+            f"<div class='missing'>Without {lost} surge, heave and yaw are not free of each other: "
             "expect it to drift off.</div>"
         )
     header = (

@@ -23,6 +23,11 @@ def listed(items: Sequence[str]) -> str:
     return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
 
 
+def fins_words(numbers: Sequence[int]) -> str:
+    """`fin 2`, `fins 1 and 3`: fins by their places, from 0, in the layout."""
+    return f"fin{'s' if len(numbers) > 1 else ''} {listed([str(k + 1) for k in numbers])}"
+
+
 def small(value: float) -> str:
     """A number of any size that never changes its width: `3.10e−05`."""
     return f"{value:.2e}".replace("-", "−") if math.isfinite(value) else "–"
@@ -61,8 +66,7 @@ def missing_part(allocation: Allocation) -> Array:
 
 def unlearned_sentence(layout: Layout, fins: Sequence[str]) -> str:
     """Which fins the method's networks have not learned, so that its commands for them are wrong."""
-    numbers = [str(layout.index(name) + 1) for name in fins]
-    return f"Not learned: fin{'s' if len(numbers) > 1 else ''} {listed(numbers)}. Choose another method"
+    return f"Not learned: {fins_words([layout.index(name) for name in fins])}. Choose another method"
 
 
 def reach_sentence(allocation: Allocation) -> str:
@@ -83,10 +87,8 @@ def reach_sentence(allocation: Allocation) -> str:
         sentence = (
             f"Not reachable: {abs(given - target):.2g} {AXIS_UNITS[axis]} of {AXIS_WORDS[axis]} too much"
         )
-    full = [str(i + 1) for i, at_limit in enumerate(saturated(allocation)) if at_limit.any()]
-    if not full:
-        return sentence
-    return f"{sentence}; fin{'s' if len(full) > 1 else ''} {listed(full)} at the limit"
+    full = np.flatnonzero(saturated(allocation).any(axis=1))
+    return f"{sentence}; {fins_words(full.tolist())} at the limit" if len(full) else sentence
 
 
 def rest_sentence(allocation: Allocation) -> str:
@@ -107,8 +109,7 @@ def authority_sentence(layout: Layout, failed: tuple[str, ...], reach: Array) ->
     blind = [AXIS_WORDS[k] for k in range(6) if reach[k] < 1e-6]
     if not blind:
         return None
-    numbers = [str(layout.index(name) + 1) for name in failed]
-    without = f"Without fin {listed(numbers)} this" if numbers else "This"
+    without = f"Without {fins_words([layout.index(name) for name in failed])} this" if failed else "This"
     return f"{without} robot cannot {listed(blind)}."
 
 

@@ -10,7 +10,7 @@ from finlab.analysis import Improvement
 from webapp.handles import Changes, on_user_change, put
 from webapp.markup.picking import chosen_button
 from webapp.markup.score_card import score_table
-from webapp.markup.words import listed, three_digits
+from webapp.markup.words import fins_words, three_digits
 from webapp.page import Page
 from webapp.panels.damage import FinButtons
 from webapp.session.display import DRAWN
@@ -196,6 +196,6 @@ def _before_and_after(found: Improvement) -> str:
     stopped = " The search was stopped early." if found.cancelled else ""
     unit = " W" if found.goal == "mission_power" else " N"
     heading = f"<b>{goal.capitalize()}: {before}{unit} before, {after}{unit} after.</b>{stopped}"
-    numbers = listed([str(found.layout.index(name) + 1) for name in found.moved])
+    moved = fins_words([found.layout.index(name) for name in found.moved]).capitalize()
     table = score_table(found.layout, found.card_after, found.card_before)
-    return f"{heading} Fins {numbers} moved; the view shows them as ghosts.{table}"
+    return f"{heading} {moved} moved; the view shows them as ghosts.{table}"

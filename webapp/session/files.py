@@ -10,7 +10,6 @@ from functools import cache
 from pathlib import Path
 
 from finlab.allocation.allocation import Allocation
-from finlab.allocation.allocator import Allocator
 from finlab.assets import shipped_layouts
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.layout import Layout, layout_to_dict, load_layout, parse_layout
@@ -67,25 +66,6 @@ def read_layout(name: str, content: bytes) -> Layout:
 def layout_bytes(layout: Layout) -> bytes:
     """The layout as a YAML file."""
     return yaml_text(layout_to_dict(layout)).encode()
-
-
-def graph_file(layout: Layout, failed: tuple[str, ...], allocator: Allocator) -> bytes:
-    """The layout graph file for deployment with the allocator's checkpoint."""
-    from finlab.deploy.graph import build_graph
-    from finlab.deploy.graph_file import graph_bytes
-
-    return graph_bytes(build_graph(layout, allocator, failed))
-
-
-def bundle_bytes(layout: Layout, failed: tuple[str, ...], allocator: Allocator) -> bytes:
-    """The bundle for the robot as a zip file: graph, the fins' physics, README and checksums.
-
-    Raises:
-        FinlabError: no robot can run the allocator's method.
-    """
-    from finlab.deploy.bundle import make_bundle
-
-    return make_bundle(layout, allocator, failed).zip_bytes()
 
 
 def candidates_csv(allocation: Allocation | None) -> bytes:

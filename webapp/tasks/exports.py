@@ -11,10 +11,13 @@ import imageio.v3 as iio
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
+from finlab.deploy.bundle import make_bundle
+from finlab.deploy.graph import build_graph
+from finlab.deploy.graph_file import graph_bytes
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.scene.robot_scene import RobotScene
-from webapp.session.files import bundle_bytes, file_stem, graph_file
+from webapp.session.files import file_stem
 from webapp.tasks.context import Context
 from webapp.viser_internals import start_server, stop_server
 
@@ -56,19 +59,19 @@ class Exports:
 
     def graph(self) -> None:
         """Send the layout graph file."""
-        self._send_made(".graph.json", graph_file)
+        self._send_made(".graph.json", lambda *robot: graph_bytes(build_graph(*robot)))
 
     def bundle(self) -> None:
         """Send the bundle for the robot: the same bytes as `finlab export --zip`.
 
         What was tried out with K and T on the page does not go to the robot.
         """
-        self._send_made(".zip", bundle_bytes)
+        self._send_made(".zip", lambda *robot: make_bundle(*robot).zip_bytes())
 
-    def _send_made(self, suffix: str, make: Callable[[Layout, tuple[str, ...], Allocator], bytes]) -> None:
+    def _send_made(self, suffix: str, make: Callable[[Layout, Allocator, tuple[str, ...]], bytes]) -> None:
         """Send what is made of the robot and its allocator, as that is shipped but for the objective."""
         state, loaded = self._session.state, self._context.solver.loaded
-        self._send(suffix, lambda: make(state.layout, state.failed, loaded(state.method, state.objective)))
+        self._send(suffix, lambda: make(state.layout, loaded(state.method, state.objective), state.failed))
 
     def html(self, shown: Allocation | None) -> None:
         """Send a standalone page of the 3D view with an answer.

@@ -17,7 +17,7 @@ from finlab.allocation.modes import (
     signature_difference,
 )
 from finlab.allocation.solution import Candidates
-from webapp.markup.words import listed
+from webapp.markup.words import fins_words
 from webapp.theme import MODE_COLORS
 
 MAX_SHOWN = len(MODE_COLORS)
@@ -108,9 +108,7 @@ def _names(signatures: list[ModeSignature]) -> list[str]:
 def _resting_words(signature: ModeSignature) -> str:
     if not signature.resting:
         return "all fins push"
-    several = len(signature.resting) > 1
-    fins = listed([str(i + 1) for i in signature.resting])
-    return f"fins {fins} rest" if several else f"fin {fins} rests"
+    return f"{fins_words(signature.resting)} {'rest' if len(signature.resting) > 1 else 'rests'}"
 
 
 def _difference_words(first: ModeSignature, signature: ModeSignature) -> list[str]:

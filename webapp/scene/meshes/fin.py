@@ -54,10 +54,7 @@ def shaft() -> Mesh:
     """The servo's housing at the root and the shaft that carries the blade."""
     housing = np.array([[-0.045, 0, 0], [-0.041, 0, 0], [-0.006, 0, 0], [-0.002, 0, 0]], dtype=float)
     rod = np.array([[-0.002, 0, 0], [ROOT + 0.86 * SPAN, 0, 0]], dtype=float)
-    return joined(
-        tube(housing, np.array([0.014, 0.018, 0.018, 0.013]), 20),
-        tube(rod, 0.0055, 12),
-    )
+    return joined(tube(housing, np.array([0.014, 0.018, 0.018, 0.013]), 20), tube(rod, 0.0055, 12))
 
 
 def mounting(angle: float) -> Array:
@@ -69,10 +66,7 @@ def mounting(angle: float) -> Array:
 def sweep(amplitude: float) -> Mesh:
     """The fan that the blade sweeps: +- `amplitude` [rad] about the shaft, across the blade's middle."""
     angle = np.linspace(-amplitude, amplitude, 17)
-    x = np.full(17, ROOT + SPAN / 2)
-    inner, outer = 0.035, CHORD - 0.004
-    arc = np.stack([x, -np.cos(angle), -np.sin(angle)], axis=-1)
-    rings = [arc * [1.0, radius, radius] for radius in (inner, outer)]
-    vertices = np.concatenate(rings)
-    faces = [(k, k + 1, k + 17) for k in range(16)] + [(k + 1, k + 18, k + 17) for k in range(16)]
-    return Mesh(vertices, np.array(faces, dtype=np.int32))
+    arc = np.stack([np.full(17, ROOT + SPAN / 2), -np.cos(angle), -np.sin(angle)], axis=-1)
+    rings = [arc * [1.0, radius, radius] for radius in (0.035, CHORD - 0.004)]
+    k = np.arange(16)
+    return Mesh(np.concatenate(rings), triangles(k, k + 1, k + 17, k + 1, k + 18, k + 17))

@@ -89,7 +89,7 @@ def revolved(x: Array, radius_y: Array, radius_z: Array, power: float = 2.0, sid
     """A closed body along the x axis whose cross-section at `x` is a superellipse.
 
     Args:
-        x: stations (P,), falling or rising [m].
+        x: stations (P,), rising [m].
         radius_y: half width (P,) at each station [m].
         radius_z: half height (P,) at each station [m].
         power: 2 is an ellipse, larger is boxier.
@@ -99,19 +99,8 @@ def revolved(x: Array, radius_y: Array, radius_z: Array, power: float = 2.0, sid
     cos, sin = np.cos(turn), np.sin(turn)
     unit_y = np.sign(cos) * np.abs(cos) ** (2 / power)
     unit_z = np.sign(sin) * np.abs(sin) ** (2 / power)
-    points = np.stack(
-        [
-            np.broadcast_to(x[:, None], (len(x), sides)),
-            radius_y[:, None] * unit_y[None],
-            radius_z[:, None] * unit_z[None],
-        ],
-        axis=-1,
-    )
-    vertices = points.reshape(-1, 3)
-    faces = _grid_faces(len(x), sides)
-    if x[-1] < x[0]:
-        faces = faces[:, ::-1].copy()
-    return Mesh(vertices, faces)
+    x, y, z = np.broadcast_arrays(x[:, None], radius_y[:, None] * unit_y, radius_z[:, None] * unit_z)
+    return Mesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), _grid_faces(len(x), sides))
 
 
 def force_arrow(way: Array, start: Array, thickness: float) -> Mesh:
