@@ -26,7 +26,6 @@ from webapp.tasks.comparison import Comparison
 from webapp.tasks.context import Context
 from webapp.tasks.exports import Exports
 from webapp.tasks.improving import Improver
-from webapp.tasks.playback import Playback
 from webapp.tasks.solver import Solver
 from webapp.tasks.sweeping import Sweep
 from webapp.tasks.swimming import Swimming
@@ -68,8 +67,6 @@ class Page(ABC):
         context = Context(client, session, solver, workers, page, self.do, changed, self.notify)
         self.answering = Answering(context)
         """The newest answer, its modes and what of it is on the robot."""
-        self.playback = Playback(context, self.answering)
-        """The refinement, step by step."""
         self.ranging = Newest(page, workers.marks, find_ranges, changed, REST_S)
         """How far each component of the target can go."""
         self.analyst = Newest(page, workers.cards, find, changed, CARD_REST_S)
@@ -136,16 +133,20 @@ class Page(ABC):
         session = self.session
         return self.bind(handle, partial(session.set_display, key), lambda: getattr(session.display, key))
 
-    def on_click(self, button: viser.GuiButtonHandle, act: Callable[[], object]) -> None:
-        """Carry out an intent when the user presses a button."""
+    def add_button(self, label: str, act: Callable[[], object], **options: Any) -> viser.GuiButtonHandle:
+        """A button that carries out an intent; `options` as viser has them."""
+        button = self.client.gui.add_button(label, **options)
 
         @button.on_click
         async def _clicked(event: Any) -> None:
             if event.client is not None:
                 self.do(act)
 
-    def on_upload(self, button: viser.GuiUploadButtonHandle, act: Callable[[str, bytes], object]) -> None:
-        """Carry out `act(name, content)` when the user has chosen a file."""
+        return button
+
+    def add_upload(self, label: str, act: Callable[[str, bytes], object], **options: Any) -> None:
+        """A button that carries out `act(name, content)` when the user has chosen a file."""
+        button = self.client.gui.add_upload_button(label, **options)
 
         @button.on_upload
         async def _uploaded(event: Any) -> None:

@@ -60,7 +60,7 @@ def add_commands(gui: viser.GuiApi, page: Page) -> None:
     for objective in OBJECTIVES:
         add(f"Keep least: {objective}", partial(session.set_setting, "objective", objective))
     add("Compare the methods", lambda: page.comparison.start(session.state))
-    add("Play the refinement", page.playback.start)
+    add("Play the refinement", page.answering.play)
     add("Stop the sweep", page.sweep.stop)
     add("Swim: pause or go on", lambda: page.swimming.set_running(not page.swimming.running), "B")
     add("Swim: back to the design", page.scenery.end_swim)

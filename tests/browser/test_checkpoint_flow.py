@@ -80,7 +80,7 @@ def test_modes_tell_their_components_and_proposals_are_drawn(trained: Page) -> N
     page.press("Play the refinement")
     page.page.locator(".step", has_text="Best raw candidate").wait_for()
     page.page.locator(".step", has_text="Answer").wait_for()
-    page.until(lambda: page.view.playback.frame is None)
+    page.until(lambda: page.view.answering.frame is None)
     page.tab("What the network proposes")
     page.until(lambda: page.page.locator(".discs svg").count() == 4)
     page.choose("Method", "search")

@@ -17,9 +17,7 @@ def command_line(state: State) -> str:
         words += ["--health", f"{name}={share:g}"]
     for name, angle in state.stuck:
         words += ["--stuck", f"{name}={math.degrees(angle):g}"]
-    if state.method != "search":
-        words += ["--method", state.method]
-    words += _objective(state)
+    words += _method(state)
     if state.policy != "closest":
         words += ["--policy", state.policy]
     return shlex.join(words)
@@ -28,17 +26,15 @@ def command_line(state: State) -> str:
 def export_line(state: State) -> str:
     """What makes the bundle for this robot."""
     words = ["finlab", "export", _layout_name(state), "-o", file_stem(state.layout.name), "--zip"]
-    if state.method in METHODS_ON_BOARD and state.method != "search":
-        words += ["--method", state.method]
-    objective = _objective(state) if state.method in METHODS_ON_BOARD else []
-    return shlex.join([*words, *objective, *_failures(state)])
+    words += _method(state) if state.method in METHODS_ON_BOARD else []
+    return shlex.join([*words, *_failures(state)])
 
 
 def python_lines(state: State) -> str:
     """The same question in Python."""
     name = _layout_name(state)
     chosen = [repr(state.method)] if state.method != "search" else []
-    chosen += [f"objective={state.objective!r}"] if _objective(state) else []
+    chosen += [f"objective={state.objective!r}"] if _asks_objective(state) else []
     target = ", ".join(f"{value:g}" for value in state.target)
     options = [f"failed={list(state.failed)!r}"] if state.failed else []
     if state.policy != "closest":
@@ -68,10 +64,14 @@ def _layout_name(state: State) -> str:
     return shipped_name(state.layout) or f"{file_stem(state.layout.name)}.yaml"
 
 
-def _objective(state: State) -> list[str]:
-    """The objective, where it is not the usual one and the method knows it."""
-    asked = state.objective != "power" and knows_objective(state.method)
-    return ["--objective", state.objective] if asked else []
+def _method(state: State) -> list[str]:
+    """The method and the objective, where they are not the usual ones."""
+    method = ["--method", state.method] if state.method != "search" else []
+    return [*method, "--objective", state.objective] if _asks_objective(state) else method
+
+
+def _asks_objective(state: State) -> bool:
+    return state.objective != "power" and knows_objective(state.method)
 
 
 def _failures(state: State) -> list[str]:

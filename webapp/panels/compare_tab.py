@@ -16,10 +16,12 @@ class CompareTab:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
-        self._run = gui.add_button(
-            "Compare the methods", icon=viser.Icon.SCALE, hint="On the wrench and the failures of now."
+        self._run = page.add_button(
+            "Compare the methods",
+            lambda: page.comparison.start(page.session.state),
+            icon=viser.Icon.SCALE,
+            hint="On the wrench and the failures of now.",
         )
-        page.on_click(self._run, lambda: page.comparison.start(page.session.state))
         page.add_choice(
             "Overlay",
             PICKER,

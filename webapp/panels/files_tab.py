@@ -4,7 +4,7 @@ from html import escape
 
 import viser
 
-from webapp.handles import Changes, put
+from webapp.handles import put
 from webapp.markup.snippets import command_line, export_line, python_lines
 from webapp.page import Page
 from webapp.session import files
@@ -16,13 +16,13 @@ class FilesTab:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
-        upload = gui.add_upload_button(
+        page.add_upload(
             "Open a layout file",
+            self._open,
             icon=viser.Icon.FOLDER_OPEN,
             mime_type=".yaml,.yml,.json",
             hint="A layout file (YAML or JSON) or a layout graph file.",
         )
-        page.on_upload(upload, self._open)
         saves = {
             "Layout (YAML)": self._send_layout,
             "Candidates (CSV)": self._send_candidates,
@@ -36,7 +36,6 @@ class FilesTab:
             hint="The layout graph alone, or with the fins' physics and checksums: what finlab export makes.",
         )
         self._command = gui.add_html("")
-        self._changes = Changes()
 
     def _open(self, name: str, content: bytes) -> None:
         self._page.session.open_layout(files.read_layout(name, content))
@@ -53,8 +52,6 @@ class FilesTab:
     def refresh(self) -> None:
         """Write the command that asks the same question."""
         state = self._page.session.state
-        if not self._changes(state):
-            return
         texts = {
             "The same question on the command line": command_line(state),
             "The same in Python": python_lines(state),

@@ -82,8 +82,7 @@ class LayoutTab:
             {str(count): partial(self._copy_around, count) for count in RING_SIZES},
             hint="Copies of the selected fin, so that so many stand evenly around the axis.",
         )
-        add = gui.add_button("Add a fin", icon=viser.Icon.PLUS, hint=f"Up to {MAX_FINS} fins.")
-        page.on_click(add, session.add_fin)
+        page.add_button("Add a fin", session.add_fin, icon=viser.Icon.PLUS, hint=f"Up to {MAX_FINS} fins.")
         self._card = gui.add_html("")
         self._hull = HullPanel(gui, page)
         self._changes = Changes()
@@ -152,13 +151,13 @@ class HullPanel:
             )
             self._unit = gui.add_dropdown("Unit of file", tuple(UNITS), hint="What 1 means in the mesh file.")
             hold_kind(self._unit)
-            upload = gui.add_upload_button(
+            page.add_upload(
                 "Import a hull (STL, OBJ, GLB)",
+                self._import,
                 icon=viser.Icon.UPLOAD,
                 mime_type=".stl,.obj,.glb,.ply",
                 hint="Up to 20 MB and 60,000 triangles.",
             )
-            page.on_upload(upload, self._import)
 
     def _import(self, name: str, content: bytes) -> None:
         self._page.session.import_hull(stored_hull(name, content, self._unit.value))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
+from html import escape
 from typing import Any
 
 import viser
@@ -113,15 +114,15 @@ class ImprovePanel:
             )
             takes = {"Add the present wrench": self._add_wrench}
             self._take = page.add_buttons(" ", takes, hint="To the mission.", visible=False)
-            self._start = gui.add_button(
-                "Search", icon=viser.Icon.SPARKLES, hint="Takes up to a minute; it can be stopped any time."
+            stops, offered = (
+                "Takes up to a minute; it can be stopped any time.",
+                "What was found so far is offered.",
             )
-            page.on_click(self._start, self._search)
+            self._start = page.add_button("Search", self._search, icon=viser.Icon.SPARKLES, hint=stops)
             self._bar = gui.add_progress_bar(0.0, visible=False)
-            self._cancel = gui.add_button(
-                "Cancel", icon=viser.Icon.X, visible=False, hint="What was found so far is offered."
+            self._cancel = page.add_button(
+                "Cancel", page.improver.cancel, icon=viser.Icon.X, visible=False, hint=offered
             )
-            page.on_click(self._cancel, page.improver.cancel)
             self._card = gui.add_html("")
             gui.add_html(chosen_button("fl-verdict", 0))
             verdicts = {"Accept": self._accept, "Leave": page.improver.forget}
@@ -165,7 +166,7 @@ class ImprovePanel:
         put(self._verdict, visible=found is not None)
         text = ""
         if improver.error is not None:
-            text = f"<div class='missing'>{improver.error}</div>"
+            text = f"<div class='missing'>{escape(improver.error)}</div>"
         elif found is not None:
             text = _before_and_after(found)
         elif progress is not None:

@@ -57,12 +57,12 @@ class ModesTab:
             page.on_change(widget, partial(session.set_setting, key))
         self._picker = ModePicker(gui, page, 250, "fl-modes")
         self._table = gui.add_html("")
-        self._play = gui.add_button(
+        self._play = page.add_button(
             "Play the refinement",
+            page.answering.play,
             icon=viser.Icon.PLAYER_PLAY,
             hint="Levenberg-Marquardt from the best raw candidate, step by step; then the answer.",
         )
-        page.on_click(self._play, page.playback.start)
         self._step = gui.add_html("")
         self._proposals = ProposalPanel(gui, page)
         self._changes = Changes()
@@ -94,7 +94,7 @@ def _origin_words(method: str) -> str:
 
 def _step_words(page: Page) -> str:
     """What is on the robot while it is neither the answer nor one of its modes."""
-    frame, sample, shown = page.playback.frame, page.session.sample, page.shown
+    frame, sample, shown = page.answering.frame, page.session.sample, page.shown
     if shown is None or (frame is None and sample is None):
         return ""
     if frame is not None:

@@ -34,10 +34,7 @@ class SweepPanel:
                 "From, to", (-5.0, 5.0), step=0.05, hint="Ends of the range [N or N m]."
             )
             hold_kind(self._range)
-            self._play = gui.add_button(
-                "Play the sweep", icon=viser.Icon.PLAYER_PLAY, hint="To and fro until you stop it."
-            )
-            page.on_click(self._play, self._toggle)
+            self._play = page.add_button("Play the sweep", self._toggle, hint="To and fro until you stop it.")
             self._plot = LinePlot(gui, FIN_LINES, "force of each fin [N]", height=170, widths=(2.0,))
             self._said = gui.add_html("")
 

@@ -68,8 +68,9 @@ class SwimTab:
         self._card = gui.add_html("")
         self._plots = SwimPlots(gui)
         with gui.add_folder("More", expand_by_default=False):
-            upload = gui.add_upload_button(
+            page.add_upload(
                 "Open a path (CSV)",
+                self._take_path,
                 icon=viser.Icon.ROUTE,
                 mime_type=".csv",
                 hint="A table with the columns t [s], x, y, z [m].",
@@ -77,7 +78,6 @@ class SwimTab:
             wrench = "Asked in blue, delivered in green, of the first robot."
             self._axis = gui.add_dropdown("Plot the wrench of", AXIS_WORDS, hint=wrench)
             hold_kind(self._axis)
-            page.on_upload(upload, self._take_path)
 
     def _setting(self, key: str) -> object:
         return getattr(self._page.session.swim, key)

@@ -96,7 +96,7 @@ class Corner:
     def refresh(self) -> None:
         """Write the status line and the legend."""
         page, answering = self._page, self._page.answering
-        raw = page.session.sample is not None or page.playback.frame is not None
+        raw = page.session.sample is not None or answering.frame is not None
         if page.swimming.swimmers:
             content = swim_corner(page.swimming, ARROWS_N)
         else:

@@ -2,9 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from finlab.layout import Layout
 from webapp.session.core import Core
-from webapp.session.display import Display
 from webapp.session.files import shipped
 from webapp.session.state import State
 from webapp.session.targets import PRESETS
@@ -105,12 +103,9 @@ STEPS = (
 class Guiding(Core):
     """The tour."""
 
-    def __init__(self, layout: Layout, display: Display | None = None) -> None:
-        """Start outside the tour."""
-        super().__init__(layout, display)
-        self.stop: int | None = None
-        """Where the tour is, None while there is none."""
-        self._before_tour: State | None = None
+    stop: int | None = None
+    """Where the tour is, None while there is none."""
+    _before_tour: State | None = None
 
     def next_stop(self) -> None:
         """The tour's first stop, or the one after this; after the last one the tour is over."""

@@ -1,16 +1,21 @@
 """Keeps one page's answer up to date: asks for the newest state, and knows what of the answer is shown."""
 
+from functools import partial
+
 import numpy as np
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
+from finlab.errors import FinlabError
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
 from webapp.tasks.mode_names import NO_MODES, Modes, same_mode
-from webapp.tasks.solver import Reply
+from webapp.tasks.solver import STEPS, Reply
 
 SEARCH_REST_S = 0.2
 """How long there must be no newer answer before all its modes are searched for [s]: that takes a while."""
+FRAME_S = 0.9
+"""How long each step of a refinement is shown [s]."""
 
 
 class Answering:
@@ -18,13 +23,15 @@ class Answering:
 
     def __init__(self, context: Context) -> None:
         """Answer what the page's session asks."""
-        self._session, self._changed, self._notify = context.session, context.changed, context.notify
+        self._session, self._loop = context.session, context.loop
+        self._changed, self._notify = context.changed, context.notify
         self._told: str | None = None
         self._shown: tuple[Allocation, Array, Allocation] | None = None
         loop, worker, solver = context.loop, context.workers.answers, context.solver
         self._answer = Newest(loop, worker, solver.reply, self._take)
         self._search = Newest(loop, worker, solver.modes, self._take_modes, SEARCH_REST_S)
-        self.frames: tuple[Allocation, ...] = ()
+        self._steps = Newest(loop, worker, solver.refinement, self._take_steps)
+        self._frames: tuple[Allocation, ...] = ()
         """Steps of a refinement that are still to be played, the present one first."""
 
     @property
@@ -64,8 +71,8 @@ class Answering:
     @property
     def shown(self) -> Allocation | None:
         """The answer with the chosen mode's or sample's command, or the step of the refinement on show."""
-        if self.frames:
-            return self.frames[0]
+        if self._frames:
+            return self._frames[0]
         best, mode, sample = self.best, self._session.mode, self._session.sample
         if best is None:
             return None
@@ -74,6 +81,11 @@ class Answering:
         if 0 < mode < len(self.modes.shown):
             return self._variant(best, self.modes.shown[mode].mode.command)
         return best
+
+    @property
+    def frame(self) -> int | None:
+        """Which step of the refinement is on the robot, None while none is played."""
+        return STEPS + 2 - len(self._frames) if self._frames else None
 
     def _variant(self, best: Allocation, command: Array) -> Allocation:
         """The answer with another command; kept, because every refresh asks for it."""
@@ -86,14 +98,25 @@ class Answering:
         """Have the worker answer the present state, unless it was asked already."""
         self._answer.ask(self._session.state)
 
+    def play(self) -> None:
+        """Show step by step how the refinement makes a raw candidate exact; a change of the state ends it.
+
+        Raises:
+            FinlabError: there is no answer to the present state yet.
+        """
+        if self.reply is None or self.busy:
+            raise FinlabError("there is no answer yet; wait for one")
+        self._steps.forget()
+        self._steps.ask(self.reply)
+
     def forget(self) -> None:
         """Nothing is known of the robot any more: another one was opened, or the page has gone."""
-        self.frames = ()
-        self._answer.forget()
-        self._search.forget()
+        self._frames = ()
+        for task in (self._answer, self._search, self._steps):
+            task.forget()
 
     def _take(self) -> None:
-        self.frames = ()
+        self._frames = ()
         error = self._answer.error
         if self.reply is not None:
             self._search.ask(self.reply)
@@ -112,3 +135,20 @@ class Answering:
             if 0 < mode < len(before):
                 self._session.show_mode(same_mode(before[mode].mode, self.modes.shown))
         self._changed()
+
+    def _take_steps(self) -> None:
+        steps = self._steps
+        if steps.error is not None:
+            self._notify("Not possible", steps.error)
+        elif steps.answered is self.reply and not self.busy:
+            self._show(steps.findings or ())
+
+    def _show(self, frames: tuple[Allocation, ...]) -> None:
+        self._frames = frames
+        self._changed()
+        if frames:
+            self._loop.later(FRAME_S, partial(self._show_next, frames))
+
+    def _show_next(self, frames: tuple[Allocation, ...]) -> None:
+        if self._frames is frames:  # else it was ended, or started again
+            self._show(frames[1:])
