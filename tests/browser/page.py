@@ -1,6 +1,7 @@
 """A page of the app in a real browser, in the words of a user: press, type, drag, read."""
 
 import re
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import Any
 
 from webapp.session.search_request import SearchRequest
 from webapp.session.swim_plan import SwimSettings
+from webapp.viser_internals import run_script
 
 WAIT_MS = 45_000
 """Longest wait for the page: software rendering on a busy machine is slow."""
@@ -40,6 +42,7 @@ class Page:
         self.page = page
         self._served = served
         self.problems: list[str] = []
+        self._marks = 0
         page.set_default_timeout(WAIT_MS * patience)
         page.on("console", lambda m: self.problems.append(m.text) if m.type == "error" else None)
         before = set(served.app.views)
@@ -64,6 +67,8 @@ class Page:
     def start_over(self) -> None:
         """As at first sight: the state, the tab, the camera, and no notes."""
 
+        done = threading.Event()
+
         def restart() -> None:
             self.session.start_over()
             self.session.display = self._display
@@ -74,13 +79,16 @@ class Page:
             self.view.sweep.stop()
             self.view.scenery.end_swim()
             self.view.scenery.robot.look_from("3D")
+            done.set()
 
         self._served.server.get_event_loop().call_soon_threadsafe(self.view.do, restart)
+        self.until(done.is_set)
         self.close_notes()
         self.tab("Wrench")
         self.until(
             lambda: not self.view.busy and self.page.locator(".mantine-Notification-root").count() == 0
         )
+        self.catch_up()
         self.problems.clear()
 
     def close_notes(self) -> None:
@@ -94,6 +102,13 @@ class Page:
         while not condition():
             assert time.monotonic() < end, "what was waited for did not happen"
             self.page.wait_for_timeout(50)
+
+    def catch_up(self) -> None:
+        """Wait until all that the server has told so far has come to the page."""
+        self._marks += 1
+        loop, gui = self._served.server.get_event_loop(), self.view.client.gui
+        loop.call_soon_threadsafe(run_script, gui, f"window.finlabMark = {self._marks}")
+        self.page.wait_for_function("mark => window.finlabMark === mark", arg=self._marks)
 
     def node(self, name: str) -> None:
         """Wait for a node of the scene."""
@@ -165,6 +180,16 @@ class Page:
         self.page.wait_for_timeout(100)
         mouse.up()
         self._pause()
+
+    def look_from_above(self) -> None:
+        """See the robot from above, where its x and y axes lie flat on the screen."""
+        self.key("2")
+
+        def above() -> bool:
+            (x, y), (u, v) = (self.pixel("/robot", (0.0, 0.0, z)) for z in (0.0, 0.1))
+            return abs(u - x) + abs(v - y) < 2.0
+
+        self.until(above)
 
     def pixel(self, node: str, point: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> tuple[float, float]:
         """Where a point of a node is on the screen."""

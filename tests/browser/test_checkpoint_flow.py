@@ -38,7 +38,7 @@ def trained(browser: Any) -> Iterator[Page]:
 def test_search_answers_a_slider_and_a_failure(trained: Page) -> None:
     page = trained
     assert page.view.answering.best.method == "search" and page.view.answering.best.checkpoint is None
-    assert "Reachable" in page.text(".fl-status") and "least power" in page.text(".fl-status")
+    page.until(lambda: "Reachable" in page.text(".fl-status") and "least power" in page.text(".fl-status"))
     page.type("Fy [N]", "0.5")
     page.until(lambda: page.session.state.target[1] == 0.5 and not page.view.busy)
     page.until(lambda: "+0.50" in page.text(".bars"))
@@ -64,7 +64,10 @@ def test_power_or_effort_is_kept_least(trained: Page) -> None:
     assert page.view.answering.best.power == watts
 
 
-def test_modes_tell_their_components_and_proposals_are_drawn(trained: Page) -> None:
+def test_modes_tell_their_components_and_proposals_are_drawn(
+    trained: Page, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("webapp.tasks.answering.FRAME_S", 2.5)  # a busy page must see each of them
     page = trained
     assert page.page.locator("svg.plot:visible .samples").count() == 0, "search draws nothing"
     assert page.page.get_by_role("button", name="Play the refinement").count() == 0

@@ -16,12 +16,12 @@ def test_linked_pair_follows_the_gizmo(page: Any) -> None:
     page.press("Mirror")
     page.until(lambda: page.session.state.links == (("front_right", "front_left"),))
     page.until(lambda: page.session.selected == "front_left")
-    page.key("2")
-    page.page.wait_for_timeout(600)
+    page.look_from_above()
     grip, further = page.pixel("/robot/fins/1", (0.168, 0, 0)), page.pixel("/robot/fins/1", (0.228, 0, 0))
     before = page.session.state.layout
     page.drag(grip, further)
-    page.until(lambda: page.session.state.layout != before and not page.view.busy)
+    page.until(lambda: page.session.state.layout != before and page.view.scenery.robot.dragged is None)
+    page.until(lambda: not page.view.busy)
     right, left = page.session.state.layout.fins[:2]
     assert left.position[0] == pytest.approx(before.fins[1].position[0] + 0.06, abs=0.02)
     assert right.position == pytest.approx((left.position[0], -left.position[1], left.position[2]))
@@ -90,9 +90,13 @@ def test_search_is_watched_and_accepted(page: Any) -> None:
     page.tab("Limits")
     before = page.session.state.layout
     page.choose("Goal", "power for a mission")
+    page.until(lambda: page.session.draft.goal == "power for a mission")
     page.press("Add the present wrench")
-    page.page.get_by_role("button", name="4", exact=True).locator("visible=true").last.click()  # holds fin 4
+    page.until(lambda: page.session.draft.mission != "")
+    page.page.get_by_role("button", name="4", exact=True).locator("visible=true").last.click()
+    page.until(lambda: page.session.draft.held == (before.names[3],))
     page.type("Reach ± [m]", "0.03", place=0)
+    page.until(lambda: page.session.draft.way("all")[0] == 0.03)
     page.press("Search")
     page.until(lambda: page.view.improver.progress is not None, seconds=60)
     page.press("Cancel")
@@ -115,7 +119,7 @@ def test_methods_side_by_side(page: Any) -> None:
     page.page.locator("table.methods tr.pick", has_text="analytic").click()
     page.until(lambda: page.session.overlay == "analytic")
     page.visible("/robot/overlay")
-    assert "analytic" in page.text("table.methods tr.chosen")
+    page.until(lambda: "analytic" in page.text("table.methods tr.chosen"))
     page.press("none")
     page.until(lambda: page.session.overlay is None)
 
@@ -123,8 +127,8 @@ def test_methods_side_by_side(page: Any) -> None:
 def test_wrench_is_dragged_in_the_view(page: Any) -> None:
     page.key("g")
     page.until(lambda: page.session.display.grips)
-    page.key("2")
-    page.page.wait_for_timeout(600)
+    page.visible("/robot/grip/force")
+    page.look_from_above()
     before = page.session.state.target
     grip, further = (
         page.pixel("/robot/grip/force", (0.112, 0, 0)),
@@ -132,6 +136,7 @@ def test_wrench_is_dragged_in_the_view(page: Any) -> None:
     )
     page.drag(grip, further)
     page.until(lambda: page.session.state.target[0] > before[0] + 0.2)
+    page.until(lambda: page.view.scenery.robot.grips.dragged is None)
     assert page.session.state.target[1:] == pytest.approx(before[1:], abs=0.02)
     page.until(lambda: not page.view.busy)
     assert page.session.history.undo_name == "Drag the force"

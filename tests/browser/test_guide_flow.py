@@ -17,7 +17,7 @@ def test_the_tour_sets_each_stop_and_brings_the_work_back(page: Any) -> None:
     page.press("Next")
     page.until(lambda: len(page.view.swimming.swimmers) == 1 and page.view.swimming.time > 0.3, seconds=60)
     page.visible("/robot", False)
-    assert "off the path" in page.text(".fl-status")
+    page.until(lambda: "off the path" in page.text(".fl-status"))
     page.press("Next")
     page.until(lambda: not page.view.swimming.active)
     page.visible("/robot")

@@ -9,12 +9,12 @@ import pytest
 def test_gizmo_moves_a_fin(page: Any) -> None:
     page.key("n")
     page.until(lambda: page.session.selected == "front_right")
-    page.key("2")  # from above, the x arrow lies flat on the screen
-    page.page.wait_for_timeout(600)
+    page.look_from_above()
     start = page.session.state.layout.fins[0].position
     grip, further = page.pixel("/robot/fins/0", (0.168, 0, 0)), page.pixel("/robot/fins/0", (0.268, 0, 0))
     page.drag(grip, further)
     page.until(lambda: page.session.state.layout.fins[0].position != start)
+    page.until(lambda: page.view.scenery.robot.dragged is None)
     page.until(lambda: not page.view.busy)
     end = page.session.state.layout.fins[0].position
     assert end[0] - start[0] == pytest.approx(0.1, abs=0.02)
@@ -30,8 +30,7 @@ def test_a_ghost_shows_where_a_held_fin_will_stick(page: Any) -> None:
     page.tab("Layout")
     page.row("Stick to hull").first.click()
     page.until(lambda: page.session.display.stick)
-    page.key("2")
-    page.page.wait_for_timeout(600)
+    page.look_from_above()
     (x, y), (u, v) = page.pixel("/robot/fins/0", (0.168, 0, 0)), page.pixel("/robot/fins/0", (0.23, 0, 0))
     mouse = page.page.mouse
     mouse.move(x, y)
@@ -80,6 +79,7 @@ def test_copies_stand_around_another_axis(page: Any) -> None:
     page.key("n")
     page.tab("Layout")
     page.choose("Copies around", "x")
+    page.until(lambda: page.row("Copies around").first.input_value().startswith("x"))
     page.press("4")
     page.until(lambda: page.session.state.layout.n_fins == 7)
     assert page.session.history.undo_name == "4 around x"
@@ -97,7 +97,7 @@ def test_bad_number_is_refused_with_a_note(page: Any) -> None:
 
 def test_page_picture_and_command_to_take_home(page: Any, tmp_path: Path) -> None:
     page.tab("Files")
-    assert "finlab allocate ucat --wrench 1.2 0 0 0 0 0.25" in page.text("pre.command")
+    page.until(lambda: "finlab allocate ucat --wrench 1.2 0 0 0 0 0.25" in page.text("pre.command"))
     with page.page.expect_download() as download:
         page.press("3D view (HTML)")
     download.value.save_as(tmp_path / "robot.html")

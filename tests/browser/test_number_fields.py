@@ -5,6 +5,16 @@ from typing import Any
 
 import pytest
 
+PAUSE_MS = 1000
+"""A number that stands so long in a field is meant, even without Enter; as in `number_fields.js`."""
+WATCH = """() => {
+  const note = (event) => (event.key ?? 'Escape') === 'Escape' && window.finlabKeys.push(performance.now());
+  const known = window.finlabKeys;
+  window.finlabKeys = [];
+  if (!known) for (const kind of ['beforeinput', 'keyup']) window.addEventListener(kind, note, true);
+}"""
+LONGEST = "() => Math.max(0, ...window.finlabKeys.map((at, k) => at - (window.finlabKeys[k - 1] ?? at)))"
+
 PACE = pytest.mark.parametrize("delay", [10, 150], ids=["fast", "slow"])
 """Time between two keys [ms]."""
 
@@ -39,47 +49,74 @@ def begin(page: Any, label: str, place: int = -1) -> Any:
     return box
 
 
+def without_a_pause(page: Any, steps: list[Any], act: Callable[[], Any]) -> Any:
+    """Type as `act` does; again, from first sight, where a busy machine made a pause between two keys."""
+    for _ in range(5):
+        page.page.evaluate(WATCH)
+        result = act()
+        if page.page.evaluate(LONGEST) < 0.9 * PAUSE_MS:
+            return result
+        page.page.wait_for_timeout(2 * PAUSE_MS)
+        page.start_over()
+        steps.clear()
+    return pytest.fail("this machine is too busy to type on")
+
+
 @PACE
 def test_a_negative_target(page: Any, steps: list[Any], delay: int) -> None:
-    page.press("Cruise")
-    page.until(lambda: page.session.state.target[0] == 2.0 and not page.view.busy)
-    box = begin(page, "Fx [N]")
-    page.page.keyboard.type("-0.5", delay=delay)
-    assert box.input_value() == "-0.5"
+    def typed() -> Any:
+        page.press("Cruise")
+        page.until(lambda: page.session.state.target[0] == 2.0 and not page.view.busy)
+        box = begin(page, "Fx [N]")
+        page.page.keyboard.type("-0.5", delay=delay)
+        assert box.input_value() == "-0.5"
+        return box
+
+    box = without_a_pause(page, steps, typed)
     page.page.keyboard.press("Enter")
-    page.until(lambda: page.session.state.target[0] == -0.5)
+    page.until(lambda: page.session.state.target[0] == -0.5 and box.input_value() == "-0.5")
     page.page.wait_for_timeout(400)
     assert steps == [("set_target", -0.5)] and box.input_value() == "-0.5"
 
 
 @PACE
 def test_half_a_degree(page: Any, steps: list[Any], delay: int) -> None:
-    page.key("n")
-    page.tab("Layout")
-    box = begin(page, "Shaft [°]")
-    page.page.keyboard.type("45.5", delay=delay)
+    def typed() -> Any:
+        page.key("n")
+        page.tab("Layout")
+        box = begin(page, "Shaft [°]")
+        page.page.keyboard.type("45.5", delay=delay)
+        return box
+
+    box = without_a_pause(page, steps, typed)
     page.page.keyboard.press("Tab")
     page.until(lambda: page.session.state.layout.fins[0].mounting_angle == pytest.approx(0.794125, abs=1e-6))
+    page.until(lambda: box.input_value() == "45.5")
     page.page.wait_for_timeout(400)
     assert len(steps) == 1 and box.input_value() == "45.5"
 
 
 @PACE
 def test_three_coordinates_one_after_the_other(page: Any, steps: list[Any], delay: int) -> None:
-    page.key("n")
-    page.tab("Layout")
     _, y, z = page.session.state.layout.fins[0].position
-    begin(page, "Position [m]", 0)
-    for typed, key in (("-0.125", "Tab"), ("0.05", "Tab"), ("-.02", "Enter")):
-        page.page.keyboard.type(typed, delay=delay)
-        page.page.keyboard.press(key)
+
+    def typed() -> None:
+        page.key("n")
+        page.tab("Layout")
+        begin(page, "Position [m]", 0)
+        for text, key in (("-0.125", "Tab"), ("0.05", "Tab"), ("-.02", "Enter")):
+            page.page.keyboard.type(text, delay=delay)
+            page.page.keyboard.press(key)
+
+    without_a_pause(page, steps, typed)
     page.until(lambda: page.session.state.layout.fins[0].position == (-0.125, 0.05, -0.02))
     page.page.wait_for_timeout(400)
     # A busy page may send two quick coordinates as one change; half a number is in none.
     whole = [(-0.125, y, z), (-0.125, 0.05, z), (-0.125, 0.05, -0.02)]
     taken = [whole.index(position) for _, position in steps]
     assert taken == sorted(set(taken)) and taken[-1] == 2
-    assert [page.row("Position [m]").nth(k).input_value() for k in range(3)] == ["-0.125", "0.05", "-0.02"]
+    wanted = ["-0.125", "0.05", "-0.02"]
+    page.until(lambda: [page.row("Position [m]").nth(k).input_value() for k in range(3)] == wanted)
 
 
 def test_a_pause_commits_a_whole_number_and_leaves_the_field_alone(page: Any, steps: list[Any]) -> None:
@@ -87,7 +124,7 @@ def test_a_pause_commits_a_whole_number_and_leaves_the_field_alone(page: Any, st
     page.page.keyboard.type("-", delay=50)
     page.page.wait_for_timeout(1300)
     assert steps == [] and box.input_value() == "-"
-    page.page.keyboard.type("1.", delay=50)
+    page.page.keyboard.insert_text("1.")  # at once, since a pause between the two keys would mean -1
     page.page.wait_for_timeout(1300)
     assert steps == [] and box.input_value() == "-1."
     page.page.keyboard.type("0", delay=50)
@@ -116,10 +153,14 @@ def test_the_server_does_not_write_into_a_field_that_is_typed_in(page: Any) -> N
 
 
 def test_escape_and_nonsense_go_back(page: Any, steps: list[Any]) -> None:
-    box = begin(page, "Fx [N]")
-    page.page.keyboard.type("7x", delay=30)
-    assert box.input_value() == "7"
-    page.page.keyboard.press("Escape")
+    def typed() -> Any:
+        box = begin(page, "Fx [N]")
+        page.page.keyboard.type("7x", delay=30)
+        assert box.input_value() == "7"
+        page.page.keyboard.press("Escape")
+        return box
+
+    box = without_a_pause(page, steps, typed)
     page.until(lambda: box.input_value() == "1.2")
     page.page.keyboard.press("Control+a")
     page.page.keyboard.type("-.", delay=30)
@@ -129,8 +170,11 @@ def test_escape_and_nonsense_go_back(page: Any, steps: list[Any]) -> None:
 
 
 def test_beyond_the_slider_and_a_comma(page: Any, steps: list[Any]) -> None:
-    begin(page, "Fz [N]")
-    page.page.keyboard.type("30,5", delay=10)
+    def typed() -> None:
+        begin(page, "Fz [N]")
+        page.page.keyboard.type("30,5", delay=10)
+
+    without_a_pause(page, steps, typed)
     page.page.keyboard.press("Tab")
     page.until(lambda: page.session.state.target[2] == 30.5)
     page.page.wait_for_timeout(400)

@@ -7,13 +7,14 @@ def test_slider_moves_numbers_and_arrows(page: Any) -> None:
     before = page.vertices("/robot/wrench/delivered_force")
     page.slide("Fx [N]", 25)
     page.until(lambda: page.session.state.target[0] > 2.0)
-    page.page.wait_for_timeout(400)  # the last step of the drag may still be on its way
+    # The last step of the drag may still be on its way.
+    page.until(lambda: float(page.row("Fx [N]").last.input_value()) == page.session.state.target[0])
     asked = page.session.state.target[0]
     page.until(lambda: f"{asked:+.2f}" in page.text(".bars"))
     page.until(lambda: not page.view.busy)
     assert abs(page.view.shown.wrench[0] - asked) < 0.05
     page.until(lambda: page.vertices("/robot/wrench/delivered_force") != before)
-    assert "Reachable" in page.text(".fl-status")
+    page.until(lambda: "Reachable" in page.text(".fl-status"))
     assert page.problems == []
 
 

@@ -114,10 +114,8 @@ class ImprovePanel:
             )
             takes = {"Add the present wrench": self._add_wrench}
             self._take = page.add_buttons(" ", takes, hint="To the mission.", visible=False)
-            stops, offered = (
-                "Takes up to a minute; it can be stopped any time.",
-                "What was found so far is offered.",
-            )
+            stops = "Takes up to a minute; it can be stopped any time."
+            offered = "What was found so far is offered."
             self._start = page.add_button("Search", self._search, icon=viser.Icon.SPARKLES, hint=stops)
             self._bar = gui.add_progress_bar(0.0, visible=False)
             self._cancel = page.add_button(

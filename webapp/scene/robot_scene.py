@@ -46,9 +46,11 @@ class RobotScene:
         self._landing = Ghost(scene, "/robot/landing", ASKED, 0.45)
         self._overlay = Overlay(scene)
         self._attainable = AttainableNodes(scene)
-        self._grips = Grips(scene, session, self._do)
+        self.grips = Grips(scene, session, self._do)
+        """Handles of the asked wrench."""
         self._fins: list[FinNode] = []
-        self._dragged: int | None = None
+        self.dragged: int | None = None
+        """Place of the fin in the user's hand."""
         self._flapping = Flapping()
         self.newtons = 1.0
         """Force [N] that an arrow of 0.1 m stands for at the moment."""
@@ -87,7 +89,7 @@ class RobotScene:
         """
         state, display = self._session.state, self._session.display
         hull = hull_of(state.layout)
-        if self._dragged is None:  # a hull that breathes with the fin one drags is hard to aim at
+        if self.dragged is None:  # a hull that breathes with the fin one drags is hard to aim at
             # Glass within glass is not drawn; inside an attainable set the hull is a net.
             net, glass = display.drawn != "none", display.graph or display.center
             self._stage.refresh(hull, display.dark, display.shadows, glass or net, display.center, net)
@@ -95,14 +97,14 @@ class RobotScene:
             self._fins.append(FinNode(self._client.scene, len(self._fins), self._clicked, self._drag))
         for node in self._fins[state.layout.n_fins :]:
             node.hide()
-        if self._grips.dragged is None:  # a scale that changes would pull the handle out of the hand
+        if self.grips.dragged is None:  # a scale that changes would pull the handle out of the hand
             self.newtons = display.newtons or fitting_newtons(_largest(state, allocation), self.newtons)
         scale = LENGTH / self.newtons
         fits = allocation is not None and allocation.layout.names == state.layout.names
         for i, fin in enumerate(state.layout.fins):
             selected = fin.name == self._session.selected
             label = _label(state, i, selected) if display.labels else None
-            self._fins[i].place(fin, hull, selected, label, i == self._dragged)
+            self._fins[i].place(fin, hull, selected, label, i == self.dragged)
             if fin.name in state.failed or allocation is None:
                 self._fins[i].command(None, np.zeros(3), 0.0, False)
             elif fits and np.isfinite(allocation.command[i, 0]):
@@ -122,16 +124,16 @@ class RobotScene:
         missing = np.zeros(6) if allocation is None else missing_part(allocation)
         top = hull.center[2] + hull.half[2]
         self._wrench.refresh(target, given, missing, top, scale)
-        self._grips.refresh(display.grips, target, self._wrench.hub(top), scale)
+        self.grips.refresh(display.grips, target, self._wrench.hub(top), scale)
         shown = self._session.selected if display.dimensions else None
         self._lines.refresh(state.layout, state.healthy, shown, display.graph, attention)
 
     def _landings(self) -> tuple[Fin, ...]:
         """Where the fin in the user's hand would come to stand: its gizmo must not be moved meanwhile."""
         names = self._session.state.layout.names
-        if self._dragged is None or self._dragged >= len(names):
+        if self.dragged is None or self.dragged >= len(names):
             return ()
-        landing = self._session.landing(names[self._dragged], *self._fins[self._dragged].pose())
+        landing = self._session.landing(names[self.dragged], *self._fins[self.dragged].pose())
         return () if landing is None else (landing,)
 
     def animate(self, elapsed: float) -> None:
@@ -148,7 +150,7 @@ class RobotScene:
         session = self._session
         if index >= session.state.layout.n_fins:
             return
-        self._dragged = None if phase == "end" else index
+        self.dragged = None if phase == "end" else index
         if phase == "start":
             session.history.end_merge()
             return

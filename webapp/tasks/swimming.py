@@ -51,6 +51,11 @@ class Swimming:
         return self._start.question is not None
 
     @property
+    def busy(self) -> bool:
+        """Whether it is just swimming a stretch."""
+        return self._stretch.busy
+
+    @property
     def done(self) -> bool:
         """Whether it has come to its end."""
         return bool(self.swimmers) and self.swimmers[0].shown.done
