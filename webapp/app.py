@@ -122,11 +122,10 @@ class App:
 
 def _answers(client: viser.ClientHandle) -> bool:
     """Whether a page is still there. Waits for it, so not to be called on the event loop."""
-    try:
+    with contextlib.suppress(RuntimeError, TimeoutError):
         _stored(client, (1.0, 1.0))
-    except (RuntimeError, TimeoutError):
-        return False
-    return True
+        return True
+    return False
 
 
 def _stored(client: viser.ClientHandle, patience: Sequence[float]) -> str | None:

@@ -9,6 +9,7 @@ from finlab.layout import load_layout
 from webapp.scene.meshes import fin
 from webapp.scene.meshes.hull import Hull, hull_of
 from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, torque_ring
+from webapp.scene.meshes.mesh_hull import Triangles
 
 
 def solid(mesh: Mesh) -> trimesh.Trimesh:
@@ -48,6 +49,17 @@ def test_hulls(shape: str) -> None:
     assert hull.contains(np.array([0.02, 0.0, 0.01])) and not hull.contains(np.array([0.5, 0.0, 0.0]))
     anchor = hull.anchor(np.array([0.1, 0.4, 0.0]))
     assert 0.02 < anchor[1] < 0.13
+
+
+def test_a_mesh_knows_inside_from_outside_of_a_ring() -> None:
+    ring = trimesh.creation.annulus(0.1, 0.3, 0.2, sections=256)
+    surface = Triangles(Mesh(ring.vertices, ring.faces))
+    points = np.random.default_rng(0).uniform(-0.4, 0.4, (300, 3))
+    radius = np.hypot(points[:, 0], points[:, 1])
+    inside = (abs(radius - 0.2) < 0.1) & (abs(points[:, 2]) < 0.1)
+    clear = abs(abs(radius - 0.2) - 0.1) > 1e-3  # the ring has corners, the circles have none
+    assert 10 < inside.sum() < 290
+    assert [surface.contains(point) for point in points[clear]] == inside[clear].tolist()
 
 
 def test_every_shipped_layout_has_a_hull_near_its_fins() -> None:

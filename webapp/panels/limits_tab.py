@@ -60,22 +60,24 @@ class LimitsTab:
         self._improve.refresh()
         analyst, display = self._page.analyst, self._page.session.display
         put(self._alone, visible=display.drawn != "none")
+        if self._changes(analyst.findings, analyst.busy, analyst.error, session.beside):
+            put(self._card, content=self._findings())
+
+    def _findings(self) -> str:
+        """The card, and what to know about the drawn set."""
+        analyst, beside = self._page.analyst, self._page.session.beside
         found = analyst.findings
-        if not self._changes(found, analyst.busy, analyst.error, session.beside):
-            return
         if analyst.error is not None:
-            put(self._card, content="<div class='fl missing'>This layout cannot be analysed.</div>")
-        elif found is None:
-            put(self._card, content="<div class='fl dim'>computing …</div>")
-        else:
-            note = "<span class='dim'>computing …</span> " if analyst.busy else ""
-            if found.now is not None:
-                unit = "N" if found.now.kind == "force" else "N m"
-                gap = three_digits(found.now.gap)
-                note += f"<span class='dim'>The body lacks at most {gap} {unit} of the true set.</span>"
-            name = "before" if session.beside is None else session.beside
-            table = score_table(found.question.layout, found.card, found.before, name)
-            put(self._card, content=f"<div class='fl'>{note}</div>{table}")
+            return "<div class='fl missing'>This layout cannot be analysed.</div>"
+        if found is None:
+            return "<div class='fl dim'>computing …</div>"
+        note = "<span class='dim'>computing …</span> " if analyst.busy else ""
+        if found.now is not None:
+            unit = "N" if found.now.kind == "force" else "N m"
+            gap = three_digits(found.now.gap)
+            note += f"<span class='dim'>The body lacks at most {gap} {unit} of the true set.</span>"
+        table = score_table(found.question.layout, found.card, found.before, beside or "before")
+        return f"<div class='fl'>{note}</div>{table}"
 
 
 class ImprovePanel:

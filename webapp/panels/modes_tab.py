@@ -65,7 +65,6 @@ class ModesTab:
         )
         self._step = gui.add_html("")
         self._proposals = ProposalPanel(gui, page)
-        self._changes = Changes()
 
     def refresh(self) -> None:
         """Write settings and candidates."""
@@ -79,9 +78,8 @@ class ModesTab:
         put(self._play, visible=state.method == "mdn")
         self._picker.refresh()
         answering, picker = page.answering, self._picker
-        if self._changes(answering.modes, answering.searching, picker.shown):
-            table = mode_table(answering.modes, answering.searching, picker.shown, picker.name)
-            put(self._table, content=table)
+        table = mode_table(answering.modes, answering.searching, picker.shown, picker.name)
+        put(self._table, content=table)
         put(self._step, content=_step_words(page))
         self._proposals.refresh()
 

@@ -12,7 +12,7 @@ from webapp.scene.fin_node import FinNode, Flapping
 from webapp.scene.gizmos import Grips
 from webapp.scene.meshes.hull import hull_of
 from webapp.scene.overlays import Ghost, Lines, Overlay, moved_fins
-from webapp.scene.stage import Stage
+from webapp.scene.stage import Stage, aim_camera
 from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, WrenchNodes, fitting_newtons
 from webapp.session.state import State
 from webapp.tasks.analyst import Findings
@@ -64,11 +64,7 @@ class RobotScene:
 
     def look_from(self, view: str) -> None:
         """Move the camera to one of `CAMERAS`."""
-        camera = self._client.camera
-        with self._client.atomic():
-            camera.up_direction = (0.0, 0.0, 1.0)
-            camera.position = CAMERAS[view]
-            camera.look_at = (0.0, 0.0, 0.03)
+        aim_camera(self._client, np.array(CAMERAS[view]), np.array([0.0, 0.0, 0.03]))
 
     def refresh(
         self,

@@ -1,15 +1,36 @@
 """The water, the floor, the hull and its axes."""
 
+from typing import Any
+
 import numpy as np
 import viser
 
+from finlab.arrays import Array
 from webapp.handles import Changes, put
 from webapp.scene.meshes.hull import AnyHull
 from webapp.scene.shape import Shape
 from webapp.theme import LIGHT, Look, look
 
-FLOOR_SIZE = 6.0
-"""Side of the floor's grid [m]."""
+
+def aim_camera(client: viser.ClientHandle, place: Array, target: Array) -> None:
+    """Let the camera stand at a place (3,) and look at another one (3,) [m]."""
+    with client.atomic():
+        client.camera.up_direction = (0.0, 0.0, 1.0)
+        client.camera.position = place
+        client.camera.look_at = target
+
+
+def add_floor(
+    scene: viser.SceneApi, name: str, size: float, cell: float, section: float, **options: Any
+) -> viser.GridHandle:
+    """A grid of a size, with fine and strong lines so far apart [m]; `options` as viser has them."""
+    lines: dict[str, Any] = {"cell_thickness": 0.6, "section_thickness": 1.0}
+    return scene.add_grid(name, size, size, cell_size=cell, section_size=section, **lines, **options)
+
+
+def paint_floor(floor: viser.GridHandle, dark: bool) -> None:
+    """The floor's colours in the dark or the light theme."""
+    put(floor, cell_color=look(dark).grid, section_color=look(dark).grid_section)
 
 
 class Stage:
@@ -33,18 +54,8 @@ class Stage:
         scene.add_frame(
             "/robot/axes", axes_length=0.09, axes_radius=0.004, origin_radius=0.009, origin_color=(40, 40, 40)
         )
-        self._grid = scene.add_grid(
-            "/floor",
-            FLOOR_SIZE,
-            FLOOR_SIZE,
-            cell_size=0.1,
-            section_size=0.5,
-            cell_thickness=0.6,
-            section_thickness=1.0,
-            fade_distance=5.0,
-            fade_strength=1.6,
-            shadow_opacity=0.22,
-        )
+        fade: dict[str, Any] = {"fade_distance": 5.0, "fade_strength": 1.6, "shadow_opacity": 0.22}
+        self._grid = add_floor(scene, "/floor", 6.0, 0.1, 0.5, **fade)
 
     def refresh(self, hull: AnyHull, dark: bool, shadows: bool, glass: bool, center: bool, net: bool) -> None:
         """Show another hull, theme or quality; a hull of glass, or a mere net, lets one look inside."""
@@ -61,6 +72,7 @@ class Stage:
             self._scene.configure_default_lights(cast_shadow=shadows)
         if self._new_theme(dark):
             self._paint(look(dark))
+            paint_floor(self._grid, dark)
 
     def show_floor(self, visible: bool) -> None:
         """Show the floor, or leave it to others."""
@@ -75,6 +87,5 @@ class Stage:
         fade = np.linspace(0, 1, 64)[:, None, None]
         water = (1 - fade) * np.array(colors.water_top) + fade * np.array(colors.water_bottom)
         self._scene.set_background_image(np.repeat(water, 8, axis=1).astype(np.uint8), format="png")
-        put(self._grid, cell_color=colors.grid, section_color=colors.grid_section)
         put(self._body.node, color=colors.hull)
         put(self._bow.node, color=colors.glass)

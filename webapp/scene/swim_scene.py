@@ -1,14 +1,17 @@
 """The water while robots swim: the way to go, where they should be, and up to two of them."""
 
+from typing import Any
+
 import numpy as np
 import viser
 
 from webapp.handles import put
 from webapp.scene.shape import UNLIT, Shape
+from webapp.scene.stage import add_floor, aim_camera, paint_floor
 from webapp.scene.swim_robot import SwimRobot, goal
 from webapp.scene.wrench_nodes import LENGTH
 from webapp.tasks.swimming import Swimming
-from webapp.theme import ASKED, DELIVERED, OTHER, look
+from webapp.theme import ASKED, DELIVERED, OTHER
 
 ARROWS_N = 1.0
 """Force that an arrow of 0.1 m stands for while robots swim [N]: one for all, so that they compare."""
@@ -29,19 +32,8 @@ class SwimScene:
         self._reference = scene.add_icosphere(
             "/swim/reference", 0.035, color=ASKED, visible=False, cast_shadow=False
         )
-        self._floor = scene.add_grid(
-            "/swim/floor",
-            14.0,
-            14.0,
-            cell_size=0.25,
-            section_size=1.0,
-            cell_thickness=0.6,
-            section_thickness=1.0,
-            fade_distance=14.0,
-            fade_strength=1.4,
-            shadow_opacity=0.18,
-            visible=False,
-        )
+        fade: dict[str, Any] = {"fade_distance": 14.0, "fade_strength": 1.4, "shadow_opacity": 0.18}
+        self._floor = add_floor(scene, "/swim/floor", 14.0, 0.25, 1.0, visible=False, **fade)
         self._robots: list[SwimRobot] = []
         self._shown: tuple[object, ...] = ()
         self._followed: np.ndarray | None = None
@@ -52,8 +44,8 @@ class SwimScene:
         visible = bool(swimmers)
         put(self._goal.node, visible=visible)
         put(self._reference, visible=visible)
-        colors = look(dark)
-        put(self._floor, visible=visible, cell_color=colors.grid, section_color=colors.grid_section)
+        put(self._floor, visible=visible)
+        paint_floor(self._floor, dark)
         if not visible:
             for robot in self._robots:
                 robot.hide()
@@ -98,11 +90,8 @@ class SwimScene:
 
     def _look_at(self, middle: np.ndarray, distance: float) -> None:
         """Move the camera to where it sees a point (3,) from a distance [m]."""
-        camera = self._client.camera
-        with self._client.atomic():
-            camera.up_direction = (0.0, 0.0, 1.0)
-            camera.position = tuple(middle + distance * np.array([-0.35, -0.75, 0.75]))
-            camera.look_at = tuple(middle + np.array([0.0, 0.0, -0.1]))
+        place = middle + distance * np.array([-0.35, -0.75, 0.75])
+        aim_camera(self._client, place, middle - np.array([0.0, 0.0, 0.1]))
 
     def animate(self, elapsed: float) -> None:
         """Let the robots move by some time on the wall [s]."""

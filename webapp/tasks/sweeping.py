@@ -71,10 +71,8 @@ class Sweep:
 
     def _go(self) -> None:
         # Whoever changes anything else takes over: the sweep ends.
-        if (
-            self._revision not in (-1, self._session.revision)
-            or self.fins != self._session.state.layout.names
-        ):
+        taken = self._revision not in (-1, self._session.revision)
+        if taken or self.fins != self._session.state.layout.names:
             self._revision = -1
             self.stop()
             self._do(lambda: None)

@@ -51,21 +51,16 @@ class Triangles:
         return np.asarray(found[best]), self.normal[best] if size < 1e-9 else normal / size
 
     def contains(self, point: Array) -> bool:
-        """Whether a point (3,) lies inside: a ray from it leaves the mesh an odd number of times."""
-        a, b, c = np.swapaxes(self.corners, 0, 1)
-        # An odd direction hits no edge of a mesh that is built along the axes.
-        ray = np.array([0.8137, 0.4271, 0.3944])
-        one, two = b - a, c - a
-        across = np.cross(ray, two)
-        size = np.einsum("fi,fi->f", one, across)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            start = np.asarray(point, dtype=float) - a
-            u = np.einsum("fi,fi->f", start, across) / size
-            other = np.cross(start, one)
-            v = other @ ray / size
-            way = np.einsum("fi,fi->f", two, other) / size
-            hit = (np.abs(size) > 1e-14) & (u >= 0) & (v >= 0) & (u + v <= 1) & (way > 0)
-        return bool(hit.sum() % 2)
+        """Whether a point (3,) lies inside: the triangles fill the whole sphere around it, else nothing.
+
+        The solid angle of a triangle is that of Van Oosterom and Strackee (1983).
+        """
+        a, b, c = np.swapaxes(self.corners - np.asarray(point, dtype=float), 0, 1)
+        u, v, w = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+        volume = (a * np.cross(b, c)).sum(axis=1)
+        scale = u * v * w + (a * b).sum(axis=1) * w + (b * c).sum(axis=1) * u + (c * a).sum(axis=1) * v
+        half_angle = np.arctan2(volume, scale)
+        return bool(abs(half_angle.sum()) > np.pi)
 
 
 @dataclass(frozen=True, eq=False)
