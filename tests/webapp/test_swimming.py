@@ -86,7 +86,7 @@ def test_pause_step_and_speed(swimming: Swimming) -> None:
     swimming.pace.set_speed(8.0)
     for wrong in (float("nan"), 0.0, "2", 99.0):
         with pytest.raises(FinlabError):
-            swimming.pace.set_speed(wrong)
+            SwimSettings().with_value("speed", wrong)
     assert "paused" in swim_card(swimming)
 
 

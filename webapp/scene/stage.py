@@ -11,6 +11,9 @@ from webapp.scene.meshes.hull import AnyHull
 from webapp.scene.shape import Shape
 from webapp.theme import LIGHT, Look, look
 
+BELOW = 0.22
+"""How far the floor is below the keel [m]."""
+
 
 def aim_camera(client: viser.ClientHandle, place: Array, target: Array) -> None:
     """Let the camera stand at a place (3,) and look at another one (3,) [m]."""
@@ -67,7 +70,7 @@ class Stage:
             self._hull = hull
             self._body.become(hull.mesh())
             self._bow.become(hull.bow())
-        put(self._grid, position=np.array([0.0, 0.0, self.floor_height(hull)]))
+        put(self._grid, position=np.array([0.0, 0.0, hull.center[2] - hull.half[2] - BELOW]))
         if self._new_lights(shadows):
             self._scene.configure_default_lights(cast_shadow=shadows)
         if self._new_theme(dark):
@@ -77,11 +80,6 @@ class Stage:
     def show_floor(self, visible: bool) -> None:
         """Show the floor, or leave it to others."""
         put(self._grid, visible=visible)
-
-    @staticmethod
-    def floor_height(hull: AnyHull) -> float:
-        """Height of the floor: a hand below the keel [m]."""
-        return hull.center[2] - hull.half[2] - 0.22
 
     def _paint(self, colors: Look) -> None:
         fade = np.linspace(0, 1, 64)[:, None, None]

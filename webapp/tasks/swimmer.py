@@ -10,8 +10,6 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.sim import ClosedLoop
 from finlab.sim.log import Tick
-from webapp.session.state import number
-from webapp.session.swim_plan import SPEEDS
 
 LAG_S = 0.25
 """What the swim may be behind the clock [s]; what is more is dropped, so that nothing piles up."""
@@ -32,13 +30,9 @@ class Pace:
         self._owed = 0.0
         self._past: deque[tuple[float, float]] = deque()
 
-    def set_speed(self, speed: object) -> None:
-        """Another speed.
-
-        Raises:
-            FinlabError: it is none.
-        """
-        self.speed = number(speed, "speed", *SPEEDS)
+    def set_speed(self, speed: float) -> None:
+        """Another speed; the true one is measured anew."""
+        self.speed = speed
         self._past.clear()
 
     def start_anew(self) -> None:
