@@ -29,7 +29,7 @@ from webapp.tasks.improving import Improver
 from webapp.tasks.solver import Solver
 from webapp.tasks.sweeping import Sweep
 from webapp.tasks.swimming import Swimming
-from webapp.theme import GREEN, VERMILLION
+from webapp.theme import VERMILLION
 
 CARD_REST_S = 0.35
 """How long a layout may not change before its card is worked out [s]: that takes a second."""
@@ -175,9 +175,9 @@ class Page(ABC):
         self.bound.append(lambda: put(style, content=chosen_button(name, choices.index(chosen()))))
         self.on_change(self.client.gui.add_button_group(label, tuple(choices), hint=hint), act)
 
-    def notify(self, title: str, body: str, *, good: bool = False) -> None:
+    def notify(self, title: str, body: str) -> None:
         """Show a note to the user."""
-        self.client.add_notification(title, body, auto_close_seconds=8.0, color=GREEN if good else VERMILLION)
+        self.client.add_notification(title, body, auto_close_seconds=8.0, color=VERMILLION)
 
     def animate(self, elapsed: float) -> None:
         """Let time pass [s]."""
@@ -186,10 +186,10 @@ class Page(ABC):
     # From the session to the page.
 
     def _refresh(self) -> None:
-        self.sweep.note(self.answering)
         with self.client.atomic():
-            # First: it settles the scale that the legend tells.
             try:
+                self.sweep.note(self.answering)
+                # Before the panels: it settles the scale that the legend tells.
                 self.scenery.refresh(self.answering, self.comparison, self.improver, self.analyst.findings)
             except Exception as error:
                 self.scenery.hide()
