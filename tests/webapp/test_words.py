@@ -140,3 +140,13 @@ def test_every_stop_of_the_tour_stands() -> None:
     session.next_stop()
     session.next_stop()
     assert session.stop is None and session.state == before
+
+
+def test_the_best_mode_is_shown_again_after_a_tour() -> None:
+    session = Session(load_layout(shipped_layouts()["ucat"]))
+    for leave in (session.end_tour, session.start_over):
+        session.next_stop()
+        session.next_stop()
+        assert session.mode == STEPS[1].mode == 1 and session.state == STEPS[1].state(session.state)
+        leave()
+        assert session.mode == 0, "although the stop asked just what was asked before"

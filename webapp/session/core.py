@@ -166,7 +166,7 @@ class Core:
     def start_over(self) -> None:
         """Everything as at first sight; the way here can be undone."""
         self._commit("Start over", self._first)
-        self.selected = None
+        self.selected, self.mode, self.sample = None, 0, None
 
     def undo(self) -> str:
         """Take back the last step; returns its name."""

@@ -125,6 +125,7 @@ class Guiding(Core):
         """Back to what was there before the tour."""
         if self._before_tour is not None:
             self._commit("End the tour", self._before_tour)
+            self.mode, self.sample = 0, None
         self.stop, self._before_tour = None, None
 
     def start_over(self) -> None:
