@@ -11,7 +11,7 @@ from webapp.session.search_request import SearchRequest
 from webapp.session.swim_plan import SwimSettings
 from webapp.viser_internals import run_script
 
-WAIT_MS = 45_000
+WAIT_MS = 120_000
 """Longest wait for the page: software rendering on a busy machine is slow."""
 PAUSE_S = 0.12
 """Between two inputs: the page sends at most one change in 50 ms, a quicker one would overwrite the last."""
@@ -96,7 +96,7 @@ class Page:
         script = "document.querySelectorAll('.mantine-Notification-closeButton').forEach(b => b.click())"
         self.page.evaluate(script)
 
-    def until(self, condition: Callable[[], bool], seconds: float = 30.0) -> None:
+    def until(self, condition: Callable[[], bool], seconds: float = 120.0) -> None:
         """Wait for the server or the page to come round; longer on a page that needs patience."""
         end = time.monotonic() + seconds * self.patience
         while not condition():

@@ -64,8 +64,8 @@ def test_failure_changes_graph_and_attainable_set(page: Any) -> None:
     whole, card = page.vertices("/robot/attainable/now"), page.text(".score")
     page.key("f")
     page.until(lambda: page.session.state.failed == ("front_right",))
-    page.until(lambda: len(page.vertices("/robot/graph")) < len(graph), seconds=60)
-    page.until(lambda: page.vertices("/robot/attainable/now") != whole, seconds=60)
+    page.until(lambda: len(page.vertices("/robot/graph")) < len(graph))
+    page.until(lambda: page.vertices("/robot/attainable/now") != whole)
     page.page.wait_for_function(
         "() => window.__viserMutable.nodeRefFromName['/robot/attainable/whole'].visible"
     )
@@ -78,7 +78,7 @@ def test_any_layout_stands_beside(page: Any) -> None:
     page.tab("Limits")
     page.choose("Beside", "pair")
     page.until(lambda: page.session.beside == "pair")
-    page.until(lambda: not page.view.analyst.busy and "pair" in page.text(".score"), seconds=60)
+    page.until(lambda: not page.view.analyst.busy and "pair" in page.text(".score"))
     assert "2 of 6" not in page.text(".score") or "axes independent" in page.text(".score")
     page.press("Pin this layout")
     page.until(lambda: page.session.beside == "pinned")
@@ -98,9 +98,9 @@ def test_search_is_watched_and_accepted(page: Any) -> None:
     page.type("Reach ± [m]", "0.03", place=0)
     page.until(lambda: page.session.draft.way("all")[0] == 0.03)
     page.press("Search")
-    page.until(lambda: page.view.improver.progress is not None, seconds=60)
+    page.until(lambda: page.view.improver.progress is not None)
     page.press("Cancel")
-    page.until(lambda: page.view.improver.findings is not None, seconds=60)
+    page.until(lambda: page.view.improver.findings is not None)
     found = page.view.improver.findings
     assert found.goal == "mission_power"
     page.until(lambda: page.page.get_by_role("button", name="Accept").count() == 1)

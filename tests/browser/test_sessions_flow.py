@@ -51,7 +51,7 @@ def test_reload_and_reconnect_restore(page: Any, served: Any) -> None:
     disconnect_all(served.server)
     page.until(lambda: before not in served.app.views.values())
     back = served.app.views
-    page.until(lambda: any(view.session is page.session for view in back.values()), seconds=60)
+    page.until(lambda: any(view.session is page.session for view in back.values()))
     page.ready()
     assert page.page.get_by_role("button", name="Undo").count() == 1, "no widget twice"
 
@@ -83,7 +83,7 @@ def test_token_opens_and_a_restart_loses_nothing(browser: Any, tmp_path: Path) -
 
     second = start(port)
     assert second.server.get_port() == port
-    page.until(lambda: len(second.app.views) == 1, seconds=60)
+    page.until(lambda: len(second.app.views) == 1)
     session = next(iter(second.app.views.values())).session
     assert session is not page.session and session.state.target[1] == 0.5
     page.until(lambda: page.row("Fy [N]").last.input_value() == "0.5")
