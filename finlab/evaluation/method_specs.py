@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.baselines.model_based import TIME_LIMIT_S
-from finlab.allocation.baselines.single_target import DEFAULT_STARTS
+from finlab.allocation.baselines.single_target import SingleTarget
 from finlab.allocation.methods import LEARNED, load_allocator
 from finlab.errors import AllocationError
 from finlab.evaluation.on_board import OnBoard
@@ -78,7 +77,7 @@ def load_method_spec(
                 f"methods: a number of starts, from 1, goes with {', '.join(SLOW)} only, got {name!r}"
             )
         # Each start has the time that it has in the method's default.
-        limit = TIME_LIMIT_S * max(1.0, starts / DEFAULT_STARTS)
+        limit = SingleTarget.time_limit_s * max(1.0, starts / SingleTarget.n_starts)
         options = {"n_starts": starts, "time_limit_s": limit}
     allocator = load_allocator(method, checkpoint=checkpoint, **options)
     chooses = objective is not None and "objective" in allocator.option_names()

@@ -5,11 +5,12 @@ Both are sums over the fins of a cost of amplitude and frequency; effort adds a 
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.errors import AllocationError
 from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyMeter, EnergyWeights, energy_of_shares, energy_scale
 from finlab.physics.fin_law import FinLaw
 from finlab.physics.plant import Plant
@@ -19,7 +20,12 @@ Name = Literal["power", "effort"]
 
 @dataclass(frozen=True)
 class Objective:
-    """What is kept least."""
+    """What is kept least.
+
+    Raises:
+        AllocationError: an unknown objective, or a loss that is none.
+        TypeError: weights of another type.
+    """
 
     name: Name = "power"
     """`power`: mean mechanical watts by each fin's own model. `effort`: the paper's energy proxy `J_en`."""
@@ -27,6 +33,17 @@ class Objective:
     """Weights of `J_en`."""
     copper_loss: float = 0.0
     """Heat in a motor's windings [W/(N m)^2] that counts beside the mechanical power."""
+
+    def __post_init__(self) -> None:
+        if self.name not in get_args(Name):
+            raise AllocationError(f"objective: expected 'power' or 'effort', got {self.name!r}")
+        if not isinstance(self.weights, EnergyWeights):
+            raise TypeError(f"energy_weights: expected EnergyWeights, got {self.weights!r}")
+        if not 0.0 <= self.copper_loss < np.inf:
+            raise AllocationError(
+                f"copper_loss: expected watts per (N m)^2, from 0, got {self.copper_loss!r}"
+            )
+        object.__setattr__(self, "copper_loss", float(self.copper_loss))
 
     @property
     def convex(self) -> bool:

@@ -7,18 +7,17 @@ table's exact Jacobian and a Hessian by differences of it.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, NamedTuple, Unpack
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from finlab.allocation.aim import Aim
-from finlab.allocation.baselines.model_based import CACHE_SIZE, TIME_LIMIT_S
+from finlab.allocation.baselines.model_based import CACHE_SIZE
 from finlab.allocation.baselines.plant_in_casadi import plant_in_casadi
-from finlab.allocation.baselines.single_target import DEFAULT_STARTS, Problem, SingleTarget
+from finlab.allocation.baselines.single_target import Problem, SingleTarget
 from finlab.arrays import Array
 from finlab.errors import AllocationError
-from finlab.inference.normalization import Normalization
 from finlab.physics import PlanarLaw, Plant, make_law
 from finlab.physics.energy import energy_of_shares, energy_scale
 
@@ -49,17 +48,12 @@ class Formulas(NamedTuple):
     """A callback to be kept alive; None where there is none."""
 
 
+@dataclass(eq=False, repr=False, kw_only=True)
 class Ipopt(SingleTarget):
     """IPOPT on `err_norm^2 + cost` within the limits, exact derivatives by CasADi or the plant.
 
     The program is built once per layout with the target as its parameter. Of the ends, the lowest objective
-    wins.
-
-    Args:
-        normalization: sigma scales the error.
-        n_starts: uniform random starts per target, beside the pseudo-inverse's answer.
-        time_limit_s: processor time per target after which no start begins; each may take half as long.
-        aim: see `ModelBased`.
+    wins. After the time limit no start begins; each may take half as long.
 
     Raises:
         AllocationError: CasADi is not installed.
@@ -67,15 +61,8 @@ class Ipopt(SingleTarget):
 
     name = "ipopt"
 
-    def __init__(
-        self,
-        normalization: Normalization,
-        *,
-        n_starts: int = DEFAULT_STARTS,
-        time_limit_s: float = TIME_LIMIT_S,
-        **aim: Unpack[Aim],
-    ) -> None:
-        super().__init__(normalization, n_starts=n_starts, time_limit_s=time_limit_s, **aim)
+    def __post_init__(self) -> None:
+        super().__post_init__()
         self._casadi = import_casadi()
         self._solver = lru_cache(CACHE_SIZE)(self._build)
 

@@ -3,11 +3,9 @@
 import math
 import time
 from abc import abstractmethod
+from dataclasses import KW_ONLY, dataclass
 from functools import lru_cache
-from inspect import Parameter, signature
-from typing import Unpack
 
-from finlab.allocation.aim import Aim, checked_objective
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.pseudo_inverse import PseudoInverse
 from finlab.allocation.command_cost import CommandCost, command_cost
@@ -17,12 +15,11 @@ from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
 from finlab.physics import Plant, plant_of
+from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyWeights
+from finlab.physics.objective import Name, Objective
 
 ENERGY_TRADEOFF = 1e-4
 """Weight of the cost beside the squared normalized error where a method weighs both; see `command_cost`."""
-TIME_LIMIT_S = 0.6
-"""Processor time [s] that a slow method takes for one target unless set otherwise: with what a call does
-besides, less than a second."""
 CACHE_SIZE = 64
 """Layouts whose prepared quantities a method keeps; a control loop asks for the same one again and again."""
 
@@ -43,35 +40,27 @@ class TimeLimit:
         return time.thread_time() > self._end
 
 
-def check_time_limit(seconds: float) -> float:
-    """A time limit as a setting; `AllocationError` where there is no time at all."""
-    if not seconds > 0.0:
-        raise AllocationError(f"time_limit_s: expected a number of seconds above 0, got {seconds}")
-    return float(seconds)
-
-
+@dataclass(eq=False, repr=False)
 class ModelBased(Allocator):
     """A method that optimizes over the fins' own laws and tables, those that score every method.
 
-    Args:
-        normalization: the yardstick of the error; nothing else is taken from a checkpoint.
-        aim: what is kept least, as settings of every such method.
+    All its fields but the first can be set.
     """
 
-    def __init__(self, normalization: Normalization, **aim: Unpack[Aim]) -> None:
-        self.normalization = normalization
-        self.aim = checked_objective(**aim)
-        self.objective, self.energy_weights = self.aim.name, self.aim.weights
-        self.copper_loss = self.aim.copper_loss
-        self._plant = plant_of
-        self._cost = lru_cache(CACHE_SIZE)(self._weigh)
-        self._inverse = lru_cache(CACHE_SIZE)(lambda plant: PseudoInverse(plant, normalization.std, self.aim))
+    normalization: Normalization
+    """The yardstick of the error; nothing else is taken from a checkpoint."""
+    _: KW_ONLY
+    objective: Name = "power"
+    """What is kept least: `power` in watts, or `effort`, the paper's energy proxy."""
+    energy_weights: EnergyWeights = DEFAULT_WEIGHTS
+    """Weights of the effort."""
+    copper_loss: float = 0.0
+    """Heat in a motor's windings [W/(N m)^2] that counts beside the mechanical power."""
 
-    @classmethod
-    def option_names(cls) -> list[str]:
-        """Names of what can be set when the method is made."""
-        own = list(signature(cls).parameters.values())[1:]
-        return [each.name for each in own if each.kind != Parameter.VAR_KEYWORD] + list(Aim.__annotations__)
+    def __post_init__(self) -> None:
+        self.aim = Objective(self.objective, self.energy_weights, self.copper_loss)
+        self._cost = lru_cache(CACHE_SIZE)(self._weigh)
+        self._inverse = lru_cache(CACHE_SIZE)(self._invert)
 
     @abstractmethod
     def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
@@ -82,13 +71,17 @@ class ModelBased(Allocator):
         """
 
     def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
-        plant = self._plant(layout)
+        plant = plant_of(layout)
         command = self._commands(plant, targets, seed)
         return Solution(plant.feasible(command))
 
-    def _weigh(self, plant: Plant, tradeoff: float = ENERGY_TRADEOFF) -> CommandCost:
+    def _weigh(self, plant: Plant) -> CommandCost:
         """What a robot's commands cost, weighed beside the squared normalized error."""
-        return command_cost(plant, self.aim, self.normalization.std, tradeoff)
+        return command_cost(plant, self.aim, self.normalization.std, ENERGY_TRADEOFF)
+
+    def _invert(self, plant: Plant) -> PseudoInverse:
+        """What answers by the pseudo-inverse, and where others start."""
+        return PseudoInverse(plant, self.normalization.std, self.aim)
 
     def _total(self, plant: Plant, command: Array, target: Array) -> Array:
         """`J = err_norm^2 + cost` (B,) of commands (B, n, 3)."""
@@ -96,3 +89,19 @@ class ModelBased(Allocator):
             command
         )
         return total
+
+
+@dataclass(eq=False, repr=False, kw_only=True)
+class TimeLimited(ModelBased):
+    """A slow method, which ends in time."""
+
+    time_limit_s: float = 0.6
+    """Processor time [s] per target after which the best command so far is the answer: with what a call does
+    besides, less than a second."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.time_limit_s > 0.0:
+            raise AllocationError(
+                f"time_limit_s: expected a number of seconds above 0, got {self.time_limit_s}"
+            )

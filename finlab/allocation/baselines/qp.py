@@ -1,15 +1,13 @@
 """Method `qp`: one linear map per layout, one box-constrained least squares per target, as in the paper."""
 
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Unpack
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from finlab.allocation.aim import Aim
 from finlab.allocation.baselines.model_based import CACHE_SIZE, ModelBased
 from finlab.arrays import Array
-from finlab.inference.normalization import Normalization
 from finlab.physics import Plant
 
 DIFFERENCE_STEP = 1e-4
@@ -33,26 +31,21 @@ class LinearMap:
         self.wrench = plant.wrench(self.reference)
 
 
+@dataclass(eq=False, repr=False, kw_only=True)
 class Qp(ModelBased):
     """Linearized once per layout, solved per target by SciPy's active-set `lsq_linear(method="bvls")`.
 
     Minimizes `||(w_ref + J du - target) / sigma||^2 + regularization ||du||^2` over commands as positions
     between their limits, where `w_ref` and `J` belong to the middle of the limits. As in the paper,
     what commands cost plays no part: the answer is the same whatever the objective.
-
-    Args:
-        normalization: sigma scales the error.
-        regularization: weight of the distance from the middle of the limits.
-        aim: see `ModelBased`.
     """
 
     name = "qp"
+    regularization: float = 1.0
+    """Weight of the distance from the middle of the limits."""
 
-    def __init__(
-        self, normalization: Normalization, *, regularization: float = 1.0, **aim: Unpack[Aim]
-    ) -> None:
-        super().__init__(normalization, **aim)
-        self.regularization = regularization
+    def __post_init__(self) -> None:
+        super().__post_init__()
         self._map = lru_cache(CACHE_SIZE)(self._prepare)
 
     def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:

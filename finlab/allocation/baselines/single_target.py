@@ -4,24 +4,14 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import Unpack
+from dataclasses import dataclass
 
 import numpy as np
 
-from finlab.allocation.aim import Aim
-from finlab.allocation.baselines.model_based import (
-    TIME_LIMIT_S,
-    ModelBased,
-    TimeLimit,
-    check_time_limit,
-)
+from finlab.allocation.baselines.model_based import TimeLimit, TimeLimited
 from finlab.allocation.command_cost import CommandCost
 from finlab.arrays import Array
-from finlab.inference.normalization import Normalization
 from finlab.physics import Plant
-
-DEFAULT_STARTS = 8
-"""Random starts per target unless set otherwise."""
 
 
 class OutOfTime(Exception):
@@ -104,28 +94,13 @@ class Problem:
             raise OutOfTime
 
 
-class SingleTarget(ModelBased):
+@dataclass(eq=False, repr=False, kw_only=True)
+class SingleTarget(TimeLimited):
     """A ready-made solver run from the pseudo-inverse's answer, which no dead zone holds, and from random
-    starts; the end with the lowest J wins.
+    starts; the end with the lowest J wins."""
 
-    Args:
-        normalization: sigma scales the error.
-        n_starts: uniform random starts per target, beside the pseudo-inverse's answer.
-        time_limit_s: processor time per target after which the best command so far is the answer.
-        aim: see `ModelBased`.
-    """
-
-    def __init__(
-        self,
-        normalization: Normalization,
-        *,
-        n_starts: int = DEFAULT_STARTS,
-        time_limit_s: float = TIME_LIMIT_S,
-        **aim: Unpack[Aim],
-    ) -> None:
-        super().__init__(normalization, **aim)
-        self.n_starts = n_starts
-        self.time_limit_s = check_time_limit(time_limit_s)
+    n_starts: int = 8
+    """Uniform random starts per target, beside the pseudo-inverse's answer."""
 
     @abstractmethod
     def _minimize(self, problem: Problem, start: Array) -> Array:

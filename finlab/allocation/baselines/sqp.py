@@ -1,20 +1,13 @@
 """Method `sqp`: re-linearize at the iterate, box QP on the normalized residual, backtracking line search."""
 
-from typing import Unpack
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.allocation.aim import Aim
 from finlab.allocation.baselines.box_least_squares import solve_box_quadratics
-from finlab.allocation.baselines.model_based import (
-    TIME_LIMIT_S,
-    ModelBased,
-    TimeLimit,
-    check_time_limit,
-)
+from finlab.allocation.baselines.model_based import TimeLimit, TimeLimited
 from finlab.arrays import Array
-from finlab.inference.normalization import Normalization
 from finlab.physics import Plant
 
 CHUNK = 2048
@@ -26,40 +19,23 @@ RIDGE = 1e-13
 solution must not be lost to rounding where fins are strong."""
 
 
-class Sqp(ModelBased):
+@dataclass(eq=False, repr=False, kw_only=True)
+class Sqp(TimeLimited):
     """Sequential quadratic programming as the paper describes it, all targets of a layout stepped together.
 
     Each step minimizes `||r + J d||^2 + regularization ||d||^2` exactly within the limits, over commands as
     positions between their limits. It starts from the pseudo-inverse's answer, whose fins give their forces
     by the cheapest commands, and from the middle of the limits; of two ends that meet the target the cheaper
     one wins, else the smaller error. Targets that neither meets get further, random starts.
-
-    Args:
-        normalization: sigma scales the error.
-        n_steps: most steps per start.
-        n_starts: starts per target beside the pseudo-inverse's answer.
-        regularization: weight of a step's length, as a share of the squared error at the iterate.
-        time_limit_s: processor time per target after which the best command so far is the answer.
-        aim: see `ModelBased`.
     """
 
     name = "sqp"
-
-    def __init__(
-        self,
-        normalization: Normalization,
-        *,
-        n_steps: int = 30,
-        n_starts: int = 4,
-        regularization: float = 1e-4,
-        time_limit_s: float = TIME_LIMIT_S,
-        **aim: Unpack[Aim],
-    ) -> None:
-        super().__init__(normalization, **aim)
-        self.n_steps = n_steps
-        self.n_starts = n_starts
-        self.regularization = regularization
-        self.time_limit_s = check_time_limit(time_limit_s)
+    n_steps: int = 30
+    """Most steps per start."""
+    n_starts: int = 4
+    """Starts per target beside the pseudo-inverse's answer."""
+    regularization: float = 1e-4
+    """Weight of a step's length, as a share of the squared error at the iterate."""
 
     def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
         first = self._inverse(plant).command(targets)  # a fin is compiled once, which no target pays for

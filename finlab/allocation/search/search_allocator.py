@@ -14,7 +14,6 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finlab.allocation.aim import checked_objective
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.judging import effort_of, power_of
@@ -36,7 +35,7 @@ from finlab.inference.normalization import Normalization
 from finlab.inference.threads import single_threaded_products
 from finlab.layout import Layout
 from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyWeights
-from finlab.physics.objective import Name
+from finlab.physics.objective import Name, Objective
 
 CHUNK = 512
 """Targets that are solved together; keeps memory flat for any number of targets."""
@@ -83,7 +82,7 @@ class SearchAllocator(Allocator):
             AllocationError: a setting that no search can work with.
         """
         self.normalization = normalization
-        self.objective = checked_objective(objective, energy_weights, copper_loss)
+        self.objective = Objective(objective, energy_weights, copper_loss)
         self.settings = self.settings_class(**settings)
         self.compiled = compiled or {}
         """Compiled fins that came with the allocator."""
@@ -105,7 +104,7 @@ class SearchAllocator(Allocator):
         return {**chosen, **vars(self.settings)}
 
     def _made_with(self, options: dict[str, Any]) -> Self:
-        aim = checked_objective(*(options.pop(k) for k in ("objective", "energy_weights", "copper_loss")))
+        aim = Objective(*(options.pop(k) for k in ("objective", "energy_weights", "copper_loss")))
         other = copy(self)
         other.settings = self.settings_class(**options)
         if aim == self.objective:  # what is known of layouts does not depend on the other settings

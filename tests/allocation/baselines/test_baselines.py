@@ -1,13 +1,12 @@
 """Every model-based method on small problems with known answers, at its limits and on degenerate layouts."""
 
 import math
-from typing import Unpack
+from typing import Any
 
 import numpy as np
 import pytest
 
 from finlab.allocation import Allocator
-from finlab.allocation.aim import Aim
 from finlab.allocation.baselines.analytic import Analytic
 from finlab.allocation.baselines.ipopt import Ipopt
 from finlab.allocation.baselines.multistart import Multistart
@@ -26,7 +25,7 @@ THRUST = 4.737410112522892
 """Thrust of the default fin over f^2 sin^2(A) [N s^2]."""
 
 
-def make(method: str, **aim: Unpack[Aim]) -> Allocator:
+def make(method: str, **aim: Any) -> Allocator:
     """A method, the slow ones with few starts."""
     if method == "ipopt":
         pytest.importorskip("casadi", reason="method ipopt is an optional extra")
