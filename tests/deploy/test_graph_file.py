@@ -76,6 +76,21 @@ def test_any_fin_comes_back_or_is_refused(angle: float, x: float, name: str) -> 
     assert parse_graph(graph_bytes(make_graph(layout)).decode()).layout == layout
 
 
+@pytest.mark.parametrize(
+    ("part", "key", "longest"),
+    [("checkpoint", "name", 200), ("checkpoint", "sha256", 64), ("self_test", "method", 40)],
+)
+def test_names_are_as_long_as_the_schema_allows(part: str, key: str, longest: int) -> None:
+    for length, good in ((longest, True), (longest + 1, False)):
+        content = edited(lambda document, n=length: document[part].update({key: "a" * n}))
+        assert jsonschema.Draft202012Validator(SCHEMA).is_valid(json.loads(content)) == good
+        if good:
+            parse_graph(content)
+        else:
+            with pytest.raises(LayoutError, match=f"{part}.{key}"):
+                parse_graph(content)
+
+
 @pytest.mark.parametrize("name", sorted(shipped_layouts()))
 def test_file_fits_the_published_schema(name: str) -> None:
     layout = load_layout(shipped_layouts()[name])
