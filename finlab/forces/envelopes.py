@@ -125,13 +125,15 @@ class Envelopes:
         return np.asarray(np.maximum(reach, 0.0) / self.maximum[:, None])
 
     @cached_property
-    def _grid(self) -> tuple[Array, Array, NDArray[np.intp], Array, Array]:
-        """First direction and gap between directions (n,) [rad], first row of each fin (n,), and largest and
-        smallest forces of all rows."""
+    def _grid(self) -> tuple[Array, Array, Array, NDArray[np.intp], Array, Array]:
+        """First direction, gap between directions and what counts as just before the first (n,) [rad], first
+        row of each fin (n,), and largest and smallest forces of all rows."""
+        middle, half = self.domain
         count = self.largest.shape[1]
-        gap = np.maximum(2.0 * self.domain[1] / max(count - 1, 1), LEAST)
+        gap = np.maximum(2.0 * half / max(count - 1, 1), LEAST)
+        before = np.where(half < np.pi, 0.5 * gap, 0.0)  # a circle has nothing before its first direction
         first = np.arange(len(gap)) * count
-        return self.domain[0] - self.domain[1], gap, first, self.largest.ravel(), self.smallest.ravel()
+        return middle - half, gap, before, first, self.largest.ravel(), self.smallest.ravel()
 
     def within(self, middle: Array, half: Array) -> Envelopes:
         """The same fins kept within arcs (n,) of force directions [rad]."""
@@ -149,13 +151,13 @@ class Envelopes:
 
     def rim(self, direction: Array) -> Rim:
         """What the fins can do in directions (R, n) [rad]."""
-        start, gap, first, largest, smallest = self._grid
+        start, gap, before, first, largest, smallest = self._grid
         count = self.largest.shape[1]
         if count == 1:
             return Rim(largest, smallest, 0.0, first, None)
-        # Directions just before the first one belong to it, not to the last: counted from half a gap before.
-        place = np.mod(direction - start + 0.5 * gap, TURN)
-        place = np.minimum(np.maximum((place - 0.5 * gap) / gap, 0.0), count - 1)
+        # Directions just before an arc belong to its start, not to its end.
+        place = np.mod(direction - start + before, TURN)
+        place = np.minimum(np.maximum((place - before) / gap, 0.0), count - 1)
         row = np.minimum(place.astype(np.intp), count - 2)
         part = place - row
         row += first

@@ -60,11 +60,10 @@ def objective(request: pytest.FixtureRequest) -> Objective:
 
 
 def inside(rows: int, seed: int = 0) -> Array:
-    """Random directions (rows, 4) [rad] within the arcs of `FINS`, some told a turn later or earlier, not in
-    the last half gap of a circle, which counts as its end."""
+    """Random directions (rows, 4) [rad] within the arcs of `FINS`, some told a turn later or earlier."""
     rng = np.random.default_rng(seed)
     ends = np.array([[-np.pi, np.pi], [-np.pi, np.pi], [ARC[0] + 0.15, ARC[1] + 0.15], [0.5, 4.5]])
-    inner = rng.uniform(ends[:, 0] + 0.07, ends[:, 1] - 0.07, (rows, 4))
+    inner = rng.uniform(ends[:, 0] + 0.02, ends[:, 1] - 0.02, (rows, 4))
     return inner + 2.0 * np.pi * rng.integers(-1, 2, (rows, 4))
 
 
