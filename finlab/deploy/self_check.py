@@ -14,7 +14,7 @@ import numpy as np
 
 from finlab.allocation.judging import REACHED
 from finlab.arrays import Array
-from finlab.deploy.graph import SELF_TEST_TOLERANCE, SelfTest
+from finlab.deploy.graph import SELF_TEST_TOLERANCE
 from finlab.deploy.robot import Robot
 from finlab.errors import DataError
 from finlab.forces.compiled_fins import compiled_fins, difference
@@ -57,23 +57,18 @@ def self_check(robot: Robot) -> list[Finding]:
     plant, normalization = plant_of(robot.graph.healthy), robot.graph.normalization
     cost = robot.allocator.objective.meter(plant)
 
-    def stored(case: SelfTest) -> Array:
-        return np.array([case.command[i] for i in alive], dtype=np.float64)
-
-    def physics(case: SelfTest) -> float:
-        return float(normalization.error(plant.wrench(stored(case)), np.array(case.delivered_wrench)))
-
-    errors, worse, dearer = [], [], []
+    differs, errors, worse, dearer = [], [], [], []
     for case in cases:
+        stored = np.array([case.command[i] for i in alive], dtype=np.float64)
+        target, delivered = np.array(case.wrench), np.array(case.delivered_wrench)
         answer = robot.allocator.allocate(layout, case.wrench, failed=failed)
-        own = answer.command[alive]
+        differs.append(float(normalization.error(plant.wrench(stored), delivered)))
         errors.append(answer.err_norm)
-        before = normalization.error(np.array(case.delivered_wrench), np.array(case.wrench))
-        worse.append(answer.err_norm - float(before))
-        prices = cost(np.stack([own, stored(case)]))
+        worse.append(answer.err_norm - float(normalization.error(delivered, target)))
+        prices = cost(np.stack([answer.command[alive], stored]))
         dearer.append(float(prices[0] / max(prices[1], 1e-9)) - 1.0)
     return [
-        Finding("wrench of the stored commands (err_norm)", worst(map(physics, cases)), SELF_TEST_TOLERANCE),
+        Finding("wrench of the stored commands (err_norm)", worst(differs), SELF_TEST_TOLERANCE),
         Finding("compiled fins, beside compiling here (share)", compiled_off(robot), COMPILED_TOLERANCE),
         Finding("own answers, judged by the fins' own models (err_norm)", worst(errors), REACHED),
         Finding("own answers, more error than stored (err_norm)", worst(worse), ERROR_TOLERANCE),

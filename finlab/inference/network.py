@@ -71,11 +71,8 @@ class _Graph:
         score = leak.reshape(-1, self.width).dot(self.score).reshape(rows, n, n, self.heads)
         weight = layers.softmax(score, axis=2)
         split = source.reshape(rows, n, self.heads, -1).transpose(0, 2, 1, 3)
-        out = np.empty((rows, n, self.heads, split.shape[-1]), dtype=np.float32)
-        np.matmul(weight.transpose(0, 3, 1, 2), split, out=out.transpose(0, 2, 1, 3))
-        flat = out.reshape(-1, self.width)
-        flat += self.bias
-        return flat
+        seen = (weight.transpose(0, 3, 1, 2) @ split).transpose(0, 2, 1, 3)
+        return np.asarray(seen.reshape(-1, self.width) + self.bias)
 
 
 class _Transformer:
@@ -96,9 +93,8 @@ class _Transformer:
         qkv = self.qkv(layers.normalized(x)).reshape(rows, -1, 3, self.heads, self.depth)
         q, k, v = qkv.transpose(2, 0, 3, 1, 4)
         score = q @ k.swapaxes(-1, -2)
-        attended = np.empty((rows, qkv.shape[1], self.heads, self.depth), dtype=np.float32)
-        np.matmul(layers.softmax(score), v, out=attended.transpose(0, 2, 1, 3))
-        x += self.out(attended.reshape(x.shape))
+        seen = (layers.softmax(score) @ v).transpose(0, 2, 1, 3)
+        x += self.out(seen.reshape(x.shape))
         self.feed_forward(x)
 
 

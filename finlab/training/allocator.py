@@ -10,7 +10,7 @@ from torch import Tensor, nn
 
 from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
 from finlab.inference.features import raw_features
-from finlab.inference.weights import TrainedWeights
+from finlab.inference.weights import State, TrainedWeights
 from finlab.layout import FinModelSpec
 from finlab.physics import make_law
 from finlab.training import losses
@@ -19,7 +19,7 @@ from finlab.training.loop import Terms, train
 from finlab.training.networks.allocator_network import AllocatorNetwork
 from finlab.training.presets import PAPER_RECIPES, AllocatorTraining, get_recipe
 from finlab.training.sampling import Batch, ForwardSampler, seeded_generator
-from finlab.training.saving import save_checkpoint, state_of, surrogate_of
+from finlab.training.saving import save_checkpoint, surrogate_of
 from finlab.training.surrogate import TRAIN_SEED
 
 
@@ -61,12 +61,10 @@ def train_allocator(
         "surrogate_sha256": base.sha256,
     }
 
-    def save(weights: dict[str, Tensor], step: int) -> None:
-        done = {"steps_done": step, "samples": step * settings.batch_size}
-        made = {**base.training, "allocator": identity | done}
-        state = state_of(weights)
+    def save(network: State, run: dict[str, Any]) -> None:
+        made = {**base.training, "allocator": run}
         save_checkpoint(
-            out, replace(base, preset=preset, network_config=config, network=state, training=made)
+            out, replace(base, preset=preset, network_config=config, network=network, training=made)
         )
 
     with shared_training(settings.batch_size) as share:

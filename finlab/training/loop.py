@@ -16,7 +16,8 @@ from torch import Tensor, nn
 from tqdm import tqdm
 
 from finlab.errors import DataError
-from finlab.training.saving import load_state, save_state
+from finlab.inference.weights import State
+from finlab.training.saving import load_state, save_state, state_of
 from finlab.whole_file import write_whole
 
 LOG_FILE = "log.csv"
@@ -76,7 +77,7 @@ def train(
     identity: dict[str, Any],
     *,
     stop_after: int | None = None,
-    on_save: Callable[[dict[str, Tensor], int], None] | None = None,
+    on_save: Callable[[State, dict[str, Any]], None] | None = None,
 ) -> dict[str, Tensor]:
     """Minimize the term `loss` of `terms_of_step(model, step)`; resume from `folder` where it holds a state.
 
@@ -87,7 +88,7 @@ def train(
         folder: where log and state are written (by the first process only).
         identity: settings that a resumed run must share.
         stop_after: stop (resumable) once this many steps are done in all.
-        on_save: called with the shipped weights and the step at each save.
+        on_save: called at each save with the shipped weights, and with `identity` and how far the run is.
 
     Returns:
         The weights to ship: the running average, or the last ones where none is kept.
@@ -137,7 +138,8 @@ def train(
         if first and (time.monotonic() - saved > SAVE_EVERY_S or last):
             # The state comes last: a run killed in between repeats a few steps and ships them after all.
             if on_save is not None:
-                on_save(average or _weights(model), step + 1)
+                progress = {"steps_done": step + 1, "samples": (step + 1) * settings.batch_size}
+                on_save(state_of(average or _weights(model)), identity | progress)
             plot_log(folder)
             saved = time.monotonic()
             save_state(folder, (step + 1, before + saved - started), model, optimizer, average, identity)

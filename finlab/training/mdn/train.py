@@ -20,13 +20,13 @@ from torch import Tensor, nn
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.inference.checkpoint import read_checkpoint, read_normalization, resolve_checkpoint
-from finlab.inference.weights import TrainedWeights
+from finlab.inference.weights import State, TrainedWeights
 from finlab.training.loop import LOG_EVERY, Terms, train
 from finlab.training.mdn.batches import Answers, Batch
 from finlab.training.mdn.shards import write_shard
 from finlab.training.networks.force_network import ForceMixture, ForceNetwork
 from finlab.training.presets import MDN_RECIPES, AnswerSettings, MdnTraining, get_recipe
-from finlab.training.saving import save_checkpoint, state_of
+from finlab.training.saving import save_checkpoint
 
 TRAIN_SEED = 140_000
 """Added to the user's seed."""
@@ -69,13 +69,9 @@ def train_mdn(
         "network": asdict(recipe.network),
     }
 
-    def save(weights: dict[str, Tensor], step: int) -> None:
-        done = {"steps_done": step, "samples": step * settings.batch_size}
-        made = {"mdn": identity | done}
-        trained = TrainedWeights(
-            out.name, normalization, recipe.network, state_of(weights), preset=preset, training=made
-        )
-        save_checkpoint(out, trained)
+    def save(network: State, run: dict[str, Any]) -> None:
+        trained = TrainedWeights(out.name, normalization, recipe.network, network)
+        save_checkpoint(out, replace(trained, preset=preset, training={"mdn": run}))
 
     # What takes the search a second takes a network in one process as long: each gets a core.
     threads = torch.get_num_threads()
