@@ -25,6 +25,7 @@ from finlab.layout.load import (
     SUFFIX,
     UNITS,
     GraphDocument,
+    GraphText,
     checksum_of,
     parse_graph_document,
     read_graph_text,
@@ -51,7 +52,7 @@ def read_graph(path: str | os.PathLike[str]) -> LayoutGraph:
         LayoutError: it cannot be read, is of another format or version, or was changed after it was written.
         DataError: the bundle cannot be read, or was changed.
     """
-    return parse_graph(*read_graph_text(Path(path)))
+    return parse_graph(read_graph_text(Path(path)))
 
 
 def graph_bytes(graph: LayoutGraph) -> bytes:
@@ -61,12 +62,10 @@ def graph_bytes(graph: LayoutGraph) -> bytes:
     return (json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode()
 
 
-def parse_graph(
-    content: str, source: str = "graph", folder: Path | None = None, tables: frozenset[str] | None = None
-) -> LayoutGraph:
-    """The graph in the text of a graph file; arguments as in `GraphText`, errors as in `read_graph`."""
-    document = parse_graph_document(content, source, folder, tables)
-    with under(source=source):
+def parse_graph(found: GraphText) -> LayoutGraph:
+    """The graph in the text of a graph file; errors as in `read_graph`."""
+    document = parse_graph_document(found)
+    with under(source=found.source):
         return _graph(document)
 
 

@@ -87,7 +87,7 @@ def parse_robot(files: Files, source: str = "bundle") -> Robot:
     Force tables are read from the folder or archive `source` once they are needed.
     """
     check_bundle_files(files, source)
-    graph = parse_graph(*bundle_graph_text(files, source))
+    graph = parse_graph(bundle_graph_text(files, source))
     allocator = allocator_from_bundle(files, source)
     assert isinstance(allocator, SearchAllocator)
     if (None if allocator.weights is None else allocator.weights.sha256) != graph.checkpoint_sha256:

@@ -65,7 +65,7 @@ def load_layout(layout: str | os.PathLike[str]) -> Layout:
     file = layout_path(layout)
     source = str(layout)
     if holds_graph(file):
-        return parse_graph_document(*read_graph_text(file)).layout
+        return parse_graph_document(read_graph_text(file)).layout
     content = read_text(file, source)
     if file.suffix.lower() == ".json":
         data = parse_json(content, source)
@@ -125,16 +125,14 @@ def bundle_graph_text(files: Files, source: str) -> GraphText:
     return GraphText(decode_text(files[GRAPH], place), place, folder, tables)
 
 
-def parse_graph_document(
-    content: str, source: str = "graph", folder: Path | None = None, tables: frozenset[str] | None = None
-) -> GraphDocument:
-    """What the text of a graph file says; arguments as in `GraphText`.
+def parse_graph_document(found: GraphText) -> GraphDocument:
+    """What the text of a graph file says.
 
     Raises:
         LayoutError: it is of another format or version, was changed after it was written, or holds no layout.
     """
-    data = parse_json(content, source)
-    with under(source=source):
+    data = parse_json(found.content, found.source)
+    with under(source=found.source):
         # Format and version first: in a file of another kind or version, unknown keys are not the news.
         if not isinstance(data, dict) or data.get("format") != GRAPH_FORMAT:
             got = shown(data.get("format")) if isinstance(data, dict) else shown(data)
@@ -147,7 +145,7 @@ def parse_graph_document(
             raise LayoutError("does not fit the contents; the file was changed, export it again", "checksum")
         if data["units"] != UNITS:
             raise LayoutError(f"expected {UNITS}, got {shown(data['units'])}", "units")
-        return _document(data, source, folder, tables)
+        return _document(data, found)
 
 
 def checksum_of(document: Mapping[str, Any]) -> str:
@@ -157,9 +155,7 @@ def checksum_of(document: Mapping[str, Any]) -> str:
     return "sha256:" + hashlib.sha256(canonical.encode("utf-8", "surrogatepass")).hexdigest()
 
 
-def _document(
-    data: Mapping[str, Any], source: str, folder: Path | None, tables: frozenset[str] | None
-) -> GraphDocument:
+def _document(data: Mapping[str, Any], found: GraphText) -> GraphDocument:
     """The layout of a graph file, read by way of the layout file that it would be."""
     parts = ("directed", "multigraph", "graph", "nodes", "edges")
     nodes = mapping(data["graph"], "graph", parts, required=parts)["nodes"]
@@ -177,10 +173,10 @@ def _document(
         fins.append(fin | {key: node[key] for key in ("position_m", "limits", "model")})
     about = mapping(data["layout"], "layout", ("name", "description", "body"), ("name",))
     head = {"format": FORMAT, "version": VERSION, "frame": data["frame"]}
-    layout = parse_layout({**head, **about, "fins": fins}, source, folder)
+    layout = parse_layout({**head, **about, "fins": fins}, found.source, found.folder)
     for i, parsed in enumerate(layout.fins):
         path = parsed.model.values().get("path")
-        if tables is not None and path is not None and path not in tables:
+        if found.tables is not None and path is not None and path not in found.tables:
             key = f"graph.nodes[{i}].model.path"
             raise LayoutError("names a force table that is not in the bundle; export it again", key)
     exact = (replace(fin, mounting_angle=angle) for fin, angle in zip(layout.fins, angles, strict=True))

@@ -14,7 +14,7 @@ from finlab.assets import shipped_layouts
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.layout import Layout, layout_to_dict, load_layout, parse_layout
 from finlab.layout.body import Hull
-from finlab.layout.load import SUFFIX, parse_graph_document
+from finlab.layout.load import SUFFIX, GraphText, parse_graph_document
 from finlab.layout.reading import MAX_BYTES, decode_text, parse_json
 from finlab.layout.yaml_file import parse_yaml, yaml_text
 from finlab.physics import plant_of
@@ -55,7 +55,7 @@ def read_layout(name: str, content: bytes) -> Layout:
         raise LayoutError(f"is larger than {MAX_BYTES:,} bytes, a layout has a few thousand", source=source)
     text = decode_text(content, source)
     if source.lower().endswith(SUFFIX):
-        layout = parse_graph_document(text, source).layout
+        layout = parse_graph_document(GraphText(text, source)).layout
     else:
         parse = parse_json if source.lower().endswith(".json") else parse_yaml
         layout = parse_layout(parse(text, source), source=source)
