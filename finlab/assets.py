@@ -34,11 +34,7 @@ def shipped_checkpoints() -> dict[str, Path]:
 
 
 def checkpoint_path(name: str = "default") -> Path:
-    """The folder of a shipped checkpoint.
-
-    Raises:
-        CheckpointError: none of that name is shipped.
-    """
+    """The folder of a shipped checkpoint; a `CheckpointError` where none of that name is shipped."""
     found = shipped_checkpoints()
     if name not in found:
         names = ", ".join(found) or "none"

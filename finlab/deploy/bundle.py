@@ -69,11 +69,7 @@ class Bundle:
             raise DataError(f"{error.filename or path}: cannot be written: {error.strerror}") from None
 
     def write_zip(self, file: str | os.PathLike[str]) -> None:
-        """Write one zip archive; an existing file is replaced whole.
-
-        Raises:
-            DataError: the file cannot be written.
-        """
+        """Write one zip archive, in place of an existing file; a `DataError` where it cannot be written."""
         write_whole(file, self.zip_bytes(), DataError)
 
     def zip_bytes(self) -> bytes:

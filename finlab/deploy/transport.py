@@ -48,11 +48,7 @@ class LoopbackUdp:
     """Datagrams on 127.0.0.1; answers go to whoever sent last."""
 
     def __init__(self, port: int) -> None:
-        """Listen on a port; 0 takes a free one.
-
-        Raises:
-            FinlabError: the port is taken.
-        """
+        """Listen on a port, for 0 on a free one; a `FinlabError` where the port is taken."""
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind(("127.0.0.1", port))

@@ -123,11 +123,7 @@ class LayoutSurrogate(NamedTuple):
 
 
 def surrogate_on(layout: Layout, weights: TrainedWeights) -> LayoutSurrogate:
-    """The surrogate of a checkpoint on one layout.
-
-    Raises:
-        CheckpointError: the checkpoint holds none.
-    """
+    """The surrogate of a checkpoint on one layout; a `CheckpointError` where it holds none."""
     if weights.surrogate_config is None:
         raise CheckpointError(
             f"checkpoint {weights.name!r} holds no surrogate; train one with `finlab train surrogate`"

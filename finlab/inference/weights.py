@@ -35,11 +35,7 @@ class SurrogateConfig:
     """Widths of the hidden layers."""
 
     def shapes(self) -> Shapes:
-        """Shape of each array of such a surrogate.
-
-        Raises:
-            ValueError: there is no such surrogate.
-        """
+        """Shape of each array; a `ValueError` where there is no surrogate of these sizes."""
         _check_sizes(*self.hidden)
         shapes: Shapes = {}
         for i, (n_in, n_out) in enumerate(pairwise([RAW_SIZE + 3, *self.hidden, 3])):
@@ -69,11 +65,7 @@ class NetworkConfig:
     """Number M of mixture components."""
 
     def shapes(self) -> Shapes:
-        """Shape of each array of such a network.
-
-        Raises:
-            ValueError: there is no such network.
-        """
+        """Shape of each array; a `ValueError` where there is no network of these sizes."""
         width, shapes = self.width, _ends(self, 6)
         for i in range(self.graph_layers):
             name, n_in = f"graph.{i}", width if i else RAW_SIZE
@@ -109,11 +101,7 @@ class ForceNetworkConfig:
     """Number M of mixture components."""
 
     def shapes(self) -> Shapes:
-        """Shape of each array of such a network.
-
-        Raises:
-            ValueError: there is no such network.
-        """
+        """Shape of each array; a `ValueError` where there is no network of these sizes."""
         width, shapes = self.width, _ends(self, 3) | _linear("enter", NODE_SIZE, self.width)
         for i in range(self.layers):
             name, look = f"layers.{i}", f"layers.{i}.look"
@@ -156,11 +144,7 @@ class TrainedWeights:
     """SHA-256 of the file of the weights; empty for what was not read from a file."""
 
     def check_network(self, kind: type[Config]) -> Config:
-        """The sizes of the network, which must be there and of one kind.
-
-        Raises:
-            CheckpointError: it is not.
-        """
+        """The sizes of the network; a `CheckpointError` where there is none, or one of another kind."""
         sizes, verb = self.network_config, "mdn" if kind is ForceNetworkConfig else "allocator"
         if not isinstance(sizes, kind):
             has = "no network" if sizes is None else f"a network that is fed {sizes.features!r}"

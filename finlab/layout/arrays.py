@@ -40,11 +40,7 @@ def empty_arrays(n_layouts: int, n_fins: int) -> LayoutArrays:
 
 
 def stack_layouts(layouts: Sequence[Layout]) -> LayoutArrays:
-    """Returns the layouts, at least one, as one batch padded to the fin count of the largest.
-
-    Raises:
-        LayoutError: there are no layouts.
-    """
+    """Returns layouts as one batch padded to the most fins; a `LayoutError` where there are none."""
     if len(layouts) == 0:
         raise LayoutError("expected at least one layout to stack, got none")
     width = max(layout.n_fins for layout in layouts)

@@ -139,11 +139,7 @@ class ClosedLoop:
             self.failed = (*self.failed, name)
 
     def mend(self, name: str) -> None:
-        """A lost fin works again.
-
-        Raises:
-            LayoutError: there is no fin of that name.
-        """
+        """A lost fin works again; a `LayoutError` where there is no fin of that name."""
         self.layout.index(name)
         self.failed = tuple(other for other in self.failed if other != name)
 

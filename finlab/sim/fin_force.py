@@ -177,11 +177,7 @@ physics than any method knows."""
 
 
 def make_plant(name: str, layout: Layout) -> FinForce:
-    """The fin force model called `name`.
-
-    Raises:
-        FinlabError: there is none of that name.
-    """
+    """The fin force model called `name`; a `FinlabError` where there is none."""
     if name not in PLANTS:
         raise FinlabError(f"plant: expected one of {', '.join(PLANTS)}, got {name!r:.60}")
     return PLANTS[name](layout)

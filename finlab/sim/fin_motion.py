@@ -14,7 +14,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.layout.angles import is_full_turn
+from finlab.layout.angles import is_full_turn, wrapped
 from finlab.physics.blade import Blade
 
 
@@ -65,7 +65,7 @@ class FinMotion:
             self.amplitude, self.amplitude_rate, aim, self.servo.amplitude_pole, dt
         )
         turn = known[:, 2] - self.direction
-        turn = np.where(self._turns_fully, np.mod(turn + math.pi, 2 * math.pi) - math.pi, turn)
+        turn = np.where(self._turns_fully, wrapped(turn), turn)
         before = self.direction
         after, rate = _follow(before, self.direction_rate, before + turn, self.servo.direction_pole, dt)
         # What flapping leaves of the servo's speed is there to turn the fin.

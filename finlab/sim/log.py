@@ -101,11 +101,7 @@ def log_of_ticks(ticks: list[Tick], **about: Any) -> RunLog:
 
 
 def load_log(path: str | Path) -> RunLog:
-    """Reads what `RunLog.save` wrote.
-
-    Raises:
-        DataError: the file is missing, or no log of this version.
-    """
+    """Reads what `RunLog.save` wrote; a `DataError` where the file is missing, or no log of this version."""
     try:
         with np.load(Path(path), allow_pickle=False) as file:
             meta = json.loads(str(file["meta"]))
