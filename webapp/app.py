@@ -113,7 +113,7 @@ class App:
             now = time.monotonic()
             for view in list(self.views.values()):
                 # A long pause (a busy machine) must not become a leap of the fins.
-                view.animate(min(now - before, 0.2))
+                view.scenery.animate(min(now - before, 0.2))
             before = now
             if now - kept > KEEP_S:
                 kept = now

@@ -179,10 +179,6 @@ class Page(ABC):
         """Show a note to the user."""
         self.client.add_notification(title, body, auto_close_seconds=8.0, color=VERMILLION)
 
-    def animate(self, elapsed: float) -> None:
-        """Let time pass [s]."""
-        self.scenery.animate(elapsed)
-
     # From the session to the page.
 
     def _refresh(self) -> None:

@@ -74,6 +74,8 @@ class Look:
     """Shafts and struts."""
     line: Rgb
     """Thin lines: the graph, dimension lines, stalks."""
+    overlay: Rgb
+    """Forces of a second method, beside those of the robot."""
 
 
 LIGHT = Look(
@@ -85,6 +87,7 @@ LIGHT = Look(
     glass=(44, 62, 78),
     metal=(98, 108, 118),
     line=(84, 104, 118),
+    overlay=(40, 44, 52),
 )
 DARK = Look(
     water_top=(24, 42, 54),
@@ -95,17 +98,13 @@ DARK = Look(
     glass=(20, 30, 40),
     metal=(120, 130, 140),
     line=(150, 170, 184),
+    overlay=(222, 228, 234),
 )
 
 
 def look(dark: bool) -> Look:
     """The look of the dark or the light theme."""
     return DARK if dark else LIGHT
-
-
-def overlay_color(dark: bool) -> Rgb:
-    """Forces of a second method, beside those of the robot."""
-    return (222, 228, 234) if dark else (40, 44, 52)
 
 
 def fin_color(index: int) -> Rgb:

@@ -11,7 +11,7 @@ from webapp.session.state import State
 from webapp.tasks.analyst import Findings
 from webapp.tasks.swimmer import ERROR
 from webapp.tasks.swimming import Swimming
-from webapp.theme import ASKED, DEAD, DELIVERED, MISSING, OTHER, TORQUE_SCALE, css, look, overlay_color
+from webapp.theme import ASKED, DEAD, DELIVERED, MISSING, OTHER, TORQUE_SCALE, css, look
 
 ARROWS = (("asked", 0.65), ("delivered", 1.0), ("missing", 1.0))
 """Words and opacities of the three arrows."""
@@ -37,7 +37,7 @@ def overlay_row(other: Allocation | None, dark: bool) -> str:
     """Whose forces lie over those of the robot."""
     if other is None:
         return ""
-    return f"{_arrow(css(overlay_color(dark)), 1.0)}<span>fins, {escape(other.method)}</span>"
+    return f"{_arrow(css(look(dark).overlay), 1.0)}<span>fins, {escape(other.method)}</span>"
 
 
 def graph_row(shown: bool, weighed: bool, dark: bool) -> str:

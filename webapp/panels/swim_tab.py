@@ -57,7 +57,7 @@ class SwimTab:
         for key, widget in settings.items():
             page.bind(widget, partial(page.session.set_swim, key), partial(self._setting, key))
         follow = gui.add_checkbox("Follow", False, hint="The camera goes along with the first robot.")
-        page.on_change(follow, page.scenery.look_after_swim)
+        page.on_change(follow, page.scenery.swim.look)
         self._fins = FinButtons(
             page,
             "Break a fin",

@@ -13,7 +13,7 @@ from webapp.scene.meshes import fin as fin_mesh
 from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, joined, tube
 from webapp.scene.shape import UNLIT, Shape
 from webapp.tasks.solver import Attention
-from webapp.theme import DEAD, LIGHT, Rgb, overlay_color
+from webapp.theme import DEAD, LIGHT, Rgb, look
 
 LIFT = np.array([0.0, 0.0, 0.025])
 """The arrows stand a little above the fins' own ones, so that equal ones can be told apart [m]."""
@@ -61,11 +61,11 @@ class Overlay:
 
     def __init__(self, scene: viser.SceneApi) -> None:
         """Build the node, showing nothing."""
-        self._shape = Shape(scene, "/robot/overlay", overlay_color(False), visible=False, cast_shadow=False)
+        self._shape = Shape(scene, "/robot/overlay", LIGHT.overlay, visible=False, cast_shadow=False)
 
     def refresh(self, answer: Allocation | None, scale: float, dark: bool) -> None:
         """Show an answer's forces, arrows of `scale` [m/N]; nothing for None."""
-        put(self._shape.node, visible=answer is not None, color=overlay_color(dark))
+        put(self._shape.node, visible=answer is not None, color=look(dark).overlay)
         if answer is not None:
             place = answer.layout.position
             self._shape.show(_arrows, place, np.nan_to_num(answer.fin_forces) * scale)

@@ -70,11 +70,6 @@ class Scenery:
         else:
             self.robot.animate(elapsed)
 
-    def look_after_swim(self, follow: bool) -> None:
-        """Let the camera go along with the first robot that swims, or see all of its path."""
-        if self._swimming.active:
-            self.swim.follow() if follow else self.swim.overlook()
-
     def end_swim(self) -> None:
         """Go back from the robot that swims to the one that is designed."""
         if self._swimming.active:

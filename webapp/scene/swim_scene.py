@@ -10,6 +10,7 @@ from webapp.scene.shape import UNLIT, Shape
 from webapp.scene.stage import add_floor, aim_camera, paint_floor
 from webapp.scene.swim_robot import SwimRobot, goal
 from webapp.scene.wrench_nodes import LENGTH
+from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming
 from webapp.theme import ASKED, DELIVERED, OTHER
 
@@ -35,7 +36,7 @@ class SwimScene:
         fade: dict[str, Any] = {"fade_distance": 14.0, "fade_strength": 1.4, "shadow_opacity": 0.18}
         self._floor = add_floor(scene, "/swim/floor", 14.0, 0.25, 1.0, visible=False, **fade)
         self._robots: list[SwimRobot] = []
-        self._shown: tuple[object, ...] = ()
+        self._shown: tuple[Swimmer, ...] = ()
         self._followed: np.ndarray | None = None
 
     def refresh(self, dark: bool) -> None:
@@ -71,22 +72,20 @@ class SwimScene:
         path = swimming.swimmers[0].path
         self._goal.show(goal, path)
         put(self._floor, position=np.array([0.0, 0.0, path[:, 2].min() - DEPTH_BELOW]))
-        self.overlook()
+        self.look(follow=False)
 
-    def overlook(self) -> None:
-        """Move the camera to where the whole path can be seen."""
+    def look(self, follow: bool) -> None:
+        """Let the camera go along with the first robot, or stand where the whole path can be seen."""
         self._followed = None
-        if not self._swimming.swimmers:
+        if not self._shown:
             return
-        path = self._swimming.swimmers[0].path
-        low, high = path.min(axis=0), path.max(axis=0)
-        self._look_at((low + high) / 2, max(0.75 * float(np.linalg.norm((high - low)[:2])), 1.2))
-
-    def follow(self) -> None:
-        """Move the camera near the first robot and go along with it."""
-        if self._swimming.swimmers and self._robots:
+        if follow:
             self._followed = self._robots[0].place
             self._look_at(self._followed, 1.1)
+        else:
+            path = self._shown[0].path
+            low, high = path.min(axis=0), path.max(axis=0)
+            self._look_at((low + high) / 2, max(0.75 * float(np.linalg.norm((high - low)[:2])), 1.2))
 
     def _look_at(self, middle: np.ndarray, distance: float) -> None:
         """Move the camera to where it sees a point (3,) from a distance [m]."""
