@@ -110,6 +110,10 @@ class Page:
         loop.call_soon_threadsafe(run_script, gui, f"window.finlabMark = {self._marks}")
         self.page.wait_for_function("mark => window.finlabMark === mark", arg=self._marks)
 
+    def rest(self, milliseconds: int) -> None:
+        """Let time pass on the page's own clock: what it had put off until earlier has happened by then."""
+        self.page.evaluate("time => new Promise(done => setTimeout(done, time))", milliseconds)
+
     def node(self, name: str) -> None:
         """Wait for a node of the scene."""
         self.page.wait_for_function("name => window.__viserMutable?.nodeRefFromName[name] != null", arg=name)

@@ -56,7 +56,7 @@ def without_a_pause(page: Any, steps: list[Any], act: Callable[[], Any]) -> Any:
         result = act()
         if page.page.evaluate(LONGEST) < 0.9 * PAUSE_MS:
             return result
-        page.page.wait_for_timeout(2 * PAUSE_MS)
+        page.rest(2 * PAUSE_MS)
         page.start_over()
         steps.clear()
     return pytest.fail("this machine is too busy to type on")
@@ -75,7 +75,7 @@ def test_a_negative_target(page: Any, steps: list[Any], delay: int) -> None:
     box = without_a_pause(page, steps, typed)
     page.page.keyboard.press("Enter")
     page.until(lambda: page.session.state.target[0] == -0.5 and box.input_value() == "-0.5")
-    page.page.wait_for_timeout(400)
+    page.rest(400)
     assert steps == [("set_target", -0.5)] and box.input_value() == "-0.5"
 
 
@@ -92,7 +92,7 @@ def test_half_a_degree(page: Any, steps: list[Any], delay: int) -> None:
     page.page.keyboard.press("Tab")
     page.until(lambda: page.session.state.layout.fins[0].mounting_angle == pytest.approx(0.794125, abs=1e-6))
     page.until(lambda: box.input_value() == "45.5")
-    page.page.wait_for_timeout(400)
+    page.rest(400)
     assert len(steps) == 1 and box.input_value() == "45.5"
 
 
@@ -110,7 +110,7 @@ def test_three_coordinates_one_after_the_other(page: Any, steps: list[Any], dela
 
     without_a_pause(page, steps, typed)
     page.until(lambda: page.session.state.layout.fins[0].position == (-0.125, 0.05, -0.02))
-    page.page.wait_for_timeout(400)
+    page.rest(400)
     # A busy page may send two quick coordinates as one change; half a number is in none.
     whole = [(-0.125, y, z), (-0.125, 0.05, z), (-0.125, 0.05, -0.02)]
     taken = [whole.index(position) for _, position in steps]
@@ -122,14 +122,14 @@ def test_three_coordinates_one_after_the_other(page: Any, steps: list[Any], dela
 def test_a_pause_commits_a_whole_number_and_leaves_the_field_alone(page: Any, steps: list[Any]) -> None:
     box = begin(page, "Fx [N]")
     page.page.keyboard.type("-", delay=50)
-    page.page.wait_for_timeout(1300)
+    page.rest(1300)
     assert steps == [] and box.input_value() == "-"
     page.page.keyboard.insert_text("1.")  # at once, since a pause between the two keys would mean -1
-    page.page.wait_for_timeout(1300)
+    page.rest(1300)
     assert steps == [] and box.input_value() == "-1."
     page.page.keyboard.type("0", delay=50)
-    page.until(lambda: page.session.state.target[0] == -1.0)
-    page.page.wait_for_timeout(300)
+    page.until(lambda: page.session.state.target[0] == -1.0 and not page.view.busy)
+    page.catch_up()
     assert box.input_value() == "-1.0", "the number is taken, the text is still the user's"
     page.page.keyboard.type("7", delay=50)
     page.page.mouse.click(30, 500)  # beside the robot
@@ -143,7 +143,7 @@ def test_the_server_does_not_write_into_a_field_that_is_typed_in(page: Any) -> N
     loop = page._served.server.get_event_loop()
     loop.call_soon_threadsafe(page.view.do, lambda: page.session.set_preset("Dive"))
     page.until(lambda: page.session.state.target[0] == 0.8 and not page.view.busy)
-    page.page.wait_for_timeout(300)
+    page.catch_up()
     page.page.keyboard.type("0.25", delay=50)
     assert box.input_value() == "-0.25"
     page.page.keyboard.press("Enter")
@@ -177,7 +177,7 @@ def test_beyond_the_slider_and_a_comma(page: Any, steps: list[Any]) -> None:
     without_a_pause(page, steps, typed)
     page.page.keyboard.press("Tab")
     page.until(lambda: page.session.state.target[2] == 30.5)
-    page.page.wait_for_timeout(400)
+    page.rest(400)
     assert steps == [("set_target", 30.5)]
 
 
