@@ -45,9 +45,11 @@ def serve(
     try:
         if port not in (0, server.get_port()):
             raise FinlabError(f"port {port} was taken while the app started; choose another --port")
+        stop = _signalled()  # whoever knows the address may send one
         secret = "" if guard.token is None else f"/?token={guard.token}"
         print(f"finlab app: http://{host}:{server.get_port()}{secret}  (Ctrl-C stops it)", flush=True)
-        _wait_for_signal()
+        while not stop.wait(0.5):  # a plain wait would keep Python from seeing the signal
+            pass
     finally:
         app.stop()
         stop_server(server)
@@ -69,9 +71,9 @@ def _check_port(host: str, port: int) -> None:
         ) from None
 
 
-def _wait_for_signal() -> None:
+def _signalled() -> threading.Event:
+    """What SIGTERM and Ctrl-C set from now on."""
     stop = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
-    while not stop.wait(0.5):  # a plain wait would keep Python from seeing the signal
-        pass
+    return stop
