@@ -82,6 +82,14 @@ class Planar(NamedTuple):
     multiplier: Array
     """What each axis of the target costs (R, 6), per unit of normalized wrench."""
 
+    @property
+    def command(self) -> Array:
+        """The commands (R, n, 3) that give the forces at the least cost."""
+        return np.stack(
+            [self.row[..., AMPLITUDE], self.row[..., FREQUENCY], self.direction - self.row[..., LEAN]],
+            axis=-1,
+        )
+
 
 def planar_problem(layout: Layout, fins: Envelopes, scale: Array, objective: Objective) -> PlanarProblem:
     """One layout as the planar search sees it.
@@ -238,17 +246,16 @@ def realize(problem: PlanarProblem, planar: Planar, rests: bool = False) -> tupl
         rests: whether a fin that hardly works rests altogether and turns to where that costs least.
             Refinement has to mend the little force that is then missing, or turned.
     """
-    fins, row = problem.fins, planar.row
+    fins = problem.fins
     least = fins.minimum * (1.0 + REST)
     idle = planar.size <= least + IDLE * rests * fins.maximum
     if rests:
         rest = fins.lookup(fins.rim(planar.direction), np.where(idle, 0.0, planar.size))
-        row = np.where(idle[..., None], rest, row)
-    direction = planar.direction - row[..., LEAN]
+        planar = planar._replace(row=np.where(idle[..., None], rest, planar.row))
+    command, cost = planar.command, planar.row[..., COST].sum(-1)
+    direction = command[..., 2]
     if rests or problem.turning_is_free:
-        direction = np.where(idle, problem.idle_direction, direction)
-    command = np.stack([row[..., AMPLITUDE], row[..., FREQUENCY], direction], axis=-1)
-    cost = row[..., COST].sum(-1)
+        np.copyto(direction, problem.idle_direction, where=idle)
     if not problem.turning_is_free:
         turn = np.where(fins.half >= np.pi, wrapped(direction), direction)
         cost = cost + (problem.direction_cost * turn * turn).sum(-1)

@@ -27,8 +27,6 @@ class EnergyWeights:
 
 DEFAULT_WEIGHTS = EnergyWeights()
 """The contract's `J_en`."""
-POWER_WEIGHTS = EnergyWeights(0.0, 0.0, 0.0, 0.0, 1.0)
-"""Inertial power and nothing else: large strokes, slow beats, the load on all fins."""
 
 
 def energy_scale(upper: Values) -> Values:

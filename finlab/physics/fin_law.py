@@ -6,7 +6,7 @@ training differentiates by itself) and CasADi's symbols; its derivatives in clos
 """
 
 from abc import ABC, abstractmethod
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -14,47 +14,42 @@ from finlab.arrays import Array, Values, library_of
 from finlab.physics.blade import Blade
 
 
-class FinLaw(Protocol):
+class FinLaw(ABC):
     """Command to force and power of one fin, or of n fins that share a model."""
 
-    @property
-    def uniform(self) -> bool:
-        """Whether the size of the force is the same whatever the zero direction."""
-        ...
+    uniform: bool = True
+    """Whether the size of the force is the same whatever the zero direction."""
+    blade: Blade = Blade()
+    """The plate whose beating takes power, where nothing better is known."""
 
-    @property
-    def blade(self) -> Blade:
-        """The plate whose beating takes power, where nothing better is known."""
-        ...
-
+    @abstractmethod
     def force(self, command: Values) -> Values:
-        """Returns the mean force (..., n, 3) [N] in the fin frame of commands (..., n, 3) [rad, Hz, rad]."""
-        ...
+        """Returns the mean force (..., n, 3) [N] in the fin frame of commands (..., n, 3) [rad, Hz, rad], in
+        single or double precision as the commands are."""
 
+    @abstractmethod
     def force_and_slopes(self, command: Array) -> tuple[Array, Array]:
         """Returns the force and its derivative by each command in turn (..., n, 3 commands, 3 axes)."""
-        ...
 
     def power(self, command: Values, copper_loss: float = 0.0) -> Values:
         """Returns the mean power (..., n) [W] of commands (..., n, 3): mechanical, and `copper_loss`
         [W/(N m)^2] times the mean squared torque on the shaft."""
-        ...
+        return self.blade.driving_power(command[..., 0], command[..., 1], copper_loss)
 
     def power_slopes(self, command: Array, copper_loss: float = 0.0) -> Array:
         """Returns the power's derivatives (..., n, 3) by each command."""
-        ...
+        slopes = np.zeros(command.shape)
+        by = self.blade.driving_slopes(command[..., 0], command[..., 1], copper_loss)
+        slopes[..., 0], slopes[..., 1] = by
+        return slopes
 
 
-class PlanarLaw(ABC):
+class PlanarLaw(FinLaw):
     """A fin whose mean force lies in the plane that its tip sweeps: a size and a direction, none along the
     shaft."""
 
     offset: Any = 0.0
     """Angle [rad] from the zero direction to the thrust."""
-    blade: Blade = Blade()
-    """The plate whose beating takes power."""
-    uniform: bool = True
-    """See `FinLaw`."""
 
     @abstractmethod
     def thrust(self, amplitude: Values, frequency: Values, zero_direction: Values) -> Values:
@@ -67,7 +62,7 @@ class PlanarLaw(ABC):
         """Returns the thrust's derivatives by amplitude, frequency and zero direction."""
 
     def force(self, command: Values) -> Values:
-        """See `FinLaw`; for numpy's arrays and tensors, float32 or float64 as the command is."""
+        """See `FinLaw`."""
         xp = library_of(command)
         amplitude, frequency, zero_direction = command[..., 0], command[..., 1], command[..., 2]
         thrust = self.thrust(amplitude, frequency, zero_direction)
@@ -96,14 +91,3 @@ class PlanarLaw(ABC):
         slopes[..., 2, 1] -= force[..., 2]
         slopes[..., 2, 2] += force[..., 1]
         return force, slopes
-
-    def power(self, command: Values, copper_loss: float = 0.0) -> Values:
-        """See `FinLaw`."""
-        return self.blade.driving_power(command[..., 0], command[..., 1], copper_loss)
-
-    def power_slopes(self, command: Array, copper_loss: float = 0.0) -> Array:
-        """See `FinLaw`."""
-        slopes = np.zeros(command.shape)
-        by = self.blade.driving_slopes(command[..., 0], command[..., 1], copper_loss)
-        slopes[..., 0], slopes[..., 1] = by
-        return slopes

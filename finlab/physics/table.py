@@ -11,16 +11,13 @@ from numpy.typing import NDArray
 
 from finlab.arrays import Array, Values, library_of
 from finlab.layout.angles import TURN
-from finlab.physics.blade import Blade
+from finlab.physics.fin_law import FinLaw
 
 
-class TableLaw:
+class TableLaw(FinLaw):
     """Interpolates forces and power on a grid of amplitude, frequency and zero direction; see `FinLaw`."""
 
     uniform = False
-    """See `FinLaw`."""
-    blade = Blade()
-    """Whose power is taken where the table has none."""
 
     def __init__(self, axes: list[Array], values: Array, periodic: bool) -> None:
         """Takes the grid's axes [rad, Hz, rad], rising, two points or more each, and what was measured
@@ -61,19 +58,16 @@ class TableLaw:
     def power(self, command: Values, copper_loss: float = 0.0) -> Values:
         """See `FinLaw`. Measured power is told as it is, whatever the loss."""
         if not self.has_power:
-            return self.blade.driving_power(command[..., 0], command[..., 1], copper_loss)
+            return super().power(command, copper_loss)
         # A polynomial through points near zero may dip below.
         return np.maximum(self._interpolated(command, 1)[..., 0, 0, 0, 3], 0.0)
 
     def power_slopes(self, command: Array, copper_loss: float = 0.0) -> Array:
         """See `FinLaw`."""
-        if self.has_power:
-            found = self._interpolated(command, 2)[..., 3:]
-            return _slopes(found)[..., 0] * (found[..., 0, 0, 0, :] > 0.0)
-        slopes = np.zeros(command.shape)
-        by = self.blade.driving_slopes(command[..., 0], command[..., 1], copper_loss)
-        slopes[..., 0], slopes[..., 1] = by
-        return slopes
+        if not self.has_power:
+            return super().power_slopes(command, copper_loss)
+        found = self._interpolated(command, 2)[..., 3:]
+        return _slopes(found)[..., 0] * (found[..., 0, 0, 0, :] > 0.0)
 
     def _interpolated(self, command: Array, orders: int) -> Array:
         """All columns of the table at commands (..., 3): values, and with two orders derivatives too.

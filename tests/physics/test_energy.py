@@ -7,13 +7,14 @@ import finlab
 from finlab.physics import Plant
 from finlab.physics.energy import (
     DEFAULT_WEIGHTS,
-    POWER_WEIGHTS,
     EnergyMeter,
     EnergyWeights,
     command_energy,
     energy_scale,
     fin_energy,
 )
+
+INERTIAL = EnergyWeights(0.0, 0.0, 0.0, 0.0, 1.0)
 
 UPPER = np.array([[0.6, 2.1, np.pi], [0.4, 3.0, -0.5], [0.5, 1.0, 0.0]])
 MIXED = EnergyWeights(0.7, 1.3, 0.2, 0.4, 0.9)
@@ -26,7 +27,7 @@ def commands(rows: int) -> np.ndarray:
 def test_each_term_by_hand() -> None:
     half = np.array([0.3, 0.7, np.pi / 4])  # 1/2, 1/3 and 1/4 of the first fin's limits
     assert fin_energy(half, UPPER[0]) == pytest.approx(1 / 4 + 1 / 9 + 0.1 / 16 + 1 / 6)
-    assert fin_energy(half, UPPER[0], POWER_WEIGHTS) == pytest.approx(1 / 4 / 27)
+    assert fin_energy(half, UPPER[0], INERTIAL) == pytest.approx(1 / 4 / 27)
     assert fin_energy(half, UPPER[0], MIXED) == pytest.approx(
         0.7 / 4 + 1.3 / 9 + 0.2 / 16 + 0.4 / 6 + 0.9 / 4 / 27
     )
@@ -36,7 +37,7 @@ def test_limits_below_zero_count_by_their_size_and_none_is_divided_by_zero() -> 
     np.testing.assert_allclose(energy_scale(UPPER)[:, 2], [np.pi, 0.5, 1e-3])
 
 
-@pytest.mark.parametrize("weights", [DEFAULT_WEIGHTS, POWER_WEIGHTS, MIXED])
+@pytest.mark.parametrize("weights", [DEFAULT_WEIGHTS, INERTIAL, MIXED])
 def test_a_robots_energy_is_the_sum_over_fins(weights: EnergyWeights) -> None:
     command = commands(5)
     fins = np.stack([fin_energy(command[:, i], UPPER[i], weights) for i in range(3)], axis=1)
@@ -53,7 +54,7 @@ def test_single_precision_says_the_same() -> None:
     np.testing.assert_allclose(rough, EnergyMeter(UPPER, MIXED)(command), rtol=1e-5)
 
 
-@pytest.mark.parametrize("weights", [DEFAULT_WEIGHTS, POWER_WEIGHTS, MIXED])
+@pytest.mark.parametrize("weights", [DEFAULT_WEIGHTS, INERTIAL, MIXED])
 def test_slopes_are_those_of_differences(weights: EnergyWeights) -> None:
     upper = np.where(UPPER == 0.0, 1.0, UPPER)  # differences of huge energies are not exact
     command, meter = commands(4), EnergyMeter(upper, weights)

@@ -7,16 +7,18 @@ import pytest
 
 from finlab.layout import FinModelSpec, Limits, load_layout
 from finlab.physics import Plant, make_law, plant_of
-from finlab.physics.energy import DEFAULT_WEIGHTS, POWER_WEIGHTS, EnergyWeights, command_energy
+from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyWeights, command_energy
 from finlab.physics.objective import Name, Objective
 from tests.random_fins import KINDS, random_robot, write_fin_table
+
+INERTIAL = EnergyWeights(0.0, 0.0, 0.0, 0.0, 1.0)
 
 OBJECTIVES = [
     Objective(),
     Objective("power", copper_loss=1.5),
     Objective("effort"),
     Objective("effort", EnergyWeights(2.0, 0.5, 0.3, 0.7, 1.1)),
-    Objective("effort", POWER_WEIGHTS),
+    Objective("effort", INERTIAL),
 ]
 
 

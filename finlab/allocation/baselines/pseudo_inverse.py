@@ -4,7 +4,6 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.forces.envelopes import layout_envelopes
-from finlab.forces.fin_envelope import AMPLITUDE, FREQUENCY, LEAN
 from finlab.forces.force_space import planar_problem, polar
 from finlab.physics import Plant
 from finlab.physics.objective import Objective
@@ -40,10 +39,8 @@ class PseudoInverse:
         """Commands (N, n, 3) for targets (N, 6)."""
         force = (targets @ self.inverse).reshape(len(targets), self.plant.n_fins, 2)
         found = polar(self._forces, force)
-        direction, row = found.direction, found.row
-        command = np.stack([row[..., AMPLITUDE], row[..., FREQUENCY], direction - row[..., LEAN]], axis=-1)
-        wanted = found.size[..., None] * np.stack([np.cos(direction), np.sin(direction)], axis=-1)
-        return self._sharpened(self.plant.feasible(command), wanted)
+        point = np.stack([np.cos(found.direction), np.sin(found.direction)], axis=-1)
+        return self._sharpened(self.plant.feasible(found.command), found.size[..., None] * point)
 
     def _sharpened(self, command: Array, wanted: Array) -> Array:
         """Commands (N, n, 3) whose planar forces are nearer to those wanted (N, n, 2), by their frequency and

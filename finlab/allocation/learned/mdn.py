@@ -88,7 +88,7 @@ def _samples(prepared: Prepared, force: Array, target: Array, names: tuple[str, 
     """Proposed forces (K, 2, n) [N] for a single target (1, 6), normalized, as the cheapest commands with
     them."""
     command, _ = realize(prepared.planar, polar(prepared.planar, force.swapaxes(1, 2)))
-    command = prepared.commands.clamp(command)
+    command = prepared.commands.feasible(command)
     wrench = prepared.commands.wrench(command)
     error = np.linalg.norm(wrench - target, axis=-1)
     layout = prepared.plant.layout

@@ -49,11 +49,16 @@ class CommandProblem:
     """Lower limits (n, 3)."""
     upper: AnyArray
     """Upper limits (n, 3)."""
-    wraps: NDArray[np.bool_]
+    full_turn: NDArray[np.bool_]
     """True (n,) where the zero direction may turn a full circle."""
 
+    @property
+    def n_fins(self) -> int:
+        """How many fins there are."""
+        return len(self.lower)
+
     @cached_property
-    def span(self) -> AnyArray:
+    def width(self) -> AnyArray:
         """Ranges of the limits (n, 3)."""
         return self.upper - self.lower
 
@@ -68,7 +73,7 @@ class CommandProblem:
     def edges(self) -> tuple[AnyArray, AnyArray]:
         """Below the first and above the second (n, 3), a command is at its limit; full circles have none."""
         low, high = self.lower + AT_LIMIT, self.upper - AT_LIMIT
-        low[self.wraps, 2], high[self.wraps, 2] = -np.inf, np.inf
+        low[self.full_turn, 2], high[self.full_turn, 2] = -np.inf, np.inf
         return low, high
 
     @cached_property
@@ -96,12 +101,20 @@ class CommandProblem:
         rows, n, _ = command.shape
         return self.fin.force(command).reshape(rows, 3 * n) @ self.columns.reshape(3 * n, 6)
 
-    def clamp(self, command: AnyArray) -> AnyArray:
-        """Commands (..., n, 3) inside the limits, zero directions wrapped first; the type is kept."""
-        return self.clamp_in_place(command.copy())
+    def linearize(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
+        """Normalized wrenches (R, 6) of commands (R, n, 3) and their derivatives (R, 6, 3 n)."""
+        rows, n, _ = command.shape
+        force, slopes = self.fin.force_and_slopes(command)
+        wrench = force.reshape(rows, 3 * n) @ self.columns.reshape(3 * n, 6)
+        jacobian: AnyArray = np.matmul(slopes, self.columns).reshape(rows, 3 * n, 6)
+        return wrench, jacobian.swapaxes(1, 2)
 
-    def clamp_in_place(self, command: AnyArray) -> AnyArray:
-        """`clamp` that overwrites its argument."""
+    def feasible(self, command: AnyArray) -> AnyArray:
+        """Commands (..., n, 3) inside the limits, zero directions wrapped first; the type is kept."""
+        return self.make_feasible(command.copy())
+
+    def make_feasible(self, command: AnyArray) -> AnyArray:
+        """`feasible` that overwrites its argument."""
         limits = self.float32 if command.dtype == np.float32 else self.float64
         direction = command[..., 2]
         direction -= limits.seam
@@ -141,18 +154,18 @@ def refine(
     """
     damping_of = np.full(len(command), damping)
     # Where nothing better is found this is the answer: it must not lie outside by a turn or a rounding error.
-    command = problem.clamp(command)
+    command = problem.feasible(command)
     best = _evaluated(problem, target, command, None if steps else _NO_SLOPES)
     for step in range(steps):
         # (R, n, 3 commands, 6): change of the normalized wrench per unit of each limit range.
         jacobian = np.matmul(best.slopes, problem.columns)
-        jacobian *= problem.span[..., None]
+        jacobian *= problem.width[..., None]
         moved = _step(problem, best, jacobian, damping_of)
-        moved *= problem.span
+        moved *= problem.width
         moved += best.command
         # The last commands are only evaluated: no step follows.
         last = step == steps - 1
-        new = _evaluated(problem, target, problem.clamp_in_place(moved), best.slopes if last else None)
+        new = _evaluated(problem, target, problem.make_feasible(moved), best.slopes if last else None)
         worse = ~(new.error <= best.error)  # an error that is not a number is no improvement
         if worse.any():
             rows = [worse.reshape(-1, *(1,) * (part.ndim - 1)) for part in new]

@@ -134,7 +134,7 @@ class Pipeline:
         candidates = self._descend_from_previous(prepared, target, seeds, previous, fallback)
         candidates = self._trade_error_for_energy(prepared, target, candidates, previous)
         # Arcs that pass the seam are brought back inside the fin's own limits.
-        return candidates._replace(command=prepared.commands.clamp(candidates.command))
+        return candidates._replace(command=prepared.commands.feasible(candidates.command))
 
     def explore(self, prepared: Prepared, targets: Array, answer: RefinedCandidates) -> RefinedCandidates:
         """Many refined answers to one target (1, 6): the answer itself, then all that many seeds lead to.
@@ -181,7 +181,7 @@ class Pipeline:
         plan = plan_ahead(prepared, previous, target[0], candidates.command[0, 0], free.command[0])
         if plan is not None:
             near = limit_turn(prepared, previous, plan.ready, TURNS[1])
-            start = near.commands.clamp(unwrap_to_arc(near, plan.command))
+            start = near.commands.feasible(unwrap_to_arc(near, plan.command))
             fresh = np.full((1, 1), -1)
             planned = refine_candidates(near, target, start[None, None], fresh, SEARCH.plan_lm_steps)
             if planned.error[0, 0] <= max(exact, candidates.error[0, 0]):
@@ -203,7 +203,7 @@ class Pipeline:
         if previous is not None:
             prepared = limit_turn(prepared, previous, candidates.command[0, 0, :, 2], TURNS[0])
         rows, p, n, _ = candidates.command.shape
-        start = prepared.commands.clamp(candidates.command.reshape(-1, n, 3))
+        start = prepared.commands.feasible(candidates.command.reshape(-1, n, 3))
         found, energy = minimize_weighted_sum(
             prepared.commands, np.repeat(target, p, axis=0), start, effort, weight
         )
@@ -230,7 +230,7 @@ class Pipeline:
         steps += prepared.arcs is not None  # fins at stops are slower to mend
         command, origin = self._search(prepared, target, seeds, keep_mode)
         if known is not None:
-            within = prepared.commands.clamp(unwrap_to_arc(prepared, known))
+            within = prepared.commands.feasible(unwrap_to_arc(prepared, known))
             command, steps = np.concatenate([command, within[None]], axis=1), steps + 1
             origin = np.concatenate([origin, np.full((1, len(within)), -1)], axis=1)
         candidates = refine_candidates(prepared, target, command, origin, steps, keep_mode)

@@ -175,7 +175,7 @@ def evaluate(
 
 def _planar_force(prepared: Prepared, command: Array) -> Array:
     """Planar forces (..., n, 2) [N] of commands."""
-    return prepared.plant.force(prepared.commands.clamp(command))[..., 1:]
+    return prepared.plant.force(prepared.commands.feasible(command))[..., 1:]
 
 
 def _columns(planar: PlanarProblem) -> Array:
@@ -239,7 +239,7 @@ def turns_beyond(
     Only fins that work have to point anywhere; what a fin turns at rest is spread over its rest.
     """
     middle, half = prepared.planar.fins.middle, prepared.planar.fins.half
-    wraps = prepared.commands.wraps
+    wraps = prepared.commands.full_turn
     offset = wrapped(direction - middle)
     stopped = np.where(wraps | ~works, 0.0, np.maximum(np.abs(offset) - half, 0.0))
     tick = np.arange(1, direction.shape[1] + 1)[:, None]

@@ -104,7 +104,7 @@ def improve(
     """Refine some rows of the candidates further, in place, together with new starts (rows, S, n, 3)."""
     command, origin = candidates.command[rows], candidates.origin[rows]
     if starts is not None:
-        command = np.concatenate([command, prepared.commands.clamp(starts)], axis=1)
+        command = np.concatenate([command, prepared.commands.feasible(starts)], axis=1)
         origin = np.concatenate([origin, np.full(starts.shape[:2], -1)], axis=1)
     longer = refine_candidates(prepared, target[rows], command, origin, steps)
     for kept, new in zip(candidates, longer, strict=True):

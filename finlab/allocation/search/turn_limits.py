@@ -35,21 +35,21 @@ def limit_turn(prepared: Prepared, previous: Array, aim: Array, width: float) ->
     lower, upper = prepared.commands.lower.copy(), prepared.commands.upper.copy()
     direction = np.where(known, direction, 0.0)
     # A fin that turns fully may pass the seam at +-pi: its arc is kept in one piece and wrapped at the end.
-    free = prepared.commands.wraps
+    free = prepared.commands.full_turn
     inside = np.clip(direction, lower[:, 2], upper[:, 2])
     low = np.where(free, direction - width, np.maximum(inside - width, lower[:, 2]))
     high = np.where(free, direction + width, np.minimum(inside + width, upper[:, 2]))
     lower[:, 2] = np.where(known, low, lower[:, 2])
     upper[:, 2] = np.where(known, high, upper[:, 2])
-    wraps = free & ~known
+    full_turn = free & ~known
     ahead = np.where(free, direction + wrapped(aim - direction), aim)
     fins = prepared.planar.fins
     middle, half = 0.5 * (lower[:, 2] + upper[:, 2]), 0.5 * (upper[:, 2] - lower[:, 2])
     planar = prepared.planar._replace(
-        fins=fins.within(middle + fins.lean(middle), np.where(wraps, np.pi, half)),
+        fins=fins.within(middle + fins.lean(middle), np.where(full_turn, np.pi, half)),
         idle_direction=np.clip(ahead, lower[:, 2], upper[:, 2]),
     )
-    commands = replace(prepared.commands, lower=lower, upper=upper, wraps=wraps)
+    commands = replace(prepared.commands, lower=lower, upper=upper, full_turn=full_turn)
     return prepared._replace(planar=planar, commands=commands, arcs=None)
 
 
@@ -65,4 +65,4 @@ def planar_force(prepared: Prepared, command: Array) -> Array:
     """Planar forces (2, n) [N] of a command (n, 3), horizontal and vertical; NaN commands count as rest."""
     problem = prepared.commands
     safe = np.where(np.isfinite(command), command, problem.lower)
-    return np.asarray(prepared.plant.force(problem.clamp(safe))[:, 1:].T)
+    return np.asarray(prepared.plant.force(problem.feasible(safe))[:, 1:].T)

@@ -69,7 +69,7 @@ def test_finds_the_way_back_from_nearby(search: SearchAllocator) -> None:
     middle = problem.lower + (0.3 + 0.4 * np.random.default_rng(0).uniform(size=(30, 5, 3))) * (
         problem.upper - problem.lower
     )
-    start = problem.clamp(middle + 0.02 * np.random.default_rng(1).normal(size=middle.shape))
+    start = problem.feasible(middle + 0.02 * np.random.default_rng(1).normal(size=middle.shape))
     target = problem.wrench(middle)
     assert error(problem, target, start).min() > 1e-3
     refined = refine(problem, target, start, 12)
@@ -144,7 +144,7 @@ def test_clamp_wraps_and_clips_in_either_precision(kind: type, search: SearchAll
     limits = Limits((0.1, 0.5), (0.2, 1.0), (0.5, 2.0))
     problem = problem_of(search, Layout("arc", (Fin("a", SHARED, 0.0, limits), Fin("b", (0, 0, 0), 1.0))))
     command = np.array([[0.7, 0.0, 1.0 - 2 * math.pi], [0.3, 1.0, 7.0]], dtype=kind)
-    clamped = problem.clamp(command)
+    clamped = problem.feasible(command)
     assert clamped.dtype == kind
     np.testing.assert_allclose(clamped, [[0.5, 0.2, 1.0], [0.3, 1.0, 7.0 - 2 * math.pi]], rtol=1e-6)
 
@@ -181,7 +181,7 @@ def test_limits_as_each_type_sees_them(mixed: CommandProblem, kind: type[np.floa
         [[(9.0, -1.0, 4.0), (0.2, 0.4, 1.9 + 2 * math.pi)], [(0.3, 1.0, -4.0), (0.2, 0.4, 4.0)]]
     )
     given = command.astype(kind)
-    found = mixed.clamp(given)
+    found = mixed.feasible(given)
     a, f = mixed.upper[0, 0], mixed.lower[0, 1]
     turn = 2 * math.pi
     expected = [[(a, f, 4.0 - turn), (0.2, 0.4, 1.7)], [(0.3, 1.0, turn - 4.0), (0.2, 0.4, 1.7)]]

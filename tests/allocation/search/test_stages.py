@@ -87,7 +87,7 @@ def test_arcs_and_what_a_direction_costs(layout: Layout, prepared: Prepared, for
     for i, fin in enumerate(layout.fins):
         low, high = fin.limits.lower[2], fin.limits.upper[2]
         full = high - low >= math.tau - 1e-9
-        assert prepared.commands.wraps[i] == full
+        assert prepared.commands.full_turn[i] == full
         if fin.model.type in ("drag", "lighthill"):
             assert planar.fins.middle[i] == pytest.approx(0.5 * (low + high))
             assert planar.fins.half[i] == pytest.approx(math.pi if full else 0.5 * (high - low))
@@ -96,7 +96,7 @@ def test_arcs_and_what_a_direction_costs(layout: Layout, prepared: Prepared, for
         upper = layout.upper[i : i + 1]
         extra = float(fin_energy(raised, upper)[0] - fin_energy(flat, upper)[0])
         assert paid.direction_cost[i] * (0.5 * high) ** 2 == pytest.approx(extra)
-    assert planar.fins.turns_fully == prepared.commands.wraps.all()
+    assert planar.fins.turns_fully == prepared.commands.full_turn.all()
 
 
 def test_each_objective_has_its_own_cost(
@@ -161,14 +161,14 @@ def test_arcs_are_narrowed_for_fins_that_point_somewhere(prepared: Prepared) -> 
     previous = drawn(prepared)
     previous[0] = np.nan
     near = limit_turn(prepared, previous, previous[:, 2], TURNS[0])
-    assert near.commands.wraps[0] == prepared.commands.wraps[0]
-    assert not near.commands.wraps[1:].any()
+    assert near.commands.full_turn[0] == prepared.commands.full_turn[0]
+    assert not near.commands.full_turn[1:].any()
     assert near.planar.fins.half[0] == prepared.planar.fins.half[0]
     assert (near.planar.fins.half[1:] <= TURNS[0] + 1e-12).all()
     assert not near.planar.fins.turns_fully
     middle = (near.planar.fins.middle - previous[:, 2])[1:]
     assert (np.abs(middle) <= TURNS[0]).all()
-    if prepared.commands.wraps.all():
+    if prepared.commands.full_turn.all():
         np.testing.assert_allclose(near.planar.fins.half[1:], TURNS[0])
         np.testing.assert_allclose(middle, 0.0, atol=1e-12)
     assert limit_turn(prepared, previous, previous[:, 2], math.pi) is prepared

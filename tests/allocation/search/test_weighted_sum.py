@@ -9,7 +9,9 @@ from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.errors import AllocationError
 from finlab.layout import random_layout
 from finlab.physics import Plant
-from finlab.physics.energy import POWER_WEIGHTS, command_energy
+from finlab.physics.energy import EnergyWeights, command_energy
+
+INERTIAL = EnergyWeights(0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def cases(limits: str, count: int = 8):  # type: ignore[no-untyped-def]
@@ -80,12 +82,12 @@ def test_inertial_effort_is_weighed_too() -> None:
     """Also where the effort is no quadratic form: more weight, less effort, more error."""
     layout, target = next(iter(cases("nominal")))
     answers = [
-        load_allocator(objective="effort", energy_weights=POWER_WEIGHTS, energy_tradeoff=w).allocate(
+        load_allocator(objective="effort", energy_weights=INERTIAL, energy_tradeoff=w).allocate(
             layout, target
         )
         for w in (0.0, 1e-2, 1.0)
     ]
-    effort = [float(command_energy(answer.command, layout.upper, POWER_WEIGHTS)) for answer in answers]
+    effort = [float(command_energy(answer.command, layout.upper, INERTIAL)) for answer in answers]
     errors = [answer.err_norm for answer in answers]
     assert errors == sorted(errors) and effort == sorted(effort, reverse=True)
     assert errors[0] < 1e-3 < errors[-1] and effort[-1] < 0.9 * effort[0]
