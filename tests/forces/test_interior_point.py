@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.optimize import minimize as scipy_minimize
 
 from finlab.forces.fin_sets import FinSets
 from finlab.forces.interior_point import minimize
@@ -67,3 +68,40 @@ def test_robots_without_anything_to_push_with() -> None:
             force, multiplier = minimize(dead, wanted, c)
             assert np.isfinite(force).all() and np.isfinite(multiplier).all()
             assert (np.linalg.norm(force, axis=-1) <= dead.radius * (1 + 1e-9)).all()
+
+
+@pytest.mark.parametrize("far", [0.3, 3.0, 30.0])
+def test_uneven_fins_within_their_polygons_against_scipy(far: float) -> None:
+    """Polygons off their centres, in discs that cut some corners: SciPy finds nothing better."""
+    rng, count, n = np.random.default_rng(5), 12, 3
+    side = 2.0 * np.pi * np.arange(count) / count
+    normals = np.stack([np.cos(side), np.sin(side)])
+    rim = 0.75 + 0.2 * np.cos(side - rng.uniform(0.0, 6.0, (6, n, 1)))
+    columns = rng.standard_normal((6, n, 2, 6))
+    radius = rng.uniform(0.5, 2.0, (6, n))
+    sets = FinSets(columns, radius, np.zeros((6, n)), np.full((6, n), np.pi), rim)
+    wanted, bend = far * rng.standard_normal((6, 6)), 0.1
+    found = minimize(sets, wanted, np.ones(6), np.full((6, n), bend))
+    for row in range(6):
+        most = (rim[row] * radius[row, :, None]).ravel()
+
+        def value(flat: Array, row: int = row) -> float:
+            missed = wanted[row] - flat @ columns[row].reshape(2 * n, 6)
+            return float(0.5 * missed @ missed + 0.5 * bend * flat @ flat)
+
+        def room(flat: Array, row: int = row, most: Array = most) -> Array:
+            force = flat.reshape(n, 2)
+            inside = radius[row] ** 2 - (force**2).sum(1)
+            return np.concatenate([most - (force @ normals).ravel(), inside])
+
+        own = found.force[row].ravel()
+        assert room(own).min() > -1e-7
+        best = scipy_minimize(
+            value,
+            0.0 * own,
+            method="SLSQP",
+            constraints={"type": "ineq", "fun": room},
+            options={"ftol": 1e-12},
+        )
+        assert value(own) <= best.fun * (1.0 + 1e-6) + 1e-9  # it may stop early, but not beyond its limits
+        assert room(best.x).min() > -1e-6
