@@ -93,9 +93,6 @@ def cost_bound(problem: PlanarProblem, target: Array, multiplier: Array) -> floa
     inverse = np.eye(6) * float(here @ here) / max(abs(value), 1e-12)
     for _ in range(ROUNDS):
         step = inverse @ slope
-        if slope @ step <= 0.0:
-            inverse = np.eye(6) * float(here @ here) / max(abs(value), 1e-12)
-            step = inverse @ slope
         for _ in range(20):
             there = here + step
             new_value, new_slope = dual(there)
