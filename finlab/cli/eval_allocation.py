@@ -95,19 +95,20 @@ def cost(
         objectives: power, effort or both.
         starts: random starts of IPOPT per target; robots with tables get twice as many, of SLSQP.
     """
-    from finlab.evaluation.experiments.cost import cost_report, cost_rows, cost_sets, parse_objectives
+    from finlab.evaluation.experiments.cost import cost_rows, cost_sets, parse_objectives
     from finlab.evaluation.method_specs import load_method_specs
+    from finlab.evaluation.report.sections.cost import cost_blocks
 
     check_positive(starts=starts)
     aims, allocators = parse_objectives(objectives), load_method_specs(methods, run.checkpoint)
-    rows = []
-    for number, name in enumerate(cost_sets(cases.split)):
-        drawn = {"layouts": cases.layouts, "targets": cases.targets, "seed": cases.seed}
-        for aim in aims:
-            found = cost_rows(name, allocators, aim, n_starts=starts, **drawn)
-            print(("\n" if number or aim != aims[0] else "") + cost_report(found))
-            rows += found
-    run.write(rows=rows)
+    drawn = {"layouts": cases.layouts, "targets": cases.targets, "seed": cases.seed}
+    rows = [
+        row
+        for name in cost_sets(cases.split)
+        for aim in aims
+        for row in cost_rows(name, allocators, aim, n_starts=starts, **drawn)
+    ]
+    run.show(*cost_blocks(rows, starts), rows=rows)
 
 
 def network(
@@ -131,7 +132,8 @@ def network(
     """
     from finlab.allocation.methods import load_allocator
     from finlab.evaluation.experiments.cost import parse_objectives
-    from finlab.evaluation.experiments.network import network_report, network_rows
+    from finlab.evaluation.experiments.network import network_rows
+    from finlab.evaluation.report.sections.network import network_blocks
 
     check_positive(layouts=layouts, targets=targets, candidates=candidates)
     counts, aims = parse_counts(fins), parse_objectives(objectives)
@@ -139,8 +141,7 @@ def network(
     allocator = load_allocator("mdn", checkpoint=run.checkpoint).with_settings(**options)
     drawn = {"layouts": layouts, "targets": targets, "seed": seed}
     rows = [row for aim in aims for row in network_rows(allocator, counts, aim, **drawn)]
-    print(network_report(rows, allocator.settings.n_candidates))
-    run.write(rows=rows)
+    run.show(*network_blocks(rows, allocator.settings.n_candidates), rows=rows)
 
 
 def ablation(
@@ -155,11 +156,12 @@ def ablation(
         candidates: candidates drawn per target.
         temperature: of the draw.
     """
-    from finlab.evaluation.experiments.ablation import ablation_report, ablation_rows
+    from finlab.evaluation.experiments.ablation import ablation_rows
+    from finlab.evaluation.report.sections.studies import ablation_blocks
 
     options = {"n_candidates": candidates, "temperature": temperature, "checkpoint": run.checkpoint}
     rows = ablation_rows(cases.draw(), seed=cases.seed, **options)
-    run.show(ablation_report(rows), rows=rows)
+    run.show(*ablation_blocks(rows, candidates, temperature), rows=rows)
 
 
 def temperature(
@@ -172,11 +174,12 @@ def temperature(
     Args:
         candidates: candidates drawn per target.
     """
-    from finlab.evaluation.experiments.temperature import temperature_report, temperature_rows
+    from finlab.evaluation.experiments.temperature import temperature_rows
+    from finlab.evaluation.report.sections.studies import temperature_blocks
 
     check_positive(candidates=candidates)
     rows = temperature_rows(cases.draw(), checkpoint=run.checkpoint, n_candidates=candidates, seed=cases.seed)
-    run.show(temperature_report(rows), rows=rows)
+    run.show(*temperature_blocks(rows, candidates=candidates), rows=rows)
 
 
 def latency(
@@ -198,16 +201,18 @@ def latency(
         robots: robots with fins that method search has not seen, of each kind of fin.
         seed: draws layouts and targets.
     """
-    from finlab.evaluation.experiments.first_answers import first_answer_report, first_answer_rows
-    from finlab.evaluation.experiments.latency import latency_cases, latency_report, latency_rows, machine
+    from finlab.evaluation.experiments.first_answers import first_answer_rows
+    from finlab.evaluation.experiments.latency import latency_cases, latency_rows, machine
+    from finlab.evaluation.report.sections.studies import first_answer_blocks, latency_blocks
 
     check_positive(calls=calls, robots=robots)
     cases = latency_cases(fins, seed)
     rows = latency_rows(run.methods(methods), cases, n_calls=calls, budget_s=budget)
     first = first_answer_rows(run.method("search"), robots=robots, seed=seed)
     described = machine()
-    text = f"{latency_report(rows, described)}\n\n{first_answer_report(first)}"
-    run.show(text, rows=rows, first_answers=first, machine=described)
+    on = "Machine: " + ", ".join(f"{key} {value}" for key, value in described.items())
+    blocks = (*latency_blocks(rows, fins), *first_answer_blocks(first), on)
+    run.show(*blocks, rows=rows, first_answers=first, machine=described)
 
 
 def steadiness(
@@ -225,12 +230,13 @@ def steadiness(
         ticks: length of a path; 600 are a minute.
         seed: draws the paths; same numbers, same paths.
     """
-    from finlab.evaluation.experiments.steadiness import steadiness_report, steadiness_rows
+    from finlab.evaluation.experiments.steadiness import steadiness_rows
+    from finlab.evaluation.report.sections.questions import steadiness_blocks
 
     check_positive(paths=paths, ticks=ticks - 1)
     robots = open_layouts(layouts)
     rows = steadiness_rows(run.method("search"), robots, n_paths=paths, ticks=ticks, seed=seed)
-    run.show(steadiness_report(rows), rows=rows)
+    run.show(*steadiness_blocks(rows, run.objective), rows=rows)
 
 
 def modes(
@@ -245,11 +251,13 @@ def modes(
         method: search or mdn; with power for the objective there is but one way.
         starts: random starts of the ground truth, per target.
     """
-    from finlab.evaluation.experiments.mode_coverage import mode_report, mode_rows
+    from finlab.evaluation.experiments.mode_coverage import mode_rows
+    from finlab.evaluation.report.sections.questions import mode_blocks
 
     check_positive(starts=starts)
     rows = mode_rows(run.method(method), cases.draw(), n_starts=starts, seed=cases.seed)
-    run.show(mode_report(rows, starts), rows=rows)
+    about = {"method": method, "objective": run.objective, "split": cases.split}
+    run.show(*mode_blocks(rows, starts, **about), rows=rows)
 
 
 def unreachable(
@@ -261,11 +269,12 @@ def unreachable(
         layouts: random layouts of 2 to 8 fins per kind of limits, with one target each.
         seed: draws layouts and targets.
     """
-    from finlab.evaluation.experiments.unreachable import unreachable_report, unreachable_rows
+    from finlab.evaluation.experiments.unreachable import unreachable_rows
+    from finlab.evaluation.report.sections.questions import unreachable_blocks
 
     check_positive(layouts=layouts)
     rows = unreachable_rows(run.method("search"), n_layouts=layouts, seed=seed)
-    run.show(unreachable_report(rows), rows=rows)
+    run.show(*unreachable_blocks(rows), rows=rows)
 
 
 def fuzz(
@@ -300,5 +309,6 @@ def fuzz(
         seed=seed,
         first_robot=first,
     )
-    run.show(fuzz_report(counts), rows=[count.row() for count in counts])
+    print(fuzz_report(counts))
+    run.write(rows=[count.row() for count in counts])
     return None if all(count.clean for count in counts) else 1

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from finlab.evaluation.experiments.closed_loop_runs import Run as LoggedRun
     from finlab.evaluation.experiments.closed_loop_runs import Scenario
     from finlab.evaluation.plots.style import Picture
+    from finlab.evaluation.report.document import Block
     from finlab.evaluation.splits import Case
     from finlab.layout import Layout
 
@@ -68,10 +69,12 @@ class Output:
         if self.json is not None:
             self.json.write_text(json_text.dumps(content, indent=1, allow_nan=False) + "\n", "utf-8")
 
-    def show(self, text: str, **content: Any) -> None:
-        """Write the rows, and print the tables."""
+    def show(self, *blocks: Block, **content: Any) -> None:
+        """Write the rows, and print words and tables as the report has them."""
+        from finlab.evaluation.report.text import to_text
+
         self.write(**content)
-        print(text)
+        print(to_text(*blocks))
 
 
 MOST_FINS = 16

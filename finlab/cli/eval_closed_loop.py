@@ -26,12 +26,14 @@ def trajectory(
     """
     from finlab.evaluation.experiments import trajectory_and_velocity as experiment
     from finlab.evaluation.plots.closed_loop_experiments import draw_layouts, track_of
+    from finlab.evaluation.report.sections.closed_loop import INTRODUCTION, trajectory_blocks
     from finlab.sim import make_trajectory
 
     robots, path = open_layouts(layouts), make_trajectory(trajectory)
     found = loop.swim(experiment.trajectory_scenarios(robots, path), run)
     rows = experiment.trajectory_rows(found)
-    run.show(experiment.trajectory_report(rows, path, loop.plant), rows=rows)
+    about = f"Trajectory {path.name}: {path.length_m:.1f} m in {path.duration_s:.0f} s; plant {loop.plant}."
+    run.show(*INTRODUCTION, *trajectory_blocks(rows), about, rows=rows)
     loop.save("trajectory", lambda: draw_layouts([(key, track_of(log)) for key, log in found], rows))
 
 
@@ -48,14 +50,16 @@ def faults(
         trajectory: circle, lissajous, square, or a CSV file with the columns t, x, y, z.
     """
     from finlab.cli.inputs import open_robot
-    from finlab.evaluation.experiments.faults import all_faults, fault_report, fault_rows, fault_scenarios
+    from finlab.evaluation.experiments.faults import all_faults, fault_rows, fault_scenarios
     from finlab.evaluation.plots.closed_loop_experiments import draw_faults
+    from finlab.evaluation.report.sections.closed_loop import INTRODUCTION, fault_blocks
     from finlab.sim import make_trajectory
 
     robot, path = open_robot(layout).layout, make_trajectory(trajectory)
     cases = all_faults(robot, path.duration_s / 2)
     rows = fault_rows(cases, loop.swim(fault_scenarios(robot, path, cases), run))
-    run.show(fault_report(rows, robot, path, loop.plant), rows=rows)
+    about = f"Layout {robot.name}, {path.name} of {path.duration_s:.0f} s; plant {loop.plant}."
+    run.show(*INTRODUCTION, *fault_blocks(rows), about, rows=rows)
     loop.save("faults", lambda: draw_faults(rows))
 
 
@@ -77,6 +81,7 @@ def velocity(
     from finlab.errors import DataError
     from finlab.evaluation.experiments import trajectory_and_velocity as experiment
     from finlab.evaluation.plots.closed_loop_experiments import draw_velocity
+    from finlab.evaluation.report.sections.closed_loop import INTRODUCTION, velocity_blocks
 
     least = experiment.SETTLED_S
     if not least < duration <= 3600.0:
@@ -84,5 +89,6 @@ def velocity(
     robot = open_robot(layout).layout
     found = loop.swim(experiment.velocity_scenarios(robot, duration_s=duration), run)
     rows = experiment.velocity_rows(found)
-    run.show(experiment.velocity_report(rows, baseline, robot, loop.plant), rows=rows)
+    about = f"Layout {robot.name}; plant {loop.plant}."
+    run.show(*INTRODUCTION, *velocity_blocks(rows, baseline), about, rows=rows)
     loop.save("velocity", lambda: draw_velocity(found))

@@ -40,10 +40,11 @@ def training(
         targets: targets on each layout.
         seed: draws data, weights, layouts and targets.
     """
-    from finlab.evaluation.experiments.training_study import training_report, training_row
+    from finlab.evaluation.experiments.training_study import training_row
     from finlab.evaluation.report.jobs import run_jobs
     from finlab.evaluation.report.plan import training_jobs
     from finlab.evaluation.report.provenance import source_commit
+    from finlab.evaluation.report.sections.studies import training_blocks
     from finlab.evaluation.splits import make_split
     from finlab.training.presets import PAPER_RECIPES, get_recipe
 
@@ -56,7 +57,7 @@ def training(
     jobs = training_jobs(settings, out)
     run_jobs(list(jobs.values()), out, commit=source_commit(), processes=0)
     rows = [training_row(change, job.result(out)[0]) for (change,), job in jobs.items()]
-    output.show(training_report(rows, preset, steps, batch_size), rows=rows)
+    output.show(*training_blocks(rows, settings), rows=rows)
 
 
 def report(

@@ -102,15 +102,10 @@ def _loss_row(loss: Loss, worst: bool) -> tuple[str, ...]:
 
 def table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
     """Rows under a head; the first column and a last one of words are flush left, numbers are flush right."""
-    widths = [max(len(row[k]) for row in [head, *rows]) for k in range(len(head))]
-    words = {0, len(head) - 1} if head[-1] in ("lost", "model") else {0}
-    return [
-        "  ".join(
-            cell.ljust(width) if k in words else cell.rjust(width)
-            for k, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in [head, *rows]
-    ]
+    from finlab.evaluation.statistics.tables import aligned
+
+    words = [k == 0 or name in ("lost", "model") for k, name in enumerate(head)]
+    return aligned(head, rows, words).splitlines()
 
 
 def _axes() -> tuple[str, ...]:

@@ -14,12 +14,11 @@ import numpy as np
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import load_allocator
 from finlab.evaluation.experiments.wrench_tracking import score
-from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.evaluation.statistics.records import Columns, columns_of_records, join_records
-from finlab.evaluation.statistics.tables import Row, text_table
+from finlab.evaluation.statistics.tables import Row
 
 VARIANTS: dict[str, dict[str, Any]] = {
     "mean_only": {"mean_only": True},
@@ -111,20 +110,3 @@ def ablation_rows(cases: Sequence[Case], *, seed: int = 0, **options: Any) -> li
         for pair in progress(list(product(VARIANTS, REFINEMENTS)), "row")
         for row in variant_rows(*pair, run_variant(ablation_method(*pair, **options), cases, seed=seed))
     ]
-
-
-def paper_ablation_rows() -> list[Row]:
-    """The printed rows; the paper does not say which model scored them."""
-    printed = paper_figures()["ablation"]
-    return [{"variant": name, "scored_by": "(printed in the paper)", **row} for name, row in printed.items()]
-
-
-def ablation_report(rows: Sequence[Row]) -> str:
-    """Each variant's rows beside the paper's, as text."""
-    order = list(VARIANTS)
-    together = sorted([*rows, *paper_ablation_rows()], key=lambda row: order.index(row["variant"]))
-    note = (
-        "time_s: mean of single calls. err_norm_mean_interval: where a rerun with another seed lands, 95 "
-        "times of 100. The paper does not say which model scored its figures."
-    )
-    return f"{text_table(together)}\n\n{note}"

@@ -149,15 +149,3 @@ def rows_and_totals(
         {key: label, "method": method, "runs": len(rows), **over_seeds(rows)}
         for (label, method), rows in groups.items()
     ]
-
-
-def spread(row: Row, key: str, digits: int = 3) -> str:
-    """Mean of a number and, where it is known, its spread as text."""
-    std = row.get(f"{key}_std")
-    return f"{row[key]:.{digits}f}" + ("" if std is None else f" +- {std:.{digits}f}")
-
-
-def shown_errors(row: Row) -> Row:
-    """The three errors as columns for people, of runs or as the paper prints them."""
-    labels = {"ate": "ATE [m]", "rte": "RTE [m]", "depth_rmse": "depth RMSE [m]"}
-    return {label: spread(row, key) for key, label in labels.items()}

@@ -3,7 +3,7 @@
 Both sides must deliver the wrench; a target that either of them misses is counted and left out of the ratio.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import SPLITS, Case, make_split
 from finlab.evaluation.statistics.bootstrap import ratio_interval
 from finlab.evaluation.statistics.recheck import known_by_hand, wrench_by_hand
-from finlab.evaluation.statistics.tables import Row, text_table
+from finlab.evaluation.statistics.tables import Row
 from finlab.evaluation.symmetric_cases import SETS, symmetric_cases
 from finlab.physics import plant_of
 from finlab.physics.objective import Name, Objective
@@ -98,18 +98,6 @@ def cost_rows(
             values = (part[chosen] for part in (cost, error, by_hand, np.concatenate(best), group))
             rows.append(about | _figures(*values))
     return rows
-
-
-def cost_report(rows: Sequence[Row]) -> str:
-    """The rows of one set and objective as a table, with what its columns mean."""
-    unit = UNITS[rows[0]["objective"]]
-    note = (
-        f"cost: mean [{unit}] under exact tracking (normalized error up to {TRACKED:g}); cost_ratio: the sum "
-        "over that of the best of the random starts; ratio_p95, ratio_max: of single targets; cheaper: share "
-        "of targets where the method beats all starts; win_error: the largest error among those, by the drag "
-        "law written out by hand."
-    )
-    return f"{text_table(rows)}\n\n{note}"
 
 
 _Answers = tuple[Array, Array, Array]

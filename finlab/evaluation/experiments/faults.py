@@ -13,10 +13,7 @@ from finlab.evaluation.experiments.closed_loop_runs import (
     follow_row,
     group_runs,
     over_seeds,
-    shown_errors,
 )
-from finlab.evaluation.paper_figures import paper_figures
-from finlab.evaluation.statistics.tables import text_table
 from finlab.layout import Layout
 from finlab.sim import Trajectory
 
@@ -106,32 +103,3 @@ def fault_verdict(row: Row) -> str:
     if growth is None or row["kind"] == HEALTHY:
         return ""
     return f"{'within' if growth <= ALLOWED else 'beyond'} {ALLOWED}"
-
-
-def fault_report(rows: Sequence[Row], layout: Layout, trajectory: Trajectory, plant: str) -> str:
-    """What was not swum and why, the table, and the paper's."""
-    why = "Not swum, since the fins that are left cannot give surge, heave and yaw independently"
-    hopeless = "".join(f"{why}: {row['fault']}.\n" for row in rows if not row["controllable"])
-    printed = [
-        {"fault": fault.replace("_", " "), "method": method, **shown_errors(values)}
-        for fault, methods in paper_figures()["fault_tolerance"].items()
-        for method, values in methods.items()
-    ]
-    table = text_table([_shown(row) for row in rows if row["controllable"]])
-    return (
-        (f"{hopeless}\n" if hopeless else "") + f"{table}\n\n"
-        f"Layout {layout.name}, {trajectory.name} of {trajectory.duration_s:.0f} s, plant {plant}.\n"
-        f"In the paper, in a pool [m]:\n{text_table(printed)}"
-    )
-
-
-def _shown(row: Row) -> Row:
-    """A row for people."""
-    ratio = row.get("ate_over_healthy")
-    return {
-        "fault": row["fault"],
-        "method": row["method"],
-        **shown_errors(row),
-        "ATE / healthy": "" if ratio is None else f"{ratio:.2f}",
-        "tracked": "yes" if row["tracked"] else "no",
-    }

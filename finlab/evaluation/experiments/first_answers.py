@@ -13,7 +13,7 @@ import numpy as np
 from finlab.allocation.allocator import Allocator
 from finlab.evaluation.noisy_tables import noisy_table
 from finlab.evaluation.progress import progress
-from finlab.evaluation.statistics.tables import Row, text_table
+from finlab.evaluation.statistics.tables import Row
 from finlab.layout import Fin, Layout, load_layout, random_layout
 from finlab.layout.random_fins import FAMILIES, random_fin_model
 
@@ -47,17 +47,6 @@ def first_answer_rows(allocator: Allocator, *, robots: int, seed: int) -> list[R
         row = {"fins": kind, "new_models": models, "robots": robots}
         rows.append({**row, "first_ms": float(first.max()), "again_ms": float(again.max())})
     return rows
-
-
-def first_answer_report(rows: Sequence[Row]) -> str:
-    """The rows as a table, with what its columns mean."""
-    note = (
-        f"Robots with {N_FINS} fins of new_models models that nobody has seen. first_ms: until the first "
-        "answer, the compilation of the fins included; again_ms: until the first answer of another robot "
-        "with the same fins. The slowest robot of each row, in the processor's time, which other work on the "
-        "machine hardly changes."
-    )
-    return f"{text_table(rows)}\n\n{note}"
 
 
 def _new_fin(rng: np.random.Generator, kind: str, name: str) -> Fin:

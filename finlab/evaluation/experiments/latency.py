@@ -17,7 +17,7 @@ from finlab.errors import DataError
 from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case, make_split
 from finlab.evaluation.statistics.bootstrap import quantile_interval
-from finlab.evaluation.statistics.tables import Row, text_table
+from finlab.evaluation.statistics.tables import Row
 
 REFERENCE = "search"
 """The method that the others are compared with, where it takes part."""
@@ -106,10 +106,3 @@ def _processor() -> str:
         if named:
             return named[1].strip()
     return platform.processor() or platform.machine()
-
-
-def latency_report(rows: Sequence[Row], described: Mapping[str, str]) -> str:
-    """The table and the machine, as text."""
-    on = ", ".join(f"{key} {value}" for key, value in described.items())
-    how = f"Whole calls of allocate, one target each, after {WARM_UP} uncounted ones on each layout."
-    return f"{text_table(rows)}\n\n{how}\nMachine: {on}."

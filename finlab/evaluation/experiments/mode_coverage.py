@@ -17,7 +17,7 @@ from finlab.arrays import Array
 from finlab.evaluation.cheapest_commands import CheapestCommands
 from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case
-from finlab.evaluation.statistics.tables import Row, text_table
+from finlab.evaluation.statistics.tables import Row
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.physics.objective import Objective
@@ -49,18 +49,6 @@ def mode_rows(
         {"fins": fins, "n": len(parts)} | {key: float(np.mean([p[key] for p in parts])) for key in parts[0]}
         for fins, parts in sorted(found.items())
     ]
-
-
-def mode_report(rows: Sequence[Row], n_starts: int) -> str:
-    """The rows as a table, with what its columns mean."""
-    note = (
-        f"Ground truth: {n_starts} random starts of IPOPT per target, cost under exact tracking by the fins' "
-        f"own models. modes: within {CHEAP:g} of the least cost, by the allocator (modes) and by the starts "
-        "(truth); coverage: share of those of the starts that the allocator has too; truth_coverage: the "
-        "reverse; best_cost: the allocator's least cost over that of the starts; distance: energy distance "
-        "between the two sets of forces over twice their mean size, 0 for the same set."
-    )
-    return f"{text_table(rows)}\n\n{note}"
 
 
 def _objective(allocator: Allocator) -> Objective:

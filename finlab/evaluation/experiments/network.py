@@ -17,7 +17,7 @@ from finlab.allocation.search.prepared import Prepared, resting_fins, resting_se
 from finlab.arrays import Array
 from finlab.evaluation.progress import progress
 from finlab.evaluation.statistics.bootstrap import ratio_interval
-from finlab.evaluation.statistics.tables import Row, text_table
+from finlab.evaluation.statistics.tables import Row
 from finlab.inference.threads import single_threaded_products
 from finlab.layout import Layout, random_layout
 from finlab.layout.random_fins import random_fin_model
@@ -79,18 +79,6 @@ def network_rows(
         group = np.repeat(np.arange(layouts), targets)
         rows += [_row(count, objective, name, found, group) for name in STARTS]
     return rows
-
-
-def network_report(rows: Sequence[Row], n_candidates: int) -> str:
-    """The rows as a table, with what they mean."""
-    meaning = "\n".join(f"{name}: {what}" for name, what in STARTS.items())
-    note = (
-        f"{n_candidates} seeds where there are several. cost_ratio: sum of costs over that of all, where "
-        f"both deliver the target (normalized error up to {TRACKED:g}), with where a rerun lands 95 times of "
-        "100; dearer: share of targets that cost over 1 % more than by all; ms: median of the processor's "
-        "time for single calls, which other work on the machine hardly changes."
-    )
-    return f"{text_table(rows)}\n\n{meaning}\n\n{note}"
 
 
 def _robot(rng: np.random.Generator, n_fins: int, mixed: bool) -> Layout:

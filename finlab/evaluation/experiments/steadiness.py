@@ -13,7 +13,7 @@ import numpy as np
 from finlab.allocation import Allocation, Allocator
 from finlab.arrays import Array
 from finlab.evaluation.progress import progress
-from finlab.evaluation.statistics.tables import Row, text_table
+from finlab.evaluation.statistics.tables import Row
 from finlab.forces.envelopes import largest_forces
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
@@ -122,17 +122,6 @@ def steadiness_rows(
         steady = [rollout(allocator, layout, path, steady=True) for path in paths]
         rows.append(_row(layout, free, steady, [forced_turn(layout, path) for path in paths]))
     return rows
-
-
-def steadiness_report(rows: Sequence[Row]) -> str:
-    """The rows as a table, with what its columns mean."""
-    note = (
-        f"{TICKS / RATE:g} s at {RATE:g} Hz unless stated otherwise; scored by the plant. turn_free and "
-        "turn_steady: the largest turn of any fin in one tick [rad] without and with `previous`; "
-        f"turn_ratio: the worst path's; steady: paths whose ratio is at most {GOAL}; forced: the largest "
-        "turn that any answer must make, where forces are unique."
-    )
-    return f"{text_table(rows)}\n\n{note}"
 
 
 def _row(layout: Layout, free: list[Rollout], steady: list[Rollout], forced: list[float | None]) -> Row:

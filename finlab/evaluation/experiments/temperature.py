@@ -13,7 +13,7 @@ from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.evaluation.statistics.records import Columns
-from finlab.evaluation.statistics.tables import Row, text_table
+from finlab.evaluation.statistics.tables import Row
 from finlab.layout import Layout
 from finlab.layout.angles import is_full_turn
 
@@ -114,13 +114,3 @@ def temperature_row(temperature: float, columns: Columns) -> Row:
         "best_j_mean": float(j.mean()),
         "best_j_mean_interval": list(mean_interval(j, group)),
     }
-
-
-def temperature_report(rows: Sequence[Row]) -> str:
-    """The table, and which temperature is best, as text."""
-    best = min(rows, key=lambda row: row["best_j_mean"])
-    note = (
-        f"best J at T = {best['temperature']:.3g}; the paper uses {PAPER_TEMPERATURE}. J and diversity are "
-        "those of the raw candidates, by the surrogate."
-    )
-    return f"{text_table(rows)}\n\n{note}"

@@ -14,7 +14,7 @@ from finlab.evaluation.experiments.wrench_tracking import run_method
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.bootstrap import mean_interval
 from finlab.evaluation.statistics.records import Columns, columns_of_records
-from finlab.evaluation.statistics.tables import Row, text_table
+from finlab.evaluation.statistics.tables import Row
 from finlab.inference.checkpoint import resolve_checkpoint
 
 LM_STEPS = 4
@@ -100,13 +100,3 @@ def training_row(name: str, columns: Columns) -> Row:
         "refined_energy_mean": float(columns["refined_energy"].mean()),
         "train_s": float(columns["train_s"]),
     }
-
-
-def training_report(rows: Sequence[Row], preset: str, steps: int, batch_size: int) -> str:
-    """The table and its budget, as text."""
-    note = (
-        f"{steps} steps of {batch_size} samples, preset {preset}; scored by the plant. err_norm: the best of "
-        f"64 raw candidates; refined: after {LM_STEPS} Levenberg-Marquardt steps on two of them."
-    )
-    meaning = "\n".join(f"{name}: {CHANGES[name].title}" for name in (row["change"] for row in rows))
-    return f"{text_table(rows)}\n\n{meaning}\n\n{note}"

@@ -6,7 +6,6 @@ model; the answers are scored by the plant. `closest` and the first group of `pr
 error, `direction` by the share of the target that is delivered and by what is delivered beside it.
 """
 
-from collections.abc import Sequence
 from itertools import product
 from typing import Any
 
@@ -18,7 +17,7 @@ from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, import_casadi
 from finlab.allocation.policy import KINDS, Policy
 from finlab.arrays import Array
 from finlab.evaluation.progress import progress
-from finlab.evaluation.statistics.tables import Row, text_table
+from finlab.evaluation.statistics.tables import Row
 from finlab.layout import Layout, random_layout
 from finlab.layout.angles import is_full_turn
 from finlab.layout.arrays import layout_effectiveness
@@ -111,16 +110,6 @@ def unreachable_rows(allocator: Allocator, *, n_layouts: int = 50, seed: int = 0
                 scores[kind].append(score)
         rows += [_row(limits, kind, found) for kind, found in scores.items() if found]
     return rows
-
-
-def unreachable_report(rows: Sequence[Row]) -> str:
-    """The rows as a table, with what its columns mean."""
-    note = (
-        "Scored by the plant against the best that IPOPT finds in the fins' planar forces. excess: closest, "
-        "and priority for its first group: normalized error beyond the least possible; direction: share of "
-        "the target lacking to the largest possible. beside: normalized wrench beside that share."
-    )
-    return f"{text_table(rows)}\n\n{note}"
 
 
 def _scores(allocator: Allocator, layout: Layout, target: Array) -> dict[str, Score]:

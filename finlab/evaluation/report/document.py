@@ -3,8 +3,9 @@
 A heading, a paragraph or a list is a string of Markdown; a paragraph *all in italics* is a remark in small.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from finlab.evaluation.plots.style import Picture
@@ -62,22 +63,27 @@ class Table:
         small = f"{show(ends[0])} – {show(ends[1])}" if ends else ""
         return show(value), small
 
+    def in_one_cell(self, row: Row, column: Column) -> str:
+        """The same with the small text in brackets."""
+        big, small = self.cell(row, column)
+        return f"{big} ({small})" if small else big
+
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture."""
+    """A picture, drawn when the page is written; printed text does without."""
 
     name: str
     """Of its file, without the ending."""
-    svg: str
-    """The picture itself."""
+    draw: Callable[[], Picture]
+    """Draws it, with matplotlib."""
     caption: str
     """What is to be seen."""
 
-    @classmethod
-    def drawn(cls, name: str, picture: Picture, caption: str) -> "Figure":
-        """Of a picture that was drawn with matplotlib."""
-        return cls(name, picture.svg(name), caption)
+    @cached_property
+    def svg(self) -> str:
+        """The picture itself."""
+        return self.draw().svg(self.name)
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,16 @@
 """`finlab eval report`: run what is missing, then write the page, its Markdown twin and the pictures."""
 
 import json
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any
 
+from finlab.allocation.learned.settings import MdnSettings
 from finlab.evaluation.method_specs import Checkpoints
 from finlab.evaluation.report.document import Block, Document, figures_of
 from finlab.evaluation.report.jobs import run_jobs
 from finlab.evaluation.report.pages import to_html, to_markdown
-from finlab.evaluation.report.plan import SECTIONS, make_plan
+from finlab.evaluation.report.plan import N_STARTS, SECTIONS, SWIMMERS, make_plan
 from finlab.evaluation.report.provenance import Provenance, how_made_blocks, source_commit
 from finlab.evaluation.report.results import Results
 from finlab.evaluation.report.sections import (
@@ -23,24 +24,11 @@ from finlab.evaluation.report.sections import (
     wrench_tracking,
 )
 from finlab.evaluation.report.sizes import Sizes
+from finlab.evaluation.statistics.tables import Row
 from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
 
 PAGE, TWIN, TABLES, PICTURES = "index.html", "report.md", "tables.json", "pictures"
 """What a report's folder holds."""
-BLOCKS: dict[str, Callable[[Results], list[Block]]] = {
-    "wrench": wrench_tracking.accuracy_blocks,
-    "cost": cost.cost_blocks,
-    "network": network.network_blocks,
-    "modes": questions.mode_blocks,
-    "unreachable": questions.unreachable_blocks,
-    "steadiness": questions.steadiness_blocks,
-    "latency": studies.latency_blocks,
-    "closed-loop": closed_loop.closed_loop_blocks,
-    "ablation": studies.ablation_blocks,
-    "temperature": studies.temperature_blocks,
-    "training": studies.training_blocks,
-}
-"""Section -> its blocks, from top to bottom."""
 
 
 def make_report(
@@ -85,9 +73,7 @@ def make_report(
 def make_document(results: Results, provenance: Provenance, sizes: Sizes, missing: int = 0) -> Document:
     """The page's blocks, from results; so many jobs have none yet."""
     blocks: list[Block] = [*summary.summary_blocks(results.tables), *methods.method_blocks()]
-    for section, section_blocks in BLOCKS.items():
-        if any(table in results.tables for table in SECTIONS[section]):
-            blocks += section_blocks(results)
+    blocks += result_blocks(results, sizes)
     blocks += how_made_blocks(results, provenance, sizes)
     note = "" if sizes.name == "full" else f" A {sizes.name} look on few cases; intervals are wide."
     note += f" {missing} parts had not been run when this page was made." if missing else ""
@@ -97,6 +83,34 @@ def make_document(results: Results, provenance: Provenance, sizes: Sizes, missin
         f"{note}"
     )
     return Document("finlab evaluation", subtitle, tuple(blocks))
+
+
+def result_blocks(results: Results, sizes: Sizes) -> list[Block]:
+    """Every table that has run, from top to bottom."""
+    tables = results.tables
+    makers: dict[str, Callable[[Sequence[Row]], list[Block]]] = {
+        "wrench": lambda _: wrench_tracking.accuracy_blocks(results),
+        "cost": lambda rows: cost.cost_blocks(rows, N_STARTS),
+        "network": lambda rows: network.network_blocks(rows, MdnSettings().n_candidates),
+        "modes": lambda rows: questions.mode_blocks(rows, sizes.of_table["modes"]["starts"]),
+        "unreachable": questions.unreachable_blocks,
+        "steadiness": questions.steadiness_blocks,
+        "latency": studies.latency_blocks,
+        "first_answers": studies.first_answer_blocks,
+        "trajectory": lambda rows: closed_loop.trajectory_blocks(rows, results.tracks),
+        "faults": closed_loop.fault_blocks,
+        "velocity": closed_loop.velocity_blocks,
+        "ablation": studies.ablation_blocks,
+        "temperature": lambda rows: studies.temperature_blocks(rows, results.scatter),
+        "training": lambda rows: studies.training_blocks(rows, sizes.of_table["training"]),
+    }
+    blocks: list[Block] = []
+    for table, make in makers.items():
+        if table in tables:
+            if table in SWIMMERS and closed_loop.INTRODUCTION[0] not in blocks:
+                blocks += closed_loop.INTRODUCTION
+            blocks += make(tables[table])
+    return blocks
 
 
 def write_report(out: Path, document: Document, tables: dict[str, Any]) -> None:

@@ -42,6 +42,7 @@ FORMATS: dict[str, Callable[[Any], str]] = {
     "count": "{:,}".format,
     "ratio": "{:.3f}".format,
     "metres": "{:.4f}".format,
+    "change": "{:+.1%}".format,
     "text": str,
     "code": "`{}`".format,
 }

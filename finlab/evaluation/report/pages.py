@@ -51,7 +51,7 @@ def _html_block(block: Block) -> str:
             return _div("cards", "".join(_div("card", text) for text in texts))
         case Table():
             return _div("table", _html_table(block))
-        case Figure(_, svg, caption):
+        case Figure(caption=caption, svg=svg):
             # The picture without what only a file of its own needs.
             return f"<figure>{svg[svg.index('<svg') :]}<figcaption>{_inline(caption)}</figcaption></figure>"
         case Fold(title, hidden):
@@ -102,7 +102,7 @@ def _text_block(block: Block, pictures: str) -> str:
             return "\n".join(f"- **{card.value}** {card.label}: {card.detail}" for card in cards)
         case Table():
             return _text_table(block)
-        case Figure(name, _, caption):
+        case Figure(name=name, caption=caption):
             return f"![{caption}]({pictures}/{name}.svg)\n\n*{caption}*"
         case Fold(title, hidden):
             inside = _text_blocks(hidden, pictures)
@@ -113,8 +113,7 @@ def _text_table(table: Table) -> str:
     lines = [[column.title for column in table.columns]]
     lines.append(["---:" if column.is_number else "---" for column in table.columns])
     for row in table.rows:
-        shown = [table.cell(row, column) for column in table.columns]
-        cells = [f"{big} ({small})" if small else big for big, small in shown]
+        cells = [table.in_one_cell(row, column) for column in table.columns]
         if row.get("_kind") == "ours":
             cells[0] = f"**{cells[0]}**"
         lines.append(cells)

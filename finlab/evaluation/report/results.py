@@ -10,8 +10,10 @@ from finlab.arrays import AnyArray
 from finlab.evaluation.experiments.ablation import variant_rows
 from finlab.evaluation.experiments.temperature import temperature_row
 from finlab.evaluation.experiments.training_study import training_row
+from finlab.evaluation.plots.closed_loop_experiments import Track
 from finlab.evaluation.report.jobs import Job, rows_of_columns
 from finlab.evaluation.report.plan import Plan
+from finlab.evaluation.report.work import tracks_of_columns
 from finlab.evaluation.splits import SPLITS
 from finlab.evaluation.statistics.records import Columns, Records, records_of_columns
 from finlab.evaluation.statistics.tables import Row, wrench_intervals, wrench_row
@@ -66,6 +68,11 @@ class Results:
         for (split, method), job in self.plan.tables.get("wrench", {}).items():
             found.setdefault(split, {})[method] = records_of_columns(self.columns(job))
         return {split: found[split] for split in SPLITS if split in found}
+
+    @cached_property
+    def tracks(self) -> list[Track]:
+        """Paths of the trajectory experiment."""
+        return tracks_of_columns(self.columns(self.plan.tables["trajectory"][()]))
 
     @cached_property
     def scatter(self) -> dict[str, AnyArray]:

@@ -126,15 +126,21 @@ def text_table(rows: Sequence[Row], columns: Sequence[str] | None = None) -> str
     """Columns padded with spaces, numbers to the right, a rule under the heading; by default every key that
     occurs, in order of first appearance."""
     columns = list(columns or dict.fromkeys(key for row in rows for key in row))
-    cells = [[format_cell(row.get(column)) for column in columns] for row in rows]
-    widths = [max([len(column), *(len(line[i]) for line in cells)]) for i, column in enumerate(columns)]
-    is_text = [any(isinstance(row.get(column), str) for row in rows) for column in columns]
+    lines = [[format_cell(row.get(column)) for column in columns] for row in rows]
+    rule = ["-" * max([len(column), *(len(line[i]) for line in lines)]) for i, column in enumerate(columns)]
+    return aligned(
+        columns, [rule, *lines], [any(isinstance(row.get(c), str) for row in rows) for c in columns]
+    )
 
-    def line(values: Sequence[str]) -> str:
-        padded = (
-            value.ljust(width) if text else value.rjust(width)
-            for value, width, text in zip(values, widths, is_text, strict=True)
-        )
-        return "  ".join(padded).rstrip()
 
-    return "\n".join([line(columns), "  ".join("-" * width for width in widths), *map(line, cells)])
+def aligned(head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[bool]) -> str:
+    """Cells under a head, padded with spaces: columns of words to the left, others to the right."""
+    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
+
+    def line(cells: Sequence[str]) -> str:
+        each = zip(cells, widths, words, strict=True)
+        return "  ".join(
+            cell.ljust(width) if left else cell.rjust(width) for cell, width, left in each
+        ).rstrip()
+
+    return "\n".join(map(line, [head, *rows]))

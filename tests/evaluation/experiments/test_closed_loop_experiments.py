@@ -11,20 +11,19 @@ from finlab.cli import main
 from finlab.evaluation.experiments.closed_loop_runs import run_all
 from finlab.evaluation.experiments.faults import (
     all_faults,
-    fault_report,
     fault_rows,
     fault_scenarios,
     fault_verdict,
 )
 from finlab.evaluation.experiments.trajectory_and_velocity import (
-    trajectory_report,
     trajectory_rows,
     trajectory_scenarios,
-    velocity_report,
     velocity_rows,
     velocity_scenarios,
 )
 from finlab.evaluation.on_board import OnBoard
+from finlab.evaluation.report.sections.closed_loop import fault_blocks, trajectory_blocks, velocity_blocks
+from finlab.evaluation.report.text import to_text
 from finlab.layout import Layout
 from finlab.sim import Trajectory, load_log
 
@@ -47,8 +46,8 @@ def test_trajectory(layout_a: Layout, analytic: Allocator, line: Trajectory) -> 
     one, every = trajectory_rows(runs)
     assert (one["layout"], one["runs"], every["layout"]) == ("A", 2, "all")
     assert 0.0 < one["ate"] < 0.3 and one["ate_std"] > 0.0
-    report = trajectory_report([one, every], line, "mean")
-    assert "printed in the paper" in report and "0.134" in report and "no alignment" in report
+    report = to_text(*trajectory_blocks([one, every])).replace("\n", " ")
+    assert "paper's method, printed" in report and "0.134" in report and "nothing aligned" in report
 
 
 def test_faults(layout_a: Layout, analytic: Allocator, line: Trajectory) -> None:
@@ -59,8 +58,8 @@ def test_faults(layout_a: Layout, analytic: Allocator, line: Trajectory) -> None
     rows = fault_rows(chosen, run_all(fault_scenarios(layout_a, line, chosen), {"analytic": analytic}, [0]))
     assert rows[0]["ate_over_healthy"] == 1.0
     hopeless = next(row for row in rows if not row["controllable"])
-    report = fault_report(rows, layout_a, line, "mean")
-    assert report.startswith("Not swum") and hopeless["fault"] in report and "ate" not in hopeless
+    report = to_text(*fault_blocks(rows))
+    assert "Not swum" in report and f"- {hopeless['fault']}" in report and "ate" not in hopeless
 
 
 @pytest.mark.parametrize(
@@ -79,7 +78,8 @@ def test_velocity(layout_a: Layout, analytic: Allocator) -> None:
     rows = velocity_rows(runs)
     assert [row["speed"] for row in rows] == [0.1, 0.1, None, None]
     assert rows[0]["inertial_w"] < rows[1]["inertial_w"], "a fixed fast beat costs more"
-    assert "%" in velocity_report(rows, "analytic", layout_a, "mean")
+    change = rows[1]["inertial_w"] / rows[0]["inertial_w"] - 1.0
+    assert f"{change:+.1%}" in to_text(*velocity_blocks(rows, "analytic"))
 
 
 def test_on_board_is_exact_within_its_limits_and_scales_beyond(layout_a: Layout, analytic: Allocator) -> None:

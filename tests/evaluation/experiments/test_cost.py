@@ -9,7 +9,9 @@ from finlab.allocation import load_allocator
 from finlab.allocation.baselines.analytic import Analytic
 from finlab.cli import main
 from finlab.errors import DataError
-from finlab.evaluation.experiments.cost import cost_report, cost_rows, cost_sets, parse_objectives
+from finlab.evaluation.experiments.cost import cost_rows, cost_sets, parse_objectives
+from finlab.evaluation.report.sections.cost import cost_blocks
+from finlab.evaluation.report.text import to_text
 from finlab.evaluation.splits import SPLITS
 from finlab.evaluation.symmetric_cases import SETS
 from finlab.layout.arrays import Array
@@ -49,9 +51,9 @@ def test_the_objective_is_told_to_methods_that_can_choose() -> None:
     allocators = {"search": load_allocator("search", objective="effort")}
     (*_, power), (*_, effort) = (cost_rows("id", allocators, aim, **SMALL) for aim in ("power", "effort"))
     assert power["cost_ratio"] < 1.002, "left at effort it would cost more"
-    assert (
-        power["cost"] != effort["cost"] and "[W]" in cost_report([power]) and "J_en" in cost_report([effort])
-    )
+    assert power["cost"] != effort["cost"]
+    watts, proxy = (to_text(*cost_blocks([row], 32)) for row in (power, effort))
+    assert "mean cost [W]" in watts and "mean cost [J_en]" in proxy
 
 
 def test_answers_that_miss_or_leave_their_limits_do_not_count() -> None:

@@ -9,7 +9,9 @@ import pytest
 from finlab.allocation import load_allocator
 from finlab.cli import main
 from finlab.evaluation.experiments import network
-from finlab.evaluation.experiments.network import STARTS, network_report, network_rows
+from finlab.evaluation.experiments.network import STARTS, network_rows
+from finlab.evaluation.report.sections.network import network_blocks
+from finlab.evaluation.report.text import to_text
 from finlab.layout import random_layout
 
 SMALL: dict[str, Any] = {"layouts": 2, "targets": 3, "seed": 1}
@@ -28,8 +30,8 @@ def test_rows_compare_what_each_start_leads_to(objective: Any) -> None:
             assert row["cost_ratio"] == 1.0 and row["dearer"] == 0.0
         if objective == "power":
             assert row["cost_ratio"] == pytest.approx(1.0, abs=1e-3)
-    text = network_report(rows, 8)
-    assert all(f"\n{name}: " in text for name in STARTS) and "8 seeds where there are several" in text
+    text = to_text(*network_blocks(rows, 8)).replace("\n", " ")
+    assert all(f"`{name}`: " in text for name in STARTS) and "8 seeds where there are several" in text
 
 
 def test_seeds_are_as_many_and_what_they_are_called() -> None:
@@ -56,7 +58,7 @@ def test_the_verb_prints_and_writes_the_rows(tmp_path: Path, capsys: pytest.Capt
     file = tmp_path / "rows.json"
     command = ["eval", "network", "--fins", "4", "--layouts", "1", "--targets", "2", "--candidates", "3"]
     assert main([*command, "--objectives", "effort", "--json", str(file)]) == 0
-    assert "3 seeds where there are several" in capsys.readouterr().out
+    assert "3 seeds where there are several" in capsys.readouterr().out.replace("\n", " ")
     assert '"sub-layouts"' in file.read_text()
 
 

@@ -48,6 +48,6 @@ def test_a_method_without_memory_turns_as_far_either_way() -> None:
 
 def test_the_verb_prints_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["eval", "steadiness", "--layouts", "pair", "--paths", "1", "--ticks", "5"]) == 0
-    assert "turn_ratio" in capsys.readouterr().out
+    assert "worst ratio" in capsys.readouterr().out
     assert main(["eval", "steadiness", "--layouts", " , "]) == 2
     assert "layouts: expected names" in capsys.readouterr().err

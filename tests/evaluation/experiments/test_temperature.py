@@ -9,9 +9,10 @@ from finlab.evaluation.experiments.temperature import (
     diversity,
     refinement_columns,
     temperature_columns,
-    temperature_report,
     temperature_row,
 )
+from finlab.evaluation.report.sections.studies import temperature_blocks
+from finlab.evaluation.report.text import to_text
 from finlab.evaluation.splits import make_split
 from finlab.layout import Fin, Layout, Limits
 
@@ -47,7 +48,7 @@ def test_a_row_and_the_best_temperature() -> None:
     rows = [temperature_row(0.1, columns([1.0, 3.0])), temperature_row(1.0, columns([2.0, 4.0]))]
     assert rows[0]["best_j_mean"] == 2.0 and rows[0]["diversity"] == pytest.approx(0.6)
     assert rows[0]["best_j_mean_interval"] == [1.0, 3.0]
-    assert "best J at T = 0.1;" in temperature_report(rows)
+    assert "is lowest at T = 0.100 here" in to_text(*temperature_blocks(rows)).replace("\n", " ")
 
 
 def test_every_candidate_before_and_after(untrained_checkpoint: Path) -> None:

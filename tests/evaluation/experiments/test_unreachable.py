@@ -49,4 +49,4 @@ def test_arcs_wider_than_half_a_turn_are_tried_in_halves() -> None:
 def test_the_verb_prints_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["eval", "unreachable", "--layouts", "4", "--seed", "5000"]) == 0
     printed = capsys.readouterr().out
-    assert "direction" in printed and "excess_max" in printed
+    assert "direction" in printed and "excess, largest" in printed

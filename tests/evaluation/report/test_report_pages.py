@@ -1,17 +1,33 @@
 """The two writers, and numbers as people read them."""
 
+from typing import Any
+
 import pytest
 
 from finlab.evaluation.report.document import Card, Column, Document, Figure, Fold, Table, figures_of
 from finlab.evaluation.report.numbers import FORMATS
 from finlab.evaluation.report.pages import to_html, to_markdown
+from finlab.evaluation.report.text import to_text
 
 COLUMNS = (Column("name", "method"), Column("value", "error <", "error", "ends"))
 ROWS = [
     {"name": "`ours`", "value": 0.00029, "ends": [0.0002, 0.0004], "_kind": "ours"},
     {"name": "theirs", "_kind": "printed"},
 ]
-PICTURE = Figure("dots", '<?xml version="1.0"?>\n<!DOCTYPE svg>\n<svg><path/></svg>', "Some dots.")
+
+
+class Drawn:
+    """A picture that needs no matplotlib."""
+
+    def svg(self, name: str) -> str:
+        return f'<?xml version="1.0"?>\n<!DOCTYPE svg>\n<svg><path id="{name}"/></svg>'
+
+
+def _drawn() -> Any:
+    return Drawn()
+
+
+PICTURE = Figure("dots", _drawn, "Some dots.")
 DOCUMENT = Document(
     "A title & more",
     "One **line**.",
@@ -32,7 +48,7 @@ def test_html() -> None:
     assert '<a href="docs/x.md">the docs</a>, <code>code</code> and 1 &lt; 2.' in page
     assert '<tr class="ours">' in page and "0.00029<small>0.00020 – 0.00040</small>" in page
     assert '<tr class="printed"><td class="name">theirs</td><td></td></tr>' in page
-    assert "<details><summary>More</summary><figure><svg><path/></svg>" in page
+    assert '<details><summary>More</summary><figure><svg><path id="dots"/></svg>' in page
     for outside in ("<?xml", "<script", "http://", "src=", "@import", "url("):
         assert outside not in page
 
@@ -42,6 +58,16 @@ def test_markdown() -> None:
     assert text.startswith("# A title & more\n\nOne **line**.")
     assert "| method | error < |\n| --- | ---: |\n| **`ours`** | 0.00029 (0.00020 – 0.00040) |" in text
     assert "![Some dots.](pictures/dots.svg)" in text and "- **1.8 ms** a call: others 90" in text
+
+
+def test_text_has_words_and_tables_but_draws_nothing() -> None:
+    def refuse() -> Any:
+        raise AssertionError("a picture was drawn")
+
+    text = to_text(*DOCUMENT.blocks, Figure("dots", refuse, "Some dots."))
+    assert "First section\n\nSee" in text and "\n- one\n- two" in text and "Some dots" not in text
+    assert "method                      error <\n`ours`  0.00029 (0.00020 – 0.00040)\ntheirs\n" in text
+    assert "a call: 1.8 ms (others 90)" in text
 
 
 def test_folded_pictures_are_found() -> None:

@@ -2,13 +2,16 @@
 
 from collections.abc import Sequence
 
+from finlab.evaluation.experiments.closed_loop_runs import LOST_M, RTE_DELTA_S
 from finlab.evaluation.experiments.faults import fault_verdict
 from finlab.evaluation.paper_figures import paper_figures
-from finlab.evaluation.plots.closed_loop_experiments import draw_faults, draw_layouts
+from finlab.evaluation.plots.closed_loop_experiments import Track, draw_faults, draw_layouts
 from finlab.evaluation.report.document import Block, Column, Figure, Row, Table, method_row, printed_row
-from finlab.evaluation.report.results import Results
-from finlab.evaluation.report.work import tracks_of_columns
 
+POWER = (
+    Column("inertial_w", "inertial power [W]", "three"),
+    Column("torque_w", "torque power [W]", "three"),
+)
 ERRORS = (
     Column("ate", "ATE [m]", "metres"),
     Column("ate_std", "spread", "error"),
@@ -17,51 +20,52 @@ ERRORS = (
 )
 PRINTED = {"ours": "paper's method, printed", "baseline": "paper's baseline, printed"}
 WHAT = (Column("method", "method"), Column("runs", "runs", "count"))
+COMPARED = ("inertial_w", "torque_w", "mae")
+"""What a speed's rows are compared by with the baseline's."""
 FAULT_WORDS = {"healthy": "healthy", "one_fin": "one fin lost", "two_fins": "two fins lost"}
 
 
-def closed_loop_blocks(results: Results) -> list[Block]:
-    """Every experiment that has run."""
-    rows = results.tables
-    blocks: list[Block] = []
-    if "trajectory" in rows:
-        blocks += _trajectory(rows["trajectory"], results)
-    if "faults" in rows:
-        blocks += _faults(rows["faults"])
-    if "velocity" in rows:
-        blocks += _velocity(rows["velocity"])
-    return [
-        "## Closed loop",
-        (
-            "A robot with six degrees of freedom swims in simulation, sensor noise and servo lag included; "
-            "the controllers are the paper's. The paper's runs took place in another simulator "
-            "(trajectories) and in a pool (faults, speeds), on paths that it does not describe: its "
-            "figures stand beside ours, not against them. All methods here were given the law `drag` by "
-            "which the simulated fins push; `on-board` is the robot's own law at a fixed frequency."
-        ),
-        *blocks,
-    ]
+INTRODUCTION = (
+    "## Closed loop",
+    (
+        "A robot with six degrees of freedom swims in simulation, sensor noise and servo lag included; "
+        "the controllers are the paper's. The paper's runs took place in another simulator "
+        "(trajectories) and in a pool (faults, speeds), on paths that it does not describe: its "
+        "figures stand beside ours, not against them. All methods were given the laws by "
+        "which the simulated fins push in plant `mean`, and none knows the soft fins of plant `flexible`; "
+        "`on-board` is the robot's own law at a fixed frequency."
+    ),
+)
+"""What all experiments share."""
 
 
-def _trajectory(rows: Sequence[Row], results: Results) -> list[Block]:
+def trajectory_blocks(rows: Sequence[Row], tracks: Sequence[Track] = ()) -> list[Block]:
+    """Several layouts along one trajectory; tracks for the picture."""
     printed = paper_figures()["trajectory"]
     shown: list[Row] = []
     for layout in dict.fromkeys(row["layout"] for row in rows):
         shown += [method_row(row) for row in rows if row["layout"] == layout]
-        shown.append(printed_row(PRINTED["ours"], printed[layout], layout=layout))
-    columns = (Column("layout", "layout"), *WHAT, *ERRORS)
+        if layout in printed:
+            shown.append(printed_row(PRINTED["ours"], printed[layout], layout=layout))
+    columns = (Column("layout", "layout"), *WHAT, *ERRORS, Column("max", "farthest [m]", "metres"), *POWER)
     return [
         "### Trajectories",
-        Figure.drawn(
+        Figure(
             "paths",
-            draw_layouts(tracks_of_columns(results.columns(results.plan.tables["trajectory"][()])), rows),
+            lambda: draw_layouts(tracks, rows),
             "One run on each of the paper's layouts: from above, and its depth over time.",
         ),
         Table(columns, shown),
+        (
+            "*Errors over whole runs from rest, mean and spread over runs; same world frame and clock, "
+            f"nothing aligned; RTE over {RTE_DELTA_S:g} s, all pairs. A robot that was ever farther than "
+            f"{LOST_M:g} m away has lost its reference.*"
+        ),
     ]
 
 
-def _faults(rows: Sequence[Row]) -> list[Block]:
+def fault_blocks(rows: Sequence[Row]) -> list[Block]:
+    """Each fin and pair lost, from the start or on the way."""
     printed = paper_figures()["fault_tolerance"]
     swum = [{**method_row(row), "verdict": fault_verdict(row)} for row in rows if row["controllable"]]
     theirs = [
@@ -80,7 +84,7 @@ def _faults(rows: Sequence[Row]) -> list[Block]:
     beside = {f"{FAULT_WORDS[k]} (printed)": v["ours"]["ate"] for k, v in printed.items()}
     blocks: list[Block] = [
         "### Lost fins",
-        Figure.drawn("faults", draw_faults(rows, beside), "Layout A. Diamonds: the paper's pool."),
+        Figure("faults", lambda: draw_faults(rows, beside), "Layout A. Diamonds: the paper's pool."),
         Table(columns, [*swum, *theirs]),
     ]
     if hopeless:
@@ -91,18 +95,33 @@ def _faults(rows: Sequence[Row]) -> list[Block]:
     return blocks
 
 
-def _velocity(rows: Sequence[Row]) -> list[Block]:
+def velocity_blocks(rows: Sequence[Row], baseline: str = "analytic") -> list[Block]:
+    """Power and error of the speed, beside a baseline's."""
     printed = paper_figures()["velocity"]
-    shown = [{**method_row(row), "speed": row["speed"] or "all"} for row in rows]
+    reference = {row["speed"]: row for row in rows if row["method"] == baseline}
+    shown = []
+    for row in rows:
+        change: Row = {}
+        if row["method"] != baseline and (other := reference.get(row["speed"])):
+            change = {f"{key}_change": row[key] / other[key] - 1.0 for key in COMPARED}
+        shown.append({**method_row(row), "speed": row["speed"] or "all", **change})
     shown += [printed_row(PRINTED[method], values, speed="all") for method, values in printed.items()]
     columns = (
         Column("speed", "speed [m/s]"),
         *WHAT,
         Column("inertial_w", "inertial power [W]", "three"),
         Column("inertial_w_std", "spread", "error"),
+        Column("inertial_w_change", f"to {baseline}", "change"),
         Column("torque_w", "torque power [W]", "three"),
+        Column("torque_w_change", f"to {baseline}", "change"),
         Column("mae", "speed error [m/s]", "metres"),
         Column("mae_std", "spread", "error"),
+        Column("mae_change", f"to {baseline}", "change"),
+        Column("mae_settled", "from 10 s", "metres"),
         Column("depth_rmse", "depth RMSE [m]", "metres"),
     )
-    return ["### Speed and power", Table(columns, shown)]
+    note = (
+        "*Runs from rest. Inertial power is the paper's sum of |I alpha omega|; torque power adds the water "
+        "that fins carry and their drag.*"
+    )
+    return ["### Speed and power", Table(columns, shown), note]

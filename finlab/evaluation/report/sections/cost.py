@@ -1,10 +1,10 @@
 """What answers cost, in watts and as the paper's effort, beside the best of many random starts."""
 
+from collections.abc import Sequence
+
 from finlab.evaluation.experiments.cost import OBJECTIVES, TRACKED, UNITS
 from finlab.evaluation.plots.costs import cost_by_fins
-from finlab.evaluation.report.document import Block, Column, Figure, Fold, Table, method_row
-from finlab.evaluation.report.plan import N_STARTS
-from finlab.evaluation.report.results import Results
+from finlab.evaluation.report.document import Block, Column, Figure, Fold, Row, Table, method_row
 
 
 def _columns(unit: str) -> tuple[Column, ...]:
@@ -23,23 +23,22 @@ def _columns(unit: str) -> tuple[Column, ...]:
     )
 
 
-def cost_blocks(results: Results) -> list[Block]:
-    """The whole section."""
-    rows = results.tables["cost"]
+def cost_blocks(rows: Sequence[Row], n_starts: int) -> list[Block]:
+    """The whole section; so many random starts for each target."""
     blocks: list[Block] = [
         "## Cost",
         (
-            f"The yardstick is the cheapest end of {N_STARTS} random starts of IPOPT with the wrench as a "
-            f"constraint ({2 * N_STARTS} of SLSQP where fins are tables), a solver that knows nothing of how "
+            f"The yardstick is the cheapest end of {n_starts} random starts of IPOPT with the wrench as a "
+            f"constraint ({2 * n_starts} of SLSQP where fins are tables), a solver that knows nothing of how "
             f"the methods search; compared where both deliver the wrench to {TRACKED:g}. Power grows faster "
             "than force, so its optimum loads all fins and is next to always unique; effort is the paper's "
             "proxy J_en, whose cheapest answer often lets some fins rest. `axes`: pure axes on the layouts "
             "A, B, penta, hexa and octo, `axes-mixed`: two or three of them together; `coincident` and "
             "`stacked`: pairs of fins at one place, or one above the other."
         ),
-        Figure.drawn(
+        Figure(
             "cost-by-fins",
-            cost_by_fins([row for row in rows if row["split"] == "id"]),
+            lambda: cost_by_fins([row for row in rows if row["split"] == "id"]),
             "Cost over that of the best start with the interval of a rerun, split `id`.",
         ),
     ]

@@ -6,7 +6,6 @@ from finlab.evaluation.experiments.cost import OBJECTIVES
 from finlab.evaluation.experiments.network import STARTS, TRACKED
 from finlab.evaluation.plots.costs import cost_by_starts
 from finlab.evaluation.report.document import Block, Column, Figure, Fold, Row, Table
-from finlab.evaluation.report.results import Results
 
 SEEDED = [name for name in STARTS if name != "all"]
 """What is compared with `all`."""
@@ -28,9 +27,8 @@ EVERY_ROW = (
 )
 
 
-def network_blocks(results: Results) -> list[Block]:
-    """The whole section."""
-    rows = results.tables["network"]
+def network_blocks(rows: Sequence[Row], n_candidates: int) -> list[Block]:
+    """The whole section; so many seeds where there are several."""
     blocks: list[Block] = [
         "## What the network buys",
         (
@@ -38,12 +36,12 @@ def network_blocks(results: Results) -> list[Block]:
             "answers exact, so a network can only make them cheaper or faster, and only where there are "
             "valleys to choose from. Robots with fins that no training saw, half of them with one random "
             "model for all fins, half with one for each; every row was given the fins' own laws, which score "
-            f"it. Cost is compared where both deliver the target to {TRACKED:g}; times are the processor's, "
-            "of single calls."
+            f"it. {n_candidates} seeds where there are several. Cost is compared where both deliver the "
+            f"target to {TRACKED:g}; times are the processor's, of single calls."
         ),
         "\n".join(f"- `{name}`: {what}" for name, what in STARTS.items()),
-        Figure.drawn(
-            "network", cost_by_starts(rows), "Cost over that of `all`, with the interval of a rerun."
+        Figure(
+            "network", lambda: cost_by_starts(rows), "Cost over that of `all`, with the interval of a rerun."
         ),
     ]
     for objective in OBJECTIVES:

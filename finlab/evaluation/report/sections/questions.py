@@ -1,14 +1,16 @@
 """What else is asked of the default method: all ways, wrenches out of reach, tick after tick."""
 
+from collections.abc import Sequence
+
 from finlab.evaluation.experiments.mode_coverage import CHEAP
 from finlab.evaluation.experiments.steadiness import GOAL, RATE
-from finlab.evaluation.report.document import Block, Column, Table
-from finlab.evaluation.report.results import Results
+from finlab.evaluation.report.document import Block, Column, Row, Table
 
 
-def mode_blocks(results: Results) -> list[Block]:
-    """Distinct ways against a ground truth that knows no search."""
-    starts = results.plan.tables["modes"][()].settings["starts"]
+def mode_blocks(
+    rows: Sequence[Row], starts: int, *, method: str = "search", objective: str = "effort", split: str = "id"
+) -> list[Block]:
+    """Distinct ways against a ground truth that knows no search, from so many random starts per target."""
     columns = (
         Column("fins", "fins", "count"),
         Column("n", "targets", "count"),
@@ -16,22 +18,23 @@ def mode_blocks(results: Results) -> list[Block]:
         Column("modes", "ways told", "three"),
         Column("coverage", "of the starts', told", "share"),
         Column("truth_coverage", "of those told, found by the starts", "share"),
-        Column("best_cost", "least effort over the starts'", "ratio"),
+        Column("best_cost", f"least {objective} over the starts'", "ratio"),
         Column("distance", "energy distance", "error"),
     )
     return [
         "## Distinct ways",
         (
-            "With effort kept least, a wrench can often be delivered in several ways (with power there is "
-            "next to always one). `result.explore()` of method `search`, which asks no network, beside what "
-            f"{starts} random starts of IPOPT per target converge to; ways of up to {CHEAP:g} times the "
-            "least effort, exact by the plant, whose law `drag` both were given. Split `id`."
+            "With effort kept least, a wrench can often be delivered in several ways; with power there is "
+            f"next to always one. Here method `{method}` keeps {objective} least on split `{split}`: what "
+            f"`result.explore()` finds, beside what {starts} random starts of IPOPT per target converge to; "
+            f"ways of up to {CHEAP:g} times the least {objective}, exact by the plant, whose fins' laws both "
+            "were given."
         ),
-        Table(columns, results.tables["modes"]),
+        Table(columns, rows),
     ]
 
 
-def unreachable_blocks(results: Results) -> list[Block]:
+def unreachable_blocks(rows: Sequence[Row]) -> list[Block]:
     """What is delivered of a wrench out of reach."""
     columns = (
         Column("limits", "limits"),
@@ -41,6 +44,7 @@ def unreachable_blocks(results: Results) -> list[Block]:
         Column("excess_max", "excess, largest", "error"),
         Column("beside_max", "beside, largest", "error"),
         Column("p50_ms", "ms per call", "three"),
+        Column("max_ms", "slowest", "three"),
     )
     return [
         "## Out of reach",
@@ -51,11 +55,11 @@ def unreachable_blocks(results: Results) -> list[Block]:
             "for `direction`, share of the target lacking to the largest possible. Beside: normalized wrench "
             "beside that share."
         ),
-        Table(columns, results.tables["unreachable"]),
+        Table(columns, rows),
     ]
 
 
-def steadiness_blocks(results: Results) -> list[Block]:
+def steadiness_blocks(rows: Sequence[Row], objective: str = "power") -> list[Block]:
     """How far fins turn from tick to tick."""
     columns = (
         Column("layout", "layout", "code"),
@@ -69,14 +73,16 @@ def steadiness_blocks(results: Results) -> list[Block]:
         Column("energy_ratio", "effort with / without", "ratio"),
         Column("energy_ratio_worst", "worst path", "ratio"),
         Column("err_norm_max", "largest error", "error"),
+        Column("ms_free", "ms without", "three"),
+        Column("ms_steady", "ms with", "three"),
     )
     return [
         "## From tick to tick",
         (
             f"Method `search` follows smooth random paths of wrenches at {RATE:g} Hz, with and without being "
-            "told its previous command; it keeps power least, by each layout's own fins, and the plant "
+            f"told its previous command; it keeps {objective} least, by each layout's own fins, and the plant "
             "scores every tick. Turn: the largest of any fin in one tick. Forced: what any answer must "
             "turn, where the fins' forces are unique."
         ),
-        Table(columns, results.tables["steadiness"]),
+        Table(columns, rows),
     ]

@@ -1,5 +1,8 @@
 """Time per call, ablation, temperature and training: one table and one picture each."""
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 from finlab.evaluation.experiments.ablation import VARIANTS
 from finlab.evaluation.experiments.first_answers import N_FINS
 from finlab.evaluation.experiments.temperature import PAPER_TEMPERATURE
@@ -8,7 +11,7 @@ from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.plots.studies import ablation_dots, figure_a, latency_dots, training_bars
 from finlab.evaluation.report.document import Block, Column, Figure, Fold, Row, Table, method_row, printed_row
 from finlab.evaluation.report.numbers import three
-from finlab.evaluation.report.results import Results
+from finlab.evaluation.statistics.records import Columns
 
 TITLES = {
     "mean_only": "mean of the mixture only",
@@ -21,9 +24,8 @@ TITLES = {
 REFINED_BY = {"adam": "Adam", "levenberg-marquardt": "Levenberg-Marquardt"}
 
 
-def latency_blocks(results: Results) -> list[Block]:
-    """Methods side by side in one run, and fins that nobody has seen."""
-    rows = results.tables.get("latency", ())
+def latency_blocks(rows: Sequence[Row], fins: int = 4) -> list[Block]:
+    """Methods side by side in one run."""
     paper_ms = paper_figures()["inference"]["cycle_s"] * 1e3
     printed = printed_row("paper's cycle, printed (Jetson Orin Nano)", {"p50_ms": paper_ms})
     columns = (
@@ -36,18 +38,19 @@ def latency_blocks(results: Results) -> list[Block]:
     return [
         "## Time per call",
         (
-            "Whole calls of `allocate`, one target each, four fins, one after the other in one run with "
-            "nothing beside it. `trf`, `slsqp` and `ipopt` start from 8 points."
+            f"Whole calls of `allocate`, one target each, {fins} fins, one after the other in one run with "
+            "nothing of the report beside it. `trf`, `slsqp` and `ipopt` start from 8 points."
         ),
-        Figure.drawn(
-            "latency", latency_dots(rows, paper_ms), "Dots are medians, bars end at the 99th percentile."
+        Figure(
+            "latency",
+            lambda: latency_dots(rows, paper_ms),
+            "Dots are medians, bars end at the 99th percentile.",
         ),
         Table(columns, [*map(method_row, rows), printed]),
-        *first_answer_blocks(results),
     ]
 
 
-def first_answer_blocks(results: Results) -> list[Block]:
+def first_answer_blocks(rows: Sequence[Row]) -> list[Block]:
     """Robots with fins that nobody has seen."""
     columns = (
         Column("fins", "fins", "code"),
@@ -63,26 +66,29 @@ def first_answer_blocks(results: Results) -> list[Block]:
             f"{N_FINS} new fins, and the first call of another robot with the same fins, by method `search`. "
             "The slowest robot, in the processor's time."
         ),
-        Table(columns, results.tables.get("first_answers", ())),
+        Table(columns, rows),
     ]
 
 
-def ablation_blocks(results: Results) -> list[Block]:
-    """The paper's five rows, twice refined, twice scored."""
+def ablation_blocks(
+    rows: Sequence[Row], candidates: int = 64, temperature: float = PAPER_TEMPERATURE
+) -> list[Block]:
+    """The paper's five rows, twice refined, twice scored, from candidates drawn at a temperature."""
     printed = paper_figures()["ablation"]
-    rows = results.tables["ablation"]
     blocks: list[Block] = [
         "## Ablation",
         (
-            "The paper's five rows with the network of the checkpoint `paper`: the same cases, 64 "
-            f"candidates, temperature {PAPER_TEMPERATURE} and refinement budget, one stage changed in each "
-            "row. The paper does not say which model scored its table; its 0.0003 here and 0.0857 above "
-            "cannot be the same one. So the same commands are scored twice: by the surrogate that refined "
-            "them and by the analytic fin model."
+            "The paper's five rows with the network of the checkpoint `paper`: the same cases, "
+            f"{candidates} candidates, temperature {temperature:g} and refinement budget, one stage changed "
+            "in each row. The paper does not say which model scored its table; its 0.0003 here and 0.0857 "
+            "above cannot be the same one. So the same commands are scored twice: by the surrogate that "
+            "refined them and by the analytic fin model."
         ),
-        Figure.drawn(
+        Figure(
             "ablation",
-            ablation_dots(rows, {name: row["err_norm_mean"] for name, row in printed.items()}, TITLES),
+            lambda: ablation_dots(
+                rows, {name: row["err_norm_mean"] for name, row in printed.items()}, TITLES
+            ),
             "Filled: scored by the plant. Hollow: by the surrogate. Diamonds: printed in the paper.",
         ),
     ]
@@ -111,13 +117,12 @@ def ablation_blocks(results: Results) -> list[Block]:
         blocks += [f"### Refined by {words}", Table(columns, lines)]
     return [
         *blocks,
-        "*s per call: single calls, timed while another part of the report ran on the other core.*",
+        "*s per call: single calls; in a report, timed while another part runs on the other core.*",
     ]
 
 
-def temperature_blocks(results: Results) -> list[Block]:
-    """The paper's figure A."""
-    rows = results.tables["temperature"]
+def temperature_blocks(rows: Sequence[Row], scatter: Columns = {}, candidates: int = 64) -> list[Block]:  # noqa: B006 - never changed
+    """The paper's figure A; candidates before and after refinement for the picture."""
     best = min(rows, key=lambda row: row["best_j_mean"])
     columns = (
         Column("temperature", "T", "three"),
@@ -130,14 +135,14 @@ def temperature_blocks(results: Results) -> list[Block]:
         "## Temperature",
         (
             "Figure A of the paper, for the network of the checkpoint `paper`. Diversity grows with the "
-            "temperature of the draw; the best cost among 64 candidates is lowest at T = "
+            f"temperature of the draw; the best cost among {candidates} candidates is lowest at T = "
             f"{three(best['temperature'])} here (the paper uses {PAPER_TEMPERATURE}). Diversity is the mean "
             "distance between two candidates in units of the command ranges; J is squared error plus "
             "weighted energy, by the surrogate, before refinement."
         ),
-        Figure.drawn(
+        Figure(
             "figure-a",
-            figure_a(rows, results.scatter, PAPER_TEMPERATURE),
+            lambda: figure_a(rows, scatter, PAPER_TEMPERATURE),
             "Left and middle: what the temperature does; dashes mark the paper's choice, the band is where "
             "a rerun lands. Right: all 64 candidates for one target on a robot of four fins, as drawn and "
             "after 80 steps of Adam.",
@@ -146,10 +151,8 @@ def temperature_blocks(results: Results) -> list[Block]:
     ]
 
 
-def training_blocks(results: Results) -> list[Block]:
-    """Small trainings with one thing changed."""
-    rows = results.tables["training"]
-    settings = next(iter(results.plan.tables["training"].values())).settings
+def training_blocks(rows: Sequence[Row], settings: Mapping[str, Any]) -> list[Block]:
+    """Small trainings with one thing changed; settings as in `training_jobs`."""
     columns = (
         Column("title", "what is changed"),
         Column("err_norm_mean", "best raw candidate", "error", "err_norm_mean_interval"),
@@ -168,6 +171,6 @@ def training_blocks(results: Results) -> list[Block]:
             "of them; the plant, fins of the law `drag`, scores. Nothing here concerns `search`, which "
             "learns nothing."
         ),
-        Figure.drawn("training", training_bars(rows, titles), "Mean error with the interval of a rerun."),
+        Figure("training", lambda: training_bars(rows, titles), "Mean error with the interval of a rerun."),
         Table(columns, [{**row, "title": titles[row["change"]]} for row in rows]),
     ]

@@ -57,15 +57,17 @@ def accuracy_blocks(results: Results) -> list[Block]:
             "`drag` with U-CAT's numbers, so on those three splits its errors tell that it does not know the "
             "fins; all other methods were given them."
         ),
-        Figure.drawn(
+        Figure(
             "error-distribution",
-            error_distribution(shown, {split: printed[split]["ours"]["err_norm_mean"] for split in shown}),
+            lambda: error_distribution(
+                shown, {split: printed[split]["ours"]["err_norm_mean"] for split in shown}
+            ),
             "How large errors are: the further left and the steeper a curve falls, the better. Errors of "
             "1e-8 are rounding. Dashes: the mean error that the paper prints for its method.",
         ),
-        Figure.drawn(
+        Figure(
             "error-by-fins",
-            error_by_fins(_by_fins(results), ORDER),
+            lambda: error_by_fins(_by_fins(results), ORDER),
             "Figure B of the paper: the error by number of working fins, splits `id` (2 to 5) and `ood-fins` "
             "(6 to 8). Dots are means, bars reach from median to 95th percentile.",
         ),

@@ -1,0 +1,30 @@
+"""Blocks as plain text, for the command line: the words and tables of the page, without its pictures."""
+
+import textwrap
+
+from finlab.evaluation.report.document import Block, Figure, Fold, Table
+from finlab.evaluation.statistics.tables import aligned
+
+WIDTH = 110
+"""Columns of a paragraph."""
+
+
+def to_text(*blocks: Block) -> str:
+    """Headings without their marks, paragraphs in lines, tables with aligned columns, folds opened."""
+    return "\n\n".join(text for text in map(_block, blocks) if text)
+
+
+def _block(block: Block) -> str:
+    match block:
+        case str():
+            return "\n".join(textwrap.fill(line.lstrip("# "), WIDTH) for line in block.splitlines())
+        case Table():
+            head = [column.title for column in block.columns]
+            lines = [[block.in_one_cell(row, column) for column in block.columns] for row in block.rows]
+            return aligned(head, lines, [not column.is_number for column in block.columns])
+        case Fold(title, hidden):
+            return to_text(title, *hidden)
+        case Figure():
+            return ""
+        case tuple(cards):
+            return "\n".join(f"{card.label}: {card.value} ({card.detail})" for card in cards)
