@@ -1,6 +1,7 @@
 """`finlab eval wrench|cost|network|ablation|temperature|latency|...`: methods on targets, without a body."""
 
 from dataclasses import asdict
+from itertools import product
 from typing import Annotated
 
 from tyro.conf import arg
@@ -97,18 +98,19 @@ def cost(
     """
     from finlab.evaluation.experiments.cost import cost_rows, cost_sets, parse_objectives
     from finlab.evaluation.method_specs import load_method_specs
-    from finlab.evaluation.report.sections.cost import cost_blocks
+    from finlab.evaluation.report.sections.cost import cost_tables, introduction
+    from finlab.evaluation.report.text import to_text
 
     check_positive(starts=starts)
     aims, allocators = parse_objectives(objectives), load_method_specs(methods, run.checkpoint)
     drawn = {"layouts": cases.layouts, "targets": cases.targets, "seed": cases.seed}
-    rows = [
-        row
-        for name in cost_sets(cases.split)
-        for aim in aims
-        for row in cost_rows(name, allocators, aim, n_starts=starts, **drawn)
-    ]
-    run.show(*cost_blocks(rows, starts), rows=rows)
+    print(to_text(*introduction(starts)))
+    rows = []
+    for name, aim in product(cost_sets(cases.split), aims):
+        found = cost_rows(name, allocators, aim, n_starts=starts, **drawn)
+        print("\n" + to_text(*cost_tables(found)))
+        rows += found
+    run.write(rows=rows)
 
 
 def network(

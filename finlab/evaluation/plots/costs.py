@@ -8,6 +8,8 @@ import numpy as np
 from finlab.evaluation.plots.style import BLUE, COLOURS, GREEN, GREY, INK, VERMILION, Picture, picture
 from finlab.evaluation.statistics.tables import Row
 
+NOTHING = 0.01
+"""Part of the cost that is always drawn above and below one, so that noise looks like noise."""
 STARTS = {"network": BLUE, "random": VERMILION, "sub-layouts": GREEN, "one": GREY}
 """Where a search begins -> colour."""
 
@@ -40,6 +42,8 @@ def _by_fins(rows: Sequence[Row], name: str, colours: Mapping[str, str], label: 
                 look: dict[str, Any] = {"color": colours[each], "markersize": 5, "elinewidth": 1.2}
                 axis.errorbar(place, ratio, reach, fmt="o", label=each, **look)
             axis.axhline(1.0, color=INK, linewidth=0.9)
+            low, high = axis.get_ylim()
+            axis.set_ylim(min(low, 1.0 - NOTHING), max(high, 1.0 + NOTHING))
             axis.set_xticks(range(len(fins)), [str(count) for count in fins])
             axis.set(xlabel="fins")
             axis.set_title(f"{objective}, below 1 is cheaper")

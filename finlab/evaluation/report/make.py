@@ -76,7 +76,7 @@ def make_document(results: Results, provenance: Provenance, sizes: Sizes, missin
     blocks += result_blocks(results, sizes)
     blocks += how_made_blocks(results, provenance, sizes)
     note = "" if sizes.name == "full" else f" A {sizes.name} look on few cases; intervals are wide."
-    note += f" {missing} parts had not been run when this page was made." if missing else ""
+    note += f" Not run yet when this page was made: {missing} of its parts." if missing else ""
     subtitle = (
         "Control allocation for robots with fins: the exact search, the same search from a network's "
         "proposals, the paper's method and seven others, every answer scored by the fins' own models."

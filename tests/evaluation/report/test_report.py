@@ -150,7 +150,7 @@ def test_a_report_can_be_made_section_by_section(few: pytest.MonkeyPatch, tmp_pa
     always = ["Who leads", "Who knows what", "How this was made"]
     assert headings(["unreachable"]) == [*always[:2], "Out of reach", always[2]]
     assert headings(["steadiness"]) == [*always[:2], "Out of reach", "From tick to tick", always[2]]
-    assert "parts had not been run when this page was made" in (tmp_path / TWIN).read_text("utf-8")
+    assert "Not run yet when this page was made: " in (tmp_path / TWIN).read_text("utf-8")
 
 
 def test_a_study_without_one_of_its_parts_is_left_out(few: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -25,23 +25,35 @@ def _columns(unit: str) -> tuple[Column, ...]:
 
 def cost_blocks(rows: Sequence[Row], n_starts: int) -> list[Block]:
     """The whole section; so many random starts for each target."""
-    blocks: list[Block] = [
+    picture = Figure(
+        "cost-by-fins",
+        lambda: cost_by_fins([row for row in rows if row["split"] == "id"]),
+        "Cost over that of the best start with the interval of a rerun, split `id`.",
+    )
+    return [*introduction(n_starts), picture, *cost_tables(rows)]
+
+
+def introduction(n_starts: int) -> tuple[Block, ...]:
+    """What is compared with what."""
+    return (
         "## Cost",
         (
             f"The yardstick is the cheapest end of {n_starts} random starts of IPOPT with the wrench as a "
             f"constraint ({2 * n_starts} of SLSQP where fins are tables), a solver that knows nothing of how "
-            f"the methods search; compared where both deliver the wrench to {TRACKED:g}. Power grows faster "
-            "than force, so its optimum loads all fins and is next to always unique; effort is the paper's "
-            "proxy J_en, whose cheapest answer often lets some fins rest. `axes`: pure axes on the layouts "
-            "A, B, penta, hexa and octo, `axes-mixed`: two or three of them together; `coincident` and "
-            "`stacked`: pairs of fins at one place, or one above the other."
+            f"the methods search; compared where both deliver the wrench to {TRACKED:g}, by the plant, whose "
+            "physics both sides were given. Power grows faster than force, so its optimum loads all fins and "
+            "is next to always unique; effort is the paper's proxy J_en, whose cheapest answer often lets "
+            "some fins rest. `axes`: pure axes on the layouts A, B, penta, hexa and octo, `axes-mixed`: two "
+            "or three of them together; `coincident` and `stacked`: pairs of fins at one place, or one above "
+            "the other. Error by hand: the largest error of the answers that are cheaper than every start, "
+            "by the drag law written out apart from the plant."
         ),
-        Figure(
-            "cost-by-fins",
-            lambda: cost_by_fins([row for row in rows if row["split"] == "id"]),
-            "Cost over that of the best start with the interval of a rerun, split `id`.",
-        ),
-    ]
+    )
+
+
+def cost_tables(rows: Sequence[Row]) -> list[Block]:
+    """The tables of each objective, over all fins and by their number."""
+    blocks: list[Block] = []
     for objective in OBJECTIVES:
         columns = _columns(UNITS[objective])
         shown = [row for row in rows if row["objective"] == objective]
@@ -53,10 +65,4 @@ def cost_blocks(rows: Sequence[Row], n_starts: int) -> list[Block]:
                 Table(columns, whole),
                 Fold("The same by number of fins", (Table(columns, by_fins),)),
             ]
-    return [
-        *blocks,
-        (
-            "*Error by hand: the largest error of the answers that are cheaper than every start, by the drag "
-            "law written out apart from the plant.*"
-        ),
-    ]
+    return blocks

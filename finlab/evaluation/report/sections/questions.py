@@ -80,8 +80,8 @@ def steadiness_blocks(rows: Sequence[Row], objective: str = "power") -> list[Blo
         "## From tick to tick",
         (
             f"Method `search` follows smooth random paths of wrenches at {RATE:g} Hz, with and without being "
-            f"told its previous command; it keeps {objective} least, by each layout's own fins, and the plant "
-            "scores every tick. Turn: the largest of any fin in one tick. Forced: what any answer must "
+            f"told its previous command; it keeps {objective} least, by each layout's own fins, and the "
+            "plant scores every tick. Turn: the largest of any fin in one tick. Forced: what any answer must "
             "turn, where the fins' forces are unique."
         ),
         Table(columns, rows),

@@ -60,7 +60,7 @@ def first_answer_blocks(rows: Sequence[Row]) -> list[Block]:
         Column("again_ms", "another robot, same fins [ms]", "three"),
     )
     return [
-        "### Fins never seen",
+        "## Fins never seen",
         (
             "A fin is compiled once, whatever its law, and kept by content: the first call of a robot with "
             f"{N_FINS} new fins, and the first call of another robot with the same fins, by method `search`. "

@@ -40,7 +40,8 @@ def summary_blocks(tables: Tables) -> list[Block]:
         (
             "The default method, `search`, against every other one. One leads where the intervals in which "
             "reruns would land do not overlap; a single run has none and no verdict. Figures that the paper "
-            "prints count as exact. `search` needs no network and no training; next comes what each "
+            "prints count as exact. Mean errors below 1e-5 say where a method stops refining, not whether "
+            "it delivers the wrench. `search` needs no network and no training; next comes what each "
             "method was given."
         ),
         Table(STANDINGS, standings(found)),

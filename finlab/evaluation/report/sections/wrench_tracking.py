@@ -69,7 +69,7 @@ def accuracy_blocks(results: Results) -> list[Block]:
             "error-by-fins",
             lambda: error_by_fins(_by_fins(results), ORDER),
             "Figure B of the paper: the error by number of working fins, splits `id` (2 to 5) and `ood-fins` "
-            "(6 to 8). Dots are means, bars reach from median to 95th percentile.",
+            "(6 to 8). Dots are means, bars reach from median to 95th percentile; 1e-8 is rounding.",
         ),
     ]
     for split in results.wrench:
