@@ -33,16 +33,8 @@ def train_surrogate(
     stop_after: int | None = None,
     fin_model: FinModelSpec | None = None,
 ) -> TrainedWeights:
-    """Train a preset's surrogate and write a checkpoint folder without an allocator network.
-
-    Args:
-        preset: name of the recipe.
-        out: folder for checkpoint, log, loss curve and resume state.
-        seed: seed of the data and of the first weights.
-        steps: optimizer steps instead of the preset's.
-        stop_after: stop (resumable) after so many steps.
-        fin_model: fin model to learn; the default `drag` otherwise.
-    """
+    """Train a preset's surrogate on a fin model, `drag` by default, and write a checkpoint folder without an
+    allocator network; `steps` stand for the preset's, other arguments as in `train_allocator`."""
     recipe = get_recipe(PAPER_RECIPES, preset)
     spec = fin_model or FinModelSpec()
     model, written = make_law(spec), {"type": spec.type, **dict(spec.parameters)}

@@ -50,12 +50,7 @@ def train_mdn(
     A run that was stopped goes on where it was when called again with the same arguments. What it learned
     from depends on how many answers there were at each step, and so on the machine.
 
-    Args:
-        preset: name of the recipe.
-        out: folder for checkpoint, answers, log, loss curves and resume state.
-        seed: seed of the answers and of the first weights.
-        stop_after: stop (resumable) after so many steps.
-        training: fields of `MdnTraining` that differ from the preset's; None does not.
+    Arguments are those of `train_allocator`; `training` are fields of `MdnTraining`.
     """
     recipe = get_recipe(MDN_RECIPES, preset)
     settings = replace(recipe.training, **{k: v for k, v in training.items() if v is not None})
