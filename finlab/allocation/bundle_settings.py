@@ -22,7 +22,7 @@ AIM = {"objective": "power", "copper_loss": 0.0}
 """What is kept least, beside the weights of the effort."""
 
 _CHOICES = {"objective": ("power", "effort")}
-_LARGEST = {"n_candidates": 4096, "n_seeds": 256, "n_refined": 256, "search_steps": 100, "refine_steps": 100}
+_LARGEST = {"n_candidates": 4096, "n_refined": 256, "search_steps": 100, "refine_steps": 100}
 """Largest settings that a robot accepts from a file; more would keep it from answering."""
 
 

@@ -15,11 +15,11 @@ import numpy as np
 from scipy.optimize import minimize
 
 from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, import_casadi
+from finlab.allocation.baselines.plant_in_casadi import plant_formulas
 from finlab.allocation.weighted_descent import DescentOptions, descend
 from finlab.arrays import Array
-from finlab.layout import Layout
+from finlab.layout import Layout, layout_effectiveness
 from finlab.physics import PlanarLaw, Plant, make_law, plant_of
-from finlab.physics.energy import energy_of_shares, energy_scale
 from finlab.physics.objective import Objective
 
 EXACT = 1e-5
@@ -74,26 +74,13 @@ class CheapestCommands:
     def _independent(self, plant: Plant) -> Array:
         """Directions (r, 6) of the normalized wrench in which the fins push at all: no constraint says what
         another one says."""
-        axes, size, _ = np.linalg.svd(plant.planar / self.sigma[:, None])
+        axes, size, _ = np.linalg.svd(layout_effectiveness(plant.layout) / self.sigma[:, None])
         return np.asarray(axes[:, : int((size > SAME_DIRECTION * size[0]).sum())].T)
 
     def _by_ipopt(self, plant: Plant) -> Solve:
         casadi: Any = import_casadi()
-        n = plant.n_fins
-        command, target = casadi.SX.sym("command", 3 * n), casadi.SX.sym("target", 6)
-        wrench, cost = casadi.SX.zeros(6), 0
-        scale, aim = energy_scale(plant.upper), self.objective
-        for i, fin in enumerate(plant.layout.fins):
-            amplitude, frequency, direction = (command[3 * i + k] for k in range(3))
-            law: Any = make_law(fin.model)
-            thrust, points = law.thrust(amplitude, frequency, direction), direction + law.offset
-            wrench += thrust * casadi.cos(points) * casadi.DM(plant.columns[i, 1])
-            wrench += thrust * casadi.sin(points) * casadi.DM(plant.columns[i, 2])
-            if aim.name == "power":
-                cost += law.blade.driving_power(amplitude, frequency, aim.copper_loss)
-            else:
-                a, f, d = (command[3 * i + k] / scale[i, k] for k in range(3))
-                cost += energy_of_shares(a, f, d, aim.weights)
+        command, wrench, cost = plant_formulas(casadi, plant, self.objective)
+        target = casadi.SX.sym("target", 6)
         missing = casadi.DM(self._independent(plant)) @ (wrench / casadi.DM(self.sigma) - target)
         program = {"x": command, "p": target, "f": cost, "g": missing}
         solver = casadi.nlpsol("cheapest", "ipopt", program, SOLVER_OPTIONS)
@@ -101,7 +88,7 @@ class CheapestCommands:
 
         def solve(wanted: Array, start: Array) -> Array:
             answer = solver(x0=start.ravel(), p=wanted, **limits)
-            return np.array(answer["x"], np.float64).reshape(n, 3)
+            return np.array(answer["x"], np.float64).reshape(-1, 3)
 
         return solve
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from finlab.allocation.baselines.model_based import ModelBased
 from finlab.arrays import Array
+from finlab.layout import layout_effectiveness
 from finlab.physics import Plant
 
 FREQUENCY_HZ = 2.0
@@ -26,7 +27,7 @@ class OnBoard(ModelBased):
     name = "on-board"
 
     def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
-        planar = plant.planar
+        planar = layout_effectiveness(plant.layout)
         force = (targets @ np.linalg.pinv(planar, rcond=1e-6).T).reshape(len(targets), plant.n_fins, 2)
         frequency = np.clip(FREQUENCY_HZ, plant.lower[:, 1], plant.upper[:, 1])
         # Beyond the limit too, so that the scaling sees how much too large an amplitude is.

@@ -116,12 +116,6 @@ class Plant:
         length, width, density, drag = (np.array(values) for values in zip(*fins, strict=True))
         return Blade(length, width, density, drag)
 
-    @property
-    def planar(self) -> Array:
-        """Wrench (6, 2 n) of 1 N along each fin's horizontal axis and z, fins side by side."""
-        planar: Array = self.columns[:, 1:].reshape(2 * self.n_fins, 6).T
-        return planar
-
     def thrust(self, amplitude: Array, frequency: Array) -> Array:
         """Returns the size of each fin's force (..., n) [N] at zero direction zero."""
         command = np.stack(np.broadcast_arrays(amplitude, frequency, 0.0), axis=-1)

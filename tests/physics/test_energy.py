@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import finlab
+from finlab.layout import layout_effectiveness
 from finlab.physics import Plant
 from finlab.physics.energy import (
     DEFAULT_WEIGHTS,
@@ -74,5 +75,6 @@ def test_planar_columns_are_what_a_newton_of_each_fin_does() -> None:
     force = plant.fin_forces(command)
     across = np.stack([(-np.sin(fin.mounting_angle), np.cos(fin.mounting_angle), 0.0) for fin in layout.fins])
     planar = np.stack([(force * across).sum(-1), force[..., 2]], axis=-1)
-    assert plant.planar.shape == (6, 2 * plant.n_fins)
-    np.testing.assert_allclose(planar.reshape(4, -1) @ plant.planar.T, plant.wrench(command), atol=1e-9)
+    columns = layout_effectiveness(layout)
+    assert columns.shape == (6, 2 * plant.n_fins)
+    np.testing.assert_allclose(planar.reshape(4, -1) @ columns.T, plant.wrench(command), atol=1e-9)

@@ -14,12 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from finlab.allocation.baselines.model_based import CACHE_SIZE
-from finlab.allocation.baselines.plant_in_casadi import plant_in_casadi
+from finlab.allocation.baselines.plant_in_casadi import plant_formulas, plant_in_casadi
 from finlab.allocation.baselines.single_target import Problem, SingleTarget
 from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.physics import PlanarLaw, Plant, make_law
-from finlab.physics.energy import energy_of_shares, energy_scale
 
 SOLVER_OPTIONS = {
     "ipopt.print_level": 0,
@@ -86,28 +85,15 @@ class Ipopt(SingleTarget):
 
     def _formulas(self, plant: Plant) -> Formulas:
         """What a robot's commands give and cost."""
-        cs, laws = self._casadi, [make_law(fin.model) for fin in plant.layout.fins]
-        sigma = cs.DM(self.normalization.std)
-        if not all(isinstance(law, PlanarLaw) for law in laws):
+        cs, sigma = self._casadi, self._casadi.DM(self.normalization.std)
+        if not all(isinstance(make_law(fin.model), PlanarLaw) for fin in plant.layout.fins):
             answer, hessian = plant_in_casadi(cs, plant, self._cost(plant), self.normalization.std)
             command, target = cs.MX.sym("command", 3 * plant.n_fins), cs.MX.sym("target", 6)
             given = answer(command)
             options = {"hess_lag": hessian}
             return Formulas(command, target, (given[:6] - target) / sigma, given[6], options, answer)
-        command, target = cs.SX.sym("command", 3 * plant.n_fins), cs.SX.sym("target", 6)
-        wrench, cost = cs.SX.zeros(6), 0
-        scale = energy_scale(plant.upper)
-        for i, law in enumerate(laws):
-            assert isinstance(law, PlanarLaw)
-            amplitude, frequency, direction = (command[3 * i + k] for k in range(3))
-            thrust, points = law.thrust(amplitude, frequency, direction), direction + law.offset
-            wrench += thrust * cs.cos(points) * cs.DM(plant.columns[i, 1])
-            wrench += thrust * cs.sin(points) * cs.DM(plant.columns[i, 2])
-            if self.objective == "power":
-                cost += law.blade.driving_power(amplitude, frequency, self.copper_loss)
-            else:
-                shares = amplitude / scale[i, 0], frequency / scale[i, 1], direction / scale[i, 2]
-                cost += energy_of_shares(*shares, self.energy_weights)
+        command, wrench, cost = plant_formulas(cs, plant, self.aim)
+        target = cs.SX.sym("target", 6)
         weight = self._cost(plant).weight
         return Formulas(command, target, (wrench - target) / sigma, weight * cost, {}, None)
 

@@ -1,4 +1,4 @@
-"""A robot whose fins have no formula, as CasADi functions that ask the plant."""
+"""A robot in CasADi: by the formulas of its fins, or, where one has none, as functions that ask the plant."""
 
 from typing import Any
 
@@ -6,10 +6,37 @@ import numpy as np
 
 from finlab.allocation.command_cost import CommandCost
 from finlab.arrays import Array
-from finlab.physics import Plant
+from finlab.physics import PlanarLaw, Plant, make_law
+from finlab.physics.energy import energy_of_shares, energy_scale
+from finlab.physics.objective import Objective
 
 DIFFERENCE = 1e-4
 """Half width of the differences, as a share of each command's range."""
+
+
+def plant_formulas(casadi: Any, plant: Plant, objective: Objective) -> tuple[Any, Any, Any]:
+    """Returns symbols of the commands (3 n,), and the wrench (6,) and the cost that they give, as formulas.
+
+    Args:
+        casadi: the module.
+        plant: a robot whose fins all have formulas.
+        objective: what commands cost.
+    """
+    command, wrench, cost = casadi.SX.sym("command", 3 * plant.n_fins), casadi.SX.zeros(6), 0
+    scale = energy_scale(plant.upper)
+    for i, fin in enumerate(plant.layout.fins):
+        law = make_law(fin.model)
+        assert isinstance(law, PlanarLaw)
+        amplitude, frequency, direction = (command[3 * i + k] for k in range(3))
+        thrust, points = law.thrust(amplitude, frequency, direction), direction + law.offset
+        wrench += thrust * casadi.cos(points) * casadi.DM(plant.columns[i, 1])
+        wrench += thrust * casadi.sin(points) * casadi.DM(plant.columns[i, 2])
+        if objective.name == "power":
+            cost += law.blade.driving_power(amplitude, frequency, objective.copper_loss)
+        else:
+            shares = amplitude / scale[i, 0], frequency / scale[i, 1], direction / scale[i, 2]
+            cost += energy_of_shares(*shares, objective.weights)
+    return command, wrench, cost
 
 
 def plant_in_casadi(casadi: Any, plant: Plant, cost: CommandCost, sigma: Array) -> tuple[Any, Any]:

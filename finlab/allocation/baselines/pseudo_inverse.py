@@ -5,6 +5,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.forces.envelopes import layout_envelopes
 from finlab.forces.force_space import planar_problem, polar
+from finlab.layout import layout_effectiveness
 from finlab.physics import Plant
 from finlab.physics.objective import Objective
 
@@ -31,7 +32,7 @@ class PseudoInverse:
         fins = layout_envelopes(plant.layout, objective)
         self._forces = planar_problem(plant.layout, fins, sigma, objective)
         most = np.repeat(np.maximum(fins.maximum, 1e-9), 2)
-        scaled = plant.planar * most / sigma[:, None]
+        scaled = layout_effectiveness(plant.layout) * most / sigma[:, None]
         self.inverse = (most[:, None] * np.linalg.pinv(scaled, rcond=rcond) / sigma).T.copy()
         """Target (6,) times this (6, 2 n) gives each fin's horizontal and vertical force [N]."""
 

@@ -17,7 +17,7 @@ from finlab.allocation.baselines.scipy_solvers import Slsqp, Trf
 from finlab.allocation.baselines.sqp import Sqp
 from finlab.allocation.method import Method
 from finlab.inference.normalization import Normalization
-from finlab.layout import Fin, Layout, Limits
+from finlab.layout import Fin, Layout, Limits, layout_effectiveness
 from finlab.physics import Plant, plant_of
 from finlab.physics.energy import EnergyWeights
 from finlab.physics.objective import Name, Objective
@@ -77,7 +77,7 @@ def test_fins_give_what_the_pseudo_inverse_asks_for(plant: Plant, objective: Obj
     direction = np.array([2.0, 1.0])
     size = share * 4.737410112522892 * (np.sin(plant.upper[:, 0]) * plant.upper[:, 1]) ** 2
     wanted = size[:, None] * np.stack([np.cos(direction), np.sin(direction)], axis=-1)
-    target = plant.planar @ wanted.ravel()
+    target = layout_effectiveness(plant.layout) @ wanted.ravel()
     command = inverse.command(target[None])
     np.testing.assert_allclose(target @ inverse.inverse, wanted.ravel(), atol=1e-9)
     np.testing.assert_allclose(plant.force(command)[0, :, 1:], wanted, atol=2e-6)
@@ -97,7 +97,7 @@ def test_within_an_arc_the_nearest_direction_takes_what_points_there(
     plant: Plant, direction: float, allowed: float, left: float
 ) -> None:
     point = np.array([math.cos(direction), math.sin(direction)])
-    target = plant.planar @ np.array([0.5, 0.0, *(0.4 * point)])
+    target = layout_effectiveness(plant.layout) @ np.array([0.5, 0.0, *(0.4 * point)])
     command = PseudoInverse(plant, SIGMA, Objective()).command(target[None])[0]
     force = plant.force(command)[:, 1:]
     assert command[1, 2] == pytest.approx(allowed, abs=1e-6)
@@ -120,7 +120,7 @@ def test_forces_are_the_weighted_least_ones(plant: Plant) -> None:
     most = 4.737410112522892 * (np.sin(plant.upper[:, 0]) * plant.upper[:, 1]) ** 2
     weight = np.repeat(most, 2)
     target = np.array([0.2, 0.1, 0.3, 0.0, 0.02, 0.01])
-    scaled = plant.planar * weight / SIGMA[:, None]
+    scaled = layout_effectiveness(plant.layout) * weight / SIGMA[:, None]
     expected = weight * np.linalg.lstsq(scaled, target / SIGMA, rcond=1e-3)[0]
     found = target @ PseudoInverse(plant, SIGMA, Objective()).inverse
     np.testing.assert_allclose(found, expected, atol=1e-9)
