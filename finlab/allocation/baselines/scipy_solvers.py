@@ -9,9 +9,6 @@ from finlab.allocation.baselines.single_target import Problem, SingleTarget
 from finlab.arrays import Array
 from finlab.physics import Plant
 
-INSIDE = 1e-6
-"""How far within the limits the solver starts, which it requires."""
-
 MET = 1e-6
 """Normalized error up to which an end meets the target."""
 
@@ -30,7 +27,7 @@ class Trf(SingleTarget):
     def _minimize(self, problem: Problem, start: Array) -> Array:
         return least_squares(
             problem.residual,
-            np.clip(start, INSIDE, 1 - INSIDE),
+            np.clip(start, 0.0, 1.0),
             problem.residual_slope,
             bounds=(0.0, 1.0),
             method="trf",

@@ -9,6 +9,7 @@ import pytest
 import torch
 
 from finlab.allocation.learned.paper import ADAM_RATE, CHUNK, PaperAllocator
+from finlab.allocation.learned.settings import PaperSettings
 from finlab.assets import checkpoint_path, shipped_layouts
 from finlab.errors import AllocationError, CheckpointError
 from finlab.inference.checkpoint import read_checkpoint
@@ -314,3 +315,7 @@ def test_adams_gradient_is_that_of_the_score(checkpoint: TrainedWeights) -> None
         offset[place] = 2e-3
         expected[place] = (score(command + offset) - score(command - offset)) / 4e-3
     np.testing.assert_allclose(slope, expected, atol=1e-3 * np.abs(expected).max())
+
+
+def test_what_the_paper_prints_is_what_it_samples_with() -> None:
+    assert PaperSettings().temperature == 0.02

@@ -261,14 +261,16 @@ def test_random_seeds_of_the_wide_search_are_spread_over_what_fins_can_give(
     np.testing.assert_allclose(np.quantile(share, [0.25, 0.5, 0.75]), [0.0625, 0.25, 0.5625], atol=0.1)
 
 
+@pytest.mark.parametrize("exactness", [1.0, 0.4])
 def test_a_seed_that_misses_is_left_for_a_dearer_one_that_does_not(
-    effort: SearchAllocator, monkeypatch: pytest.MonkeyPatch
+    exactness: float, effort: SearchAllocator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What misses by less than `promising_error` is judged by its cost, the rest by what is missing."""
+    """What misses by less than `promising_error` is judged by its cost, the rest by what is missing; of
+    a weak robot, in proportion."""
     layout = load_layout("A")
-    prepared = effort.pipeline.prepare(layout)
+    prepared = effort.pipeline.prepare(layout)._replace(exactness=exactness)
     whole = pipeline.force_space.descend
-    missed = SEARCH.promising_error * np.array([0.9, 0.5, 1.1, 1.5])
+    missed = exactness * SEARCH.promising_error * np.array([0.9, 0.5, 1.1, 1.5])
 
     def told(*arguments: Any) -> Any:
         planar = whole(*arguments)
