@@ -35,10 +35,10 @@ SIZES = {
     "quick": Sizes(
         "quick",
         {
-            "wrench": cases(30, 30),
+            "wrench": cases(20, 40),
             "wrench-other": cases(20, 10),
-            "wrench-slow": cases(8, 1),
-            "cost": cases(6, 1),
+            "wrench-slow": cases(6, 1),
+            "cost": cases(5, 1),
             "network": cases(4, 4, fins=[4, 8, 12]),
             "modes": cases(6, 1, starts=32),
             "unreachable": {"layouts": 8},
