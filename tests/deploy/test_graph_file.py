@@ -85,10 +85,10 @@ def test_names_are_as_long_as_the_schema_allows(part: str, key: str, longest: in
         content = edited(lambda document, n=length: document[part].update({key: "a" * n}))
         assert jsonschema.Draft202012Validator(SCHEMA).is_valid(json.loads(content)) == good
         if good:
-            parse_graph(content)
+            parse_graph(GraphText(content))
         else:
             with pytest.raises(LayoutError, match=f"{part}.{key}"):
-                parse_graph(content)
+                parse_graph(GraphText(content))
 
 
 @pytest.mark.parametrize("name", sorted(shipped_layouts()))
