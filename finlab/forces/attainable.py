@@ -3,7 +3,7 @@
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from itertools import count
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,17 +18,18 @@ FLAT = 1e-5
 """Thickness, as a share of the size, below which a hull counts as flat."""
 
 
-class Hull(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Hull:
     """A convex hull of dimension 0 to 3, and the planes that bound it."""
 
     vertices: Array
     """Corners (V, 3)."""
     faces: NDArray[np.intp]
-    """Triangles (F, 3), counter-clockwise seen from outside; none below dimension 3."""
+    """Triangles (F, 3) of corners, counter-clockwise seen from outside; none below dimension 3."""
     outline: NDArray[np.intp]
     """Corners in order around a flat hull, or the two ends of a line; empty otherwise."""
     dimension: int
-    """0 to 3."""
+    """3 for a body, 2 flat, 1 a line, 0 a point."""
     normals: Array
     """Outward unit normals (N, 3) of bounding planes; a flat hull lies between two of them."""
     offsets: Array
@@ -96,10 +97,10 @@ TOLERANCE = 0.01
 """Gap at which no more directions are added, as a share of the farthest vertex."""
 
 
-@dataclass(frozen=True, eq=False)
-class AttainableSet:
-    """A convex polytope of attainable forces or torques. Every vertex is attained, by the fins or, where
-    `hull` says so, by the convex hulls of what they can push."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AttainableSet(Hull):
+    """A convex polytope of attainable forces or torques, body frame [N] or [N m]. Every vertex is attained,
+    by the fins or, where `hull` says so, by the convex hulls of what they can push."""
 
     kind: Kind
     """What it is a set of: `force` or `torque`."""
@@ -107,14 +108,6 @@ class AttainableSet:
     """Whether all else is zero (torque for forces, force for torques) or free."""
     failed: tuple[str, ...]
     """Names of the fins that push nothing."""
-    vertices: Array
-    """Corners (V, 3), body frame [N] or [N m]."""
-    faces: NDArray[np.intp]
-    """Triangles (F, 3) of vertices, counter-clockwise from outside; none when the set is flat or smaller."""
-    outline: NDArray[np.intp]
-    """Vertices around a flat set, or the two ends of a line; empty otherwise."""
-    dimension: int
-    """3 for a body, 2 flat, 1 a line, 0 nothing but the origin."""
     gap: float
     """Nothing attainable lies further than this outside any face [N] or [N m]."""
     hull: bool
@@ -170,13 +163,10 @@ def attainable_set(
         points = np.concatenate([found.vertices, new[far]])
         found = hull_of(points)
     return AttainableSet(
+        **vars(found),
         kind=kind,
         alone=alone,
         failed=tuple(name for name in layout.names if name in failed),
-        vertices=found.vertices,
-        faces=found.faces,
-        outline=found.outline,
-        dimension=found.dimension,
         gap=max(float(beyond.max()), 0.0),
         hull=len(wide_fins(sets)) > 0,
         sampled=any(fin.model.type == "table" for fin in layout.fins),
