@@ -15,6 +15,7 @@ from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import Case
 from finlab.evaluation.statistics.records import Records, join_records
 from finlab.evaluation.statistics.tables import (
+    FIN_COUNT_COLUMNS,
     energy_rows,
     rows_by_fin_count,
     text_table,
@@ -130,21 +131,12 @@ def wrench_report(records: dict[str, Records], split: str, *, single: int | None
     timing = "one call at a time" if single else "the time of all targets of a layout over their number"
     energies = energy_comparison(records)
     beside = [f"energy over that of {energies[0]['reference']}", text_table(energies), ""] if energies else []
-    shown = (
-        "method",
-        "err_norm_mean",
-        "err_norm_median",
-        "err_norm_p95",
-        "success_0.01",
-        "energy_mean",
-        "power_mean",
-    )
     return "\n".join(
         [
             text_table([*wrench_rows(records, split), *paper_wrench_rows(split)]),
             "",
             "where a rerun with another seed lands, 95 times of 100 (bootstrap over layouts)",
-            text_table(interval_rows(records, split), shown),
+            text_table(interval_rows(records, split), ("method", *FIN_COUNT_COLUMNS[1:])),
             "",
             text_table(by_fins),
             "",

@@ -92,6 +92,8 @@ def draw_velocity(runs: Sequence[Run]) -> Picture:
                 error = [np.abs(log.motion[:, 0] - log.reference_surge).mean() for log in logs]
                 power = [log.inertial_power.sum(axis=1).mean() for log in logs]
                 style: dict[str, Any] = {"color": COLOURS.get(method, GREY), "ms": 5, "alpha": 0.8}
+                if method == methods[0]:  # a ring around those that do the same
+                    style |= {"ms": 9, "markerfacecolor": "none", "alpha": 1.0}
                 trade.plot(error, power, marker, label=f"{method}, {speed:.2f} m/s", **style)
         over_time.set(xlabel="time [s]", ylabel="surge speed [m/s]", title="Speed, reference dashed")
         trade.set(

@@ -96,7 +96,9 @@ class Picture:
 
         canvas = io.BytesIO()
         self.figure.savefig(canvas, format="png", dpi=DPI)
-        Image.open(canvas).convert("RGB").quantize(COLOURS_IN_PNG).save(path, format="PNG", optimize=True)
+        Image.open(canvas).convert("RGB").quantize(COLOURS_IN_PNG, Image.Quantize.MAXCOVERAGE).save(
+            path, format="PNG", optimize=True
+        )
         return path
 
     def svg(self, name: str) -> str:

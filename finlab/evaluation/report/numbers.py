@@ -35,6 +35,12 @@ def share(value: float) -> str:
     return f"{100 * value:.{digits}f} %"
 
 
+def change(value: float) -> str:
+    """A ratio less one as a percentage: +82.0 %, 0.0 %."""
+    percent = round(100.0 * value, 1)
+    return f"{percent:+.1f} %" if percent else "0.0 %"
+
+
 FORMATS: dict[str, Callable[[Any], str]] = {
     "error": error,
     "three": three,
@@ -42,7 +48,7 @@ FORMATS: dict[str, Callable[[Any], str]] = {
     "count": "{:,}".format,
     "ratio": "{:.3f}".format,
     "metres": "{:.4f}".format,
-    "change": "{:+.1%}".format,
+    "change": change,
     "text": str,
     "code": "`{}`".format,
 }

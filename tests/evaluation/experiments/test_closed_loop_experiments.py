@@ -79,7 +79,7 @@ def test_velocity(layout_a: Layout, analytic: Allocator) -> None:
     assert [row["speed"] for row in rows] == [0.1, 0.1, None, None]
     assert rows[0]["inertial_w"] < rows[1]["inertial_w"], "a fixed fast beat costs more"
     change = rows[1]["inertial_w"] / rows[0]["inertial_w"] - 1.0
-    assert f"{change:+.1%}" in to_text(*velocity_blocks(rows, "analytic"))
+    assert f"{100 * change:+.1f} %" in to_text(*velocity_blocks(rows, "analytic"))
 
 
 def test_on_board_is_exact_within_its_limits_and_scales_beyond(layout_a: Layout, analytic: Allocator) -> None:

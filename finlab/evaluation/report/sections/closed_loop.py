@@ -44,7 +44,7 @@ def trajectory_blocks(rows: Sequence[Row], tracks: Sequence[Track] = ()) -> list
     printed = paper_figures()["trajectory"]
     shown: list[Row] = []
     for layout in dict.fromkeys(row["layout"] for row in rows):
-        shown += [method_row(row) for row in rows if row["layout"] == layout]
+        shown += [_swum(row) for row in rows if row["layout"] == layout]
         if layout in printed:
             shown.append(printed_row(PRINTED["ours"], printed[layout], layout=layout))
     columns = (Column("layout", "layout"), *WHAT, *ERRORS, Column("max", "farthest [m]", "metres"), *POWER)
@@ -67,7 +67,7 @@ def trajectory_blocks(rows: Sequence[Row], tracks: Sequence[Track] = ()) -> list
 def fault_blocks(rows: Sequence[Row]) -> list[Block]:
     """Each fin and pair lost, from the start or on the way."""
     printed = paper_figures()["fault_tolerance"]
-    swum = [{**method_row(row), "verdict": fault_verdict(row)} for row in rows if row["controllable"]]
+    swum = [{**_swum(row), "verdict": fault_verdict(row)} for row in rows if row["controllable"]]
     theirs = [
         printed_row(PRINTED[method], values, fault=FAULT_WORDS[fault])
         for fault, methods in printed.items()
@@ -104,7 +104,7 @@ def velocity_blocks(rows: Sequence[Row], baseline: str = "analytic") -> list[Blo
         change: Row = {}
         if row["method"] != baseline and (other := reference.get(row["speed"])):
             change = {f"{key}_change": row[key] / other[key] - 1.0 for key in COMPARED}
-        shown.append({**method_row(row), "speed": row["speed"] or "all", **change})
+        shown.append({**_swum(row), "speed": row["speed"] or "all", **change})
     shown += [printed_row(PRINTED[method], values, speed="all") for method, values in printed.items()]
     columns = (
         Column("speed", "speed [m/s]"),
@@ -125,3 +125,8 @@ def velocity_blocks(rows: Sequence[Row], baseline: str = "analytic") -> list[Blo
         "that fins carry and their drag.*"
     )
     return ["### Speed and power", Table(columns, shown), note]
+
+
+def _swum(row: Row) -> Row:
+    """A row with its method's name as code, and no spread where there was a single run."""
+    return {k: v for k, v in method_row(row).items() if row["runs"] > 1 or not k.endswith("_std")}
