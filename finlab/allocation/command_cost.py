@@ -61,7 +61,7 @@ class CommandCost(ABC):
 class EffortCost(CommandCost):
     """The paper's effort `J_en`: all of it but the inertial part is a quadratic form itself."""
 
-    def __init__(self, meter: EnergyMeter, weight: float = 1.0) -> None:
+    def __init__(self, meter: EnergyMeter, weight: float) -> None:
         super().__init__(meter, weight)
         scale, weights = energy_scale(meter.upper), meter.weights
         squares = np.array([weights.amplitude, weights.frequency, weights.zero_direction])
@@ -85,7 +85,7 @@ class EffortCost(CommandCost):
 class PowerCost(CommandCost):
     """Mean mechanical power by each fin's own model."""
 
-    def __init__(self, meter: PowerMeter, weight: float = 1.0) -> None:
+    def __init__(self, meter: PowerMeter, weight: float) -> None:
         super().__init__(meter, weight)
         self._meter = meter
 

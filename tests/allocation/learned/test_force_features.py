@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finlab.allocation.learned.force_features import VECTORS, RobotView, features, robot_view, see
+from finlab.allocation.learned.force_features import SHARES, VECTORS, RobotView, features, robot_view, see
 from finlab.forces.envelopes import layout_envelopes
 from finlab.forces.force_space import PlanarProblem, planar_problem
 from finlab.inference.force_network import NODE_SIZE
-from finlab.layout import FinModelSpec, Layout, random_layout
+from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
 from finlab.physics.objective import Objective
 
 STD = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
@@ -71,6 +71,19 @@ def test_a_fins_own_vectors_are_turned_to_its_force() -> None:
         np.testing.assert_allclose(nodes[:, 6 + place], turned[0], atol=1e-6)
         np.testing.assert_allclose(nodes[:, 7 + place], turned[1], atol=1e-6)
     np.testing.assert_allclose(nodes[:, 6:][:, plain], own[:, plain], rtol=1e-6)
+
+
+def test_a_fin_with_stops_is_seen_within_them() -> None:
+    """The mean direction of an arc of half h is sin(h) / h ahead of its middle; an even fin reaches all."""
+    arc = Limits(zero_direction=(-0.5, 1.7))
+    layout = Layout("arc", (Fin("a", (0.2, 0.1, 0.0), 0.3, arc), Fin("b", (-0.2, 0.1, 0.0), 2.0)))
+    static, half = robot_view(problem_of(layout), True).static, 1.1
+    reach = 1 + len(SHARES)
+    np.testing.assert_allclose(static[:, reach], 1.0, rtol=1e-6)
+    ahead = static[:, reach + 1] + 1j * static[:, reach + 2]
+    assert ahead[0] == pytest.approx(2.0 * np.sin(half) / half * np.exp(0.6j), abs=0.12)
+    assert ahead[1] == pytest.approx(0.0, abs=1e-6), "a circle has no middle"
+    assert VECTORS[0] == reach + 1
 
 
 def test_turning_the_robot_changes_nothing(layout: Layout) -> None:

@@ -127,6 +127,19 @@ def test_more_candidates_than_components_are_drawn_by_a_seed(shipped: MdnAllocat
     assert means is not None and len({command.tobytes() for command in means.command.round(9)}) <= 16
 
 
+def test_components_are_drawn_as_often_as_they_weigh(shipped: MdnAllocator, layout_a: Layout) -> None:
+    """Behind the means, 8,000 draws; and their spread is the component's own, by the temperature."""
+    insight = shipped.insight(layout_a, TARGET)
+    view, m = shipped._view(shipped.pipeline, layout_a), len(insight.weight)
+    target = np.array([TARGET]) / shipped.normalization.std
+    proposal = propose(shipped.network, view, target, m + 8000, 1.0, 3)
+    drawn = proposal.component[0, m:]
+    share = np.bincount(drawn, minlength=m) / len(drawn)
+    np.testing.assert_allclose(share, insight.weight / insight.weight.sum(), atol=0.02)
+    assert sorted(proposal.component[0, :m]) == list(range(m))
+    assert (np.diff(insight.weight[proposal.component[0, :m]]) <= 0.0).all()
+
+
 def test_it_goes_on_from_the_previous_command(shipped: MdnAllocator, layout_a: Layout) -> None:
     before = shipped.allocate(layout_a, TARGET)
     near = np.array(TARGET) + [0.02, 0.0, 0.01, 0.0, 0.0, 0.0]
