@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from finlab.forces import force_space
+from finlab.forces.envelopes import Envelopes, Projected
 from finlab.forces.fin_envelope import COST, MOBILITY
 from finlab.forces.force_space import Planar, PlanarProblem, descend, realize
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
@@ -193,6 +194,23 @@ def test_the_cost_that_is_told_is_that_of_the_commands(name: str) -> None:
             moved = np.linalg.norm(Plant(layout).force(command), axis=-1)
             working = planar.size > 5e-3 * problem.fins.maximum
             assert np.abs(moved - planar.size)[working].max() < 5e-3 * problem.fins.maximum.max()
+
+
+@pytest.mark.parametrize("rows", [1, 5])
+def test_forces_that_settle_are_searched_no_longer(rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Newton's method needs a few steps, however many are allowed."""
+    layout, projected = robot(3), []
+    problem, target = problem_of(layout), 0.5 * reachable(layout, rows)
+    whole = Envelopes.project
+
+    def spy(self: Envelopes, force: Array, size: Array) -> Projected:
+        projected.append(len(force))
+        return whole(self, force, size)
+
+    monkeypatch.setattr(Envelopes, "project", spy)
+    found = descend(problem, target, np.tile(problem.fins.maximum, (rows, 1)), 60)
+    assert np.linalg.norm(found.residual, axis=1).max() < 1e-6
+    assert 3 < len(projected) < 15
 
 
 def test_the_last_steps_deliver_what_fins_at_their_limits_leave(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -36,6 +36,7 @@ FINS: dict[str, tuple[FinModelSpec, Limits]] = {
     "soft": (FinModelSpec("soft"), Limits()),
     "uneven": (FinModelSpec("soft", (("e", 0.2), ("phi_e", 1.0))), Limits()),
     "leaning": (FinModelSpec("soft", (("d", 0.15), ("e", 0.1))), Limits(zero_direction=(-1.0, 0.5))),
+    "leaning all round": (FinModelSpec("soft", (("d", 0.15), ("e", 0.1))), Limits()),
     "declining": (
         FinModelSpec("soft", (("k", 5.0), ("x0", 0.6), ("q", 6.0))),
         Limits((0.05, 0.8), (0.1, 3.0)),
