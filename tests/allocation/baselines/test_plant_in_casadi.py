@@ -1,0 +1,42 @@
+"""What ipopt sees of a robot by formulas, against the plant that scores its answers."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from finlab.allocation.baselines.plant_in_casadi import plant_formulas
+from finlab.layout import FinModelSpec, Limits, load_layout
+from finlab.physics import Plant
+from finlab.physics.energy import EnergyWeights
+from finlab.physics.objective import Objective
+
+casadi = pytest.importorskip("casadi", reason="method ipopt is an optional extra")
+
+
+@pytest.mark.parametrize(
+    "objective",
+    [
+        Objective("power", copper_loss=0.3),
+        Objective("effort"),
+        Objective("effort", EnergyWeights(1.0, 0.7, 0.3, 0.4, 0.6)),
+    ],
+)
+def test_formulas_are_the_plant(objective: Objective) -> None:
+    """Wrench and cost of random commands; every fin has a law and limits of its own."""
+    layout = load_layout("A")
+    laws = ("drag", "lighthill", "soft", "drag")
+    limits = [Limits((0.05, 0.5), (0.1, 1.5 + 0.3 * i), (-1.0, 1.5 + 0.4 * i)) for i in range(4)]
+    fins = zip(layout.fins, laws, limits, strict=True)
+    layout = replace(
+        layout, fins=tuple(replace(f, model=FinModelSpec(law), limits=ends) for f, law, ends in fins)
+    )
+    plant = Plant(layout)
+    symbols, wrenches, costs = plant_formulas(casadi, plant, objective)
+    formulas = casadi.Function("formulas", [symbols], [wrenches, costs])
+    command = plant.sample(np.random.default_rng(0), (8,))
+    cost = objective.meter(plant)(command)
+    for row in range(8):
+        wrench, own = (np.array(part).ravel() for part in formulas(command[row].ravel()))
+        np.testing.assert_allclose(wrench, plant.wrench(command[row]), atol=1e-9)
+        assert own[0] == pytest.approx(cost[row], rel=1e-9)
