@@ -14,6 +14,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.allocation.search.cheaper_commands import cheaper_commands
 from finlab.allocation.search.prepared import Prepared, prepare, resting_fins, resting_seeds
 from finlab.allocation.search.receding_horizon import plan_ahead
 from finlab.allocation.search.refined_candidates import (
@@ -233,6 +234,11 @@ class Pipeline:
             within = prepared.commands.feasible(unwrap_to_arc(prepared, known))
             command, steps = np.concatenate([command, within[None]], axis=1), steps + 1
             origin = np.concatenate([origin, np.full((1, len(within)), -1)], axis=1)
+        if prepared.measured:
+            flat = target if len(target) == 1 else np.repeat(target, command.shape[1], axis=0)
+            start, exact = command.reshape(-1, *command.shape[2:]), exact_error(prepared)
+            found = cheaper_commands(prepared.commands, prepared.cost, flat, start, exact)
+            command = found.reshape(command.shape)
         candidates = refine_candidates(prepared, target, command, origin, steps, keep_mode)
         candidates = RefinedCandidates._make(values[:, : self.settings.n_refined] for values in candidates)
         missed = candidates.error[:, 0] > exact_error(prepared)

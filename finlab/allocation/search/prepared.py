@@ -37,6 +37,8 @@ class Prepared(NamedTuple):
     arcs: tuple[Array, Array] | None
     """Middles and halves (P, n) [rad] of arcs of force directions in which the search is repeated; None where
     those of the fins will do."""
+    measured: bool
+    """Whether the search sees the cost of some fin smoothed, one that is known by a table."""
     exactness: float
     """What thresholds on the normalized error are multiplied by: less than one for a robot that is weak
     beside the error's yardstick."""
@@ -62,6 +64,7 @@ def prepare(
         resting_seeds(fins.maximum, rests),
         objective.meter(plant),
         arcs_to_search(fins, len(rests)),
+        objective.convex and any(fin.model.type == "table" for fin in layout.fins),
         min(1.0, float(np.linalg.norm(strongest))),
     )
 

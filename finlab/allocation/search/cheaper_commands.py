@@ -1,0 +1,169 @@
+"""Cheaper commands near those of a search, where compiled fins only tell about what fins cost.
+
+The cost of a measured fin rises and falls with the noise of its table; the search in force space sees it
+smoothed. From where that leads, sequential quadratic programming by the fins' own laws goes down to the next
+minimum under exact tracking: steps solve
+
+    min g d + 1/2 d H d   s.t.   J d = what is missing,   within the limits,
+
+with H the curvature of cost minus multipliers times wrench, a block of 3 x 3 for each fin, from differences
+of the laws' slopes and made convex. Commands are counted in units of their ranges.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
+from finlab.arrays import AnyArray, Array
+from finlab.physics.objective import CostMeter
+
+STEPS = 6
+"""Most quadratic problems solved in turn."""
+SETTLED = 2e-3
+"""Share of its cost that some row must still have to gain for another step."""
+BEFORE, BACK, AFTER = 1, 1, 2
+"""Levenberg-Marquardt steps that bring commands onto the target: first, after each step, and in the end."""
+SPACING = 1e-4
+"""Of the commands whose slopes are compared, in ranges."""
+FLATTEST = 0.02
+"""Least curvature, as a share of the mean slope of the cost."""
+DAMPING = (1e-3, 0.2, 10.0)
+"""Curvature that is added at first, as such a share; its factors after steps that help and that do not."""
+LONGEST = 0.3
+"""Largest change of a command in one step, in ranges."""
+PASSES = 4
+"""Times that a step is solved, each time with the limits held that it would have crossed."""
+RIDGE = 1e-10
+"""Relative regularization of the 6 x 6 systems."""
+
+
+class _Model(NamedTuple):
+    """R problems near their commands."""
+
+    missing: Array
+    """Target minus wrench, normalized (R, 6)."""
+    jacobian: Array
+    """Change of the wrench (R, n, 3, 6)."""
+    slope: Array
+    """Of the cost (R, n, 3)."""
+    by_force: Array
+    """Second derivatives (R, n, 3, 3, 6) of the wrench."""
+    by_cost: Array
+    """Second derivatives (R, n, 3, 3) of the cost."""
+
+
+def cheaper_commands(
+    problem: CommandProblem, cost: CostMeter, target: Array, command: Array, exact_error: float
+) -> Array:
+    """Returns commands (R, n, 3) that cost no more than those given once these are refined.
+
+    Args:
+        problem: the layout.
+        cost: what is kept least.
+        target: normalized wrenches (R, 6), or one for all rows (1, 6).
+        command: where to start (R, n, 3).
+        exact_error: normalized error up to which commands are exact.
+    """
+    target = np.broadcast_to(target, (len(command), 6))
+    start = refine(problem, target, command, BEFORE)
+    here, value, error = start.command, cost(start.command), start.error
+    damping = np.full(len(here), DAMPING[0])
+    multiplier: AnyArray | None = None
+    for _ in range(STEPS):
+        model = _model(problem, cost, target, here)
+        if multiplier is None:
+            multiplier = _balance(model)
+        step, multiplier = _step(problem, model, here, multiplier, damping)
+        # An error costs twice what the multipliers say, so that none is left for a gain.
+        weight = 2.0 * np.linalg.norm(multiplier, axis=-1)
+        gain = np.abs((model.slope * step).sum((1, 2))) + weight * error
+        if (gain <= SETTLED * value).all():
+            break
+        # Brought back onto the target, a long step is not refused for the error that its bend leaves.
+        there, _, new_error = refine(problem, target, here + step * problem.width, BACK)
+        new_value = cost(there)
+        better = new_value + weight * new_error < value + weight * error
+        here = np.where(better[:, None, None], there, here)
+        value, error = np.where(better, new_value, value), np.where(better, new_error, error)
+        damping = np.where(better, damping * DAMPING[1], damping * DAMPING[2])
+    found = refine(problem, target, here, AFTER)
+    value = cost(start.command)
+    keep = (found.error > exact_error) | ((cost(found.command) > value) & (start.error <= exact_error))
+    return np.where(keep[:, None, None], start.command, found.command)
+
+
+def _model(problem: CommandProblem, cost: CostMeter, target: Array, command: Array) -> _Model:
+    """The problems near commands (R, n, 3), by their slopes there and a little to the side."""
+    rows, n, _ = command.shape
+    high = problem.edges[1] - SPACING * problem.width
+    apart = np.where(command > high, -SPACING, SPACING)
+    points = np.repeat(command[None], 4, axis=0)
+    for k in range(3):
+        points[k + 1, ..., k] += (apart * problem.width)[..., k]
+    points = points.reshape(4 * rows, n, 3)
+    force, slopes = problem.fin.force_and_slopes(points)
+    jacobian = (slopes @ problem.columns * problem.width[..., None]).reshape(4, rows, n, 3, 6)
+    slope = (cost.slopes(points) * problem.width).reshape(4, rows, n, 3)
+    wrench = force[:rows].reshape(rows, 3 * n) @ problem.columns.reshape(3 * n, 6)
+    apart = np.moveaxis(apart, -1, 0)[..., None]
+    by_force = np.moveaxis((jacobian[1:] - jacobian[0]) / apart[..., None], 0, 2)
+    by_cost = np.moveaxis((slope[1:] - slope[0]) / apart, 0, 2)
+    return _Model(target - wrench, jacobian[0], slope[0], by_force, by_cost)
+
+
+def _balance(model: _Model) -> AnyArray:
+    """Multipliers (R, 6) that come nearest to balancing the slopes of the cost."""
+    jacobian = model.jacobian.reshape(len(model.jacobian), -1, 6)
+    transposed = jacobian.swapaxes(1, 2)
+    pull = transposed @ model.slope.reshape(len(jacobian), -1, 1)
+    return np.asarray(np.linalg.solve(_regular(transposed @ jacobian), pull)[..., 0])
+
+
+def _step(
+    problem: CommandProblem, model: _Model, command: Array, multiplier: AnyArray, damping: Array
+) -> tuple[Array, Array]:
+    """Steps (R, n, 3) in ranges, and the multipliers (R, 6) with which they are the cheapest."""
+    curvature = model.by_cost - (model.by_force @ multiplier[:, None, None, :, None])[..., 0]
+    size, axes = np.linalg.eigh(0.5 * (curvature + curvature.swapaxes(-1, -2)))
+    usual = (np.abs(model.slope).mean((1, 2)) + 1e-12)[:, None, None]
+    size = np.maximum(np.abs(size), FLATTEST * usual) + damping[:, None, None] * usual
+    curvature = (axes * size[..., None, :]) @ axes.swapaxes(-1, -2)
+    span = np.where(problem.width > 0.0, problem.width, 1.0)
+    low, high = (problem.lower - command) / span, (problem.upper - command) / span
+    low[:, problem.full_turn, 2], high[:, problem.full_turn, 2] = -np.inf, np.inf
+    step: Array = np.zeros(command.shape)
+    held: AnyArray = np.zeros(command.shape, bool)
+    answer = multiplier
+    for _ in range(PASSES):
+        free, answer = _free_step(model, curvature, np.where(held, step, 0.0), held)
+        out = ((free < low) | (free > high)) & ~held
+        step = np.clip(free, low, high)
+        if not out.any():
+            break
+        held |= out
+    longest = np.abs(step).max((1, 2))
+    return step * np.minimum(1.0, LONGEST / np.maximum(longest, 1e-12))[:, None, None], answer
+
+
+def _free_step(model: _Model, curvature: Array, fixed: Array, held: AnyArray) -> tuple[Array, Array]:
+    """The cheapest steps (R, n, 3) of which some are held at what is fixed, and their multipliers (R, 6)."""
+    missing = model.missing - np.einsum("rnij,rni->rj", model.jacobian, fixed)
+    slope = np.where(held, 0.0, model.slope + (curvature @ fixed[..., None])[..., 0])
+    jacobian = np.where(held[..., None], 0.0, model.jacobian)
+    block = np.where(held[..., None] | held[..., None, :], np.eye(3) * held[..., None], curvature)
+    mobility = np.linalg.inv(block)
+    pulled = mobility @ jacobian
+    drift = (mobility @ slope[..., None])[..., 0]
+    gram = _regular(np.einsum("rnij,rnik->rjk", jacobian, pulled))
+    right = missing + np.einsum("rnij,rni->rj", jacobian, drift)
+    multiplier = np.linalg.solve(gram, right[..., None])[..., 0]
+    step = (pulled @ multiplier[:, None, :, None])[..., 0] - drift
+    return np.where(held, fixed, step), multiplier
+
+
+def _regular(gram: Array) -> Array:
+    """Matrices (R, 6, 6), slightly regularized."""
+    size = RIDGE * np.trace(gram, axis1=1, axis2=2) + 1e-14
+    regular: Array = gram + size[:, None, None] * np.eye(6)
+    return regular
