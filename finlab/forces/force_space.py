@@ -237,24 +237,25 @@ def polar(problem: PlanarProblem, force: Array) -> Planar:
     return Planar(found.size, _direction(found), row, unknown, unknown)
 
 
-def realize(problem: PlanarProblem, planar: Planar, rests: bool = False) -> tuple[Array, Array]:
+def realize(problem: PlanarProblem, planar: Planar, rests: float | None = None) -> tuple[Array, Array]:
     """Commands (R, n, 3) that give planar forces at the least cost, and that cost (R,).
 
     Args:
         problem: the layout.
         planar: the forces.
-        rests: whether a fin that hardly works rests altogether and turns to where that costs least.
-            Refinement has to mend the little force that is then missing, or turned.
+        rests: share of its largest force up to which a fin rests altogether and turns to where that costs
+            least; with 0, only those that do their least turn. Refinement has to mend the little force that
+            is then missing, or turned. None leaves all as they are.
     """
     fins = problem.fins
     least = fins.minimum * (1.0 + REST)
-    idle = planar.size <= least + IDLE * rests * fins.maximum
+    idle = planar.size <= least + (rests or 0.0) * fins.maximum
     if rests:
         rest = fins.lookup(fins.rim(planar.direction), np.where(idle, 0.0, planar.size))
         planar = planar._replace(row=np.where(idle[..., None], rest, planar.row))
     command, cost = planar.command, planar.row[..., COST].sum(-1)
     direction = command[..., 2]
-    if rests or problem.turning_is_free:
+    if rests is not None or problem.turning_is_free:
         np.copyto(direction, problem.idle_direction, where=idle)
     if not problem.turning_is_free:
         turn = np.where(fins.half >= np.pi, wrapped(direction), direction)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from finlab.forces import force_space
 from finlab.forces.envelopes import Envelopes, Projected
 from finlab.forces.fin_envelope import COST, MOBILITY
-from finlab.forces.force_space import Planar, PlanarProblem, descend, realize
+from finlab.forces.force_space import IDLE, Planar, PlanarProblem, descend, realize
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.layout.angles import wrapped
 from finlab.physics import Plant, make_law
@@ -187,7 +187,7 @@ def test_the_cost_that_is_told_is_that_of_the_commands(name: str) -> None:
         problem = problem_of(layout, objective)
         planar = solved(problem, 0.6 * reachable(layout, 15))
         meter = objective.meter(Plant(layout))
-        for rests in (False, True):
+        for rests in (None, 0.0, IDLE):
             command, told = realize(problem, planar, rests)
             full = float(meter(layout.upper[None])[0])
             assert np.abs(told - meter(command)).max() < 5e-3 * full

@@ -22,6 +22,7 @@ from finlab.allocation.search.refined_candidates import (
     FallbackForces,
     RefinedCandidates,
     exact_error,
+    improve,
     nearest_forces,
     rank,
     refine_candidates,
@@ -58,6 +59,9 @@ class SearchNumbers:
     """The same from six fins on, where there are more local minima to leave."""
     same_cost: float = 2e-4
     """Share by which costs differ at least of forces that are refined as two."""
+    dear: float = 0.01
+    """Share of its cost by which refinement may make an answer dearer: where a fin is near the peak of its
+    thrust, commands that differ much hardly differ in force."""
     bound_steps: int = 30
     """The same where a lower bound is asked for."""
     wide_seeds: int = 64
@@ -150,7 +154,7 @@ class Pipeline:
         else:
             drawn = np.random.default_rng(0).random((SEARCH.wide_seeds, n)) ** 2 * maximum
             seeds, works = np.concatenate([prepared.seeds, drawn]), None
-        command, origin = self._search(
+        command, origin, _ = self._search(
             prepared, target, seeds[None], False, keep=len(seeds), steps=SEARCH.wide_steps, works=works
         )
         found = refine_candidates(prepared, target, command, origin, MISSED.first_lm_steps)
@@ -229,21 +233,31 @@ class Pipeline:
         # Fins that rest have hardly any slope: two steps where there are such.
         keep_mode, steps = known is not None, self.settings.refine_steps + (not self.objective.convex)
         steps += prepared.arcs is not None  # fins at stops are slower to mend
-        command, origin = self._search(prepared, target, seeds, keep_mode)
+        command, origin, expected = self._search(prepared, target, seeds, keep_mode)
+        searched = command[:, 0]
         if known is not None:
             within = prepared.commands.feasible(unwrap_to_arc(prepared, known))
             command, steps = np.concatenate([command, within[None]], axis=1), steps + 1
             origin = np.concatenate([origin, np.full((1, len(within)), -1)], axis=1)
+        exact = exact_error(prepared)
         if prepared.measured:
             flat = target if len(target) == 1 else np.repeat(target, command.shape[1], axis=0)
-            start, exact = command.reshape(-1, *command.shape[2:]), exact_error(prepared)
+            start = command.reshape(-1, *command.shape[2:])
             found = cheaper_commands(prepared.commands, prepared.cost, flat, start, exact)
             command = found.reshape(command.shape)
         candidates = refine_candidates(prepared, target, command, origin, steps, keep_mode)
         candidates = RefinedCandidates._make(values[:, : self.settings.n_refined] for values in candidates)
-        missed = candidates.error[:, 0] > exact_error(prepared)
+        missed = candidates.error[:, 0] > exact
         if missed.any():
             refine_missed(prepared, target, candidates, missed, fallback)
+            searched = np.where(missed[:, None, None], candidates.command[:, 0], searched)
+        if self.objective.convex:  # what was reached late, or became dear on the way, is made cheaper
+            dear = missed | (candidates.cost[:, 0] > (1.0 + SEARCH.dear) * expected)
+            dear &= candidates.error[:, 0] <= exact
+            if dear.any():
+                rows = target if len(target) == 1 else target[dear]
+                start = cheaper_commands(prepared.commands, prepared.cost, rows, searched[dear], exact)
+                improve(prepared, target, candidates, dear, start[:, None], 1)
         return candidates
 
     def _search(
@@ -256,8 +270,9 @@ class Pipeline:
         keep: int | None = None,
         steps: int | None = None,
         works: Array | None = None,
-    ) -> tuple[Array, NDArray[np.intp]]:
-        """Cheapest commands (N, P, n, 3) reached from seeds, and whose seeds they are (N, P).
+    ) -> tuple[Array, NDArray[np.intp], Array]:
+        """Cheapest commands (N, P, n, 3) reached from seeds, whose seeds they are (N, P), and what the first
+        should cost (N,).
 
         With `keep_mode`, the first seed is how the robot moves now; what it leads to stays first.
         """
@@ -276,9 +291,9 @@ class Pipeline:
         )
         planar = force_space.descend(problem, flat, seeds.reshape(-1, *seeds.shape[2:]), steps, works)
         rests = not self.objective.convex
-        command, cost = force_space.realize(problem, planar, rests)
+        command, cost = force_space.realize(problem, planar, force_space.IDLE if rests else None)
         if n_starts == 1 and not rests:
-            return command[:, None], np.zeros((rows, 1), np.intp)
+            return command[:, None], np.zeros((rows, 1), np.intp), cost
         error = np.einsum("ri,ri->r", planar.residual, planar.residual)
         score = rank(cost, error, (SEARCH.promising_error * prepared.exactness) ** 2).reshape(rows, n_starts)
         if keep_mode:
@@ -286,12 +301,12 @@ class Pipeline:
         # With fins at rest, what refinement mends changes the order of the costs: twice as many are tried.
         chosen = _distinct(score)[:, : keep or self.settings.n_refined * (1 + rests)]
         place = chosen + np.arange(0, rows * n_starts, n_starts)[:, None]
-        kept = command.take(place, axis=0)
-        if rests:  # what resting fins leave undone cannot always be mended: both ways are refined
-            working, _ = force_space.realize(problem, planar)
-            kept = np.concatenate([kept, working.take(place, axis=0)], axis=1)
-            chosen = np.concatenate([chosen, chosen], axis=1)
-        return kept, chosen // (n_starts // n_seeds)
+        kept, expected = command.take(place, axis=0), cost[place[:, 0]]
+        if rests:  # what resting fins leave undone cannot always be mended: all ways are refined
+            ways = (force_space.realize(problem, planar, share)[0] for share in (0.0, None))
+            kept = np.concatenate([kept, *(way.take(place, axis=0) for way in ways)], axis=1)
+            chosen = np.concatenate([chosen, chosen, chosen], axis=1)
+        return kept, chosen // (n_starts // n_seeds), expected
 
 
 def _distinct(score: Array) -> NDArray[np.intp]:

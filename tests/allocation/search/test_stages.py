@@ -286,8 +286,8 @@ def test_a_seed_that_misses_is_left_for_a_dearer_one_that_does_not(
         pipeline.force_space, "realize", lambda *a, **k: (realize(*a, **k)[0], price), raising=True
     )
     target = np.array([EASY]) / effort.normalization.std
-    _, chosen = effort.pipeline._search(prepared, target, seeds, False, keep=4)
-    assert chosen[0, :4].tolist() == [0, 1, 2, 3]
+    _, chosen, expected = effort.pipeline._search(prepared, target, seeds, False, keep=4)
+    assert chosen[0, :4].tolist() == [0, 1, 2, 3] and expected.tolist() == [4.0]
 
 
 def test_exploring_power_rests_fins_for_good(search: SearchAllocator) -> None:
