@@ -19,6 +19,11 @@ MAX_SUBSETS = 80
 """Most sub-layouts that are searched."""
 LEAST_WORKING = 2
 """Fewest fins that work in a sub-layout; of two fins, one."""
+UNEVEN = 4
+"""Starts in which all fins work, some much harder than others: equal fins that all work alike are a saddle of
+the effort, which a search leaves slowly."""
+LEAST_SHARE = 0.05
+"""Least share of its largest force with which a fin begins there."""
 
 
 class Prepared(NamedTuple):
@@ -31,7 +36,8 @@ class Prepared(NamedTuple):
     commands: CommandProblem
     """The layout for the refinement of commands."""
     seeds: Array
-    """Sizes of forces (S, n) [N] to start from: all fins, then sub-layouts whose other fins nearly rest."""
+    """Sizes of forces (S, n) [N] to start from: all fins, then for effort sub-layouts whose other fins nearly
+    rest, and fins that work unevenly."""
     cost: CostMeter
     """By which answers are compared."""
     arcs: tuple[Array, Array] | None
@@ -55,15 +61,18 @@ def prepare(
     plant = plant_of(layout)
     fins = layout_envelopes(layout, objective, compiled)
     planar = planar_problem(layout, fins, std, objective)
-    rests = ((),) if objective.convex else resting_fins(layout.n_fins)
+    seeds = fins.maximum[None]
+    if not objective.convex:
+        rests = resting_seeds(fins.maximum, resting_fins(layout.n_fins))
+        seeds = np.concatenate([rests, uneven_seeds(fins.maximum)])
     strongest = np.tile(fins.maximum, 2)[:, None] * planar.columns
     return Prepared(
         plant,
         planar,
         CommandProblem(plant, plant.columns / std, plant.lower, plant.upper, plant.full_turn),
-        resting_seeds(fins.maximum, rests),
+        seeds,
         objective.meter(plant),
-        arcs_to_search(fins, len(rests)),
+        arcs_to_search(fins, len(seeds)),
         objective.convex and any(fin.model.type == "table" for fin in layout.fins),
         min(1.0, float(np.linalg.norm(strongest))),
     )
@@ -89,3 +98,10 @@ def resting_seeds(maximum: Array, rests: tuple[tuple[int, ...], ...], left: floa
     for row, fins in enumerate(rests):
         seeds[row, list(fins)] *= left
     return seeds
+
+
+def uneven_seeds(maximum: Array) -> Array:
+    """Seeds (`UNEVEN`, n) [N] from largest forces (n,), spread by irrational steps: a few fins work hard."""
+    row, fin = np.arange(1, UNEVEN + 1)[:, None], np.arange(len(maximum))
+    spread = (row * 0.6180339887 + fin * 0.7548776662) % 1.0
+    return maximum * (LEAST_SHARE + (1.0 - LEAST_SHARE) * spread**2)

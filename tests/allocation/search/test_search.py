@@ -174,7 +174,7 @@ def test_candidates_are_offered_best_first(objective: Name) -> None:
         np.testing.assert_allclose(wrench, Plant(layout).wrench(command), atol=1e-12)
         scored = method.normalization.error(wrench, result.target)
         assert scored == pytest.approx(error, abs=1e-12)
-    rests = ["all fins", *(f"without {name}" for name in layout.names)]
+    rests = ["all fins", "all fins, unevenly", *(f"without {name}" for name in layout.names)]
     rests += [f"without {a} and {b}" for a, b in combinations(layout.names, 2)]
     assert set(candidates.source) <= set(rests)
 

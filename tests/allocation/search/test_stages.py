@@ -11,7 +11,15 @@ import pytest
 from finlab.allocation import load_allocator
 from finlab.allocation.search import pipeline, search_allocator
 from finlab.allocation.search.pipeline import SEARCH
-from finlab.allocation.search.prepared import MAX_SUBSETS, Prepared, prepare, resting_fins, resting_seeds
+from finlab.allocation.search.prepared import (
+    MAX_SUBSETS,
+    UNEVEN,
+    Prepared,
+    prepare,
+    resting_fins,
+    resting_seeds,
+    uneven_seeds,
+)
 from finlab.allocation.search.refined_candidates import (
     MISSED,
     RANKING,
@@ -27,7 +35,7 @@ from finlab.allocation.search.settings import Settings
 from finlab.allocation.search.turn_limits import TURNS, limit_turn
 from finlab.assets import shipped_layouts
 from finlab.errors import AllocationError
-from finlab.layout import Layout, load_layout
+from finlab.layout import Fin, Layout, load_layout
 from finlab.physics import Plant
 from finlab.physics.energy import EnergyWeights, command_energy, fin_energy
 from finlab.physics.objective import Name, Objective
@@ -137,8 +145,10 @@ def test_up_to_two_fins_rest_or_all_but_two(for_effort: Prepared, prepared: Prep
         expected += [tuple(i for i in range(n) if i not in pair) for pair in combinations(range(n), 2)]
     expected = expected[:MAX_SUBSETS]
     assert list(resting_fins(n)) == expected
-    assert [tuple(np.flatnonzero(row < top)) for row in for_effort.seeds] == expected
-    for row, resting in zip(for_effort.seeds, expected, strict=True):
+    rests, uneven = np.split(for_effort.seeds, [len(expected)])
+    assert [tuple(np.flatnonzero(row < top)) for row in rests] == expected
+    np.testing.assert_array_equal(uneven, uneven_seeds(top))
+    for row, resting in zip(rests, expected, strict=True):
         np.testing.assert_allclose(row[list(resting)], 1e-3 * top[list(resting)])
     # Power has one cheapest allocation: all fins work.
     np.testing.assert_array_equal(prepared.seeds, prepared.planar.fins.maximum[None])
@@ -154,6 +164,24 @@ def test_how_many_sub_layouts_there_are(n: int, count: int) -> None:
 def test_seeds_by_hand() -> None:
     seeds = resting_seeds(np.array([1.0, 2.0, 4.0]), ((), (1,), (0, 2)))
     np.testing.assert_allclose(seeds, [[1.0, 2.0, 4.0], [1.0, 2e-3, 4.0], [1e-3, 2.0, 4e-3]])
+
+
+@pytest.mark.parametrize("n", [2, 3, 6])
+def test_uneven_seeds_differ_from_fin_to_fin_and_from_seed_to_seed(n: int) -> None:
+    share = uneven_seeds(np.full(n, 3.0)) / 3.0
+    assert share.shape == (4, n) and share.min() >= 0.05 and share.max() < 1.0
+    assert np.ptp(share, axis=1).min() > 0.1, "no start in which equal fins work alike"
+    assert np.abs(share[:, None] - share[None])[~np.eye(4, dtype=bool)].max(axis=-1).min() > 0.05
+    assert uneven_seeds(np.array([1.0, 2.0]))[:, 1] == pytest.approx(2.0 * share[:, 1])
+
+
+@pytest.mark.parametrize("share", [0.5, 0.8])
+def test_twins_that_must_give_more_than_one_can_work_unevenly(share: float) -> None:
+    """For effort one at its largest and the other a little is cheaper than both alike."""
+    pair = Layout("twins", tuple(Fin(name, (0.1, 0.05, 0.0), 0.3) for name in "ab"))
+    target = Plant(pair).wrench(np.array([[0.6, 2.1, 0.4]] * 2)) * share
+    size = np.linalg.norm(load_allocator(objective="effort").allocate(pair, target).fin_forces, axis=1)
+    assert size.max() > 0.9 * 6.66 and size.min() < size.max() * (2.2 * share - 1.0)
 
 
 def test_arcs_are_narrowed_for_fins_that_point_somewhere(prepared: Prepared) -> None:
@@ -203,7 +231,7 @@ def test_effort_is_searched_longer_with_more_fins(
     for name, n, steps in (("A", 4, few), ("penta", 5, few), ("hexa", 6, many), ("octo", 8, many)):
         counted.clear()
         effort.allocate(load_layout(shipped_layouts()[name]), EASY)
-        assert counted == [(n, len(resting_fins(n)), steps)]
+        assert counted == [(n, len(resting_fins(n)) + UNEVEN, steps)]
 
 
 def test_power_is_searched_once(search: SearchAllocator, counted: list[tuple[int, int, int]]) -> None:
@@ -238,7 +266,7 @@ def test_exploring_tries_what_may_be_another_way(
     rests = len(resting_fins(4))
     # The question is asked again first, as of a copy.
     assert counted[1:] == [
-        (4, rests + (SEARCH.wide_seeds if objective == "effort" else 0), SEARCH.wide_steps)
+        (4, rests + (UNEVEN + SEARCH.wide_seeds) * (objective == "effort"), SEARCH.wide_steps)
     ]
 
 
