@@ -19,7 +19,7 @@ LEVELS = (
     ("inference", "control"),
     ("forces",),
     ("allocation",),
-    ("training", "sim", "analysis"),
+    ("training", "sim", "analysis", "fit"),
     ("evaluation", "deploy"),
     ("cli",),
 )

@@ -19,7 +19,7 @@ _BROKEN_PIPE = 141
 """128 + SIGPIPE, as shells report it."""
 
 _EXTRAS = {"torch": "train", "viser": "app", "trimesh": "app", "yourdfpy": "urdf"}
-_EXTRAS |= {"matplotlib": "plot", "markdown_it": "plot"}
+_EXTRAS |= {"matplotlib": "plot", "markdown_it": "plot", "sklearn": "fit"}
 """Packages that some verbs need beside the base install, and the extra that brings each."""
 
 
@@ -72,13 +72,14 @@ _DESCRIPTION = "Control allocation for fin-actuated underwater robots: a target 
 
 def _command_line() -> SubcommandApp:
     """All verbs; a function may return an exit code, None means 0."""
-    from finlab.cli import allocate, app, evaluate, export, layout, simulate, train
+    from finlab.cli import allocate, app, evaluate, export, fit, layout, simulate, train
 
     root = SubcommandApp()
     root.command(allocate.allocate)
     root.command(layout.verbs, name="layout", help="Check, show and optimize layout files.")
     root.command(train.verbs, name="train", help="Train the surrogate and the allocator.")
     root.command(evaluate.verbs, name="eval", help="Measure methods against the analytic fin model.")
+    root.command(fit.verbs, name="fit", help="Fit fins to measurements.")
     root.command(simulate.simulate)
     root.command(export.export)
     root.command(app.app)

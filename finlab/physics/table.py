@@ -19,13 +19,15 @@ class TableLaw(FinLaw):
 
     uniform = False
 
-    def __init__(self, axes: list[Array], values: Array, periodic: bool) -> None:
+    def __init__(self, axes: list[Array], values: Array, periodic: bool, notes: tuple[str, ...] = ()) -> None:
         """Takes the grid's axes [rad, Hz, rad], rising, two points or more each, and what was measured
         (a, f, d, 3 or 4): forces [N], and power [W] where it is known.
 
         A periodic grid's zero directions cover the circle, without the first one again at the end.
         """
         self.periodic = periodic
+        self.notes = notes
+        """What to know of the table, a sentence each."""
         turn = np.append(axes[2], axes[2][0] + TURN) if periodic else axes[2]
         self.covers = tuple((float(axis[0]), float(axis[-1])) for axis in axes)
         """First and last amplitude [rad], frequency [Hz] and zero direction [rad] of the grid."""

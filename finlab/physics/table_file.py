@@ -4,7 +4,8 @@ Its columns are A [rad], f [Hz], phi [rad], Fx, Fy, Fz [N] under a header line, 
 known; A is the half amplitude, phi the zero direction, forces and power are cycle means, forces in the fin
 frame (x' shaft, y' horizontal thrust axis, z' up). A fin without P takes the power of a plate like U-CAT's
 fin. Rows come in any order but must fill a grid: every amplitude with every frequency with every zero
-direction. Spacing is free.
+direction. Spacing is free. Lines that begin with # say what to know of the table; other columns are passed
+over.
 """
 
 import csv
@@ -28,6 +29,8 @@ COLUMNS = ("A", "f", "phi", "Fx", "Fy", "Fz")
 """Columns of a force table, by name; their order in the file is free."""
 POWER_COLUMN = "P"
 """Column of the mean power [W], which may be left out."""
+DOUBT = "not to be trusted"
+"""How a table's note begins that every answer repeats."""
 MAX_BYTES = 50_000_000
 """Largest table that is read [bytes]."""
 
@@ -41,14 +44,14 @@ def read_table(path: str | os.PathLike[str]) -> TableLaw:
             thrust or no power to tell of.
     """
     source = str(path)
-    rows, lines = _read_rows(Path(path))
+    rows, lines, notes = _read_rows(Path(path))
     _check_units(rows, source)
     axes, values = _grid(rows, lines, source)
     periodic, axes[2], values = _close_circle(axes[2], values, source)
     for name, axis in zip(COLUMNS, axes, strict=False):
         if len(axis) < 2:
             raise DataError(f"{source}: column {name} has one value, expected at least 2 to interpolate")
-    return TableLaw(axes, values, periodic)
+    return TableLaw(axes, values, periodic, notes)
 
 
 def write_table(
@@ -87,13 +90,16 @@ def table_bytes(path: str | os.PathLike[str]) -> bytes:
     return content
 
 
-def _read_rows(path: Path) -> tuple[Array, NDArray[np.intp]]:
-    """Returns the table (rows, 6 or 7) in the order of `COLUMNS`, with the power behind, and the line (rows,)
-    of the file that each row stands in."""
+def _read_rows(path: Path) -> tuple[Array, NDArray[np.intp], tuple[str, ...]]:
+    """Returns the table (rows, 6 or 7) in the order of `COLUMNS`, with the power behind, the line (rows,) of
+    the file that each row stands in, and the notes above the header."""
     try:
-        lines = list(csv.reader(table_bytes(path).decode("utf-8-sig").splitlines()))
+        text = table_bytes(path).decode("utf-8-sig").splitlines()
+        above = next((k for k, line in enumerate(text) if not line.startswith("#")), len(text))
+        lines = list(csv.reader(text[above:]))
     except (UnicodeDecodeError, csv.Error) as error:
         raise DataError(f"{path}: cannot be read as CSV text: {error}") from None
+    notes = tuple(line.lstrip("# ").rstrip() for line in text[:above])
     header = [cell.strip() for cell in lines[0]] if lines else []
     missing = [name for name in COLUMNS if name not in header]
     if missing:
@@ -105,7 +111,7 @@ def _read_rows(path: Path) -> tuple[Array, NDArray[np.intp]]:
     columns = [*COLUMNS, POWER_COLUMN] if POWER_COLUMN in header else [*COLUMNS]
     order = [header.index(name) for name in columns]
     rows, numbers = [], []
-    for line, cells in enumerate(lines[1:], start=2):
+    for line, cells in enumerate(lines[1:], start=above + 2):
         if not any(cell.strip() for cell in cells):
             continue
         if len(cells) != len(header):
@@ -114,7 +120,7 @@ def _read_rows(path: Path) -> tuple[Array, NDArray[np.intp]]:
         numbers.append(line)
     if not rows:
         raise DataError(f"{path}: has no rows below its header")
-    return np.array(rows), np.array(numbers)
+    return np.array(rows), np.array(numbers), notes
 
 
 def _number(cell: str, where: str) -> float:

@@ -1,0 +1,105 @@
+"""`finlab fit fin|plan`: from measurements to a fin that layouts can name, and what to measure."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from tyro.conf import Positional, arg
+from tyro.extras import SubcommandApp
+
+verbs = SubcommandApp()
+
+
+@verbs.command
+def fin(
+    data: Annotated[Positional[tuple[Path, ...]], arg(metavar="DATA.csv...")],
+    output: Annotated[Path, arg(metavar="FIN.csv", aliases=["-o"])],
+    angles: Literal["rad", "deg"] | None = None,
+    amplitude: Literal["half", "peak-to-peak"] | None = None,
+    frequency: Literal["hz", "rpm"] | None = None,
+    sensor_turn: Annotated[tuple[float, float, float], arg(metavar="X Y Z")] = (0.0, 0.0, 0.0),
+    lever: float | None = None,
+    page: bool = True,
+    seed: int = 0,
+) -> None:
+    """Fit a fin to a load cell's measurements, and write it for layouts to name, with a page beside it.
+
+    Files hold cycle means (A, f, Fy, Fz and perhaps phi, Fx, P and standard deviations sFx, sFy, sFz) or raw
+    series (t, angle, Fy, Fz and perhaps Fx, P); A is half the stroke, phi the zero direction, forces are in
+    the fin frame (x' shaft, y' horizontal thrust axis, z' up). Units may stand in the header, `A [deg]`.
+
+    Args:
+        data: CSV files of one fin.
+        output: the fitted fin; the page is FIN.html beside it.
+        angles: unit of amplitudes, zero directions and angles; recognized where it is not given.
+        amplitude: whether amplitudes are half the stroke or the whole; recognized where it is beyond doubt.
+        frequency: unit of frequencies; recognized where it is beyond doubt.
+        sensor_turn: how the load cell is turned against the fin frame, about x', then y', then z' [deg].
+        lever: distance along the shaft from the load cell to the fin's centre [m], for moments My, Mz.
+        page: write the page.
+        seed: draws samples where there are too many.
+    """
+    from finlab.errors import DataError
+    from finlab.fit.advice import next_measurements, thin_regions
+    from finlab.fit.conventions import Conventions
+    from finlab.fit.fin_file import summary, write_fin
+    from finlab.fit.fin_fit import fit_fin
+    from finlab.fit.measurements import read_measurements
+
+    if output.suffix.lower() != ".csv":
+        raise DataError(f"{output}: a fin is a CSV file, expected a name that ends in .csv")
+    measurements = read_measurements(data, Conventions(angles, amplitude, frequency, sensor_turn, lever))
+    fit = fit_fin(measurements, seed)
+    write_fin(fit, output)
+    print("\n".join(summary(fit)))
+    for clause in thin_regions(fit):
+        print(f"data are thin: {clause}")
+    print("measure next, A [rad], f [Hz], zero direction [rad]:")
+    for command in next_measurements(fit):
+        print("  " + "  ".join(f"{value:7.3f}" for value in command))
+    print(f"{output}: name it in a layout, model: {{type: table, path: {output.name}}}")
+    if page:
+        from finlab.evaluation.report.fin_fit_page import write_fin_fit_page
+
+        write_fin_fit_page(fit, output.with_suffix(".html"))
+        print(output.with_suffix(".html"))
+
+
+@verbs.command
+def plan(
+    output: Annotated[Path, arg(metavar="PLAN.csv", aliases=["-o"])],
+    layout: str | None = None,
+    fin: str | None = None,
+    samples: int = 300,
+    fixed: bool = False,
+    seed: int = 0,
+) -> None:
+    """Write a plan of measurements for a rig: commands in an efficient order, some of them twice.
+
+    Args:
+        output: the plan; with its forces filled in, `finlab fit fin` reads it.
+        layout: whose limits count; the nominal ones by default.
+        fin: name of the fin of that layout; the first one by default.
+        samples: how many measurements.
+        fixed: the rig cannot turn the fin's zero direction.
+        seed: scrambles the commands.
+    """
+    from finlab.cli.inputs import open_robot
+    from finlab.errors import DataError, FinlabError
+    from finlab.fit.rig_plan import plan_measurements
+    from finlab.layout import Limits
+    from finlab.whole_file import write_whole
+
+    limits = Limits()
+    if layout is not None:
+        fins = {found.name: found for found in open_robot(layout).layout.fins}
+        if fin is not None and fin not in fins:
+            raise FinlabError(f"{layout} has no fin {fin!r:.60}, expected one of {', '.join(fins)}")
+        limits = fins[fin or next(iter(fins))].limits
+    elif fin is not None:
+        raise FinlabError("--fin names a fin of a layout; give --layout, too")
+    plan = plan_measurements(limits, samples, not fixed, seed)
+    write_whole(output, plan.csv(), DataError)
+    minutes = plan.duration / 60.0
+    print(
+        f"{output}: {len(plan.command)} measurements, {plan.repeats} of them repeats, about {minutes:.0f} min"
+    )

@@ -1,0 +1,197 @@
+"""A fin from measurements: smooth forces and power with their uncertainty, and whether to trust them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.fit.gaussian_process import Component
+from finlab.fit.measurements import MIN_SAMPLES, Measurements
+from finlab.layout.angles import TURN
+from finlab.layout.arrays import Array
+
+MOST_SAMPLES = 1500
+"""Samples beyond this number are thinned: the time grows with their cube."""
+OUTLIER = 5.0
+"""Error, over the usual one, beyond which a sample is left out."""
+BAND = 1.96
+"""Standard deviations of a band that holds 95 % of a normal distribution."""
+GOOD_ERROR = 0.05
+"""Uncertainty of a force over the largest one, on average, up to which a fit is trusted."""
+GOOD_BAND = 0.85
+"""Share of samples left out that must lie within their band."""
+COVERED = 0.75 * TURN
+"""Zero directions from which a table goes all round; fewer make a table of their arc."""
+
+
+@dataclass(frozen=True)
+class FinFit:
+    """A fin's forces as Gaussian processes, one for each axis of the frame that turns with the fin."""
+
+    measurements: Measurements
+    """The samples that were used."""
+    outliers: tuple[str, ...]
+    """Where the samples stand that were left out."""
+    components: tuple[Component, Component, Component]
+    """Force along the thrust's mean direction, across it, and along the shaft, over `largest`."""
+    power: Component | None
+    """Power over its largest, where it was measured."""
+    lean: float
+    """Angle from the zero direction to the thrust's mean direction [rad]."""
+    largest: float
+    """Largest force that was measured, outliers apart [N]."""
+    largest_power: float
+    """Largest power that was measured [W]."""
+    notes: tuple[str, ...]
+    """What was recognized, filled in or left out, a sentence each."""
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Largest amplitude [rad] and frequency [Hz] that were measured."""
+        return float(self.measurements.command[:, 0].max()), float(self.measurements.command[:, 1].max())
+
+    def predict(self, command: Array) -> tuple[Array, Array]:
+        """Returns forces [N] in the fin frame and their standard deviations (..., 3) at commands (..., 3)."""
+        inputs = self.scaled(command)
+        found = [component.predict(inputs) for component in self.components]
+        (along, across, sideways), (by_along, by_across, by_sideways) = zip(*found, strict=True)
+        angle = command[..., 2].reshape(-1) + self.lean
+        cos, sin = np.cos(angle), np.sin(angle)
+        force = np.stack([sideways, along * cos - across * sin, along * sin + across * cos], axis=-1)
+        deviation = [by_sideways, np.hypot(by_along * cos, by_across * sin)]
+        deviation += [np.hypot(by_along * sin, by_across * cos)]
+        shape = command.shape
+        return self.largest * force.reshape(shape), self.largest * np.stack(deviation, -1).reshape(shape)
+
+    def predict_power(self, command: Array) -> Array | None:
+        """Returns the power [W], (...), at commands (..., 3); None where none was measured."""
+        if self.power is None:
+            return None
+        power = self.largest_power * self.power.predict(self.scaled(command))[0]
+        return np.maximum(power, 0.0).reshape(command.shape[:-1])
+
+    def error(self) -> float:
+        """Returns the cross-validated error: root mean square over the samples, each predicted from all
+        others, of the force's error over the largest force, the noise of the samples included."""
+        return float(np.sqrt(np.mean(sum(component.left_out**2 for component in self.components))))
+
+    def noise(self) -> float:
+        """Returns the noise of a sample over the largest force, root mean square over samples and axes."""
+        return float(np.sqrt(np.mean(sum(component.variance for component in self.components))))
+
+    def coverage(self) -> float:
+        """Returns the share of samples that lie in the 95 % band of the fit to all others."""
+        inside = [np.abs(c.left_out) <= BAND * c.left_out_deviation for c in self.components[:2]]
+        return float(np.mean(inside))
+
+    def uncertainty(self, command: Array) -> Array:
+        """Returns the standard deviation (...) of the force at commands (..., 3) over the largest force."""
+        return np.asarray(np.linalg.norm(self.predict(command)[1], axis=-1) / self.largest)
+
+    def doubts(self) -> tuple[str, ...]:
+        """Returns why the fit should not be trusted, a clause each; nothing where it may be."""
+        grid = self.grid()
+        doubtful = []
+        usual = float(np.sqrt(np.mean(self.uncertainty(grid) ** 2)))
+        if usual > GOOD_ERROR:
+            doubtful.append(f"forces are uncertain by {usual:.0%} of the largest one")
+        if self.coverage() < GOOD_BAND:
+            doubtful.append(f"only {self.coverage():.0%} of the samples lie in their 95 % band")
+        lost = len(self.outliers)
+        if lost > 0.1 * (lost + len(self.measurements)):
+            doubtful.append(f"{lost} of {lost + len(self.measurements)} samples contradict the others")
+        if len(self.measurements) < 3 * MIN_SAMPLES:
+            doubtful.append(f"{len(self.measurements)} samples are few, 300 are a good number")
+        return tuple(doubtful)
+
+    def grid(self, shape: tuple[int, int, int] = (7, 7, 12)) -> Array:
+        """Returns commands on a grid (*shape, 3) over what was measured, from rest on."""
+        amplitude, frequency = self.reach
+        axes = [
+            np.linspace(0.0, most, count) for most, count in ((amplitude, shape[0]), (frequency, shape[1]))
+        ]
+        axes.append(self.directions(shape[2]))
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+
+    def directions(self, count: int) -> Array:
+        """Returns zero directions [rad] of a table: all round, or the arc where samples are."""
+        measured = self.measurements.command[:, 2]
+        if not self.measurements.turned or np.ptp(measured) >= COVERED:
+            return np.linspace(-0.5 * TURN, 0.5 * TURN, count, endpoint=False)
+        return np.linspace(measured.min(), measured.max(), count)
+
+    def scaled(self, command: Array) -> Array:
+        """Returns commands (m, 3) as the components take them."""
+        flat = command.reshape(-1, 3).copy()
+        flat[:, :2] /= self.reach
+        if not self.measurements.turned:
+            flat[:, 2] = 0.0
+        return flat
+
+
+def fit_fin(measurements: Measurements, seed: int = 0) -> FinFit:
+    """Returns the fin that explains samples, leaving out those that contradict all others.
+
+    Args:
+        seed: draws the samples that are kept where there are more than `MOST_SAMPLES`.
+    """
+    notes = list(measurements.notes)
+    if len(measurements) > MOST_SAMPLES:
+        drawn = np.random.default_rng(seed).permutation(len(measurements)) >= MOST_SAMPLES
+        notes.append(f"{MOST_SAMPLES} of {len(measurements)} samples, drawn at random, are used")
+        measurements = measurements.without(drawn)
+    bad = _outliers(measurements)
+    outliers = tuple(place for place, out in zip(measurements.places, bad, strict=True) if out)
+    if outliers:
+        shown = ", ".join(outliers[:5]) + (" ..." if len(outliers) > 5 else "")
+        notes.append(f"{len(outliers)} of {len(bad)} samples contradict the others and are left out: {shown}")
+        measurements = measurements.without(bad)
+    return _fitted(measurements, outliers, tuple(notes))
+
+
+def _fitted(measurements: Measurements, outliers: tuple[str, ...], notes: tuple[str, ...]) -> FinFit:
+    turned, lean = _turned_forces(measurements)
+    largest = float(np.linalg.norm(measurements.force, axis=-1).max())
+    inputs = _scaled(measurements)
+    variance: list[Array | None] = [None, None, None]
+    if measurements.deviation is not None:
+        # Deviations of the two axes across the shaft stay what they are in a frame that turns between them.
+        planar = np.mean(measurements.deviation[:, 1:] ** 2, axis=-1) / largest**2
+        variance = [planar, planar, measurements.deviation[:, 0] ** 2 / largest**2]
+    along, across, sideways = (Component(inputs, turned[:, k] / largest, variance[k]) for k in range(3))
+    power, largest_power = None, 1.0
+    if measurements.power is not None:
+        largest_power = float(measurements.power.max())
+        power = Component(inputs, measurements.power / largest_power)
+    return FinFit(
+        measurements, outliers, (along, across, sideways), power, lean, largest, largest_power, notes
+    )
+
+
+def _outliers(measurements: Measurements) -> NDArray[np.bool_]:
+    """Which samples (n,) lie far off a fit to the others."""
+    turned, _ = _turned_forces(measurements)
+    largest = np.quantile(np.linalg.norm(measurements.force, axis=-1), 0.98)
+    inputs, bad = _scaled(measurements), np.zeros(len(measurements), dtype=bool)
+    for values in turned[:, :2].T:
+        component = Component(inputs, values / largest, wild=True)
+        bad |= np.abs(component.left_out) > OUTLIER * component.left_out_deviation
+    return bad
+
+
+def _turned_forces(measurements: Measurements) -> tuple[Array, float]:
+    """Forces along the thrust's mean direction, across it and along the shaft (n, 3), and the angle [rad]
+    from the zero direction to that direction."""
+    force, phi = measurements.force, measurements.command[:, 2]
+    planar = (force[:, 1] + 1j * force[:, 2]) * np.exp(-1j * phi)
+    lean = float(np.angle(np.median(planar.real) + 1j * np.median(planar.imag)))
+    planar *= np.exp(-1j * lean)
+    return np.stack([planar.real, planar.imag, force[:, 0]], axis=-1), lean
+
+
+def _scaled(measurements: Measurements) -> Array:
+    command = measurements.command.copy()
+    command[:, :2] /= command[:, :2].max(axis=0)
+    if not measurements.turned:
+        command[:, 2] = 0.0
+    return command

@@ -1,0 +1,216 @@
+"""What a load cell measured of one fin, read from CSV files: cycle means, or raw series of time and angle."""
+
+import csv
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.errors import DataError
+from finlab.fit.conventions import Columns, Conventions, named_column, to_fin_frame
+from finlab.fit.time_series import cycle_means
+from finlab.layout.angles import TURN
+from finlab.layout.arrays import Array
+
+MAX_BYTES = 500_000_000
+"""Largest file that is read [bytes]; a raw series of an hour at 1 kHz has half of it."""
+MIN_SAMPLES = 20
+"""Fewest samples from which a fin can be told at all."""
+SAME = 1e-3
+"""Numbers [rad, Hz] closer than this are one and the same."""
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """Samples of one fin in its own frame (x' shaft, y' horizontal thrust axis, z' up), cycle means."""
+
+    command: Array
+    """Half amplitude [rad], frequency [Hz], zero direction [rad], (n, 3)."""
+    force: Array
+    """Mean force [N], (n, 3)."""
+    deviation: Array | None
+    """Standard deviation of each force [N], (n, 3), where the file tells it."""
+    power: Array | None
+    """Mean mechanical power [W], (n,), where the file tells it."""
+    places: tuple[str, ...]
+    """Where each sample stands, file and line."""
+    notes: tuple[str, ...]
+    """What was recognized, filled in or left out, a sentence each."""
+    turned: bool = True
+    """Whether several zero directions were measured; if not, the fin counts as the same all round."""
+
+    def __len__(self) -> int:
+        return len(self.command)
+
+    def without(self, places: NDArray[np.bool_]) -> "Measurements":
+        """The samples but those (n,) that are marked."""
+        keep = ~places
+        return Measurements(
+            self.command[keep],
+            self.force[keep],
+            None if self.deviation is None else self.deviation[keep],
+            None if self.power is None else self.power[keep],
+            tuple(place for place, kept in zip(self.places, keep, strict=True) if kept),
+            self.notes,
+            self.turned,
+        )
+
+
+def read_measurements(
+    paths: Sequence[str | os.PathLike[str]], conventions: Conventions | None = None
+) -> Measurements:
+    """Returns the samples of all files together.
+
+    Each file has a header; columns come in any order, units may stand behind names (`A [deg]`). Cycle means:
+    A, f, Fy, Fz and perhaps phi, Fx, P, sFx, sFy, sFz (standard deviations). Raw series: t, angle, Fy, Fz and
+    perhaps Fx, P.
+
+    Raises:
+        DataError: a file is missing, too large, lacks a column or holds what no fin can do; or there are too
+            few samples, or only one amplitude or frequency.
+    """
+    conventions = conventions or Conventions()
+    read = [_read(Path(path), conventions) for path in paths]
+    if not read:
+        raise DataError("expected at least one CSV file of measurements, got none")
+    return _checked(read, ", ".join(str(path) for path in paths))
+
+
+def _read(path: Path, conventions: Conventions) -> tuple[Columns, tuple[str, ...]]:
+    """A file's columns in finlab's conventions, one row per sample, and the place of each."""
+    columns, lines = _read_columns(path)
+    raw = "t" in columns.values and "angle" in columns.values
+    to_fin_frame(columns, conventions)
+    if raw:
+        columns, starts = cycle_means(columns, lines)
+        return columns, tuple(f"{path} from line {line}" for line in starts)
+    for name in ("A", "f"):
+        if name not in columns.values:
+            raise DataError(f"{path}: column {name} is missing, expected A, f, phi, Fx, Fy, Fz in any order")
+    return columns, tuple(f"{path} line {line}" for line in lines)
+
+
+def _read_columns(path: Path) -> tuple[Columns, NDArray[np.intp]]:
+    """The columns that a fit reads, as they stand, and the line of each row."""
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise DataError(
+                f"{path}: is larger than {MAX_BYTES / 1e6:.0f} MB; cut it into shorter series, "
+                "or write cycle means"
+            )
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.reader(file)
+            header = next(reader, [])
+            named = [named_column(cell) for cell in header]
+            used = [i for i, (name, _) in enumerate(named) if name]
+            names = [named[i][0] for i in used]
+            if len(set(names)) < len(names):
+                raise DataError(f"{path}: two columns stand for {_repeated(names)}; keep one")
+            rows, lines = [], []
+            for line, cells in enumerate(reader, start=2):
+                if cells and not cells[0].startswith("#") and any(cell.strip() for cell in cells):
+                    rows.append(_numbers(cells, header, used, f"{path}: line {line}"))
+                    lines.append(line)
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise DataError(f"{path}: cannot be read as CSV text: {error}") from None
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read: {error.strerror}") from None
+    if not rows:
+        raise DataError(f"{path}: has no rows below its header")
+    values = dict(zip(names, np.array(rows).T.copy(), strict=True))
+    told = {names[k] for k, i in enumerate(used) if named[i][1] is not None}
+    for k, i in enumerate(used):
+        values[names[k]] *= named[i][1] or 1.0
+    return Columns(values, told, str(path)), np.array(lines)
+
+
+def _numbers(cells: list[str], header: list[str], used: list[int], where: str) -> list[float]:
+    """The used cells of a row as finite numbers."""
+    if len(cells) != len(header):
+        raise DataError(f"{where} has {len(cells)} values, the header has {len(header)}")
+    try:
+        numbers = [float(cells[i]) for i in used]
+        if all(map(math.isfinite, numbers)):
+            return numbers
+    except ValueError:
+        pass
+    for i in used:
+        try:
+            bad = not math.isfinite(float(cells[i]))
+        except ValueError:
+            bad = True
+        if bad:
+            raise DataError(
+                f"{where}, column {header[i].strip()}, holds {cells[i].strip()!r:.40}, expected a number"
+            )
+    raise AssertionError("unreachable: some cell was no finite number")
+
+
+def _repeated(names: list[str]) -> str:
+    return next(name for name in names if names.count(name) > 1)
+
+
+def _checked(read: list[tuple[Columns, tuple[str, ...]]], source: str) -> Measurements:
+    """The samples of all files, with what is wrong with them as a whole said in a sentence."""
+    files = [columns.values for columns, _ in read]
+    places = tuple(place for _, own in read for place in own)
+    notes = [note for columns, _ in read for note in columns.notes]
+
+    def gathered(name: str) -> Array | None:
+        return np.concatenate([f[name] for f in files]) if all(name in f for f in files) else None
+
+    n = len(places)
+    if n < MIN_SAMPLES:
+        raise DataError(f"{source}: {n} samples, expected at least {MIN_SAMPLES}; 300 are a good number")
+    amplitude, frequency = gathered("A"), gathered("f")
+    assert amplitude is not None and frequency is not None
+    for name, values, unit in (("A", amplitude, "rad"), ("f", frequency, "Hz")):
+        if np.ptp(values) < SAME:
+            raise DataError(
+                f"{source}: column {name} has the one value {values[0]:.4g} {unit}, expected several; a fin's "
+                "force cannot be told from one amplitude or one frequency"
+            )
+    phi, sideways = gathered("phi"), gathered("Fx")
+    turned = phi is not None and bool(np.ptp(phi) >= SAME)
+    if not turned:
+        said = "there is no column phi" if phi is None else f"phi is {phi[0]:.4g} rad throughout"
+        notes.append(
+            f"{said}: the other zero directions are filled by symmetry, as a fin that is the same all round"
+        )
+    if phi is None:
+        phi = np.zeros(n)
+    elif np.ptp(phi) > TURN + 1e-3:
+        raise DataError(
+            f"{source}: the zero directions span {np.ptp(phi):.4g} rad; say their unit with --angles"
+        )
+    if sideways is None:
+        sideways = np.zeros(n)
+        notes.append("there is no column Fx: no force along the shaft is assumed")
+    across = [gathered(name) for name in ("Fy", "Fz")]
+    force = np.stack([sideways, *[column for column in across if column is not None]], axis=-1)
+    if not force[:, 1:].any():
+        raise DataError(f"{source}: Fy and Fz are 0 throughout; such a fin drives nothing")
+    for k, name in ((1, "Fy"), (2, "Fz")):
+        if turned and np.ptp(force[:, k]) == 0.0:
+            raise DataError(
+                f"{source}: column {name} is {force[0, k]:.4g} throughout; is the sensor connected?"
+            )
+    power = gathered("P")
+    if power is not None and power.min() < -0.02 * np.abs(power).max():
+        raise DataError(
+            f"{source}: column P has {power.min():.4g} W, expected the mean power that drives the fin"
+        )
+    spread = [gathered(name) for name in ("sFx", "sFy", "sFz")]
+    given = [column for column in spread if column is not None]
+    deviation = None
+    if given:
+        if min(column.min() for column in given) <= 0.0:
+            raise DataError(f"{source}: a standard deviation is 0 or less; leave out what is not known")
+        mean = np.mean(given, axis=0)
+        deviation = np.stack([mean if column is None else column for column in spread], axis=-1)
+    command = np.stack([amplitude, frequency, phi], axis=-1)
+    return Measurements(command, force, deviation, power, places, tuple(notes), turned)
