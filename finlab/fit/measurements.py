@@ -171,8 +171,8 @@ def _checked(read: list[tuple[Columns, tuple[str, ...]]], source: str) -> Measur
     for name, values, unit in (("A", amplitude, "rad"), ("f", frequency, "Hz")):
         if np.ptp(values) < SAME:
             raise DataError(
-                f"{source}: column {name} has the one value {values[0]:.4g} {unit}, expected several; a fin's "
-                "force cannot be told from one amplitude or one frequency"
+                f"{source}: column {name} has the one value {values[0]:.4g} {unit}, expected several; a "
+                "fin's force cannot be told from one amplitude or one frequency"
             )
     phi, sideways = gathered("phi"), gathered("Fx")
     turned = phi is not None and bool(np.ptp(phi) >= SAME)

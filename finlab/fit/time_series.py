@@ -155,6 +155,6 @@ def _check_flat(columns: Columns, lines: NDArray[np.intp], first: NDArray[np.int
                 begin = first[int(np.argmax(flat > FLAT))]
                 line = lines[begin + int(np.argmax(force[begin:] == extreme))]
                 raise DataError(
-                    f"{columns.source}: line {line}, column {name}: stays at exactly {extreme:.4g} N for more "
-                    f"than {FLAT:.0%} of a cycle; the sensor is saturated, measure in a wider range"
+                    f"{columns.source}: line {line}, column {name}: stays at exactly {extreme:.4g} N for "
+                    f"more than {FLAT:.0%} of a cycle; the sensor is saturated, measure in a wider range"
                 )
