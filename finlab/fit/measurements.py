@@ -21,7 +21,9 @@ MAX_BYTES = 500_000_000
 MIN_SAMPLES = 20
 """Fewest samples from which a fin can be told at all."""
 SAME = 1e-3
-"""Numbers [rad, Hz] closer than this are one and the same."""
+"""Amplitudes [rad] or frequencies [Hz] all closer than this are one and the same."""
+SAME_DIRECTION = 0.05
+"""The same of zero directions [rad]."""
 
 
 @dataclass(frozen=True)
@@ -87,11 +89,11 @@ def _read(path: Path, conventions: Conventions) -> tuple[Columns, tuple[str, ...
     to_fin_frame(columns, conventions)
     if raw:
         columns, starts = cycle_means(columns, lines)
-        return columns, tuple(f"{path} from line {line}" for line in starts)
+        return columns, tuple(f"{path.name} from line {line}" for line in starts)
     for name in ("A", "f"):
         if name not in columns.values:
             raise DataError(f"{path}: column {name} is missing, expected A, f, phi, Fx, Fy, Fz in any order")
-    return columns, tuple(f"{path} line {line}" for line in lines)
+    return columns, tuple(f"{path.name} line {line}" for line in lines)
 
 
 def _read_columns(path: Path) -> tuple[Columns, NDArray[np.intp]]:
@@ -175,9 +177,9 @@ def _checked(read: list[tuple[Columns, tuple[str, ...]]], source: str) -> Measur
                 "fin's force cannot be told from one amplitude or one frequency"
             )
     phi, sideways = gathered("phi"), gathered("Fx")
-    turned = phi is not None and bool(np.ptp(phi) >= SAME)
+    turned = phi is not None and bool(np.ptp(phi) >= SAME_DIRECTION)
     if not turned:
-        said = "there is no column phi" if phi is None else f"phi is {phi[0]:.4g} rad throughout"
+        said = "there is no column phi" if phi is None else f"phi is {phi[0]:.3f} rad throughout"
         notes.append(
             f"{said}: the other zero directions are filled by symmetry, as a fin that is the same all round"
         )

@@ -23,7 +23,9 @@ DOT: dict[str, Any] = {"s": 9, "color": GREY, "alpha": 0.75, "linewidths": 0, "z
 def draw_thrust(fit: FinFit) -> Picture:
     """Force along the thrust's direction over amplitude, one panel for each band of frequencies."""
     command = fit.measurements.command
-    measured = _along(fit, fit.measurements.force, command)
+    # Without what differs from one zero direction to the next, which the line has averaged.
+    uneven = _even(fit, command) - _along(fit, fit.predict(command)[0], command)
+    measured = _along(fit, fit.measurements.force, command) + uneven
     edges = np.quantile(command[:, 1], np.linspace(0.0, 1.0, PANELS + 1))
     line = np.linspace(0.0, fit.reach[0], LINE)
     with picture(2, PANELS // 2, height=4.8, sharex=True, sharey=True) as view:

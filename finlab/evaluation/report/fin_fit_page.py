@@ -58,7 +58,7 @@ def fin_fit_page(fit: FinFit, name: str) -> Document:
         ),
     )
     return Document(
-        f"Fitted fin {name}",
+        f"Fin {name}, fitted",
         verdict,
         (
             cards,
@@ -66,7 +66,8 @@ def fin_fit_page(fit: FinFit, name: str) -> Document:
             Figure.drawn(
                 "thrust",
                 draw_thrust(fit),
-                "Force along the thrust's direction; the line is the mean over all zero directions.",
+                "Force along the thrust's direction, averaged over all zero directions. What the fit says of a "
+                "sample's own direction is taken off the sample.",
             ),
             "## Errors and direction",
             Figure.drawn(
