@@ -66,8 +66,8 @@ def fin_fit_page(fit: FinFit, name: str) -> Document:
             Figure.drawn(
                 "thrust",
                 draw_thrust(fit),
-                "Force along the thrust's direction, averaged over all zero directions. What the fit says of a "
-                "sample's own direction is taken off the sample.",
+                "Force along the thrust's direction, averaged over all zero directions. What the fit says "
+                "of a sample's own direction is taken off the sample.",
             ),
             "## Errors and direction",
             Figure.drawn(

@@ -1,0 +1,168 @@
+"""Files of a load cell: units, conventions, and a sentence for whatever is wrong with them."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finlab.arrays import Array
+from finlab.errors import DataError
+from finlab.fit.conventions import Conventions
+from finlab.fit.measurements import Measurements, read_measurements
+from tests.fit.cell import columns_of, commands, measured, soft, write
+
+Columns = dict[str, Array]
+
+
+@pytest.fixture
+def columns() -> Columns:
+    command = commands(40)
+    return columns_of(command, measured(soft(d=0.1), command))
+
+
+def read(tmp_path: Path, columns: Columns, conventions: Conventions | None = None) -> Measurements:
+    return read_measurements([write(tmp_path / "cell.csv", columns)], conventions)
+
+
+def test_a_plain_file_is_read_as_it_stands(tmp_path: Path, columns: Columns) -> None:
+    found = read(tmp_path, columns)
+    np.testing.assert_allclose(found.command[:, 2], columns["phi"], rtol=1e-7)
+    np.testing.assert_allclose(found.force[:, 1], columns["Fy"], rtol=1e-7)
+    assert found.places[3] == "cell.csv line 5" and found.notes == () and found.turned
+
+
+def in_degrees(c: Columns) -> Columns:
+    return c | {"A": np.degrees(c["A"]), "phi": np.degrees(c["phi"])}
+
+
+@pytest.mark.parametrize(
+    ("change", "conventions", "noted"),
+    [
+        (in_degrees, None, "taken for degrees"),
+        (in_degrees, Conventions(angles="deg"), ""),
+        (lambda c: c | {"A": 4.0 * c["A"]}, Conventions(amplitude="peak-to-peak"), ""),
+        (lambda c: {("A [deg]" if k == "A" else k): np.degrees(v) if k == "A" else v for k, v in c.items()}, None, ""),
+        (lambda c: c | {"f": 60.0 * c["f"]}, None, "beats per minute"),
+        (lambda c: {("f (rpm)" if k == "f" else k): 60.0 * v if k == "f" else v for k, v in c.items()}, None, ""),
+        (lambda c: {("Fy [mN]" if k == "Fy" else k): 1e3 * v if k == "Fy" else v for k, v in c.items()}, None, ""),
+    ],
+)  # fmt: skip
+def test_units_are_told_or_recognized(
+    tmp_path: Path,
+    columns: Columns,
+    change: Callable[[Columns], Columns],
+    conventions: Conventions | None,
+    noted: str,
+) -> None:
+    plain = read(tmp_path, columns)
+    found = read(tmp_path, change(columns), conventions)
+    factor = 2.0 if conventions is not None and conventions.amplitude else 1.0
+    np.testing.assert_allclose(found.command, plain.command * [factor, 1.0, 1.0], rtol=1e-6)
+    np.testing.assert_allclose(found.force, plain.force, rtol=1e-6, atol=1e-12)
+    assert noted in " ".join(found.notes) and bool(found.notes) == bool(noted)
+
+
+def test_whole_strokes_are_recognized_where_halves_are_impossible(tmp_path: Path, columns: Columns) -> None:
+    wide = columns | {"A": columns["A"] * 4.0}
+    found = read(tmp_path, wide)
+    np.testing.assert_allclose(found.command[:, 0], 2.0 * columns["A"], rtol=1e-6)
+    assert "peak-to-peak" in found.notes[0]
+
+
+def test_moments_over_a_lever_are_forces(tmp_path: Path, columns: Columns) -> None:
+    lever = 0.25
+    moment = np.cross([lever, 0.0, 0.0], np.stack([columns[k] for k in ("Fx", "Fy", "Fz")], axis=-1))
+    cell = {k: columns[k] for k in ("A", "f", "phi")} | {"My": moment[:, 1], "Mz": moment[:, 2]}
+    found = read(tmp_path, cell, Conventions(lever=lever))
+    np.testing.assert_allclose(found.force[:, 1:], np.stack([columns["Fy"], columns["Fz"]], axis=-1), rtol=1e-6)
+    with pytest.raises(DataError, match="--lever"):
+        read(tmp_path, cell)
+
+
+def test_a_turned_sensor_is_turned_back(tmp_path: Path, columns: Columns) -> None:
+    # The cell's z axis points along the fin's -y: it is turned by 90 degrees about the shaft.
+    seen = columns | {"Fy": columns["Fz"], "Fz": -columns["Fy"]}
+    found = read(tmp_path, seen, Conventions(sensor_turn=(90.0, 0.0, 0.0)))
+    np.testing.assert_allclose(found.force[:, 1], columns["Fy"], rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(found.force[:, 2], columns["Fz"], rtol=1e-6, atol=1e-9)
+
+
+def test_one_zero_direction_is_filled_by_symmetry_and_said(tmp_path: Path, columns: Columns) -> None:
+    without = {k: v for k, v in columns.items() if k not in ("phi", "Fx")}
+    found = read(tmp_path, without)
+    assert not found.turned and "symmetry" in found.notes[0] and "along the shaft" in found.notes[1]
+    assert not read(tmp_path, columns | {"phi": 0.0 * columns["phi"] + 0.3}).turned
+
+
+def test_deviations_and_power_are_kept(tmp_path: Path, columns: Columns) -> None:
+    found = read(tmp_path, columns | {"P": columns["A"], "sFy": 0.1 + 0.0 * columns["A"]})
+    assert found.power is not None and found.deviation is not None
+    assert found.power == pytest.approx(columns["A"]) and (found.deviation == pytest.approx(0.1))
+
+
+def emptied(columns: Columns, tmp_path: Path) -> Path:
+    path = write(tmp_path / "bad.csv", columns)
+    lines = path.read_text().splitlines()
+    lines[4] = ",".join(["0.3", "", *lines[4].split(",")[2:]])
+    path.write_text("\n".join(lines))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (lambda c: {k: v[:12] for k, v in c.items()}, "12 samples, expected at least 20"),
+        (lambda c: c | {"A": 0.0 * c["A"] + 0.4}, "column A has the one value 0.4 rad"),
+        (lambda c: c | {"f": 0.0 * c["f"] + 1.0}, "column f has the one value 1 Hz"),
+        (lambda c: c | {"Fz": 0.0 * c["Fz"] + 0.2}, "column Fz is 0.2 throughout"),
+        (lambda c: c | {"Fy": 0.0 * c["Fy"], "Fz": 0.0 * c["Fz"]}, "0 throughout; such a fin drives nothing"),
+        (lambda c: c | {"Fy": c["Fy"] + np.where(np.arange(40) == 7, np.nan, 0.0)}, "line 9, column Fy, holds 'nan'"),
+        (lambda c: {k: v for k, v in c.items() if k != "Fz"}, "column Fz is missing"),
+        (lambda c: {k: v for k, v in c.items() if k != "A"}, "column A is missing"),
+        (lambda c: c | {"amplitude": c["A"]}, "two columns stand for A"),
+        (lambda c: c | {"A": -c["A"]}, "half amplitudes from -0"),
+        (lambda c: c | {"f": 2000.0 * c["f"]}, "expected 0 to 20"),
+        (lambda c: c | {"P": -c["A"]}, "expected the mean power that drives the fin"),
+        (lambda c: c | {"sFy": 0.0 * c["A"]}, "a standard deviation is 0"),
+    ],
+)  # fmt: skip
+def test_bad_files_get_a_sentence(
+    tmp_path: Path, columns: Columns, change: Callable[[Columns], Columns], sentence: str
+) -> None:
+    with pytest.raises(DataError, match=sentence) as raised:
+        read(tmp_path, change(columns))
+    assert "cell.csv" in str(raised.value)
+
+
+def test_a_gap_a_short_line_and_no_file(tmp_path: Path, columns: Columns, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(DataError, match="line 5, column f, holds '', expected a number"):
+        read_measurements([emptied(columns, tmp_path)])
+    path = write(tmp_path / "short.csv", columns)
+    path.write_text(path.read_text() + "1,2\n")
+    with pytest.raises(DataError, match="line 42 has 2 values, the header has 6"):
+        read_measurements([path])
+    with pytest.raises(DataError, match=r"nowhere\.csv: cannot be read: No such file"):
+        read_measurements([tmp_path / "nowhere.csv"])
+    with pytest.raises(DataError, match="at least one CSV file"):
+        read_measurements([])
+    monkeypatch.setattr("finlab.fit.measurements.MAX_BYTES", 100)
+    with pytest.raises(DataError, match="is larger than 0 MB; cut it"):
+        read_measurements([path])
+
+
+def test_several_files_are_one_set(tmp_path: Path, columns: Columns) -> None:
+    half = [{k: v[:20] for k, v in columns.items()}, {k: v[20:] for k, v in columns.items()}]
+    paths = [write(tmp_path / f"{k}.csv", part) for k, part in enumerate(half)]
+    found = read_measurements(paths)
+    np.testing.assert_allclose(found.force, read(tmp_path, columns).force)
+    assert found.places[20] == "1.csv line 2"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [({"lever": 0.0}, "expected metres above 0, got 0"), ({"sensor_turn": (np.nan, 0.0, 0.0)}, "three angles")],
+)
+def test_conventions_are_checked(wrong: dict[str, object], sentence: str) -> None:
+    with pytest.raises(DataError, match=sentence):
+        Conventions(**wrong)  # type: ignore[arg-type]
