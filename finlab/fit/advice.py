@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from finlab.arrays import Array
 from finlab.fit.fin_fit import FinFit
-from finlab.layout.arrays import Array
 
 THIN = 2.0
 """A region is thin where the force is this many times as uncertain as it is on average ..."""

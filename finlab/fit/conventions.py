@@ -11,9 +11,9 @@ from typing import Literal
 
 import numpy as np
 
+from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.layout.angles import TURN
-from finlab.layout.arrays import Array
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 
 UNITS = {

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.fit.gaussian_process import Component
 from finlab.fit.measurements import MIN_SAMPLES, Measurements
 from finlab.layout.angles import TURN
-from finlab.layout.arrays import Array
 
 MOST_SAMPLES = 1500
 """Samples beyond this number are thinned: the time grows with their cube."""

@@ -9,10 +9,10 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import WhiteKernel
 
+from finlab.arrays import Array
 from finlab.fit.thrust_kernel import ThrustKernel
-from finlab.layout.arrays import Array
 
-TUNED_ON = 400
+TUNED_ON = 250
 """Most samples on which the kernel's numbers are fitted; the time grows with their cube."""
 NOISE = (1e-8, 1.0)
 """Ends of the fitted variance of the noise, over the largest force squared."""

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.conventions import Columns, Conventions, named_column, to_fin_frame
 from finlab.fit.time_series import cycle_means
 from finlab.layout.angles import TURN
-from finlab.layout.arrays import Array
 
 MAX_BYTES = 500_000_000
 """Largest file that is read [bytes]; a raw series of an hour at 1 kHz has half of it."""

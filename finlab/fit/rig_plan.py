@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import qmc
 
+from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.layout.arrays import Array
 from finlab.layout.fin import Limits
 
 REPEATED = 0.1

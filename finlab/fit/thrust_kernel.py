@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from sklearn.gaussian_process.kernels import Hyperparameter, Kernel
 
-from finlab.layout.arrays import Array
+from finlab.arrays import Array
 
 BOUNDS = {
     "even": (1e-4, 1e4),

@@ -5,9 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.conventions import Columns
-from finlab.layout.arrays import Array
 
 MIN_AMPLITUDE = 0.02
 """Half amplitude [rad] below which the fin rests."""
@@ -147,12 +147,14 @@ def _without_drift(columns: Columns, time: Array, angle: Array) -> dict[str, Arr
 
 def _check_flat(columns: Columns, lines: NDArray[np.intp], first: NDArray[np.intp]) -> None:
     """Refuse forces that stay exactly at their largest or least for a good part of a cycle."""
+    samples = np.diff(first)
     for name in ("Fy", "Fz"):
         force = columns.values[name]
         for extreme in (force.max(), force.min()):
-            flat = np.add.reduceat((force == extreme).astype(float), first)[:-1] / np.diff(first)
-            if np.ptp(force) > 0.0 and (flat > FLAT).any():
-                begin = first[int(np.argmax(flat > FLAT))]
+            flat = np.add.reduceat((force == extreme).astype(float), first)[:-1] / samples
+            saturated = (flat > FLAT) & (samples >= PER_CYCLE)
+            if np.ptp(force) > 0.0 and saturated.any():
+                begin = first[int(np.argmax(saturated))]
                 line = lines[begin + int(np.argmax(force[begin:] == extreme))]
                 raise DataError(
                     f"{columns.source}: line {line}, column {name}: stays at exactly {extreme:.4g} N for "

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from finlab.arrays import Array
 from finlab.evaluation.plots.style import BLUE, GREY, ORANGE, Picture, picture
 from finlab.fit.fin_fit import BAND, FinFit
 from finlab.layout.angles import wrapped
-from finlab.layout.arrays import Array
 
 PANELS = 6
 """Frequencies side by side in the first picture."""

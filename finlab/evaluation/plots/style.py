@@ -107,7 +107,9 @@ class Picture:
 
         text = io.StringIO()
         with matplotlib.rc_context({**_LOOK, "svg.hashsalt": name}):
-            self.figure.savefig(text, format="svg", dpi=160, transparent=True, metadata={"Date": None, "Creator": None})
+            self.figure.savefig(
+                text, format="svg", dpi=160, transparent=True, metadata={"Date": None, "Creator": None}
+            )
         return text.getvalue()
 
 

@@ -1,0 +1,166 @@
+"""Fitted fins beside the laws that were measured: error, band, outliers, doubt, advice, and their file."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finlab import load_allocator, load_layout
+from finlab.arrays import Array
+from finlab.errors import DataError
+from finlab.fit.advice import next_measurements, thin_regions
+from finlab.fit.fin_file import summary, write_fin
+from finlab.fit.fin_fit import FinFit, fit_fin
+from finlab.layout import Fin, FinModelSpec, Layout
+from finlab.layout.angles import wrapped
+from finlab.physics import TableLaw, make_law
+from finlab.physics.table_file import DOUBT, read_table
+from tests.fit.cell import commands, measured, samples, soft
+
+LAW = soft(k=4.0, p=1.4, x0=0.9, q=4.0, e=0.15, phi_e=1.0, d=0.12)
+TEST = commands(2000, seed=9)
+OUTLIERS = (17, 100)
+
+
+@pytest.fixture(scope="module")
+def fit() -> FinFit:
+    """300 samples with 5 % noise, two of them wrong, and their power."""
+    command = commands(300)
+    force = measured(LAW, command)
+    largest = np.linalg.norm(force, axis=-1).max()
+    force[OUTLIERS, 1] += 1.2 * largest
+    found = samples(command, force)
+    power = LAW.power(command) * (1.0 + 0.03 * np.random.default_rng(3).standard_normal(300))
+    return fit_fin(type(found)(command, force, None, power, found.places, ()))
+
+
+def error_of(fit: FinFit, test: Array = TEST) -> Array:
+    truth = LAW.force(test)
+    return np.asarray(
+        np.linalg.norm(fit.predict(test)[0] - truth, axis=-1) / np.linalg.norm(truth, axis=-1).max()
+    )
+
+
+def test_forces_are_near_the_truth_and_the_band_holds_it(fit: FinFit) -> None:
+    assert np.sqrt(np.mean(error_of(fit) ** 2)) < 0.03
+    force, deviation = fit.predict(TEST)
+    inside = np.abs(force - LAW.force(TEST))[:, 1:] <= 1.96 * deviation[:, 1:]
+    assert 0.85 < inside.mean() <= 1.0
+    assert deviation[:, 1:].mean() < 0.03 * fit.largest, "a band as wide as the water is no knowledge"
+
+
+def test_power_and_lean(fit: FinFit) -> None:
+    power = fit.predict_power(TEST)
+    assert power is not None
+    assert np.abs(power - LAW.power(TEST)).max() < 0.05 * LAW.power(TEST).max()
+    assert fit.lean == pytest.approx(0.12, abs=0.03)
+    assert fit.predict(np.array([[0.0, 1.0, 0.3], [0.4, 0.0, 1.0]]))[0] == pytest.approx(0.0), "at rest"
+
+
+def test_outliers_are_named_and_no_good_sample_with_them(fit: FinFit) -> None:
+    assert {f"line {k + 2}" for k in OUTLIERS} <= set(fit.outliers)
+    assert len(fit.outliers) <= 8
+    assert "contradict the others" in " ".join(summary(fit))
+
+
+def test_a_good_fit_is_trusted(fit: FinFit) -> None:
+    assert fit.doubts() == () and not summary(fit)[0].startswith(DOUBT)
+    assert 0.9 < fit.coverage() < 1.0 and 0.01 < fit.error() < 0.06 and 0.01 < fit.noise() < 0.06
+
+
+def test_few_samples_are_doubted_first_of_all(tmp_path: Path) -> None:
+    command = commands(24, seed=5)
+    few = fit_fin(samples(command, measured(LAW, command, 0.3)))
+    assert "24 samples are few" in few.doubts()[-1] or len(few.doubts()) > 0
+    assert summary(few)[0].startswith(DOUBT)
+    write_fin(few, tmp_path / "few.csv")
+    assert (tmp_path / "few.csv").read_text().startswith(f"# {DOUBT}: ")
+    notes = load_allocator().allocate(robot_with(tmp_path / "few.csv"), [0.3, 0, 0, 0, 0, 0]).notes
+    assert any(f"is {DOUBT}" in note for note in notes)
+
+
+def test_the_file_of_a_fin_is_a_table_that_answers_as_the_fit(fit: FinFit, tmp_path: Path) -> None:
+    write_fin(fit, tmp_path / "fin.csv")
+    law = read_table(tmp_path / "fin.csv")
+    assert isinstance(law, TableLaw) and law.has_power and law.notes == summary(fit)
+    # The grid's own error is small beside that of the fit.
+    assert np.abs(law.force(TEST) - fit.predict(TEST)[0]).max() < 0.02 * fit.largest
+    with pytest.raises(DataError, match=r"ends in \.csv"):
+        write_fin(fit, tmp_path / "fin.yaml")
+
+
+def robot_with(path: Path) -> Layout:
+    """Layout A with a table for every fin."""
+    layout, model = load_layout("A"), FinModelSpec("table", (("path", str(path)),))
+    fins = (Fin(f.name, f.position, f.mounting_angle, f.limits, model) for f in layout.fins)
+    return Layout(layout.name, tuple(fins))
+
+
+def test_allocation_on_a_fitted_fin_comes_near_on_the_true_one(fit: FinFit, tmp_path: Path) -> None:
+    write_fin(fit, tmp_path / "fin.csv")
+    answer = load_allocator().allocate(robot_with(tmp_path / "fin.csv"), [0.8, 0, 0.3, 0, 0, 0.1])
+    assert answer.err_norm < 1e-5
+    table, size = make_law(FinModelSpec("table", (("path", str(tmp_path / "fin.csv")),))), 0.0
+    for command in answer.command:
+        size = max(size, float(np.linalg.norm(table.force(command) - LAW.force(command))))
+    assert size < 0.06 * fit.largest
+
+
+def test_deviations_that_are_told_count() -> None:
+    command = commands(150)
+    true, wild = LAW.force(command), np.arange(150) % 3 == 0
+    deviation = np.where(wild, 0.8, 0.02)[:, None] * np.ones(3)
+    force = true + deviation * np.random.default_rng(2).standard_normal(true.shape)
+    told = samples(command, force)
+    found = fit_fin(type(told)(command, force, deviation, None, told.places, ()))
+    assert np.sqrt(np.mean(error_of(found) ** 2)) < 0.03
+
+
+def test_one_zero_direction_speaks_for_all() -> None:
+    law = soft(d=0.1)
+    command = commands(120)
+    command[:, 2] = 0.3
+    told = samples(command, measured(law, command, 0.02))
+    found = fit_fin(type(told)(command, told.force, None, None, told.places, (), turned=False))
+    truth = law.force(TEST)
+    error = np.linalg.norm(found.predict(TEST)[0] - truth, axis=-1) / np.linalg.norm(truth, axis=-1).max()
+    assert np.sqrt(np.mean(error**2)) < 0.02
+
+
+def test_advice_leads_to_where_nothing_was_measured() -> None:
+    command = commands(160)
+    command = command[(command[:, 0] < 0.35) | (command[:, 1] < 1.1) | (np.arange(160) == 0)]
+    command[0] = [0.6, 2.1, 0.0]
+    thin = fit_fin(samples(command, measured(LAW, command, 0.03)))
+    clauses = thin_regions(thin)
+    assert clauses and "amplitudes above" in clauses[0] and "frequencies above" in clauses[0]
+    advised = next_measurements(thin)
+    assert advised.shape == (5, 3)
+    assert ((advised[:, 0] > 0.35) & (advised[:, 1] > 1.1)).sum() >= 4
+    assert len(np.unique(advised.round(3), axis=0)) == 5
+
+    def uncertain_with(more: Array) -> float:
+        both = np.concatenate([command, more])
+        return float(fit_fin(samples(both, measured(LAW, both, 0.03))).uncertainty(thin.grid()).mean())
+
+    elsewhere = np.array([[0.2, 0.5, phi] for phi in (-2.0, -1.0, 0.0, 1.0, 2.0)])
+    assert uncertain_with(advised) < 0.9 * uncertain_with(elsewhere)
+
+
+def test_directions_of_an_arc_stay_an_arc() -> None:
+    command = commands(80)
+    command[:, 2] *= 0.3
+    found = fit_fin(samples(command, measured(LAW, command)))
+    directions = found.directions(9)
+    assert directions[0] == pytest.approx(command[:, 2].min()) and directions[-1] == pytest.approx(
+        command[:, 2].max()
+    )
+    assert np.ptp(wrapped(found.grid()[..., 2])) < 2.0
+
+
+def test_many_samples_are_thinned_and_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("finlab.fit.fin_fit.MOST_SAMPLES", 100)
+    command = commands(130)
+    found = fit_fin(samples(command, measured(LAW, command)))
+    assert len(found.measurements) + len(found.outliers) == 100
+    assert "100 of 130 samples, drawn at random" in " ".join(found.notes)
