@@ -1,4 +1,12 @@
-"""From measurements to models: a fin from a load cell, a robot from a swim.
+"""From measurements to models: a fin from a load cell.
 
-Nothing here knows the truth that `finlab.sim` swims in; what is fitted comes from data alone.
+Nothing here knows the truth that `finlab.sim` swims in; what is fitted comes from data alone. Needs the extra
+`[fit]`.
 """
+
+from finlab.fit.conventions import Conventions
+from finlab.fit.fin_file import write_fin
+from finlab.fit.fin_fit import FinFit, fit_fin
+from finlab.fit.measurements import Measurements, read_measurements
+
+__all__ = ["Conventions", "FinFit", "Measurements", "fit_fin", "read_measurements", "write_fin"]

@@ -20,6 +20,8 @@ GOOD_ERROR = 0.05
 """Uncertainty of a force over the largest one, on average, up to which a fit is trusted."""
 GOOD_BAND = 0.85
 """Share of samples left out that must lie within their band."""
+ROUND = (0.01, 0.05)
+"""Steps of amplitude [rad] and frequency [Hz] to whose next multiple a table goes."""
 COVERED = 0.75 * TURN
 """Zero directions from which a table goes all round; fewer make a table of their arc."""
 
@@ -105,8 +107,8 @@ class FinFit:
         return tuple(doubtful)
 
     def grid(self, shape: tuple[int, int, int] = (7, 7, 12)) -> Array:
-        """Returns commands on a grid (*shape, 3) over what was measured, from rest on."""
-        amplitude, frequency = self.reach
+        """Returns commands on a grid (*shape, 3) over what was measured, from rest on, to round numbers."""
+        amplitude, frequency = np.ceil(np.divide(self.reach, ROUND) - 1e-9) * ROUND
         axes = [
             np.linspace(0.0, most, count) for most, count in ((amplitude, shape[0]), (frequency, shape[1]))
         ]
@@ -184,7 +186,7 @@ def _turned_forces(measurements: Measurements) -> tuple[Array, float]:
     from the zero direction to that direction."""
     force, phi = measurements.force, measurements.command[:, 2]
     planar = (force[:, 1] + 1j * force[:, 2]) * np.exp(-1j * phi)
-    lean = float(np.angle(np.median(planar.real) + 1j * np.median(planar.imag)))
+    lean = float(np.angle(planar.sum()))
     planar *= np.exp(-1j * lean)
     return np.stack([planar.real, planar.imag, force[:, 0]], axis=-1), lean
 
