@@ -37,7 +37,7 @@ class FinFit:
     components: tuple[Component, Component, Component]
     """Force along the thrust's mean direction, across it, and along the shaft, over `largest`."""
     power: Component | None
-    """Power over its largest, where it was measured."""
+    """Root of the power over its largest, where it was measured: power grows faster than force does."""
     lean: float
     """Angle from the zero direction to the thrust's mean direction [rad]."""
     largest: float
@@ -69,8 +69,8 @@ class FinFit:
         """Returns the power [W], (...), at commands (..., 3); None where none was measured."""
         if self.power is None:
             return None
-        power = self.largest_power * self.power.predict(self.scaled(command))[0]
-        return np.maximum(power, 0.0).reshape(command.shape[:-1])
+        root = np.maximum(self.power.predict(self.scaled(command))[0], 0.0)
+        return np.asarray(self.largest_power * root.reshape(command.shape[:-1]) ** 2)
 
     def error(self) -> float:
         """Returns the cross-validated error: root mean square over the samples, each predicted from all
@@ -160,11 +160,12 @@ def _fitted(measurements: Measurements, outliers: tuple[str, ...], notes: tuple[
         # Deviations of the two axes across the shaft stay what they are in a frame that turns between them.
         planar = np.mean(measurements.deviation[:, 1:] ** 2, axis=-1) / largest**2
         variance = [planar, planar, measurements.deviation[:, 0] ** 2 / largest**2]
-    along, across, sideways = (Component(inputs, turned[:, k] / largest, variance[k]) for k in range(3))
+    along = Component(inputs, turned[:, 0] / largest, variance[0])
+    across, sideways = (Component(inputs, turned[:, k] / largest, variance[k], along.mean) for k in (1, 2))
     power, largest_power = None, 1.0
     if measurements.power is not None:
         largest_power = float(measurements.power.max())
-        power = Component(inputs, measurements.power / largest_power)
+        power = Component(inputs, np.sqrt(np.maximum(measurements.power, 0.0) / largest_power))
     return FinFit(
         measurements, outliers, (along, across, sideways), power, lean, largest, largest_power, notes
     )
@@ -174,11 +175,11 @@ def _outliers(measurements: Measurements) -> NDArray[np.bool_]:
     """Which samples (n,) lie far off a fit to the others."""
     turned, _ = _turned_forces(measurements)
     largest = np.quantile(np.linalg.norm(measurements.force, axis=-1), 0.98)
-    inputs, bad = _scaled(measurements), np.zeros(len(measurements), dtype=bool)
-    for values in turned[:, :2].T:
-        component = Component(inputs, values / largest, wild=True)
-        bad |= np.abs(component.left_out) > OUTLIER * component.left_out_deviation
-    return bad
+    inputs = _scaled(measurements)
+    along = Component(inputs, turned[:, 0] / largest, wild=True)
+    across = Component(inputs, turned[:, 1] / largest, size=along.mean, wild=True)
+    far = [np.abs(c.left_out) > OUTLIER * c.left_out_deviation for c in (along, across)]
+    return np.asarray(far[0] | far[1])
 
 
 def _turned_forces(measurements: Measurements) -> tuple[Array, float]:

@@ -25,23 +25,30 @@ class Component:
     """Force along one axis, or power, over its scale: mean, standard deviation and what it cannot explain."""
 
     def __init__(
-        self, inputs: Array, values: Array, variance: Array | None = None, wild: bool = False
+        self,
+        inputs: Array,
+        values: Array,
+        variance: Array | None = None,
+        size: Array | None = None,
+        wild: bool = False,
     ) -> None:
         """Takes scaled inputs (n, 3) as `ThrustKernel` does, values (n,), and their noise's variance (n,).
 
         Where the variance is not known, it is found from the errors of a first fit, made as if the noise were
-        the same everywhere: it has a part that is, and a part that grows with the value. With `wild`, a few
-        values may be far off without making the others' noise larger.
+        the same everywhere: it has a part that is, and a part that grows with the `size` (n,) of the whole
+        force, by default that of the value. With `wild`, a few values may be far off without making the
+        others' noise larger.
         """
         if variance is None:
-            first = _tuned(inputs, values, None)
-            error, _ = _left_out(first, values)
-            variance = _noise_of(error, np.asarray(values - error), wild)
+            error, _ = _left_out(_tuned(inputs, values, None), values)
+            variance = _noise_of(error, np.asarray(values - error) if size is None else size, wild)
         self._process = _tuned(inputs, values, variance)
         self._inputs, self.variance = inputs, variance
         self.left_out, self.left_out_deviation = _left_out(self._process, values)
         """Error of each value (n,) under the fit to all others, and what its standard deviation should be,
         noise included."""
+        self.mean = np.asarray(values - self.left_out)
+        """Each value (n,) as all others predict it."""
 
     def predict(self, inputs: Array) -> tuple[Array, Array]:
         """Returns the mean and its standard deviation (m,) at inputs (m, 3), the noise not counted."""
@@ -60,11 +67,11 @@ def _tuned(inputs: Array, values: Array, variance: Array | None) -> GaussianProc
     """The process with the numbers that make the values most likely, by up to `TUNED_ON` of them."""
     few = np.linspace(0, len(values) - 1, min(len(values), TUNED_ON)).astype(int)
     kernel = ThrustKernel() if variance is not None else ThrustKernel() + WhiteKernel(1e-3, NOISE)
-    alpha = 1e-10 if variance is None else variance
+    alpha = np.full(len(values), 1e-10) if variance is None else variance
     with warnings.catch_warnings():
         # A number at the end of its range means: this fin does not vary that way.
         warnings.simplefilter("ignore", ConvergenceWarning)
-        process = GaussianProcessRegressor(kernel, alpha=alpha if np.ndim(alpha) == 0 else alpha[few])
+        process = GaussianProcessRegressor(kernel, alpha=alpha[few])
         process.fit(inputs[few], values[few])
         if len(few) < len(values):
             process = GaussianProcessRegressor(process.kernel_, alpha=alpha, optimizer=None)
@@ -79,18 +86,18 @@ def _left_out(process: GaussianProcessRegressor, values: Array) -> tuple[Array, 
     return np.asarray(inverse @ values / own), np.asarray(1.0 / np.sqrt(own))
 
 
-def _noise_of(error: Array, mean: Array, wild: bool) -> Array:
-    """Variances (n,) of the noise a + b mean^2 under which errors are most likely: they are normal, or with
+def _noise_of(error: Array, size: Array, wild: bool) -> Array:
+    """Variances (n,) of the noise a + b size^2 under which errors are most likely: they are normal, or with
     `wild` follow Student's t with `TAILS` degrees of freedom."""
     usual = float(np.median(error**2)) / 0.455 + 1e-12
 
     def unlikely(logs: Array) -> float:
-        variance = np.exp(logs[0]) + np.exp(logs[1]) * mean**2
+        variance = np.exp(logs[0]) + np.exp(logs[1]) * size**2
         share = error**2 / variance
         tails = (TAILS + 1.0) * np.log1p(share / TAILS) if wild else share
         return float(np.sum(np.log(variance) + tails))
 
-    start = np.log([0.5 * usual, 0.5 * usual / (float(np.mean(mean**2)) + 1e-12)])
+    start = np.log([0.5 * usual, 0.5 * usual / (float(np.mean(size**2)) + 1e-12)])
     found = minimize(unlikely, start, method="Nelder-Mead").x
     even, grown = np.exp(np.maximum(found, np.log(1e-3 * usual)))
-    return np.asarray(even + grown * mean**2)
+    return np.asarray(even + grown * size**2)

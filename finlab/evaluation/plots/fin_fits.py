@@ -81,6 +81,7 @@ def draw_errors(fit: FinFit) -> Picture:
         if fit.measurements.power is not None:
             axis = next(axes)
             power = fit.predict_power(command)
+            assert power is not None
             axis.scatter(power, fit.measurements.power, **DOT)
             most = float(fit.measurements.power.max())
             axis.plot([0.0, most], [0.0, most], color=ORANGE, lw=1.2)

@@ -63,15 +63,17 @@ def fin_fit_page(fit: FinFit, name: str) -> Document:
         (
             cards,
             "## Thrust",
-            Figure.drawn(
+            Figure(
                 "thrust",
-                draw_thrust(fit),
+                lambda: draw_thrust(fit),
                 "Force along the thrust's direction, averaged over all zero directions. What the fit says "
                 "of a sample's own direction is taken off the sample.",
             ),
             "## Errors and direction",
-            Figure.drawn(
-                "errors", draw_errors(fit), "Directions are drawn for forces above a tenth of the largest."
+            Figure(
+                "errors",
+                lambda: draw_errors(fit),
+                "Directions are drawn for forces above a tenth of the largest.",
             ),
             "## What to measure next",
             f"Data are thin at {'; '.join(thin)}." if thin else "Data are thin nowhere.",
