@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finlab.allocation.command_cost import EffortCost, command_cost
+from finlab.allocation.command_cost import CommandCost, EffortCost, command_cost
+from finlab.arrays import Array
 from finlab.layout import FinModelSpec, Layout, random_layout
 from finlab.physics import Plant, plant_of
-from finlab.physics.energy import EnergyMeter, EnergyWeights, command_energy
-from finlab.physics.objective import Objective
+from finlab.physics.energy import EnergyMeter, EnergyWeights, command_energy, energy_scale
+from finlab.physics.objective import Objective, PowerMeter
 
 SIGMA = np.array([1.4, 1.4, 2.0, 0.35, 0.3, 0.4])
 AIMS = [
@@ -99,3 +100,50 @@ def test_for_a_robot_that_is_weak_beside_the_yardstick_cost_counts_less() -> Non
     assert usual == 1e-4 and 0.0 < weak < 1e-7
     error = plant.wrench(plant.upper) / (1e3 * SIGMA)
     assert weak < (error @ error) * 1e-2
+
+
+def differences(cost: CommandCost, at: Array) -> Array:
+    """Derivatives (B, n, 3) of what commands (B, n, 3) cost, by central differences."""
+    slopes = np.empty(at.shape)
+    for i, k in np.ndindex(at.shape[1:]):
+        offset = np.zeros(at.shape[1:])
+        offset[i, k] = 1e-6
+        slopes[:, i, k] = (cost(at + offset) - cost(at - offset)) / 2e-6
+    return slopes
+
+
+def test_the_bowl_of_the_inertial_effort_bends_as_a_fifth_power() -> None:
+    """Of s^5, half the second derivative is 10 s^3: 0.4 times the squared slope over the value."""
+    plant = robot(*[FinModelSpec("drag")] * 3)
+    at, scale = plant.sample(np.random.default_rng(1), (6,)), energy_scale(plant.upper)
+    plain, whole = (EffortCost(EnergyMeter(plant.upper, aim.weights), 0.7) for aim in AIMS[:2])
+    a, f = at[..., 0] / scale[:, 0], at[..., 1] / scale[:, 1]
+    inertial = 0.7 * 3.0 * a**2 * f**3
+    np.testing.assert_allclose(whole(at) - plain(at), inertial.sum(-1))
+    slopes = differences(whole, at) - differences(plain, at)
+    expected = 0.4 * slopes**2 / inertial[..., None]
+    found, base = whole.bowl(at), plain.bowl(at)
+    np.testing.assert_allclose(found.diagonal - base.diagonal, expected, rtol=1e-5, atol=1e-7)
+    expected = 0.4 * slopes[..., 0] * slopes[..., 1] / inertial
+    np.testing.assert_allclose(found.mixed - base.mixed, expected, rtol=1e-5)
+
+
+@pytest.mark.parametrize("copper_loss", [0.0, 0.3])
+def test_the_bowl_of_power_is_each_fins_own(mixed: Plant, copper_loss: float) -> None:
+    cost = command_cost(mixed, Objective(copper_loss=copper_loss), SIGMA, 0.7)
+    at = mixed.sample(np.random.default_rng(2), (6,))
+    slopes, bowl = differences(cost, at), cost.bowl(at)
+    meter = Objective(copper_loss=copper_loss).meter(mixed)
+    assert isinstance(meter, PowerMeter)
+    power = cost.weight * meter.fins(at)
+    np.testing.assert_allclose(power.sum(-1), cost(at))
+    np.testing.assert_allclose(bowl.slope, 0.5 * slopes, rtol=1e-5, atol=1e-8)
+    np.testing.assert_allclose(bowl.diagonal, 0.4 * slopes**2 / power[..., None], rtol=1e-5, atol=1e-8)
+    expected = 0.4 * slopes[..., 0] * slopes[..., 1] / power
+    np.testing.assert_allclose(bowl.mixed, expected, rtol=1e-5, atol=1e-8)
+
+
+def test_a_fin_that_takes_no_power_has_a_flat_bowl() -> None:
+    plant = robot(FinModelSpec("drag"), limits="nominal")
+    bowl = command_cost(plant, Objective(), SIGMA, 0.7).bowl(np.array([[[0.0, 0.0, 0.3]]]))
+    assert all((values == 0.0).all() for values in bowl)
