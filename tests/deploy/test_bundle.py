@@ -1,5 +1,6 @@
 """Bundles: the same bytes every time, read back whole, and refused once anything in them was changed."""
 
+import errno
 import hashlib
 import io
 import json
@@ -253,6 +254,8 @@ def test_archive_is_plain(bundle: Bundle) -> None:
         assert archive.testzip() is None
         for entry in archive.infolist():
             assert entry.date_time == (1980, 1, 1, 0, 0, 0) and entry.compress_type == zipfile.ZIP_STORED
+            assert entry.create_system == 3 and entry.external_attr >> 16 == 0o100644, "a file, owner writes"
+        assert {name: archive.read(name) for name in archive.namelist()} == dict(bundle.files)
 
 
 def test_a_changed_file_is_named(measured_bundle: Bundle, with_networks: Bundle) -> None:
@@ -482,6 +485,37 @@ def test_a_folder_with_other_things_is_not_written_to(bundle: Bundle, tmp_path: 
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(DataError, match="holds 'thesis.tex', which is no part of a bundle"):
         bundle.write(tmp_path)
+
+
+def test_what_cannot_be_written_is_named(
+    bundle: Bundle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken = tmp_path / "taken"
+    taken.write_text("a file")
+    for folder, named in ((taken, taken), (taken / "deeper", taken / "deeper")):
+        with pytest.raises(DataError) as caught:
+            bundle.write(folder)
+        assert str(caught.value).startswith(f"{named}: cannot be written: ")
+    with pytest.raises(DataError, match="cannot be written: Not a directory"):
+        bundle.write_zip(taken / "bundle.zip")
+    # Inside, the file is named; and what was written before it is no bundle.
+    folder = tmp_path / "new" / "robot"
+    bundle.write(folder)
+    (folder / README).unlink()
+    (folder / README).mkdir()
+    with pytest.raises(DataError) as caught:
+        bundle.write(folder)
+    assert str(caught.value) == f"{folder / README}: cannot be written: Is a directory"
+    assert not (folder / CHECKSUMS).exists()
+
+    def full(*_: Any) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    # A full disk names no file, so the folder is named.
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(DataError) as caught:
+        bundle.write(tmp_path / "full")
+    assert str(caught.value) == f"{tmp_path / 'full'}: cannot be written: No space left on device"
 
 
 def test_methods_that_do_not_travel_are_refused() -> None:

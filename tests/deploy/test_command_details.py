@@ -128,6 +128,25 @@ def test_deadlines_are_positive_and_finite(
     assert timings[1] == Timing(None, 1.0)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "the following arguments are required: check|allocate|serve|speed"),
+        (["fly", "bundle"], "invalid choice: 'fly'"),
+        (["check"], "the following arguments are required: BUNDLE"),
+        (["allocate", "bundle"], "the following arguments are required: --wrench"),
+        (["allocate", "bundle", "--wrench", "1"], "--wrench: expected 6 arguments"),
+        (["allocate", "bundle", "--wrench", *"123456", "--policy=hope"], "invalid choice: 'hope'"),
+        (["serve", "bundle", "--udp=here"], "--udp: invalid int value: 'here'"),
+    ],
+)
+def test_a_wrong_call_ends_with_usage_and_2(arguments: list[str], message: str, capsys: Any) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main(arguments)
+    told = capsys.readouterr().err
+    assert stopped.value.code == 2 and told.startswith("usage: finlab-runtime ") and message in told
+
+
 @pytest.mark.parametrize(("stopped", "code"), [(KeyboardInterrupt, 130), (BrokenPipeError, 141)])
 def test_an_end_from_outside_has_the_shells_code(
     stopped: type[BaseException], code: int, monkeypatch: pytest.MonkeyPatch, capfd: Any
@@ -172,6 +191,50 @@ def test_waiting_ends_at_the_deadline(robot: Robot, monkeypatch: pytest.MonkeyPa
     clock = iter([0.0, 5.0, 9.0])  # past the deadline nothing is waited for
     assert server.answer(line)["status"] == "late"
     assert work.waited[-1] == 0.0 and waits[-1] == 0.0
+
+
+class Clock:
+    """Time that only the transport lets pass: 0.3 s before each request."""
+
+    def __init__(self, *requests: bytes | None) -> None:
+        self.now, self.requests = 100.0, list(requests)
+        self.waits: list[float | None] = []
+        self.sent: list[str] = []
+
+    def newest(self, timeout: float | None) -> bytes | None:
+        self.waits.append(timeout)
+        self.now += 0.3
+        if not self.requests:
+            raise EOFError
+        return self.requests.pop(0)
+
+    def send(self, line: bytes) -> None:
+        assert line.endswith(b"}\n")
+        self.sent.append(json.loads(line)["status"])
+
+
+def test_only_good_targets_and_rest_wind_up_the_watchdog(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    good, bad = json.dumps({"wrench": WRENCH}).encode(), b"nonsense"
+    clock = Clock(good, bad, bad, good, bad, bad, bad, bad, None)
+    monkeypatch.setattr("finlab.deploy.serve.time.monotonic", lambda: clock.now)
+    Server(robot, Timing(watchdog=1.0)).run(clock)
+    assert clock.sent == ["ok", *["error"] * 2, "ok", *["error"] * 4, "neutral", "neutral"]
+    assert clock.waits == pytest.approx([1.0, 1.0, 0.7, 0.4, 1.0, 0.7, 0.4, 0.1, 0.0, 1.0])
+    clock = Clock(good, bad)
+    Server(robot, Timing(watchdog=None)).run(clock)
+    assert clock.waits == [None] * 3
+
+
+def test_rest_forgets_the_last_commands_and_keeps_lost_fins(robot: Robot) -> None:
+    server = Server(robot, Timing())
+    lost = robot.layout.names[1]
+    assert server.answer(json.dumps({"wrench": WRENCH, "failed": [lost]}).encode())["status"] == "ok"
+    assert server._sent is not None
+    rest = server._rest()
+    assert server._sent is None and rest["id"] is None and rest["fins"] == list(robot.layout.names)
+    assert [row is None for row in rest["command"]] == [name == lost for name in robot.layout.names]
 
 
 def test_the_longest_request_that_is_read(robot: Robot) -> None:

@@ -1,8 +1,11 @@
 """The exported ONNX files answer, in onnxruntime, as the numpy networks do."""
 
+import errno
+import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
@@ -12,8 +15,8 @@ from numpy.typing import NDArray
 
 from finlab.assets import checkpoint_path
 from finlab.cli import main
-from finlab.deploy.onnx_export import NETWORK, SURROGATE, onnx_files
-from finlab.errors import CheckpointError
+from finlab.deploy.onnx_export import NETWORK, SURROGATE, onnx_files, write_onnx
+from finlab.errors import CheckpointError, DataError
 from finlab.inference.checkpoint import read_checkpoint
 from finlab.inference.force_network import NODE_SIZE, PAIR_SIZE, NumpyForceNetwork
 from finlab.inference.network import NumpyNetwork
@@ -112,3 +115,45 @@ def test_checkpoints_without_a_network_have_no_export() -> None:
     weights = read_checkpoint(checkpoint_path("paper"))
     with pytest.raises(CheckpointError, match="only the networks of the methods `mdn` and `paper` have an"):
         onnx_files(replace(weights, network_config=None, network={}))
+
+
+def test_without_the_package_one_sentence_says_how_to_get_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "onnx", None)
+    told = "the package onnx is not installed; pip install 'finlab[onnx]'"
+    with pytest.raises(DataError) as caught:
+        onnx_files(read_checkpoint(checkpoint_path("paper")))
+    assert str(caught.value) == told
+    assert main(["export", "A", "-o", str(tmp_path / "x"), "--onnx", "--checkpoint", "paper"]) == 2
+    assert told in capsys.readouterr().err and not (tmp_path / "x").exists()
+
+
+def test_folders_are_made_and_what_cannot_be_written_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    weights = read_checkpoint(checkpoint_path())
+    folder = tmp_path / "new" / "and" / "nested"
+    for _ in range(2):  # again in place of the first
+        assert write_onnx(weights, folder) == [NETWORK]
+        assert (folder / NETWORK).read_bytes() == onnx_files(weights)[NETWORK]
+    (folder / NETWORK).unlink()
+    (folder / NETWORK).mkdir()
+    taken = tmp_path / "taken"
+    taken.write_text("a file")
+    for place, named, why in (
+        (folder, folder / NETWORK, "Is a directory"),
+        (taken, taken, "File exists"),
+        (taken / "deeper", taken / "deeper", "Not a directory"),
+    ):
+        with pytest.raises(DataError) as caught:
+            write_onnx(weights, place)
+        assert str(caught.value) == f"{named}: cannot be written: {why}"
+
+    def full(*_: Any) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(DataError) as caught:
+        write_onnx(weights, tmp_path)
+    assert str(caught.value) == f"{tmp_path}: cannot be written: No space left on device"

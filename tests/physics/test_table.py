@@ -212,6 +212,44 @@ def test_a_good_table_with_power_is_read(tmp_path):
     assert law.has_power and law.power(at) == pytest.approx([2.0, 0.5])
 
 
+def test_a_table_may_end_at_the_highest_frequency_and_amplitude(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text("\n".join(scaled(frequency=10.0, amplitude=2.5 * math.pi)))
+    assert read_table(path).covers[:2] == (
+        pytest.approx((0.25 * math.pi, 0.5 * math.pi)),
+        pytest.approx((10.0, 20.0)),
+    )
+    path.write_text("\n".join(scaled(frequency=10.001)))
+    with pytest.raises(DataError, match="f goes up to 20, expected Hz up to 20; these look like beats"):
+        read_table(path)
+
+
+def circle_with_power(path, force_at_end, extra):
+    """A table around the circle, whose end has another force, and extra power, beside its beginning."""
+    angles = np.linspace(-math.pi, math.pi, 9)
+    last = np.arange(9) == 8
+    rows = [
+        f"{a},{f},{d},0,{a * f * math.cos(d) + force_at_end * end},{a * f * math.sin(d)},{5 + extra * end}"
+        for a in (0.5, 1)
+        for f in (1, 2)
+        for d, end in zip(angles, last, strict=True)
+    ]
+    path.write_text("\n".join([HEADER + ",P", *rows]))
+    return path
+
+
+def test_a_circle_is_closed_by_its_forces_whatever_the_power(tmp_path):
+    law = read_table(circle_with_power(tmp_path / "t.csv", 0.0, 40.0))
+    assert law.periodic and law.has_power
+    at = np.array([[1.0, 2.0, math.pi], [1.0, 2.0, -math.pi]])
+    np.testing.assert_allclose(law.power(at), [5.0, 5.0])
+    np.testing.assert_allclose(law.force(at), [[0.0, -2.0, 0.0]] * 2, atol=1e-12)
+    assert read_table(circle_with_power(tmp_path / "t.csv", 0.09, 0.0)).periodic
+    # Large powers do not excuse forces that differ by more than a twentieth of the largest force, 2 N.
+    with pytest.raises(DataError, match="one turn later differ"):
+        read_table(circle_with_power(tmp_path / "t.csv", 0.15, 0.0))
+
+
 def test_power_never_falls_below_zero_between_points_near_zero(tmp_path):
     """A cubic through 0, 0, 1 dips; its slope is then told as that of zero."""
     power = [0.0, 0.0, 0.0, 1.0, 1.0]
