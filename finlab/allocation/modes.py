@@ -15,6 +15,7 @@ import numpy as np
 from finlab.allocation.solution import PlainData
 from finlab.arrays import Array
 from finlab.layout import Layout
+from finlab.layout.angles import wrapped
 from finlab.physics import plant_of
 
 if TYPE_CHECKING:
@@ -144,7 +145,7 @@ def mode_signature(command: Array, force: Array) -> ModeSignature:
 
 def signature_difference(a: ModeSignature, b: ModeSignature) -> Array:
     """How `b` differs from `a` (3, n) in direction, thrust and style; 1 is what counts as different."""
-    turn = np.angle(np.exp(1j * (b.direction - a.direction))) / SAME_DIRECTION
+    turn = wrapped(b.direction - a.direction) / SAME_DIRECTION
     rest = np.array([b.thrust - a.thrust, b.style - a.style]) / SAME_SIZE
     difference: Array = np.nan_to_num(np.concatenate([turn[None], rest]))
     return difference
@@ -161,6 +162,6 @@ def _change(command: Array, previous: Array, lower: Array, upper: Array) -> tupl
     if not known.any():
         return None, None
     change = (command - previous)[known] / np.maximum(upper - lower, 1e-9)[known]
-    turn = np.abs(np.angle(np.exp(1j * (command - previous)[known, 2])))
+    turn = np.abs(wrapped((command - previous)[known, 2]))
     change[:, 2] = turn / np.pi
     return float(np.sqrt((change**2).sum(1).mean())), float(turn.max())

@@ -168,3 +168,29 @@ def test_distance_counts_shares_of_each_range() -> None:
     (mode,) = modes_of(candidates(command.tolist()), lower, upper, previous)
     squares = (0.1 / 0.4) ** 2 + (0.5 / 2.0) ** 2 + (0.25 / math.pi) ** 2
     assert mode.distance == pytest.approx(math.sqrt(squares / 2)) and mode.turn == pytest.approx(0.25)
+
+
+def test_what_differs_is_counted_in_what_counts_as_different() -> None:
+    """Half of 25 degrees over the seam, a force of e^0.1 times the size, a style of e^-0.5."""
+    one = ModeSignature((), np.array([1.0]), np.array([math.pi - 0.1]), np.array([-0.2]))
+    turn = math.radians(12.5)
+    other = ModeSignature((), np.array([1.1]), np.array([turn - 0.1 - math.pi]), np.array([-0.7]))
+    np.testing.assert_allclose(signature_difference(one, other), [[0.5], [0.4], [-2.0]], atol=1e-12)
+    np.testing.assert_allclose(signature_difference(other, one), [[-0.5], [-0.4], [2.0]], atol=1e-12)
+    rest = ModeSignature((0,), *np.full((3, 1), math.nan))
+    assert (signature_difference(rest, rest) == 0.0).all() and same_signature(rest, rest)
+    assert not same_signature(rest, one) and not same_signature(one, other)
+
+
+def test_the_distance_is_over_the_fins_that_both_know() -> None:
+    previous = np.array([(0.2, 1.0, -3.0), (0.3, 1.5, 0.5), (math.nan,) * 3])
+    now: list[tuple[float, ...]] = [(0.31, 0.6, 3.0), (math.nan,) * 3, (0.4, 1.5, 0.0)]
+    lower, upper = (np.tile(ends[:1], (3, 1)) for ends in (LOWER, UPPER))
+    (mode,) = modes_of(candidates(now), lower, upper, previous)
+    assert mode.turn == pytest.approx(2.0 * math.pi - 6.0)
+    shares = 0.11 / 0.55, -0.4 / 2.0, (2.0 * math.pi - 6.0) / math.pi
+    assert mode.distance == pytest.approx(math.hypot(*shares))
+    previous[2] = 0.4, 1.5, 0.3
+    (mode,) = modes_of(candidates(now), lower, upper, previous)
+    assert mode.turn == pytest.approx(0.3)
+    assert mode.distance == pytest.approx(math.sqrt((math.hypot(*shares) ** 2 + (0.3 / math.pi) ** 2) / 2.0))

@@ -151,7 +151,7 @@ def _free_step(model: _Model, curvature: Array, fixed: Array, held: AnyArray) ->
     missing = model.missing - np.einsum("rnij,rni->rj", model.jacobian, fixed)
     slope = np.where(held, 0.0, model.slope + (curvature @ fixed[..., None])[..., 0])
     jacobian = np.where(held[..., None], 0.0, model.jacobian)
-    block = np.where(held[..., None] | held[..., None, :], np.eye(3) * held[..., None], curvature)
+    block = np.where(held[..., None] | held[..., None, :], np.eye(3), curvature)
     mobility = np.linalg.inv(block)
     pulled = mobility @ jacobian
     drift = (mobility @ slope[..., None])[..., 0]
