@@ -1,5 +1,7 @@
 """The nearest wrench within reach: held against its own proof of optimality and against a general solver."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize
@@ -7,7 +9,7 @@ from scipy.optimize import minimize
 from finlab.assets import shipped_layouts
 from finlab.forces.fin_sets import planar_sets
 from finlab.forces.force_space import PlanarProblem
-from finlab.forces.nearest import nearest, nearest_along, nearest_in_turn
+from finlab.forces.nearest import Nearest, nearest, nearest_along, nearest_in_turn
 from finlab.layout import load_layout, random_layout
 from tests.forces.conftest import problem_of
 
@@ -112,6 +114,40 @@ def test_a_general_solver_finds_nothing_nearer() -> None:
     )
     mine = 0.5 * ((nearest(planar_sets(planar), target[None]).wrench[0] - target) ** 2).sum()
     assert mine == pytest.approx(found.fun, rel=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_along_a_direction_that_the_fins_do_not_have_nothing_is_given(seed: int) -> None:
+    """Two fins push along four of six axes; next to nothing beside them is let pass."""
+    sets = planar_sets(problem_of(random_layout(np.random.default_rng(seed), n_fins=2)))
+    flat = sets.columns.reshape(4, 6)
+    along = flat.T @ np.array([0.4, 0.1, -0.2, 0.3])
+    size = float(np.linalg.norm(along))
+    beside = np.linalg.svd(flat)[2][-1]
+    for share, given in ((0.0, True), (1e-6, True), (2e-3, False), (0.1, False), (0.5, False)):
+        found = nearest_along(sets, along + share * size * beside)
+        assert bool(found.force.any()) == bool(found.wrench.any()) == given
+        if given:
+            np.testing.assert_allclose(found.wrench[0], along, atol=1e-3 * size)
+    nothing = nearest_along(sets, np.zeros(6))
+    assert not nothing.force.any() and not nothing.wrench.any() and not nothing.multiplier.any()
+
+
+def test_a_group_that_would_spoil_an_earlier_one_ends_the_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+    sets, asked = planar_sets(problem_of(load_layout(shipped_layouts()["penta"]))), []
+    groups = [np.isin(np.arange(6), axes) for axes in ([0, 1, 2], [3], [4, 5])]
+    target = np.array([0.3, 0.1, 0.2, 0.05, 0.0, 0.02])
+
+    def spoiling(*arguments: Any) -> Nearest:
+        asked.append(arguments)
+        found = nearest(*arguments)
+        return found._replace(force=0.5 * found.force) if len(asked) == 2 else found
+
+    monkeypatch.setattr("finlab.forces.nearest.nearest", spoiling)
+    found = nearest_in_turn(sets, target, groups)
+    assert len(asked) == 2
+    np.testing.assert_array_equal(found.force, nearest(*asked[0]).force)
+    np.testing.assert_allclose(found.wrench[0, :3], target[:3], atol=1e-5)
 
 
 def test_where_forces_are_unique_the_weakest_fin_sets_the_share() -> None:
