@@ -19,11 +19,8 @@ MAX_SUBSETS = 80
 """Most sub-layouts that are searched."""
 LEAST_WORKING = 2
 """Fewest fins that work in a sub-layout; of two fins, one."""
-UNEVEN = 4
-"""Starts in which all fins work, some much harder than others: equal fins that all work alike are a saddle of
-the effort, which a search leaves slowly."""
 LEAST_SHARE = 0.05
-"""Least share of its largest force with which a fin begins there."""
+"""Least share of its largest force with which a fin begins where all work, some much harder than others."""
 
 
 class Prepared(NamedTuple):
@@ -101,7 +98,11 @@ def resting_seeds(maximum: Array, rests: tuple[tuple[int, ...], ...], left: floa
 
 
 def uneven_seeds(maximum: Array) -> Array:
-    """Seeds (`UNEVEN`, n) [N] from largest forces (n,), spread by irrational steps: a few fins work hard."""
-    row, fin = np.arange(1, UNEVEN + 1)[:, None], np.arange(len(maximum))
+    """Seeds (n, n) [N] from largest forces (n,), spread by irrational steps: a few fins work hard.
+
+    Equal fins that all work alike are a saddle of the effort, which a search leaves slowly.
+    """
+    fin = np.arange(len(maximum))
+    row = fin[:, None] + 1
     spread = (row * 0.6180339887 + fin * 0.7548776662) % 1.0
     return maximum * (LEAST_SHARE + (1.0 - LEAST_SHARE) * spread**2)

@@ -21,7 +21,7 @@ from finlab.allocation.policy import Policy
 from finlab.allocation.question import usable_fins
 from finlab.allocation.search.levenberg_marquardt import refine
 from finlab.allocation.search.pipeline import SEARCH, Pipeline
-from finlab.allocation.search.prepared import UNEVEN, Prepared, resting_fins
+from finlab.allocation.search.prepared import Prepared, resting_fins
 from finlab.allocation.search.refined_candidates import FallbackForces, RefinedCandidates, nearest_forces
 from finlab.allocation.search.settings import Settings
 from finlab.allocation.solution import Candidates, Solution
@@ -253,4 +253,4 @@ def _seed_names(layout: Layout) -> tuple[str, ...]:
         f"without {' and '.join(names[i] for i in fins)}" if fins else "all fins"
         for fins in resting_fins(len(names))
     ]
-    return (*rests, *["all fins, unevenly"] * UNEVEN)
+    return (*rests, *["all fins, unevenly"] * len(names))

@@ -13,7 +13,6 @@ from finlab.allocation.search import pipeline, search_allocator
 from finlab.allocation.search.pipeline import SEARCH
 from finlab.allocation.search.prepared import (
     MAX_SUBSETS,
-    UNEVEN,
     Prepared,
     prepare,
     resting_fins,
@@ -169,10 +168,10 @@ def test_seeds_by_hand() -> None:
 @pytest.mark.parametrize("n", [2, 3, 6])
 def test_uneven_seeds_differ_from_fin_to_fin_and_from_seed_to_seed(n: int) -> None:
     share = uneven_seeds(np.full(n, 3.0)) / 3.0
-    assert share.shape == (4, n) and share.min() >= 0.05 and share.max() < 1.0
+    assert share.shape == (n, n) and share.min() >= 0.05 and share.max() < 1.0
     assert np.ptp(share, axis=1).min() > 0.1, "no start in which equal fins work alike"
-    assert np.abs(share[:, None] - share[None])[~np.eye(4, dtype=bool)].max(axis=-1).min() > 0.05
-    assert uneven_seeds(np.array([1.0, 2.0]))[:, 1] == pytest.approx(2.0 * share[:, 1])
+    assert np.abs(share[:, None] - share[None])[~np.eye(n, dtype=bool)].max(axis=-1).min() > 0.05
+    assert uneven_seeds(np.arange(1.0, n + 1.0)) == pytest.approx(share * np.arange(1.0, n + 1.0))
 
 
 @pytest.mark.parametrize("share", [0.5, 0.8])
@@ -231,7 +230,7 @@ def test_effort_is_searched_longer_with_more_fins(
     for name, n, steps in (("A", 4, few), ("penta", 5, few), ("hexa", 6, many), ("octo", 8, many)):
         counted.clear()
         effort.allocate(load_layout(shipped_layouts()[name]), EASY)
-        assert counted == [(n, len(resting_fins(n)) + UNEVEN, steps)]
+        assert counted == [(n, len(resting_fins(n)) + n, steps)]
 
 
 def test_power_is_searched_once(search: SearchAllocator, counted: list[tuple[int, int, int]]) -> None:
@@ -265,9 +264,7 @@ def test_exploring_tries_what_may_be_another_way(
     assert len(result.explore()) >= 2
     rests = len(resting_fins(4))
     # The question is asked again first, as of a copy.
-    assert counted[1:] == [
-        (4, rests + (UNEVEN + SEARCH.wide_seeds) * (objective == "effort"), SEARCH.wide_steps)
-    ]
+    assert counted[1:] == [(4, rests + (4 + SEARCH.wide_seeds) * (objective == "effort"), SEARCH.wide_steps)]
 
 
 def test_random_seeds_of_the_wide_search_are_spread_over_what_fins_can_give(
