@@ -278,3 +278,20 @@ def test_it_ends_when_no_row_has_more_to_gain(
     command = plant.sample(np.random.default_rng(7), (4,))
     cheaper_commands(problem, Objective("power").meter(plant), problem.wrench(command), command, 1e-5)
     assert len(steps) == 1
+
+
+def test_a_step_that_crosses_no_limit_is_solved_once(
+    problem: CommandProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solved, taken = [], _free_step
+
+    def counted(*given: Any) -> Any:
+        solved.append(given)
+        return taken(*given)
+
+    monkeypatch.setattr(module, "_free_step", counted)
+    model, damping = drawn_model(6), np.full(ROWS, 1e4)
+    middle = np.tile((problem.lower + problem.upper) / 2, (ROWS, 1, 1))
+    model = model._replace(missing=1e-2 * model.missing)
+    _step(problem, model, middle, np.zeros((ROWS, 6)), damping)
+    assert len(solved) == 1
