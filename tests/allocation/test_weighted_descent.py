@@ -1,5 +1,7 @@
 """The weighted descent against dense linear algebra: energies, held variables, damping, when rows stop."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -242,3 +244,61 @@ def test_it_stops_when_told_with_the_best_so_far(plant: Plant) -> None:
     np.testing.assert_array_equal(stopped.command, one.command)
     longer = descend(plant, start, target, SIGMA, DescentOptions(n_steps=20))
     assert (longer.objective < one.objective).all()
+
+
+class Spring:
+    """One fin whose commands are half of its wrench; it counts how often it was asked."""
+
+    n_fins = 1
+    lower, upper, width = np.full((1, 3), -10.0), np.full((1, 3), 10.0), np.full((1, 3), 20.0)
+    full_turn = np.zeros(1, dtype=bool)
+
+    def __init__(self) -> None:
+        self.asked = 0
+
+    def linearize(self, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        self.asked += 1
+        slope = np.eye(6)[:, :3] / 2.0
+        return np.asarray(command[:, 0] @ slope.T), np.tile(slope, (len(command), 1, 1))
+
+    def feasible(self, command: np.ndarray) -> np.ndarray:
+        return np.asarray(np.clip(command, self.lower, self.upper))
+
+
+def settle(missing: float, **options: Any) -> tuple[float, int]:
+    """The square root of where J ends, as a share of what was missing first, and how many steps it took."""
+    target, spring = np.zeros((1, 6)), Spring()
+    target[0, 1] = missing
+    found = descend(spring, np.zeros((1, 1, 3)), target, np.ones(6), DescentOptions(**options))
+    return float(np.sqrt(found.objective[0])) / missing, spring.asked - 1
+
+
+def test_the_first_damping_is_that_of_a_full_range_and_one_plus_the_objective() -> None:
+    """A range moves the wrench by 10, so a damping d leaves d / (100 + d) of what was missing."""
+    for missing in (1e-3, 0.1, 3.0):
+        for given in ({}, {"damping": 5.0}):
+            damping = given.get("damping", 0.01) * (1.0 + missing**2)
+            left, steps = settle(missing, n_steps=1, **given)
+            assert steps == 1 and left == pytest.approx(damping / (100.0 + damping), rel=1e-6)
+
+
+def test_damping_falls_by_its_factor_after_each_gain_as_far_as_it_may() -> None:
+    first, second = 0.5 * (1.0 + 1e-4), 0.2 * 0.5 * (1.0 + 1e-4)
+    left, _ = settle(0.01, n_steps=2, damping=0.5)
+    assert left == pytest.approx(first / (100.0 + first) * second / (100.0 + second), rel=1e-5)
+    left, _ = settle(0.01, n_steps=2, damping=0.5, least_damping=0.3)
+    assert left == pytest.approx(first / (100.0 + first) * 0.3 / 100.3, rel=1e-5)
+    left, _ = settle(0.01, n_steps=2, damping=0.5, least_relative_damping=1e-3)  # of 3 * 100
+    assert left == pytest.approx(first / (100.0 + first) * 0.3 / 100.3, rel=1e-5)
+
+
+def test_a_row_is_done_below_the_squared_tolerance_or_without_a_gain() -> None:
+    """Each step leaves half of the error, a quarter of the objective."""
+    half = {"damping": 100.0, "damping_factors": (1.0, 6.0)}
+    assert settle(1e-4, n_steps=5, **half)[1] == 5
+    # J is 1e-8 at first and 1e-8 / 4^k after k steps; the tolerance squared is 1e-9 or 1e-10.
+    assert settle(1e-4, n_steps=50, tolerance=1e-9**0.5, **half)[1] == 2
+    assert settle(1e-4, n_steps=50, tolerance=1e-10**0.5, **half)[1] == 4
+    # Here each leaves 1000 / 1100 of the error: a gain of 0.21 of the objective that is left.
+    slow = {"damping": 500.0, "damping_factors": (1.0, 6.0), "n_steps": 50}
+    assert settle(1.0, tolerance=0.22, **slow)[1] == 1 < 5 < settle(1.0, tolerance=0.2, **slow)[1]

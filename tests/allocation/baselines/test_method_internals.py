@@ -235,6 +235,11 @@ def test_sqp_answers_all_targets_of_all_chunks(plant: Plant, monkeypatch: pytest
     np.testing.assert_allclose(method._commands(plant, targets, 0), whole, atol=1e-9)
 
 
+def test_sqp_has_no_answers_to_no_targets(plant: Plant) -> None:
+    command = Sqp(NORMALIZATION)._commands(plant, np.empty((0, 6)), 0)
+    assert command.shape == (0, 2, 3)
+
+
 # Multistart.
 
 

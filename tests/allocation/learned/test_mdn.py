@@ -15,6 +15,7 @@ from finlab.errors import AllocationError, CheckpointError
 from finlab.inference.checkpoint import read_checkpoint
 from finlab.layout import FinModelSpec, Layout, load_layout, random_layout
 from finlab.physics import Plant
+from finlab.physics.energy import command_energy
 
 TARGET = [0.5, -0.3, 1.0, 0.05, -0.02, 0.1]
 
@@ -179,3 +180,30 @@ def test_it_needs_no_torch() -> None:
         "assert a.err_norm < 1e-4"
     )
     subprocess.run([sys.executable, "-c", code], timeout=60, check=True)
+
+
+@pytest.mark.parametrize("objective", ["power", "effort"])
+def test_samples_tell_what_the_plant_says_of_them(
+    objective: str, shipped: MdnAllocator, layout_a: Layout
+) -> None:
+    method, plant = shipped.with_settings(objective=objective), Plant(layout_a)
+    told = method.allocate(layout_a, TARGET).samples
+    assert told is not None and len(told) == 16
+    assert ((told.command >= plant.lower) & (told.command <= plant.upper)).all()
+    np.testing.assert_allclose(told.wrench, plant.wrench(told.command), atol=1e-9)
+    error = np.linalg.norm((told.wrench - TARGET) / method.normalization.std, axis=-1)
+    np.testing.assert_allclose(told.err_norm, error, rtol=1e-9)
+    np.testing.assert_allclose(told.energy, command_energy(told.command, plant.upper), rtol=1e-9)
+    np.testing.assert_allclose(told.power, plant.power(told.command).sum(-1), rtol=1e-9)
+
+
+def test_samples_are_the_proposed_forces(shipped: MdnAllocator, layout_a: Layout) -> None:
+    """As near as the compiled fins come, where a fin can give what is proposed."""
+    prepared, target = shipped.pipeline.prepare(layout_a), np.array([TARGET])
+    told, proposal = shipped.allocate(layout_a, TARGET).samples, shipped.proposals(prepared, target, 0)
+    assert told is not None
+    force, given = proposal.force[0].swapaxes(1, 2), Plant(layout_a).force(told.command)[..., 1:]
+    size, fins = np.linalg.norm(force, axis=-1), prepared.planar.fins
+    able = (size > 2.0 * fins.minimum) & (size < 0.99 * fins.maximum)
+    assert able.mean() > 0.5
+    np.testing.assert_allclose(given[able], force[able], atol=0.02 * fins.maximum.max())

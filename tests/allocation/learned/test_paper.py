@@ -319,3 +319,28 @@ def test_adams_gradient_is_that_of_the_score(checkpoint: TrainedWeights) -> None
 
 def test_what_the_paper_prints_is_what_it_samples_with() -> None:
     assert PaperSettings().temperature == 0.02
+
+
+def test_random_starts_fill_the_limits(checkpoint: TrainedWeights, robot: Layout) -> None:
+    """Evenly: by mean, spread and ends of thousands of draws in normalized coordinates."""
+    paper = PaperAllocator(checkpoint, n_candidates=2000, warm_start="random")
+    prepared = paper._prepared(robot)
+    mixture = paper._predict(prepared, np.array([TARGET, TARGET]))
+    drawn = paper._draw(mixture, 3)
+    assert drawn.shape == (2, 2000, robot.n_fins, 3) and drawn.dtype == np.float32
+    assert -1.0 <= drawn.min() < -0.999 and 0.999 < drawn.max() <= 1.0
+    np.testing.assert_allclose(drawn.mean((0, 1)), 0.0, atol=0.05)
+    np.testing.assert_allclose(drawn.std((0, 1)), 1.0 / np.sqrt(3.0), atol=0.03)
+    assert (drawn[0] != drawn[1]).any() and (paper._draw(mixture, 4) != drawn).any()
+
+
+@pytest.mark.parametrize(("refinement", "steps"), [("adam", 80), ("levenberg-marquardt", 20)])
+def test_without_a_number_of_steps_it_takes_the_usual_one(
+    refinement: str, steps: int, checkpoint: TrainedWeights, robot: Layout
+) -> None:
+    usual, told, fewer = (
+        PaperAllocator(checkpoint, refinement=refinement, n_steps=n).allocate(robot, TARGET).command
+        for n in (None, steps, steps // 20)
+    )
+    np.testing.assert_array_equal(usual, told)
+    assert (usual != fewer).any()
