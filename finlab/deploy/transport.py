@@ -61,13 +61,13 @@ class LoopbackUdp:
         """See `Transport`."""
         self._socket.settimeout(timeout)
         try:
-            line, self._sender = self._socket.recvfrom(MAX_LINE + 1)
+            line, self._sender = self._socket.recvfrom(MAX_LINE)  # no datagram is longer
         except (TimeoutError, BlockingIOError):  # the second where the time allowed was 0
             return None
         self._socket.setblocking(False)
         while True:
             try:
-                line, self._sender = self._socket.recvfrom(MAX_LINE + 1)
+                line, self._sender = self._socket.recvfrom(MAX_LINE)
             except BlockingIOError:
                 return line
 

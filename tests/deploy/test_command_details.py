@@ -1,8 +1,10 @@
 """What the command on the robot prints, the deadline's arithmetic, and files that do not depend on order."""
 
 import json
+import os
 from concurrent.futures import Future
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -51,6 +53,25 @@ def test_speed_answers_as_many_targets_as_asked_and_at_least_one(
     )
 
 
+def test_speed_asks_2000_targets_and_says_how_soon_the_robot_was_ready(
+    on_board: Robot, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    """The clock stands at 5 s as the command starts and at 5.25 s after the first answer."""
+    clock, counts = iter([5.0, 5.25]), []
+
+    def times(allocate: Any, targets: np.ndarray) -> tuple[float, float]:
+        counts.append(len(targets))
+        return 1.0, 2.0
+
+    monkeypatch.setattr("finlab.deploy.self_check.answer_times", times)
+    monkeypatch.setattr("finlab.deploy.self_check.peak_memory", lambda: 123.4)
+    monkeypatch.setattr(Robot, "allocate", lambda *_: None)
+    monkeypatch.setattr("finlab.deploy.command.time", SimpleNamespace(perf_counter=lambda: next(clock)))
+    assert main(["speed", "bundle"]) == 0
+    assert counts == [2000]
+    assert capsys.readouterr().out.endswith(", ready after 0.25 s, peak memory 123 MB\n")
+
+
 def test_times_are_percentiles_in_milliseconds(monkeypatch: pytest.MonkeyPatch) -> None:
     clock, asked = [0.0], []
 
@@ -96,6 +117,38 @@ def test_allocate_prints_a_table_or_one_object(on_board: Robot, capsys: Any) -> 
     assert lines[1 + lost] == "back_left    failed"
     a, f, d = truth.command[0]
     assert lines[1] == f"front_right  {a:7.3f}  {f:6.3f}  {d:20.3f}"
+
+
+def test_below_the_table_stand_its_figures_and_each_note(
+    on_board: Robot, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    told = replace(on_board.allocate(WRENCH, policy="direction", seed=3), notes=("first note", "second note"))
+    asked: list[Any] = []
+
+    def answer(_: Robot, *arguments: Any, **options: Any) -> Any:
+        asked.append((*arguments, options))
+        return told
+
+    monkeypatch.setattr(Robot, "allocate", answer)
+    line = ["allocate", "bundle", "--wrench", *map(str, WRENCH), "--policy=direction", "--seed=3"]
+    assert main(line) == 0
+    assert asked == [(WRENCH, {"failed": [], "policy": "direction", "seed": 3})]
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[5].startswith(f"err_norm {told.err_norm:.2e}   power {told.power:.3f} W   energy ")
+    assert lines[6:] == ["first note", "second note"]
+
+
+def test_one_core_is_enough_unless_somebody_says_otherwise(
+    on_board: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+    monkeypatch.setattr("finlab.deploy.self_check.self_check", lambda _: [])
+    for chosen in names:
+        for name in names:
+            monkeypatch.delenv(name, raising=False)
+        monkeypatch.setenv(chosen, "7")
+        assert main(["check", "bundle"]) == 0
+        assert {name: os.environ[name] for name in names} == {**dict.fromkeys(names, "1"), chosen: "7"}
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import io
 import json
+import os
 import socket
 import subprocess
 import sys
@@ -15,7 +16,7 @@ import pytest
 from finlab.allocation import Allocation
 from finlab.deploy.bundle import Bundle
 from finlab.deploy.robot import Robot, parse_robot
-from finlab.deploy.serve import Server, Timing
+from finlab.deploy.serve import MAX_LINE, Server, Timing
 from finlab.deploy.transport import LoopbackUdp, StandardStreams
 from finlab.errors import FinlabError
 
@@ -153,6 +154,39 @@ def test_streams_keep_only_the_newest_request() -> None:
         streams.newest(1.0)
     streams.send(b"answer\n")
     assert sink.getvalue() == b"answer\n"
+
+
+def test_streams_read_no_more_of_a_line_than_it_takes_to_refuse_it() -> None:
+    class Endless(io.BytesIO):
+        """Remembers how much was asked for at once."""
+
+        asked: list[Any] = []
+
+        def readline(self, size: int | None = -1, /) -> bytes:
+            self.asked.append(size)
+            return super().readline(size)
+
+    source = Endless(b"x" * (MAX_LINE + 1))
+    streams = StandardStreams(source, io.BytesIO())
+    line = streams.newest(5.0)
+    assert line is not None and len(line) == MAX_LINE + 1
+    with pytest.raises(EOFError):
+        streams.newest(5.0)
+    assert source.asked == [MAX_LINE + 1] * 2
+
+
+def test_silence_on_open_streams_is_told_after_the_timeout() -> None:
+    reader, writer = os.pipe()
+    with open(reader, "rb") as source, open(writer, "wb") as end:
+        streams = StandardStreams(source, io.BytesIO())
+        assert streams.newest(0.0) is None and streams.newest(0.05) is None
+        end.write(b"\n  \nlate\n")
+        end.flush()
+        assert streams.newest(5.0) == b"late\n"
+        assert streams.newest(0.05) is None
+        end.close()
+        with pytest.raises(EOFError):
+            streams.newest(5.0)
 
 
 def test_datagrams_on_this_machine_only() -> None:
