@@ -71,7 +71,7 @@ def test_asks_for_the_core_and_offers_extras(wheel: Path) -> None:
     about = email.message_from_bytes(archive.read(name))
     required = [line for line in about.get_all("Requires-Dist", []) if "extra ==" not in line]
     assert {name_of(line) for line in required} == CORE
-    extras = {"train", "app", "onnx", "urdf", "ipopt", "plot", "test", "dev"}
+    extras = {"train", "app", "onnx", "urdf", "ipopt", "plot", "fit", "test", "dev"}
     assert extras == set(about.get_all("Provides-Extra", []))
 
 
