@@ -302,3 +302,22 @@ def test_a_row_is_done_below_the_squared_tolerance_or_without_a_gain() -> None:
     # Here each leaves 1000 / 1100 of the error: a gain of 0.21 of the objective that is left.
     slow = {"damping": 500.0, "damping_factors": (1.0, 6.0), "n_steps": 50}
     assert settle(1.0, tolerance=0.22, **slow)[1] == 1 < 5 < settle(1.0, tolerance=0.2, **slow)[1]
+
+
+class Wall(Spring):
+    """A spring whose wrench, but not its slope, says that nothing helps."""
+
+    def linearize(self, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        wrench, slope = super().linearize(command)
+        return -wrench, slope
+
+
+@pytest.mark.parametrize(("largest", "steps"), [(5.0, 1), (7.0, 2), (35.0, 2), (37.0, 3)])
+def test_damping_grows_six_times_after_each_step_that_does_not_help(largest: float, steps: int) -> None:
+    """From one: a row is done once its damping is the largest."""
+    wall, target = Wall(), np.zeros((1, 6))
+    target[0, 1] = 1.0
+    options = DescentOptions(damping=0.5, largest_damping=largest)
+    found = descend(wall, np.zeros((1, 1, 3)), target, np.ones(6), options)
+    assert wall.asked - 1 == steps
+    assert found.objective[0] == 1.0 and (found.command == 0.0).all()

@@ -8,6 +8,7 @@ import pytest
 
 from finlab.allocation import load_allocator
 from finlab.allocation.search.receding_horizon import HORIZON, _changes, _columns, _detours, _drifts
+from finlab.allocation.search.refined_candidates import _turned_at_rest
 from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.allocation.search.turn_limits import limit_turn, unwrap_to_arc
 from finlab.assets import shipped_layouts
@@ -130,3 +131,46 @@ def test_six_equations_leave_three_fins_no_detour(search: SearchAllocator) -> No
     null = 2 * n - np.linalg.matrix_rank(_columns(planar), tol=1e-6)
     found = _detours(planar, np.ones((n, 2)), np.ones((n, 2)), HORIZON)
     assert (len(found) == 0) == (null == 0)
+
+
+# What is narrowed or turned before a search.
+
+
+def test_free_fins_are_narrowed_over_the_seam_and_turn_ahead_within_their_arcs(
+    search: SearchAllocator,
+) -> None:
+    """The fin of which nothing is known stays free; the others' arcs are a radian around where they point."""
+    prepared = search.pipeline.prepare(load_layout(shipped_layouts()["penta"]))
+    direction = np.array([3.0, -2.5, 0.4, np.nan, -3.1])
+    previous = np.column_stack([np.full(5, 0.3), np.full(5, 1.0), direction])
+    near = limit_turn(prepared, previous, np.array([-3.0, 0.0, 0.6, 1.0, 3.1]), 0.5)
+    known, turn = np.array([0, 1, 2, 4]), 2.0 * math.pi
+    np.testing.assert_allclose(near.commands.lower[known, 2], direction[known] - 0.5)
+    np.testing.assert_allclose(near.commands.upper[known, 2], direction[known] + 0.5)
+    assert near.commands.full_turn.tolist() == [False, False, False, True, False]
+    np.testing.assert_allclose(near.planar.fins.half, [0.5, 0.5, 0.5, math.pi, 0.5])
+    ahead = [turn - 3.0, -2.0, 0.6, 1.0, 3.1 - turn]
+    np.testing.assert_allclose(near.planar.idle_direction, ahead)
+    middle = 0.5 * (near.commands.lower[:, 2] + near.commands.upper[:, 2])
+    lean = prepared.planar.fins.lean(middle)
+    apart = near.planar.fins.middle - middle - lean
+    np.testing.assert_allclose(np.exp(1j * apart), 1.0, atol=1e-9)
+    assert near.arcs is None and prepared.commands.full_turn.all()
+
+
+def test_only_fins_at_rest_are_turned_at_random(search: SearchAllocator) -> None:
+    prepared = search.pipeline.prepare(load_layout(shipped_layouts()["penta"]))
+    plant = prepared.plant
+    command = np.tile(plant.upper, (2, 1, 1))
+    command[..., 2] = 0.4
+    command[0, [1, 3], :2] = command[1, 2, :2] = plant.lower[1, :2]
+    force = np.linalg.norm(plant.force(command)[..., 1:], axis=-1)
+    rests = force <= 1e-2 * prepared.planar.fins.maximum
+    assert rests.sum() == 3
+    starts = _turned_at_rest(prepared, command, 6)
+    assert starts.shape == (2, 6, 5, 3)
+    np.testing.assert_array_equal(starts[..., :2], np.repeat(command[:, None, :, :2], 6, axis=1))
+    turned = starts[..., 2] != 0.4
+    np.testing.assert_array_equal(turned, np.repeat(rests[:, None], 6, axis=1))
+    drawn = plant.sample(np.random.default_rng(0), (6,))[..., 2]
+    np.testing.assert_array_equal(starts[0][:, [1, 3], 2], drawn[:, [1, 3]])
