@@ -107,6 +107,15 @@ def test_same_graph_same_bytes() -> None:
     assert graph_bytes(make_graph(layout)) == graph_bytes(make_graph(load_layout(shipped_layouts()["ucat"])))
 
 
+def test_a_file_is_text_for_people() -> None:
+    """A line for each value, every letter as it is written, and an end of the last line."""
+    layout = replace(load_layout(shipped_layouts()["A"]), description="Flösse für Ελλάδα")
+    text = graph_bytes(make_graph(layout)).decode()
+    assert '"Flösse für Ελλάδα"' in text and text.endswith("\n}\n") and not text.endswith("\n\n")
+    assert text.startswith('{\n "format": ')
+    assert parse_graph(GraphText(text)).layout.description == layout.description
+
+
 def test_networkx_reads_nodes_and_edges() -> None:
     layout = load_layout(shipped_layouts()["A"])
     document = json.loads(graph_bytes(make_graph(layout, failed=("back_left",))))

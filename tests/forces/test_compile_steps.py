@@ -86,6 +86,8 @@ def test_a_size_that_falls_again_has_its_peak_between_grid_points() -> None:
     found = steps._with_peaks(size[None])
     assert found.max(axis=1)[0] == pytest.approx([9.0] * 5)
     assert (found != size[None]).sum() == 3, "only the largest of a column whose peak lies within"
+    three = 9.0 - (np.arange(3.0)[:, None] - 1.2) ** 2
+    assert steps._with_peaks(three[None]).max() == pytest.approx(9.0)
     two = size[None, :2]
     assert (steps._with_peaks(two) == two).all()
 
