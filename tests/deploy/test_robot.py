@@ -5,12 +5,14 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import finlab
-from finlab.allocation import Allocator
+from finlab.allocation import Allocation, Allocator
+from finlab.allocation.policy import CLOSEST
 from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.assets import shipped_layouts
 from finlab.deploy.bundle import Bundle, make_bundle
@@ -204,3 +206,22 @@ def test_command_allocates_and_checks(folder: Path, capsys: pytest.CaptureFixtur
     assert "front_left" in capsys.readouterr().out
     assert main(["check", "nowhere"]) == 2
     assert capsys.readouterr().err.startswith("finlab-runtime: error: nowhere: cannot be read")
+
+
+def test_what_is_not_said_is_that_of_the_library(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fins that the bundle lost stay lost, the policy is `closest`, and the seed is 0."""
+    layout, asked = robot.layout, []
+    hurt = Robot(replace(robot.graph, failed=layout.names[:1]), robot.allocator)
+    healthy = robot.allocator.allocate
+
+    def spy(*arguments: Any, **options: Any) -> Allocation:
+        asked.append(options)
+        return healthy(*arguments, **options)
+
+    monkeypatch.setattr(robot.allocator, "allocate", spy, raising=False)
+    hurt.allocate([1.0, 0.0, 0.5, 0.0, 0.0, 0.1])
+    hurt.allocate([1.0, 0.0, 0.5, 0.0, 0.0, 0.1], failed=layout.names[:2], policy="direction", seed=5)
+    assert asked == [
+        {"failed": layout.names[:1], "previous": None, "policy": CLOSEST, "seed": 0},
+        {"failed": layout.names[:2], "previous": None, "policy": "direction", "seed": 5},
+    ]
