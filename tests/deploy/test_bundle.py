@@ -482,9 +482,11 @@ def test_links_in_a_folder_are_refused(
 
 
 def test_a_folder_with_other_things_is_not_written_to(bundle: Bundle, tmp_path: Path) -> None:
-    (tmp_path / "thesis.tex").write_text("years of work")
+    for name in ("zoo.txt", "thesis.tex", "well.txt"):
+        (tmp_path / name).write_text("years of work")
     with pytest.raises(DataError, match="holds 'thesis.tex', which is no part of a bundle"):
-        bundle.write(tmp_path)
+        bundle.write(tmp_path)  # the first of them by name
+    assert len(list(tmp_path.iterdir())) == 3
 
 
 def test_what_cannot_be_written_is_named(
