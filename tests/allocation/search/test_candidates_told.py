@@ -1,6 +1,7 @@
 """What is told of candidates: each number is the plant's own, whatever was kept least."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
 from finlab.physics import Plant
 from finlab.physics.energy import command_energy
+from tests.random_fins import random_robot
 
 TARGET = np.array([1.0, 0.5, 2.0, 0.0, 0.1, 0.1])
 OBJECTIVES: list[dict[str, Any]] = [
@@ -174,3 +176,15 @@ def test_only_fins_at_rest_are_turned_at_random(search: SearchAllocator) -> None
     np.testing.assert_array_equal(turned, np.repeat(rests[:, None], 6, axis=1))
     drawn = plant.sample(np.random.default_rng(0), (6,))[..., 2]
     np.testing.assert_array_equal(starts[0][:, [1, 3], 2], drawn[:, [1, 3]])
+
+
+def test_arcs_of_forces_lean_as_measured_fins_do(search: SearchAllocator, tmp_path: Path) -> None:
+    """A measured fin's force points a little beside its zero direction."""
+    layout = random_robot(np.random.default_rng(4), ("table",), tmp_path, n_fins=(3, 5), limits="nominal")
+    prepared = search.pipeline.prepare(layout)
+    direction = np.linspace(-1.0, 1.0, layout.n_fins)
+    previous = np.column_stack([np.full((layout.n_fins, 2), 0.4), direction])
+    near = limit_turn(prepared, previous, direction, 0.3)
+    lean = prepared.planar.fins.lean(direction)
+    assert np.abs(lean).max() > 1e-3
+    np.testing.assert_allclose(near.planar.fins.middle, direction + lean, atol=1e-9)
