@@ -147,3 +147,10 @@ def test_a_fin_that_takes_no_power_has_a_flat_bowl() -> None:
     plant = robot(FinModelSpec("drag"), limits="nominal")
     bowl = command_cost(plant, Objective(), SIGMA, 0.7).bowl(np.array([[[0.0, 0.0, 0.3]]]))
     assert all((values == 0.0).all() for values in bowl)
+
+
+def test_fins_that_take_milliwatts_count_by_their_own_full_load() -> None:
+    plant = robot(*[FinModelSpec("lighthill", (("length", 0.03),))] * 3, limits="nominal")
+    assert plant.power(plant.upper[None]).max() < 1.0
+    full = command_cost(plant, Objective(), 1e-6 * SIGMA, 1e-4)(plant.upper[None])
+    np.testing.assert_allclose(full, 1e-4 * 10 * 3)

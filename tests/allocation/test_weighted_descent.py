@@ -321,3 +321,11 @@ def test_damping_grows_six_times_after_each_step_that_does_not_help(largest: flo
     found = descend(wall, np.zeros((1, 1, 3)), target, np.ones(6), options)
     assert wall.asked - 1 == steps
     assert found.objective[0] == 1.0 and (found.command == 0.0).all()
+
+
+def test_what_has_no_range_stays_where_it_is() -> None:
+    stiff = Limits((0.3, 0.3), (0.3, 1.4), (0.7, 0.7))
+    plant = plant_of(Layout("stiff", (Fin("a", (0.2, 0.1, 0.0), 0.4, limits=stiff),)))
+    wanted = plant.wrench(np.array([[[0.3, 1.1, 0.7]]]))
+    found = descend(plant, plant.lower[None], wanted, SIGMA, DescentOptions())
+    np.testing.assert_allclose(found.command[0, 0], [0.3, 1.1, 0.7], atol=1e-6)

@@ -17,6 +17,7 @@ from finlab.allocation.search.cheaper_commands import (
     _free_step,
     _Model,
     _model,
+    _regular,
     _step,
     cheaper_commands,
 )
@@ -295,3 +296,10 @@ def test_a_step_that_crosses_no_limit_is_solved_once(
     model = model._replace(missing=1e-2 * model.missing)
     _step(problem, model, middle, np.zeros((ROWS, 6)), damping)
     assert len(solved) == 1
+
+
+def test_systems_are_regularized_by_their_size_and_a_trifle() -> None:
+    gram = np.stack([np.zeros((6, 6)), np.diag(np.arange(1.0, 7.0))])
+    ridge = _regular(gram) - gram
+    np.testing.assert_allclose(ridge[0], 1e-14 * np.eye(6))
+    np.testing.assert_allclose(ridge[1], 21e-10 * np.eye(6), atol=1e-14)
