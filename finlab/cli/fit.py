@@ -38,15 +38,13 @@ def fin(
         page: write the page.
         seed: draws samples where there are too many.
     """
-    from finlab.errors import DataError
     from finlab.fit.advice import next_measurements, thin_regions
     from finlab.fit.conventions import Conventions
-    from finlab.fit.fin_file import summary, write_fin
+    from finlab.fit.fin_file import check_fin_path, summary, write_fin
     from finlab.fit.fin_fit import fit_fin
     from finlab.fit.measurements import read_measurements
 
-    if output.suffix.lower() != ".csv":
-        raise DataError(f"{output}: a fin is a CSV file, expected a name that ends in .csv")
+    check_fin_path(output)
     measurements = read_measurements(data, Conventions(angles, amplitude, frequency, sensor_turn, lever))
     fit = fit_fin(measurements, seed)
     write_fin(fit, output)

@@ -17,7 +17,7 @@ def next_measurements(fit: FinFit, count: int = 5) -> Array:
     """Returns commands (count, 3), best first: each lessens the variance of the forces, summed over all
     commands, more than any other would after those before it."""
     commands = fit.grid(CANDIDATES)[1:, 1:].reshape(-1, 3)  # at rest there is nothing to measure
-    inputs = fit.scaled(commands)
+    inputs = fit.measurements.scaled(commands)
     covariances = [component.covariance(inputs) for component in fit.components[:2]]
     noises = [float(np.mean(component.variance)) for component in fit.components[:2]]
     chosen = []

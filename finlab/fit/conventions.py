@@ -98,8 +98,8 @@ def to_fin_frame(columns: Columns, conventions: Conventions) -> None:
     if turn.any():
         from scipy.spatial.transform import Rotation
 
-        seen = np.stack([columns.values.get(name, np.zeros(1)) + 0.0 * columns.values["Fz"]
-                         for name in ("Fx", "Fy", "Fz")], axis=-1)  # fmt: skip
+        none = np.zeros_like(columns.values["Fz"])
+        seen = np.stack([columns.values.get(name, none) for name in ("Fx", "Fy", "Fz")], axis=-1)
         turned = Rotation.from_euler("xyz", turn).apply(seen)
         columns.values |= {name: turned[:, k] for k, name in enumerate(("Fx", "Fy", "Fz"))}
 

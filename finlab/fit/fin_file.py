@@ -39,16 +39,25 @@ def write_fin(fit: FinFit, path: str | os.PathLike[str]) -> None:
     Raises:
         DataError: the file cannot be written, or is not called .csv.
     """
+    check_fin_path(path)
+    write_whole(path, fin_csv(fit), DataError)
+
+
+def check_fin_path(path: str | os.PathLike[str]) -> None:
+    """Refuse a name that no layout would take for a table; before a fit, which takes seconds.
+
+    Raises:
+        DataError: it does not end in .csv.
+    """
     if Path(path).suffix.lower() != ".csv":
         raise DataError(f"{path}: a fin is a CSV file, expected a name that ends in .csv")
-    write_whole(path, fin_csv(fit), DataError)
 
 
 def summary(fit: FinFit) -> tuple[str, ...]:
     """Returns what the fit is worth, a line each; the first says why it should not be trusted, if so."""
     doubts = fit.doubts()
     head = (f"{DOUBT}: {'; '.join(doubts)}",) if doubts else ()
-    amplitude, frequency = fit.reach
+    amplitude, frequency = fit.measurements.reach
     lean = float(np.degrees(fit.lean))
     return (
         *head,

@@ -47,14 +47,9 @@ class FinFit:
     notes: tuple[str, ...]
     """What was recognized, filled in or left out, a sentence each."""
 
-    @property
-    def reach(self) -> tuple[float, float]:
-        """Largest amplitude [rad] and frequency [Hz] that were measured."""
-        return float(self.measurements.command[:, 0].max()), float(self.measurements.command[:, 1].max())
-
     def predict(self, command: Array) -> tuple[Array, Array]:
         """Returns forces [N] in the fin frame and their standard deviations (..., 3) at commands (..., 3)."""
-        inputs = self.scaled(command)
+        inputs = self.measurements.scaled(command)
         found = [component.predict(inputs) for component in self.components]
         (along, across, sideways), (by_along, by_across, by_sideways) = zip(*found, strict=True)
         angle = command[..., 2].reshape(-1) + self.lean
@@ -69,7 +64,7 @@ class FinFit:
         """Returns the power [W], (...), at commands (..., 3); None where none was measured."""
         if self.power is None:
             return None
-        root = np.maximum(self.power.predict(self.scaled(command))[0], 0.0)
+        root = np.maximum(self.power.predict(self.measurements.scaled(command))[0], 0.0)
         return np.asarray(self.largest_power * root.reshape(command.shape[:-1]) ** 2)
 
     def error(self) -> float:
@@ -108,7 +103,7 @@ class FinFit:
 
     def grid(self, shape: tuple[int, int, int] = (7, 7, 12)) -> Array:
         """Returns commands on a grid (*shape, 3) over what was measured, from rest on, to round numbers."""
-        amplitude, frequency = np.ceil(np.divide(self.reach, ROUND) - 1e-9) * ROUND
+        amplitude, frequency = np.ceil(np.divide(self.measurements.reach, ROUND) - 1e-9) * ROUND
         axes = [
             np.linspace(0.0, most, count) for most, count in ((amplitude, shape[0]), (frequency, shape[1]))
         ]
@@ -121,14 +116,6 @@ class FinFit:
         if not self.measurements.turned or np.ptp(measured) >= COVERED:
             return np.linspace(-0.5 * TURN, 0.5 * TURN, count, endpoint=False)
         return np.linspace(measured.min(), measured.max(), count)
-
-    def scaled(self, command: Array) -> Array:
-        """Returns commands (m, 3) as the components take them."""
-        flat = command.reshape(-1, 3).copy()
-        flat[:, :2] /= self.reach
-        if not self.measurements.turned:
-            flat[:, 2] = 0.0
-        return flat
 
 
 def fit_fin(measurements: Measurements, seed: int = 0) -> FinFit:
@@ -154,7 +141,7 @@ def fit_fin(measurements: Measurements, seed: int = 0) -> FinFit:
 def _fitted(measurements: Measurements, outliers: tuple[str, ...], notes: tuple[str, ...]) -> FinFit:
     turned, lean = _turned_forces(measurements)
     largest = float(np.linalg.norm(measurements.force, axis=-1).max())
-    inputs = _scaled(measurements)
+    inputs = measurements.scaled(measurements.command)
     variance: list[Array | None] = [None, None, None]
     if measurements.deviation is not None:
         # Deviations of the two axes across the shaft stay what they are in a frame that turns between them.
@@ -175,7 +162,7 @@ def _outliers(measurements: Measurements) -> NDArray[np.bool_]:
     """Which samples (n,) lie far off a fit to the others."""
     turned, _ = _turned_forces(measurements)
     largest = np.quantile(np.linalg.norm(measurements.force, axis=-1), 0.98)
-    inputs = _scaled(measurements)
+    inputs = measurements.scaled(measurements.command)
     along = Component(inputs, turned[:, 0] / largest, wild=True)
     across = Component(inputs, turned[:, 1] / largest, size=along.mean, wild=True)
     far = [np.abs(c.left_out) > OUTLIER * c.left_out_deviation for c in (along, across)]
@@ -190,11 +177,3 @@ def _turned_forces(measurements: Measurements) -> tuple[Array, float]:
     lean = float(np.angle(planar.sum()))
     planar *= np.exp(-1j * lean)
     return np.stack([planar.real, planar.imag, force[:, 0]], axis=-1), lean
-
-
-def _scaled(measurements: Measurements) -> Array:
-    command = measurements.command.copy()
-    command[:, :2] /= command[:, :2].max(axis=0)
-    if not measurements.turned:
-        command[:, 2] = 0.0
-    return command

@@ -48,6 +48,20 @@ class Measurements:
     def __len__(self) -> int:
         return len(self.command)
 
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Largest amplitude [rad] and frequency [Hz] that were measured."""
+        return float(self.command[:, 0].max()), float(self.command[:, 1].max())
+
+    def scaled(self, command: Array) -> Array:
+        """Returns commands (..., 3) as inputs (m, 3) of a fit: over the reach, and all in one direction where
+        only one was measured."""
+        inputs = command.reshape(-1, 3).copy()
+        inputs[:, :2] /= self.reach
+        if not self.turned:
+            inputs[:, 2] = 0.0
+        return inputs
+
     def without(self, places: NDArray[np.bool_]) -> "Measurements":
         """The samples but those (n,) that are marked."""
         keep = ~places
@@ -134,22 +148,18 @@ def _numbers(cells: list[str], header: list[str], used: list[int], where: str) -
     """The used cells of a row as finite numbers."""
     if len(cells) != len(header):
         raise DataError(f"{where} has {len(cells)} values, the header has {len(header)}")
-    try:
-        numbers = [float(cells[i]) for i in used]
-        if all(map(math.isfinite, numbers)):
-            return numbers
-    except ValueError:
-        pass
+    numbers = []
     for i in used:
         try:
-            bad = not math.isfinite(float(cells[i]))
+            number = float(cells[i])
         except ValueError:
-            bad = True
-        if bad:
+            number = math.nan
+        if not math.isfinite(number):
             raise DataError(
                 f"{where}, column {header[i].strip()}, holds {cells[i].strip()!r:.40}, expected a number"
             )
-    raise AssertionError("unreachable: some cell was no finite number")
+        numbers.append(number)
+    return numbers
 
 
 def _repeated(names: list[str]) -> str:

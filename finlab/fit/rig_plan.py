@@ -9,6 +9,7 @@ from scipy.stats import qmc
 
 from finlab.arrays import Array
 from finlab.errors import DataError
+from finlab.fit.measurements import MIN_SAMPLES
 from finlab.layout.fin import Limits
 
 REPEATED = 0.1
@@ -63,9 +64,10 @@ def plan_measurements(limits: Limits, samples: int = 300, turn: bool = True, see
     Raises:
         DataError: fewer than 20 samples.
     """
-    if samples < 20:
+    if samples < MIN_SAMPLES:
         raise DataError(
-            f"{samples} samples are too few to tell a fin; expected at least 20, 300 are a good number"
+            f"{samples} samples are too few to tell a fin; expected at least {MIN_SAMPLES}, 300 are "
+            "a good number"
         )
     repeats = round(REPEATED * samples)
     drawn = qmc.Sobol(3, rng=np.random.default_rng(seed)).random(1 << (samples - repeats - 1).bit_length())

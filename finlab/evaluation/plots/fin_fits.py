@@ -27,7 +27,7 @@ def draw_thrust(fit: FinFit) -> Picture:
     uneven = _even(fit, command) - _along(fit, fit.predict(command)[0], command)
     measured = _along(fit, fit.measurements.force, command) + uneven
     edges = np.quantile(command[:, 1], np.linspace(0.0, 1.0, PANELS + 1))
-    line = np.linspace(0.0, fit.reach[0], LINE)
+    line = np.linspace(0.0, fit.measurements.reach[0], LINE)
     with picture(2, PANELS // 2, height=4.8, sharex=True, sharey=True) as view:
         for axis, low, high in zip(view.axes, edges[:-1], edges[1:], strict=True):
             inside = (command[:, 1] >= low) & (command[:, 1] <= high)
@@ -72,7 +72,7 @@ def draw_errors(fit: FinFit) -> Picture:
             share = _along(fit, force, command)[strong] / _even(fit, command[strong])
             axis.scatter(np.degrees(command[strong, 2]), share, **DOT)
             turn = np.linspace(-math.pi, math.pi, LINE)
-            hard = np.stack([np.full(LINE, 0.8 * most) for most in fit.reach] + [turn], axis=-1)
+            hard = np.stack([np.full(LINE, 0.8 * most) for most in fit.measurements.reach] + [turn], axis=-1)
             axis.plot(
                 np.degrees(turn), _along(fit, fit.predict(hard)[0], hard) / _even(fit, hard), color=BLUE
             )
