@@ -16,24 +16,8 @@ from finlab.allocation.search.receding_horizon import (
     plan_ahead,
 )
 from finlab.allocation.search.search_allocator import SearchAllocator
-from finlab.layout import Fin, Layout, load_layout
-
-
-@pytest.fixture
-def flip(effort: SearchAllocator) -> tuple[Prepared, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """A robot whose sway falls by 0.2 N a tick, through zero and on: its fins have to turn over soon."""
-    layout = load_layout("A")
-    before = effort.allocate(layout, [0.0, 0.6, 1.5, 0.0, 0.0, 0.0])
-    target = np.array([0.0, 0.4, 1.5, 0.0, 0.0, 0.0])
-    near = effort.allocate(layout, target, previous=before.command).command
-    far = effort.allocate(layout, target).command
-    return (
-        effort.pipeline.prepare(layout),
-        before.command,
-        target / effort.normalization.std,
-        near,
-        far[None],
-    )
+from finlab.layout import Fin, Layout
+from tests.allocation.conftest import Flip
 
 
 @pytest.fixture
@@ -43,9 +27,7 @@ def pair(effort: SearchAllocator) -> Prepared:
     return effort.pipeline.prepare(Layout("pair", (Fin("a", place, 0.4), Fin("b", place, 0.4))))
 
 
-def test_every_path_gives_the_predicted_wrenches(
-    flip: tuple[Prepared, np.ndarray, np.ndarray, np.ndarray, np.ndarray], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_path_gives_the_predicted_wrenches(flip: Flip, monkeypatch: pytest.MonkeyPatch) -> None:
     prepared, before, target, near, far = flip
     tried: list[np.ndarray] = []
 

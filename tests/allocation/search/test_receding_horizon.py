@@ -10,7 +10,8 @@ from finlab.allocation.search.prepared import Prepared
 from finlab.allocation.search.receding_horizon import HORIZON, choose, evaluate, plan_ahead, turns_beyond
 from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.forces.fin_envelope import COST
-from finlab.layout import Fin, Layout, Limits, load_layout
+from finlab.layout import Fin, Layout, Limits
+from tests.allocation.conftest import Flip
 
 TICKS = HORIZON.ticks
 
@@ -158,19 +159,8 @@ def test_the_way_is_left_only_for_a_gain(gain: float, chosen: int) -> None:
     assert cost[0] == 1.0
 
 
-def coming_flip(effort: SearchAllocator) -> tuple[Prepared, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """A robot whose sway falls towards zero and goes on below, so that its fins have to turn over soon."""
-    layout = load_layout("A")
-    before = effort.allocate(layout, [0.0, 0.6, 1.5, 0.0, 0.0, 0.0])
-    target = np.array([0.0, 0.4, 1.5, 0.0, 0.0, 0.0])
-    near = effort.allocate(layout, target, previous=before.command).command
-    far = effort.allocate(layout, target).command
-    prepared = effort.pipeline.prepare(layout)
-    return prepared, before.command, target / effort.normalization.std, near, far[None]
-
-
-def test_sudden_changes_are_not_predicted(effort: SearchAllocator) -> None:
-    prepared, before, target, near, far = coming_flip(effort)
+def test_sudden_changes_are_not_predicted(flip: Flip) -> None:
+    prepared, before, target, near, far = flip
     wrench = prepared.commands.wrench(before[None])[0]
     direction = (target - wrench) / np.linalg.norm(target - wrench)
     eager = replace(
@@ -184,8 +174,8 @@ def test_sudden_changes_are_not_predicted(effort: SearchAllocator) -> None:
     assert plan_ahead(prepared, before, target, near, far, eager) is None
 
 
-def test_the_plan_gives_the_next_tick_within_the_limits(effort: SearchAllocator) -> None:
-    prepared, before, target, near, far = coming_flip(effort)
+def test_the_plan_gives_the_next_tick_within_the_limits(flip: Flip) -> None:
+    prepared, before, target, near, far = flip
     plan = plan_ahead(prepared, before, target, near, far, replace(HORIZON, stay_gain=-1e9))
     assert plan is not None
     np.testing.assert_array_equal(plan.command[:, 2], plan.ready)
