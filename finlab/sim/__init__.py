@@ -6,6 +6,7 @@
 World: z up. Body: x forward, y left, z up. SI and radians.
 """
 
+from finlab.physics.vehicle import Vehicle as Vehicle
 from finlab.sim.closed_loop import ClosedLoop as ClosedLoop
 from finlab.sim.fin_force import PLANTS as PLANTS
 from finlab.sim.fin_motion import Servo as Servo
@@ -19,4 +20,3 @@ from finlab.sim.task import Cruise as Cruise
 from finlab.sim.task import Task as Task
 from finlab.sim.task import Trajectory as Trajectory
 from finlab.sim.task import make_trajectory as make_trajectory
-from finlab.sim.vehicle import Vehicle as Vehicle

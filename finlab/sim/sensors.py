@@ -6,7 +6,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.control import Measurement
-from finlab.sim.vehicle import euler
+from finlab.physics.vehicle import euler
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from finlab.layout import Body, Layout
-from finlab.sim.vehicle import Vehicle, complete_body
+from finlab.physics.vehicle import Vehicle, complete_body
 
 SIGNS = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 """Of surge, sway, heave, roll, pitch, yaw under half a turn about x, from NED to FLU or back."""

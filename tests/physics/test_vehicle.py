@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from finlab.layout import Body, Layout
-from finlab.sim.vehicle import (
+from finlab.physics.vehicle import (
     STATE_SIZE,
     Vehicle,
     complete_body,
