@@ -12,9 +12,9 @@ from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.arrays import force_columns
 from finlab.physics import plant_of
+from finlab.physics.fin_motion import FinMotion, Servo, fin_power
 from finlab.physics.vehicle import STATE_SIZE, Vehicle, complete_body, quaternion_of_yaw
 from finlab.sim.fin_force import make_plant
-from finlab.sim.fin_motion import FinMotion, Servo, fin_power
 from finlab.sim.log import RunLog, Tick, log_of_ticks
 from finlab.sim.sensors import Sensors, SensorSettings
 from finlab.sim.task import Cruise, Task

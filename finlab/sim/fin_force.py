@@ -16,7 +16,7 @@ from finlab.layout import Layout
 from finlab.layout.angles import wrapped
 from finlab.physics import plant_of
 from finlab.physics.blade import Blade
-from finlab.sim.fin_motion import FinMotion
+from finlab.physics.fin_motion import FinMotion
 
 
 class FinForce(Protocol):
