@@ -131,7 +131,7 @@ class ClosedLoopRuns:
     seed: Count = 0
     """Of the first run; the others follow on."""
     plant: Name = "mean"
-    """One of mean, ripple, flexible."""
+    """One of mean, ripple, flexible, wake, inflow, offset."""
     steady: bool = False
     """Tell the allocator its previous command."""
     figures: Folder = None

@@ -38,7 +38,9 @@ def simulate(
         method: search, mdn, paper, qp, sqp, analytic, multistart, trf, slsqp, ipopt or on-board.
         objective: what the method keeps least: power in watts, or effort, the paper's J_en.
         duration: time for a shipped trajectory.
-        plant: mean (the fin law), ripple (within the flapping cycle) or flexible (fins with soft tips).
+        plant: what the fins really do: mean (the fin law), ripple (within the flapping cycle), flexible (fins
+            with soft tips), wake (fins in each other's jets), inflow (thrust falls with speed) or offset
+            (centre of gravity and fins not where the layout says).
         gains: waypoint, waypoint_paper (proportional terms alone), or a YAML file.
         current: velocity of the water in the world [m/s].
         steady: tell the allocator its previous command.

@@ -124,6 +124,16 @@ class Vehicle:
             tz / iz,
         ]
 
+    def velocity_in_water(self, state: Array) -> Array:
+        """Velocity relative to the water and angular rates (6,) of a state, body frame [m/s, rad/s]."""
+        velocity = state[7:].copy()
+        if any(self.current):
+            w, axis, current = state[3], state[4:7], np.array(self.current)
+            # The current as the body sees it: turned by the conjugate quaternion.
+            across = 2.0 * np.cross(current, axis)
+            velocity[:3] -= current + w * across - np.cross(axis, across)
+        return velocity
+
     def step(self, state: Array, wrench: Sequence[float], dt: float) -> Array:
         """The state (13,) after `dt` [s] under a wrench that the body carries along: Runge-Kutta, order 4."""
         y0: list[float] = state.tolist()

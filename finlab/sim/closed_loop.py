@@ -10,12 +10,11 @@ from finlab.arrays import Array
 from finlab.control import Completion, Controller, Measurement, VelocityController, WaypointController
 from finlab.errors import FinlabError
 from finlab.layout import Layout
-from finlab.layout.arrays import force_columns
 from finlab.physics import plant_of
 from finlab.physics.fin_motion import FinMotion, Servo, fin_power
 from finlab.physics.vehicle import STATE_SIZE, Vehicle, complete_body, quaternion_of_yaw
-from finlab.sim.fin_force import make_plant
 from finlab.sim.log import RunLog, Tick, log_of_ticks
+from finlab.sim.plants import make_plant
 from finlab.sim.sensors import Sensors, SensorSettings
 from finlab.sim.task import Cruise, Task
 
@@ -54,7 +53,7 @@ class ClosedLoop:
             task: a `Trajectory` or a `Cruise`.
             controller: by default the waypoint controller for trajectories, the velocity controller for
                 cruises.
-            plant: `mean`, `ripple` or `flexible`; see `PLANTS`.
+            plant: what the fins really do; see `PLANTS`.
             steady: whether the allocator is given its previous command, so that fins turn little per tick.
             sensors: rates and noise; the defaults of `SensorSettings`.
             servo: what drives the fins.
@@ -82,7 +81,6 @@ class ClosedLoop:
         """The fins' motion: amplitude, frequency, zero direction and phase of each."""
         self._fin_force = make_plant(plant, layout)
         self._plant = plant_of(layout)
-        self._columns = force_columns(layout.position, layout.mounting_angle)
         self._sensors = Sensors(SensorSettings() if sensors is None else sensors, np.random.default_rng(seed))
         self._pending = sorted(failures, key=lambda failure: failure[1])
         self.failed: tuple[str, ...] = ()
@@ -183,7 +181,8 @@ class ClosedLoop:
         inertial, torque = np.zeros(self.layout.n_fins), np.zeros(self.layout.n_fins)
         for k in range(n_steps):
             self.fins.step(command, dt)
-            wrenches = np.einsum("nk,nkw->nw", self._fin_force.step(self.fins, dt), self._columns)
+            force = self._fin_force.step(self.fins, dt, self.vehicle.velocity_in_water(self.state))
+            wrenches = np.einsum("nk,nkw->nw", force, self._fin_force.columns)
             wrenches[~alive] = 0.0
             wrench = wrenches.sum(axis=0)
             self.state = self.vehicle.step(self.state, wrench.tolist(), dt)

@@ -1,22 +1,25 @@
 """Forces of moving fins on the hull: the cycle mean, resolved within the cycle, or of fins with soft tips.
 
-A fin force model keeps the momentum that it needs from step to step; `step` gives each fin's planar force.
+A fin force model keeps the momentum that it needs from step to step; `step` gives each fin's planar force,
+and `columns` say what it does to the robot. `plants.py` names them all.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.errors import FinlabError
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
+from finlab.layout.arrays import force_columns
 from finlab.physics import plant_of
 from finlab.physics.blade import Blade
 from finlab.physics.fin_motion import FinMotion
+
+STILL = np.zeros(6)
+"""Of a robot at rest in the water; see `FinForce.step`."""
 
 
 class FinForce(Protocol):
@@ -24,10 +27,12 @@ class FinForce(Protocol):
 
     step_s: float
     """Longest step that resolves the force [s]."""
+    columns: Array
+    """Wrench (n, 3, 6) of 1 N along each fin's shaft, e_h and e_z, about the true centre of gravity."""
 
-    def step(self, motion: FinMotion, dt: float) -> Array:
+    def step(self, motion: FinMotion, dt: float, water: Array = STILL) -> Array:
         """Force (n, 3) of each fin in its own frame (shaft, e_h, e_z) [N], the mean over the step that has
-        just been taken."""
+        just been taken; `water` (6,) is how the robot moves through the water [m/s, rad/s], body frame."""
         ...
 
 
@@ -38,8 +43,9 @@ class MeanForce:
 
     def __init__(self, layout: Layout) -> None:
         self._plant = plant_of(layout)
+        self.columns = self._plant.columns
 
-    def step(self, motion: FinMotion, dt: float) -> Array:
+    def step(self, motion: FinMotion, dt: float, water: Array = STILL) -> Array:
         command = motion.command
         command[:, 2] = wrapped(command[:, 2])
         result = self._plant.forces(command)
@@ -61,9 +67,10 @@ class RippleForce:
 
     def __init__(self, layout: Layout) -> None:
         self._mean = MeanForce(layout)
+        self.columns = self._mean.columns
         self._momentum = np.zeros((layout.n_fins, 2))
 
-    def step(self, motion: FinMotion, dt: float) -> Array:
+    def step(self, motion: FinMotion, dt: float, water: Array = STILL) -> Array:
         length = self.blade.length
         force = self._mean.step(motion, dt) * (1.0 - np.cos(2 * motion.phase))[:, None]
         angle, speed = motion.angle + math.pi, motion.speed
@@ -101,6 +108,7 @@ class FlexibleForce:
 
     def __init__(self, layout: Layout, fin: SoftFin | None = None) -> None:
         self.fin = SoftFin() if fin is None else fin
+        self.columns = force_columns(layout.position, layout.mounting_angle)
         n = layout.n_fins
         self._tip_angle: Array | None = None
         self._tip_speed = np.zeros(n)
@@ -110,7 +118,7 @@ class FlexibleForce:
         nodes, weights = np.polynomial.legendre.leggauss(4)
         self._arm, self._weight = 0.5 * tip * (nodes + 1.0), 0.5 * tip * weights
 
-    def step(self, motion: FinMotion, dt: float) -> Array:
+    def step(self, motion: FinMotion, dt: float, water: Array = STILL) -> Array:
         angle, speed = motion.angle + math.pi, motion.speed  # the fin points away from its thrust
         if self._tip_angle is None:
             self._tip_angle, self._root_angle = angle.copy(), angle
@@ -165,19 +173,3 @@ class FlexibleForce:
             - root_drag[:, None] * root_normal
         )
         return force
-
-
-PLANTS: dict[str, Callable[[Layout], FinForce]] = {
-    "mean": MeanForce,
-    "ripple": RippleForce,
-    "flexible": FlexibleForce,
-}
-"""`mean`: the layout's fin law. `ripple`: the same within the cycle. `flexible`: fins with soft tips, other
-physics than any method knows."""
-
-
-def make_plant(name: str, layout: Layout) -> FinForce:
-    """The fin force model called `name`; a `FinlabError` where there is none."""
-    if name not in PLANTS:
-        raise FinlabError(f"plant: expected one of {', '.join(PLANTS)}, got {name!r:.60}")
-    return PLANTS[name](layout)

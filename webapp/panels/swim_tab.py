@@ -36,7 +36,7 @@ class SwimTab:
         self._page = page
         self._own: Trajectory | None = None
         rival = "A second robot on the same path, with another method."
-        forces = "Mean forces, forces with their ripple, or flexible fins."
+        forces = "The fin law, its ripple, or what no layout says: soft fins, jets, inflow, offsets."
         speed = "Simulated time per real time; a slow machine falls short of it."
         self._path = gui.add_dropdown("Path", tuple(SHIPPED), hint="Where to swim.")
         settings: dict[str, Any] = {

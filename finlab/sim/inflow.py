@@ -1,0 +1,42 @@
+"""Thrust that falls while the fin moves through the water: the layout's fin law, less by the advance ratio.
+
+As a propeller's, a fin's thrust depends on how fast it comes into fresh water beside how fast it beats:
+J = V / (2 pi f A L), with V the speed of the fin's foot through the water along its thrust. The thrust is
+multiplied by 1 - 0.4 tanh(J): it falls where the fin runs ahead and grows a little where it brakes. The
+number is our choice.
+"""
+
+import math
+
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.layout import Layout
+from finlab.physics import plant_of
+from finlab.physics.fin_motion import FinMotion
+from finlab.physics.wrench import body_force
+from finlab.sim.fin_force import STILL, MeanForce
+
+MOST = 0.4
+"""Largest share that is lost, at a speed far beyond that of the tip."""
+
+
+class InflowForce:
+    """The fins of one layout; its `step` is that of `FinForce`."""
+
+    step_s = 0.02
+
+    def __init__(self, layout: Layout) -> None:
+        self._mean = MeanForce(layout)
+        self.columns = self._mean.columns
+        self._position, self._angle = layout.position, layout.mounting_angle
+        self._length = plant_of(layout).blade.length
+
+    def step(self, motion: FinMotion, dt: float, water: Array = STILL) -> Array:
+        force = self._mean.step(motion, dt, water)
+        along = body_force(force, self._angle)
+        along /= np.maximum(np.linalg.norm(along, axis=-1), 1e-9)[:, None]
+        speed = np.einsum("nk,nk->n", water[:3] + np.cross(water[3:], self._position), along)
+        tip = 2 * math.pi * motion.frequency * motion.amplitude * self._length
+        result: Array = force * (1.0 - MOST * np.tanh(speed / np.maximum(tip, 1e-3)))[:, None]
+        return result
