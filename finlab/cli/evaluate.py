@@ -10,7 +10,7 @@ from typing import Annotated
 from tyro.conf import arg
 from tyro.extras import SubcommandApp
 
-from finlab.cli import eval_allocation, eval_closed_loop
+from finlab.cli import eval_allocation, eval_closed_loop, eval_fit
 from finlab.cli.eval_arguments import Checkpoint, Count, Folder, Name, Names, Output, check_folders
 from finlab.cli.inputs import check_positive
 
@@ -129,6 +129,7 @@ for verb in (
     eval_closed_loop.trajectory,
     eval_closed_loop.faults,
     eval_closed_loop.velocity,
+    eval_fit.fit,
     training,
     report,
 ):

@@ -1,5 +1,6 @@
 """Fins as they would be known from a tank: a grid of forces with noise, in a CSV file."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -7,6 +8,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from finlab.arrays import Array
 from finlab.layout import Fin, FinModelSpec
 from finlab.physics import TableLaw, make_law, write_table
 
@@ -17,7 +19,17 @@ NOISE = 0.03
 """Standard deviation of each component of a force, as a share of it."""
 
 
-def noisy_table(rng: np.random.Generator, fin: Fin, name: str) -> Fin:
+def share_of_components(rng: np.random.Generator, force: Array) -> Array:
+    """Forces (..., 3) with noise on each component that is a share of it."""
+    return np.asarray(force * (1.0 + NOISE * rng.standard_normal(force.shape)))
+
+
+def noisy_table(
+    rng: np.random.Generator,
+    fin: Fin,
+    name: str,
+    measure: Callable[[np.random.Generator, Array], Array] = share_of_components,
+) -> Fin:
     """A fin with a table of its model in place of the model; the file of that name is written once."""
     path = Path(_folder().name) / f"{name}.csv"
     if not path.exists():
@@ -25,8 +37,7 @@ def noisy_table(rng: np.random.Generator, fin: Fin, name: str) -> Fin:
         axes = [np.linspace(*ends, count) for ends, count in ranges]
         axes.append(np.linspace(-np.pi, np.pi, GRID[2], endpoint=False))
         force = make_law(fin.model).force(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))
-        measured = force * (1.0 + NOISE * rng.standard_normal(force.shape))
-        write_table(path, TableLaw(axes, measured, periodic=True), *axes)
+        write_table(path, TableLaw(axes, measure(rng, force), periodic=True), *axes)
     return replace(fin, model=FinModelSpec("table", (("path", str(path)),)))
 
 

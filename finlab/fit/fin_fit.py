@@ -14,6 +14,8 @@ MOST_SAMPLES = 1500
 """Samples beyond this number are thinned: the time grows with their cube."""
 OUTLIER = 5.0
 """Error, over the usual one, beyond which a sample is left out."""
+ROUNDS = 3
+"""Fits that look for such samples, each without those that the one before has found."""
 BAND = 1.96
 """Standard deviations of a band that holds 95 % of a normal distribution."""
 GOOD_ERROR = 0.05
@@ -159,14 +161,30 @@ def _fitted(measurements: Measurements, outliers: tuple[str, ...], notes: tuple[
 
 
 def _outliers(measurements: Measurements) -> NDArray[np.bool_]:
-    """Which samples (n,) lie far off a fit to the others."""
+    """Which samples (n,) lie far off a fit to the others.
+
+    Wild samples bend the first fit, so that their neighbours look wild, too: those that a fit without the
+    suspects explains are taken back.
+    """
     turned, _ = _turned_forces(measurements)
-    largest = np.quantile(np.linalg.norm(measurements.force, axis=-1), 0.98)
+    values = turned / np.quantile(np.linalg.norm(measurements.force, axis=-1), 0.98)
     inputs = measurements.scaled(measurements.command)
-    along = Component(inputs, turned[:, 0] / largest, wild=True)
-    across = Component(inputs, turned[:, 1] / largest, size=along.mean, wild=True)
-    far = [np.abs(c.left_out) > OUTLIER * c.left_out_deviation for c in (along, across)]
-    return np.asarray(far[0] | far[1])
+    out = np.zeros(len(inputs), dtype=bool)
+    for _ in range(ROUNDS):
+        kept, before = ~out, out
+        along = Component(inputs[kept], values[kept, 0], wild=True)
+        across = Component(inputs[kept], values[kept, 1], size=along.mean, wild=True)
+        size = along.predict(inputs)[0]
+        far = [
+            along.surprise(inputs, values[:, 0]),
+            across.surprise(inputs, values[:, 1], size),
+        ]
+        for surprise, component in zip(far, (along, across), strict=True):
+            surprise[kept] = np.abs(component.left_out) / component.left_out_deviation
+        out = np.maximum(*far) > OUTLIER
+        if (out == before).all():
+            break
+    return np.asarray(out)
 
 
 def _turned_forces(measurements: Measurements) -> tuple[Array, float]:

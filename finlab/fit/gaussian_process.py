@@ -39,9 +39,12 @@ class Component:
         force, by default that of the value. With `wild`, a few values may be far off without making the
         others' noise larger.
         """
+        self._noise = 0.0, 0.0
         if variance is None:
             error, _ = _left_out(_tuned(inputs, values, None), values)
-            variance = _noise_of(error, np.asarray(values - error) if size is None else size, wild)
+            size = np.asarray(values - error) if size is None else size
+            self._noise = _noise_of(error, size, wild)
+            variance = self._noise_at(size)
         self._process = _tuned(inputs, values, variance)
         self._inputs, self.variance = inputs, variance
         self.left_out, self.left_out_deviation = _left_out(self._process, values)
@@ -54,6 +57,17 @@ class Component:
         """Returns the mean and its standard deviation (m,) at inputs (m, 3), the noise not counted."""
         mean, deviation = self._process.predict(inputs, return_std=True)
         return np.asarray(mean), np.asarray(deviation)
+
+    def surprise(self, inputs: Array, values: Array, size: Array | None = None) -> Array:
+        """Returns how far (m,) values are off that the process has not seen, over what is to be expected with
+        noise of the same kind; `size` (m,) as above, by default that of the prediction."""
+        mean, deviation = self.predict(inputs)
+        noise = self._noise_at(mean if size is None else size)
+        return np.asarray(np.abs(values - mean) / np.sqrt(deviation**2 + noise))
+
+    def _noise_at(self, size: Array) -> Array:
+        even, grown = self._noise
+        return np.asarray(even + grown * size**2)
 
     def covariance(self, inputs: Array) -> Array:
         """Returns the covariance (m, m) that is left after the measurements."""
@@ -86,9 +100,9 @@ def _left_out(process: GaussianProcessRegressor, values: Array) -> tuple[Array, 
     return np.asarray(inverse @ values / own), np.asarray(1.0 / np.sqrt(own))
 
 
-def _noise_of(error: Array, size: Array, wild: bool) -> Array:
-    """Variances (n,) of the noise a + b size^2 under which errors are most likely: they are normal, or with
-    `wild` follow Student's t with `TAILS` degrees of freedom."""
+def _noise_of(error: Array, size: Array, wild: bool) -> tuple[float, float]:
+    """The a and b of the noise's variance a + b size^2 under which errors are most likely: they are normal,
+    or with `wild` follow Student's t with `TAILS` degrees of freedom."""
     usual = float(np.median(error**2)) / 0.455 + 1e-12
 
     def unlikely(logs: Array) -> float:
@@ -100,4 +114,4 @@ def _noise_of(error: Array, size: Array, wild: bool) -> Array:
     start = np.log([0.5 * usual, 0.5 * usual / (float(np.mean(size**2)) + 1e-12)])
     found = minimize(unlikely, start, method="Nelder-Mead").x
     even, grown = np.exp(np.maximum(found, np.log(1e-3 * usual)))
-    return np.asarray(even + grown * size**2)
+    return float(even), float(grown)

@@ -8,7 +8,7 @@ from sklearn.gaussian_process.kernels import Hyperparameter, Kernel
 from finlab.arrays import Array
 
 BOUNDS = {
-    "even": (1e-4, 1e4),
+    "even": (1e-3, 1e4),
     "uneven": (1e-7, 1e2),
     "amplitude": (0.15, 20.0),
     "frequency": (0.15, 20.0),
@@ -22,7 +22,8 @@ class ThrustKernel(Kernel):  # type: ignore[misc]
 
     k = s s' E (even + uneven D), where s = A f makes the force vanish at rest and grow from there, E falls
     with the distance of amplitudes and of frequencies, and D with the angle between the zero directions, so
-    that a fin which is the same all round needs no more data than one direction. Inputs (n, 3) are amplitude
+    that a fin which is the same all round needs no more data than one direction. E is Matern's with 5/2: a
+    smoother one believes that it knows a fin which saturates better than it does. Inputs (n, 3) are amplitude
     and frequency over their largest values, and the zero direction [rad].
     """
 
@@ -55,13 +56,15 @@ class ThrustKernel(Kernel):  # type: ignore[misc]
         by_amplitude = ((X[:, None, 0] - other[None, :, 0]) / self.amplitude) ** 2
         by_frequency = ((X[:, None, 1] - other[None, :, 1]) / self.frequency) ** 2
         by_turn = 2.0 * (1.0 - np.cos(X[:, None, 2] - other[None, :, 2])) / self.turn**2
-        near = np.multiply.outer(X[:, 0] * X[:, 1], other[:, 0] * other[:, 1])
-        near *= np.exp(-0.5 * (by_amplitude + by_frequency))
+        distance = np.sqrt(5.0 * (by_amplitude + by_frequency))
+        bare = np.multiply.outer(X[:, 0] * X[:, 1], other[:, 0] * other[:, 1]) * np.exp(-distance)
+        near = bare * (1.0 + distance + distance**2 / 3.0)
         even, uneven = self.even * near, self.uneven * near * np.exp(-0.5 * by_turn)
-        k = even + uneven
         if not eval_gradient:
-            return k
-        return k, np.stack([k * by_amplitude, even, k * by_frequency, uneven * by_turn, uneven], axis=-1)
+            return even + uneven
+        by_scale = bare * (1.0 + distance) * (5.0 / 3.0) * (self.even + self.uneven * np.exp(-0.5 * by_turn))
+        slopes = [by_scale * by_amplitude, even, by_scale * by_frequency, uneven * by_turn, uneven]
+        return even + uneven, np.stack(slopes, axis=-1)
 
     def diag(self, X: Array) -> Array:
         """Returns the variances (n,) alone."""

@@ -58,9 +58,19 @@ def test_power_and_lean(fit: FinFit) -> None:
 
 
 def test_outliers_are_named_and_no_good_sample_with_them(fit: FinFit) -> None:
-    assert {f"line {k + 2}" for k in OUTLIERS} <= set(fit.outliers)
-    assert len(fit.outliers) <= 8
+    assert {f"line {k + 2}" for k in OUTLIERS} == set(fit.outliers)
     assert "contradict the others" in " ".join(summary(fit))
+
+
+def test_neighbours_of_wild_samples_are_taken_back_under_mixed_noise() -> None:
+    command, rng = commands(150, seed=4), np.random.default_rng(54)
+    force = measured(LAW, command, seed=5)
+    largest = np.linalg.norm(force, axis=-1).max()
+    force += 0.02 * largest * rng.standard_normal(force.shape)
+    wild = rng.choice(150, 4, replace=False)
+    force[wild, 2] += 0.6 * largest
+    found = fit_fin(samples(command, force))
+    assert set(found.outliers) == {f"line {k + 2}" for k in wild}
 
 
 def test_a_good_fit_is_trusted(fit: FinFit) -> None:
