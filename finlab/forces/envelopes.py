@@ -20,6 +20,8 @@ LEAST = 1e-12
 """What sizes are kept above before something is divided by them."""
 RIM = 48
 """Sides of the polygon around what an uneven fin can push: at most a fifth of a percent too wide."""
+PLACES = 2.0 / np.pi * (LEVELS - 1) * (1.0 - 1e-12)
+"""From the angle of a force in the table to its place among the levels, of which none is past the last."""
 LONGEST_TURN = 0.3
 """Largest turn [rad] from a direction to that of the nearest force on the rim."""
 
@@ -31,10 +33,12 @@ class Rim(NamedTuple):
     """Largest force (R, n) [N]."""
     smallest: Array
     """Force at rest (R, n) [N]."""
+    span: Array
+    """What lies between the two (R, n) [N], above zero."""
     bend: Array | float
     """Derivative of the largest force by the direction (R, n) [N/rad]."""
     first: NDArray[np.intp]
-    """Direction (R, n) of the table just before this one, counted through all fins."""
+    """Row of the table (R, n) with which the direction just before this one begins."""
     part: Array | None
     """How far towards the next row (R, n); None where there is but one."""
 
@@ -125,6 +129,18 @@ class Envelopes:
         return np.asarray(np.maximum(reach, 0.0) / self.maximum[:, None])
 
     @cached_property
+    def _steps(self) -> Array:
+        """Rows of the table, and how much is added to them up to the next ones (n * K * LEVELS, 2, 8)."""
+        return np.stack([self.table, np.diff(self.table, axis=0, append=self.table[-1:])], axis=1)
+
+    @cached_property
+    def _all_round(self) -> Rim:
+        """The rim of fins that are the same all round."""
+        largest, smallest = self.largest[:, 0], self.smallest[:, 0]
+        first = np.arange(len(largest)) * LEVELS
+        return Rim(largest, smallest, largest - smallest + LEAST, 0.0, first, None)
+
+    @cached_property
     def _grid(self) -> tuple[Array, Array, Array, NDArray[np.intp], Array, Array]:
         """First direction, gap between directions and what counts as just before the first (n,) [rad], first
         row of each fin (n,), and largest and smallest forces of all rows."""
@@ -151,10 +167,10 @@ class Envelopes:
 
     def rim(self, direction: Array) -> Rim:
         """What the fins can do in directions (R, n) [rad]."""
-        start, gap, before, first, largest, smallest = self._grid
         count = self.largest.shape[1]
         if count == 1:
-            return Rim(largest, smallest, 0.0, first, None)
+            return self._all_round
+        start, gap, before, first, largest, smallest = self._grid
         # Directions just before an arc belong to its start, not to its end.
         place = np.mod(direction - start + before, TURN)
         place = np.minimum(np.maximum((place - before) / gap, 0.0), count - 1)
@@ -164,27 +180,30 @@ class Envelopes:
         low, high = largest.take(row), largest.take(row + 1)
         rest, rest_after = smallest.take(row), smallest.take(row + 1)
         rise = high - low
-        return Rim(low + part * rise, rest + part * (rest_after - rest), rise / gap, row, part)
+        most, least = low + part * rise, rest + part * (rest_after - rest)
+        return Rim(most, least, most - least + LEAST, rise / gap, row * LEVELS, part)
 
     def lookup(self, rim: Rim, size: Array) -> Array:
         """Rows (R, n, 8) of the tables for forces of sizes (R, n) [N] in the directions of a rim."""
-        share = (size - rim.smallest) / (rim.largest - rim.smallest + LEAST)
-        np.minimum(np.maximum(share, 0.0, out=share), 1.0, out=share)
-        np.sqrt(np.sqrt(share, out=share), out=share)
-        place: Array = np.arcsin(share, out=share)
-        place *= 2.0 / np.pi * (LEVELS - 1)
+        place = size - rim.smallest
+        place /= rim.span
+        np.minimum(np.maximum(place, 0.0, out=place), 1.0, out=place)
+        np.sqrt(np.sqrt(place, out=place), out=place)
+        np.arcsin(place, out=place)
+        place *= PLACES
         level = place.astype(np.intp)
-        np.minimum(level, LEVELS - 2, out=level)
-        part = (place - level)[..., None]
-        level += rim.first * LEVELS
+        place -= level
+        part = place[..., None]
+        level += rim.first
         found = self._between(level, part)
         if rim.part is not None:
             found += (self._between(level + LEVELS, part) - found) * rim.part[..., None]
         return found
 
     def _between(self, row: NDArray[np.intp], part: Array) -> Array:
-        found: Array = self.table.take(row, axis=0)
-        found += (self.table.take(row + 1, axis=0) - found) * part
+        step = self._steps.take(row, axis=0)
+        found: Array = step[..., 1, :] * part
+        found += step[..., 0, :]
         return found
 
     def project(self, force: Array, size: Array) -> Projected:

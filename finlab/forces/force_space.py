@@ -55,7 +55,8 @@ class PlanarProblem(NamedTuple):
     along_shaft: Array
     """Normalized wrench per newton (n, 6) of forces along the shafts."""
     products: Array
-    """Outer products (3n, 36) of each fin's columns: horizontal, both orders of mixed, vertical."""
+    """Outer products (3n, 36) of each fin's columns, slightly regularized: horizontal, both orders of mixed,
+    vertical."""
     fins: Envelopes
     """What the fins can do, and at what cost."""
     direction_cost: Array
@@ -119,8 +120,10 @@ def flat_columns(columns: Array) -> tuple[Array, Array]:
     """`columns` and `products` of a problem from normalized columns (n, 2, 6)."""
     x, y = columns[:, 0], columns[:, 1]
     outer = [np.einsum("ni,nj->nij", a, b) for a, b in ((x, x), (x, y), (y, x), (y, y))]
-    products = np.concatenate([outer[0], outer[1] + outer[2], outer[3]]).reshape(-1, 36)
-    return np.concatenate([x, y]), np.ascontiguousarray(products)
+    products = np.concatenate([outer[0], outer[1] + outer[2], outer[3]])
+    # The ridge of a sum is the sum of the ridges.
+    products += RIDGE * np.trace(products, axis1=1, axis2=2)[:, None, None] * np.eye(6)
+    return np.concatenate([x, y]), np.ascontiguousarray(products.reshape(-1, 36))
 
 
 class _Response(NamedTuple):
@@ -160,7 +163,7 @@ def descend(
         works: 0 where a fin has to rest (R, n), else 1; by default every fin may work.
     """
     fins, rows, n = problem.fins, len(seeds), seeds.shape[-1]
-    cut = np.ones((rows, n))
+    cut = None if works is None else works.copy()
     if seeds.ndim == 3:
         response = _quadratic(problem, fins.project(seeds, _size(seeds)), cut)
     else:
@@ -174,7 +177,7 @@ def descend(
     for step in range(steps):
         multiplier = _multiplier(problem, target, response)
         force, size = _answer(problem, response, multiplier)
-        if before is not None:
+        if before is not None and step > 1:  # no seed leads to the end at once
             change = np.abs(force - before)
             if rows == 1:  # the same, without axes, in a third of the time
                 done = change.max() <= settled * size.max()
@@ -187,13 +190,17 @@ def descend(
                 size = _size(force)
         before = force
         found = fins.project(force, size)
-        cut *= found.rim.largest / np.maximum(found.wanted, LEAST)
-        np.minimum(cut, 1.0 if works is None else works, out=cut)
+        over = found.wanted > found.rim.largest
+        if cut is not None or over.any():
+            share = found.rim.largest / np.maximum(found.wanted, LEAST)
+            cut = np.minimum(share if cut is None else cut * share, 1.0 if works is None else works)
         response = _quadratic(problem, found, cut)
-    multiplier = _multiplier(problem, target, response)
-    found = fins.project(*_answer(problem, response, multiplier))
+    else:
+        multiplier = _multiplier(problem, target, response)
+        force, size = _answer(problem, response, multiplier)
+    found = fins.project(force, size)
     rests = not problem.turning_is_free and (found.size <= found.rim.smallest).any()
-    if rests or found.stopped is not None or (cut < 1.0).any():
+    if rests or found.stopped is not None or cut is not None:
         found, multiplier = _mended(problem, target, response, found, multiplier)
     row = fins.lookup(found.rim, found.size)
     shaft = row[..., SHAFT] if fins.pushes_sideways else None
@@ -270,18 +277,20 @@ def _direction(found: Projected) -> Array:
     return found.direction
 
 
-def _quadratic(problem: PlanarProblem, found: Projected, cut: Array) -> _Response:
-    """The response of the quadratics that stand for the costs near the present forces."""
+def _quadratic(problem: PlanarProblem, found: Projected, cut: Array | None) -> _Response:
+    """The response of the quadratics that stand for the costs near the present forces, all of it `cut`."""
     row = problem.fins.lookup(found.rim, found.size)
     across = np.exp(row[..., MOBILITY])
-    across *= cut
-    stiffness = row[..., STIFFNESS]
-    along = across / stiffness
+    softness = 1.0 / row[..., STIFFNESS]
+    kept = found.size * (1.0 - softness)
+    drift = None if found.rim.part is None else row[..., DRIFT]
+    if cut is not None:
+        across *= cut
+        kept *= cut
+        drift = None if drift is None else drift * cut
+    along = across * softness
     x, y = found.unit[:, 0], found.unit[:, 1]
-    shift = found.unit * (found.size * (1.0 - 1.0 / stiffness) * cut)[:, None]
-    drift = None
-    if found.rim.part is not None:
-        drift = row[..., DRIFT] * cut
+    shift = found.unit * kept[:, None]
     if not problem.turning_is_free:
         turn = _direction(found) - row[..., LEAN]
         turn -= TURN * np.rint(turn / TURN)
@@ -361,9 +370,7 @@ def _multiplier(problem: PlanarProblem, target: Array, response: _Response) -> A
 def _gram(problem: PlanarProblem, mobility: Array) -> Array:
     """sum_i B_i M_i B_i^T (R, 36), slightly regularized."""
     gram: Array = mobility.reshape(len(mobility), -1) @ problem.products
-    # Every seventh entry of the flattened matrix is on the diagonal.
-    diagonal = gram[:, ::7]
-    diagonal += RIDGE * diagonal.sum(1, keepdims=True) + LEAST
+    gram[:, ::7] += LEAST  # the diagonal
     return gram
 
 

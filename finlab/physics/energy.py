@@ -69,31 +69,38 @@ class EnergyMeter:
 
     def __init__(self, upper: Array, weights: EnergyWeights = DEFAULT_WEIGHTS) -> None:
         """Make it for upper limits (n, 3)."""
-        self.upper, self.weights = upper, weights
-        squares = np.tile([weights.amplitude, weights.frequency, weights.zero_direction], len(upper))
-        self._float64 = energy_scale(upper), squares
-        self._float32 = energy_scale(upper).astype(np.float32), squares.astype(np.float32)
+        self.upper, self.weights, self._scale = upper, weights, energy_scale(upper)
+        squares = np.array([weights.amplitude, weights.frequency, weights.zero_direction])
+        self._twice = 2.0 * squares / self._scale**2
+        self._product = weights.product / (self._scale[:, 0] * self._scale[:, 1])
 
     def __call__(self, command: NDArray[np.floating]) -> AnyArray:
         """Energies (R,) of commands (R, n, 3)."""
-        scale, squares = self._float32 if command.dtype == np.float32 else self._float64
-        scaled = command / scale
-        a, f = scaled[..., 0], scaled[..., 1]
-        beats: AnyArray = np.einsum("rn,rn->r", a, f)
-        beats *= self.weights.product
+        # Of a quadratic form, half the slopes times the commands.
+        energy: AnyArray = np.einsum("rni,rni->r", self._quadratic_slopes(command), command)
+        energy *= 0.5
         if self.weights.inertial:
-            beats += self.weights.inertial * ((a * f) ** 2 * f).sum(-1)
-        scaled *= scaled
-        beats += scaled.reshape(len(scaled), len(squares)).dot(squares)
-        return beats
+            a, f = self._beat(command)
+            energy += self.weights.inertial * ((a * f) ** 2 * f).sum(-1)
+        return energy
 
     def slopes(self, command: NDArray[np.floating]) -> AnyArray:
         """Derivatives (R, n, 3) of the energies by commands (R, n, 3)."""
-        scale, squares = self._float32 if command.dtype == np.float32 else self._float64
-        scaled = command / scale
-        a, f, w = scaled[..., 0], scaled[..., 1], self.weights
-        slopes: AnyArray = 2 * squares.reshape(scale.shape) * scaled
-        slopes[..., 0] += w.product * f + w.inertial * 2 * a * f**3
-        slopes[..., 1] += w.product * a + w.inertial * 3 * (a * f) ** 2
-        slopes /= scale
+        slopes = self._quadratic_slopes(command)
+        if self.weights.inertial:
+            a, f = self._beat(command)
+            slopes[..., 0] += self.weights.inertial * 2.0 * a * f**3 / self._scale[:, 0]
+            slopes[..., 1] += self.weights.inertial * 3.0 * (a * f) ** 2 / self._scale[:, 1]
         return slopes
+
+    def _quadratic_slopes(self, command: NDArray[np.floating]) -> AnyArray:
+        """Derivatives (R, n, 3) of all but the inertial part."""
+        slopes: AnyArray = command * self._twice
+        slopes[..., 0] += self._product * command[..., 1]
+        slopes[..., 1] += self._product * command[..., 0]
+        return slopes
+
+    def _beat(self, command: NDArray[np.floating]) -> tuple[AnyArray, AnyArray]:
+        """Normalized amplitudes and frequencies (R, n)."""
+        share = command[..., :2] / self._scale[:, :2]
+        return share[..., 0], share[..., 1]

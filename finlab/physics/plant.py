@@ -3,6 +3,7 @@
 It judges every allocation method, and the model-based methods optimize over it.
 """
 
+from dataclasses import astuple
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -112,9 +113,8 @@ class Plant:
     @cached_property
     def blade(self) -> Blade:
         """The plates whose beating takes power, side by side (n,)."""
-        fins = [make_law(fin.model).blade for fin in self.layout.fins]
-        length, width, density, drag = (np.array(values) for values in zip(*fins, strict=True))
-        return Blade(length, width, density, drag)
+        fins = [astuple(make_law(fin.model).blade) for fin in self.layout.fins]
+        return Blade(*map(np.array, zip(*fins, strict=True)))
 
     def thrust(self, amplitude: Array, frequency: Array) -> Array:
         """Returns the size of each fin's force (..., n) [N] at zero direction zero."""

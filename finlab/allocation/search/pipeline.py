@@ -132,7 +132,7 @@ class Pipeline:
         target = targets / self.std
         if seeds is None:
             own = prepared.seeds if self.settings.subsets else prepared.seeds[:1]
-            seeds = np.broadcast_to(own, (len(target), *own.shape))
+            seeds = own[None].repeat(len(target), axis=0)
         if previous is None:
             candidates = self._descend(prepared, target, seeds, fallback)
             return self._trade_error_for_energy(prepared, target, candidates, None)
