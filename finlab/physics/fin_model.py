@@ -15,7 +15,7 @@ from finlab.physics.drag import Drag
 from finlab.physics.fin_law import FinLaw, PlanarLaw
 from finlab.physics.lighthill import Lighthill
 from finlab.physics.soft import Soft
-from finlab.physics.table import TableLaw
+from finlab.physics.table import GridLaw, TableLaw
 from finlab.physics.table_file import read_table
 
 PLANAR_LAWS: dict[str, type[PlanarLaw]] = {"drag": Drag, "lighthill": Lighthill, "soft": Soft}
@@ -35,23 +35,33 @@ def make_law(spec: FinModelSpec) -> FinLaw:
 
 
 def stack_laws(specs: Sequence[FinModelSpec]) -> list[tuple[NDArray[np.intp], FinLaw]]:
-    """Returns the laws of n fins as (places, law); fins of one formula or one table are evaluated together.
+    """Returns the laws of n fins as (places, law); fins of one formula, and those with tables that tell the
+    same quantities, are evaluated together.
 
     Raises:
         DataError: a table's file is missing or wrong.
     """
-    kinds = [spec if spec.type == "table" else spec.type for spec in specs]
+    laws = [make_law(spec) for spec in specs]
+    kinds = [
+        law.has_power if isinstance(law, TableLaw) else spec.type
+        for spec, law in zip(specs, laws, strict=True)
+    ]
     groups: list[tuple[NDArray[np.intp], FinLaw]] = []
     for kind in dict.fromkeys(kinds):
         places = np.array([i for i, own in enumerate(kinds) if own == kind])
-        same = [specs[i] for i in places]
-        if isinstance(kind, FinModelSpec) or all(spec == same[0] for spec in same):
-            law = make_law(same[0])
-        else:
-            rows: list[dict[str, Any]] = [spec.values() for spec in same]
-            law = PLANAR_LAWS[kind](**{name: np.array([row[name] for row in rows]) for name in rows[0]})
-        groups.append((places, law))
+        groups.append((places, _together([specs[i] for i in places], [laws[i] for i in places])))
     return groups
+
+
+def _together(specs: list[FinModelSpec], laws: list[FinLaw]) -> FinLaw:
+    """One law for fins of one formula, or with tables of as many columns."""
+    if all(spec == specs[0] for spec in specs):
+        return laws[0]
+    tables = [law.grid for law in laws if isinstance(law, TableLaw)]
+    if tables:
+        return GridLaw(tables)
+    rows: list[dict[str, Any]] = [spec.values() for spec in specs]
+    return PLANAR_LAWS[specs[0].type](**{name: np.array([row[name] for row in rows]) for name in rows[0]})
 
 
 def file_stamp(spec: FinModelSpec) -> tuple[int, int] | None:

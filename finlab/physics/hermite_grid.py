@@ -1,0 +1,153 @@
+"""Cubic Hermite interpolation on grids over amplitude, frequency and zero direction.
+
+One grid answers for commands of any shape, n grids side by side for those of n fins, each by its own.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from finlab.arrays import AnyArray, Array
+from finlab.layout.angles import TURN
+
+ROUNDING = 1e-12
+"""How far [rad, Hz, rad] outside a grid a value may lie that is meant to be at its edge."""
+
+
+class Grid(NamedTuple):
+    """What is known of one fin."""
+
+    axes: list[Array]
+    """Amplitudes [rad], frequencies [Hz] and zero directions [rad], rising, two points or more each."""
+    values: Array
+    """At the grid's points (a, f, d, columns)."""
+    periodic: bool
+    """Whether the zero directions cover the circle, the first one not repeated at the end."""
+
+
+class HermiteGrids:
+    """Interpolates on one grid, or on n grids with as many columns each.
+
+    Between the points a cubic polynomial is used along each axis, whose slope at a point is that of the line
+    through its neighbours. Outside a grid its edge counts.
+    """
+
+    def __init__(self, grids: list[Grid]) -> None:
+        """Prepares the grids."""
+        knots = [axis for grid in grids for axis in _closed(grid)]
+        counts = np.array([len(axis) for axis in knots])
+        first, last = np.array([axis[0] for axis in knots]), np.array([axis[-1] for axis in knots])
+        scale, shift = 1.0 / (last - first), 2.0 * np.arange(len(knots))
+        # All axes are looked up together: on one line where axis k lies between 2 k and 2 k + 1.
+        line = [(axis - axis[0]) * s + k for axis, s, k in zip(knots, scale, shift, strict=True)]
+        self._line = np.concatenate(line)
+        shapes = [_shapes(axis, grids[k // 3].periodic and k % 3 == 2) for k, axis in enumerate(knots)]
+        self._shapes = np.concatenate([shape for shape, _ in shapes])
+        self._places = np.concatenate([place for _, place in shapes])
+        before = np.cumsum(counts) - counts
+        # The values of all grids below each other, each with a rim of neighbours; a view of four in a row.
+        padded = [_with_neighbours(grid) for grid in grids]
+        self.columns: int = grids[0].values.shape[-1]
+        """How many values each point has."""
+        flat = np.concatenate([values.reshape(-1, self.columns) for values in padded])
+        self._rows = sliding_window_view(flat.ravel(), 4 * self.columns)[:: self.columns]
+        stride = np.array([(p.shape[1] * p.shape[2], p.shape[2], 1) for p in padded])
+        start = np.cumsum([0, *(p[..., 0].size for p in padded[:-1])])
+        four = np.arange(4)
+        around = four[:, None] * stride[:, :1, None] + four * stride[:, 1:2, None]
+        self._first, self._last = self._each(first), self._each(last)
+        self._scale, self._shift = self._each(scale), self._each(shift)
+        self._last_cell = self._each(before + counts - 2)
+        self._middle = 0.5 * (self._first[..., 2] + self._last[..., 2])
+        self._stride = self._each(stride)
+        self._start = self._each(start - (before.reshape(-1, 3) * stride).sum(1), 1)[..., 0]
+        self._around = self._each(around.reshape(-1, 16), 16)
+
+    @staticmethod
+    def _each(values: AnyArray, count: int = 3) -> AnyArray:
+        """Values of the grids (n, count), or (count,) of a single one, for commands of any shape."""
+        rows = values.reshape(-1, count)
+        return rows[0] if len(rows) == 1 else rows
+
+    def __call__(self, command: Array, orders: int) -> Array:
+        """All columns at commands (..., 3), or (..., n, 3): values, and with two orders derivatives too.
+
+        Returns:
+            (..., orders, orders, orders, columns): by amplitude, by frequency, by zero direction.
+        """
+        cell, weight = self._weights(command, orders)
+        corner = (cell * self._stride).sum(-1) + self._start
+        grid = self._rows[corner[..., None] + self._around]
+        rows = command.shape[:-1]
+        both = weight[..., 0, :, None, :, None] * weight[..., 1, None, :, None, :]
+        along = both.reshape(*rows, orders**2, 16) @ grid
+        along = weight[..., 2, None, :, :] @ along.reshape(*rows, orders**2, 4, self.columns)
+        found: Array = along.reshape(*rows, orders, orders, orders, self.columns)
+        return found
+
+    def _weights(self, command: Array, orders: int) -> tuple[NDArray[np.intp], Array]:
+        """Cells (..., 3) of commands (..., 3), counted through all axes, and on each axis the weights of four
+        neighbours in the value and, with two orders, in the derivative (..., 3, orders, 4)."""
+        value = np.array(command, np.float64)
+        direction = value[..., 2]
+        direction -= TURN * np.rint((direction - self._middle) / TURN)
+        held = np.minimum(np.maximum(value, self._first), self._last)
+        place = (held - self._first) * self._scale + self._shift
+        cell = np.minimum(self._line.searchsorted(place, side="right") - 1, self._last_cell)
+        start = self._places.take(cell, axis=0)
+        pace = start[..., 1]
+        t = (held - start[..., 0]) * pace
+        squared = t * t
+        powers = np.zeros((*t.shape, orders, 4))
+        powers[..., 0, 0], powers[..., 0, 1], powers[..., 0, 2] = 1.0, t, squared
+        np.multiply(squared, t, out=powers[..., 0, 3])
+        if orders == 2:
+            pace = pace * (np.abs(held - value) <= ROUNDING)  # beyond the grid nothing changes any more
+            powers[..., 1, 1] = pace
+            np.multiply(2.0 * t, pace, out=powers[..., 1, 2])
+            np.multiply(3.0 * squared, pace, out=powers[..., 1, 3])
+        return cell, powers @ self._shapes.take(cell, axis=0)
+
+
+def _closed(grid: Grid) -> list[Array]:
+    """The axes, a circle closed."""
+    amplitude, frequency, direction = grid.axes
+    return [
+        amplitude,
+        frequency,
+        np.append(direction, direction[0] + TURN) if grid.periodic else direction,
+    ]
+
+
+def _with_neighbours(grid: Grid) -> Array:
+    """The values with a rim of neighbours. At an edge the missing one is the edge itself, which makes its
+    slope one-sided."""
+    values = np.pad(grid.values, ((1, 1), (1, 1), (0, 0), (0, 0)), "edge")
+    around, how = ((1, 2), "wrap") if grid.periodic else ((1, 1), "edge")
+    return np.pad(values, ((0, 0), (0, 0), around, (0, 0)), how)  # type: ignore[call-overload, no-any-return]
+
+
+def _shapes(knots: Array, periodic: bool) -> tuple[Array, Array]:
+    """Of each cell between knots (n,): the polynomials (n, 4 powers, 4 neighbours) that weigh its neighbours,
+    where it starts, and one over its width (n, 2). The last row stands for no cell.
+
+    The slope at a knot is that of the line through its neighbours.
+    """
+    gaps = np.diff(knots)
+    before, after = (gaps[-1], gaps[0]) if periodic else (0.0, 0.0)
+    pair = np.concatenate([[before], gaps]) + np.concatenate([gaps, [after]])
+    early, late = gaps / pair[:-1], gaps / pair[1:]
+    none, one = np.zeros_like(gaps), np.ones_like(gaps)
+    shapes = np.array(
+        [
+            [none, one, none, none],
+            [-early, none, early, none],
+            [2.0 * early, late - 3.0, 3.0 - 2.0 * early, -late],
+            [-early, 2.0 - late, early - 2.0, late],
+        ]
+    )
+    shapes = np.moveaxis(shapes, -1, 0)
+    places = np.stack([knots[:-1], 1.0 / gaps], axis=-1)
+    return np.concatenate([shapes, shapes[-1:]]), np.concatenate([places, places[-1:]])
