@@ -78,6 +78,8 @@ def is_bundle(path: str | os.PathLike[str]) -> bool:
 def archive_around(path: str | os.PathLike[str]) -> str | None:
     """The zip archive of a bundle that a force table lies in, as in `robot.zip/tables/x.csv`; None for a
     file that lies in none."""
+    if ".zip" not in os.fspath(path):  # asked for each table at each answer
+        return None
     tables = os.path.dirname(path)
     archive = os.path.dirname(tables)
     within = archive.endswith(".zip") and os.path.basename(tables) + "/" == TABLES

@@ -17,6 +17,6 @@ except ImportError:
 
 
 def solve(matrix: Array, right: Array) -> AnyArray:
-    """Solutions (R, 6, 1) of R systems (R, 6, 6) with right sides (R, 6, 1), or (1, 6, 1) for all."""
+    """Solutions (..., m, k) of systems (..., m, m) with right sides (..., m, k), broadcast."""
     solution: AnyArray = _lapack.solve(matrix, right)
     return solution

@@ -16,13 +16,14 @@ import numpy as np
 
 from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
 from finlab.arrays import AnyArray, Array
+from finlab.forces.small_systems import solve
 from finlab.physics.objective import CostMeter
 
 STEPS = 6
 """Most quadratic problems solved in turn."""
 SETTLED = 2e-3
 """Share of its cost that some row must still have to gain for another step."""
-BEFORE, BACK, AFTER = 1, 1, 2
+BEFORE, BACK, AFTER = 1, 1, 1
 """Levenberg-Marquardt steps that bring commands onto the target: first, after each step, and in the end."""
 SPACING = 1e-4
 """Of the commands whose slopes are compared, in ranges."""
@@ -87,6 +88,8 @@ def cheaper_commands(
         here = np.where(better[:, None, None], there, here)
         value, error = np.where(better, new_value, value), np.where(better, new_error, error)
         damping = np.where(better, damping * DAMPING[1], damping * DAMPING[2])
+    if here is start.command:
+        return here
     found = refine(problem, target, here, AFTER)
     value = cost(start.command)
     keep = (found.error > exact_error) | ((cost(found.command) > value) & (start.error <= exact_error))
@@ -117,7 +120,7 @@ def _balance(model: _Model) -> AnyArray:
     jacobian = model.jacobian.reshape(len(model.jacobian), -1, 6)
     transposed = jacobian.swapaxes(1, 2)
     pull = transposed @ model.slope.reshape(len(jacobian), -1, 1)
-    return np.asarray(np.linalg.solve(_regular(transposed @ jacobian), pull)[..., 0])
+    return solve(_regular(transposed @ jacobian), pull)[..., 0]
 
 
 def _step(
@@ -148,18 +151,28 @@ def _step(
 
 def _free_step(model: _Model, curvature: Array, fixed: Array, held: AnyArray) -> tuple[Array, Array]:
     """The cheapest steps (R, n, 3) of which some are held at what is fixed, and their multipliers (R, 6)."""
-    missing = model.missing - np.einsum("rnij,rni->rj", model.jacobian, fixed)
-    slope = np.where(held, 0.0, model.slope + (curvature @ fixed[..., None])[..., 0])
-    jacobian = np.where(held[..., None], 0.0, model.jacobian)
-    block = np.where(held[..., None] | held[..., None, :], np.eye(3), curvature)
-    mobility = np.linalg.inv(block)
-    pulled = mobility @ jacobian
-    drift = (mobility @ slope[..., None])[..., 0]
-    gram = _regular(np.einsum("rnij,rnik->rjk", jacobian, pulled))
-    right = missing + np.einsum("rnij,rni->rj", jacobian, drift)
-    multiplier = np.linalg.solve(gram, right[..., None])[..., 0]
+    rows, n = fixed.shape[:2]
+    missing, slope, jacobian = model.missing, model.slope, model.jacobian
+    if held.any():
+        missing = missing - _wrench_of(jacobian, fixed)
+        slope = np.where(held, 0.0, slope + (curvature @ fixed[..., None])[..., 0])
+        jacobian = np.where(held[..., None], 0.0, jacobian)
+        curvature = np.where(held[..., None] | held[..., None, :], np.eye(3), curvature)
+    # Both at once: how the commands answer the multipliers, and what they do without them.
+    answer = solve(curvature, np.concatenate([jacobian, slope[..., None]], axis=-1))
+    pulled, drift = answer[..., :6], answer[..., 6]
+    gram = jacobian.reshape(rows, 3 * n, 6).swapaxes(1, 2) @ pulled.reshape(rows, 3 * n, 6)
+    right = missing + _wrench_of(jacobian, drift)
+    multiplier = solve(_regular(gram), right[..., None])[..., 0]
     step = (pulled @ multiplier[:, None, :, None])[..., 0] - drift
     return np.where(held, fixed, step), multiplier
+
+
+def _wrench_of(jacobian: Array, step: Array) -> Array:
+    """What steps (R, n, 3) change of the wrench (R, 6), by its derivatives (R, n, 3, 6)."""
+    rows, n, _ = step.shape
+    wrench: Array = (step.reshape(rows, 1, 3 * n) @ jacobian.reshape(rows, 3 * n, 6))[:, 0]
+    return wrench
 
 
 def _regular(gram: Array) -> Array:
