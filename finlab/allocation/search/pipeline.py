@@ -10,12 +10,13 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.search.cheaper_commands import cheaper_commands
-from finlab.allocation.search.prepared import Prepared, prepare, resting_fins, resting_seeds
+from finlab.allocation.search.prepared import Prepared, neighbour_seeds, prepare, resting_fins, resting_seeds
 from finlab.allocation.search.receding_horizon import plan_ahead
 from finlab.allocation.search.refined_candidates import (
     MISSED,
@@ -55,8 +56,10 @@ class SearchNumbers:
     after five."""
     few_fins_steps: int = 8
     """The same for other costs with up to five fins."""
+    many_fins: int = 6
+    """Fins from which on there are more local minima to leave, and seeds near the best are tried as well."""
     many_fins_steps: int = 12
-    """The same from six fins on, where there are more local minima to leave."""
+    """The same for so many fins."""
     same_cost: float = 2e-4
     """Share by which costs differ at least of forces that are refined as two."""
     dear: float = 0.01
@@ -130,13 +133,15 @@ class Pipeline:
             fallback: where to start from when targets were missed; None from it ends their search.
         """
         target = targets / self.std
+        near_best = seeds is None and self.settings.subsets and prepared.plant.n_fins >= SEARCH.many_fins
         if seeds is None:
             own = prepared.seeds if self.settings.subsets else prepared.seeds[:1]
             seeds = own[None].repeat(len(target), axis=0)
+        start = _Start(seeds, near_best and not self.objective.convex, fallback)
         if previous is None:
-            candidates = self._descend(prepared, target, seeds, fallback)
+            candidates = self._descend(prepared, target, start)
             return self._trade_error_for_energy(prepared, target, candidates, None)
-        candidates = self._descend_from_previous(prepared, target, seeds, previous, fallback)
+        candidates = self._descend_from_previous(prepared, target, start, previous)
         candidates = self._trade_error_for_energy(prepared, target, candidates, previous)
         # Arcs that pass the seam are brought back inside the fin's own limits.
         return candidates._replace(command=prepared.commands.feasible(candidates.command))
@@ -169,33 +174,33 @@ class Pipeline:
         return min(cost_bound(prepared.planar, wanted, planar.multiplier[0]), best)
 
     def _descend_from_previous(
-        self, prepared: Prepared, target: Array, seeds: Array, previous: Array, fallback: FallbackForces
+        self, prepared: Prepared, target: Array, start: _Start, previous: Array
     ) -> RefinedCandidates:
         """Answers that turn the fins as little as the target allows, with regard to the next ticks.
 
         Fins at rest turn towards where they will be needed, or else where they would be cheapest.
         """
-        free = self._descend(prepared, target, seeds, fallback)
+        free = self._descend(prepared, target, start)
         aim = free.command[0, 0, :, 2]
         force = planar_force(prepared, previous)
-        kept = force if seeds.ndim == 4 else np.hypot(*force)
-        seeds = np.concatenate([kept[None, None], seeds], axis=1)
+        kept = force if start.seeds.ndim == 4 else np.hypot(*force)
+        start = start._replace(seeds=np.concatenate([kept[None, None], start.seeds], axis=1))
         near = limit_turn(prepared, previous, aim, TURNS[0])
-        candidates = self._descend(near, target, seeds, fallback, known=free.command[0])
+        candidates = self._descend(near, target, start, known=free.command[0])
         exact = exact_error(prepared)
         plan = plan_ahead(prepared, previous, target[0], candidates.command[0, 0], free.command[0])
         if plan is not None:
             near = limit_turn(prepared, previous, plan.ready, TURNS[1])
-            start = near.commands.feasible(unwrap_to_arc(near, plan.command))
+            ready = near.commands.feasible(unwrap_to_arc(near, plan.command))
             fresh = np.full((1, 1), -1)
-            planned = refine_candidates(near, target, start[None, None], fresh, SEARCH.plan_lm_steps)
+            planned = refine_candidates(near, target, ready[None, None], fresh, SEARCH.plan_lm_steps)
             if planned.error[0, 0] <= max(exact, candidates.error[0, 0]):
                 candidates = candidates.with_first(planned)
         for width in TURNS[1:]:
             if candidates.error[0, 0] <= (exact if width == TURNS[1] else SEARCH.passing_error):
                 break
             near = limit_turn(prepared, previous, aim, width)
-            candidates = self._descend(near, target, seeds, fallback, known=free.command[0])
+            candidates = self._descend(near, target, start, known=free.command[0])
         return candidates
 
     def _trade_error_for_energy(
@@ -218,12 +223,7 @@ class Pipeline:
         return RefinedCandidates._make(values.take(order, axis=0) for values in flat)
 
     def _descend(
-        self,
-        prepared: Prepared,
-        target: Array,
-        seeds: Array,
-        fallback: FallbackForces,
-        known: Array | None = None,
+        self, prepared: Prepared, target: Array, start: _Start, known: Array | None = None
     ) -> RefinedCandidates:
         """Search from seeds, refine, and go on where that did not reach the target.
 
@@ -233,7 +233,9 @@ class Pipeline:
         # Fins that rest have hardly any slope: two steps where there are such.
         keep_mode, steps = known is not None, self.settings.refine_steps + (not self.objective.convex)
         steps += prepared.arcs is not None  # fins at stops are slower to mend
-        command, origin, expected = self._search(prepared, target, seeds, keep_mode)
+        command, origin, expected = self._search(
+            prepared, target, start.seeds, keep_mode, near_best=start.near_best
+        )
         searched = command[:, 0]
         if known is not None:
             within = prepared.commands.feasible(unwrap_to_arc(prepared, known))
@@ -241,23 +243,19 @@ class Pipeline:
             origin = np.concatenate([origin, np.full((1, len(within)), -1)], axis=1)
         exact = exact_error(prepared)
         if prepared.measured:
-            flat = target if len(target) == 1 else np.repeat(target, command.shape[1], axis=0)
-            start = command.reshape(-1, *command.shape[2:])
-            found = cheaper_commands(prepared.commands, prepared.cost, flat, start, exact)
-            command = found.reshape(command.shape)
+            command = _cheaper(prepared, target, command)
         candidates = refine_candidates(prepared, target, command, origin, steps, keep_mode)
         candidates = RefinedCandidates._make(values[:, : self.settings.n_refined] for values in candidates)
         missed = candidates.error[:, 0] > exact
         if missed.any():
-            refine_missed(prepared, target, candidates, missed, fallback)
+            refine_missed(prepared, target, candidates, missed, start.fallback)
             searched = np.where(missed[:, None, None], candidates.command[:, 0], searched)
         if self.objective.convex:  # what was reached late, or became dear on the way, is made cheaper
             dear = missed | (candidates.cost[:, 0] > (1.0 + SEARCH.dear) * expected)
             dear &= candidates.error[:, 0] <= exact
             if dear.any():
-                rows = target if len(target) == 1 else target[dear]
-                start = cheaper_commands(prepared.commands, prepared.cost, rows, searched[dear], exact)
-                improve(prepared, target, candidates, dear, start[:, None], 1)
+                found = _cheaper(prepared, target[dear], searched[dear, None])
+                improve(prepared, target, candidates, dear, found, 1)
         return candidates
 
     def _search(
@@ -267,6 +265,7 @@ class Pipeline:
         seeds: Array,
         keep_mode: bool,
         *,
+        near_best: bool = False,
         keep: int | None = None,
         steps: int | None = None,
         works: Array | None = None,
@@ -285,28 +284,80 @@ class Pipeline:
             works = None if works is None else np.repeat(works, n_arcs, axis=0)
         n_starts = seeds.shape[1]
         flat = target if rows == 1 else np.repeat(target, n_starts, axis=0)
-        usual = SEARCH.few_fins_steps if n < 6 else SEARCH.many_fins_steps
+        usual = SEARCH.few_fins_steps if n < SEARCH.many_fins else SEARCH.many_fins_steps
         steps = (
             steps or self.settings.search_steps or (SEARCH.convex_steps if self.objective.convex else usual)
         )
         planar = force_space.descend(problem, flat, seeds.reshape(-1, *seeds.shape[2:]), steps, works)
-        rests = not self.objective.convex
-        command, cost = force_space.realize(problem, planar, force_space.IDLE if rests else None)
-        if n_starts == 1 and not rests:
+        if n_starts == 1 and self.objective.convex:
+            command, cost = force_space.realize(problem, planar)
             return command[:, None], np.zeros((rows, 1), np.intp), cost
-        error = np.einsum("ri,ri->r", planar.residual, planar.residual)
-        score = rank(cost, error, (SEARCH.promising_error * prepared.exactness) ** 2).reshape(rows, n_starts)
+        ends = self._ends(prepared, problem, planar, rows)
+        origin = np.repeat(np.arange(n_seeds), n_starts // n_seeds)
+        if near_best:
+            best = ends.score.argmin(axis=1) + np.arange(0, rows * n_starts, n_starts)
+            size, fins = planar.size[best], prepared.planar.fins
+            near = neighbour_seeds(size, size > force_space.IDLE * fins.maximum, fins.maximum)
+            flat = target if rows == 1 else np.repeat(target, near.shape[1], axis=0)
+            planar = force_space.descend(prepared.planar, flat, near.reshape(-1, n), steps)
+            ends = ends.beside(self._ends(prepared, prepared.planar, planar, rows))
+            origin = np.concatenate([origin, np.full(near.shape[1], -1)])
+        score = ends.score
         if keep_mode:
+            score = score.copy()  # it may be the cost itself
             score[:, 0] = -1.0
         # With fins at rest, what refinement mends changes the order of the costs: twice as many are tried.
-        chosen = _distinct(score)[:, : keep or self.settings.n_refined * (1 + rests)]
-        place = chosen + np.arange(0, rows * n_starts, n_starts)[:, None]
-        kept, expected = command.take(place, axis=0), cost[place[:, 0]]
-        if rests:  # what resting fins leave undone cannot always be mended: all ways are refined
-            ways = (force_space.realize(problem, planar, share)[0] for share in (0.0, None))
-            kept = np.concatenate([kept, *(way.take(place, axis=0) for way in ways)], axis=1)
-            chosen = np.concatenate([chosen, chosen, chosen], axis=1)
-        return kept, chosen // (n_starts // n_seeds), expected
+        ways = ends.command.shape[2]
+        chosen = _distinct(score)[:, : keep or self.settings.n_refined * min(ways, 2)]
+        row = np.arange(rows)[:, None]
+        # What resting fins leave undone cannot always be mended: all ways are refined.
+        kept = ends.command[row, chosen].swapaxes(1, 2).reshape(rows, -1, n, 3)
+        return kept, np.tile(origin[chosen], (1, ways)), ends.cost[row[:, 0], chosen[:, 0]]
+
+    def _ends(
+        self, prepared: Prepared, problem: force_space.PlanarProblem, planar: force_space.Planar, rows: int
+    ) -> _Ends:
+        """Where S descents for each of N targets (rows) have ended."""
+        shares = (None,) if self.objective.convex else (force_space.IDLE, 0.0, None)
+        found = [force_space.realize(problem, planar, share) for share in shares]
+        command, cost = np.stack([each for each, _ in found], axis=1), found[0][1]
+        error = np.einsum("ri,ri->r", planar.residual, planar.residual)
+        score = rank(cost, error, (SEARCH.promising_error * prepared.exactness) ** 2)
+        return _Ends(*(values.reshape(rows, -1, *values.shape[1:]) for values in (command, cost, score)))
+
+
+class _Start(NamedTuple):
+    """Where the search for N targets begins."""
+
+    seeds: Array
+    """Sizes of forces (N, S, n) or planar forces (N, S, 2, n) [N]."""
+    near_best: bool
+    """Whether the seeds near the best allocation are tried as well."""
+    fallback: FallbackForces
+    """Where to start from when targets were missed."""
+
+
+class _Ends(NamedTuple):
+    """Where S descents for each of N targets have ended."""
+
+    command: Array
+    """(N, S, W, n, 3), in W ways to let fins rest."""
+    cost: Array
+    """In the first way (N, S)."""
+    score: Array
+    """What they are sorted by (N, S)."""
+
+    def beside(self, other: _Ends) -> _Ends:
+        """These and others."""
+        return _Ends(*(np.concatenate(both, axis=1) for both in zip(self, other, strict=True)))
+
+
+def _cheaper(prepared: Prepared, target: Array, command: Array) -> Array:
+    """`cheaper_commands` near P commands (N, P, n, 3) for each of N targets."""
+    flat = command.reshape(-1, *command.shape[2:])
+    each = target.repeat(command.shape[1], axis=0)
+    found = cheaper_commands(prepared.commands, prepared.cost, each, flat, exact_error(prepared))
+    return found.reshape(command.shape)
 
 
 def _distinct(score: Array) -> NDArray[np.intp]:

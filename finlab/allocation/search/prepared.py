@@ -4,6 +4,7 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.allocation.search.levenberg_marquardt import CommandProblem
 from finlab.arrays import Array
@@ -19,6 +20,10 @@ MAX_SUBSETS = 80
 """Most sub-layouts that are searched."""
 LEAST_WORKING = 2
 """Fewest fins that work in a sub-layout; of two fins, one."""
+RESTING = 1e-3
+"""Share of its largest force at which a fin begins that is to rest."""
+WAKING = (0.1, 0.5)
+"""Least share of its largest force at which a fin begins that worked, and that of one that rested."""
 LEAST_SHARE = 0.05
 """Least share of its largest force with which a fin begins where all work, some much harder than others."""
 
@@ -89,7 +94,7 @@ def resting_fins(n: int) -> tuple[tuple[int, ...], ...]:
     return tuple(resting[:MAX_SUBSETS])
 
 
-def resting_seeds(maximum: Array, rests: tuple[tuple[int, ...], ...], left: float = 1e-3) -> Array:
+def resting_seeds(maximum: Array, rests: tuple[tuple[int, ...], ...], left: float = RESTING) -> Array:
     """Seeds (S, n) [N] from largest forces (n,) in which some fins nearly rest, at the share that is left."""
     seeds = np.tile(maximum, (len(rests), 1))
     for row, fins in enumerate(rests):
@@ -106,3 +111,21 @@ def uneven_seeds(maximum: Array) -> Array:
     row = fin[:, None] + 1
     spread = (row * 0.6180339887 + fin * 0.7548776662) % 1.0
     return maximum * (LEAST_SHARE + (1.0 - LEAST_SHARE) * spread**2)
+
+
+def neighbour_seeds(size: Array, works: NDArray[np.bool_], maximum: Array) -> Array:
+    """Seeds (R, n (n + 1) / 2, n) [N] near allocations of many fins, of which some rest.
+
+    In each, one fin or two work that did not, or rest that did not, or take each other's part: of six fins
+    and more the cheapest ways rest more of them than are tried from the start.
+
+    Args:
+        size: sizes of the forces (R, n) [N].
+        works: which fins work (R, n).
+        maximum: largest forces (n,) [N].
+    """
+    first, second = np.triu_indices(size.shape[1])
+    one = np.eye(size.shape[1], dtype=bool)
+    wanted = works[:, None] ^ (one[first] | one[second])
+    start = maximum * np.where(works, np.maximum(size / maximum, WAKING[0]), WAKING[1])
+    return np.where(wanted, start[:, None], RESTING * maximum)
