@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 def simulate(
     layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
     trajectory: Annotated[str, arg(metavar="NAME|FILE")] = "lissajous",
+    excite: bool = False,
     fail: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME@SECONDS")] = (),
     method: Annotated[str, arg(metavar="NAME")] = "search",
     objective: Literal["power", "effort"] = "power",
@@ -34,6 +35,8 @@ def simulate(
     Args:
         layout: layout file, layout graph file, or the name of a shipped layout.
         trajectory: circle, lissajous, square, or a CSV file with the columns t, x, y, z.
+        excite: shake every axis and fin on the spot instead, for at most 300 s, within bounds of depth and
+            attitude; `finlab fit robot` learns the robot from the log.
         fail: a fin and when it is lost, such as front_left@30.
         method: search, mdn, paper, qp, sqp, analytic, multistart, trf, slsqp, ipopt or on-board.
         objective: what the method keeps least: power in watts, or effort, the paper's J_en.
@@ -54,24 +57,35 @@ def simulate(
 
     from finlab.cli.inputs import open_robot
     from finlab.control import WaypointController, WaypointGains, load_gains
+    from finlab.errors import FinlabError
     from finlab.evaluation.method_specs import load_method_spec
     from finlab.sim import NO_NOISE, ClosedLoop, make_trajectory
+    from finlab.sim.excite import LONGEST_S, excitation
 
     robot = open_robot(layout)
     failures = [(name, 0.0) for name in robot.failed] + [_failure(text) for text in fail]
     _check_folder(output)
-    loop = ClosedLoop(
-        robot.layout,
-        load_method_spec(method, checkpoint, objective),
-        make_trajectory(trajectory, duration),
-        WaypointController(load_gains(WaypointGains, gains)),
-        plant=plant,
-        steady=steady,
-        sensors=None if noise else NO_NOISE,
-        current=current,
-        failures=failures,
-        seed=seed,
-    )
+    sensors = None if noise else NO_NOISE
+    if excite:
+        if fail:
+            raise FinlabError("--excite: a robot is learned with the fins that it has; leave --fail out")
+        swum = robot.layout.without(robot.failed) if robot.failed else robot.layout
+        whole = LONGEST_S if duration is None else duration
+        loop = excitation(swum, whole, plant=plant, sensors=sensors, current=current, seed=seed)
+        failures = []
+    else:
+        loop = ClosedLoop(
+            robot.layout,
+            load_method_spec(method, checkpoint, objective),
+            make_trajectory(trajectory, duration),
+            WaypointController(load_gains(WaypointGains, gains)),
+            plant=plant,
+            steady=steady,
+            sensors=sensors,
+            current=current,
+            failures=failures,
+            seed=seed,
+        )
     for sentence in _warnings(loop, failures):
         print(sentence, file=sys.stderr)
     seconds = round(loop.task.duration_s, 1)
@@ -80,7 +94,7 @@ def simulate(
             loop.step()
             bar.update(loop.period_s)
     log = loop.log
-    print(summary(log))
+    print(excitation_summary(log) if excite else summary(log))
     if output is not None:
         from finlab.evaluation.plots.closed_loop_run import save_pictures
 
@@ -107,6 +121,21 @@ def summary(log: RunLog) -> str:
     if row["max"] >= LOST_M:
         lines.append(f"the robot lost its reference: it was more than {LOST_M:g} m away")
     return "\n".join(lines)
+
+
+def excitation_summary(log: RunLog) -> str:
+    """How far the robot went from where it began, in a line or two."""
+    import numpy as np
+
+    from finlab.physics.vehicle import euler
+
+    away = np.abs(log.position - log.position[0]).max(axis=0)
+    tilt = np.degrees(np.abs(euler(log.quaternion)[:, :2]).max())
+    return (
+        f"{log.layout} shaken on the spot, plant {log.plant}, {log.time[-1]:.0f} s: at most "
+        f"{np.hypot(away[0], away[1]):.2f} m away, {away[2]:.2f} m up or down, {tilt:.0f} deg of roll or "
+        f"pitch, {np.abs(log.motion[:, :3]).max():.2f} m/s"
+    )
 
 
 def _failure(text: str) -> tuple[str, float]:

@@ -31,6 +31,11 @@ class Measurement(NamedTuple):
     pitch: float
     """Pitch [rad], positive with the nose down, from the IMU."""
 
+    def as_array(self) -> Array:
+        """Position, roll, pitch, yaw, velocity and rates side by side (12,), as a log keeps them."""
+        pose = [*self.position[:2], -self.depth, self.roll, self.pitch, self.yaw]
+        return np.array([*pose, *self.velocity, *self.rates])
+
 
 class Setpoint(NamedTuple):
     """What the robot should do now; a controller takes what it needs."""

@@ -197,6 +197,7 @@ class ClosedLoop:
             position=before[:3].copy(),
             quaternion=before[3:7].copy(),
             motion=before[7:].copy(),
+            measured=now.as_array(),
             reference=setpoint.position,
             reference_surge=setpoint.surge,
             asked=asked,

@@ -11,7 +11,7 @@ from finlab.arrays import AnyArray
 from finlab.errors import DataError
 
 FORMAT = "finlab-swim"
-VERSION = 1
+VERSION = 2
 
 
 class Tick(NamedTuple):
@@ -25,6 +25,9 @@ class Tick(NamedTuple):
     """Attitude (4,) as w, x, y, z, body to world."""
     motion: AnyArray
     """Velocity (3,) [m/s] and angular rates (3,) [rad/s] in the body frame."""
+    measured: AnyArray
+    """What the sensors said last (12,): position [m], roll, pitch, yaw [rad], velocity [m/s] and angular
+    rates [rad/s] in the body frame."""
     reference: AnyArray
     """Where the robot should be at `time` (3,) [m]; NaN where the task does not say."""
     reference_surge: float

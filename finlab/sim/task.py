@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -99,9 +100,26 @@ class Trajectory:
         return float(np.linalg.norm(np.diff(self.samples, axis=0), axis=1).sum())
 
 
-Task = Trajectory | Cruise
-"""What a `ClosedLoop` can be given: whatever has a `name`, a `duration_s` [s], a `setpoint` for every time
-(after the end as at the end) and a `start`: position (3,) [m] and heading [rad] to begin with."""
+class Task(Protocol):
+    """What a `ClosedLoop` can be given."""
+
+    @property
+    def name(self) -> str:
+        """What it is called in logs."""
+        ...
+
+    @property
+    def duration_s(self) -> float:
+        """How long it takes [s]."""
+        ...
+
+    def setpoint(self, time: float) -> Setpoint:
+        """What to do at `time` [s]; after the end as at the end."""
+        ...
+
+    def start(self) -> tuple[Array, float]:
+        """Position (3,) [m] and heading [rad] to begin with."""
+        ...
 
 
 def _eased(duration_s: float) -> tuple[Array, Array]:

@@ -1,0 +1,207 @@
+"""A swim from which a robot can be learned: every axis and every fin is varied, depth and attitude are kept.
+
+The controller holds the place softly and adds a sum of sines on each axis, each axis with periods of its own.
+The allocator gives that wrench with forces that also push against each other, and draws each fin's amplitude
+anew every few seconds, so that the law of each fin shows. Where the robot leaves its bounds, the excitation
+fades until it is back.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.solution import Solution
+from finlab.arrays import Array
+from finlab.control import Measurement, Setpoint
+from finlab.errors import DataError
+from finlab.inference.normalization import Normalization
+from finlab.layout import Layout
+from finlab.layout.angles import wrapped
+from finlab.layout.arrays import layout_effectiveness
+from finlab.physics import plant_of
+from finlab.physics.vehicle import complete_body
+from finlab.sim.closed_loop import ClosedLoop
+from finlab.sim.sensors import SensorSettings
+
+LONGEST_S = 300.0
+"""Longest swim [s]."""
+SHORTEST_S = 30.0
+"""Shortest one [s]: once through the slowest sine."""
+SHARE = (0.40, 0.35, 0.30, 0.15, 0.15, 0.15)
+"""Amplitude of the excitation on each axis, as a share of what all fins together could give at most."""
+PERIODS_S = (
+    (31.0, 13.0, 7.0),
+    (23.0, 11.0, 6.1),
+    (17.0, 9.1, 5.3),
+    (8.3, 4.9, 3.1),
+    (12.1, 6.7, 4.1),
+    (19.0, 9.7, 4.5),
+)
+"""Periods of the sines of each axis [s]; no two axes share one."""
+INNER_SHARE = 0.3
+"""Amplitude of the forces that cancel, as a share of the largest force of a fin."""
+REDRAW_S = 3.1
+"""Time after which each fin has another amplitude [s]."""
+BOUNDS = (1.5, 0.5, 0.35)
+"""Horizontal distance [m], change of depth [m] and roll or pitch [rad] at which the excitation has faded."""
+PERIOD_S = 0.1
+"""Of the controller [s]."""
+
+
+@dataclass(frozen=True)
+class Stay:
+    """Stay where the swim began, at depth."""
+
+    duration_s: float = LONGEST_S
+    """How long [s]."""
+    depth: float = 1.5
+    """Below the world's origin [m]."""
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        return "excitation"
+
+    def setpoint(self, time: float) -> Setpoint:
+        """The same at all times."""
+        return Setpoint(np.array([0.0, 0.0, -self.depth]), 0.0)
+
+    def start(self) -> tuple[Array, float]:
+        """There, heading along x."""
+        return np.array([0.0, 0.0, -self.depth]), 0.0
+
+
+class ExcitingController:
+    """Holds a place and heading softly, and shakes all six axes."""
+
+    name = "excitation"
+    axes: tuple[str, ...] = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+    lead_s = 0.0
+    period_s = PERIOD_S
+
+    def __init__(self, layout: Layout, seed: int = 0) -> None:
+        plant, body = plant_of(layout), complete_body(layout)
+        largest = np.linalg.norm(plant.forces(plant.upper), axis=-1)
+        # Each axis as far as all fins could push it, were they all aimed at it.
+        reach = np.linalg.norm(plant.columns[:, 1:], axis=1)
+        self._size = np.array(SHARE) * (reach * largest[:, None]).sum(axis=0)
+        rng = np.random.default_rng(seed)
+        self._phase = rng.uniform(0.0, 2 * math.pi, (6, len(PERIODS_S[0])))
+        own = np.array([body.mass_kg or 1.0] * 3 + list(body.inertia_kgm2 or (1.0,) * 3))
+        inertia = own + np.array(body.added_mass or (0.0,) * 6)
+        # A position loop of 0.25 rad/s, one of 0.4 rad/s for depth and heading; damping of about 0.8.
+        pace = np.array([0.25, 0.25, 0.4, 0.0, 0.0, 0.4])
+        self._stiff, self._damp = inertia * pace**2, inertia * np.array([0.2, 0.2, 0.6, 0.5, 0.5, 0.6])
+
+    def reset(self) -> None:
+        """Nothing is remembered."""
+
+    def wrench(self, measurement: Measurement, setpoint: Setpoint) -> Array:
+        """Returns the wrench (6,) [N, N m]."""
+        away = setpoint.position - np.array([*measurement.position[:2], -measurement.depth])
+        c, s = math.cos(measurement.yaw), math.sin(measurement.yaw)
+        error = np.array([c * away[0] + s * away[1], c * away[1] - s * away[0], away[2], 0.0, 0.0, 0.0])
+        error[5] = float(wrapped(-measurement.yaw))
+        speed = np.concatenate([measurement.velocity, measurement.rates])
+        tilt = max(abs(measurement.roll), abs(measurement.pitch))
+        used = max(math.hypot(away[0], away[1]) / BOUNDS[0], abs(away[2]) / BOUNDS[1], tilt / BOUNDS[2])
+        shaken = min(1.0, max(0.0, 2.0 - 2.0 * used)) * self.excitation(measurement.time)
+        return np.asarray(self._stiff * error - self._damp * speed + shaken)
+
+    def excitation(self, time: float) -> Array:
+        """The sum of sines (6,) at a time [s], at most the amplitude of each axis."""
+        angle = 2 * math.pi * time / np.array(PERIODS_S) + self._phase
+        return np.asarray(self._size * np.sin(angle).mean(axis=1))
+
+
+class ExcitingAllocator(Allocator):
+    """Gives a wrench with forces that also push against each other, and with amplitudes drawn at random."""
+
+    name = "excitation"
+
+    def __init__(self, layout: Layout, seed: int = 0) -> None:
+        self.normalization = Normalization(np.zeros(6), np.ones(6))
+        self._rng = np.random.default_rng(seed)
+        self._plant = plant_of(layout)
+        self._to_force = np.linalg.pinv(layout_effectiveness(layout), rcond=1e-6)
+        _, values, right = np.linalg.svd(layout_effectiveness(layout))
+        rank = int((values > 1e-6 * values[0]).sum())
+        self._inner = right[rank:]
+        self._largest = np.linalg.norm(self._plant.forces(self._plant.upper), axis=-1)
+        self._phase = self._rng.uniform(0.0, 2 * math.pi, (len(self._inner), 2))
+        self._calls = 0
+        shares = np.linspace(0.0, 1.0, 13), np.linspace(0.0, 1.0, 41)
+        grid = np.stack(np.meshgrid(*shares, indexing="ij"), axis=-1).reshape(-1, 1, 2)
+        lower, upper = self._plant.lower[:, :2], self._plant.upper[:, :2]
+        self._grid = np.concatenate(
+            [lower + grid * (upper - lower), np.zeros((len(grid), len(lower), 1))], axis=-1
+        )
+        self._amplitude = upper[:, 0]
+
+    @classmethod
+    def option_names(cls) -> list[str]:
+        """Nothing can be set."""
+        return []
+
+    def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
+        return Solution(np.stack([self._command(target) for target in targets]))
+
+    def _command(self, target: Array) -> Array:
+        """The next command (n, 3); each call is a tick of the controller."""
+        time = self._calls * PERIOD_S
+        if self._calls % round(REDRAW_S / PERIOD_S) == 0:
+            share = self._rng.uniform(0.2, 1.0, self._plant.n_fins)
+            lower, upper = self._plant.lower[:, 0], self._plant.upper[:, 0]
+            self._amplitude = lower + share * (upper - lower)
+        self._calls += 1
+        k = np.arange(len(self._inner))
+        swing = np.sin(2 * math.pi * time / (14.3 + 3.7 * k) + self._phase[:, 0])
+        swing += np.sin(2 * math.pi * time / (5.9 + 1.3 * k) + self._phase[:, 1])
+        inner = INNER_SHARE * float(self._largest.mean()) * swing @ self._inner if len(k) else 0.0
+        force = (self._to_force @ target + inner).reshape(-1, 2)
+        size, direction = np.hypot(*force.T), np.arctan2(force[:, 1], force[:, 0])
+        tried = self._grid.copy()
+        tried[..., 2] = direction
+        tried = self._plant.feasible(tried)
+        miss = np.abs(np.linalg.norm(self._plant.forces(tried), axis=-1) - size) / self._largest
+        other = np.abs(tried[..., 0] - self._amplitude) / self._plant.upper[:, 0]
+        best = np.argmin(miss + 0.05 * other, axis=0)
+        return np.asarray(tried[best, np.arange(self._plant.n_fins)])
+
+
+def excitation(
+    layout: Layout,
+    duration_s: float = LONGEST_S,
+    *,
+    plant: str = "mean",
+    sensors: SensorSettings | None = None,
+    current: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    seed: int = 0,
+) -> ClosedLoop:
+    """The swim, ready to be run.
+
+    Args:
+        layout: the robot.
+        duration_s: how long [s].
+        plant: what the fins really do; see `PLANTS`.
+        sensors: rates and noise; the defaults of `SensorSettings`.
+        current: velocity of the water in the world [m/s].
+        seed: of the excitation and of the sensors' noise.
+
+    Raises:
+        DataError: the duration is too short to tell anything, or longer than five minutes.
+    """
+    if not SHORTEST_S <= duration_s <= LONGEST_S:
+        raise DataError(f"duration: expected {SHORTEST_S:g} to {LONGEST_S:g} s, got {duration_s:g}")
+    return ClosedLoop(
+        layout,
+        ExcitingAllocator(layout, seed),
+        Stay(duration_s),
+        ExcitingController(layout, seed),
+        plant=plant,
+        sensors=sensors,
+        current=current,
+        seed=seed,
+    )

@@ -1,0 +1,72 @@
+"""The manoeuvre that robots are learned from: within its bounds, and rich enough."""
+
+import numpy as np
+import pytest
+
+from finlab.cli import main
+from finlab.errors import DataError
+from finlab.layout import Layout, load_layout
+from finlab.physics.vehicle import euler
+from finlab.sim import RunLog, load_log
+from finlab.sim.excite import BOUNDS, ExcitingAllocator, excitation
+
+
+@pytest.fixture(scope="module", params=["A", "penta"])
+def swim(request: pytest.FixtureRequest) -> RunLog:
+    return excitation(load_layout(request.param), 60.0, seed=3).run()
+
+
+def test_depth_attitude_and_place_stay_within_bounds(swim: RunLog) -> None:
+    away = np.abs(swim.position - swim.position[0]).max(axis=0)
+    assert np.hypot(away[0], away[1]) < BOUNDS[0] and away[2] < BOUNDS[1]
+    assert np.abs(euler(swim.quaternion)[:, :2]).max() < BOUNDS[2]
+
+
+def test_every_axis_and_every_fin_is_varied(swim: RunLog) -> None:
+    layout = load_layout(swim.layout)
+    assert (swim.delivered.std(axis=0) > [1.0, 0.5, 1.0, 0.1, 0.2, 0.2]).all()
+    assert (swim.motion.std(axis=0) > [0.03, 0.005, 0.01, 0.03, 0.05, 0.05]).all()
+    for i in range(layout.n_fins):
+        command = swim.command[:, i]
+        assert np.ptp(command[:, 0]) > 0.3 and np.ptp(command[:, 1]) > 1.0
+        counts, _ = np.histogram(command[:, 2], bins=4, range=(-np.pi, np.pi))
+        assert counts.min() > 10
+        # Amplitude and frequency are no function of each other, or the law of the fin could not be told.
+        assert abs(np.corrcoef(command[:, 0], command[:, 1])[0, 1]) < 0.8
+    force = swim.fin_force.reshape(len(swim.time), -1)
+    assert np.linalg.matrix_rank(force - force.mean(axis=0), tol=1.0) >= min(
+        force.shape[1], 2 * layout.n_fins
+    )
+
+
+def test_what_sensors_said_is_kept(swim: RunLog) -> None:
+    assert swim.measured.shape == (len(swim.time), 12)
+    said = np.concatenate([swim.position, euler(swim.quaternion), swim.motion], axis=1)
+    error = (swim.measured - said)[1:]
+    assert (error.std(axis=0) > 0.003).all() and (np.abs(error).max(axis=0) < 0.2).all()
+
+
+def test_commands_give_the_wrench_where_the_fins_can() -> None:
+    layout = load_layout("A")
+    allocator = ExcitingAllocator(layout, seed=1)
+    target = np.array([2.0, 0.5, -1.0, 0.05, 0.1, 0.1])
+    answers = [allocator.allocate(layout, target) for _ in range(50)]
+    missed = [np.linalg.norm((answer.wrench - target)[:3]) for answer in answers]
+    assert np.median(missed) < 0.5
+    assert len({round(answer.command[0, 0], 3) for answer in answers}) > 1
+
+
+def test_the_command_writes_a_log(tmp_path: object, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = f"{tmp_path}/swim"
+    assert main(["simulate", "A", "--excite", "--duration", "30", "--plant", "offset", "-o", folder]) == 0
+    assert "shaken on the spot" in capsys.readouterr().out
+    log = load_log(f"{folder}/log.npz")
+    assert log.task == "excitation" and log.plant == "offset" and len(log.time) == 300
+
+
+def test_what_cannot_be_shaken_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    layout: Layout = load_layout("A")
+    with pytest.raises(DataError, match="30 to 300 s, got 301"):
+        excitation(layout, 301.0)
+    assert main(["simulate", "A", "--excite", "--fail", "front_left@3"]) == 2
+    assert "leave --fail out" in capsys.readouterr().err
