@@ -13,6 +13,7 @@ from typing import Any, Protocol, TypeVar
 import viser
 
 from finlab.allocation.allocation import Allocation
+from finlab.bundle_files import LARGEST_BUNDLE
 from finlab.errors import FinlabError
 from webapp.handles import Changes, on_user_change, put
 from webapp.markup.picking import chosen_button
@@ -25,14 +26,19 @@ from webapp.tasks.background import EventLoop, Newest, Workers
 from webapp.tasks.comparison import Comparison
 from webapp.tasks.context import Context
 from webapp.tasks.exports import Exports
+from webapp.tasks.fitting import Fitting
 from webapp.tasks.improving import Improver
 from webapp.tasks.solver import Solver
 from webapp.tasks.sweeping import Sweep
 from webapp.tasks.swimming import Swimming
 from webapp.theme import VERMILLION
+from webapp.viser_internals import limit_uploads
 
 CARD_REST_S = 0.35
 """How long a layout may not change before its card is worked out [s]: that takes a second."""
+
+MAX_UPLOAD = LARGEST_BUNDLE
+"""Largest file that a browser may send [bytes]; each kind of file has a limit of its own below it."""
 
 Input = TypeVar("Input")
 
@@ -73,6 +79,8 @@ class Page(ABC):
         """What the layout can do."""
         self.improver = Improver(context)
         """The search for a better layout."""
+        self.fitting = Fitting(context)
+        """Measurements that become a fin."""
         self.comparison = Comparison(context)
         """Other methods on the same question."""
         self.swimming = Swimming(context, self._swam)
@@ -85,6 +93,7 @@ class Page(ABC):
         """What is seen beside the panel."""
         self.bound: list[Callable[[], None]] = []
         """Each writes what the session holds into a widget; the panel that is being built takes them."""
+        limit_uploads(client.gui, MAX_UPLOAD, self._refuse_upload)
         self._panels: list[Panel] = []
         self._panels, self._swim_panels = self._build()
         self._refresh()
@@ -144,7 +153,9 @@ class Page(ABC):
 
         return button
 
-    def add_upload(self, label: str, act: Callable[[str, bytes], object], **options: Any) -> None:
+    def add_upload(
+        self, label: str, act: Callable[[str, bytes], object], **options: Any
+    ) -> viser.GuiUploadButtonHandle:
         """A button that carries out `act(name, content)` when the user has chosen a file."""
         button = self.client.gui.add_upload_button(label, **options)
 
@@ -152,6 +163,8 @@ class Page(ABC):
         async def _uploaded(event: Any) -> None:
             file = event.target.value
             self.do(partial(act, file.name, file.content))
+
+        return button
 
     def add_buttons(
         self, label: str, acts: Mapping[str, Callable[[], object]], **options: Any
@@ -178,6 +191,11 @@ class Page(ABC):
     def notify(self, title: str, body: str) -> None:
         """Show a note to the user."""
         self.client.add_notification(title, body, auto_close_seconds=8.0, color=VERMILLION)
+
+    def _refuse_upload(self, name: str, size: int) -> None:
+        """Told when a browser offers a file that is too large to be taken at all."""
+        text = f"{str(name)[-60:]}: has {size:,} bytes, expected at most {MAX_UPLOAD:,}; nothing was read"
+        self.notify("Not possible", text)
 
     # From the session to the page.
 
@@ -234,6 +252,7 @@ class Page(ABC):
         self.swimming.stop()
         self.comparison.cancel()
         self.improver.forget()
+        self.fitting.forget()
         for task in (self.answering, self.analyst, self.ranging):
             task.forget()
 

@@ -64,6 +64,22 @@ def run_script(gui: viser.GuiApi, source: str) -> None:
     gui._websock_interface.queue_message(_messages.RunJavascriptMessage(source=source))
 
 
+def limit_uploads(gui: viser.GuiApi, most: int, refuse: Callable[[str, int], None]) -> None:
+    """Take no file that says it has more bytes than `most`: viser would gather it in memory before anybody
+    is asked. `refuse` is told its name and size on the event loop; what comes of it after that is dropped."""
+
+    def begin(client_id: Any, message: Any) -> None:
+        if message.size_bytes <= most:
+            gui._handle_file_transfer_start(client_id, message)
+            return
+        size = message.size_bytes
+        done = _messages.FileTransferPartAck(message.source_component_uuid, message.transfer_uuid, size, size)
+        gui._websock_interface.queue_message(done)  # so that the page stops showing how far it is
+        refuse(message.filename, size)
+
+    gui._websock_interface._incoming_handlers[_messages.FileTransferStartUpload] = [begin]
+
+
 def stop_server(server: viser.ViserServer) -> None:
     """Stop a server, silently."""
     with contextlib.redirect_stdout(io.StringIO()):

@@ -55,7 +55,7 @@ def check_fin_path(path: str | os.PathLike[str]) -> None:
 
 def summary(fit: FinFit) -> tuple[str, ...]:
     """Returns what the fit is worth, a line each; the first says why it should not be trusted, if so."""
-    doubts = fit.doubts()
+    doubts = fit.doubts
     head = (f"{DOUBT}: {'; '.join(doubts)}",) if doubts else ()
     amplitude, frequency = fit.measurements.reach
     lean = float(np.degrees(fit.lean))

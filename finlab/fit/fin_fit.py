@@ -1,6 +1,8 @@
 """A fin from measurements: smooth forces and power with their uncertainty, and whether to trust them."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,16 +53,28 @@ class FinFit:
 
     def predict(self, command: Array) -> tuple[Array, Array]:
         """Returns forces [N] in the fin frame and their standard deviations (..., 3) at commands (..., 3)."""
-        inputs = self.measurements.scaled(command)
-        found = [component.predict(inputs) for component in self.components]
-        (along, across, sideways), (by_along, by_across, by_sideways) = zip(*found, strict=True)
-        angle = command[..., 2].reshape(-1) + self.lean
+        thrust, unsure = self.thrust(command)
+        angle = command[..., 2] + self.lean
         cos, sin = np.cos(angle), np.sin(angle)
-        force = np.stack([sideways, along * cos - across * sin, along * sin + across * cos], axis=-1)
+        along, across, sideways = np.moveaxis(thrust, -1, 0)
+        by_along, by_across, by_sideways = np.moveaxis(unsure, -1, 0)
+        force = [sideways, along * cos - across * sin, along * sin + across * cos]
         deviation = [by_sideways, np.hypot(by_along * cos, by_across * sin)]
         deviation += [np.hypot(by_along * sin, by_across * cos)]
-        shape = command.shape
-        return self.largest * force.reshape(shape), self.largest * np.stack(deviation, -1).reshape(shape)
+        return np.stack(force, axis=-1), np.stack(deviation, axis=-1)
+
+    def thrust(self, command: Array) -> tuple[Array, Array]:
+        """Returns forces [N] along the thrust's mean direction, across it and along the shaft, and their
+        standard deviations (..., 3), at commands (..., 3)."""
+        inputs = self.measurements.scaled(command)
+        found = np.array([component.predict(inputs) for component in self.components])
+        mean, deviation = self.largest * found.transpose(1, 2, 0)
+        return mean.reshape(command.shape), deviation.reshape(command.shape)
+
+    @cached_property
+    def measured(self) -> Array:
+        """The forces of the samples [N], as `thrust` has them (n, 3)."""
+        return _turned_forces(self.measurements)[0]
 
     def predict_power(self, command: Array) -> Array | None:
         """Returns the power [W], (...), at commands (..., 3); None where none was measured."""
@@ -87,8 +101,9 @@ class FinFit:
         """Returns the standard deviation (...) of the force at commands (..., 3) over the largest force."""
         return np.asarray(np.linalg.norm(self.predict(command)[1], axis=-1) / self.largest)
 
+    @cached_property
     def doubts(self) -> tuple[str, ...]:
-        """Returns why the fit should not be trusted, a clause each; nothing where it may be."""
+        """Why the fit should not be trusted, a clause each; nothing where it may be."""
         grid = self.grid()
         doubtful = []
         usual = float(np.sqrt(np.mean(self.uncertainty(grid) ** 2)))
@@ -120,23 +135,30 @@ class FinFit:
         return np.linspace(measured.min(), measured.max(), count)
 
 
-def fit_fin(measurements: Measurements, seed: int = 0) -> FinFit:
+def fit_fin(
+    measurements: Measurements, seed: int = 0, progress: Callable[[str], None] | None = None
+) -> FinFit:
     """Returns the fin that explains samples, leaving out those that contradict all others.
 
     Args:
+        measurements: at least `MIN_SAMPLES`.
         seed: draws the samples that are kept where there are more than `MOST_SAMPLES`.
+        progress: told in a few words what comes next.
     """
+    tell = progress or (lambda _: None)
     notes = list(measurements.notes)
     if len(measurements) > MOST_SAMPLES:
         drawn = np.random.default_rng(seed).permutation(len(measurements)) >= MOST_SAMPLES
         notes.append(f"{MOST_SAMPLES} of {len(measurements)} samples, drawn at random, are used")
         measurements = measurements.without(drawn)
+    tell("looking for samples that contradict the others")
     bad = _outliers(measurements)
     outliers = tuple(place for place, out in zip(measurements.places, bad, strict=True) if out)
     if outliers:
         shown = ", ".join(outliers[:5]) + (" ..." if len(outliers) > 5 else "")
         notes.append(f"{len(outliers)} of {len(bad)} samples contradict the others and are left out: {shown}")
         measurements = measurements.without(bad)
+    tell("fitting forces and power" if measurements.power is not None else "fitting forces")
     return _fitted(measurements, outliers, tuple(notes))
 
 

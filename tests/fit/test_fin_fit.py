@@ -74,14 +74,14 @@ def test_neighbours_of_wild_samples_are_taken_back_under_mixed_noise() -> None:
 
 
 def test_a_good_fit_is_trusted(fit: FinFit) -> None:
-    assert fit.doubts() == () and not summary(fit)[0].startswith(DOUBT)
+    assert fit.doubts == () and not summary(fit)[0].startswith(DOUBT)
     assert 0.9 < fit.coverage() < 1.0 and 0.01 < fit.error() < 0.06 and 0.01 < fit.noise() < 0.06
 
 
 def test_few_samples_are_doubted_first_of_all(tmp_path: Path) -> None:
     command = commands(24, seed=5)
     few = fit_fin(samples(command, measured(LAW, command, 0.3)))
-    assert "24 samples are few" in few.doubts()[-1] or len(few.doubts()) > 0
+    assert "24 samples are few" in few.doubts[-1] or len(few.doubts) > 0
     assert summary(few)[0].startswith(DOUBT)
     write_fin(few, tmp_path / "few.csv")
     assert (tmp_path / "few.csv").read_text().startswith(f"# {DOUBT}: ")

@@ -40,7 +40,7 @@ def running() -> EventLoop:
 
 def page_of(worker: Any, session: Any = None, **options: Any) -> Context:
     """A page that does all its work on one worker, with the stand-in allocator unless told otherwise."""
-    workers: Any = SimpleNamespace(answers=worker, swims=worker, searches=worker)
+    workers: Any = SimpleNamespace(answers=worker, swims=worker, searches=worker, fits=worker)
     silent: dict[str, Any] = {
         "client": None,
         "solver": Solver(load=load_stand_in),

@@ -12,7 +12,8 @@ from finlab.deploy.bundle import make_bundle
 from finlab.deploy.graph import build_graph
 from finlab.deploy.graph_file import graph_bytes
 from finlab.errors import DataError
-from finlab.layout import FinModelSpec, Layout, load_layout
+from finlab.layout import FinModelSpec, Layout, layout_to_dict, load_layout
+from finlab.layout.yaml_file import yaml_text
 from finlab.physics import make_law, plant_of
 from finlab.physics.table_file import write_table
 from webapp.markup.snippets import command_line, export_line
@@ -66,9 +67,12 @@ def test_only_paper_warns_of_fins() -> None:
     assert reach_sentence(warned) == "Not learned: fins 1, 2, 3 and 4. Choose another method"
 
 
-def test_a_table_fin_goes_through_the_whole_app(tabled: Layout, tmp_path: Path) -> None:
+def test_a_table_fin_goes_through_the_whole_app(
+    tabled: Layout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     session = Session(load_layout("ucat"))
-    session.open_layout(files.read_layout("tabled.yaml", files.layout_bytes(tabled)))
+    session.open_layout(files.read_layout(*files.layout_file(tabled)))
     for axis, value in enumerate(reachable(tabled)):
         session.set_target(axis, round(value, 4))
     reply = SOLVER.reply(session.state)
@@ -92,7 +96,7 @@ def test_a_table_fin_goes_through_the_whole_app(tabled: Layout, tmp_path: Path) 
 
 
 def test_a_table_that_is_not_here_is_told_when_the_layout_is_opened(tabled: Layout, tmp_path: Path) -> None:
-    content = files.layout_bytes(tabled)
+    content = yaml_text(layout_to_dict(tabled)).encode()
     (tmp_path / "fin.csv").unlink()
     with pytest.raises(DataError, match="fin.csv"):
         files.read_layout("other.yaml", content.replace(b"tabled", b"other"))

@@ -20,16 +20,17 @@ class FilesTab:
             "Open a layout file",
             self._open,
             icon=viser.Icon.FOLDER_OPEN,
-            mime_type=".yaml,.yml,.json",
-            hint="A layout file (YAML or JSON) or a layout graph file.",
+            mime_type=".yaml,.yml,.json,.zip",
+            hint="A layout file (YAML, JSON), a graph file, a bundle, or a layout zipped with its tables.",
         )
+        hint = "Measured fins come along in a ZIP. The HTML page moves by itself and needs no server."
         saves = {
             "Layout (YAML)": self._send_layout,
             "Candidates (CSV)": self._send_candidates,
             "Picture (PNG)": page.exports.picture,
             "3D view (HTML)": lambda: page.exports.html(page.shown),
         }
-        page.add_buttons("Save", saves, hint="The HTML page moves by itself and needs no server.")
+        page.add_buttons("Save", saves, hint=hint)
         page.add_buttons(
             "For the robot",
             {"Graph file": page.exports.graph, "Bundle (ZIP)": page.exports.bundle},
@@ -41,8 +42,7 @@ class FilesTab:
         self._page.session.open_layout(files.read_layout(name, content))
 
     def _send_layout(self) -> None:
-        layout = self._page.session.state.layout
-        self._page.exports.download(f"{files.file_stem(layout.name)}.yaml", files.layout_bytes(layout))
+        self._page.exports.download(*files.layout_file(self._page.session.state.layout))
         self._page.session.note_saved()
 
     def _send_candidates(self) -> None:

@@ -13,6 +13,7 @@ from finlab.layout.body import HULL_SHAPES
 from webapp.handles import Changes, hold_kind, put
 from webapp.markup.score_card import check_card, warnings
 from webapp.page import Page
+from webapp.panels.fin_model import FinModelPanel
 from webapp.scene.meshes.hull import hull_of
 from webapp.scene.meshes.mesh_hull import UNITS
 from webapp.session import ANGLE_STEPS, POSITION_STEPS
@@ -60,6 +61,7 @@ class LayoutTab:
             page.bind_display(snap_m, "position_snap")
             page.bind_display(snap_deg, "angle_snap")
             page.bind_display(gui.add_checkbox("Stick to hull", False, hint=slides), "stick")
+        self._model = FinModelPanel(gui, page)
         edits: dict[str, Callable[[], object]] = {
             "Mirror": session.mirror_fin,
             "Mirror once": partial(session.mirror_fin, linked=False),
@@ -106,6 +108,7 @@ class LayoutTab:
 
     def refresh(self) -> None:
         """Write the layout and the selected fin."""
+        self._model.refresh()
         session, layout = self._page.session, self._page.session.state.layout
         put(self._fins, options=(NONE, *layout.names), value=session.selected or NONE)
         selected = session.selected is not None

@@ -1,10 +1,11 @@
 """Intents about the layout: place, turn, copy and remove fins, shape the hull."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 from finlab.errors import FinlabError
-from finlab.layout import Fin, Layout
+from finlab.layout import Fin, FinModelSpec, Layout
 from finlab.layout.body import Hull
 from webapp.session import layout_edits
 from webapp.session.core import Core
@@ -120,6 +121,11 @@ class Editing(Core):
         """The selected fin goes."""
         name = self._selected_name()
         self._edit(f"Delete {name}", layout_edits.deleted(self.state.layout, name))
+
+    def set_model(self, names: Sequence[str], model: FinModelSpec) -> None:
+        """Another model for some fins."""
+        which = names[0] if len(names) == 1 else f"{len(names)} fins"
+        self._edit(f"Fit {which}", layout_edits.with_model(self.state.layout, names, model))
 
     def set_hull(self, shape: str, size: Vector) -> None:
         """A parametric hull of a size [m]."""

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from finlab.allocation.allocation import Allocation
 from finlab.assets import shipped_layouts
+from finlab.deploy.bundle import with_tables_inside
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.layout import Layout, layout_to_dict, load_layout, parse_layout
 from finlab.layout.body import Hull
@@ -22,6 +23,7 @@ from finlab.sim import Trajectory
 from finlab.sim.task import read_trajectory
 from webapp.scene.meshes.mesh_hull import UNITS, read_mesh
 from webapp.session.state import chosen
+from webapp.session.table_files import archive_of, read_archive
 
 MAX_PATH_BYTES = 2_000_000
 """Largest file of a way to swim that is taken."""
@@ -44,13 +46,17 @@ def file_stem(name: str) -> str:
 
 
 def read_layout(name: str, content: bytes) -> Layout:
-    """The layout in an uploaded layout file or layout graph file.
+    """The layout in an uploaded layout file, graph file, bundle, or archive of a layout with its tables.
 
     Raises:
         LayoutError: the file is too large, no text or no layout; the message names file and key.
         DataError: a fin's force table is not on this computer, or cannot be read.
     """
     source = Path(str(name)).name[:80] or "upload"
+    if source.lower().endswith(".zip"):
+        layout = read_archive(source, content, table_folder())
+        plant_of(layout)
+        return layout
     if len(content) > MAX_BYTES:
         raise LayoutError(f"is larger than {MAX_BYTES:,} bytes, a layout has a few thousand", source=source)
     text = decode_text(content, source)
@@ -63,9 +69,16 @@ def read_layout(name: str, content: bytes) -> Layout:
     return layout
 
 
-def layout_bytes(layout: Layout) -> bytes:
-    """The layout as a YAML file."""
-    return yaml_text(layout_to_dict(layout)).encode()
+def layout_file(layout: Layout) -> tuple[str, bytes]:
+    """Name and content of the layout's file: YAML, or where fins are known by tables an archive with them.
+
+    Raises:
+        DataError: a table cannot be read, or is too large to travel.
+    """
+    stem = file_stem(layout.name)
+    inside, tables = with_tables_inside(layout)
+    text = yaml_text(layout_to_dict(inside)).encode()
+    return (f"{stem}.zip", archive_of(f"{stem}.yaml", text, tables)) if tables else (f"{stem}.yaml", text)
 
 
 def candidates_csv(allocation: Allocation | None) -> bytes:
@@ -91,6 +104,11 @@ def candidates_csv(allocation: Allocation | None) -> bytes:
 def cache_folder() -> Path:
     """Where the app keeps files of its own: `$XDG_CACHE_HOME/finlab`, or `~/.cache/finlab`."""
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "finlab"
+
+
+def table_folder() -> Path:
+    """Where the app keeps the force tables of fins."""
+    return cache_folder() / "tables"
 
 
 def stored_hull(name: str, content: bytes, unit: str) -> Hull:

@@ -1,13 +1,14 @@
 """Changes of a layout that a designer makes by hand. Each takes a layout and returns another one."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from finlab.errors import FinlabError
-from finlab.layout import Body, Fin, Layout
+from finlab.layout import Body, Fin, FinModelSpec, Layout
 from finlab.layout.angles import wrapped
 from finlab.layout.body import HULL_SHAPES, Hull
 from webapp.scene.meshes.hull import hull_of
@@ -135,6 +136,13 @@ def _mirror_name(name: str) -> str:
         if right in name:
             return name.replace(right, left)
     return f"{name}_mirror"
+
+
+def with_model(layout: Layout, names: Sequence[str], model: FinModelSpec) -> Layout:
+    """The layout with another model on some fins."""
+    for name in names:
+        layout = layout.replace_fin(name, model=model)
+    return layout
 
 
 def shaped(layout: Layout, shape: str, size: Vector) -> Layout:

@@ -116,6 +116,8 @@ class Workers:
     """Robots that swim: all the time, in short turns."""
     searches: Worker = field(default_factory=Worker)
     """Better layouts: up to minutes."""
+    fits: Worker = field(default_factory=Worker)
+    """Fins fitted to measurements: seconds."""
 
     def stop(self) -> None:
         """End all threads."""

@@ -11,13 +11,14 @@ import imageio.v3 as iio
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
-from finlab.deploy.bundle import make_bundle
+from finlab.deploy.bundle import make_bundle, with_tables_inside
 from finlab.deploy.graph import build_graph
 from finlab.deploy.graph_file import graph_bytes
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.scene.robot_scene import RobotScene
 from webapp.session.files import file_stem
+from webapp.session.table_files import archive_of, has_tables
 from webapp.tasks.context import Context
 from webapp.viser_internals import start_server, stop_server
 
@@ -58,8 +59,18 @@ class Exports:
         self._context, self._session = context, context.session
 
     def graph(self) -> None:
-        """Send the layout graph file."""
-        self._send_made(".graph.json", lambda *robot: graph_bytes(build_graph(*robot)))
+        """Send the layout graph file; where fins are known by tables, an archive with them."""
+        layout = self._session.state.layout
+        name = f"{file_stem(layout.name)}.graph.json"
+
+        def archive(*robot: Any) -> bytes:
+            inside, tables = with_tables_inside(layout)
+            return archive_of(name, graph_bytes(replace(build_graph(*robot), layout=inside)), tables)
+
+        if has_tables(layout):
+            self._send_made(".graph.zip", archive)
+        else:
+            self._send_made(".graph.json", lambda *robot: graph_bytes(build_graph(*robot)))
 
     def bundle(self) -> None:
         """Send the bundle for the robot: the same bytes as `finlab export --zip`.
@@ -91,10 +102,13 @@ class Exports:
 
     def _send(self, suffix: str, make: Callable[[], bytes]) -> None:
         """Have the worker make a file, and send it; of each kind only the newest that is asked for."""
-        name = f"{file_stem(self._session.state.layout.name)}{suffix}"
+        self.send_made(f"{file_stem(self._session.state.layout.name)}{suffix}", make)
+
+    def send_made(self, name: str, make: Callable[[], bytes]) -> None:
+        """Have the worker make a file of this name, and send it; of each name only the newest."""
         loop, notify = self._context.loop, self._context.notify
         self._context.workers.answers.submit(
-            (id(self), suffix),
+            (id(self), name),
             lambda: loop.post(partial(self.download, name, make())),
             lambda text: loop.post(partial(notify, "Not exported", text)),
         )

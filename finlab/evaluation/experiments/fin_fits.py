@@ -143,7 +143,7 @@ def _fitted(allocator: Allocator, case: Case, samples: int, noise: Noise, rng: n
         missed = _missed(allocator, case, fitted)
         grid = noisy_table(rng, fin, f"fit-{rng.integers(1 << 62):x}", noise)
         floor = _missed(allocator, case, grid.model)
-    return Fitted(error, covered, len(fit.outliers), not fit.doubts(), missed, floor, fit_s, page_s)
+    return Fitted(error, covered, len(fit.outliers), not fit.doubts, missed, floor, fit_s, page_s)
 
 
 def _against(fit: FinFit, command: Array, truth: Array) -> tuple[Array, float]:

@@ -38,7 +38,7 @@ def fin_fit_page(fit: FinFit, name: str) -> Document:
             command, np.linalg.norm(force, axis=-1), np.linalg.norm(deviation, axis=-1), strict=True
         )
     ]
-    doubts = fit.doubts()
+    doubts = fit.doubts
     thin = thin_regions(fit)
     verdict = (
         f"**Not to be trusted: {'; '.join(doubts)}.**"
@@ -66,8 +66,8 @@ def fin_fit_page(fit: FinFit, name: str) -> Document:
             Figure(
                 "thrust",
                 lambda: draw_thrust(fit),
-                "Force along the thrust's direction, averaged over all zero directions. What the fit says "
-                "of a sample's own direction is taken off the sample.",
+                "Force along the thrust's direction, averaged over all zero directions. Samples are moved "
+                "to the frequency of the line as the fit has it: what stands off the line it leaves over.",
             ),
             "## Errors and direction",
             Figure(

@@ -1,0 +1,275 @@
+"""A file of measurements dropped on a fin: the fit, undo, refusals; layouts that carry their tables."""
+
+import io
+import threading
+import time
+import zipfile
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from finlab import load_allocator
+from finlab.errors import DataError, FinlabError, LayoutError
+from finlab.layout import Layout, load_layout
+from finlab.physics.table_file import DOUBT, table_bytes
+from tests.fit.cell import columns_of, commands, measured, soft, write
+from tests.webapp.loops import page_of
+from webapp.markup.fin_model import model_card
+from webapp.markup.fit_card import fit_card
+from webapp.session import Session, files
+from webapp.session.layout_edits import with_model
+from webapp.session.table_files import archive_of, read_archive, stored_table
+from webapp.tasks import fitting
+from webapp.tasks.background import Worker
+from webapp.tasks.fitting import Fitting
+
+LAW = soft(k=4.0, p=1.4, x0=0.9, q=4.0, e=0.15, phi_e=1.0, d=0.12)
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where tables are kept in these tests."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "finlab" / "tables"
+
+
+@pytest.fixture
+def worker() -> Iterator[Worker]:
+    worker = Worker()
+    yield worker
+    worker.stop()
+
+
+def cell(tmp_path: Path, n: int = 70) -> bytes:
+    """A file of noisy measurements, one of which is wild."""
+    command = commands(n)
+    force = measured(LAW, command)
+    force[5, 1] += 4.0
+    return write(tmp_path / "cell.csv", columns_of(command, force)).read_bytes()
+
+
+def until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + 60
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+class Opened:
+    """A page without a browser."""
+
+    def __init__(self, worker: Worker) -> None:
+        self.session, self.told, self.refused = Session(load_layout("ucat")), [], []
+        self.told: list[str] = []
+        self.refused: list[str] = []
+        context = page_of(
+            worker,
+            self.session,
+            do=self._do,
+            notify=lambda title, text: self.told.append(f"{title}: {text}"),
+            changed=lambda: self.stages.append(self.fitting.progress),
+        )
+        self.stages: list[str] = []
+        self.fitting = Fitting(context)
+
+    def _do(self, act: Callable[[], object]) -> None:
+        try:
+            act()
+        except FinlabError as error:
+            self.refused.append(str(error))
+
+    @property
+    def models(self) -> list[str]:
+        return [fin.model.type for fin in self.session.state.layout.fins]
+
+
+def test_a_noisy_file_becomes_the_fins_model_and_undo_takes_it_off(tmp_path: Path, worker: Worker) -> None:
+    opened = Opened(worker)
+    before, fitting = opened.session.state, opened.fitting
+    fitting.start("back_left", "../cell.csv", cell(tmp_path))
+    with pytest.raises(FinlabError, match="under way already"):
+        fitting.start("back_left", "cell.csv", b"")
+    until(lambda: fitting.findings is not None)
+    until(lambda: opened.session.state != before)
+    assert "looking for samples that contradict the others" in opened.stages
+    assert (
+        opened.models == ["drag", "drag", "table", "drag"]
+        and opened.session.history.undo_name == "Fit back_left"
+    )
+    found = fitting.findings
+    assert found is not None and found.fit is not None and found.upload.content == b""
+    card = fit_card(found)
+    assert "May be trusted" in card and "1 sample contradicts the others: cell.csv line 7." in card
+    assert card.count("<circle") >= 60 and "Measure next" in card and "of 69 samples" in card
+    answer = load_allocator().allocate(opened.session.state.layout, [0.5, 0, 0.2, 0, 0, 0.05])
+    assert answer.err_norm < 1e-6
+    fitting.put_on_all()
+    assert opened.models == ["table"] * 4 and opened.session.history.undo_name == "Fit 3 fins"
+    with pytest.raises(FinlabError, match="no other fin"):
+        fitting.put_on_all()
+    opened.session.undo()
+    opened.session.undo()
+    assert opened.session.state == before
+
+
+def test_a_finished_table_is_recognized(tmp_path: Path, worker: Worker) -> None:
+    opened = Opened(worker)
+    opened.fitting.start("back_left", "cell.csv", cell(tmp_path))
+    until(lambda: "table" in opened.models)
+    path = str(opened.session.state.layout.fins[2].model.values()["path"])
+    opened.fitting.start("front_left", "fin.csv", table_bytes(path))
+    until(lambda: opened.models == ["drag", "table", "table", "drag"])
+    found = opened.fitting.findings
+    assert found is not None and found.fit is None and "fin.csv is a finished force table" in fit_card(found)
+    assert opened.session.state.layout.fins[1].model == opened.session.state.layout.fins[2].model
+    words = model_card(opened.session.state.layout.fins[1])
+    assert "<b>table</b>, fitted to 69 samples" in words and "all round" in words
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "sentence"),
+    [
+        ("cell.csv", b"A,f,Fy,Fz\n0.1,1,1,x\n", "cell.csv: line 2, column Fz, holds 'x', expected a number"),
+        ("cell.csv", b"A,f,Fy,Fz\n0.1,1,1,1\n", "cell.csv: 1 samples, expected at least 20"),
+        ("picture.png", b"\x89PNG\x0d\x0a\xff\xfe", "picture.png: cannot be read as CSV text"),
+        ("empty.csv", b"", "empty.csv: "),
+    ],
+)
+def test_bad_files_get_a_sentence_and_change_nothing(
+    name: str, content: bytes, sentence: str, worker: Worker, cache: Path
+) -> None:
+    opened = Opened(worker)
+    before = opened.session.state
+    opened.fitting.start("back_left", name, content)
+    until(lambda: bool(opened.told))
+    assert opened.told[0].startswith(f"Not fitted: {sentence}"), "without the server's folder"
+    assert opened.session.state == before and not opened.fitting.busy and not cache.exists()
+
+
+def test_large_files_and_unknown_fins_are_refused_at_once(
+    worker: Worker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened = Opened(worker)
+    with pytest.raises(FinlabError, match="nobody"):
+        opened.fitting.start("nobody", "cell.csv", b"")
+    monkeypatch.setattr(fitting, "MAX_BYTES", 10)
+    with pytest.raises(DataError, match="cell.csv: has 11 bytes, expected at most 10"):
+        opened.fitting.start("back_left", "cell.csv", b"12345678901")
+    assert not opened.fitting.busy
+
+
+def test_what_was_cancelled_or_left_comes_to_nothing(tmp_path: Path, worker: Worker) -> None:
+    opened, gate = Opened(worker), threading.Event()
+    before = opened.session.state
+    worker.submit("hold", lambda: gate.wait(30), lambda _: None)  # type: ignore[arg-type,func-returns-value]
+    opened.fitting.start("back_left", "cell.csv", cell(tmp_path))
+    opened.fitting.forget()
+    gate.set()
+    done = threading.Event()
+    worker.submit("after", done.set, lambda _: None)
+    assert done.wait(60) and opened.session.state == before and opened.stages == []
+
+
+def test_a_fin_that_became_another_meanwhile_is_left_alone(tmp_path: Path, worker: Worker) -> None:
+    opened, gate = Opened(worker), threading.Event()
+    worker.submit("hold", lambda: gate.wait(30), lambda _: None)  # type: ignore[arg-type,func-returns-value]
+    opened.fitting.start("back_left", "cell.csv", cell(tmp_path))
+    opened.session.open_layout(load_layout("penta"))
+    gate.set()
+    until(lambda: bool(opened.refused))
+    assert "back_left is no longer the fin that cell.csv was for" in opened.refused[0]
+    assert "table" not in opened.models and opened.fitting.findings is None
+
+
+def test_doubts_come_first(tmp_path: Path, worker: Worker) -> None:
+    opened = Opened(worker)
+    opened.fitting.start("back_left", "few.csv", cell(tmp_path, 25))
+    until(lambda: "table" in opened.models)
+    assert opened.fitting.findings is not None
+    assert fit_card(opened.fitting.findings).startswith(
+        "<div class='fl'><div class='said'><b class='missing'>Not to be trusted: "
+    )
+    assert DOUBT in model_card(opened.session.state.layout.fins[2])
+
+
+def robot(tmp_path: Path, cache: Path) -> Layout:
+    """U-CAT with one measured fin."""
+    from finlab.layout import FinModelSpec
+    from finlab.physics import make_law
+    from finlab.physics.table_file import write_table
+
+    grid = [[0.05, 0.3, 0.6], [0.1, 1.0, 2.1], [-3.0, -1.5, 0.0, 1.5]]
+    write_table(tmp_path / "mine.csv", make_law(FinModelSpec("soft")), *grid)  # type: ignore[arg-type]
+    spec = stored_table((tmp_path / "mine.csv").read_bytes(), cache)
+    return replace(with_model(load_layout("ucat"), ["back_left"], spec), name="my robot")
+
+
+def test_a_layout_carries_its_tables_elsewhere(tmp_path: Path, cache: Path) -> None:
+    layout = robot(tmp_path, cache)
+    name, content = files.layout_file(layout)
+    assert name == "my_robot.zip" and files.layout_file(layout) == (name, content)
+    elsewhere = tmp_path / "elsewhere"
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        archive.extractall(elsewhere)
+    for path in cache.glob("*.csv"):
+        path.unlink()
+    opened = load_layout(elsewhere / "my_robot.yaml")
+    answer = load_allocator().allocate(opened, [0.5, 0, 0.2, 0, 0, 0.05])
+    assert answer.err_norm < 1e-6
+    again = files.read_layout(name, content)
+    assert again == layout and table_bytes(str(again.fins[2].model.values()["path"]))
+    assert files.layout_file(load_layout("ucat"))[0] == "ucat.yaml"
+
+
+def test_a_bundle_opens_in_the_app(tmp_path: Path, cache: Path) -> None:
+    from finlab.deploy.bundle import make_bundle
+
+    layout = robot(tmp_path, cache)
+    content = make_bundle(layout, load_allocator()).zip_bytes()
+    assert files.read_layout("robot.zip", content).fins[2].model == layout.fins[2].model
+    with pytest.raises(DataError, match=r"^robot\.zip: is neither"):
+        files.read_layout("robot.zip", content.replace(b"finlab-graph", b"finlab-gr@ph"))
+
+
+@pytest.mark.parametrize(
+    ("parts", "sentence"),
+    [
+        ({"a.yaml": b"x", "b.yaml": b"y"}, "2 of them layouts; expected a bundle, or one layout file"),
+        ({"a.yaml": b"x", "../out.csv": b"y"}, "holds '../out.csv', expected a layout file and CSV tables"),
+        ({"a.yaml": b"x", "run.py": b"y"}, "holds 'run.py'"),
+        ({"a.yaml": b"name: 3"}, "robot.zip/a.yaml: "),
+    ],
+)
+def test_other_archives_are_refused(parts: dict[str, bytes], sentence: str, tmp_path: Path) -> None:
+    (name, document), *rest = parts.items()
+    with pytest.raises(LayoutError) as raised:
+        read_archive("robot.zip", archive_of(name, document, dict(rest)), tmp_path / "kept")
+    assert sentence in str(raised.value) and str(raised.value).startswith("robot.zip")
+    assert not (tmp_path / "kept").exists()
+    with pytest.raises(LayoutError, match=r"^robot\.zip: cannot be read as a zip archive"):
+        read_archive("robot.zip", b"no zip", tmp_path)
+
+
+def test_files_that_say_they_are_too_large_never_come_in() -> None:
+    from types import SimpleNamespace
+
+    from viser import _messages
+
+    from webapp.viser_internals import limit_uploads
+
+    begun: list[Any] = []
+    sent: list[Any] = []
+    refused: list[tuple[str, int]] = []
+    wire = SimpleNamespace(_incoming_handlers={}, queue_message=sent.append)
+    gui: Any = SimpleNamespace(
+        _websock_interface=wire, _handle_file_transfer_start=lambda client, message: begun.append(message)
+    )
+    limit_uploads(gui, 100, lambda name, size: refused.append((name, size)))
+    (begin,) = wire._incoming_handlers[_messages.FileTransferStartUpload]
+    for size in (100, 10_000_000_000):
+        begin(1, _messages.FileTransferStartUpload("button", f"t{size}", "big.csv", "text/csv", 1, size))
+    assert [message.size_bytes for message in begun] == [100] and refused == [("big.csv", 10_000_000_000)]
+    assert sent[0].transferred_bytes == sent[0].total_bytes == 10_000_000_000

@@ -1,0 +1,50 @@
+"""What a fin is known by, in words: a law with its numbers, or a table and what it is worth."""
+
+import math
+from html import escape
+
+from finlab.errors import DataError
+from finlab.layout.fin import FIN_MODELS, Fin, FinModelSpec
+from finlab.physics import make_law
+from finlab.physics.table import TableLaw
+from finlab.physics.table_file import DOUBT
+
+LAWS = {
+    "drag": "a stiff blade in quasi-steady drag (U-CAT's own law)",
+    "lighthill": "a fin after Lighthill's elongated-body theory",
+    "soft": "a soft fin that saturates, then declines",
+}
+"""Fin models with a formula, in words."""
+
+
+def model_card(fin: Fin) -> str:
+    """The model of a fin."""
+    return f"<div class='fl'>{_words(fin.model)}</div>"
+
+
+def _words(model: FinModelSpec) -> str:
+    if model.type == "table":
+        return _table_words(model)
+    values, rules = model.values(), FIN_MODELS[model.type]
+    given = ", ".join(
+        f"{escape(rule.meaning)} {float(values[name]):.4g}{f' {rule.unit}' if rule.unit else ''}"
+        for name, rule in rules.items()
+    )
+    return f"<b>{model.type}</b>: {LAWS[model.type]}.<div class='dim'>{given}.</div>"
+
+
+def _table_words(model: FinModelSpec) -> str:
+    try:
+        law = make_law(model)
+    except DataError as error:
+        return f"<b>table</b>: <span class='missing'>{escape(str(error))}</span>"
+    assert isinstance(law, TableLaw)
+    (low_a, high_a), (low_f, high_f), (low_d, high_d) = law.covers
+    turn = "all round" if law.periodic else f"from {math.degrees(low_d):.0f}° to {math.degrees(high_d):.0f}°"
+    covers = f"A {low_a:.2f} to {high_a:.2f} rad, f {low_f:.2f} to {high_f:.2f} Hz, {turn}"
+    power = "with the power that was measured" if law.has_power else "power as of U-CAT's fin"
+    doubt = next((note for note in law.notes if note.startswith(DOUBT)), None)
+    said = "" if doubt is None else f"<div class='missing'>This fin is {escape(doubt)}.</div>"
+    fitted = next((note for note in law.notes if note.startswith("fitted to ")), None)
+    origin = f", {escape(fitted.split(',')[0])}" if fitted else " of forces"
+    return f"<b>table</b>{origin}.{said}<div class='dim'>{covers}; {power}.</div>"

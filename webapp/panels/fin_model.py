@@ -1,0 +1,113 @@
+"""What the selected fin is known by, and a new model for it from a file of measurements."""
+
+from html import escape
+
+import viser
+
+from finlab.errors import FinlabError
+from webapp.handles import Changes, put
+from webapp.markup.fin_model import model_card
+from webapp.page import Page
+from webapp.session.files import file_stem
+from webapp.tasks.fitting import MAX_BYTES, Fitted
+
+
+class FinModelPanel:
+    """Widgets of one folder."""
+
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
+        """Build the widgets."""
+        self._page = page
+        with gui.add_folder("Fin model"):
+            self._words = gui.add_html("")
+            self._upload_button = page.add_upload(
+                "Fit from measurements (CSV)",
+                self._upload,
+                icon=viser.Icon.UPLOAD,
+                mime_type=".csv,.txt",
+                hint=(
+                    "For the selected fin: noisy rows of A, f, phi, Fx, Fy, Fz, a raw series, or a finished "
+                    f"force table. Up to {MAX_BYTES // 1_000_000} MB."
+                ),
+            )
+            self._bar = gui.add_progress_bar(100.0, animated=True, visible=False)
+            self._cancel = page.add_button(
+                "Cancel",
+                page.fitting.forget,
+                icon=viser.Icon.X,
+                visible=False,
+                hint="The fin stays as it is.",
+            )
+            self._card = gui.add_html("")
+            results = {
+                "On all like it": page.fitting.put_on_all,
+                "Table (CSV)": self._send_table,
+                "Page (HTML)": self._send_page,
+                "Close": page.fitting.forget,
+            }
+            self._results = page.add_buttons(
+                "Fit", results, visible=False, hint="All fins that had the same model. Undo takes a fit back."
+            )
+        self._changes = Changes()
+
+    def _upload(self, name: str, content: bytes) -> None:
+        session = self._page.session
+        if session.selected is None:
+            raise FinlabError("no fin is selected; click the one that was measured, or choose it in the list")
+        self._page.fitting.start(session.selected, name, content)
+
+    def _found(self) -> Fitted:
+        found = self._page.fitting.findings
+        if found is None:
+            raise FinlabError("there is no fit; upload a file of measurements first")
+        return found
+
+    def _send_table(self) -> None:
+        from finlab.physics.table_file import table_bytes
+
+        found = self._found()
+        path = str(found.model.values()["path"])
+        self._page.exports.download(f"{file_stem(found.upload.fin)}.csv", table_bytes(path))
+
+    def _send_page(self) -> None:
+        found = self._found()
+        fit = found.fit
+        if fit is None:
+            raise FinlabError("a finished table has no page; only a fit has")
+
+        def page() -> bytes:
+            from finlab.evaluation.report.fin_fit_page import fin_fit_page
+            from finlab.evaluation.report.pages import to_html
+
+            return to_html(fin_fit_page(fit, found.upload.fin)).encode()
+
+        self._page.exports.send_made(f"{file_stem(found.upload.fin)}.html", page)
+
+    def refresh(self) -> None:
+        """Write the model of the selected fin, and how far a fit is."""
+        session, fitting = self._page.session, self._page.fitting
+        layout = session.state.layout
+        if session.selected is None:
+            words = "<div class='fl dim'>Select the fin that was measured.</div>"
+        else:
+            words = model_card(layout.fins[layout.index(session.selected)])
+        put(self._words, content=words)
+        put(self._upload_button, disabled=session.selected is None or fitting.busy)
+        put(self._bar, visible=fitting.busy)
+        put(self._cancel, visible=fitting.busy)
+        found = fitting.findings
+        put(self._results, visible=found is not None)
+        if self._changes(found, fitting.busy, fitting.progress, fitting.error):
+            put(self._card, content=self._written(found))
+
+    def _written(self, found: Fitted | None) -> str:
+        fitting = self._page.fitting
+        if fitting.busy:
+            return f"<div class='fl dim'>{escape(fitting.progress)} …</div>"
+        if fitting.error is not None:
+            return f"<div class='fl missing'>{escape(fitting.error)}</div>"
+        if found is None:
+            return ""
+        from webapp.markup.fit_card import fit_card  # scikit-learn comes with it
+
+        return fit_card(found)
