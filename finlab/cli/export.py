@@ -52,11 +52,11 @@ def export(
 
     allocator = load_allocator(method, checkpoint=checkpoint, objective=objective)
     if graph_alone:
+        from finlab.deploy.bundle import write_graph_and_tables
         from finlab.deploy.graph import build_graph
-        from finlab.deploy.graph_file import write_graph
 
         graph = build_graph(robot.layout, allocator, failed)
-        write_graph(graph, output)
+        write_graph_and_tables(graph, output)
         print(f"{output}: {robot.layout.n_fins} fins, {len(graph.self_test)} self-tests, method {method}")
         return
     from finlab.deploy.bundle import make_bundle

@@ -8,6 +8,7 @@ import io
 import os
 import zipfile
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,12 +25,13 @@ from finlab.bundle_files import (
     LARGEST_BUNDLE,
     LARGEST_TABLE,
     README,
+    TABLES,
     checksums,
     largest,
     table_name,
 )
 from finlab.deploy.graph import LayoutGraph, build_graph
-from finlab.deploy.graph_file import graph_bytes
+from finlab.deploy.graph_file import graph_bytes, write_graph
 from finlab.errors import AllocationError, DataError
 from finlab.forces.compiled_fins import compiled_bytes, compiled_fins
 from finlab.inference.checkpoint import checkpoint_files
@@ -115,6 +117,23 @@ def make_bundle(layout: Layout, allocator: Allocator, failed: tuple[str, ...] = 
     if sum(map(len, files.values())) > LARGEST_BUNDLE:
         raise DataError(f"layout {layout.name!r}: its bundle would be larger than {LARGEST_BUNDLE:,} bytes")
     return Bundle({**files, CHECKSUMS: checksums(files)})
+
+
+def write_graph_and_tables(graph: LayoutGraph, path: str | os.PathLike[str]) -> None:
+    """Write a graph file, and beside it the force tables that it names, so that they can travel together.
+
+    Raises:
+        LayoutError: a file cannot be written, or the name does not end in `.graph.json`.
+        DataError: a table cannot be read, or is too large to travel.
+    """
+    inside, tables = with_tables_inside(graph.layout)
+    folder = Path(path).parent
+    if tables:
+        with suppress(OSError):  # the first table tells why it cannot be written
+            (folder / TABLES).mkdir(exist_ok=True)
+    for name, content in tables.items():
+        write_whole(folder / name, content)
+    write_graph(replace(graph, layout=inside), path)
 
 
 def with_tables_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:

@@ -63,7 +63,7 @@ def summary(fit: FinFit) -> tuple[str, ...]:
         *head,
         f"fitted to {len(fit.measurements)} samples, amplitudes up to {amplitude:.3g} rad, frequencies up to "
         f"{frequency:.3g} Hz, forces up to {fit.largest:.3g} N",
-        f"cross-validated error {fit.error():.1%} of the largest force, of which noise {fit.noise():.1%}; "
+        f"cross-validated error {fit.error():.1%} of the largest force, noise of a sample {fit.noise():.1%}; "
         f"{fit.coverage():.0%} of the samples lie in the 95 % band of the fit to the others",
         f"thrust leans {lean:+.1f} deg off the zero direction",
         *fit.notes,

@@ -7,12 +7,14 @@ import io
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from PIL import Image, ImageOps
 
 from tests.browser.conftest import CHROMIUM, FLAGS, Served
 from tests.browser.page import Page
+from tests.fit.cell import columns_of, commands, measured, soft, write
 
 SIZE = {"width": 1400, "height": 860}
 
@@ -92,6 +94,23 @@ def _layout(page: Page) -> None:
     page.tab("Layout")
 
 
+def _fit(page: Page) -> None:
+    law = soft(k=4.0, p=1.4, x0=0.9, q=4.0, e=0.15, phi_e=1.0, d=0.12)
+    command = commands(300, seed=5)
+    force = measured(law, command)
+    force[(17, 100), 1:] += 3.0
+    _layout(page)
+    with TemporaryDirectory() as folder:
+        cell = write(Path(folder) / "cell.csv", columns_of(command, force))
+        page.upload("Fit from measurements (CSV)", cell)
+        page.until(lambda: page.view.fitting.findings is not None and not page.view.busy)
+    page.press("On all like it")
+    page.until(lambda: not page.view.busy)
+    page.tab("Place")  # closes the folder
+    page.page.mouse.move(SIZE["width"] - 200, 500)
+    page.page.mouse.wheel(0, 130)
+
+
 def _hull(page: Page) -> None:
     _layout(page)
     page.tab("Hull")
@@ -168,6 +187,7 @@ SCENES: dict[str, Callable[[Page], object]] = {
     "app-tour": _tour,
     "app-layout": _layout,
     "app-hull": _hull,
+    "app-fit": _fit,
     "app-modes": _modes,
     "app-proposals": _proposals,
     "app-limits": _limits,

@@ -15,7 +15,7 @@ from finlab.deploy.graph import N_SELF_TEST, build_graph
 from finlab.deploy.graph_file import graph_bytes, read_graph, write_graph
 from finlab.errors import FinlabError
 from finlab.inference.checkpoint import read_checkpoint
-from finlab.layout import Layout
+from finlab.layout import Layout, save_layout
 from finlab.layout.load import checksum_of
 from finlab.physics import Plant
 
@@ -77,6 +77,23 @@ def test_force_tables_are_found_beside_the_graph_file(
     path.write_text(json.dumps(document))
     for layout in (finlab.load_layout(path), read_graph(path).layout):
         assert layout.fins[2].model.values() == {"path": str(tmp_path / "tank" / "soft.csv")}
+
+
+def test_an_exported_graph_file_takes_its_tables_along(
+    measured: Layout, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    save_layout(measured, tmp_path / "robot.yaml")
+    here, there = tmp_path / "here", tmp_path / "there"
+    here.mkdir()
+    assert main(["export", str(tmp_path / "robot.yaml"), "-o", str(here / "x.graph.json")]) == 0
+    here.rename(there)
+    moved = finlab.load_layout(there / "x.graph.json")
+    paths = [str(fin.model.values()["path"]) for fin in moved.fins if fin.model.type == "table"]
+    assert paths and all(path.startswith(str(there / "tables")) for path in paths)
+    assert finlab.load_allocator().allocate(moved, [0.2, 0, 0.2, 0, 0, 0]).err_norm < 1e-6
+    capsys.readouterr()
+    assert main(["export", str(there / "x.graph.json"), "-o", str(tmp_path / "no" / "x.graph.json")]) == 2
+    assert "cannot be written: No such file or directory" in capsys.readouterr().err
 
 
 def test_unknown_failed_fin_is_refused(allocator: Allocator) -> None:

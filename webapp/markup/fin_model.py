@@ -30,7 +30,8 @@ def _words(model: FinModelSpec) -> str:
         f"{escape(rule.meaning)} {float(values[name]):.4g}{f' {rule.unit}' if rule.unit else ''}"
         for name, rule in rules.items()
     )
-    return f"<b>{model.type}</b>: {LAWS[model.type]}.<div class='dim'>{given}.</div>"
+    given = given.replace("^2", "²").replace("^3", "³")
+    return f"<b>{model.type}</b>: {LAWS[model.type]}.<div class='dim'>{given[0].upper()}{given[1:]}.</div>"
 
 
 def _table_words(model: FinModelSpec) -> str:

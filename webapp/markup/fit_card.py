@@ -49,7 +49,7 @@ def _sentence(note: str) -> str:
 def _figures(fit: FinFit) -> str:
     rows = (
         ("cross-validated error, of the largest force", f"{100.0 * fit.error():.1f} %"),
-        ("of which noise of the samples", f"{100.0 * fit.noise():.1f} %"),
+        ("noise of a sample, of the largest force", f"{100.0 * fit.noise():.1f} %"),
         ("unseen samples within the 95 % band", f"{100.0 * fit.coverage():.0f} %"),
         (f"largest force of {len(fit.measurements)} samples", f"{three_digits(fit.largest)} N"),
     )
@@ -80,8 +80,9 @@ def thrust_plot(curves: tuple[ThrustCurve, ...]) -> str:
     """Thrust over amplitude at a few frequencies: samples, the fit, and its 95 % band."""
     top = max(float(max(curve.thrust.max(), curve.samples[:, 1].max(initial=0.0))) for curve in curves)
     bottom = min(0.0, *(float(curve.samples[:, 1].min(initial=0.0)) for curve in curves))
-    across = cost_axis("half amplitude [rad]", np.array([0.0, float(curves[0].amplitude[-1])]))
-    up = cost_axis("thrust [N]", np.array([bottom, top]))
+    reach = float(curves[0].amplitude[-1])
+    across = cost_axis("half amplitude [rad]", np.array([0.0, reach]))._replace(low=0.0, high=1.02 * reach)
+    up = cost_axis("thrust [N]", np.array([bottom, top]))._replace(low=bottom)
 
     def x(value: float) -> float:
         return LEFT + across.share(value) * (WIDTH - LEFT - RIGHT)
