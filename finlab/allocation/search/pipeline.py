@@ -59,7 +59,9 @@ class SearchNumbers:
     many_fins: int = 6
     """Fins from which on there are more local minima to leave, and seeds near the best are tried as well."""
     many_fins_steps: int = 12
-    """The same for so many fins."""
+    """Quadratic problems for costs that grow more slowly than force, with so many fins."""
+    near_best: int = 3
+    """Allocations near which they are tried."""
     same_cost: float = 2e-4
     """Share by which costs differ at least of forces that are refined as two."""
     dear: float = 0.01
@@ -242,7 +244,7 @@ class Pipeline:
             command, steps = np.concatenate([command, within[None]], axis=1), steps + 1
             origin = np.concatenate([origin, np.full((1, len(within)), -1)], axis=1)
         exact = exact_error(prepared)
-        if prepared.measured:
+        if prepared.measured or start.near_best:
             command = _cheaper(prepared, target, command)
         candidates = refine_candidates(prepared, target, command, origin, steps, keep_mode)
         candidates = RefinedCandidates._make(values[:, : self.settings.n_refined] for values in candidates)
@@ -295,13 +297,16 @@ class Pipeline:
         ends = self._ends(prepared, problem, planar, rows)
         origin = np.repeat(np.arange(n_seeds), n_starts // n_seeds)
         if near_best:
-            best = ends.score.argmin(axis=1) + np.arange(0, rows * n_starts, n_starts)
-            size, fins = planar.size[best], prepared.planar.fins
-            near = neighbour_seeds(size, size > force_space.IDLE * fins.maximum, fins.maximum)
-            flat = target if rows == 1 else np.repeat(target, near.shape[1], axis=0)
-            planar = force_space.descend(prepared.planar, flat, near.reshape(-1, n), steps)
+            best = (
+                _distinct(ends.score)[:, : SEARCH.near_best]
+                + np.arange(0, rows * n_starts, n_starts)[:, None]
+            )
+            size, fins = planar.size[best.ravel()], prepared.planar.fins
+            near = neighbour_seeds(size, size > force_space.IDLE * fins.maximum, fins.maximum).reshape(-1, n)
+            flat = target if rows == 1 else np.repeat(target, len(near) // rows, axis=0)
+            planar = force_space.descend(prepared.planar, flat, near, steps)
             ends = ends.beside(self._ends(prepared, prepared.planar, planar, rows))
-            origin = np.concatenate([origin, np.full(near.shape[1], -1)])
+            origin = np.concatenate([origin, np.full(len(near) // rows, -1)])
         score = ends.score
         if keep_mode:
             score = score.copy()  # it may be the cost itself
