@@ -1,8 +1,9 @@
-"""Cheaper commands near those of a search, where compiled fins only tell about what fins cost.
+"""Cheaper commands near those of a search in force space, where that stops short of the minimum.
 
-The cost of a measured fin rises and falls with the noise of its table; the search in force space sees it
-smoothed. From where that leads, sequential quadratic programming by the fins' own laws goes down to the next
-minimum under exact tracking: steps solve
+The cost of a measured fin rises and falls with the noise of its table; the search sees it smoothed. For the
+effort of many fins the cheapest way often has some at their largest force and others at rest, where the
+search hardly moves. From where it leads, sequential quadratic programming by the fins' own laws goes on to the
+next minimum under exact tracking: steps solve
 
     min g d + 1/2 d H d   s.t.   J d = what is missing,   within the limits,
 

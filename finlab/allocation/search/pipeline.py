@@ -16,7 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.search.cheaper_commands import cheaper_commands
-from finlab.allocation.search.prepared import Prepared, neighbour_seeds, prepare, resting_fins, resting_seeds
+from finlab.allocation.search.prepared import (
+    MANY,
+    Prepared,
+    neighbour_seeds,
+    prepare,
+    resting_fins,
+    resting_seeds,
+)
 from finlab.allocation.search.receding_horizon import plan_ahead
 from finlab.allocation.search.refined_candidates import (
     MISSED,
@@ -56,12 +63,10 @@ class SearchNumbers:
     after five."""
     few_fins_steps: int = 8
     """The same for other costs with up to five fins."""
-    many_fins: int = 6
-    """Fins from which on there are more local minima to leave, and seeds near the best are tried as well."""
     many_fins_steps: int = 12
-    """Quadratic problems for costs that grow more slowly than force, with so many fins."""
+    """The same from `MANY` fins on."""
     near_best: int = 3
-    """Allocations near which they are tried."""
+    """Allocations of so many fins near which more seeds are tried."""
     same_cost: float = 2e-4
     """Share by which costs differ at least of forces that are refined as two."""
     dear: float = 0.01
@@ -135,7 +140,7 @@ class Pipeline:
             fallback: where to start from when targets were missed; None from it ends their search.
         """
         target = targets / self.std
-        near_best = seeds is None and self.settings.subsets and prepared.plant.n_fins >= SEARCH.many_fins
+        near_best = seeds is None and self.settings.subsets and prepared.plant.n_fins >= MANY
         if seeds is None:
             own = prepared.seeds if self.settings.subsets else prepared.seeds[:1]
             seeds = own[None].repeat(len(target), axis=0)
@@ -244,7 +249,7 @@ class Pipeline:
             command, steps = np.concatenate([command, within[None]], axis=1), steps + 1
             origin = np.concatenate([origin, np.full((1, len(within)), -1)], axis=1)
         exact = exact_error(prepared)
-        if prepared.measured or start.near_best:
+        if prepared.unsettled:
             command = _cheaper(prepared, target, command)
         candidates = refine_candidates(prepared, target, command, origin, steps, keep_mode)
         candidates = RefinedCandidates._make(values[:, : self.settings.n_refined] for values in candidates)
@@ -286,7 +291,7 @@ class Pipeline:
             works = None if works is None else np.repeat(works, n_arcs, axis=0)
         n_starts = seeds.shape[1]
         flat = target if rows == 1 else np.repeat(target, n_starts, axis=0)
-        usual = SEARCH.few_fins_steps if n < SEARCH.many_fins else SEARCH.many_fins_steps
+        usual = SEARCH.few_fins_steps if n < MANY else SEARCH.many_fins_steps
         steps = (
             steps or self.settings.search_steps or (SEARCH.convex_steps if self.objective.convex else usual)
         )

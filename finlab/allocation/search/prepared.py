@@ -18,6 +18,8 @@ from finlab.physics.plant import Plant, plant_of
 
 MAX_SUBSETS = 80
 """Most sub-layouts that are searched."""
+MANY = 6
+"""Fins from which on effort has more local minima than sub-layouts are searched."""
 LEAST_WORKING = 2
 """Fewest fins that work in a sub-layout; of two fins, one."""
 RESTING = 1e-3
@@ -45,8 +47,9 @@ class Prepared(NamedTuple):
     arcs: tuple[Array, Array] | None
     """Middles and halves (P, n) [rad] of arcs of force directions in which the search is repeated; None where
     those of the fins will do."""
-    measured: bool
-    """Whether the search sees the cost of some fin smoothed, one that is known by a table."""
+    unsettled: bool
+    """Whether cheaper commands may lie near those of the search: it sees the power of a force table smoothed,
+    and with many fins for effort some are at their largest force while others rest."""
     exactness: float
     """What thresholds on the normalized error are multiplied by: less than one for a robot that is weak
     beside the error's yardstick."""
@@ -75,7 +78,7 @@ def prepare(
         seeds,
         objective.meter(plant),
         arcs_to_search(fins, len(seeds)),
-        objective.convex and any(fin.model.type == "table" for fin in layout.fins),
+        any(fin.model.type == "table" for fin in layout.fins) if objective.convex else layout.n_fins >= MANY,
         min(1.0, float(np.linalg.norm(strongest))),
     )
 
