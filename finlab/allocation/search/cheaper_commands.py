@@ -2,8 +2,8 @@
 
 The cost of a measured fin rises and falls with the noise of its table; the search sees it smoothed. For the
 effort of many fins the cheapest way often has some at their largest force and others at rest, where the
-search hardly moves. From where it leads, sequential quadratic programming by the fins' own laws goes on to the
-next minimum under exact tracking: steps solve
+search hardly moves. From where it leads, sequential quadratic programming by the fins' own laws goes on to
+the next minimum under exact tracking: steps solve
 
     min g d + 1/2 d H d   s.t.   J d = what is missing,   within the limits,
 
