@@ -133,7 +133,7 @@ def _convert_angles(columns: Columns, conventions: Conventions) -> None:
         low, high = values["A"].min(), values["A"].max()
         raise DataError(
             f"{source}: half amplitudes from {low:.4g} to {high:.4g} rad, expected 0 to {MAX_AMPLITUDE:.4g}; "
-            "say how to read them with --angles and --amplitude"
+            "name the unit in the header, `A [deg]`, or say how to read them with --angles and --amplitude"
         )
 
 
@@ -152,7 +152,7 @@ def _convert_frequency(columns: Columns, conventions: Conventions) -> None:
     if high > MAX_FREQUENCY or low < 0.0:
         raise DataError(
             f"{columns.source}: frequencies from {low:.4g} to {high:.4g} Hz, expected 0 to "
-            f"{MAX_FREQUENCY:g}; say how to read them with --frequency"
+            f"{MAX_FREQUENCY:g}; name the unit in the header, `f [rpm]`, or with --frequency"
         )
 
 

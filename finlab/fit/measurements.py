@@ -1,10 +1,11 @@
 """What a load cell measured of one fin, read from CSV files: cycle means, or raw series of time and angle."""
 
 import csv
-import math
 import os
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from finlab.errors import DataError
 from finlab.fit.conventions import Columns, Conventions, named_column, to_fin_frame
 from finlab.fit.time_series import cycle_means
 from finlab.layout.angles import TURN
+from finlab.physics.table_file import row_numbers
 
 MAX_BYTES = 500_000_000
 """Largest file that is read [bytes]; a raw series of an hour at 1 kHz has half of it."""
@@ -22,6 +24,12 @@ MIN_SAMPLES = 20
 """Fewest samples from which a fin can be told at all."""
 SAME = 1e-3
 """Amplitudes [rad] or frequencies [Hz] all closer than this are one and the same."""
+ROUNDED = 1e-9
+"""Share of the largest force below which a value is nothing but rounding errors."""
+FLAT_TOP = 5
+"""Commands that give exactly the largest force, or the least, from which a sensor counts as saturated ..."""
+FLAT_SHARE = 0.02
+"""... if they are this share of all rows."""
 SAME_DIRECTION = 0.05
 """The same of zero directions [rad]."""
 
@@ -118,48 +126,35 @@ def _read_columns(path: Path) -> tuple[Columns, NDArray[np.intp]]:
                 f"{path}: is larger than {MAX_BYTES / 1e6:.0f} MB; cut it into shorter series, "
                 "or write cycle means"
             )
+        if path.exists() and not path.is_file():
+            raise DataError(f"{path}: is not a regular file, expected a CSV file of measurements")
         with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file)
+            above, first = 1, file.readline()
+            while first.startswith("#"):
+                above, first = above + 1, file.readline()
+            reader = csv.reader(chain([first], file), delimiter=max(",;\t", key=first.count))
             header = next(reader, [])
             named = [named_column(cell) for cell in header]
             used = [i for i, (name, _) in enumerate(named) if name]
             names = [named[i][0] for i in used]
             if len(set(names)) < len(names):
                 raise DataError(f"{path}: two columns stand for {_repeated(names)}; keep one")
-            rows, lines = [], []
-            for line, cells in enumerate(reader, start=2):
+            numbers, lines = array("d"), array("q")  # lists would take ten times the room
+            for line, cells in enumerate(reader, start=above + 1):
                 if cells and not cells[0].startswith("#") and any(cell.strip() for cell in cells):
-                    rows.append(_numbers(cells, header, used, f"{path}: line {line}"))
+                    numbers.extend(row_numbers(cells, header, used, f"{path}: line {line}"))
                     lines.append(line)
     except (UnicodeDecodeError, csv.Error) as error:
         raise DataError(f"{path}: cannot be read as CSV text: {error}") from None
     except OSError as error:
         raise DataError(f"{path}: cannot be read: {error.strerror}") from None
-    if not rows:
+    if not lines:
         raise DataError(f"{path}: has no rows below its header")
-    values = dict(zip(names, np.array(rows).T.copy(), strict=True))
+    values = dict(zip(names, np.array(numbers).reshape(len(lines), -1).T.copy(), strict=True))
     told = {names[k] for k, i in enumerate(used) if named[i][1] is not None}
     for k, i in enumerate(used):
         values[names[k]] *= named[i][1] or 1.0
     return Columns(values, told, str(path)), np.array(lines)
-
-
-def _numbers(cells: list[str], header: list[str], used: list[int], where: str) -> list[float]:
-    """The used cells of a row as finite numbers."""
-    if len(cells) != len(header):
-        raise DataError(f"{where} has {len(cells)} values, the header has {len(header)}")
-    numbers = []
-    for i in used:
-        try:
-            number = float(cells[i])
-        except ValueError:
-            number = math.nan
-        if not math.isfinite(number):
-            raise DataError(
-                f"{where}, column {header[i].strip()}, holds {cells[i].strip()!r:.40}, expected a number"
-            )
-        numbers.append(number)
-    return numbers
 
 
 def _repeated(names: list[str]) -> str:
@@ -202,16 +197,13 @@ def _checked(read: list[tuple[Columns, tuple[str, ...]]], source: str) -> Measur
     if sideways is None:
         sideways = np.zeros(n)
         notes.append("there is no column Fx: no force along the shaft is assumed")
+    command = np.stack([amplitude, frequency, phi], axis=-1)
     across = [gathered(name) for name in ("Fy", "Fz")]
     force = np.stack([sideways, *[column for column in across if column is not None]], axis=-1)
     if not force[:, 1:].any():
         raise DataError(f"{source}: Fy and Fz are 0 throughout; such a fin drives nothing")
-    for k, name in ((1, "Fy"), (2, "Fz")):
-        if turned and np.ptp(force[:, k]) == 0.0:
-            raise DataError(
-                f"{source}: column {name} is {force[0, k]:.4g} throughout; is the sensor connected?"
-            )
     power = gathered("P")
+    _check_sensors(source, command, force, power, places, turned)
     if power is not None and power.min() < -0.02 * np.abs(power).max():
         raise DataError(
             f"{source}: column P has {power.min():.4g} W, expected the mean power that drives the fin"
@@ -224,5 +216,29 @@ def _checked(read: list[tuple[Columns, tuple[str, ...]]], source: str) -> Measur
             raise DataError(f"{source}: a standard deviation is 0 or less; leave out what is not known")
         mean = np.mean(given, axis=0)
         deviation = np.stack([mean if column is None else column for column in spread], axis=-1)
-    command = np.stack([amplitude, frequency, phi], axis=-1)
     return Measurements(command, force, deviation, power, places, tuple(notes), turned)
+
+
+def _check_sensors(
+    source: str, command: Array, force: Array, power: Array | None, places: tuple[str, ...], turned: bool
+) -> None:
+    """Refuse columns that never change, and those that stop at one value again and again."""
+    nothing = ROUNDED * np.abs(force).max()
+    columns = dict(zip(("Fx", "Fy", "Fz"), force.T, strict=True)) | ({} if power is None else {"P": power})
+    for name, column in columns.items():
+        needed = name == "P" or (turned and name != "Fx")
+        if np.ptp(column) == 0.0 and (needed or abs(column[0]) > nothing):
+            raise DataError(
+                f"{source}: column {name} is {column[0]:.4g} throughout; is the sensor connected?"
+            )
+        values, counts = np.unique(column, return_counts=True)
+        # A coarse sensor repeats all its values.
+        usual = int(counts[1:-1][np.abs(values[1:-1]) > nothing].max(initial=1))
+        for extreme in values[[0, -1]]:
+            there = np.flatnonzero(column == extreme)
+            many = len(np.unique(command[there], axis=0))
+            if abs(extreme) > nothing and many >= max(FLAT_TOP, FLAT_SHARE * len(column), 3 * usual):
+                raise DataError(
+                    f"{places[there[0]]}, column {name}: is exactly {extreme:.4g} as in {len(there) - 1} "
+                    "other rows, and beyond it in none; the sensor is saturated, measure in a wider range"
+                )

@@ -11,6 +11,7 @@ over.
 import csv
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -114,25 +115,40 @@ def _read_rows(path: Path) -> tuple[Array, NDArray[np.intp], tuple[str, ...]]:
     for line, cells in enumerate(lines[1:], start=above + 2):
         if not any(cell.strip() for cell in cells):
             continue
-        if len(cells) != len(header):
-            raise DataError(f"{path}: line {line} has {len(cells)} values, the header has {len(header)}")
-        rows.append([_number(cells[i], f"{path}: line {line}, column {header[i]},") for i in order])
+        rows.append(row_numbers(cells, header, order, f"{path}: line {line}"))
         numbers.append(line)
     if not rows:
         raise DataError(f"{path}: has no rows below its header")
     return np.array(rows), np.array(numbers), notes
 
 
+def row_numbers(cells: Sequence[str], header: Sequence[str], order: Sequence[int], where: str) -> list[float]:
+    """Returns the cells of a row at some places as finite numbers.
+
+    Raises:
+        DataError: the row is too long or too short, or a cell holds something else; `where` names the row.
+    """
+    if len(cells) != len(header):
+        raise DataError(f"{where} has {len(cells)} values, the header has {len(header)}")
+    try:
+        values = [float(cells[i]) for i in order]
+    except ValueError:
+        values = [math.nan]
+    if all(map(math.isfinite, values)):
+        return values
+    return [_number(cells[i], f"{where}, column {header[i].strip()},") for i in order]  # tells which
+
+
 def _number(cell: str, where: str) -> float:
     """A cell as a finite number."""
     if not cell.strip():
-        raise DataError(f"{where} is empty; leave no gaps in the table")
+        raise DataError(f"{where} is empty; leave no gaps")
     try:
         value = float(cell)
     except ValueError:
         raise DataError(f"{where} holds {cell.strip()!r:.40}, which is not a number") from None
     if not math.isfinite(value):
-        raise DataError(f"{where} holds a value that is not finite ({value}); leave no gaps in the table")
+        raise DataError(f"{where} holds a value that is not finite ({value}); leave no gaps")
     return value
 
 

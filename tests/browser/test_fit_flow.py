@@ -47,7 +47,7 @@ def test_a_wrong_file_is_told_where_and_changes_nothing(page: Any, tmp_path: Pat
     before = page.session.state
     (tmp_path / "cell.csv").write_text("A,f,phi,Fx,Fy,Fz\n0.3,1.0,0.0,0,oops,0\n")
     page.upload("Fit from measurements (CSV)", tmp_path / "cell.csv")
-    sentence = "cell.csv: line 2, column Fy, holds 'oops', expected a number"
+    sentence = "cell.csv: line 2, column Fy, holds 'oops', which is not a number"
     page.until(lambda: any(sentence in note for note in page.notes()))
     page.page.locator(".fl.missing", has_text=sentence).wait_for()
     assert page.session.state == before and load_layout("ucat") == before.layout

@@ -125,6 +125,12 @@ def emptied(columns: Columns, tmp_path: Path) -> Path:
         (lambda c: c | {"Fz": 0.0 * c["Fz"] + 0.2}, "column Fz is 0.2 throughout"),
         (lambda c: c | {"Fy": 0.0 * c["Fy"], "Fz": 0.0 * c["Fz"]}, "0 throughout; such a fin drives nothing"),
         (lambda c: c | {"Fy": np.where(np.arange(40) == 7, np.nan, c["Fy"])}, "line 9, column Fy, holds"),
+        (lambda c: c | {"Fx": 0.0 * c["Fx"] + 0.3}, "column Fx is 0.3 throughout; is the sensor connected"),
+        (lambda c: c | {"P": 0.0 * c["Fx"] + 3.0}, "column P is 3 throughout; is the sensor connected"),
+        (lambda c: c | {"phi": 0.0 * c["Fx"], "Fy": 0.0 * c["Fy"] + 2.0}, "column Fy is 2 throughout"),
+        (lambda c: c | {"Fy": np.minimum(c["Fy"], np.sort(c["Fy"])[-8])},
+         r"cell.csv line \d+, column Fy: is exactly .* as in 7 other rows, .* is saturated"),
+        (lambda c: c | {"Fz": np.maximum(c["Fz"], np.sort(c["Fz"])[8])}, "column Fz: is exactly -"),
         (lambda c: {k: v for k, v in c.items() if k != "Fz"}, "column Fz is missing"),
         (lambda c: {k: v for k, v in c.items() if k != "A"}, "column A is missing"),
         (lambda c: c | {"amplitude": c["A"]}, "two columns stand for A"),
@@ -142,10 +148,8 @@ def test_bad_files_get_a_sentence(
     assert "cell.csv" in str(raised.value)
 
 
-def test_a_gap_a_short_line_and_no_file(
-    tmp_path: Path, columns: Columns, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with pytest.raises(DataError, match="line 5, column f, holds '', expected a number"):
+def test_a_gap_a_short_line_and_no_file(tmp_path: Path, columns: Columns) -> None:
+    with pytest.raises(DataError, match="line 5, column f, is empty; leave no gaps"):
         read_measurements([emptied(columns, tmp_path)])
     path = write(tmp_path / "short.csv", columns)
     path.write_text(path.read_text() + "1,2\n")
@@ -155,9 +159,28 @@ def test_a_gap_a_short_line_and_no_file(
         read_measurements([tmp_path / "nowhere.csv"])
     with pytest.raises(DataError, match="at least one CSV file"):
         read_measurements([])
-    monkeypatch.setattr("finlab.fit.measurements.MAX_BYTES", 100)
-    with pytest.raises(DataError, match="is larger than 0 MB; cut it"):
-        read_measurements([path])
+    with pytest.raises(DataError, match=r"/dev/zero: is not a regular file"):
+        read_measurements(["/dev/zero"])
+    with (tmp_path / "huge.csv").open("wb") as file:
+        file.truncate(10_000_000_000)  # sparse: it takes no room
+    with pytest.raises(DataError, match=r"huge\.csv: is larger than 500 MB; cut it"):
+        read_measurements([tmp_path / "huge.csv"])
+
+
+def test_other_delimiters_and_remarks_above_the_header(tmp_path: Path, columns: Columns) -> None:
+    plain = read(tmp_path, columns)
+    for delimiter in ";\t":
+        text = (tmp_path / "cell.csv").read_text().replace(",", delimiter)
+        (tmp_path / "other.csv").write_text(f"# rig 3\n# 5 May\n{text}")
+        found = read_measurements([tmp_path / "other.csv"])
+        np.testing.assert_array_equal(found.force, plain.force)
+        assert found.places[0] == "other.csv line 4"
+
+
+def test_a_coarse_sensor_is_no_saturated_one(tmp_path: Path, columns: Columns) -> None:
+    step = 0.1 * np.ptp(columns["Fy"])
+    coarse = columns | {name: np.round(columns[name] / step) * step for name in ("Fy", "Fz")}
+    assert len(read(tmp_path, coarse)) == 40
 
 
 def test_several_files_are_one_set(tmp_path: Path, columns: Columns) -> None:

@@ -132,7 +132,11 @@ def test_a_finished_table_is_recognized(tmp_path: Path, worker: Worker) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "sentence"),
     [
-        ("cell.csv", b"A,f,Fy,Fz\n0.1,1,1,x\n", "cell.csv: line 2, column Fz, holds 'x', expected a number"),
+        (
+            "cell.csv",
+            b"A,f,Fy,Fz\n0.1,1,1,x\n",
+            "cell.csv: line 2, column Fz, holds 'x', which is not a number",
+        ),
         ("cell.csv", b"A,f,Fy,Fz\n0.1,1,1,1\n", "cell.csv: 1 samples, expected at least 20"),
         ("picture.png", b"\x89PNG\x0d\x0a\xff\xfe", "picture.png: cannot be read as CSV text"),
         ("empty.csv", b"", "empty.csv: "),
