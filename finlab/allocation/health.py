@@ -1,8 +1,8 @@
-"""Fins that work in part: weaker, no longer turning, or running on as they were when they stopped listening.
+"""Fins that work in part: weaker, torn, no longer turning, or running on as they were when they went deaf.
 
-Each becomes a layout with other limits, so every method accounts for it and limits hold as always: a fin that
-no longer turns still pushes along its last direction, and the force of one that runs on is part of every
-wrench. A fin that gives no force at all is `failed` and leaves the layout.
+Each becomes a layout with other limits, or with a smaller fin, so every method accounts for it and limits
+hold as always: a fin that no longer turns still pushes along its last direction, and the force of one that
+runs on is part of every wrench. A fin that gives no force at all is `failed` and leaves the layout.
 """
 
 from __future__ import annotations
@@ -29,9 +29,12 @@ class Health:
     """Zero direction [rad] at which a fin no longer turns; it still flaps."""
     running: tuple[tuple[str, Command], ...] = ()
     """Command (amplitude [rad], frequency [Hz], zero direction [rad]) that a fin keeps, come what may."""
+    thrust: tuple[tuple[str, float], ...] = ()
+    """Share, above 0 and up to 1, of its law's thrust that a fin gives at every command, as one with a torn
+    blade does."""
 
     def __post_init__(self) -> None:
-        for name, share in self.weak:
+        for name, share in (*self.weak, *self.thrust):
             if not 0.0 < share <= 1.0:
                 raise AllocationError(
                     f"health of {name}: expected a share above 0 and up to 1, got {share}; "
@@ -50,6 +53,7 @@ class Health:
         weak: Mapping[str, float] | None = None,
         stuck: Mapping[str, float] | None = None,
         running: Mapping[str, Command] | None = None,
+        thrust: Mapping[str, float] | None = None,
     ) -> Health:
         """Health from dictionaries, by the fins' names.
 
@@ -57,20 +61,23 @@ class Health:
             AllocationError: a share out of range, an angle that is no number.
         """
         try:
-            shares, angles = ({k: float(v) for k, v in (d or {}).items()} for d in (weak, stuck))
+            shares, angles, thrusts = (
+                {k: float(v) for k, v in (d or {}).items()} for d in (weak, stuck, thrust)
+            )
             kept = {name: (float(a), float(f), float(d)) for name, (a, f, d) in (running or {}).items()}
         except (TypeError, ValueError, AttributeError) as error:
             raise AllocationError(
                 "health: expected dictionaries by fin name, of shares, of angles and of commands "
-                f"(amplitude, frequency, zero direction), got weak={weak}, stuck={stuck}, running={running}"
+                f"(amplitude, frequency, zero direction), got weak={weak}, stuck={stuck}, running={running}, "
+                f"thrust={thrust}"
             ) from error
-        return cls(tuple(shares.items()), tuple(angles.items()), tuple(kept.items()))
+        return cls(tuple(shares.items()), tuple(angles.items()), tuple(kept.items()), tuple(thrusts.items()))
 
     def applied_to(self, layout: Layout) -> Layout:
         """The layout with the limits that are left.
 
         Raises:
-            LayoutError: there is no fin of a name.
+            LayoutError: there is no fin of a name, or a fin that is a table is said to have lost thrust.
         """
         return _applied(self, layout)
 
@@ -78,11 +85,17 @@ class Health:
 @lru_cache(maxsize=64)
 def _applied(health: Health, layout: Layout) -> Layout:
     weak, stuck, running = dict(health.weak), dict(health.stuck), dict(health.running)
-    layout.indices((*weak, *stuck, *running))
+    thrust = dict(health.thrust)
+    layout.indices((*weak, *stuck, *running, *thrust))
     return replace(
         layout,
         fins=tuple(
-            _damaged(fin, weak.get(fin.name), stuck.get(fin.name), running.get(fin.name))
+            _damaged(
+                fin if fin.name not in thrust else replace(fin, model=fin.model.scaled(thrust[fin.name])),
+                weak.get(fin.name),
+                stuck.get(fin.name),
+                running.get(fin.name),
+            )
             for fin in layout.fins
         ),
     )

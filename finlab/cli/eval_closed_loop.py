@@ -1,10 +1,10 @@
-"""`finlab eval trajectory|faults|velocity`: the paper's closed-loop experiments in simulation."""
+"""`finlab eval trajectory|faults|velocity`: the paper's closed-loop experiments; and `eval monitor`."""
 
 from typing import Annotated
 
 from tyro.conf import arg
 
-from finlab.cli.eval_arguments import ClosedLoopRuns, MethodRun, Name, Names, Source, open_layouts
+from finlab.cli.eval_arguments import ClosedLoopRuns, Count, MethodRun, Name, Names, Source, open_layouts
 
 RUN = MethodRun()
 LAYOUT_RUNS = ClosedLoopRuns()
@@ -92,3 +92,37 @@ def velocity(
     about = f"Layout {robot.name}; plant {loop.plant}."
     run.show(*INTRODUCTION, *velocity_blocks(rows, baseline), about, rows=rows)
     loop.save("velocity", lambda: draw_velocity(found))
+
+
+def monitor(
+    layouts: Names = "A,B,C,D",
+    trajectory: Source = "lissajous",
+    method: Name = "search",
+    plant: Name = "mean",
+    seed: Count = 0,
+    seeds: Count = 4,
+    run: Annotated[MethodRun, arg(name="")] = RUN,
+) -> None:
+    """Lose each fin while swimming without telling the allocator; how soon and how surely a monitor finds it.
+
+    A seed takes about three minutes with four layouts.
+
+    Args:
+        layouts: names or files with commas between.
+        trajectory: circle, lissajous, square, or a CSV file with the columns t, x, y, z.
+        method: the allocator.
+        plant: how the fins' forces are simulated; see finlab simulate --help.
+        seed: the first seed of times, currents and noise.
+        seeds: how many; each loses every fin of every layout once, and swims once without a loss.
+    """
+    from finlab.cli.inputs import check_positive
+    from finlab.evaluation.experiments.fault_monitoring import monitoring_rows, swim_losses
+    from finlab.evaluation.report.sections.fault_monitoring import monitoring_blocks
+    from finlab.sim import make_trajectory
+
+    check_positive(seeds=seeds)
+    robots, path = open_layouts(layouts), make_trajectory(trajectory)
+    losses = swim_losses(robots, path, run.method(method), range(seed, seed + seeds), plant=plant)
+    rows = monitoring_rows(losses)
+    about = f"{path.name} of {path.duration_s:.0f} s by {method}; plant {plant}; {seeds} seeds from {seed}."
+    run.show(*monitoring_blocks(rows), about, rows=rows)

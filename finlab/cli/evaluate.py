@@ -129,6 +129,7 @@ for verb in (
     eval_closed_loop.trajectory,
     eval_closed_loop.faults,
     eval_closed_loop.velocity,
+    eval_closed_loop.monitor,
     eval_fit.fit,
     training,
     report,

@@ -10,14 +10,17 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from tyro.conf import Positional, UseAppendAction, arg
 
 if TYPE_CHECKING:
-    from finlab.sim import ClosedLoop, RunLog
+    from finlab.sim import ClosedLoop, FinFault, RunLog
 
 
 def simulate(
     layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
     trajectory: Annotated[str, arg(metavar="NAME|FILE")] = "lissajous",
     excite: bool = False,
-    fail: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME@SECONDS")] = (),
+    fail: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME@SECONDS[:KIND]")] = (),
+    announced: bool = True,
+    monitor: bool = False,
+    servo_feedback: bool = False,
     method: Annotated[str, arg(metavar="NAME")] = "search",
     objective: Literal["power", "effort"] = "power",
     duration: Annotated[float | None, arg(metavar="SECONDS")] = None,
@@ -37,7 +40,12 @@ def simulate(
         trajectory: circle, lissajous, square, or a CSV file with the columns t, x, y, z.
         excite: shake every axis and fin on the spot instead, for at most 300 s, within bounds of depth and
             attitude; `finlab fit robot` learns the robot from the log.
-        fail: a fin and when it is lost, such as front_left@30.
+        fail: a fin and when it is lost, such as front_left@30; or what else becomes of it:
+            front_left@30:weak=0.5 (half of its thrust is left), front_left@30:stuck (it no longer turns),
+            front_left@60:whole (it is repaired).
+        announced: whether the allocator is told of what happens to fins.
+        monitor: let a FaultMonitor watch the robot and tell the allocator what it finds.
+        servo_feedback: let the servos report their motion to the monitor.
         method: search, mdn, paper, qp, sqp, analytic, multistart, trf, slsqp, ipopt or on-board.
         objective: what the method keeps least: power in watts, or effort, the paper's J_en.
         duration: time for a shipped trajectory.
@@ -56,45 +64,53 @@ def simulate(
     from tqdm import tqdm
 
     from finlab.cli.inputs import open_robot
-    from finlab.control import WaypointController, WaypointGains, load_gains
+    from finlab.control import FaultMonitor, WaypointController, WaypointGains, load_gains
     from finlab.errors import FinlabError
     from finlab.evaluation.method_specs import load_method_spec
-    from finlab.sim import NO_NOISE, ClosedLoop, make_trajectory
+    from finlab.sim import NO_NOISE, ClosedLoop, FinFault, make_trajectory
     from finlab.sim.excite import LONGEST_S, excitation
 
     robot = open_robot(layout)
-    failures = [(name, 0.0) for name in robot.failed] + [_failure(text) for text in fail]
+    failures = [FinFault(name, 0.0) for name in robot.failed] + [_failure(text) for text in fail]
     _check_folder(output)
     sensors = None if noise else NO_NOISE
     if excite:
-        if fail:
-            raise FinlabError("--excite: a robot is learned with the fins that it has; leave --fail out")
+        if fail or monitor:
+            raise FinlabError(
+                "--excite: a robot is learned with the fins that it has; leave --fail and --monitor out"
+            )
         swum = robot.layout.without(robot.failed) if robot.failed else robot.layout
         whole = LONGEST_S if duration is None else duration
         loop = excitation(swum, whole, plant=plant, sensors=sensors, current=current, seed=seed)
         failures = []
     else:
+        controller = WaypointController(load_gains(WaypointGains, gains))
         loop = ClosedLoop(
             robot.layout,
             load_method_spec(method, checkpoint, objective),
             make_trajectory(trajectory, duration),
-            WaypointController(load_gains(WaypointGains, gains)),
+            controller,
             plant=plant,
             steady=steady,
             sensors=sensors,
             current=current,
             failures=failures,
+            announced=announced,
+            monitor=FaultMonitor(robot.layout, period_s=controller.period_s) if monitor else None,
+            servo_feedback=servo_feedback,
             seed=seed,
         )
     for sentence in _warnings(loop, failures):
         print(sentence, file=sys.stderr)
     seconds = round(loop.task.duration_s, 1)
     with tqdm(total=seconds, unit="s", disable=None, leave=False, file=sys.stderr) as bar:
+        found = Findings()
         while not loop.done:
             loop.step()
+            found.note(loop)
             bar.update(loop.period_s)
     log = loop.log
-    print(excitation_summary(log) if excite else summary(log))
+    print("\n".join([excitation_summary(log) if excite else summary(log), *found.sentences]))
     if output is not None:
         from finlab.evaluation.plots.closed_loop_run import save_pictures
 
@@ -138,18 +154,49 @@ def excitation_summary(log: RunLog) -> str:
     )
 
 
-def _failure(text: str) -> tuple[str, float]:
-    """Name and time of `NAME@SECONDS`."""
-    from finlab.errors import FinlabError
+class Findings:
+    """What a monitor says on the way, as sentences."""
 
-    name, at, number = text.rpartition("@")
+    def __init__(self) -> None:
+        """Nothing has been found."""
+        self.sentences: list[str] = []
+        """One for each time that the monitor changes its mind."""
+        self._last = ""
+
+    def note(self, loop: ClosedLoop) -> None:
+        """Look at the monitor's verdict after a step."""
+        verdict = loop.verdict
+        if verdict is None:
+            return
+        words = [f"{name} lost" for name in verdict.failed]
+        if verdict.health is not None:
+            stuck = dict(verdict.health.stuck)
+            words += [f"{name} weak" for name, _ in verdict.health.thrust]
+            words += [f"{name} stuck at {math.degrees(angle):.0f} deg" for name, angle in stuck.items()]
+        now = ", ".join(words) or "all fins whole"
+        if now != (self._last or "all fins whole"):
+            self.sentences.append(f"{loop.time - loop.period_s:.1f} s: the monitor takes {now}")
+        self._last = now
+
+
+def _failure(text: str) -> FinFault:
+    """What `NAME@SECONDS`, `NAME@SECONDS:KIND` or `NAME@SECONDS:weak=SHARE` says."""
+    from finlab.errors import FinlabError
+    from finlab.sim import FinFault
+
+    name, at, rest = text.rpartition("@")
+    number, _, what = rest.partition(":")
+    kind, equals, share = what.partition("=")
     try:
-        time = float(number)
-    except ValueError:
-        time = math.nan
-    if not at or not name or not (math.isfinite(time) and time >= 0.0):
-        raise FinlabError(f"--fail: expected NAME@SECONDS such as front_left@30, got {text!r:.60}")
-    return name, time
+        fault = FinFault(name, float(number), kind or "lost", float(share) if equals else 0.5).checked()
+    except (ValueError, FinlabError):
+        fault = None
+    if not at or not name or fault is None or (equals and kind != "weak"):
+        raise FinlabError(
+            "--fail: expected NAME@SECONDS such as front_left@30, with :weak=0.5, :stuck or :whole after it "
+            f"for what is no loss, got {text!r:.60}"
+        )
+    return fault
 
 
 def _check_folder(output: Path | None) -> None:
@@ -160,12 +207,13 @@ def _check_folder(output: Path | None) -> None:
         raise FinlabError(f"{output}: expected a new or empty folder")
 
 
-def _warnings(loop: ClosedLoop, failures: list[tuple[str, float]]) -> list[str]:
+def _warnings(loop: ClosedLoop, failures: list[FinFault]) -> list[str]:
     """What will not be controllable, said before the run."""
     from finlab.control import Completion
 
     sentences, lost = [], []
-    for name, time in [("", 0.0), *sorted(failures, key=lambda failure: failure[1])]:
+    events = sorted((event for event in failures if event.kind == "lost"), key=lambda event: event.time_s)
+    for name, time in [("", 0.0), *((event.fin, event.time_s) for event in events)]:
         lost += [name] if name else []
         if not Completion(loop.layout, tuple(lost), loop.controller.axes).controllable:
             without = f" without {', '.join(lost)}" if lost else ""

@@ -9,7 +9,10 @@ from finlab.control.controllers import Measurement as Measurement
 from finlab.control.controllers import Setpoint as Setpoint
 from finlab.control.controllers import VelocityController as VelocityController
 from finlab.control.controllers import WaypointController as WaypointController
+from finlab.control.fault_monitor import FaultMonitor as FaultMonitor
+from finlab.control.fault_monitor import Verdict as Verdict
 from finlab.control.gains import WAYPOINT_GAINS as WAYPOINT_GAINS
 from finlab.control.gains import VelocityGains as VelocityGains
 from finlab.control.gains import WaypointGains as WaypointGains
 from finlab.control.gains import load_gains as load_gains
+from finlab.control.monitor_settings import MonitorSettings as MonitorSettings

@@ -54,6 +54,13 @@ FIN_MODELS: Mapping[str, Mapping[str, Parameter]] = {
 }
 """The fin models there are, by name, with their numeric parameters."""
 
+SCALES_THRUST: Mapping[str, tuple[str, float]] = {
+    "drag": ("area", 1.0),
+    "lighthill": ("width", 0.5),
+    "soft": ("k", 1.0),
+}
+"""The parameter by which a model's thrust is made larger or smaller, and its exponent."""
+
 
 @dataclass(frozen=True)
 class FinModelSpec:
@@ -90,6 +97,18 @@ class FinModelSpec:
             LayoutError: unknown model, unknown parameter, or a value that is none.
         """
         return cls(str(values["type"]), tuple((k, v) for k, v in values.items() if k != "type"))
+
+    def scaled(self, share: float) -> "FinModelSpec":
+        """The model of a fin that gives a share of the thrust at every command.
+
+        Raises:
+            LayoutError: the fin is a table, whose file would have to be another one.
+        """
+        if self.type not in SCALES_THRUST:
+            raise LayoutError("the thrust of a table cannot be scaled; name another CSV file", "type")
+        name, exponent = SCALES_THRUST[self.type]
+        value = float(self.values()[name]) * share**exponent
+        return FinModelSpec(self.type, tuple({**dict(self.parameters), name: value}.items()))
 
     def values(self) -> dict[str, float | str]:
         """Returns all parameters of the model, those given and those left at their defaults."""

@@ -9,6 +9,7 @@ World: z up. Body: x forward, y left, z up. SI and radians.
 from finlab.physics.fin_motion import Servo as Servo
 from finlab.physics.vehicle import Vehicle as Vehicle
 from finlab.sim.closed_loop import ClosedLoop as ClosedLoop
+from finlab.sim.fin_fault import FinFault as FinFault
 from finlab.sim.log import RunLog as RunLog
 from finlab.sim.log import Tick as Tick
 from finlab.sim.log import load_log as load_log

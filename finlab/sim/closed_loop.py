@@ -4,15 +4,25 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
+from finlab.allocation.health import Health
 from finlab.arrays import Array
-from finlab.control import Completion, Controller, Measurement, VelocityController, WaypointController
-from finlab.errors import FinlabError
+from finlab.control import (
+    Completion,
+    Controller,
+    FaultMonitor,
+    Measurement,
+    VelocityController,
+    Verdict,
+    WaypointController,
+)
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.physics.fin_motion import FinMotion, Servo, fin_power
 from finlab.physics.vehicle import STATE_SIZE, Vehicle, complete_body, quaternion_of_yaw
+from finlab.sim.fin_fault import FinFault, names_of
 from finlab.sim.log import RunLog, Tick, log_of_ticks
 from finlab.sim.plants import make_plant
 from finlab.sim.sensors import Sensors, SensorSettings
@@ -42,7 +52,10 @@ class ClosedLoop:
         sensors: SensorSettings | None = None,
         servo: Servo | None = None,
         current: Sequence[float] = (0.0, 0.0, 0.0),
-        failures: Sequence[tuple[str, float]] = (),
+        failures: Sequence[FinFault | tuple[str, float]] = (),
+        announced: bool = True,
+        monitor: FaultMonitor | None = None,
+        servo_feedback: bool = False,
         seed: int = 0,
     ) -> None:
         """Puts the robot at rest at the start of its task.
@@ -58,16 +71,18 @@ class ClosedLoop:
             sensors: rates and noise; the defaults of `SensorSettings`.
             servo: what drives the fins.
             current: velocity of the water (3,) in the world [m/s].
-            failures: names of fins, each with the time [s] at which it is lost.
+            failures: what becomes of fins, and when; (name, time [s]) is a fin that is lost.
+            announced: whether the allocator is told of what happens; else it goes on as before, unless a
+                monitor notices.
+            monitor: watches the robot, tells the allocator what it finds, and is told what is announced.
+            servo_feedback: whether the servos report their motion to the monitor.
             seed: of the sensors' noise and of the allocator.
 
         Raises:
-            FinlabError: an unknown fin or plant, or a time that is none.
+            FinlabError: an unknown fin, plant or kind of failure, or a time that is none.
         """
-        layout.indices([name for name, _ in failures])
-        for name, time in failures:
-            if not (math.isfinite(time) and time >= 0.0):
-                raise FinlabError(f"failure of {name}: expected a time of 0 s or more, got {time}")
+        events = [FinFault(*failure).checked() for failure in failures]
+        layout.indices([event.fin for event in events])
         self.layout = layout
         self.allocator = allocator
         self.task = task
@@ -82,9 +97,14 @@ class ClosedLoop:
         self._fin_force = make_plant(plant, layout)
         self._plant = plant_of(layout)
         self._sensors = Sensors(SensorSettings() if sensors is None else sensors, np.random.default_rng(seed))
-        self._pending = sorted(failures, key=lambda failure: failure[1])
-        self.failed: tuple[str, ...] = ()
-        """Names of the fins that are lost now."""
+        self._pending = sorted(events, key=lambda event: event.time_s)
+        self.announced, self.monitor, self.servo_feedback = announced, monitor, servo_feedback
+        self.broken: dict[str, FinFault] = {}
+        """What is true: the fins that are not whole now, by name."""
+        self._told: dict[str, FinFault] = {}
+        self._held = np.full(layout.n_fins, np.nan)
+        self.verdict: Verdict | None = None
+        """What the monitor believed at the last step; None without one."""
         self._completion: dict[tuple[str, ...], Completion] = {}
         self._ticks: list[Tick] = []
         self._command: Array | None = None
@@ -125,37 +145,90 @@ class ClosedLoop:
             seed=self.seed,
         )
 
-    def fail(self, name: str) -> None:
-        """A fin stops and hangs still; the allocator knows at once.
+    @property
+    def lost(self) -> tuple[str, ...]:
+        """Names of the fins that are lost now, whoever knows of it."""
+        return names_of(self.broken, "lost")
+
+    @property
+    def failed(self) -> tuple[str, ...]:
+        """Names of the fins that the allocator takes for lost."""
+        return names_of(self._told, "lost") if self.verdict is None else self.verdict.failed
+
+    @property
+    def health(self) -> Health | None:
+        """What the allocator takes for damaged."""
+        if self.verdict is not None:
+            return self.verdict.health
+        weak = {name: self._told[name].share for name in names_of(self._told, "weak")}
+        stuck = {name: float(self._held[self.layout.index(name)]) for name in names_of(self._told, "stuck")}
+        return Health.of(thrust=weak, stuck=stuck) if weak or stuck else None
+
+    def fail(
+        self, name: str, kind: str = "lost", share: float = 0.5, *, announced: bool | None = None
+    ) -> None:
+        """Something becomes of a fin, now.
+
+        Args:
+            name: of the fin.
+            kind: lost (hangs still), weak (gives a share of its thrust), stuck (beats but no longer turns) or
+                whole.
+            share: of the thrust that a weak fin gives.
+            announced: whether the allocator knows at once; by default as the swim was made.
 
         Raises:
             LayoutError: there is no fin of that name, or it is the last that works.
+            FinlabError: the kind or the share is none.
         """
-        self.layout.index(name)
-        if name not in self.failed:
-            self.layout.without([*self.failed, name])
-            self.failed = (*self.failed, name)
+        fault = FinFault(name, self.time, kind, share).checked()
+        index = self.layout.index(name)
+        if kind == "lost":
+            self.layout.without([*(other for other in self.lost if other != name), name])
+        self._held[index] = self.fins.direction[index] if kind == "stuck" else np.nan
+        if kind == "stuck":
+            self.fins.direction_rate[index] = 0.0
+        for known in (self.broken, self._told) if self._tells(announced) else (self.broken,):
+            known.pop(name, None)
+            if kind != "whole":
+                known[name] = fault
+        if self._tells(announced) and self.monitor is not None:
+            strength = {"lost": 0.0, "weak": share}.get(kind, 1.0)
+            self.verdict = self.monitor.tell(name, strength, self._held[index])
 
-    def mend(self, name: str) -> None:
-        """A lost fin works again; a `LayoutError` where there is no fin of that name."""
-        self.layout.index(name)
-        self.failed = tuple(other for other in self.failed if other != name)
+    def mend(self, name: str, *, announced: bool | None = None) -> None:
+        """A fin works again as it should; a `LayoutError` where there is no fin of that name."""
+        self.fail(name, "whole", announced=announced)
+
+    def _tells(self, announced: bool | None) -> bool:
+        return self.announced if announced is None else announced
 
     def step(self) -> Tick:
         """Swims for one control period and returns what happened."""
         time = self.time
-        while self._pending and self._pending[0][1] <= time + 1e-9:
-            self.fail(self._pending.pop(0)[0])
+        while self._pending and self._pending[0].time_s <= time + 1e-9:
+            event = self._pending.pop(0)
+            self.fail(event.fin, event.kind, event.share)
         now = self._sensors.measure(time, self.state)
+        if self.monitor is not None:
+            reported = self.fins.command if self.servo_feedback else None
+            self.verdict = self.monitor.step(now, self._command, reported)
         asked = self._complete()(
             self.controller.wrench(now, self.task.setpoint(time + self.controller.lead_s))
         )
         previous = self._command if self.steady else None
         answer = self.allocator.allocate(
-            self.layout, asked, failed=self.failed, previous=previous, seed=self.seed
+            self.layout,
+            asked,
+            failed=self.failed,
+            previous=previous,
+            health=self.health,
+            seed=self.seed,
         )
-        tick = self._move(time, now, asked, answer.command, answer.solve_ms)
-        self._command = answer.command
+        command = answer.command
+        if self.monitor is not None:
+            command = self.monitor.probed(command)
+        tick = self._move(time, now, asked, command, answer.solve_ms)
+        self._command = command
         self._ticks.append(tick)
         return tick
 
@@ -167,23 +240,41 @@ class ClosedLoop:
 
     def _complete(self) -> Completion:
         """What completes the controller's wrench for the fins that work now."""
-        if self.failed not in self._completion:
-            self._completion[self.failed] = Completion(self.layout, self.failed, self.controller.axes)
-        return self._completion[self.failed]
+        failed = self.failed
+        if failed not in self._completion:
+            self._completion[failed] = Completion(self.layout, failed, self.controller.axes)
+        return self._completion[failed]
+
+    def _alive(self) -> NDArray[np.bool_]:
+        """Which fins (n,) are not lost."""
+        lost = self.lost
+        return np.array([name not in lost for name in self.layout.names])
+
+    def _moved(self, command: Array) -> Array:
+        """What the servos make of a command (n, 3): a lost fin is not moved, a stuck one does not turn."""
+        result = command.copy()
+        result[~self._alive()] = np.nan
+        result[:, 2] = np.where(np.isnan(self._held), result[:, 2], self._held)
+        return result
 
     def _move(self, time: float, now: Measurement, asked: Array, command: Array, solve_ms: float) -> Tick:
         """Fins and body over one period with a constant command."""
         before, setpoint = self.state, self.task.setpoint(time)
         n_steps = max(1, math.ceil(self.period_s / self._fin_force.step_s - 1e-9))
         dt = self.period_s / n_steps
-        alive = np.isfinite(command[:, 0])
+        moved, commanded = self._moved(command), np.isfinite(command[:, :1])
+        alive = self._alive()
+        works = np.isfinite(moved[:, 0])
+        share = np.where(works, 1.0, 0.0)
+        for name in names_of(self.broken, "weak"):
+            share[self.layout.index(name)] *= self.broken[name].share
         mean = np.zeros((self.layout.n_fins, 6))
         inertial, torque = np.zeros(self.layout.n_fins), np.zeros(self.layout.n_fins)
         for k in range(n_steps):
-            self.fins.step(command, dt)
+            self.fins.step(moved, dt)
             force = self._fin_force.step(self.fins, dt, self.vehicle.velocity_in_water(self.state))
             wrenches = np.einsum("nk,nkw->nw", force, self._fin_force.columns)
-            wrenches[~alive] = 0.0
+            wrenches *= share[:, None]
             wrench = wrenches.sum(axis=0)
             self.state = self.vehicle.step(self.state, wrench.tolist(), dt)
             if k + 1 < n_steps:  # the sample at the end belongs to the next period
@@ -201,7 +292,7 @@ class ClosedLoop:
             reference=setpoint.position,
             reference_surge=setpoint.surge,
             asked=asked,
-            allocated=self._plant.wrench(np.where(alive[:, None], command, 0.0)),
+            allocated=self._plant.wrench(np.where(commanded, command, 0.0)),
             delivered=mean.sum(axis=0),
             command=command,
             fin_motion=self.fins.command,
@@ -210,5 +301,18 @@ class ClosedLoop:
             inertial_power=inertial,
             torque_power=torque,
             alive=alive,
+            **self._suspicion(),
             solve_ms=solve_ms,
         )
+
+    def _suspicion(self) -> dict[str, Array]:
+        """The monitor's columns of a tick, NaN without one."""
+        if self.verdict is None:
+            unknown = np.full(self.layout.n_fins, np.nan)
+            return {"fault_probability": unknown, "strength": unknown, "strength_std": unknown}
+        found = self.verdict
+        return {
+            "fault_probability": found.probability,
+            "strength": found.strength,
+            "strength_std": found.strength_std,
+        }

@@ -39,7 +39,8 @@ class Tick(NamedTuple):
     delivered: AnyArray
     """Wrench (6,) of the fins, mean over the period [N, N m]."""
     command: AnyArray
-    """Command (n, 3): amplitude [rad], frequency [Hz], zero direction [rad]; NaN for a lost fin."""
+    """Command (n, 3): amplitude [rad], frequency [Hz], zero direction [rad]; NaN for a fin that is taken for
+    lost."""
     fin_motion: AnyArray
     """What the fins did at the end of the period (n, 3), in the same units."""
     fin_angle: AnyArray
@@ -51,7 +52,13 @@ class Tick(NamedTuple):
     torque_power: AnyArray
     """max(torque times speed, 0) of each fin (n,), mean over the period [W]."""
     alive: AnyArray
-    """Which fins work (n,)."""
+    """Which fins move as told, stuck and weak ones among them (n,)."""
+    fault_probability: AnyArray
+    """What the monitor gives for each fin not being whole (n,), 0 to 1; NaN without a monitor."""
+    strength: AnyArray
+    """Share of its nominal thrust that the monitor gives each fin (n,); NaN without one."""
+    strength_std: AnyArray
+    """Standard deviation of that share (n,); NaN without one."""
     solve_ms: float
     """Time of the allocation [ms]."""
 

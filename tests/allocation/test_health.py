@@ -1,6 +1,7 @@
 """Fins that work in part: what is left of them is used, and no more."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,8 +10,9 @@ from finlab.allocation import Health, load_allocator
 from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.assets import shipped_layouts
 from finlab.cli import main
-from finlab.errors import AllocationError, FinlabError
+from finlab.errors import AllocationError, FinlabError, LayoutError
 from finlab.layout import Layout, Limits, load_layout
+from finlab.layout.fin import FinModelSpec
 from finlab.physics import Plant
 
 TARGET = [1.0, 0.3, 1.0, 0.0, 0.05, 0.1]
@@ -30,6 +32,27 @@ def test_a_weak_fin_keeps_to_what_is_left(search: SearchAllocator, penta: Layout
     assert amplitude <= 0.4 * whole.amplitude[1] and frequency <= 0.4 * whole.frequency[1]
     far = search.allocate(penta, [20.0, 0, 0, 0, 0, 0], health=health)
     assert np.linalg.norm(far.fin_forces[penta.index("bow")]) < 0.05 * np.linalg.norm(far.fin_forces)
+
+
+@pytest.mark.parametrize("kind", ["drag", "lighthill", "soft"])
+def test_a_torn_fin_gives_its_share_at_every_command(
+    search: SearchAllocator, penta: Layout, kind: str
+) -> None:
+    fins = tuple(replace(fin, model=FinModelSpec(kind)) for fin in penta.fins)
+    layout, bow = replace(penta, fins=fins), penta.index("bow")
+    result = search.allocate(layout, TARGET, health=Health.of(thrust={"bow": 0.4}))
+    assert result.err_norm < 1e-5
+    told, law = result.fin_forces, Plant(layout).fin_forces(result.command)
+    assert np.linalg.norm(law[bow]) > 0.01, "the fin is in use"
+    np.testing.assert_allclose(told[bow], 0.4 * law[bow], rtol=1e-9)
+    np.testing.assert_allclose(np.delete(told, bow, 0), np.delete(law, bow, 0), rtol=1e-9)
+
+
+def test_the_thrust_of_a_table_cannot_be_scaled() -> None:
+    with pytest.raises(LayoutError, match="cannot be scaled"):
+        FinModelSpec("table", (("path", "fin.csv"),)).scaled(0.5)
+    with pytest.raises(AllocationError, match="share above 0"):
+        Health.of(thrust={"bow": 1.5})
 
 
 def test_a_stuck_fin_points_where_it_stays(search: SearchAllocator, penta: Layout) -> None:

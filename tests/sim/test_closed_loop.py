@@ -8,7 +8,7 @@ import pytest
 from finlab.allocation.allocator import Allocator
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.layout import Layout
-from finlab.sim import NO_NOISE, ClosedLoop, Cruise, RunLog, Tick, load_log, make_trajectory
+from finlab.sim import NO_NOISE, ClosedLoop, Cruise, FinFault, RunLog, Tick, load_log, make_trajectory
 from finlab.sim.log import log_of_ticks
 
 
@@ -100,3 +100,47 @@ def log_of_ticks_like(log: object, ticks: list[Tick]) -> object:
     """The same log made anew from its ticks."""
     about = {name: getattr(log, name) for name in ("layout", "fins", "method", "controller", "task", "plant")}
     return log_of_ticks(ticks, seed=log.seed, **about)  # type: ignore[attr-defined]
+
+
+def test_what_becomes_of_fins_without_a_word(layout_a: Layout, analytic: Allocator) -> None:
+    events = [FinFault("front_left", 2.0), FinFault("back_left", 2.0, "weak", 0.5)]
+    events += [FinFault("back_right", 2.0, "stuck"), FinFault("back_left", 4.0, "whole")]
+    swim = ClosedLoop(layout_a, analytic, make_trajectory("circle"), failures=events, announced=False)
+    log = swum(swim, 5.0)
+    lost, weak, stuck = (layout_a.index(name) for name in ("front_left", "back_left", "back_right"))
+    after = log.time >= 2.0
+    assert swim.failed == () and swim.health is None and swim.lost == ("front_left",)
+    assert set(swim.broken) == {"front_left", "back_right"}
+    assert np.isfinite(log.command).all(), "the allocator goes on as before"
+    assert not log.alive[after, lost].any() and log.alive[~after].all()
+    assert (log.fin_force[after, lost] == 0.0).all()
+    assert np.ptp(log.fin_motion[after, stuck, 2]) < 1e-9 and np.ptp(log.command[after, stuck, 2]) > 0.02
+    law = np.linalg.norm(swim._plant.fin_forces(log.fin_motion), axis=-1)
+    share = np.linalg.norm(log.fin_force, axis=-1)[:, weak] / law[:, weak]
+    assert np.median(share[after & (log.time < 4.0)]) == pytest.approx(0.5, abs=0.06)
+    assert np.median(share[log.time > 4.0]) == pytest.approx(1.0, abs=0.06)
+    assert np.isnan(log.fault_probability).all(), "nobody watches"
+
+
+def test_what_is_announced_reaches_the_allocator(layout_a: Layout, analytic: Allocator) -> None:
+    swim = ClosedLoop(layout_a, analytic, make_trajectory("circle"))
+    swum(swim, 1.0)
+    swim.fail("front_left", "weak", 0.4)
+    swim.fail("back_left", "stuck")
+    assert swim.health is not None
+    assert swim.health.thrust == (("front_left", 0.4),)
+    (name, angle), fin = swim.health.stuck[0], layout_a.index("back_left")
+    assert name == "back_left" and angle == swim.fins.direction[fin]
+    assert swim.step().command[fin, 2] == pytest.approx(angle, abs=1e-9)
+    swim.mend("front_left", announced=False)
+    assert dict(swim.health.thrust) == {"front_left": 0.4}, "nobody said that it is whole"
+    swim.mend("front_left")
+    assert swim.health.thrust == ()
+
+
+@pytest.mark.parametrize(("kind", "share"), [("melted", 0.5), ("weak", 1.0), ("weak", 0.0)])
+def test_no_such_failures(layout_a: Layout, analytic: Allocator, kind: str, share: float) -> None:
+    with pytest.raises(FinlabError, match="failure of front_left: expected"):
+        FinFault("front_left", 1.0, kind, share).checked()
+    with pytest.raises(FinlabError, match="failure of front_left: expected"):
+        ClosedLoop(layout_a, analytic, make_trajectory("circle")).fail("front_left", kind, share)

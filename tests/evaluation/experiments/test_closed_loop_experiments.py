@@ -119,10 +119,26 @@ def test_uncontrollable_is_said_before_the_run(tmp_path: Path, capsys: pytest.Ca
     assert "from 0.5 s on, A without front_left, back_left cannot give surge, heave and yaw" in err
 
 
+def test_a_monitor_says_what_it_finds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "line.csv"
+    path.write_text("t,x,y,z\n0,0,0,-1\n16,2,0,-1\n")
+    argv = ["simulate", "A", "--trajectory", str(path), "--method", "analytic", "--fail", "front_left@10"]
+    watched = [*argv, "--no-announced", "--monitor", "--servo-feedback", "-o", str(tmp_path / "swim")]
+    assert main(watched) == 0
+    assert "s: the monitor takes front_left lost" in capsys.readouterr().out
+    log = load_log(tmp_path / "swim" / "log.npz")
+    assert log.fault_probability[-1].argmax() == log.fins.index("front_left")
+    assert main([*argv, "--no-announced"]) == 0
+    assert "monitor" not in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("argv", "message"),
     [
         (["simulate", "A", "--fail", "front_left"], "expected NAME@SECONDS"),
+        (["simulate", "A", "--fail", "front_left@3:melted"], "expected NAME@SECONDS"),
+        (["simulate", "A", "--fail", "front_left@3:stuck=0.5"], "expected NAME@SECONDS"),
+        (["simulate", "A", "--fail", "front_left@3:weak=2"], "expected NAME@SECONDS"),
         (["simulate", "A", "--fail", "tail@3", "--method", "analytic"], "no fin 'tail'"),
         (["simulate", "A", "--trajectory", "spiral", "--method", "analytic"], "circle, lissajous, square"),
         (["eval", "trajectory", "--runs", "0"], "runs: expected a number of at least 1"),

@@ -1,0 +1,207 @@
+"""Notices fins that are weak, lost or stuck, from how the robot moves, and takes repaired ones back."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from finlab.allocation.health import Health
+from finlab.arrays import Array
+from finlab.control.controllers import Measurement
+from finlab.control.hypotheses import LEVELS, Hypotheses
+from finlab.control.monitor_settings import MonitorSettings
+from finlab.control.motion_model import MotionModel
+from finlab.control.probe import Probe
+from finlab.control.servo_reports import report_evidence
+from finlab.layout import Body, Layout
+
+LOST_BELOW = 0.12
+"""A strength below which a fin is lost."""
+WHOLE_ABOVE = 0.9
+"""A strength from which a fin that was weak is whole again."""
+COARSE = 0.05
+"""The allocator is told of strengths in steps of this size, so that it need not think anew at every tick."""
+
+
+class Verdict(NamedTuple):
+    """What a monitor believes of n fins."""
+
+    failed: tuple[str, ...]
+    """Names of the fins that are lost: `failed=` of an allocator."""
+    health: Health | None
+    """What is known of weak and stuck ones: `health=` of an allocator; None where there are none."""
+    probability: Array
+    """Of each fin not being whole (n,), 0 to 1."""
+    strength: Array
+    """Share of its law's thrust that each fin gives (n,)."""
+    strength_std: Array
+    """Standard deviation of that share (n,)."""
+
+
+class FaultMonitor:
+    """Watches one robot; to be called at a fixed rate, before the allocator.
+
+        monitor = FaultMonitor(layout)
+        while swimming:
+            verdict = monitor.step(measurement, command)  # the command that was in force until now
+            answer = allocator.allocate(layout, wrench, failed=verdict.failed, health=verdict.health)
+            command = monitor.probed(answer.command)
+
+    A fin that rests cannot be told from one that is lost: its probability stays where it was.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        body: Body | None = None,
+        settings: MonitorSettings | None = None,
+        *,
+        period_s: float = 0.1,
+    ) -> None:
+        """Believes that all fins are whole.
+
+        Args:
+            layout: the robot.
+            body: its mass, damping and buoyancy; by default the layout's, completed by U-CAT's.
+            settings: noise and expectations.
+            period_s: time between calls [s].
+        """
+        self.layout, self.period_s = layout, period_s
+        self.settings = MonitorSettings() if settings is None else settings
+        self._model = MotionModel(layout, body, period_s)
+        self._beliefs = Hypotheses(layout.n_fins, self._model.inertia, self.settings)
+        self._probe = Probe(layout, self.settings.probe_every_s, period_s)
+        n = layout.n_fins
+        self._weak = np.zeros(n, dtype=bool)
+        self._lost = np.zeros(n, dtype=bool)
+        self._told = np.zeros(n, dtype=bool)
+        self._held = np.full(n, np.nan)
+        self._heading = np.zeros((n, 2))
+        self._coarse = np.ones(n)
+        self._velocity: Array | None = None
+
+    @property
+    def broken(self) -> tuple[str, ...]:
+        """Names of the fins that are taken for lost, weak or stuck."""
+        marked = self._lost | self._weak | ~np.isnan(self._held)
+        return tuple(self.layout.names[k] for k in np.flatnonzero(marked))
+
+    def step(self, measurement: Measurement, command: Array | None, reported: Array | None = None) -> Verdict:
+        """Takes what has been measured and says what is believed.
+
+        Args:
+            measurement: of now. A velocity counts as new where its array is another one than last time.
+            command: (n, 3) [rad, Hz, rad] in force since the last call, NaN for fins at rest; None before the
+                first.
+            reported: what the servos say that the fins did (n, 3) [rad, Hz, rad]; NaN where they are silent.
+        """
+        beliefs, m = self._beliefs, measurement
+        seen = np.array([*m.velocity.tolist(), *m.rates.tolist(), m.roll, m.pitch])
+        last, self._velocity = self._velocity, m.velocity
+        if last is None or command is None:
+            beliefs.state[:, :8] = seen
+            return self.verdict()
+        other = self._other_direction(beliefs.feed(self.period_s))
+        step = self._model.step(beliefs.state[0], m.yaw, command, reported, self._held, other)
+        beliefs.predict(step, self.period_s)
+        besides = None
+        if reported is not None:
+            evidence = report_evidence(reported, self._expected(), other, len(LEVELS) + 1)
+            besides = beliefs.spread(evidence)
+        beliefs.update(seen, m.velocity is last, besides)
+        self._judge(other)
+        return self.verdict()
+
+    def tell(self, name: str, strength: float = 1.0, stuck: float = math.nan) -> Verdict:
+        """Somebody knows what has become of a fin: its strength, and where it is stuck [rad] if it is.
+
+        Raises:
+            LayoutError: there is no fin of that name.
+        """
+        fin = self.layout.index(name)
+        self._beliefs.believe(fin, strength)
+        self._mark(fin, strength, stuck)
+        self._told[fin] = True
+        return self.verdict()
+
+    def probed(self, command: Array) -> Array:
+        """The command (n, 3) with a short, small beat now and then of fins that the monitor found to be lost.
+
+        A lost fin gives nothing by it; of one that has been repaired the robot feels it, and takes it back.
+        """
+        return self._probe.added(command, self._lost & ~self._told, self._model.fins.direction)
+
+    def verdict(self) -> Verdict:
+        """What is believed now."""
+        beliefs = self._beliefs
+        strength, by_kind = beliefs.strength.copy(), beliefs.of_fins
+        probability = by_kind.sum(axis=1)
+        stuck = ~np.isnan(self._held)
+        failed: tuple[str, ...] = ()
+        health = None
+        broken = self._lost | self._weak | stuck
+        if broken.any():
+            names = self.layout.names
+            # The last but one belief is a whole fin, the last one of a stuck fin that it turns again.
+            whole = by_kind[:, -2] + np.where(stuck, by_kind[:, -1], 0.0)
+            probability = np.where(broken, 1.0 - whole, probability)
+            failed = tuple(names[k] for k in np.flatnonzero(self._lost))
+            health = self._health(strength, stuck & ~self._lost)
+        return Verdict(failed, health, probability, strength, beliefs.strength_std)
+
+    def _health(self, strength: Array, stuck: Array) -> Health | None:
+        """What an allocator should know of fins that still push; a table's thrust cannot be scaled."""
+        fins = self.layout.fins
+        weak = [k for k in np.flatnonzero(self._weak) if fins[k].model.type != "table"]
+        if not weak and not stuck.any():
+            return None
+        far = np.abs(strength - self._coarse) > 0.75 * COARSE
+        steps = np.clip(np.round(strength / COARSE), 1, round(1 / COARSE)) * COARSE
+        self._coarse = np.where(far, steps, self._coarse)
+        return Health(
+            thrust=tuple((fins[k].name, float(self._coarse[k])) for k in weak),
+            stuck=tuple((fins[k].name, float(self._held[k])) for k in np.flatnonzero(stuck)),
+        )
+
+    def _other_direction(self, fresh: Array) -> Array:
+        """Zero directions (n,) of the beliefs that fins stick: where they were when it may have begun."""
+        now = self._model.fins.direction
+        here = np.stack([np.cos(now), np.sin(now)], axis=1)
+        self._heading += self._beliefs.of_turned(fresh)[:, None] * (here - self._heading)
+        seen = np.arctan2(self._heading[:, 1], self._heading[:, 0])
+        return np.where(np.isnan(self._held), seen, np.nan)
+
+    def _expected(self) -> Array:
+        """What the fins should do (n, 3) if they are what they are taken for."""
+        expected = self._model.fins.motion.copy()
+        expected[:, 2] = np.where(np.isnan(self._held), expected[:, 2], self._held)
+        return expected
+
+    def _judge(self, other: Array) -> None:
+        """Acts on what has become all but certain."""
+        beliefs = self._beliefs
+        if self._weak.any():
+            strength = beliefs.strength
+            gone = self._weak & (strength < LOST_BELOW)
+            if (self._lost | gone).sum() < self.layout.n_fins:
+                self._lost |= gone
+                self._weak &= ~gone
+            self._weak &= strength < WHOLE_ABOVE
+        by_kind = beliefs.of_fins
+        total = by_kind.sum(axis=1)
+        fin = int(total.argmax())
+        if total[fin] < self.settings.threshold:
+            return
+        kind = int(by_kind[fin].argmax())
+        turned = kind == len(LEVELS)
+        level = float(beliefs.strength[fin]) if turned else LEVELS[kind]
+        if level == 0.0 and self._lost.sum() == self.layout.n_fins - 1:
+            return  # the last one that works
+        beliefs.adopt(fin, kind)
+        self._mark(fin, level, float(other[fin]) if turned else float(self._held[fin]))
+        self._told[fin] = False
+
+    def _mark(self, fin: int, strength: float, stuck: float) -> None:
+        self._lost[fin] = strength < LOST_BELOW
+        self._weak[fin] = LOST_BELOW <= strength < WHOLE_ABOVE
+        self._held[fin] = stuck if strength >= LOST_BELOW else math.nan

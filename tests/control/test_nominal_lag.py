@@ -1,0 +1,23 @@
+"""One step per period against the simulated servo's small steps."""
+
+import numpy as np
+
+from finlab.control.nominal_lag import NominalLag
+from finlab.layout import Layout
+from finlab.physics.fin_motion import FinMotion
+
+
+def test_it_follows_as_the_simulated_servo_does(layout_a: Layout) -> None:
+    rng = np.random.default_rng(5)
+    lag, motion = NominalLag(layout_a, 0.1), FinMotion(layout_a)
+    low, high = layout_a.lower, layout_a.upper
+    for _ in range(40):
+        command = low + rng.uniform(size=low.shape) * (high - low) * (0.9, 0.9, 0.5)
+        for _ in range(10):
+            motion.step(command, 0.01)
+        np.testing.assert_allclose(lag.step(command), motion.command, atol=0.02)
+    command[1] = np.nan
+    motion.step(command, 0.1)
+    still = lag.step(command)
+    np.testing.assert_allclose(still[1], motion.command[1], atol=0.02)
+    assert still[1, 0] == 0.0 and lag.direction[1] == still[1, 2]
