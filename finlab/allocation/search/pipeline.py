@@ -140,11 +140,11 @@ class Pipeline:
             fallback: where to start from when targets were missed; None from it ends their search.
         """
         target = targets / self.std
-        near_best = seeds is None and self.settings.subsets and prepared.plant.n_fins >= MANY
         if seeds is None:
             own = prepared.seeds if self.settings.subsets else prepared.seeds[:1]
             seeds = own[None].repeat(len(target), axis=0)
-        start = _Start(seeds, near_best and not self.objective.convex, fallback)
+        many = prepared.plant.n_fins >= MANY
+        start = _Start(seeds, many and self.settings.subsets and not self.objective.convex, fallback)
         if previous is None:
             candidates = self._descend(prepared, target, start)
             return self._trade_error_for_energy(prepared, target, candidates, None)

@@ -25,7 +25,8 @@ class Settings:
     refine_steps: int = 1
     """Levenberg-Marquardt steps on the commands, by the fins' own laws."""
     subsets: bool = True
-    """Whether allocations that rest some fins are searched, where the objective may prefer them."""
+    """Whether allocations that rest some fins are searched, where the objective may prefer them; of many fins
+    also near the best that any method began with."""
     energy_tradeoff: float = 0.0
     """w of the weighted sum `err_norm^2 + w J_en` to minimize, with objective `effort`; 0: the least cost
     among exact answers."""

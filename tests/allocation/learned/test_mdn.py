@@ -87,7 +87,7 @@ def test_candidates_keep_the_name_of_their_component(settled: MdnAllocator, layo
 
 def test_from_tick_to_tick_candidates_keep_it_too(shipped: MdnAllocator) -> None:
     # A previous command without directions narrows no arc: each proposal leads to where it always does.
-    layout, all_kept = load_layout("octo"), shipped.with_settings(n_refined=100)
+    layout, all_kept = load_layout("octo"), shipped.with_settings(n_refined=100, subsets=False)
     alone = all_kept.allocate(layout, TARGET).candidates
     answer = all_kept.allocate(layout, TARGET, previous=np.full((8, 3), np.nan)).candidates
     assert alone is not None and answer is not None
