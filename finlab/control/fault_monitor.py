@@ -14,6 +14,7 @@ from finlab.control.motion_model import MotionModel
 from finlab.control.probe import Probe
 from finlab.control.servo_reports import report_evidence
 from finlab.layout import Body, Layout
+from finlab.layout.angles import TURN
 
 LOST_BELOW = 0.12
 """A strength below which a fin is lost."""
@@ -76,7 +77,7 @@ class FaultMonitor:
         self._lost = np.zeros(n, dtype=bool)
         self._told = np.zeros(n, dtype=bool)
         self._held = np.full(n, np.nan)
-        self._heading = np.zeros((n, 2))
+        self._since = self._model.fins.direction.copy()
         self._coarse = np.ones(n)
         self._velocity: Array | None = None
 
@@ -99,15 +100,14 @@ class FaultMonitor:
         seen = np.array([*m.velocity.tolist(), *m.rates.tolist(), m.roll, m.pitch])
         last, self._velocity = self._velocity, m.velocity
         if last is None or command is None:
-            beliefs.state[:, :8] = seen
+            beliefs.state[:8] = seen
             return self.verdict()
         other = self._other_direction(beliefs.feed(self.period_s))
-        step = self._model.step(beliefs.state[0], m.yaw, command, reported, self._held, other)
+        step = self._model.step(beliefs.state, m.yaw, command, reported, self._held, other)
         beliefs.predict(step, self.period_s)
         besides = None
         if reported is not None:
-            evidence = report_evidence(reported, self._expected(), other, len(LEVELS) + 1)
-            besides = beliefs.spread(evidence)
+            besides = report_evidence(reported, self._expected(), other, len(LEVELS) + 1)
         beliefs.update(seen, m.velocity is last, besides)
         self._judge(other)
         return self.verdict()
@@ -134,7 +134,7 @@ class FaultMonitor:
     def verdict(self) -> Verdict:
         """What is believed now."""
         beliefs = self._beliefs
-        strength, by_kind = beliefs.strength.copy(), beliefs.of_fins
+        strength, by_kind = beliefs.strength.copy(), beliefs.probability
         probability = by_kind.sum(axis=1)
         stuck = ~np.isnan(self._held)
         failed: tuple[str, ...] = ()
@@ -165,11 +165,9 @@ class FaultMonitor:
 
     def _other_direction(self, fresh: Array) -> Array:
         """Zero directions (n,) of the beliefs that fins stick: where they were when it may have begun."""
-        now = self._model.fins.direction
-        here = np.stack([np.cos(now), np.sin(now)], axis=1)
-        self._heading += self._beliefs.of_turned(fresh)[:, None] * (here - self._heading)
-        seen = np.arctan2(self._heading[:, 1], self._heading[:, 0])
-        return np.where(np.isnan(self._held), seen, np.nan)
+        turn = self._model.fins.direction - self._since
+        self._since += fresh[:, -1] * (turn - TURN * np.round(turn / TURN))
+        return np.where(np.isnan(self._held), self._since, np.nan)
 
     def _expected(self) -> Array:
         """What the fins should do (n, 3) if they are what they are taken for."""
@@ -187,7 +185,7 @@ class FaultMonitor:
                 self._lost |= gone
                 self._weak &= ~gone
             self._weak &= strength < WHOLE_ABOVE
-        by_kind = beliefs.of_fins
+        by_kind = beliefs.probability
         total = by_kind.sum(axis=1)
         fin = int(total.argmax())
         if total[fin] < self.settings.threshold:

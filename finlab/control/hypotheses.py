@@ -28,96 +28,82 @@ MOST_MISFIT = 1e5
 
 
 class Hypotheses:
-    """States of all beliefs (m, 12 + n), their probabilities (m,), and the covariance that they share.
+    """What is taken for true of n fins, and beside it m beliefs about each fin, that it has just changed.
 
-    The first belief is what is taken for true. Then come, for each fin, `LEVELS` of strength, and last the
-    fin's other direction: of a fin that turns, that it sticks; of a stuck one, that it turns again.
+    They are that it has come to one of `LEVELS` of strength, and, the last one, to its other direction: a fin
+    that turned sticks, a stuck one turns again.
     """
 
     def __init__(self, n_fins: int, inertia: Array, settings: MonitorSettings) -> None:
         """Starts at rest, whole; takes the body's mass and moments (6,) with those of the water."""
         self.n_fins, self.settings = n_fins, settings
         s, size = settings, FIRST_FIN + n_fins
-        self._kinds = len(LEVELS) + 1
-        self.state = np.zeros((1 + n_fins * self._kinds, size))
-        """States of all beliefs (m, 12 + n)."""
-        self.state[:, STRENGTH] = 1.0
+        self.state = np.zeros(size)
+        """State z (14 + n) that is taken for true."""
+        self.state[STRENGTH] = 1.0
+        self.off: Array = np.zeros((n_fins, len(LEVELS) + 1, size))
+        """How the states of the beliefs differ from it (n, m, 14 + n)."""
         variance = np.zeros(size)
         variance[MOTION] = variance[TILT] = 1e-4
         variance[CURRENT], variance[TORQUE] = s.current**2, s.torque**2
         variance[STRENGTH] = s.strength**2
         self.covariance = np.diag(variance)
-        """Covariance (14 + n, 12 + n) of each."""
+        """Covariance (14 + n, 14 + n) of each."""
         noise = np.zeros(size)
-        noise[:3], noise[3:6] = s.force_noise**2, s.torque_noise**2
-        self._motion_noise = noise[MOTION] / inertia**2
-        noise[MOTION] = 0.0
         noise[CURRENT], noise[TORQUE] = s.current_drift**2, s.torque_drift**2
         noise[STRENGTH] = s.strength_drift**2
-        self._noise = noise
-        self._sensors = np.array([s.velocity_noise**2] * 3 + [s.rate_noise**2] * 3 + [s.tilt_noise**2] * 2)
+        motion = np.array([s.force_noise**2] * 3 + [s.torque_noise**2] * 3) / inertia**2
+        self._noise, self._motion_noise = noise, motion
+        self._sensors = np.diag([s.velocity_noise**2] * 3 + [s.rate_noise**2] * 3 + [s.tilt_noise**2] * 2)
         self._most = np.full(n_fins, s.strength**2)
-        self._fin = np.repeat(np.arange(n_fins), self._kinds)
-        self._rows = np.arange(1, len(self.state))
-        self._turned_rows = np.arange(n_fins) * self._kinds + self._kinds
-        self._turned_strength = FIRST_FIN + np.arange(n_fins)
-        self._level = np.tile([*LEVELS, np.nan], n_fins)
-        self.probability: Array = np.zeros(len(self.state))
-        """Probabilities (m,), sum 1."""
+        self.probability: Array = np.zeros((n_fins, len(LEVELS) + 1))
+        """Probability (n, m) of each belief."""
         self._age_s = 0.0
         self.misfit = 1.0
         """How many times as much (a variance) the motion is disturbed as the settings say, at least 1."""
         self.distance = 0.0
-        """Squared distance of the last measurement from what the first belief expected, in variances."""
+        """Squared distance of the last measurement from what was expected, in variances."""
         self._settle()
 
     def _settle(self) -> None:
-        """All beliefs start from the first, at their prior probabilities."""
-        strength = self.state[0, STRENGTH]
-        level = np.where(np.isnan(self._level), strength[self._fin], self._level)
-        possible = np.isnan(self._level) | (np.abs(level - strength[self._fin]) > APART)
-        self.level = level
-        """Strength (m - 1,) of its fin that each belief but the first begins with."""
-        self._rate = np.where(possible, self.settings.failures / self._kinds, 0.0)
-        self.state[1:] = self.state[0]
-        self.state[self._rows, FIRST_FIN + self._fin] = level
-        prior = self._rate * self.settings.doubt_s
-        self.probability[1:], self.probability[0] = prior, 1.0 - prior.sum()
+        """All beliefs begin, at their prior probabilities."""
+        jump = np.append(LEVELS, 0.0) - self.strength[:, None]
+        jump[:, -1] = 0.0
+        possible = np.abs(jump) > APART
+        possible[:, -1] = True
+        self._jump = jump
+        self._rate = np.where(possible, self.settings.failures / jump.shape[1], 0.0)
+        self.off[:] = 0.0
+        self._strengths_off()[:] = jump
+        self.probability = self._rate * self.settings.doubt_s
+
+    def _strengths_off(self) -> Array:
+        """The part (n, m) of `off` that is about the strength of the fin in question; a view."""
+        view: Array = np.einsum("iki->ik", self.off[:, :, STRENGTH])
+        return view
 
     def feed(self, dt: float) -> Array:
-        """What is taken for true may have ended just now; returns how much (m - 1,) of each belief is new."""
+        """What is taken for true may have ended just now; returns how much (n, m) of each belief is new."""
         self._age_s += dt
         if self._age_s < self.settings.settle_s:
             self._settle()
-            return np.ones(len(self._rows))
-        p, begins = self.probability, self._rate * dt
-        kept = p[1:] * (1.0 - dt / self.settings.doubt_s)
-        new = p[0] * begins
-        total = kept + new
-        share: Array = new / np.maximum(total, 1e-300)
-        others, strength = self.state[1:], self.state[0, STRENGTH][self._fin]
-        others += share[:, None] * (self.state[0] - others)
-        self.state[self._rows, FIRST_FIN + self._fin] += share * (self.level - strength)
-        p[1:] = total
-        p[0] = 1.0 - total.sum()
+            return np.ones_like(self.probability)
+        new = self._rate * (dt * (1.0 - self.probability.sum()))
+        self.probability *= 1.0 - dt / self.settings.doubt_s
+        self.probability += new
+        share: Array = new / np.maximum(self.probability, 1e-300)
+        self.off *= (1.0 - share)[:, :, None]
+        self._strengths_off()[:] += share * self._jump
         return share
-
-    def of_turned(self, values: Array) -> Array:
-        """Of values (m - 1,) those (n,) of the fins' other directions."""
-        return values[self._turned_rows - 1]
-
-    def spread(self, by_fin: Array) -> Array:
-        """Logarithms (m,) for whole robots, of those (n, 1 + kinds) for fins, their present state first."""
-        as_is = by_fin[:, 0]
-        return np.concatenate([[0.0], (by_fin[:, 1:] - as_is[:, None]).ravel()])
 
     def predict(self, step: Step, dt: float) -> None:
         """All beliefs over one period."""
-        turned = self.state[self._turned_rows, self._turned_strength]
-        self.state = (self.state - self.state[0]) @ step.transition.T + step.state
-        self.state[self._turned_rows, MOTION] += turned[:, None] * step.turned
-        self.covariance = step.transition @ self.covariance @ step.transition.T
-        variance = self.covariance.ravel()[:: len(self._noise) + 1]
+        turned = self.strength + self._strengths_off()[:, -1]
+        forward = step.transition.T
+        self.state, self.off = step.state, self.off @ forward
+        self.off[:, -1, MOTION] += turned[:, None] * step.turned
+        self.covariance = step.transition @ self.covariance @ forward
+        variance = self.covariance.ravel()[:: len(self.state) + 1]
         variance += self._noise * dt
         variance[MOTION] += self._motion_noise * (self.misfit * dt)
         excess = variance[STRENGTH] / self._most
@@ -129,49 +115,49 @@ class Hypotheses:
     def update(self, seen: Array, slow: bool, besides: Array | None) -> None:
         """Takes velocity, rates, roll and pitch (8,); without the velocity where it is no new one.
 
-        `besides` holds the logarithms (m,) of what else speaks for each belief.
+        `besides` holds the logarithms (n, m) of what else speaks for each belief.
         """
         rows = slice(3 if slow else 0, 8)
         covariance = self.covariance
-        spread = covariance[rows, rows].copy()
-        spread.ravel()[:: len(spread) + 1] += self._sensors[rows]
-        inverse = np.linalg.inv(spread)
+        inverse = np.linalg.inv(covariance[rows, rows] + self._sensors[rows, rows])
         gain = covariance[:, rows] @ inverse
-        missed = seen[rows] - self.state[:, rows]
-        distance = ((missed @ inverse) * missed).sum(axis=1)
-        self.distance = float(distance[0])
+        missed = seen[rows] - self.state[rows]
+        others = missed - self.off[:, :, rows]
+        distance = (others @ inverse * others).sum(axis=-1)
+        self.distance = float(missed @ inverse @ missed)
         # Where fins are not what the model says, even the best belief is far off: trust it less.
-        surprise = min(float(distance.min()) / len(spread), MOST_SURPRISE) - EXPECTED_SURPRISE
+        least = min(float(distance.min()), self.distance)
+        surprise = min(least / len(inverse), MOST_SURPRISE) - EXPECTED_SURPRISE
         self.misfit = min(max(self.misfit * math.exp(ADAPTING * surprise), 1.0), MOST_MISFIT)
-        self.state += missed @ gain.T
+        self.state = self.state + gain @ missed
+        self.off -= self.off[:, :, rows] @ gain.T
         self.covariance = covariance - gain @ covariance[rows]
-        likely = -0.5 * distance if besides is None else besides - 0.5 * distance
-        self.probability *= np.exp(likely - likely.max())
-        self.probability /= self.probability.sum()
-
-    @property
-    def of_fins(self) -> Array:
-        """Probability (n, kinds) that something has happened to a fin, by what."""
-        return self.probability[1:].reshape(self.n_fins, self._kinds)
+        better = 0.5 * (self.distance - distance)
+        if besides is not None:
+            better += besides
+        best = max(float(better.max()), 0.0)
+        weight = self.probability * np.exp(better - best)
+        self.probability = weight / (weight.sum() + (1.0 - self.probability.sum()) * math.exp(-best))
 
     @property
     def strength(self) -> Array:
         """Strengths (n,) that are taken for true."""
-        return self.state[0, STRENGTH]
+        return self.state[STRENGTH]
 
     @property
     def strength_std(self) -> Array:
         """Their standard deviations (n,)."""
-        return np.sqrt(self.covariance.ravel()[:: len(self._noise) + 1][STRENGTH])
+        std: Array = np.sqrt(self.covariance.ravel()[:: len(self.state) + 1][STRENGTH])
+        return std
 
     def adopt(self, fin: int, kind: int) -> None:
         """One belief is now taken for true, and all begin anew."""
-        self.state[0] = self.state[1 + fin * self._kinds + kind]
+        self.state = self.state + self.off[fin, kind]
         self._doubt(fin, self.settings.new_strength if 0 < kind < len(LEVELS) - 1 else self.settings.strength)
 
     def believe(self, fin: int, strength: float) -> None:
         """Somebody knows the strength of a fin."""
-        self.state[0, FIRST_FIN + fin] = strength
+        self.state[FIRST_FIN + fin] = strength
         self._doubt(fin, self.settings.strength)
 
     def _doubt(self, fin: int, std: float) -> None:

@@ -21,9 +21,11 @@ class NominalLag:
         n = layout.n_fins
         lower, upper = layout.lower[:, 2], layout.upper[:, 2]
         self._full = is_full_turn(upper - lower)
-        self._dt = period_s
-        self._pole = np.repeat([[servo.amplitude_pole], [servo.direction_pole]], n, axis=1)
-        self._decay = np.exp(-self._pole * period_s)
+        pole = np.repeat([[servo.amplitude_pole], [servo.direction_pole]], n, axis=1)
+        decay = np.exp(-pole * period_s)
+        # Exact step of x'' = -2 pole x' - pole^2 (x - aim): new error and rate from the old ones.
+        self._kept, self._carried = (1.0 + pole * period_s) * decay, period_s * decay
+        self._driven, self._slowed = -(pole**2) * period_s * decay, (1.0 - pole * period_s) * decay
         self._swing = servo.speed_limit / TURN
         self._value = np.stack([np.zeros(n), 0.5 * (lower + upper)])
         self._rate = np.zeros((2, n))
@@ -39,16 +41,16 @@ class NominalLag:
     def step(self, command: Array) -> Array:
         """Follows a command (n, 3) for one period; returns what the fins do (n, 3). NaN rows hang still."""
         rests = np.isnan(command[:, 0])
-        known = np.where(rests[:, None], 0.0, command) if rests.any() else command
+        some_rest = bool(rests.any())
+        known = np.where(rests[:, None], 0.0, command) if some_rest else command
         aim = np.empty_like(self._value)
         np.minimum(known[:, 0], self._swing / np.maximum(known[:, 1], 1e-9), out=aim[0])
         turn = known[:, 2] - self._value[1]
         aim[1] = self._value[1] + np.where(self._full, turn - TURN * np.round(turn / TURN), turn)
         error = self._value - aim
-        slope = self._rate + self._pole * error
-        value = aim + (error + slope * self._dt) * self._decay
-        rate = (self._rate - self._pole * slope * self._dt) * self._decay
-        if rests.any():
+        value = aim + self._kept * error + self._carried * self._rate
+        rate = self._driven * error + self._slowed * self._rate
+        if some_rest:
             value[0, rests], value[1, rests], rate[:, rests] = 0.0, self._value[1, rests], 0.0
         self._value, self._rate = value, rate
         result = np.empty_like(command)

@@ -24,16 +24,17 @@ def report_evidence(reported: Array, expected: Array, other: Array, kinds: int) 
             direction is the other one.
 
     Returns:
-        A column for each, and one more in front for the fin as it is taken to be, which follows.
+        (n, kinds), 0 for what fits as well as that the fin is as it is taken to be, and follows.
     """
     still = _far(reported[:, 0], 0.0, AMPLITUDE_RAD)
     beats = _far(reported[:, 0], expected[:, 0], AMPLITUDE_RAD)
     points = _turned(reported[:, 2], expected[:, 2])
     follows = np.minimum(beats + points, MOST)
-    result = np.repeat(-follows[:, None], kinds + 1, axis=1)
-    result[:, 1] = -np.minimum(still, follows)  # the servo of a lost fin may still turn, its blade gone
+    result = np.zeros((len(reported), kinds))
+    # The servo of a lost fin may still turn, its blade gone.
+    result[:, 0] = follows - np.minimum(still, follows)
     aside = np.where(np.isnan(other), points, _turned(reported[:, 2], other))
-    result[:, -1] = -np.minimum(beats + aside, MOST)
+    result[:, -1] = follows - np.minimum(beats + aside, MOST)
     result[np.isnan(result)] = 0.0
     return result
 
