@@ -1,4 +1,4 @@
-"""`finlab fit fin|plan`: from measurements to a fin that layouts can name, and what to measure."""
+"""`finlab fit fin|plan|robot`: from measurements to a fin that layouts can name, from a swim to a robot."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -101,3 +101,43 @@ def plan(
     print(
         f"{output}: {len(plan.command)} measurements, {plan.repeats} of them repeats, about {minutes:.0f} min"
     )
+
+
+@verbs.command
+def robot(
+    layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
+    logs: Annotated[Positional[tuple[Path, ...]], arg(metavar="LOG...")],
+    output: Annotated[Path, arg(metavar="LAYOUT2", aliases=["-o"])],
+    residual: bool = True,
+) -> None:
+    """Learn a robot from swims: its fins' strengths and directions, its body, what fins take from each other.
+
+    A log is log.npz of `finlab simulate`, or a CSV file: t, what was measured (x, y, z, roll, pitch, yaw, u,
+    v, w, p, q, r), and FIN.A, FIN.f, FIN.phi for each fin as it was told. `finlab simulate --excite` shows a
+    swim that tells much.
+
+    Args:
+        layout: the robot as it is believed to be: layout file or the name of a shipped layout.
+        logs: swims of that robot.
+        output: the layout as the swims show it; fins whose law is another one become tables beside it.
+        residual: look for another law of thrust, jets and inflow, too, and use what helps on parts not seen.
+    """
+    from finlab.cli.inputs import open_robot
+    from finlab.errors import DataError
+    from finlab.fit.robot.fitted_layout import write_robot
+    from finlab.fit.robot.report import summary, table
+    from finlab.fit.robot.robot_fit import fit_robot
+    from finlab.fit.robot.swim_file import read_swim
+    from finlab.fit.robot.unknowns import RESIDUAL
+
+    if output.suffix.lower() not in (".yaml", ".yml", ".json"):
+        raise DataError(
+            f"{output}: a layout is a YAML or JSON file, expected a name that ends in .yaml or .json"
+        )
+    believed = open_robot(layout).layout
+    fit = fit_robot(believed, [read_swim(log, believed) for log in logs], RESIDUAL if residual else ())
+    write_robot(fit, output)
+    print("\n".join(summary(fit)))
+    print()
+    print(table(fit))
+    print(f"\n{output}: the robot as it swam")

@@ -89,7 +89,9 @@ def _document_of(graph: LayoutGraph) -> dict[str, Any]:
         "checksum": "",
         "frame": FRAME,
         "units": UNITS,
-        "layout": {key: layout[key] for key in ("name", "description", "body") if key in layout},
+        "layout": {
+            key: layout[key] for key in ("name", "description", "body", "interaction") if key in layout
+        },
         "graph": {
             "directed": False,
             "multigraph": False,

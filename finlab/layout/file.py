@@ -14,6 +14,7 @@ from typing import Any
 from finlab.errors import LayoutError
 from finlab.layout.body import BODY_KEYS, HULL_KEYS, Body, Hull
 from finlab.layout.fin import Fin, FinModelSpec, Limits
+from finlab.layout.interaction import Interaction, Jet
 from finlab.layout.layout import MAX_FINS, Layout
 from finlab.layout.rules import mapping, number, shown, text, under
 from finlab.whole_file import write_whole
@@ -54,6 +55,9 @@ def layout_to_dict(layout: Layout) -> dict[str, Any]:
     data["fins"] = [_fin_to_dict(fin) for fin in layout.fins]
     if layout.body is not None:
         data["body"] = _plain(asdict(layout.body))
+    if layout.interaction is not None:
+        data["interaction"] = _plain(asdict(layout.interaction))
+        del data["interaction"]["velocity"]
     return data
 
 
@@ -74,7 +78,7 @@ def save_layout(layout: Layout, path: str | os.PathLike[str]) -> None:
 
 
 def _layout(data: Any, folder: Path) -> Layout:
-    keys = ("format", "version", "name", "description", "frame", "fins", "body")
+    keys = ("format", "version", "name", "description", "frame", "fins", "body", "interaction")
     # Format and version first: in a file of another kind or version, unknown keys are not the news.
     if isinstance(data, dict) and "format" in data and data["format"] != FORMAT:
         raise LayoutError(f"expected {FORMAT}, got {shown(data['format'])}", "format")
@@ -99,8 +103,10 @@ def _layout(data: Any, folder: Path) -> Layout:
             parsed.append(_fin(fin, folder))
     with under("body"):
         body = None if data.get("body") is None else _body(data["body"], folder)
+    with under("interaction"):
+        interaction = None if data.get("interaction") is None else _interaction(data["interaction"])
     description = "" if data.get("description") is None else data["description"]
-    return Layout(name=data["name"], fins=tuple(parsed), description=description, body=body)
+    return Layout(data["name"], tuple(parsed), description, body, interaction)
 
 
 def _fin(data: Any, folder: Path) -> Fin:
@@ -137,6 +143,18 @@ def _body(data: Any, folder: Path) -> Body:
     return Body(**data)
 
 
+def _interaction(data: Any) -> Interaction:
+    data = dict(mapping(data, "", ("jets", "half_thrust_n", "narrowness", "inflow")))
+    jets = [] if data.get("jets") is None else data["jets"]
+    if not isinstance(jets, list):
+        raise LayoutError(f"expected a list of jets, got {shown(jets)}", "jets")
+    keys, parsed = ("source", "target", "share"), []
+    for i, jet in enumerate(jets):
+        with under(f"jets[{i}]"):
+            parsed.append(Jet(**mapping(jet, "", keys, required=keys)))
+    return Interaction(**{**data, "jets": tuple(parsed)})
+
+
 def _absolute(path: str, folder: Path) -> str:
     return os.path.normpath(folder / path)
 
@@ -157,4 +175,4 @@ def _plain(value: Any) -> Any:
     """Lists for tuples, and mappings without what is None."""
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items() if item is not None}
-    return list(value) if isinstance(value, tuple) else value
+    return [_plain(item) for item in value] if isinstance(value, tuple) else value

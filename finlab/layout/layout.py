@@ -12,6 +12,7 @@ from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.layout.body import Body
 from finlab.layout.fin import Fin
+from finlab.layout.interaction import Interaction
 from finlab.layout.rules import MAX_DESCRIPTION_LENGTH, MAX_NAME_LENGTH, text
 
 MAX_FINS = 16
@@ -30,6 +31,8 @@ class Layout:
     """What there is to know about it, for people."""
     body: Body | None = None
     """Hull, mass and hydrodynamics, where known."""
+    interaction: Interaction | None = None
+    """What the fins take from each other and from speed, where a swim has shown it."""
 
     def __post_init__(self) -> None:
         text(self.name, "name", MAX_NAME_LENGTH)
@@ -44,10 +47,14 @@ class Layout:
                     f"{fin.name!r} is already the name of fins[{first_use[fin.name]}]", f"fins[{i}].name"
                 )
             first_use[fin.name] = i
+        for i, jet in enumerate(self.interaction.jets if self.interaction else ()):
+            for key, name in (("source", jet.source), ("target", jet.target)):
+                if name not in first_use:
+                    raise LayoutError(f"there is no fin {name!r}", f"interaction.jets[{i}].{key}")
 
     @cached_property
     def _hash(self) -> int:
-        return hash((self.name, self.fins, self.description, self.body))
+        return hash((self.name, self.fins, self.description, self.body, self.interaction))
 
     def __hash__(self) -> int:
         # Kept: every call of an allocator looks its layout up, and hashing all fins takes longer than that.
@@ -55,7 +62,7 @@ class Layout:
 
     def __getstate__(self) -> dict[str, Any]:
         # Hashes of text differ between processes, and arrays are quickly made again.
-        return {key: self.__dict__[key] for key in ("name", "fins", "description", "body")}
+        return {key: self.__dict__[key] for key in ("name", "fins", "description", "body", "interaction")}
 
     @cached_property
     def position(self) -> Array:
@@ -113,13 +120,31 @@ class Layout:
             raise LayoutError(
                 f"layout {self.name} has no fin left once {', '.join(names)} are lost; keep one"
             )
-        return replace(self, fins=tuple(fin for i, fin in enumerate(self.fins) if i not in lost))
+        fins = tuple(fin for i, fin in enumerate(self.fins) if i not in lost)
+        left = self.interaction and self.interaction.among([fin.name for fin in fins])
+        return replace(self, fins=fins, interaction=left)
+
+    def moving(self, velocity: ArrayLike) -> "Layout":
+        """Returns the layout as it is at a velocity relative to the water (6,) [m/s, rad/s], body frame: only
+        where speed takes something from the fins is it another one.
+
+        The velocity is rounded to 0.01, so that what is prepared for a layout serves again.
+
+        Raises:
+            LayoutError: the velocity is not six finite numbers.
+        """
+        if self.interaction is None or not any(self.interaction.inflow):
+            return self
+        rounded = tuple(np.round(np.asarray(velocity, np.float64), 2).tolist())
+        return replace(self, interaction=replace(self.interaction, velocity=rounded))
 
     def replace_fin(self, name: str, /, **changes: Any) -> "Layout":
         """Returns the layout with some fields of one fin changed, such as `position=(0.1, 0, 0)`."""
         i = self.index(name)
         fins = list(self.fins)
         fins[i] = replace(fins[i], **changes)
+        if fins[i].name != name and self.interaction is not None:
+            return replace(self, fins=tuple(fins), interaction=self.interaction.renamed(name, fins[i].name))
         return replace(self, fins=tuple(fins))
 
 

@@ -21,6 +21,8 @@ SUFFIX = ".graph.json"
 """How the name of a graph file ends."""
 GRAPH_FORMAT = "finlab-graph"
 GRAPH_VERSION = 2
+ABOUT = ("name", "description", "body", "interaction")
+"""What the part `layout` of a graph file holds: keys of a layout file."""
 UNITS = {"length": "m", "angle": "rad", "frequency": "Hz", "force": "N", "torque": "N m"}
 _PARTS = ("frame", "units", "layout", "graph", "normalization", "checkpoint", "self_test")
 KEYS = ("format", "version", "checksum", *_PARTS)
@@ -171,7 +173,7 @@ def _document(data: Mapping[str, Any], found: GraphText) -> GraphDocument:
             angles.append(number(node["mounting_angle_rad"], "mounting_angle_rad", -math.tau, math.tau))
         fin = {"name": node["id"], "mounting_angle_deg": math.degrees(angles[-1])}
         fins.append(fin | {key: node[key] for key in ("position_m", "limits", "model")})
-    about = mapping(data["layout"], "layout", ("name", "description", "body"), ("name",))
+    about = mapping(data["layout"], "layout", ABOUT, ("name",))
     head = {"format": FORMAT, "version": VERSION, "frame": data["frame"]}
     layout = parse_layout({**head, **about, "fins": fins}, found.source, found.folder)
     for i, parsed in enumerate(layout.fins):

@@ -5,6 +5,7 @@ It judges every allocation method, and the model-based methods optimize over it.
 
 from dataclasses import astuple
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -93,6 +94,12 @@ class Plant:
         wrench: Array = wrench_of_forces(force, self.columns)
         return wrench, jacobian.swapaxes(-1, -2)
 
+    @property
+    def parts(self) -> tuple[Any, Array]:
+        """What tells each fin's part of the wrench, by `force` and `force_and_slopes` in axes of its own, and
+        the wrench (n, axes, 6) per unit of each; here the fins' forces."""
+        return self, self.columns
+
     def power(self, command: Array, copper_loss: float = 0.0) -> Array:
         """Returns each fin's mean power (..., n) [W] of commands (..., n, 3), NaN for a failed fin's; with a
         motor's loss [W/(N m)^2], see `FinLaw.power`."""
@@ -170,4 +177,8 @@ def plant_of(layout: Layout) -> Plant:
 @lru_cache(maxsize=256)
 def _made(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> Plant:
     """A plant; tables whose files have changed are read again."""
-    return Plant(layout)
+    if layout.interaction is None:
+        return Plant(layout)
+    from finlab.physics.coupled_plant import CoupledPlant  # one that few layouts need, built on this one
+
+    return CoupledPlant(layout)

@@ -56,6 +56,7 @@ class ClosedLoop:
         announced: bool = True,
         monitor: FaultMonitor | None = None,
         servo_feedback: bool = False,
+        truth: Layout | None = None,
         seed: int = 0,
     ) -> None:
         """Puts the robot at rest at the start of its task.
@@ -76,6 +77,8 @@ class ClosedLoop:
                 monitor notices.
             monitor: watches the robot, tells the allocator what it finds, and is told what is announced.
             servo_feedback: whether the servos report their motion to the monitor.
+            truth: the robot that really swims, where `layout` is only what the allocator believes of it; it
+                has the same fins.
             seed: of the sensors' noise and of the allocator.
 
         Raises:
@@ -91,11 +94,13 @@ class ClosedLoop:
         self.plant = plant
         self.steady = steady
         self.seed = seed
-        self.vehicle = Vehicle(complete_body(layout), current)
-        self.fins = FinMotion(layout, servo)
+        truth = layout if truth is None else truth
+        self.vehicle = Vehicle(complete_body(truth), current)
+        self.fins = FinMotion(truth, servo)
         """The fins' motion: amplitude, frequency, zero direction and phase of each."""
-        self._fin_force = make_plant(plant, layout)
+        self._fin_force = make_plant(plant, truth)
         self._plant = plant_of(layout)
+        self._blade = plant_of(truth).blade
         self._sensors = Sensors(SensorSettings() if sensors is None else sensors, np.random.default_rng(seed))
         self._pending = sorted(events, key=lambda event: event.time_s)
         self.announced, self.monitor, self.servo_feedback = announced, monitor, servo_feedback
@@ -217,7 +222,7 @@ class ClosedLoop:
         )
         previous = self._command if self.steady else None
         answer = self.allocator.allocate(
-            self.layout,
+            self.layout.moving((*now.velocity, *now.rates)),  # what speed takes from fins, where known
             asked,
             failed=self.failed,
             previous=previous,
@@ -279,7 +284,7 @@ class ClosedLoop:
             self.state = self.vehicle.step(self.state, wrench.tolist(), dt)
             if k + 1 < n_steps:  # the sample at the end belongs to the next period
                 self._sensors.measure(time + (k + 1) * dt, self.state)
-            power = fin_power(self.fins, self._plant.blade)
+            power = fin_power(self.fins, self._blade)
             mean += wrenches / n_steps
             inertial += power.inertial / n_steps
             torque += power.torque / n_steps

@@ -109,7 +109,8 @@ def _model(problem: CommandProblem, cost: CostMeter, target: Array, command: Arr
     force, slopes = problem.fin.force_and_slopes(points)
     jacobian = (slopes @ problem.columns * problem.width[..., None]).reshape(4, rows, n, 3, 6)
     slope = (cost.slopes(points) * problem.width).reshape(4, rows, n, 3)
-    wrench = force[:rows].reshape(rows, 3 * n) @ problem.columns.reshape(3 * n, 6)
+    columns = problem.columns.reshape(-1, 6)
+    wrench = force[:rows].reshape(rows, len(columns)) @ columns
     apart = np.moveaxis(apart, -1, 0)[..., None]
     by_force = np.moveaxis((jacobian[1:] - jacobian[0]) / apart[..., None], 0, 2)
     by_cost = np.moveaxis((slope[1:] - slope[0]) / apart, 0, 2)

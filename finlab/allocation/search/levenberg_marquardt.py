@@ -44,7 +44,8 @@ class CommandProblem:
     fin: FinForces
     """What commands give: the fins' own laws, or a surrogate."""
     columns: AnyArray
-    """Normalized wrench per newton (n, 3, 6) of each fin's force along the axes in which it says so."""
+    """Normalized wrench (n, 3, 6) per newton of each fin's force along the axes in which `fin` tells it; six
+    axes in place of three where each fin's command changes what the others give."""
     lower: AnyArray
     """Lower limits (n, 3)."""
     upper: AnyArray
@@ -98,14 +99,15 @@ class CommandProblem:
 
     def wrench(self, command: AnyArray) -> AnyArray:
         """Normalized wrenches (R, 6) of commands (R, n, 3)."""
-        rows, n, _ = command.shape
-        return self.fin.force(command).reshape(rows, 3 * n) @ self.columns.reshape(3 * n, 6)
+        columns = self.columns.reshape(-1, 6)
+        return self.fin.force(command).reshape(len(command), len(columns)) @ columns
 
     def linearize(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
         """Normalized wrenches (R, 6) of commands (R, n, 3) and their derivatives (R, 6, 3 n)."""
         rows, n, _ = command.shape
         force, slopes = self.fin.force_and_slopes(command)
-        wrench = force.reshape(rows, 3 * n) @ self.columns.reshape(3 * n, 6)
+        columns = self.columns.reshape(-1, 6)
+        wrench = force.reshape(rows, len(columns)) @ columns
         jacobian: AnyArray = np.matmul(slopes, self.columns).reshape(rows, 3 * n, 6)
         return wrench, jacobian.swapaxes(1, 2)
 
@@ -203,7 +205,8 @@ def _evaluated(
         force, slopes = problem.fin.force_and_slopes(command)
     else:
         force = problem.fin.force(command)
-    wrench = force.reshape(rows, 3 * n).dot(problem.columns.reshape(3 * n, 6))
+    columns = problem.columns.reshape(-1, 6)
+    wrench = force.reshape(rows, len(columns)).dot(columns)
     residual = target - wrench
     return _Evaluated(command, wrench, residual, np.einsum("ri,ri->r", residual, residual), slopes)
 

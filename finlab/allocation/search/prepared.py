@@ -64,6 +64,7 @@ def prepare(
         DataError: a fin's force table cannot be read.
     """
     plant = plant_of(layout)
+    parts, columns = plant.parts
     fins = layout_envelopes(layout, objective, compiled)
     planar = planar_problem(layout, fins, std, objective)
     seeds = fins.maximum[None]
@@ -74,7 +75,7 @@ def prepare(
     return Prepared(
         plant,
         planar,
-        CommandProblem(plant, plant.columns / std, plant.lower, plant.upper, plant.full_turn),
+        CommandProblem(parts, columns / std, plant.lower, plant.upper, plant.full_turn),
         seeds,
         objective.meter(plant),
         arcs_to_search(fins, len(seeds)),

@@ -1,0 +1,272 @@
+"""Output error over short windows: unknowns with which simulated swims come nearest to the measured ones.
+
+A swim is cut into windows of some seconds, and each begins in a state of its own, which is looked for, too:
+noise of sensors then biases nothing, and no error grows for longer than a window (multiple shooting, see
+L. Ljung, System Identification, 2nd ed., and H. G. Bock 1983). Gauss-Newton steps with Levenberg's damping;
+derivatives by differences, all swims integrated side by side; the windows' states are eliminated from the
+normal equations. Each unknown is believed to lie within its scale of what the layout says.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.arrays import Array
+from finlab.fit.robot.equations import Bodies, integrate
+from finlab.fit.robot.model import RobotModel
+from finlab.fit.robot.swim import ANGLES, STEP_S
+from finlab.fit.robot.unknowns import Unknowns
+from finlab.layout.angles import wrapped
+
+WINDOW = 80
+"""Steps of a window."""
+DEVIATION = np.array([0.02, 0.02, 0.01, 0.01, 0.01, 0.02, 0.01, 0.01, 0.01, 0.01, 0.01, 0.01])
+"""What is believed of the sensors' noise [m, rad, m/s, rad/s] before their residuals tell."""
+START_DEVIATION = np.array([0.1] * 3 + [0.1] * 3 + [0.1] * 3 + [0.2] * 3)
+"""How far a window may begin from the smoothed measurements."""
+DIFFERENCE = 1e-3
+"""Step of the differences, in scales."""
+MOST_STEPS = 12
+"""Most Gauss-Newton steps."""
+SETTLED = 1e-4
+"""Relative gain below which they end."""
+CLIP = 4.0
+"""Residuals beyond this many deviations count like this many: a rare outlier must not rule."""
+
+
+class Windows(NamedTuple):
+    """W windows of L steps; what a swim does not fill is NaN in the measurements."""
+
+    step: NDArray[np.intp]
+    """Which step of all swims each is (W, L)."""
+    measured: Array
+    """(L, 12, W)."""
+    start: Array
+    """Smoothed state at the beginning (12, W)."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Unknowns that were found."""
+
+    unknowns: Unknowns
+    """What they are."""
+    vector: Array
+    """(size,), in scales."""
+    start: Array
+    """States in which the windows begin (12, W)."""
+    information: Array
+    """Second derivatives of half the cost by the unknowns (size, size), with what was believed before."""
+    scores: Array
+    """Slopes of half the cost of each window (W, size)."""
+    residual: Array
+    """Measured less simulated, in deviations (L, 12, W); NaN where nothing was measured."""
+    state: Array
+    """Simulated states (L, 12, W)."""
+
+
+def cut(n_steps: list[int], measured: Array, smooth: Array) -> Windows:
+    """Windows of swims of so many steps each; measurements (M, 12) and smoothed ones (M, 12)."""
+    steps, begin = [], 0
+    for count in n_steps:
+        n = max(1, round(count / WINDOW))
+        length = count // n
+        steps += [begin + k * length + np.arange(length) for k in range(n)]
+        begin += count
+    longest = max(len(one) for one in steps)
+    padded = np.array([np.concatenate([one, np.full(longest - len(one), one[-1])]) for one in steps])
+    own = np.array([len(one) for one in steps])
+    values = np.where((np.arange(longest) < own[:, None])[..., None], measured[padded], np.nan)
+    return Windows(padded, np.moveaxis(values, 0, -1), smooth[padded[:, 0]].T.copy())
+
+
+def fit_windows(
+    model: RobotModel,
+    unknowns: Unknowns,
+    windows: Windows,
+    deviation: Array,
+    vector: Array,
+    start: Array | None = None,
+    most_steps: int = MOST_STEPS,
+) -> Fitted:
+    """Unknowns from windows.
+
+    Args:
+        model: the robot and its swims.
+        unknowns: what is looked for.
+        windows: what was measured.
+        deviation: standard deviation of each channel (12,).
+        vector: where to begin (size,).
+        start: states of the windows to begin with, instead of the smoothed ones.
+        most_steps: most Gauss-Newton steps.
+    """
+    start = windows.start.copy() if start is None else start.copy()
+    damping, at = 1e-3, _Linear.at(model, unknowns, windows, deviation, vector, start)
+    for _ in range(most_steps):
+        change, moved = at.step(damping)
+        new_vector, new_start = vector + change, start + moved
+        cost = _cost(model, unknowns, windows, deviation, new_vector, new_start)
+        while not cost < at.cost and damping < 1e6:
+            damping *= 10.0
+            change, moved = at.step(damping)
+            new_vector, new_start = vector + change, start + moved
+            cost = _cost(model, unknowns, windows, deviation, new_vector, new_start)
+        if not cost < at.cost:
+            break
+        gain = (at.cost - cost) / at.cost
+        vector, start, damping = new_vector, new_start, max(0.1 * damping, 1e-6)
+        at = _Linear.at(model, unknowns, windows, deviation, vector, start)
+        if gain < SETTLED:
+            break
+    return Fitted(unknowns, vector, start, at.information, at.scores, at.residual, at.state)
+
+
+def score(
+    model: RobotModel, fitted: Fitted, windows: Windows, deviation: Array, most_steps: int = 4
+) -> Array:
+    """Half the squared residuals (W,) of windows that the fit has not seen; only how they begin is found."""
+    nothing = np.zeros(fitted.unknowns.size)
+    start = windows.start.copy()
+    for _ in range(most_steps):
+        at = _Linear.at(model, fitted.unknowns, windows, deviation, fitted.vector, start, only_start=True)
+        start = start + at.step_of_starts(nothing)
+    state = _simulated(model, fitted.unknowns, windows, fitted.vector, start)
+    weighted = _clipped(_residual(windows, state, deviation))
+    result: Array = 0.5 * np.nansum(weighted**2, axis=(0, 1))
+    return result
+
+
+@dataclass(frozen=True)
+class _Linear:
+    """The problem near some unknowns, the windows' beginnings eliminated."""
+
+    cost: float
+    gradient: Array
+    information: Array
+    scores: Array
+    residual: Array
+    state: Array
+    inner: Array
+    """Inverse second derivatives by the beginnings (W, 12, 12)."""
+    mixed: Array
+    """(W, 12, size)."""
+    pull: Array
+    """(W, 12)."""
+
+    @classmethod
+    def at(
+        cls,
+        model: RobotModel,
+        unknowns: Unknowns,
+        windows: Windows,
+        deviation: Array,
+        vector: Array,
+        start: Array,
+        only_start: bool = False,
+    ) -> "_Linear":
+        n = 0 if only_start else unknowns.size
+        vectors = np.concatenate([vector[None], vector + DIFFERENCE * np.eye(unknowns.size)[:n]])
+        n_all, w = 1 + n + 12, start.shape[1]
+        wrench = _wrenches(model, unknowns, windows, vectors)
+        wrench = np.concatenate([wrench, np.repeat(wrench[:, :, :1], 12, axis=2)], axis=2)
+        vectors = np.concatenate([vectors, np.repeat(vector[None], 12, axis=0)])
+        begin = np.repeat(start[:, None], n_all, axis=1)
+        for k in range(12):
+            begin[k, 1 + n + k] += DIFFERENCE * START_DEVIATION[k]
+        bodies = Bodies(*(part[..., None] for part in model.bodies(unknowns, vectors)))
+        state = integrate(begin, wrench, bodies, STEP_S)
+        residual = _residual(windows, state[:, :, 0], deviation)
+        weighted = _clipped(residual)
+        with np.errstate(invalid="ignore"):  # an outlier pulls with constant force
+            weight = np.where(np.abs(weighted) > CLIP, CLIP / np.abs(weighted), 1.0) / deviation[:, None]
+        known = np.isfinite(residual)
+        slopes = (state[:, :, 1:] - state[:, :, :1]) / DIFFERENCE
+        slopes *= np.where(known, weight, 0.0)[:, :, None]
+        left = np.where(known, weighted, 0.0)
+        by = np.moveaxis(slopes, (2, 3), (0, 1)).reshape(n + 12, w, -1).swapaxes(0, 1)  # (W, n + 12, L 12)
+        r = np.moveaxis(left, 2, 0).reshape(w, -1)
+        scaled = by[:, n:]
+        pull = np.einsum("wkm,wm->wk", scaled, r) - (start - windows.start).T / START_DEVIATION
+        inner = np.asarray(np.linalg.inv(scaled @ scaled.swapaxes(1, 2) + np.eye(12)), np.float64)
+        mixed = scaled @ by[:, :n].swapaxes(1, 2)
+        own = by[:, :n] @ by[:, :n].swapaxes(1, 2)
+        whole = own - mixed.swapaxes(1, 2) @ inner @ mixed
+        scores = np.einsum("wkm,wm->wk", by[:, :n], r) - np.einsum("wkn,wkl,wl->wn", mixed, inner, pull)
+        believed = np.eye(unknowns.size) + np.outer(unknowns.gauge, unknowns.gauge)
+        return cls(
+            cost=_half(left, start, windows, unknowns, vector),
+            gradient=scores.sum(axis=0) - (believed @ vector)[:n],
+            information=whole.sum(axis=0) + believed[:n, :n],
+            scores=scores,
+            residual=residual,
+            state=state[:, :, 0],
+            inner=inner,
+            mixed=mixed,
+            pull=pull,
+        )
+
+    def step(self, damping: float) -> tuple[Array, Array]:
+        """Changes of the unknowns (size,) and of the beginnings (12, W)."""
+        damped = self.information + damping * np.diag(np.diag(self.information))
+        change = np.asarray(np.linalg.solve(damped, self.gradient), np.float64)
+        return change, self.step_of_starts(change)
+
+    def step_of_starts(self, change: Array) -> Array:
+        """Changes of the beginnings (12, W) that go with those of the unknowns (size,)."""
+        pull = self.pull - self.mixed @ change[: self.mixed.shape[2]]
+        result: Array = (self.inner @ pull[..., None])[..., 0].T * START_DEVIATION[:, None]
+        return result
+
+
+def _wrenches(model: RobotModel, unknowns: Unknowns, windows: Windows, vectors: Array) -> Array:
+    """Wrenches (L, 6, B, W) of B vectors (B, size) that differ from the first in one entry each."""
+    first = model.wrench(unknowns, vectors[0])[windows.step]
+    wrench = np.empty((*first.shape, len(vectors)))
+    wrench[:] = first[..., None]
+    for k, vector in enumerate(vectors[1:], start=1):
+        if unknowns.force[np.argmax(vector != vectors[0])]:
+            wrench[..., k] = model.wrench(unknowns, vector)[windows.step]
+    return np.ascontiguousarray(wrench.transpose(1, 2, 3, 0))
+
+
+def _simulated(model: RobotModel, unknowns: Unknowns, windows: Windows, vector: Array, start: Array) -> Array:
+    """States (L, 12, W)."""
+    wrench = _wrenches(model, unknowns, windows, vector[None])[:, :, 0]
+    with np.errstate(all="ignore"):  # a step too far may make a robot take off
+        return integrate(start, wrench, model.bodies(unknowns, vector[None]), STEP_S)
+
+
+def _residual(windows: Windows, state: Array, deviation: Array) -> Array:
+    """Measured less simulated (L, 12, W), in deviations."""
+    away = windows.measured - state
+    away[:, ANGLES] = wrapped(away[:, ANGLES])
+    result: Array = away / deviation[:, None]
+    return result
+
+
+def _clipped(residual: Array) -> Array:
+    """Signed roots of Huber's loss: the square of what is returned grows linearly beyond `CLIP`."""
+    with np.errstate(invalid="ignore"):
+        size = np.abs(residual)
+        far = np.sqrt(np.maximum(2.0 * CLIP * size - CLIP**2, 0.0))
+        result: Array = np.sign(residual) * np.where(size > CLIP, far, size)
+    return result
+
+
+def _half(weighted: Array, start: Array, windows: Windows, unknowns: Unknowns, vector: Array) -> float:
+    """Half the cost: residuals, beginnings, and what was believed."""
+    begun = (start - windows.start) / START_DEVIATION[:, None]
+    return 0.5 * float(
+        np.nansum(weighted**2) + (begun**2).sum() + vector @ vector + (unknowns.gauge @ vector) ** 2
+    )
+
+
+def _cost(
+    model: RobotModel, unknowns: Unknowns, windows: Windows, deviation: Array, vector: Array, start: Array
+) -> float:
+    state = _simulated(model, unknowns, windows, vector, start)
+    if not np.isfinite(state).all():  # a robot that takes off; what is NaN would count as not measured
+        return float("inf")
+    return _half(_clipped(_residual(windows, state, deviation)), start, windows, unknowns, vector)

@@ -1,0 +1,166 @@
+"""A fitted robot as a layout: where its fins are and how strong, its body, the interaction, and tables of
+fins whose law is another one."""
+
+import csv
+import io
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.errors import DataError
+from finlab.fit.robot.model import leaned, shape_factor
+from finlab.fit.robot.report import summary
+from finlab.fit.robot.robot_fit import RobotFit
+from finlab.layout import Body, Fin, FinModelSpec, Interaction, Jet, Layout, save_layout
+from finlab.layout.interaction import MAX_SHARE
+from finlab.layout.rules import MAX_DESCRIPTION_LENGTH
+from finlab.physics import make_law
+from finlab.physics.table_file import COLUMNS, POWER_COLUMN
+from finlab.whole_file import write_whole
+
+GRID = (17, 17, 16)
+"""Amplitudes, frequencies and zero directions of a fin that becomes a table."""
+STRENGTH = {"drag": "drag_coefficient", "soft": "k"}
+"""Parameter of a fin's model that its thrust is proportional to."""
+LEANS = (3.0, 0.01)
+"""Standard errors, and angle [rad], from which a fin's lean counts."""
+LEAST_SHARE = 0.005
+"""Smallest share of a jet that is worth its line."""
+
+
+def fitted_layout(fit: RobotFit, path: str | os.PathLike[str]) -> tuple[Layout, dict[str, str]]:
+    """Returns the layout that a fit gives, and the texts of the tables that it names, by path.
+
+    Args:
+        fit: what was found.
+        path: of the layout; tables lie beside it.
+    """
+    layout, place = fit.model.layout, Path(path)
+    center, mounting = _found(fit, "center"), _found(fit, "mounting")
+    fins, tables = [], {}
+    for i, fin in enumerate(layout.fins):
+        model, table = _model(fit, i)
+        if table is not None:
+            name = str(place.resolve().with_name(f"{place.stem}-fin{i + 1}.csv"))
+            tables[name], model = table, FinModelSpec("table", (("path", name),))
+        x, y, z = (float(value) for value in np.array(fin.position) - center)
+        angle = float(np.mod(fin.mounting_angle + mounting[i] + np.pi, 2 * np.pi) - np.pi)
+        fins.append(replace(fin, position=(x, y, z), mounting_angle=angle, model=model))
+    notes = "\n".join(summary(fit))
+    text = f"{notes}\n{layout.description}".strip()[:MAX_DESCRIPTION_LENGTH]
+    name = layout.name if place.stem == layout.name else place.stem[:64].strip() or layout.name
+    return Layout(name, tuple(fins), text, _body(fit), _interaction(fit)), tables
+
+
+def write_robot(fit: RobotFit, path: str | os.PathLike[str]) -> Layout:
+    """Writes the layout that a fit gives, and tables beside it where its fins follow another law.
+
+    Raises:
+        DataError: a table cannot be written.
+        LayoutError: the layout cannot be written.
+    """
+    layout, tables = fitted_layout(fit, path)
+    for name, text in tables.items():
+        write_whole(name, text, DataError)
+    beside = {name: Path(name).name for name in tables}
+    save_layout(_named(layout, beside), path)
+    return layout
+
+
+def _named(layout: Layout, names: dict[str, str]) -> Layout:
+    """The layout as its file says it: tables beside it by their names alone."""
+
+    def renamed(fin: Fin) -> Fin:
+        path = str(fin.model.values().get("path", ""))
+        if path not in names:
+            return fin
+        return replace(fin, model=FinModelSpec("table", (("path", names[path]),)))
+
+    return replace(layout, fins=tuple(renamed(fin) for fin in layout.fins))
+
+
+def _found(fit: RobotFit, name: str) -> Array:
+    """A block that every fit has, in its own units."""
+    return fit.fitted.unknowns.of(name, fit.fitted.vector)
+
+
+def _model(fit: RobotFit, i: int) -> tuple[FinModelSpec, str | None]:
+    """The model of the i-th fin, or the text of its table where its law is another one."""
+    spec = fit.model.layout.fins[i].model
+    strength = float(np.exp(_found(fit, "strength")[i]))
+    error = fit.part_error("lean")
+    assert error is not None
+    lean = float(_found(fit, "lean")[i])
+    lean = lean if abs(lean) > max(LEANS[0] * error[i], LEANS[1]) else 0.0
+    values = spec.values()
+    if fit.part("shape") is None and spec.type in STRENGTH and (not lean or spec.type == "soft"):
+        key = STRENGTH[spec.type]
+        changed = {**dict(spec.parameters), key: float(values[key]) * strength}
+        if lean:
+            changed["d"] = float(values["d"]) + lean
+        return FinModelSpec(spec.type, tuple(changed.items())), None
+    return spec, _table(fit, i, strength, lean)
+
+
+def _table(fit: RobotFit, i: int, strength: float, lean: float) -> str:
+    """The i-th fin's law as a table, from rest to its limits."""
+    fin = fit.model.layout.fins[i]
+    law = make_law(fin.model)
+    ends = fin.limits.amplitude[1], fin.limits.frequency[1]
+    axes = [np.linspace(0.0, end, count) for end, count in zip(ends, GRID, strict=False)]
+    axes.append(np.linspace(-np.pi, np.pi, GRID[2], endpoint=False))
+    command = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    force = strength * np.asarray(law.force(command))
+    shape = fit.part("shape")
+    if shape is not None:
+        force = force * shape_factor(fit.model.shape_terms(command), shape)[:, None]
+    force = leaned(force[:, None], np.array([lean]))[:, 0]
+    power = np.asarray(law.power(command))
+    text = io.StringIO()
+    text.write(f"# fin {fin.name}, fitted to a swim of the whole robot\n")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([*COLUMNS, POWER_COLUMN])
+    rows = np.hstack([command, force, power[:, None]]) + 0.0
+    writer.writerows([f"{value:.8g}" for value in row] for row in rows)
+    return text.getvalue()
+
+
+def _body(fit: RobotFit) -> Body:
+    """The body as it was found."""
+    model, unknowns, vector = fit.model, fit.fitted.unknowns, fit.fitted.vector
+    found = model.bodies(unknowns, vector[None])
+    hull = None if model.layout.body is None else model.layout.body.hull
+    if hull is not None:
+        hull = replace(hull, center_m=tuple(np.array(hull.center_m) - _found(fit, "center")))
+    added = np.maximum(found.inertia[:, 0] - model.own_inertia, 0.0)
+    return replace(
+        model.body,
+        hull=hull,
+        added_mass=tuple(added.tolist()),
+        linear_damping=tuple(found.linear[:, 0].tolist()),
+        quadratic_damping=tuple(found.quadratic[:, 0].tolist()),
+        center_of_buoyancy_m=tuple(found.center[:, 0].tolist()),
+        buoyancy_n=max(float(found.lift[0]), 0.0),
+    )
+
+
+def _interaction(fit: RobotFit) -> Interaction | None:
+    """What the fins take from each other, and speed from them; None where neither is used."""
+    jets, inflow = fit.part("jets"), fit.part("inflow")
+    if jets is None and inflow is None:
+        return None
+    names, made, form = fit.model.layout.names, [], (Interaction.half_thrust_n, Interaction.narrowness)
+    if jets is not None:
+        pairs = [(a, b) for a in names for b in names if a != b]
+        shares = np.clip(jets[:-2].reshape(-1, 2), -MAX_SHARE, MAX_SHARE)
+        form = fit.model.jet_form(jets)
+        made = [
+            Jet(a, b, tuple(share.tolist()))
+            for (a, b), share in zip(pairs, shares, strict=True)
+            if np.abs(share).max() >= LEAST_SHARE
+        ]
+    taken = (0.0, 0.0) if inflow is None else tuple(np.clip(inflow, -MAX_SHARE, MAX_SHARE).tolist())
+    return Interaction(tuple(made), *form, taken)

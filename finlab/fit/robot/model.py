@@ -1,0 +1,127 @@
+"""From unknowns to what a robot does: the wrenches of its fins over a swim, and the body that they move."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.fit.robot.equations import Bodies
+from finlab.fit.robot.swim import Swim
+from finlab.fit.robot.unknowns import Unknowns, blocks_of
+from finlab.layout import Layout
+from finlab.layout.arrays import force_columns
+from finlab.physics import plant_of
+from finlab.physics.coupling import WIDE_AND_NARROW, foot_velocity, inflow_terms, jet_terms, jet_ways
+from finlab.physics.vehicle import GRAVITY, complete_body
+
+TYPICAL_SPEED = np.array([0.2, 0.2, 0.2, 0.5, 0.5, 0.5])
+"""At which linear and quadratic damping are compared [m/s, rad/s]."""
+NARROWNESS = 2.0
+"""Of jets, before a swim tells."""
+DAMPING_DOUBT = 0.5
+"""How far damping may be off, as a share of what the layout says."""
+
+
+class RobotModel:
+    """One layout, and the swims from which it is learned, M steps in all."""
+
+    def __init__(self, layout: Layout, swims: Sequence[Swim]) -> None:
+        """Takes the robot as it is believed to be."""
+        self.layout, body, zeros = layout, complete_body(layout), (0.0,) * 6
+        assert body.mass_kg is not None and body.inertia_kgm2 is not None
+        self.body = body
+        self.own_inertia = np.array([body.mass_kg] * 3 + list(body.inertia_kgm2))
+        """Without added mass (6,)."""
+        self.inertia = self.own_inertia + np.array(body.added_mass or zeros)
+        self.linear = np.array(body.linear_damping or zeros)
+        self.quadratic = np.array(body.quadratic_damping or zeros)
+        self.weight = body.mass_kg * GRAVITY
+        self.lift = self.weight if body.buoyancy_n is None else body.buoyancy_n
+        self.center = np.array(body.center_of_buoyancy_m or (0.0, 0.0, 0.0))
+        at_speed = self.linear + self.quadratic * TYPICAL_SPEED
+        at_speed = np.maximum(at_speed, 0.1 * self.inertia * TYPICAL_SPEED)
+        doubt = DAMPING_DOUBT * np.stack([at_speed, at_speed / TYPICAL_SPEED])
+        self.blocks = blocks_of(layout.names, doubt)
+        plant = plant_of(layout)
+        self.motion = np.concatenate([swim.motion for swim in swims])
+        working = (self.motion[..., 0] > 0.0) & (self.motion[..., 1] > 0.0)
+        self.alone = np.where(working[..., None], plant.forces(self.motion), 0.0)
+        """What each fin gives by the layout's law (M, SUBSTEPS, n, 3) [N], in its own frame."""
+        self.half_thrust = 0.25 * float(np.linalg.norm(self.alone, axis=-1).mean()) + 1e-6
+        """Thrust [N] at which a jet takes half of what a very strong one takes."""
+        self.middle = [float(np.median(self.motion[..., k][working])) for k in range(2)]
+        """Amplitude [rad] and frequency [Hz] at which a fin has the strength that is told."""
+        ends = [np.quantile(self.motion[..., k][working], (0.02, 0.98)) for k in range(2)]
+        self.seen = [(max(float(low), 1e-3), max(float(high), 2e-3)) for low, high in ends]
+        """Amplitudes and frequencies between which nearly all were; the law is told no further."""
+        self._shapes = self.shape_terms(self.motion)
+        self.length = plant.blade.length
+        self.velocity = np.zeros((len(self.motion), 6))
+        """How the robot moved through the water (M, 6) [m/s, rad/s], as far as is known."""
+
+    def shape_terms(self, command: Array) -> Array:
+        """Terms (..., 5) of the logarithm of a fin's true law over the layout's, for commands (..., 3)."""
+        (low_a, high_a), (low_f, high_f) = self.seen
+        a = np.log(np.clip(command[..., 0], low_a, high_a) / self.middle[0])
+        f = np.log(np.clip(command[..., 1], low_f, high_f) / self.middle[1])
+        return np.stack([a, f, a * a, a * f, f * f], axis=-1)
+
+    def wrench(self, unknowns: Unknowns, vector: Array) -> Array:
+        """Mean wrench (M, 6) of each step for one vector (size,) of unknowns."""
+        layout, force = self.layout, leaned(self.alone, unknowns.of("lean", vector))
+        share = np.exp(unknowns.of("strength", vector)) * np.ones(force.shape[:-1])
+        shape = unknowns.part("shape", vector)
+        if shape is not None:
+            share *= shape_factor(self._shapes, shape)
+        position = layout.position - unknowns.of("center", vector)
+        columns = force_columns(position, layout.mounting_angle + unknowns.of("mounting", vector))
+        force = force * share[..., None]
+        jets, inflow = unknowns.part("jets", vector), unknowns.part("inflow", vector)
+        kept = np.ones(share.shape)
+        if jets is not None:
+            half_thrust, narrowness = self.jet_form(jets)
+            met = jet_terms(force, jet_ways(position, columns), half_thrust, narrowness * WIDE_AND_NARROW)
+            kept -= np.einsum("msjik,jik->msi", met, jet_shares(jets, layout.n_fins))
+        if inflow is not None:
+            foot = foot_velocity(position, columns, self.velocity)[:, None]
+            kept -= inflow_terms(force, self.motion, foot, self.length) @ inflow
+        mean = (force * kept[..., None]).mean(axis=1)
+        wrench: Array = mean.reshape(len(mean), -1) @ columns.reshape(-1, 6)
+        wrench[:, [0, 1, 5]] += unknowns.of("bias", vector)
+        return wrench
+
+    def jet_form(self, jets: Array) -> tuple[float, float]:
+        """Thrust [N] at which a jet takes half of the most, and how narrow it is; the last two unknowns."""
+        return self.half_thrust * float(np.exp(jets[-2])), NARROWNESS * float(np.exp(jets[-1]))
+
+    def bodies(self, unknowns: Unknowns, vectors: Array) -> Bodies:
+        """The bodies (..., B) of B vectors (B, size)."""
+        return Bodies(
+            (self.inertia * np.exp(unknowns.of("inertia", vectors))).T,
+            np.maximum(self.linear + unknowns.of("linear", vectors), 0.0).T,
+            np.maximum(self.quadratic + unknowns.of("quadratic", vectors), 0.0).T,
+            np.full(len(vectors), self.weight),
+            self.lift + unknowns.of("lift", vectors)[:, 0],
+            (self.center + unknowns.of("buoyancy", vectors)).T,
+            unknowns.of("current", vectors).T,
+        )
+
+
+def leaned(force: Array, lean: Array) -> Array:
+    """Forces (..., n, 3) in fin frames, turned about the shafts by (n,) [rad]."""
+    cos, sin = np.cos(lean), np.sin(lean)
+    y, z = force[..., 1], force[..., 2]
+    return np.stack([force[..., 0], cos * y - sin * z, sin * y + cos * z], axis=-1)
+
+
+def shape_factor(terms: Array, shape: Array) -> Array:
+    """What thrust is multiplied by, from terms (..., 5) and their coefficients (5,)."""
+    result: Array = np.exp(np.clip(terms @ shape, -2.0, 2.0))
+    return result
+
+
+def jet_shares(jets: Array, n: int) -> Array:
+    """Coefficients (n, n, 2) of the jets of fin j (first) on fin i (second), from their list."""
+    shares = np.zeros((n, n, 2))
+    shares[~np.eye(n, dtype=bool)] = jets[:-2].reshape(-1, 2)
+    return shares

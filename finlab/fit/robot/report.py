@@ -1,0 +1,68 @@
+"""What a fit to swims is worth, in sentences and as a table."""
+
+import numpy as np
+
+from finlab.fit.robot.robot_fit import UNTOLD, RobotFit
+from finlab.physics.table_file import DOUBT
+
+MEANINGS = {
+    "shape": "thrust that grows otherwise with amplitude and frequency",
+    "jets": "what fins take from each other by their jets",
+    "inflow": "what speed through the water takes",
+}
+"""What the blocks that are tried besides stand for."""
+
+
+def summary(fit: RobotFit) -> tuple[str, ...]:
+    """Returns what the fit is worth, a line each; the first says why it should not be trusted, if so."""
+    doubts = fit.doubts()
+    head = (f"{DOUBT}: {'; '.join(doubts)}",) if doubts else ()
+    seconds = 0.1 * len(fit.model.motion)
+    used = [MEANINGS[trial.name] for trial in fit.trials if trial.used]
+    unused = [MEANINGS[trial.name] for trial in fit.trials if not trial.used]
+    lines = [
+        f"fitted to {seconds:.0f} s of swimming, of whose motion simulated swims explain {fit.explained:.1%}",
+        *([f"used, since it helps on parts not seen: {'; '.join(used)}"] if used else []),
+        *([f"tried, and no help: {'; '.join(unused)}"] if unused else []),
+        "a common scale of all forces, damping and inertia cannot be told from motion; it rests on the mass "
+        "and added mass that the layout gave",
+    ]
+    untold = fit.untold()
+    if untold:
+        lines.append(f"the data cannot tell {', '.join(untold)}: there the layout's own values stand")
+    return (*head, *lines, *fit.notes)
+
+
+def table(fit: RobotFit) -> str:
+    """Every unknown with its standard error, and how much of what was doubtful before is left."""
+    unknowns, vector, error = fit.fitted.unknowns, fit.fitted.vector, fit.error
+    width = max(len(label) for label in unknowns.labels)
+    lines = [f"{'':{width}}  {'found':>10}  {'+-':>9}  doubt left"]
+    rows = zip(unknowns.labels, unknowns.units, vector, error, unknowns.scale, strict=True)
+    for label, unit, value, own, scale in rows:
+        said = "  not told by the data" if own > UNTOLD else ""
+        lines.append(
+            f"{label:{width}}  {value * scale:10.4f}  {own * scale:9.4f}  {min(own, 1.0):9.0%} {unit}{said}"
+        )
+    lines.append("")
+    names = ("x", "y", "z", "roll", "pitch", "yaw", "u", "v", "w", "p", "q", "r")
+    spread = "  ".join(f"{name} {value:.3g}" for name, value in zip(names, fit.deviation, strict=True))
+    lines.append(f"left over (m, rad, m/s, rad/s): {spread}")
+    for trial in fit.trials:
+        verdict = "used" if trial.used else "not used"
+        lines.append(
+            f"{MEANINGS[trial.name]}: half squared error of a window not seen falls by {trial.gain:.2f} "
+            f"+- {trial.error:.2f}, {verdict}"
+        )
+    return "\n".join(lines)
+
+
+def strengths(fit: RobotFit) -> dict[str, tuple[float, float]]:
+    """Strength of each fin over what the layout said, and its standard error, by name."""
+    found, error = fit.part("strength"), fit.part_error("strength")
+    assert found is not None and error is not None
+    share = np.exp(found)
+    return {
+        name: (float(value), float(value * own))
+        for name, value, own in zip(fit.model.layout.names, share, error, strict=True)
+    }

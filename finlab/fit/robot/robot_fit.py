@@ -1,0 +1,250 @@
+"""From swims to a robot: what is fitted in which order, what helps on parts not seen, what is known.
+
+First all that every robot has; then, one after the other, another law of thrust, jets and inflow, each kept
+only where it lessens the error on windows that its fit has not seen.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.arrays import Array
+from finlab.errors import DataError
+from finlab.fit.robot.equations import body_velocity
+from finlab.fit.robot.estimate import DEVIATION, Fitted, Windows, cut, fit_windows, score
+from finlab.fit.robot.model import RobotModel
+from finlab.fit.robot.swim import ANGLES, CHANNELS, Swim, smoothed
+from finlab.fit.robot.unknowns import BASE, RESIDUAL, Unknowns
+from finlab.layout import Layout
+
+SURE = 2.0
+"""Standard errors by which what is kept must lessen the error on windows not seen."""
+UNTOLD = 0.7
+"""Share of what was doubtful before that must be left for the data to have told nothing."""
+SOUND = 0.5
+"""Least share of the motion that simulated swims should explain."""
+WEAKLY_KNOWN = 0.1
+"""Standard error of a fin's strength beside those of the others, as a share, that is worth a doubt."""
+DEVIATION_RANGE = (0.1, 30.0)
+"""Deviations of sensors within these multiples of what is believed."""
+UNSEEN_STEPS = 6
+"""Gauss-Newton steps of fits to one half of the windows, which begin at the fit to all."""
+ROUNDS = 2
+"""Times that deviations are estimated and the base fitted again."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Whether something more helps."""
+
+    name: str
+    """Block of unknowns."""
+    gain: float
+    """By how much the half squared error of a window not seen falls, mean over windows."""
+    error: float
+    """Its standard error."""
+    used: bool
+    """Whether it was kept."""
+
+
+@dataclass(frozen=True)
+class RobotFit:
+    """A robot as its swims show it."""
+
+    model: RobotModel
+    """What was believed, and the swims."""
+    fitted: Fitted
+    """What was found."""
+    deviation: Array
+    """Of each channel (12,): the sensors' noise and what the model does not explain [m, rad, m/s, rad/s]."""
+    explained: float
+    """Share of the motion within windows that simulated swims explain."""
+    trials: tuple[Trial, ...]
+    """What was tried besides."""
+    notes: tuple[str, ...]
+    """What to know of the data."""
+
+    @property
+    def covariance(self) -> Array:
+        """Of the unknowns (size, size), in scales: by the curvature of the cost, or by how much the windows
+        differ where that is more."""
+        inverse = np.linalg.inv(self.fitted.information)
+        scores = self.fitted.scores
+        spread = inverse @ (scores.T @ scores) @ inverse
+        widen = np.sqrt(np.maximum(np.diag(spread) / np.diag(inverse), 1.0))
+        return np.asarray(inverse * np.outer(widen, widen))
+
+    @property
+    def error(self) -> Array:
+        """Standard errors (size,), in scales: 1 is what was doubtful before."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    def part(self, name: str) -> Array | None:
+        """What was found of one block, in its own units; None where it is not used."""
+        return self.fitted.unknowns.part(name, self.fitted.vector)
+
+    def part_error(self, name: str) -> Array | None:
+        """Its standard errors."""
+        return self.fitted.unknowns.part(name, self.error)
+
+    def untold(self) -> tuple[str, ...]:
+        """What the data cannot tell: nearly as doubtful as before."""
+        labels = self.fitted.unknowns.labels
+        return tuple(label for label, error in zip(labels, self.error, strict=True) if error > UNTOLD)
+
+    def doubts(self) -> tuple[str, ...]:
+        """Why the fit should not be trusted; empty where it may."""
+        found = []
+        if self.explained < SOUND:
+            found.append(
+                f"simulated swims explain {self.explained:.0%} of the motion, expected at least {SOUND:.0%}"
+            )
+        unknowns, names = self.fitted.unknowns, self.model.layout.names
+        place, n = unknowns.place("strength"), len(names)
+        scale = unknowns.scale[place]
+        beside = np.eye(n) - 1.0 / n if n > 1 else np.eye(1)
+        covariance = beside @ (self.covariance[place, place] * np.outer(scale, scale)) @ beside.T
+        for name, error in zip(names, np.sqrt(np.diag(covariance)), strict=True):
+            if error > WEAKLY_KNOWN:
+                found.append(f"the strength of {name} is known to {error:.0%} only; swim with it at work")
+        return tuple(found)
+
+
+def fit_robot(layout: Layout, swims: Sequence[Swim], tried: Sequence[str] = RESIDUAL) -> RobotFit:
+    """Learns a robot.
+
+    Args:
+        layout: the robot as it is believed to be; what its body does not say is U-CAT's.
+        swims: what was measured.
+        tried: what is looked for besides, where it helps: some of `RESIDUAL`.
+
+    Raises:
+        DataError: there is no swim, or the fit goes astray.
+    """
+    if not swims:
+        raise DataError("expected at least one swim, got none")
+    if layout.interaction is not None:
+        raise DataError(
+            f"layout {layout.name} has an interaction already; fit the layout from which that was fitted, "
+            "with all logs together"
+        )
+    model = RobotModel(layout, swims)
+    measured = np.concatenate([swim.measured for swim in swims])
+    smooth = np.concatenate([smoothed(swim.measured) for swim in swims])
+    windows = cut([len(swim) for swim in swims], measured, smooth)
+    model.velocity[:] = smooth[:, 6:]
+    unknowns, deviation = Unknowns(model.blocks, BASE), DEVIATION
+    vector, start = np.zeros(unknowns.size), windows.start
+    for _ in range(ROUNDS):
+        fitted = fit_windows(model, unknowns, windows, deviation, vector, start)
+        vector, start = fitted.vector, fitted.start
+        deviation = _deviation(fitted, deviation)
+        _keep_velocity(model, fitted, windows)
+    fitted, trials = _with_what_helps(model, windows, deviation, fitted, tried)
+    deviation = _deviation(fitted, deviation)
+    _keep_velocity(model, fitted, windows)
+    fitted = fit_windows(model, fitted.unknowns, windows, deviation, fitted.vector, fitted.start)
+    if not np.isfinite(fitted.vector).all():
+        raise DataError(f"{swims[0].name}: the fit goes astray; is the layout that of the robot that swam?")
+    return RobotFit(model, fitted, deviation, _explained(fitted, windows), trials, _notes(swims, windows))
+
+
+def _with_what_helps(
+    model: RobotModel, windows: Windows, deviation: Array, fitted: Fitted, left: Sequence[str]
+) -> tuple[Fitted, tuple[Trial, ...]]:
+    """The fit with all that helps on windows not seen, and what was tried."""
+    trials: list[Trial] = []
+    left = list(left)
+    here = _unseen(model, fitted.unknowns, windows, deviation, fitted.vector)
+    while left:
+        tried = []
+        for name in left:
+            unknowns = Unknowns(model.blocks, (*fitted.unknowns.names, name))
+            begin = unknowns.taken_over(fitted.unknowns, fitted.vector)
+            there = _unseen(model, unknowns, windows, deviation, begin)
+            gains = here - there
+            error = float(gains.std(ddof=1) / np.sqrt(len(gains))) if len(gains) > 1 else np.inf
+            tried.append((float(gains.mean()), error, name, unknowns, begin, there))
+        gain, error, name, unknowns, begin, there = max(tried, key=lambda one: one[0])
+        if not gain > SURE * error:
+            trials += [Trial(one[2], one[0], one[1], False) for one in tried]
+            break
+        trials.append(Trial(name, gain, error, True))
+        fitted = fit_windows(model, unknowns, windows, deviation, begin, fitted.start)
+        here = there
+        left.remove(name)
+    return fitted, tuple(trials)
+
+
+def _unseen(
+    model: RobotModel, unknowns: Unknowns, windows: Windows, deviation: Array, vector: Array
+) -> Array:
+    """Half squared errors (W,) of windows by fits to the other half of them."""
+    count = windows.start.shape[1]
+    found = np.zeros(count)
+    for fold in (0, 1):
+        seen, unseen = (np.flatnonzero(np.arange(count) % 2 == side) for side in (1 - fold, fold))
+        fitted = fit_windows(
+            model, unknowns, _some(windows, seen), deviation, vector, most_steps=UNSEEN_STEPS
+        )
+        found[unseen] = score(model, fitted, _some(windows, unseen), deviation)
+    return found
+
+
+def _some(windows: Windows, chosen: NDArray[np.intp]) -> Windows:
+    return Windows(windows.step[chosen], windows.measured[..., chosen], windows.start[:, chosen])
+
+
+def _deviation(fitted: Fitted, deviation: Array) -> Array:
+    """Deviations (12,) of the channels by what is left over, outliers aside."""
+    left = np.abs(fitted.residual)
+    found = DEVIATION.copy()
+    for k in range(12):
+        said = left[:, k][np.isfinite(left[:, k])]
+        if len(said):
+            usual = said[said <= 5.0 * 1.4826 * max(float(np.median(said)), 1e-6)]
+            found[k] = deviation[k] * float(np.sqrt(np.mean(usual**2)))
+    return np.asarray(np.clip(found, DEVIATION_RANGE[0] * DEVIATION, DEVIATION_RANGE[1] * DEVIATION))
+
+
+def _keep_velocity(model: RobotModel, fitted: Fitted, windows: Windows) -> None:
+    """Tells the model how the robot moved through the water, by the simulated swim."""
+    # Backwards, since what fills up a window repeats its last step.
+    steps, states = windows.step.T[::-1], fitted.state[::-1].swapaxes(1, 2)
+    model.velocity[steps] = states[..., 6:]
+    current = fitted.unknowns.of("current", fitted.vector)
+    angles = np.zeros((len(model.velocity), 3))
+    angles[steps] = states[..., ANGLES]
+    world = np.broadcast_to([*current, 0.0], angles.shape)
+    model.velocity[:, :3] -= body_velocity(angles, world)
+
+
+def _explained(fitted: Fitted, windows: Windows) -> float:
+    """Share of the motion's variance within windows that the simulated swims explain, mean over channels of
+    velocity and rates, or of pose where those are not measured."""
+    shares = []
+    for channels in (range(6, 12), range(6)):
+        for k in channels:
+            said = windows.measured[:, k]
+            known = np.isfinite(said)
+            if not known.any():
+                continue
+            away = np.where(known, said - fitted.state[:, k], np.nan)
+            whole = float(np.nanvar(said - np.nanmean(said, axis=0)))
+            shares.append(max(0.0, 1.0 - float(np.nanmean(away**2)) / max(whole, 1e-12)))
+        if shares:
+            break
+    return float(np.mean(shares)) if shares else 0.0
+
+
+def _notes(swims: Sequence[Swim], windows: Windows) -> tuple[str, ...]:
+    """What to know of the data."""
+    notes = []
+    if any(swim.replayed for swim in swims):
+        notes.append("what the fins did was worked out from their commands, with nominal servos")
+    silent = [name for k, name in enumerate(CHANNELS) if not np.isfinite(windows.measured[:, k]).any()]
+    if silent:
+        notes.append(f"nothing was measured of {', '.join(silent)}")
+    return tuple(notes)

@@ -1,0 +1,95 @@
+"""One swim as a fit sees it: what the fins did and what the sensors said, on an even grid of time."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.fit.robot.equations import body_rates, body_velocity
+from finlab.layout import Layout
+from finlab.physics.fin_motion import FinMotion
+
+STEP_S = 0.1
+"""Spacing of the grid [s]."""
+SUBSTEPS = 2
+"""Moments within a step at which the fins' forces are taken."""
+CHANNELS = ("x", "y", "z", "roll", "pitch", "yaw", "u", "v", "w", "p", "q", "r")
+"""What sensors may say: position in the world [m], attitude [rad], velocity [m/s] and angular rates [rad/s]
+in the body frame."""
+ANGLES = slice(3, 6)
+"""Those that are angles."""
+
+
+@dataclass(frozen=True)
+class Swim:
+    """N steps of one robot with n fins."""
+
+    name: str
+    """What it is called in messages: its file."""
+    motion: Array
+    """What the fins did, (N, SUBSTEPS, n, 3): amplitude [rad], frequency [Hz], direction [rad]; zero
+    amplitude and frequency for a fin that was lost."""
+    measured: Array
+    """What the sensors said at the beginning of each step (N, 12), in the order of `CHANNELS`; NaN where
+    there is nothing new."""
+    replayed: bool = False
+    """Whether what the fins did was worked out from their commands, with nominal servos."""
+
+    def __len__(self) -> int:
+        return len(self.motion)
+
+
+def replay(layout: Layout, command: Array) -> Array:
+    """What fins with nominal servos do (N, SUBSTEPS, n, 3) under commands (N, n, 3), one per step, NaN for a
+    lost fin."""
+    fins = FinMotion(layout)
+    motion = np.empty((len(command), SUBSTEPS, *command.shape[1:]))
+    for k, row in enumerate(command):
+        for s in range(SUBSTEPS):
+            fins.step(row, STEP_S / SUBSTEPS)
+            motion[k, s] = fins.command
+    return motion
+
+
+def between(ends: Array, command: Array) -> Array:
+    """What fins did (N, SUBSTEPS, n, 3) by what they did at the end of each step (N, n, 3).
+
+    Frequencies change at once with the command (N, n, 3); a fin without a command is lost and hangs still.
+    """
+    before = np.concatenate([ends[:1], ends[:-1]])
+    share = (np.arange(SUBSTEPS) + 0.5)[:, None, None] / SUBSTEPS
+    motion: Array = before[:, None] + share * (ends - before)[:, None]
+    lost = np.asarray(~np.isfinite(command[..., 0]))
+    motion[..., 1] = np.where(lost, 0.0, command[..., 1])[:, None]
+    motion[..., 0] = np.where(lost[:, None], 0.0, motion[..., 0])
+    return motion
+
+
+def only_new(measured: Array) -> Array:
+    """Samples (N, 12) of which those that a slow sensor only held are NaN."""
+    held = np.zeros(measured.shape, bool)
+    held[1:] = measured[1:] == measured[:-1]
+    return np.where(held, np.nan, measured)
+
+
+def smoothed(measured: Array) -> Array:
+    """Samples (N, 12) without holes and with less noise: a first guess of what the robot did. Channels that
+    say nothing are made of the others, or zero."""
+    from scipy.signal import savgol_filter
+
+    grid = np.arange(len(measured))
+    full = np.zeros(measured.shape)
+    known = np.asarray(np.isfinite(measured))
+    said = np.asarray(known.any(axis=0))
+    for k in np.flatnonzero(said):
+        fresh = known[:, k]
+        values = measured[fresh, k]
+        values = np.unwrap(values) if ANGLES.start <= k < ANGLES.stop else values
+        full[:, k] = np.interp(grid, grid[fresh], values)
+    full[:, said] = savgol_filter(full[:, said], 11, 2, axis=0)
+    pace = np.gradient(full, STEP_S, axis=0)
+    rates = body_rates(full[:, ANGLES], pace[:, ANGLES])
+    velocity = body_velocity(full[:, ANGLES], pace[:, :3])
+    made = np.concatenate([velocity, rates], axis=1)
+    full[:, 6:] = np.where(said[6:], full[:, 6:], made)
+    return full

@@ -1,0 +1,138 @@
+"""What a fit looks for, with what is believed before: each unknown in units of how far it may be off."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from finlab.arrays import Array
+
+AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+"""Names of the body's axes of motion."""
+BASE = (
+    *("strength", "mounting", "lean", "center", "bias"),
+    *("buoyancy", "lift", "current", "inertia", "linear", "quadratic"),
+)
+"""Blocks that every fit looks for."""
+RESIDUAL = ("shape", "jets", "inflow")
+"""What is looked for besides, where it helps: another law of thrust, jets, inflow."""
+
+SAME_SCALE = 0.003
+"""How far the common scale of all inertia may be off, as a share."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """Unknowns of one kind."""
+
+    name: str
+    """What they are called in code."""
+    labels: tuple[str, ...]
+    """What each is called in reports."""
+    unit: str
+    """In which they are told."""
+    scale: Array
+    """How far each may be off: one standard deviation of what is believed before a swim."""
+    force: bool
+    """Whether the wrench of the fins depends on them."""
+
+
+def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
+    """All unknowns of a robot with fins of these names; linear and quadratic damping may be off by (2, 6)."""
+
+    def block(
+        name: str,
+        labels: Sequence[str],
+        scale: float | Sequence[float] | Array,
+        unit: str,
+        force: bool = True,
+    ) -> Block:
+        return Block(name, tuple(labels), unit, np.broadcast_to(scale, len(labels)).astype(float), force)
+
+    shape = ("amplitude", "frequency", "amplitude^2", "amplitude x frequency", "frequency^2")
+    jets = [
+        f"{kind} jet of {a} on {b}" for a in names for b in names if a != b for kind in ("wide", "narrow")
+    ]
+    form = ("thrust of half a jet, logarithm", "narrowness of jets, logarithm")
+    blocks = (
+        block("strength", [f"strength of {name}, logarithm" for name in names], 0.3, ""),
+        block("mounting", [f"mounting angle of {name}" for name in names], 0.1, "rad"),
+        block("lean", [f"lean of {name}" for name in names], 0.1, "rad"),
+        block("center", [f"centre of gravity, {axis}" for axis in "xyz"], 0.02, "m"),
+        block("buoyancy", [f"centre of buoyancy, {axis}" for axis in "xyz"], 0.01, "m", False),
+        block("lift", ["buoyancy less weight"], 2.0, "N", False),
+        block("bias", [f"constant {axis}" for axis in ("Fx", "Fy", "Tz")], (1.0, 1.0, 0.1), "N, N m"),
+        block("current", ["current along x", "current along y"], 0.05, "m/s", False),
+        block("inertia", [f"inertia with water in {axis}, logarithm" for axis in AXES], 0.1, "", False),
+        block("linear", [f"linear damping in {axis}" for axis in AXES], damping[0], "N s/m, N m s", False),
+        block("quadratic", [f"quadratic damping in {axis}" for axis in AXES], damping[1], "", False),
+        block("shape", [f"thrust by {name}" for name in shape], (0.5, 0.5, 0.3, 0.3, 0.3), ""),
+        block("jets", [*jets, *form], np.array([0.15] * len(jets) + [0.7, 0.4]), ""),
+        block("inflow", ["inflow", "inflow squared"], 0.4, ""),
+    )
+    return {one.name: one for one in blocks}
+
+
+class Unknowns:
+    """A vector of some blocks, each entry in units of its scale, so that all are believed to be 0 +- 1."""
+
+    def __init__(self, blocks: dict[str, Block], chosen: Sequence[str]) -> None:
+        self.blocks = [blocks[name] for name in chosen]
+        sizes = [len(block.labels) for block in self.blocks]
+        ends = np.cumsum(sizes)
+        self._where = {
+            block.name: slice(int(end) - size, int(end))
+            for block, end, size in zip(self.blocks, ends, sizes, strict=True)
+        }
+        self.size = int(ends[-1])
+        """How many there are."""
+        self.scale = np.concatenate([block.scale for block in self.blocks])
+        """(size,)."""
+        self.labels = tuple(label for block in self.blocks for label in block.labels)
+        """What each is called."""
+        self.units = tuple(block.unit for block in self.blocks for _ in block.labels)
+        """In which each is told."""
+        self.force = np.array([block.force for block in self.blocks for _ in block.labels])
+        """Whether the wrench of the fins depends on each (size,)."""
+
+    @cached_property
+    def gauge(self) -> Array:
+        """Its product with a vector (size,) is believed to be 0 +- 1, too: that the common scale of all
+        inertia is as the layout says. Motion cannot tell it, so nothing else must move it."""
+        place = self._where["inertia"]
+        gauge = np.zeros(self.size)
+        gauge[place] = self.scale[place] / (place.stop - place.start) / SAME_SCALE
+        return gauge
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the blocks."""
+        return tuple(block.name for block in self.blocks)
+
+    def part(self, name: str, vector: Array) -> Array | None:
+        """The unknowns (..., k) of one block in its own units, from vectors (..., size); None where it is not
+        looked for."""
+        if name not in self._where:
+            return None
+        where = self._where[name]
+        result: Array = vector[..., where] * self.scale[where]
+        return result
+
+    def of(self, name: str, vector: Array) -> Array:
+        """`part` of a block that every fit looks for."""
+        found = self.part(name, vector)
+        assert found is not None, name
+        return found
+
+    def place(self, name: str) -> slice:
+        """Where a block stands."""
+        return self._where[name]
+
+    def taken_over(self, other: "Unknowns", vector: Array) -> Array:
+        """A vector of another choice of blocks as one of these; what that one lacks is zero."""
+        result = np.zeros(self.size)
+        for name, where in self._where.items():
+            if name in other._where:
+                result[where] = vector[other._where[name]]
+        return result

@@ -1,0 +1,84 @@
+"""What fins take from each other and from the robot's speed, as a fit to a swim has found it.
+
+The share of its own thrust that fin i keeps is
+
+    1 - sum over j of (a_ij B_k(c_ij) + b_ij B_4k(c_ij)) T_j / (T_j + T_0) - (p tanh J_i + q tanh^2 J_i)
+
+with T_j the thrust of fin j by itself, c_ij the cosine between its jet (against its thrust) and the way from
+j to i, B_k(c) = exp(k (c - 1)), and J_i the fin's speed through the water along its thrust over that of its
+tip. `finlab.physics.coupling` computes it.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from finlab.errors import LayoutError
+from finlab.layout.rules import MAX_NAME_LENGTH, number, numbers, text
+
+MAX_SHARE = 2.0
+"""Largest coefficient of a share."""
+
+
+@dataclass(frozen=True)
+class Jet:
+    """What the jet of one fin takes from another. Checked on construction."""
+
+    source: str
+    """Name of the fin that throws the water."""
+    target: str
+    """Name of the fin that the water meets."""
+    share: tuple[float, ...]
+    """Share of the target's thrust that a wide and a narrow jet (a, b) take where it lies in their middle."""
+
+    def __post_init__(self) -> None:
+        text(self.source, "source", MAX_NAME_LENGTH)
+        text(self.target, "target", MAX_NAME_LENGTH)
+        if self.source == self.target:
+            raise LayoutError(f"{self.source!r} does not lie in its own jet; name two fins", "target")
+        object.__setattr__(self, "share", numbers(self.share, "share", 2, -MAX_SHARE, MAX_SHARE))
+
+
+@dataclass(frozen=True)
+class Interaction:
+    """All that a robot's fins take from each other. Checked on construction."""
+
+    jets: tuple[Jet, ...] = ()
+    """What jets take; pairs that are not named take nothing."""
+    half_thrust_n: float = 0.5
+    """Thrust T_0 [N] at which a jet takes half of what a very strong one takes."""
+    narrowness: float = 2.0
+    """How narrow the wide jet is, k: 2 falls to 1 / e at 60 degrees, 4 at 41. The narrow one has four times
+    as much."""
+    inflow: tuple[float, ...] = (0.0, 0.0)
+    """Coefficients p and q of what speed through the water takes."""
+    velocity: tuple[float, ...] = (0.0,) * 6
+    """The robot's velocity relative to the water [m/s, rad/s], body frame; of now, and in no file."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "jets", tuple(self.jets))
+        pairs = [(jet.source, jet.target) for jet in self.jets]
+        for i, pair in enumerate(pairs):
+            if pair in pairs[:i]:
+                raise LayoutError(f"the jet of {pair[0]!r} on {pair[1]!r} is given twice", f"jets[{i}]")
+        object.__setattr__(
+            self, "half_thrust_n", number(self.half_thrust_n, "half_thrust_n", high=1e4, positive=True)
+        )
+        object.__setattr__(self, "narrowness", number(self.narrowness, "narrowness", 0.0, 100.0))
+        object.__setattr__(self, "inflow", numbers(self.inflow, "inflow", 2, -MAX_SHARE, MAX_SHARE))
+        object.__setattr__(self, "velocity", numbers(self.velocity, "velocity", 6, -100.0, 100.0))
+
+    def renamed(self, old: str, new: str) -> "Interaction":
+        """The same with another name for one fin."""
+
+        def name(known: str) -> str:
+            return new if known == old else known
+
+        return replace(
+            self, jets=tuple(Jet(name(jet.source), name(jet.target), jet.share) for jet in self.jets)
+        )
+
+    def among(self, names: Iterable[str]) -> "Interaction":
+        """What is left of it among the fins of these names."""
+        left = set(names)
+        jets = tuple(jet for jet in self.jets if jet.source in left and jet.target in left)
+        return self if len(jets) == len(self.jets) else replace(self, jets=jets)

@@ -1,0 +1,69 @@
+"""The plant of a layout whose fins take something from each other: see `finlab.layout.interaction`."""
+
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.layout.layout import Layout
+from finlab.physics.coupling import Coupling
+from finlab.physics.plant import Plant
+
+
+class CoupledPlant(Plant):
+    """A `Plant` in which the force of each fin depends on the commands of all."""
+
+    def __init__(self, layout: Layout) -> None:
+        super().__init__(layout)
+        assert layout.interaction is not None
+        self.coupling = Coupling(layout, layout.interaction, self.columns, self.blade.length)
+
+    def force(self, command: Array) -> Array:
+        """See `Plant`."""
+        alone = super().force(command)
+        return alone * self.coupling.kept(alone, command)[..., None]
+
+    def force_and_slopes(self, command: Array) -> tuple[Array, Array]:
+        """See `Plant`; the derivatives of each fin's force by its own command, the other fins unchanged."""
+        alone, slopes = super().force_and_slopes(command)
+        kept, by_command = self.coupling.kept_and_slopes(alone, slopes, command)
+        n = np.arange(self.n_fins)
+        own = np.moveaxis(by_command[..., n, :, n], 0, -2)
+        slopes = slopes * kept[..., None, None] + own[..., None] * alone[..., None, :]
+        return alone * kept[..., None], slopes
+
+    @property
+    def parts(self) -> tuple["WrenchParts", Array]:
+        """See `Plant`; each fin's part in all six axes of the wrench, since its command changes the parts of
+        the others, too."""
+        return WrenchParts(self), np.broadcast_to(np.eye(6), (self.n_fins, 6, 6))
+
+    def linearize(self, command: Array) -> tuple[Array, Array]:
+        """See `Plant`."""
+        shares, slopes = self.shares_and_slopes(command)
+        jacobian = slopes.reshape(*command.shape[:-2], 3 * self.n_fins, 6)
+        return shares.sum(axis=-2), jacobian.swapaxes(-1, -2)
+
+    def shares_and_slopes(self, command: Array) -> tuple[Array, Array]:
+        """Each fin's part of the wrench (..., n, 6), and the derivatives of the whole wrench by each command
+        of each fin (..., n, 3, 6)."""
+        alone, own = super().force_and_slopes(command)
+        kept, by_command = self.coupling.kept_and_slopes(alone, own, command)
+        by_alone = np.einsum("...na,nab->...nb", alone, self.columns)
+        slopes = (own @ self.columns) * kept[..., None, None]
+        slopes += by_command @ by_alone[..., None, :, :]
+        return by_alone * kept[..., None], slopes
+
+
+class WrenchParts:
+    """A coupled plant as the refinement of commands sees it: parts of a wrench in place of forces of fins."""
+
+    def __init__(self, plant: CoupledPlant) -> None:
+        self._plant = plant
+
+    def force(self, command: Array) -> Array:
+        """Each fin's part of the wrench (..., n, 6) of commands (..., n, 3)."""
+        parts: Array = np.einsum("...na,nab->...nb", self._plant.force(command), self._plant.columns)
+        return parts
+
+    def force_and_slopes(self, command: Array) -> tuple[Array, Array]:
+        """See `CoupledPlant.shares_and_slopes`."""
+        return self._plant.shares_and_slopes(command)

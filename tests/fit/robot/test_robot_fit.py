@@ -1,0 +1,135 @@
+"""From a swim to a robot: known truths are found again, what is not there is not, what is unknown is said."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finlab import load_allocator
+from finlab.cli import main
+from finlab.errors import DataError
+from finlab.fit.robot.fitted_layout import fitted_layout, write_robot
+from finlab.fit.robot.report import strengths, summary, table
+from finlab.fit.robot.robot_fit import RobotFit, fit_robot
+from finlab.fit.robot.swim import Swim, only_new, replay
+from finlab.fit.robot.swim_file import read_swim
+from finlab.layout import Fin, FinModelSpec, Interaction, Layout, load_layout, save_layout
+from finlab.layout.angles import wrapped
+from finlab.physics import plant_of
+from tests.fit.robot.swims import swim, write_csv
+
+CENTER = np.array([0.015, -0.01, 0.005])
+STRENGTH = {"front_right": 0.8, "front_left": 1.15, "back_left": 1.0}
+TURNED = {"front_right": 0.08, "front_left": -0.05, "back_left": 0.0}
+
+
+@pytest.fixture(scope="module")
+def drawn() -> Layout:
+    return load_layout("ucat").without(["back_right"])
+
+
+@pytest.fixture(scope="module")
+def truth(drawn: Layout) -> Layout:
+    def changed(fin: Fin) -> Fin:
+        model = FinModelSpec("drag", (("drag_coefficient", 0.15 * STRENGTH[fin.name]),))
+        x, y, z = (np.array(fin.position) - CENTER).tolist()
+        angle = fin.mounting_angle + TURNED[fin.name]
+        return replace(fin, position=(x, y, z), mounting_angle=angle, model=model)
+
+    return replace(drawn, fins=tuple(changed(fin) for fin in drawn.fins))
+
+
+@pytest.fixture(scope="module")
+def fit(drawn: Layout, truth: Layout) -> RobotFit:
+    command, measured = swim(truth, 60.0, seed=1)
+    return fit_robot(drawn, [Swim("made up", replay(drawn, command), only_new(measured), True)])
+
+
+def test_strengths_directions_and_centre_are_found_within_their_errors(fit: RobotFit) -> None:
+    for name, (found, error) in strengths(fit).items():
+        assert found == pytest.approx(STRENGTH[name], abs=max(4.0 * error, 0.02)) and error < 0.05
+    turned, error = fit.part("mounting"), fit.part_error("mounting")
+    assert turned is not None and error is not None
+    np.testing.assert_array_less(np.abs(turned - list(TURNED.values())), np.maximum(4.0 * error, 0.01))
+    center, error = fit.part("center"), fit.part_error("center")
+    assert center is not None and error is not None
+    np.testing.assert_allclose(center, CENTER, atol=0.004)
+    assert (error < 0.004).all()
+
+
+def test_what_is_not_there_is_not_used_and_nothing_is_doubted(fit: RobotFit) -> None:
+    assert fit.doubts() == ()
+    assert not any(trial.used for trial in fit.trials) and len(fit.trials) == 3
+    assert fit.explained > 0.8
+    text = "\n".join(summary(fit))
+    assert "tried, and no help" in text and "common scale" in text and "nominal servos" in text
+    assert "strength of front_left" in table(fit)
+
+
+def test_the_fitted_layout_allocates_for_the_true_robot(fit: RobotFit, truth: Layout, tmp_path: Path) -> None:
+    path = tmp_path / "fitted.yaml"
+    write_robot(fit, path)
+    fitted, drawn = load_layout(path), fit.model.layout
+    assert fitted.name == "fitted" and fitted.interaction is None
+    assert fitted.description.startswith("fitted to 60 s of swimming")
+    true = plant_of(truth)
+    targets = 0.6 * true.wrench(true.sample(np.random.default_rng(3), (30,)))
+    allocator = load_allocator()
+    missed = [
+        np.linalg.norm(true.wrench(allocator.allocate_batch(robot, targets).command) - targets, axis=1).mean()
+        for robot in (drawn, fitted)
+    ]
+    assert missed[1] < missed[0] / 4.0
+
+
+def test_the_hull_moves_with_the_centre(fit: RobotFit, tmp_path: Path) -> None:
+    fitted, tables = fitted_layout(fit, tmp_path / "x.yaml")
+    assert tables == {} and fitted.body is not None and fitted.body.hull is not None
+    np.testing.assert_allclose(fitted.body.hull.center_m, -CENTER, atol=0.004)
+
+
+def test_a_fin_that_never_works_is_said_to_be_unknown(drawn: Layout) -> None:
+    lost = replace(drawn, fins=tuple(fin for i, fin in enumerate(drawn.fins) if i != 1))
+    command, measured = swim(lost, 60.0, seed=2)
+    motion = replay(lost, command)
+    whole = np.zeros((*motion.shape[:2], 3, 3))
+    whole[:, :, [0, 2]] = motion
+    found = fit_robot(drawn, [Swim("two fins", whole, only_new(measured))], tried=())
+    assert any("front_left" in doubt for doubt in found.doubts())
+    assert "strength of front_left, logarithm" in found.untold()
+    assert summary(found)[0].startswith("not to be trusted")
+
+
+def test_a_layout_with_an_interaction_is_not_fitted_again(drawn: Layout) -> None:
+    with pytest.raises(DataError, match="has an interaction already"):
+        fit_robot(
+            replace(drawn, interaction=Interaction()), [Swim("x", np.zeros((1, 2, 3, 3)), np.zeros((1, 12)))]
+        )
+
+
+def test_the_command_reads_a_csv_file(
+    drawn: Layout, truth: Layout, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    save_layout(drawn, tmp_path / "drawn.yaml")
+    command, measured = swim(truth, 31.0, seed=4)
+    write_csv(tmp_path / "swim.csv", drawn, command, measured)
+    again = read_swim(tmp_path / "swim.csv", drawn)
+    assert len(again) == 309 and again.replayed
+    np.testing.assert_allclose(again.motion, replay(drawn, command)[:309], atol=1e-6)
+    np.testing.assert_allclose(again.measured[:, 6:], measured[:309, 6:], atol=1e-6)
+    np.testing.assert_allclose(wrapped(again.measured[:, 3:6] - measured[:309, 3:6]), 0.0, atol=1e-6)
+    arguments = [
+        "fit",
+        "robot",
+        "--no-residual",
+        f"{tmp_path}/drawn.yaml",
+        f"{tmp_path}/swim.csv",
+        "-o",
+        f"{tmp_path}/found.json",
+    ]
+    assert main(arguments) == 0
+    assert "strength of front_right" in capsys.readouterr().out
+    assert load_layout(tmp_path / "found.json").names == drawn.names
+    assert main([*arguments[:-1], f"{tmp_path}/found.txt"]) == 2
+    assert not (tmp_path / "found.txt").exists()
