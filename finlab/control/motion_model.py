@@ -57,7 +57,13 @@ class MotionModel:
         self._slopes = np.zeros((size, size))
         self._slopes[range(3, 6), range(11, 14)] = 1.0 / self.inertia[3:]
         height = (body.center_of_buoyancy_m or zeros)[2]
-        self._slopes[range(3, 5), range(6, 8)] = -self._vehicle.lift * height / self.inertia[3:5]
+        righting = -self._vehicle.lift * height / self.inertia[3:5]
+        self._slopes[range(3, 5), range(6, 8)] = righting
+        self._slopes[range(6, 8), range(3, 5)] = 1.0
+        # To second order, for roll swings within half a second.
+        self._slopes[range(6, 8), range(6, 8)] = 0.5 * period_s * righting
+        self._swing = np.zeros(6)
+        self._swing[3:5] = 0.5 * period_s * righting
         self._force = np.zeros((2, layout.n_fins, 6))
 
     def step(
@@ -89,13 +95,11 @@ class MotionModel:
         flow[:3] -= current @ rotation
         damping = -np.expm1(-dt * (self._linear + self._quadratic * np.abs(flow))) / dt
         slopes = self._slopes.copy()
-        slopes.ravel()[: 6 * len(slopes) : len(slopes) + 1] = -damping
+        slopes.ravel()[: 6 * len(slopes) : len(slopes) + 1] = self._swing - damping
         slopes[:3, CURRENT] = damping[:3, None] * rotation.T
         slopes[MOTION, STRENGTH] = (wrench / self.inertia).T
         slopes *= dt
         slopes += self._one
-        # Roll turns with the rate at the end of the period, which keeps its quick swing from growing.
-        slopes[TILT] += dt * slopes[3:5]
         return Step(after, slopes, dt / self.inertia * turned)
 
     def _carried(self, body: list[float], wrench: list[float]) -> list[float]:
