@@ -189,7 +189,10 @@ def _outliers(measurements: Measurements) -> NDArray[np.bool_]:
     suspects explains are taken back.
     """
     turned, _ = _turned_forces(measurements)
-    values = turned / np.quantile(np.linalg.norm(measurements.force, axis=-1), 0.98)
+    largest = float(np.quantile(np.linalg.norm(measurements.force, axis=-1), 0.98))
+    values = turned / largest
+    # Who knows that a sample is bad has not been contradicted by it.
+    told = 0.0 if measurements.deviation is None else measurements.deviation[:, 1:].max(axis=1) / largest
     inputs = measurements.scaled(measurements.command)
     out = np.zeros(len(inputs), dtype=bool)
     for _ in range(ROUNDS):
@@ -197,13 +200,11 @@ def _outliers(measurements: Measurements) -> NDArray[np.bool_]:
         along = Component(inputs[kept], values[kept, 0], wild=True)
         across = Component(inputs[kept], values[kept, 1], size=along.mean, wild=True)
         size = along.predict(inputs)[0]
-        far = [
-            along.surprise(inputs, values[:, 0]),
-            across.surprise(inputs, values[:, 1], size),
-        ]
-        for surprise, component in zip(far, (along, across), strict=True):
-            surprise[kept] = np.abs(component.left_out) / component.left_out_deviation
-        out = np.maximum(*far) > OUTLIER
+        out = np.zeros_like(out)
+        for component, value in ((along, values[:, 0]), (across, values[:, 1])):
+            error, deviation = component.unseen(inputs, value, size)
+            error[kept], deviation[kept] = component.left_out, component.left_out_deviation
+            out |= np.abs(error) > OUTLIER * np.maximum(deviation, told)
         if (out == before).all():
             break
     return np.asarray(out)

@@ -58,12 +58,12 @@ class Component:
         mean, deviation = self._process.predict(inputs, return_std=True)
         return np.asarray(mean), np.asarray(deviation)
 
-    def surprise(self, inputs: Array, values: Array, size: Array | None = None) -> Array:
-        """Returns how far (m,) values are off that the process has not seen, over what is to be expected with
-        noise of the same kind; `size` (m,) as above, by default that of the prediction."""
+    def unseen(self, inputs: Array, values: Array, size: Array | None = None) -> tuple[Array, Array]:
+        """Returns the errors (m,) of values that the process has not seen, and what their standard deviation
+        should be with noise of the same kind; `size` (m,) as above, by default that of the prediction."""
         mean, deviation = self.predict(inputs)
         noise = self._noise_at(mean if size is None else size)
-        return np.asarray(np.abs(values - mean) / np.sqrt(deviation**2 + noise))
+        return np.asarray(values - mean), np.sqrt(deviation**2 + noise)
 
     def _noise_at(self, size: Array) -> Array:
         even, grown = self._noise

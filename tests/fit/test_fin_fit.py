@@ -123,6 +123,7 @@ def test_deviations_that_are_told_count() -> None:
     force = true + deviation * np.random.default_rng(2).standard_normal(true.shape)
     told = samples(command, force)
     found = fit_fin(type(told)(command, force, deviation, None, told.places, ()))
+    assert found.outliers == (), "a sample that is known to be bad contradicts nothing"
     assert np.sqrt(np.mean(error_of(found) ** 2)) < 0.03
 
 

@@ -188,6 +188,21 @@ def test_a_fin_that_became_another_meanwhile_is_left_alone(tmp_path: Path, worke
     assert "table" not in opened.models and opened.fitting.findings is None
 
 
+def test_two_pages_fit_at_once_each_its_own(tmp_path: Path, worker: Worker) -> None:
+    one, other = Opened(worker), Opened(worker)
+    content = cell(tmp_path)
+    one.fitting.start("back_left", "one.csv", content)
+    other.fitting.start("front_left", "other.csv", content)
+    until(lambda: "table" in other.models)
+    assert one.models == ["drag", "drag", "table", "drag"] and other.models == [
+        "drag",
+        "table",
+        "drag",
+        "drag",
+    ]
+    assert one.fitting.findings is not None and one.fitting.findings.upload.name == "one.csv"
+
+
 def test_doubts_come_first(tmp_path: Path, worker: Worker) -> None:
     opened = Opened(worker)
     opened.fitting.start("back_left", "few.csv", cell(tmp_path, 25))
