@@ -71,6 +71,12 @@ class FinFit:
         mean, deviation = self.largest * found.transpose(1, 2, 0)
         return mean.reshape(command.shape), deviation.reshape(command.shape)
 
+    def mean_thrust(self, command: Array) -> Array:
+        """Returns the forces of `thrust` (..., 3) alone, which is much quicker."""
+        inputs = self.measurements.scaled(command)
+        found = np.stack([component.expect(inputs) for component in self.components], axis=-1)
+        return np.asarray(self.largest * found.reshape(command.shape))
+
     @cached_property
     def measured(self) -> Array:
         """The forces of the samples [N], as `thrust` has them (n, 3)."""
@@ -80,7 +86,7 @@ class FinFit:
         """Returns the power [W], (...), at commands (..., 3); None where none was measured."""
         if self.power is None:
             return None
-        root = np.maximum(self.power.predict(self.measurements.scaled(command))[0], 0.0)
+        root = np.maximum(self.power.expect(self.measurements.scaled(command)), 0.0)
         return np.asarray(self.largest_power * root.reshape(command.shape[:-1]) ** 2)
 
     def error(self) -> float:
@@ -199,7 +205,7 @@ def _outliers(measurements: Measurements) -> NDArray[np.bool_]:
         kept, before = ~out, out
         along = Component(inputs[kept], values[kept, 0], wild=True)
         across = Component(inputs[kept], values[kept, 1], size=along.mean, wild=True)
-        size = along.predict(inputs)[0]
+        size = along.expect(inputs)
         out = np.zeros_like(out)
         for component, value in ((along, values[:, 0]), (across, values[:, 1])):
             error, deviation = component.unseen(inputs, value, size)

@@ -9,7 +9,7 @@ from finlab.fit.fin_fit import FinFit
 
 POINTS = 60
 """Of a curve."""
-DIRECTIONS = 12
+DIRECTIONS = 8
 """Zero directions over which a thrust is averaged."""
 
 
@@ -34,24 +34,28 @@ class ThrustCurve(NamedTuple):
 def thrust_curves(fit: FinFit, count: int) -> list[ThrustCurve]:
     """Returns `count` curves, rising with the frequency; each has as many samples as the others."""
     command = fit.measurements.command
-    rest = fit.measured[:, 0] - fit.thrust(command)[0][:, 0]
+    rest = fit.measured[:, 0] - fit.mean_thrust(command)[:, 0]
     edges = np.quantile(command[:, 1], np.linspace(0.0, 1.0, count + 1))
     line = np.linspace(0.0, fit.measurements.reach[0], POINTS)
     curves = []
     for low, high in zip(edges[:-1], edges[1:], strict=True):
         inside = (command[:, 1] >= low) & (command[:, 1] <= high)
         middle = float(np.median(command[inside, 1]))
-        thrust, deviation = all_round(fit, np.stack([line, np.full(POINTS, middle)], axis=-1))
+        grid = _turned(fit, np.stack([line, np.full(POINTS, middle)], axis=-1))
+        found = np.array(fit.components[0].predict(fit.measurements.scaled(grid)))
+        thrust, deviation = fit.largest * found.reshape(2, *grid.shape[:2]).mean(axis=2)
         own = np.interp(command[inside, 0], line, thrust)
         samples = np.stack([command[inside, 0], own + rest[inside]], axis=-1)
         curves.append(ThrustCurve(middle, (float(low), float(high)), line, thrust, deviation, samples))
     return curves
 
 
-def all_round(fit: FinFit, command: Array) -> tuple[Array, Array]:
-    """Returns thrust [N] and its standard deviation (n,) at amplitudes and frequencies (n, 2 or 3),
-    averaged over zero directions."""
+def all_round(fit: FinFit, command: Array) -> Array:
+    """Returns the thrust [N] (n,) at amplitudes and frequencies (n, 2 or 3), averaged over directions."""
+    return np.asarray(fit.mean_thrust(_turned(fit, command))[..., 0].mean(axis=1))
+
+
+def _turned(fit: FinFit, command: Array) -> Array:
+    """Commands (n, `DIRECTIONS`, 3) with these amplitudes and frequencies."""
     turn = fit.directions(DIRECTIONS)
-    parts = np.broadcast_arrays(command[:, None, 0], command[:, None, 1], turn)
-    thrust, deviation = fit.thrust(np.stack(parts, axis=-1))
-    return thrust[..., 0].mean(axis=1), deviation[..., 0].mean(axis=1)
+    return np.stack(np.broadcast_arrays(command[:, None, 0], command[:, None, 1], turn), axis=-1)

@@ -38,7 +38,7 @@ def draw_thrust(fit: FinFit) -> Picture:
 def draw_errors(fit: FinFit) -> Picture:
     """What the fit leaves over at each sample, and the directions of thrust beside the zero directions."""
     command, measured = fit.measurements.command, fit.measured
-    predicted = fit.thrust(command)[0]
+    predicted = fit.mean_thrust(command)
     reach = np.linalg.norm(predicted, axis=-1)
     error = 100.0 * np.linalg.norm(measured - predicted, axis=-1) / fit.largest
     strong = reach > SURE * fit.largest
@@ -59,13 +59,13 @@ def draw_errors(fit: FinFit) -> Picture:
         axis.set(xlabel="fitted force [N]", ylabel="direction less zero direction [deg]", title="Lean")
         if fit.measurements.turned:
             axis = next(axes)
-            share = measured[strong, 0] / all_round(fit, command[strong])[0]
+            share = measured[strong, 0] / all_round(fit, command[strong])
             axis.scatter(np.degrees(command[strong, 2]), share, **DOT)
             turn = np.linspace(-math.pi, math.pi, POINTS)
             hard = np.stack(
                 [np.full(POINTS, 0.8 * most) for most in fit.measurements.reach] + [turn], axis=-1
             )
-            axis.plot(np.degrees(turn), fit.thrust(hard)[0][:, 0] / all_round(fit, hard)[0], color=BLUE)
+            axis.plot(np.degrees(turn), fit.mean_thrust(hard)[:, 0] / all_round(fit, hard), color=BLUE)
             axis.set(xlabel="zero direction [deg]", ylabel="thrust over its mean", title="Unevenness")
             axis.set_xticks([-180, -90, 0, 90, 180])
         if fit.measurements.power is not None:

@@ -1,0 +1,54 @@
+"""What pictures of a fit draw, beside the law that was measured; and the page that draws it."""
+
+import numpy as np
+import pytest
+
+from finlab.evaluation.report.fin_fit_page import fin_fit_page
+from finlab.evaluation.report.pages import to_html
+from finlab.fit.fin_fit import FinFit, fit_fin
+from finlab.fit.thrust_curves import all_round, thrust_curves
+from tests.fit.cell import commands, measured, samples, soft
+
+LAW = soft(k=4.0, p=1.4, x0=0.9, q=4.0, e=0.15, phi_e=1.0, d=0.12)
+
+
+@pytest.fixture(scope="module")
+def fit() -> FinFit:
+    """150 samples with 2 % noise."""
+    command = commands(150)
+    return fit_fin(samples(command, measured(LAW, command, 0.02)))
+
+
+def truth(amplitude: float, frequency: float) -> float:
+    """The law's thrust averaged over all zero directions."""
+    turn = np.linspace(-np.pi, np.pi, 24, endpoint=False)
+    command = np.stack([np.full(24, amplitude), np.full(24, frequency), turn], axis=-1)
+    return float(np.linalg.norm(LAW.force(command), axis=-1).mean())
+
+
+def test_curves_are_the_laws_and_samples_stand_by_them(fit: FinFit) -> None:
+    curves = thrust_curves(fit, 3)
+    assert [curve.frequency for curve in curves] == sorted(curve.frequency for curve in curves)
+    for curve in curves:
+        assert 49 <= len(curve.samples) <= 52 and curve.band[0] <= curve.frequency <= curve.band[1]
+        expected = [truth(a, curve.frequency) for a in curve.amplitude]
+        np.testing.assert_allclose(curve.thrust, expected, atol=0.05 * fit.largest)
+        own = np.interp(curve.samples[:, 0], curve.amplitude, curve.thrust)
+        assert np.abs(curve.samples[:, 1] - own).max() < 0.1 * fit.largest
+        assert curve.deviation[0] == 0.0 and (curve.deviation[1:] > 0.0).all()
+
+
+def test_means_alone_are_those_with_deviations(fit: FinFit) -> None:
+    command = commands(20, seed=4)
+    np.testing.assert_allclose(fit.mean_thrust(command), fit.thrust(command)[0], atol=1e-12)
+    turned = np.hypot(*fit.thrust(command)[0][:, :2].T)
+    np.testing.assert_allclose(turned, np.linalg.norm(fit.predict(command)[0][:, 1:], axis=-1))
+    assert all_round(fit, np.array([[0.3, 1.0]])) == pytest.approx(truth(0.3, 1.0), rel=0.05)
+    kept = np.linalg.norm(fit.measurements.force, axis=-1)
+    np.testing.assert_allclose(np.linalg.norm(fit.measured, axis=-1), kept)
+
+
+def test_the_page_says_what_the_fit_is_worth(fit: FinFit) -> None:
+    html = to_html(fin_fit_page(fit, "bench"))
+    assert "Fin bench, fitted" in html and "May be trusted within what was measured." in html
+    assert html.count("<svg") >= 2 and "What to measure next" in html
