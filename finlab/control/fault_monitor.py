@@ -16,8 +16,8 @@ from finlab.control.servo_reports import report_evidence
 from finlab.layout import Body, Layout
 from finlab.layout.angles import TURN
 
-LOST_BELOW = 0.12
-"""A strength below which a fin is lost."""
+LOST_BELOW = 0.2
+"""A strength below which a fin is given up as lost."""
 WHOLE_ABOVE = 0.9
 """A strength from which a fin that was weak is whole again."""
 COARSE = 0.05

@@ -15,6 +15,8 @@ from finlab.control.motion_model import CURRENT, FIRST_FIN, MOTION, STRENGTH, TI
 
 LEVELS = (0.0, 0.35, 0.7, 1.0)
 """Strengths that a fin may suddenly have."""
+LOSSES = 0.6
+"""Share of all events that are losses."""
 APART = 0.2
 """A level this near to a fin's strength is no event."""
 
@@ -72,7 +74,9 @@ class Hypotheses:
         possible = np.abs(jump) > APART
         possible[:, -1] = True
         self._jump = jump
-        self._rate = np.where(possible, self.settings.failures / jump.shape[1], 0.0)
+        often = np.full(jump.shape[1], (1.0 - LOSSES) / (jump.shape[1] - 1))
+        often[0] = LOSSES
+        self._rate = np.where(possible, self.settings.failures * often, 0.0)
         self.off[:] = 0.0
         self._strengths_off()[:] = jump
         self.probability = self._rate * self.settings.doubt_s

@@ -27,7 +27,7 @@ class MonitorSettings:
     """Of its change [N m], per root of a second."""
     strength: float = 0.05
     """Of the strength of a whole or a lost fin, and the most that is ever unknown of one that rests."""
-    new_strength: float = 0.15
+    new_strength: float = 0.25
     """The same of a fin that has just become weak."""
     strength_drift: float = 0.005
     """Of its change, per root of a second."""
@@ -39,5 +39,5 @@ class MonitorSettings:
     """Time at the start in which current and trim are learnt and nothing is suspected [s]."""
     probe_every_s: float = 20.0
     """Time after which a fin that was found to be lost is tried again [s]; 0 for never."""
-    threshold: float = 0.99
+    threshold: float = 0.995
     """Probability of a fin's failure from which it is acted on."""

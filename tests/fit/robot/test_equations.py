@@ -39,7 +39,9 @@ def of_vehicle() -> Vehicle:
     body = ucat_body()
     assert body.mass_kg
     lift = body.mass_kg * GRAVITY + 1.5
-    return Vehicle(replace(body, center_of_buoyancy_m=(0.001, -0.002, 0.05), buoyancy_n=lift), (*CURRENT, 0.0))
+    return Vehicle(
+        replace(body, center_of_buoyancy_m=(0.001, -0.002, 0.05), buoyancy_n=lift), (*CURRENT, 0.0)
+    )
 
 
 def test_derivatives_agree_with_the_vehicle() -> None:
