@@ -188,7 +188,10 @@ def _read_archive(files: _Contents) -> None:
         for entry in entries:
             # Nothing is unpacked, so a name can do no harm; still, a bundle holds these files only.
             if largest(entry.filename) < 0 or entry.filename in files:
-                raise DataError(f"{files.source}: holds {entry.filename!r:.60}, which is no part of a bundle")
+                layout = entry.filename.endswith((".yaml", ".graph.json"))
+                hint = "; unpack it, and name the layout file in it" if layout else ""
+                name = f"{entry.filename!r:.60}"
+                raise DataError(f"{files.source}: holds {name}, which is no part of a bundle{hint}")
             with archive.open(entry) as stream:
                 files.take(entry.filename, stream.read)
 

@@ -153,6 +153,10 @@ def fit_fin(
     """
     tell = progress or (lambda _: None)
     notes = list(measurements.notes)
+    rest = measurements.command[:, 0] * measurements.command[:, 1] == 0.0
+    if rest.any():
+        notes.append(f"{rest.sum()} samples at rest tell nothing and are left out")
+        measurements = measurements.without(rest)
     if len(measurements) > MOST_SAMPLES:
         drawn = np.random.default_rng(seed).permutation(len(measurements)) >= MOST_SAMPLES
         notes.append(f"{MOST_SAMPLES} of {len(measurements)} samples, drawn at random, are used")

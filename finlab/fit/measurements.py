@@ -212,8 +212,10 @@ def _checked(read: list[tuple[Columns, tuple[str, ...]]], source: str) -> Measur
     given = [column for column in spread if column is not None]
     deviation = None
     if given:
-        if min(column.min() for column in given) <= 0.0:
-            raise DataError(f"{source}: a standard deviation is 0 or less; leave out what is not known")
+        wrong = (np.min(given, axis=0) <= 0.0) & (amplitude * frequency > 0.0)  # at rest all is known
+        if wrong.any():
+            place = places[int(np.argmax(wrong))]
+            raise DataError(f"{place}: a standard deviation is 0 or less; leave out what is not known")
         mean = np.mean(given, axis=0)
         deviation = np.stack([mean if column is None else column for column in spread], axis=-1)
     return Measurements(command, force, deviation, power, places, tuple(notes), turned)

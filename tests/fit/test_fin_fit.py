@@ -127,6 +127,16 @@ def test_deviations_that_are_told_count() -> None:
     assert np.sqrt(np.mean(error_of(found) ** 2)) < 0.03
 
 
+def test_samples_at_rest_tell_nothing() -> None:
+    command = commands(60)
+    force = measured(LAW, command)
+    still = np.array([[0.0, 1.0, 0.0], [0.3, 0.0, 1.0]])
+    both = samples(np.concatenate([command, still]), np.concatenate([force, np.zeros((2, 3))]))
+    found = fit_fin(both)
+    assert len(found.measurements) == 60 and "2 samples at rest" in " ".join(found.notes)
+    np.testing.assert_allclose(found.predict(TEST)[0], fit_fin(samples(command, force)).predict(TEST)[0])
+
+
 def test_one_zero_direction_speaks_for_all() -> None:
     law = soft(d=0.1)
     command = commands(120)

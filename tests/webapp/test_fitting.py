@@ -7,8 +7,10 @@ import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from finlab import load_allocator
@@ -24,6 +26,7 @@ from webapp.session.layout_edits import with_model
 from webapp.session.table_files import archive_of, read_archive, stored_table
 from webapp.tasks import fitting
 from webapp.tasks.background import Worker
+from webapp.tasks.exports import Exports
 from webapp.tasks.fitting import Fitting
 
 LAW = soft(k=4.0, p=1.4, x0=0.9, q=4.0, e=0.15, phi_e=1.0, d=0.12)
@@ -127,6 +130,23 @@ def test_a_finished_table_is_recognized(tmp_path: Path, worker: Worker) -> None:
     assert opened.session.state.layout.fins[1].model == opened.session.state.layout.fins[2].model
     words = model_card(opened.session.state.layout.fins[1])
     assert "<b>table</b>, fitted to 69 samples" in words and "all round" in words
+
+
+def test_a_noisy_full_grid_can_be_fitted_all_the_same(tmp_path: Path, worker: Worker) -> None:
+    opened = Opened(worker)
+    axes = np.meshgrid([0.1, 0.3, 0.6], [0.4, 1.0, 2.0], np.arange(-3.0, 3.0, 1.2), indexing="ij")
+    command = np.stack(axes, axis=-1).reshape(-1, 3)
+    content = write(tmp_path / "grid.csv", columns_of(command, measured(LAW, command))).read_bytes()
+    opened.fitting.start("back_left", "grid.csv", content)
+    until(lambda: "table" in opened.models)
+    taken = opened.session.state
+    opened.fitting.fit_table()
+    until(lambda: opened.session.state != taken)
+    assert opened.fitting.findings is not None and opened.fitting.findings.fit is not None
+    with pytest.raises(FinlabError, match="no full grid was taken"):
+        opened.fitting.fit_table()
+    opened.session.undo()
+    assert opened.session.state == taken
 
 
 @pytest.mark.parametrize(
@@ -238,9 +258,38 @@ def test_a_layout_carries_its_tables_elsewhere(tmp_path: Path, cache: Path) -> N
     opened = load_layout(elsewhere / "my_robot.yaml")
     answer = load_allocator().allocate(opened, [0.5, 0, 0.2, 0, 0, 0.05])
     assert answer.err_norm < 1e-6
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(
+        DataError, match=r"holds 'my_robot\.yaml', .*; unpack it, and name the layout file in it"
+    ):
+        load_layout(tmp_path / name)
     again = files.read_layout(name, content)
     assert again == layout and table_bytes(str(again.fins[2].model.values()["path"]))
     assert files.layout_file(load_layout("ucat"))[0] == "ucat.yaml"
+
+
+def test_a_graph_file_travels_with_its_tables(tmp_path: Path, cache: Path, worker: Worker) -> None:
+    sent: list[tuple[str, bytes]] = []
+    client: Any = SimpleNamespace(send_file_download=lambda name, content, **_: sent.append((name, content)))
+    layout = robot(tmp_path, cache)
+    session = Session(layout)
+    Exports(page_of(worker, session, client=client)).graph()
+    until(lambda: bool(sent))
+    ((name, content),) = sent
+    assert name == "my_robot.graph.zip"
+    for path in cache.glob("*.csv"):
+        path.unlink()
+    opened = files.read_layout(name, content)
+    assert opened.fins[2].model == layout.fins[2].model and table_bytes(
+        dict(opened.fins[2].model.parameters)["path"]
+    )
+
+
+def test_limits_beyond_what_was_measured_are_told(tmp_path: Path, cache: Path) -> None:
+    fin = robot(tmp_path, cache).fins[2]
+    assert "at the edge" not in model_card(fin)
+    wide = replace(fin, limits=replace(fin.limits, frequency=(0.1, 3.0)))
+    assert "may be asked for 0.60 rad and 3.00 Hz" in model_card(wide)
 
 
 def test_a_bundle_opens_in_the_app(tmp_path: Path, cache: Path) -> None:
@@ -273,8 +322,6 @@ def test_other_archives_are_refused(parts: dict[str, bytes], sentence: str, tmp_
 
 
 def test_files_that_say_they_are_too_large_never_come_in() -> None:
-    from types import SimpleNamespace
-
     from viser import _messages
 
     from webapp.viser_internals import limit_uploads

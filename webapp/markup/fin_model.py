@@ -9,6 +9,8 @@ from finlab.physics import make_law
 from finlab.physics.table import TableLaw
 from finlab.physics.table_file import DOUBT
 
+BEYOND = 0.01
+"""Amplitude [rad] or frequency [Hz] by which limits may lie beyond a table without a word."""
 LAWS = {
     "drag": "a stiff blade in quasi-steady drag (U-CAT's own law)",
     "lighthill": "a fin after Lighthill's elongated-body theory",
@@ -19,12 +21,11 @@ LAWS = {
 
 def model_card(fin: Fin) -> str:
     """The model of a fin."""
-    return f"<div class='fl'>{_words(fin.model)}</div>"
+    words = _table_words(fin) if fin.model.type == "table" else _law_words(fin.model)
+    return f"<div class='fl'>{words}</div>"
 
 
-def _words(model: FinModelSpec) -> str:
-    if model.type == "table":
-        return _table_words(model)
+def _law_words(model: FinModelSpec) -> str:
     values, rules = model.values(), FIN_MODELS[model.type]
     given = ", ".join(
         f"{escape(rule.meaning)} {float(values[name]):.4g}{f' {rule.unit}' if rule.unit else ''}"
@@ -34,9 +35,9 @@ def _words(model: FinModelSpec) -> str:
     return f"<b>{model.type}</b>: {LAWS[model.type]}.<div class='dim'>{given[0].upper()}{given[1:]}.</div>"
 
 
-def _table_words(model: FinModelSpec) -> str:
+def _table_words(fin: Fin) -> str:
     try:
-        law = make_law(model)
+        law = make_law(fin.model)
     except DataError as error:
         return f"<b>table</b>: <span class='missing'>{escape(str(error))}</span>"
     assert isinstance(law, TableLaw)
@@ -46,6 +47,12 @@ def _table_words(model: FinModelSpec) -> str:
     power = "with the power that was measured" if law.has_power else "power as of U-CAT's fin"
     doubt = next((note for note in law.notes if note.startswith(DOUBT)), None)
     said = "" if doubt is None else f"<div class='missing'>This fin is {escape(doubt)}.</div>"
+    if fin.limits.amplitude[1] > high_a + BEYOND or fin.limits.frequency[1] > high_f + BEYOND:
+        most_a, most_f = fin.limits.amplitude[1], fin.limits.frequency[1]
+        said += (
+            f"<div class='missing'>The fin may be asked for {most_a:.2f} rad and {most_f:.2f} Hz: beyond "
+            "what was measured the force counts as at the edge.</div>"
+        )
     fitted = next((note for note in law.notes if note.startswith("fitted to ")), None)
     origin = f", {escape(fitted.split(',')[0])}" if fitted else " of forces"
     return f"<b>table</b>{origin}.{said}<div class='dim'>{covers}; {power}.</div>"

@@ -26,7 +26,7 @@ def fit_card(found: Fitted) -> str:
     """What came of a file that was dropped on a fin."""
     name, fin = escape(found.upload.name), escape(found.upload.fin)
     if found.fit is None:
-        said = f"<b>{name} is a finished force table.</b> It is on {fin} as it stands; nothing was fitted."
+        said = f"<b>{name} is a finished force table.</b> It is on {fin} as it stands. Fit it if it is noisy."
         return f"<div class='fl said'>{said}</div>"
     fit = found.fit
     if fit.doubts:

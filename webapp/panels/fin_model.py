@@ -43,6 +43,7 @@ class FinModelPanel:
                 "On all like it": page.fitting.put_on_all,
                 "Table (CSV)": self._send_table,
                 "Page (HTML)": self._send_page,
+                "Fit it": page.fitting.fit_table,
                 "Close": page.fitting.forget,
             }
             self._results = page.add_buttons(
@@ -96,6 +97,9 @@ class FinModelPanel:
         put(self._bar, visible=fitting.busy)
         put(self._cancel, visible=fitting.busy)
         found = fitting.findings
+        if found is not None:
+            middle = ("Fit it",) if found.fit is None else ("Table (CSV)", "Page (HTML)")
+            put(self._results, options=("On all like it", *middle, "Close"))
         put(self._results, visible=found is not None)
         if self._changes(found, fitting.busy, fitting.progress, fitting.error):
             put(self._card, content=self._written(found))
