@@ -49,7 +49,7 @@ def test_a_wrong_file_is_told_where_and_changes_nothing(page: Any, tmp_path: Pat
     page.upload("Fit from measurements (CSV)", tmp_path / "cell.csv")
     sentence = "cell.csv: line 2, column Fy, holds 'oops', which is not a number"
     page.until(lambda: any(sentence in note for note in page.notes()))
-    page.page.locator(".fl.missing", has_text=sentence).wait_for()
+    page.page.locator(".fl .missing", has_text=sentence).wait_for()
     assert page.session.state == before and load_layout("ucat") == before.layout
 
 

@@ -231,7 +231,8 @@ def test_doubts_come_first(tmp_path: Path, worker: Worker) -> None:
     assert fit_card(opened.fitting.findings).startswith(
         "<div class='fl'><div class='said'><b class='missing'>Not to be trusted: "
     )
-    assert DOUBT in model_card(opened.session.state.layout.fins[2])
+    fin = opened.session.state.layout.fins[2]
+    assert DOUBT in model_card(fin) and DOUBT not in model_card(fin, doubts=False)
 
 
 def robot(tmp_path: Path, cache: Path) -> Layout:

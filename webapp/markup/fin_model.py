@@ -19,9 +19,9 @@ LAWS = {
 """Fin models with a formula, in words."""
 
 
-def model_card(fin: Fin) -> str:
-    """The model of a fin."""
-    words = _table_words(fin) if fin.model.type == "table" else _law_words(fin.model)
+def model_card(fin: Fin, doubts: bool = True) -> str:
+    """The model of a fin; without `doubts` where they stand elsewhere already."""
+    words = _table_words(fin, doubts) if fin.model.type == "table" else _law_words(fin.model)
     return f"<div class='fl'>{words}</div>"
 
 
@@ -35,7 +35,7 @@ def _law_words(model: FinModelSpec) -> str:
     return f"<b>{model.type}</b>: {LAWS[model.type]}.<div class='dim'>{given[0].upper()}{given[1:]}.</div>"
 
 
-def _table_words(fin: Fin) -> str:
+def _table_words(fin: Fin, doubts: bool) -> str:
     try:
         law = make_law(fin.model)
     except DataError as error:
@@ -46,7 +46,7 @@ def _table_words(fin: Fin) -> str:
     covers = f"A {low_a:.2f} to {high_a:.2f} rad, f {low_f:.2f} to {high_f:.2f} Hz, {turn}"
     power = "with the power that was measured" if law.has_power else "power as of U-CAT's fin"
     doubt = next((note for note in law.notes if note.startswith(DOUBT)), None)
-    said = "" if doubt is None else f"<div class='missing'>This fin is {escape(doubt)}.</div>"
+    said = "" if doubt is None or not doubts else f"<div class='missing'>This fin is {escape(doubt)}.</div>"
     if fin.limits.amplitude[1] > high_a + BEYOND or fin.limits.frequency[1] > high_f + BEYOND:
         most_a, most_f = fin.limits.amplitude[1], fin.limits.frequency[1]
         said += (

@@ -91,7 +91,9 @@ class FinModelPanel:
         if session.selected is None:
             words = "<div class='fl dim'>Select the fin that was measured.</div>"
         else:
-            words = model_card(layout.fins[layout.index(session.selected)])
+            fin = layout.fins[layout.index(session.selected)]
+            found = fitting.findings
+            words = model_card(fin, doubts=found is None or found.model != fin.model)
         put(self._words, content=words)
         put(self._upload_button, disabled=session.selected is None or fitting.busy)
         put(self._bar, visible=fitting.busy)
@@ -109,7 +111,7 @@ class FinModelPanel:
         if fitting.busy:
             return f"<div class='fl dim'>{escape(fitting.progress)} …</div>"
         if fitting.error is not None:
-            return f"<div class='fl missing'>{escape(fitting.error)}</div>"
+            return f"<div class='fl'><div class='said missing'>{escape(fitting.error)}</div></div>"
         if found is None:
             return ""
         from webapp.markup.fit_card import fit_card  # scikit-learn comes with it
