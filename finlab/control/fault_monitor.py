@@ -75,7 +75,6 @@ class FaultMonitor:
         n = layout.n_fins
         self._weak = np.zeros(n, dtype=bool)
         self._lost = np.zeros(n, dtype=bool)
-        self._told = np.zeros(n, dtype=bool)
         self._held = np.full(n, np.nan)
         self._since = self._model.fins.direction.copy()
         self._coarse = np.ones(n)
@@ -121,15 +120,14 @@ class FaultMonitor:
         fin = self.layout.index(name)
         self._beliefs.believe(fin, strength)
         self._mark(fin, strength, stuck)
-        self._told[fin] = True
         return self.verdict()
 
     def probed(self, command: Array) -> Array:
-        """The command (n, 3) with a short, small beat now and then of fins that the monitor found to be lost.
+        """The command (n, 3) with a short, small beat now and then of fins that are taken for lost.
 
         A lost fin gives nothing by it; of one that has been repaired the robot feels it, and takes it back.
         """
-        return self._probe.added(command, self._lost & ~self._told, self._model.fins.direction)
+        return self._probe.added(command, self._lost, self._model.fins.direction)
 
     def verdict(self) -> Verdict:
         """What is believed now."""
@@ -197,7 +195,6 @@ class FaultMonitor:
             return  # the last one that works
         beliefs.adopt(fin, kind)
         self._mark(fin, level, float(other[fin]) if turned else float(self._held[fin]))
-        self._told[fin] = False
 
     def _mark(self, fin: int, strength: float, stuck: float) -> None:
         self._lost[fin] = strength < LOST_BELOW

@@ -38,6 +38,6 @@ class MonitorSettings:
     settle_s: float = 6.0
     """Time at the start in which current and trim are learnt and nothing is suspected [s]."""
     probe_every_s: float = 20.0
-    """Time after which a fin that was found to be lost is tried again [s]; 0 for never."""
+    """Time after which a fin that is taken for lost is tried again [s]; 0 for never."""
     threshold: float = 0.995
     """Probability of a fin's failure from which it is acted on."""

@@ -156,6 +156,11 @@ class ClosedLoop:
         return names_of(self.broken, "lost")
 
     @property
+    def told(self) -> tuple[str, ...]:
+        """Names of the fins that somebody said are broken."""
+        return tuple(self._told)
+
+    @property
     def failed(self) -> tuple[str, ...]:
         """Names of the fins that the allocator takes for lost."""
         return names_of(self._told, "lost") if self.verdict is None else self.verdict.failed

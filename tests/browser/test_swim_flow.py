@@ -1,4 +1,4 @@
-"""Watch a robot swim, beside another method, with a fin that breaks half-way."""
+"""Watch a robot swim, beside another method, with a fin that breaks half-way, with or without a word."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ def test_swims_loses_a_fin_and_goes_on(page: Any) -> None:
     page.until(lambda: page.view.swimming.time > 4.0)
     page.type("Speed", "0.5")  # slowly, so that a busy page sees the rest before it has arrived
     page.until(lambda: page.pixel("/swim/robot0") != start)  # it moves on the screen
-    page.until(lambda: page.page.locator(".uplot:visible").count() == 3)
+    page.until(lambda: page.page.locator(".uplot:visible").count() == 4)
     page.page.get_by_role("button", name="2", exact=True).locator("visible=true").first.click()
     page.until(lambda: page.view.swimming.swimmers[0].shown.failed == ("front_left",))
     page.until(lambda: "3 of 4 fins" in page.text(".fl-status"))
@@ -40,4 +40,36 @@ def test_swims_loses_a_fin_and_goes_on(page: Any) -> None:
     page.press("End")
     page.until(lambda: not page.view.swimming.active)
     page.visible("/robot")
+    assert page.problems == []
+
+
+def test_a_fin_breaks_without_a_word_and_the_robot_finds_out(page: Any) -> None:
+    page.tab("Swim")
+    for label, entry in (("Path", "circle"), ("Method", "analytic")):
+        page.choose(label, entry)
+        page.until(lambda entry=entry: entry in vars(page.session.swim).values())
+    page.row("Announced").first.click()
+    page.until(lambda: not page.session.swim.announced)
+    page.type("Speed", "4")
+    page.press("Start")
+    page.until(lambda: len(page.view.swimming.swimmers) == 1)
+    page.until(lambda: page.view.swimming.time > 14.0)
+    page.type("Speed", "0.5")  # slowly, so that it can be seen that nobody knows yet
+    page.page.get_by_role("button", name="2", exact=True).locator("visible=true").first.click()
+    shown = lambda: page.view.swimming.swimmers[0].shown  # noqa: E731
+    page.until(lambda: shown().lost == ("front_left",))
+    page.until(lambda: "3 of 4 fins" in page.text(".fl-status"))
+    page.until(lambda: shown().failed == ("front_left",))
+    page.until(lambda: "The monitor found front_left lost" in page.page.inner_text("body"))
+    ((name, seconds),) = shown().found
+    assert name == "front_left" and 0.0 < seconds < 8.0
+    doubts = shown().record[:, -4:]
+    assert doubts[-1, 1] > 0.99 and doubts[-1, [0, 2, 3]].max() < 0.5
+    before = page.view.swimming.time
+    page.type("Speed", "4")
+    page.until(lambda: page.view.swimming.time > before + 8.0)
+    record = shown().record
+    assert record[record[:, 0] > before + 5.0, 1].max() < 0.3, "it is back on its path"
+    page.press("End")
+    page.until(lambda: not page.view.swimming.active)
     assert page.problems == []

@@ -58,7 +58,7 @@ def test_swims_to_the_end_and_tells_how(swimming: Swimming) -> None:
     assert not swimming.running and swimming.time == pytest.approx(2.0)
     first, second = swimming.swimmers
     record = first.shown.record
-    assert record.shape == (20, FORCES + 4) and np.isfinite(record).all()
+    assert record.shape == (20, FORCES + 8) and np.isfinite(record).all()
     assert np.all(np.diff(record[:, TIME]) > 0) and record[0, ERROR] < 0.1
     assert second.shown.record[-1, TIME] == record[-1, TIME], "both swim the same way at the same time"
     assert first.track_error is not None and first.track_error < 0.3
@@ -136,3 +136,33 @@ def test_files_with_ways_are_checked() -> None:
         read_path("../bad.csv", b"t,x\n0,1\n")
     with pytest.raises(FinlabError, match="bytes"):
         read_path("big.csv", b"0" * 3_000_000)
+
+
+def test_a_fin_that_breaks_without_a_word_is_found(swimming: Swimming) -> None:
+    begin(swimming, path="circle")
+    swimming.set_running(False)
+    swimmer = swimming.swimmers[0]
+    while swimmer.swim.time < 12.0:
+        swimmer.step()
+    swimming.toggle("front_left", announced=False)
+    until(lambda: swimming.swimmers[0].shown.lost == ("front_left",))
+    assert swimmer.shown.failed == () and swimmer.shown.found == ()
+    assert "does not know yet" in swim_card(swimming)
+    while not swimmer.swim.failed and swimmer.swim.time < 20.0:
+        swimmer.step()
+    swimmer.shown = swimmer.moment()
+    ((name, seconds),) = swimmer.shown.found
+    assert (name, swimmer.shown.failed) == ("front_left", ("front_left",)) and 0.0 < seconds < 8.0
+    assert f"found front_left lost {seconds:.1f} s after" in swim_card(swimming)
+    doubts = swimmer.shown.record[:, FORCES + 4 :]
+    assert doubts[-1, UCAT.index("front_left")] > 0.99 and doubts[0].max() < 0.1
+    swimming.toggle("front_left", announced=False)
+    until(lambda: swimming.swimmers[0].shown.lost == ())
+    assert "front_left works, but the allocator takes it for lost" in swim_card(swimming)
+
+
+def test_whether_the_allocator_is_told_is_a_setting() -> None:
+    settings = SwimSettings().with_value("announced", False)
+    assert not settings.announced and SwimSettings().announced
+    with pytest.raises(FinlabError, match="announced: expected true or false"):
+        settings.with_value("announced", "no")

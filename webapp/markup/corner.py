@@ -135,7 +135,7 @@ def swim_corner(swimming: Swimming, newtons: float) -> str:
             *((s.method, c) for s, c in zip(swimming.swimmers, (DELIVERED, OTHER), strict=False)),
         )
     )
-    alive = len(first.fins) - len(first.shown.failed)
+    alive = len(first.fins) - len(first.shown.lost)
     off = f"{100 * float(first.shown.record[-1, ERROR]):.1f}" if len(first.shown.record) else "–"
     parts = [
         f"<b>{escape(first.swim.layout.name)}</b>",

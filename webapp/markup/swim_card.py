@@ -3,6 +3,7 @@
 from html import escape
 
 from webapp.markup.words import fins_words, unlearned_sentence
+from webapp.tasks.swimmer import Moment
 from webapp.tasks.swimming import Swimming
 from webapp.theme import DELIVERED, OTHER, css
 
@@ -17,6 +18,25 @@ def pace_words(swimming: Swimming) -> str:
     if rate is None or rate > 0.9 * speed:
         return f"running at {speed:.2g}×"
     return f"<span class='missing'>running at {rate:.1g}×, as fast as this machine can</span>"
+
+
+def findings_words(shown: Moment) -> list[str]:
+    """What the monitor has found out of what nobody told, and what it has not."""
+    sentences = [
+        f"The monitor found {escape(name)} lost {seconds:.1f} s after it broke."
+        for name, seconds in shown.found
+    ]
+    for name in shown.lost:
+        if name not in shown.failed:
+            sentences.append(
+                f"<span class='missing'>{escape(name)} is lost, and the allocator does not know yet.</span>"
+            )
+    sentences += [
+        f"<span class='missing'>{escape(name)} works, but the allocator takes it for lost.</span>"
+        for name in shown.failed
+        if name not in shown.lost
+    ]
+    return sentences
 
 
 def swim_card(swimming: Swimming) -> str:
@@ -51,6 +71,7 @@ def swim_card(swimming: Swimming) -> str:
             f"<div class='missing'>Without {lost} surge, heave and yaw are not free of each other: "
             "expect it to drift off.</div>"
         )
+    warning += "".join(f"<div>{sentence}</div>" for sentence in findings_words(first.shown))
     header = (
         "<tr><th>method</th>"
         "<th title='root mean square distance from where it should be'>off the path [cm]</th>"

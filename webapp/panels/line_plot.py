@@ -15,7 +15,7 @@ from webapp.theme import css, fin_color
 FONT = "11px sans-serif"
 FIN_LINES = tuple(css(fin_color(i)) for i in range(MAX_FINS))
 """Colours of lines that belong to a fin each."""
-ROOM = 1.08
+ROOM = 1.14
 """Room above the last tick, so that its number is not cut off."""
 
 

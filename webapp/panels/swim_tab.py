@@ -26,6 +26,10 @@ EVERY_S = 0.2
 """Least time between two drawings [s]."""
 SMALL = 0.01
 """What the vertical axes show at least."""
+PLOT_PX = 76
+"""Height of a plot [px]: four fit below the buttons."""
+CERTAIN = 114.0
+"""End of the axis of probabilities [%]: some room above what is certain."""
 
 
 class SwimTab:
@@ -63,7 +67,13 @@ class SwimTab:
             "Break a fin",
             "Press a fin's number: break or mend it while it swims.",
             "fl-breaks",
-            page.swimming.toggle,
+            lambda name: page.swimming.toggle(name, page.session.swim.announced),
+        )
+        tells = "The allocator is told. Off: a monitor must find out from how the robot moves."
+        page.bind(
+            gui.add_checkbox("Announced", True, hint=tells),
+            partial(page.session.set_swim, "announced"),
+            partial(self._setting, "announced"),
         )
         self._card = gui.add_html("")
         self._plots = SwimPlots(gui)
@@ -101,30 +111,32 @@ class SwimTab:
             swimming.pace.set_speed(speed)
         swimmers = swimming.swimmers
         names = swimmers[0].fins if swimmers else self._page.session.state.layout.names
-        failed = swimmers[0].shown.failed if swimmers else self._page.session.state.failed
+        lost = swimmers[0].shown.lost if swimmers else self._page.session.state.failed
         paused = swimming.active and not swimming.running and not swimming.done
         put(self._run, options=("Start", "Go on" if paused else "Pause", "Step", "End"))
-        self._fins.refresh(names, failed)
+        self._fins.refresh(names, lost)
         put(self._card, content=swim_card(swimming))
         self._plots.refresh(swimming, option_index(self._axis))
 
 
 class SwimPlots:
-    """Three plots over time."""
+    """Four plots over time."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
         """Build them, empty."""
         self._drawn = 0.0
         self._changes = Changes()
-        self._error = LinePlot(gui, (css(DELIVERED), css(OTHER)), "off path [cm]")
-        self._wrench = LinePlot(gui, (css(ASKED), css(DELIVERED)), "surge [N]")
-        self._force = LinePlot(gui, FIN_LINES, "fins [N]", "time [s]", height=124)
+        self._error = LinePlot(gui, (css(DELIVERED), css(OTHER)), "off [cm]", height=PLOT_PX)
+        self._wrench = LinePlot(gui, (css(ASKED), css(DELIVERED)), "surge [N]", height=PLOT_PX)
+        self._force = LinePlot(gui, FIN_LINES, "fins [N]", height=PLOT_PX)
+        self._broken = LinePlot(gui, FIN_LINES, "broken %", "time [s]", height=PLOT_PX + 24)
 
     def refresh(self, swimming: Swimming, axis: int) -> None:
-        """Draw errors, one axis of the wrench and forces, but no more often than an eye can follow."""
+        """Draw errors, one axis of the wrench, forces and the monitor's doubts, but no more often than an eye
+        can follow."""
         swimmers = swimming.swimmers
         moments = tuple(swimmer.shown for swimmer in swimmers)
-        for plot in (self._error, self._wrench, self._force):
+        for plot in (self._error, self._wrench, self._force, self._broken):
             plot.show(bool(swimmers))
         soon = time.monotonic() - self._drawn < EVERY_S and swimming.running
         if not moments or soon or not len(moments[0].record) or not self._changes(axis, *moments):
@@ -139,5 +151,8 @@ class SwimPlots:
         both = [record[:, column + axis] for column in (ASKED_COLUMN, DELIVERED_COLUMN)]
         self._wrench.name(f"{AXIS_WORDS[axis]} [{AXIS_UNITS[axis]}]", "")
         self._wrench.draw(seconds, both, (-top_of([-both[0], -both[1]], SMALL), top_of(both, SMALL)))
-        forces = list(record[:, FORCES:].T)
+        n_fins = len(swimmers[0].fins)
+        forces = list(record[:, FORCES : FORCES + n_fins].T)
         self._force.draw(seconds, forces, (0.0, top_of(forces, SMALL)))
+        doubts = list(100.0 * record[:, FORCES + n_fins :].T)
+        self._broken.draw(seconds, doubts, (0.0, CERTAIN))

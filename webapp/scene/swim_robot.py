@@ -105,7 +105,7 @@ class SwimRobot:
 
     def _flap(self, moment: Moment) -> None:
         """Take over what the fins do; lost ones hang limp, in the colour of failed ones."""
-        alive = np.array([name not in moment.failed for name in self._names])
+        alive = np.array([name not in moment.lost for name in self._names])
         self._flapping.take(np.where(alive[:, None], moment.motion, np.nan))
         for node, works in zip(self._fins, alive, strict=False):
             node.paint(bool(works))

@@ -30,6 +30,8 @@ class SwimSettings:
     """How the fins' forces are simulated: one of `PLANTS`."""
     speed: float = 1.0
     """Simulated time per time on the wall."""
+    announced: bool = True
+    """Whether the allocator is told of fins that break and are mended; else the monitor has to find out."""
 
     def with_value(self, key: str, value: Any) -> "SwimSettings":
         """One field changed; the page may send anything.
@@ -39,6 +41,10 @@ class SwimSettings:
         """
         if key == "speed":
             return replace(self, speed=number(value, "speed", *SPEEDS))
+        if key == "announced":
+            if not isinstance(value, bool):
+                raise FinlabError(f"announced: expected true or false, got {value!r:.60}")
+            return replace(self, announced=value)
         choices = {
             "path": (*SHIPPED, OWN),
             "method": COMPARED,

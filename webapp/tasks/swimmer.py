@@ -79,14 +79,18 @@ class Moment(NamedTuple):
     """Wrench (6,) that the fins gave."""
     reference: Array
     """Where the robot should be (3,) [m]."""
-    failed: tuple[str, ...]
+    lost: tuple[str, ...]
     """Fins that are lost."""
+    failed: tuple[str, ...]
+    """Those that the allocator takes for lost."""
+    found: tuple[tuple[str, float], ...]
+    """Those of which nobody told it, each with the time that the monitor needed to find out [s]."""
     controllable: bool
     """Whether the working fins hold surge, heave and yaw."""
     done: bool
     """Whether the task is over."""
     record: Array
-    """Rows of ticks (N, 20 + n); `TIME` to `FORCES` say where what is."""
+    """Rows of ticks (N, 20 + 2 n); `TIME` to `FORCES` say where what is."""
 
 
 TIME, ERROR, DEPTH_ERROR, POWER, SOLVE_MS = range(5)
@@ -94,7 +98,7 @@ TIME, ERROR, DEPTH_ERROR, POWER, SOLVE_MS = range(5)
 of all fins [W], time of the allocation [ms]."""
 ASKED, DELIVERED, PLACE, FORCES = 5, 11, 17, 20
 """First columns of the asked (6) and delivered (6) wrench [N, N m], the position (3) [m], and of
-the force of each fin (n) [N]."""
+the force of each fin (n) [N]; then comes the probability of each fin being broken (n)."""
 
 
 class Swimmer:
@@ -112,6 +116,7 @@ class Swimmer:
         """Fins that its method has not learned."""
         self._rows: list[Array] = []
         self._last: Tick | None = None
+        self._found: dict[str, float] = {}
         self.shown = self.moment()
         """What the page shows now."""
 
@@ -122,7 +127,19 @@ class Swimmer:
         power = float(tick.inertial_power.sum())
         head = (tick.time, float(np.linalg.norm(off)), abs(float(off[2])), power, tick.solve_ms)
         force = np.linalg.norm(tick.fin_force, axis=1)
-        self._rows.append(np.concatenate([head, tick.asked, tick.delivered, tick.position, force]))
+        suspicion = tick.fault_probability
+        self._rows.append(np.concatenate([head, tick.asked, tick.delivered, tick.position, force, suspicion]))
+        self._note_findings()
+
+    def _note_findings(self) -> None:
+        """When the monitor found out what nobody told; forgotten once the fin is whole or taken for it."""
+        swim = self.swim
+        unknown = [name for name in swim.lost if name not in swim.told]
+        self._found = {
+            name: self._found.get(name, swim.time - self.period_s - swim.broken[name].time_s)
+            for name in unknown
+            if name in swim.failed
+        }
 
     def moment(self) -> Moment:
         """What there is to show after the last step; called on the thread that swims."""
@@ -137,10 +154,12 @@ class Swimmer:
             asked=np.zeros(6) if last is None else last.asked,
             delivered=np.zeros(6) if last is None else last.delivered,
             reference=swim.task.setpoint(swim.time).position,
+            lost=swim.lost,
             failed=swim.failed,
+            found=tuple(self._found.items()),
             controllable=swim.controllable,
             done=swim.done,
-            record=np.array(thin) if thin else np.zeros((0, FORCES + n)),
+            record=np.array(thin) if thin else np.zeros((0, FORCES + 2 * n)),
         )
 
     @property

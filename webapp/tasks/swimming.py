@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from finlab.control import FaultMonitor
 from finlab.errors import FinlabError
 from finlab.sim import ClosedLoop, make_trajectory
 from webapp.session.state import State
@@ -83,7 +84,15 @@ class Swimming:
         path = make_trajectory(plan.path) if isinstance(plan.path, str) else plan.path
         allocator = self._solver.allocator(State(plan.layout, method=method, objective=plan.objective))
         failures = [(name, 0.0) for name in plan.failed]
-        return Swimmer(method, ClosedLoop(plan.layout, allocator, path, plant=plan.plant, failures=failures))
+        swim = ClosedLoop(
+            plan.layout,
+            allocator,
+            path,
+            plant=plan.plant,
+            failures=failures,
+            monitor=FaultMonitor(plan.layout),
+        )
+        return Swimmer(method, swim)
 
     def _begin(self) -> None:
         if self._start.error is not None:
@@ -114,15 +123,16 @@ class Swimming:
         self.set_running(False)
         self._submit(1)
 
-    def toggle(self, name: str) -> None:
-        """A fin of all robots breaks, or is mended, before the next step."""
+    def toggle(self, name: str, announced: bool = True) -> None:
+        """A fin of all robots breaks, or is mended, before the next step; the allocators are told, or not."""
         if not self.swimmers:
             raise FinlabError("nothing swims yet; press Start")
-        failed = self.swimmers[0].shown.failed
-        broken = name in failed
-        if not broken and len(failed) + 1 >= len(self.swimmers[0].fins):
+        lost = self.swimmers[0].shown.lost
+        broken = name in lost
+        if not broken and len(lost) + 1 >= len(self.swimmers[0].fins):
             raise FinlabError(f"{name} is the last fin that works; mend another one first")
-        self._acts.append(lambda swim: swim.mend(name) if broken else swim.fail(name))
+        kind = "whole" if broken else "lost"
+        self._acts.append(lambda swim: swim.fail(name, kind, announced=announced))
         if not self.running:
             self._submit(0)
 
