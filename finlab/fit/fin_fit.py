@@ -5,19 +5,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.fit.gaussian_process import Component
 from finlab.fit.measurements import MIN_SAMPLES, Measurements
+from finlab.fit.outliers import find_outliers
 from finlab.layout.angles import TURN
 
 MOST_SAMPLES = 1500
 """Samples beyond this number are thinned: the time grows with their cube."""
-OUTLIER = 5.0
-"""Error, over the usual one, beyond which a sample is left out."""
-ROUNDS = 3
-"""Fits that look for such samples, each without those that the one before has found."""
 BAND = 1.96
 """Standard deviations of a band that holds 95 % of a normal distribution."""
 GOOD_ERROR = 0.05
@@ -80,7 +76,7 @@ class FinFit:
     @cached_property
     def measured(self) -> Array:
         """The forces of the samples [N], as `thrust` has them (n, 3)."""
-        return _turned_forces(self.measurements)[0]
+        return self.measurements.thrust()[0]
 
     def predict_power(self, command: Array) -> Array | None:
         """Returns the power [W], (...), at commands (..., 3); None where none was measured."""
@@ -162,7 +158,7 @@ def fit_fin(
         notes.append(f"{MOST_SAMPLES} of {len(measurements)} samples, drawn at random, are used")
         measurements = measurements.without(drawn)
     tell("looking for samples that contradict the others")
-    bad = _outliers(measurements)
+    bad = find_outliers(measurements)
     outliers = tuple(place for place, out in zip(measurements.places, bad, strict=True) if out)
     if outliers:
         shown = ", ".join(outliers[:5]) + (" ..." if len(outliers) > 5 else "")
@@ -173,7 +169,7 @@ def fit_fin(
 
 
 def _fitted(measurements: Measurements, outliers: tuple[str, ...], notes: tuple[str, ...]) -> FinFit:
-    turned, lean = _turned_forces(measurements)
+    turned, lean = measurements.thrust()
     largest = float(np.linalg.norm(measurements.force, axis=-1).max())
     inputs = measurements.scaled(measurements.command)
     variance: list[Array | None] = [None, None, None]
@@ -190,41 +186,3 @@ def _fitted(measurements: Measurements, outliers: tuple[str, ...], notes: tuple[
     return FinFit(
         measurements, outliers, (along, across, sideways), power, lean, largest, largest_power, notes
     )
-
-
-def _outliers(measurements: Measurements) -> NDArray[np.bool_]:
-    """Which samples (n,) lie far off a fit to the others.
-
-    Wild samples bend the first fit, so that their neighbours look wild, too: those that a fit without the
-    suspects explains are taken back.
-    """
-    turned, _ = _turned_forces(measurements)
-    largest = float(np.quantile(np.linalg.norm(measurements.force, axis=-1), 0.98))
-    values = turned / largest
-    # Who knows that a sample is bad has not been contradicted by it.
-    told = 0.0 if measurements.deviation is None else measurements.deviation[:, 1:].max(axis=1) / largest
-    inputs = measurements.scaled(measurements.command)
-    out = np.zeros(len(inputs), dtype=bool)
-    for _ in range(ROUNDS):
-        kept, before = ~out, out
-        along = Component(inputs[kept], values[kept, 0], wild=True)
-        across = Component(inputs[kept], values[kept, 1], size=along.mean, wild=True)
-        size = along.expect(inputs)
-        out = np.zeros_like(out)
-        for component, value in ((along, values[:, 0]), (across, values[:, 1])):
-            error, deviation = component.unseen(inputs, value, size)
-            error[kept], deviation[kept] = component.left_out, component.left_out_deviation
-            out |= np.abs(error) > OUTLIER * np.maximum(deviation, told)
-        if (out == before).all():
-            break
-    return np.asarray(out)
-
-
-def _turned_forces(measurements: Measurements) -> tuple[Array, float]:
-    """Forces along the thrust's mean direction, across it and along the shaft (n, 3), and the angle [rad]
-    from the zero direction to that direction."""
-    force, phi = measurements.force, measurements.command[:, 2]
-    planar = (force[:, 1] + 1j * force[:, 2]) * np.exp(-1j * phi)
-    lean = float(np.angle(planar.sum()))
-    planar *= np.exp(-1j * lean)
-    return np.stack([planar.real, planar.imag, force[:, 0]], axis=-1), lean

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.conventions import Columns, Conventions, named_column, to_fin_frame
+from finlab.fit.sensor_checks import check_sensors
 from finlab.fit.time_series import cycle_means
 from finlab.layout.angles import TURN
 from finlab.physics.table_file import row_numbers
@@ -24,12 +25,6 @@ MIN_SAMPLES = 20
 """Fewest samples from which a fin can be told at all."""
 SAME = 1e-3
 """Amplitudes [rad] or frequencies [Hz] all closer than this are one and the same."""
-ROUNDED = 1e-9
-"""Share of the largest force below which a value is nothing but rounding errors."""
-FLAT_TOP = 5
-"""Commands that give exactly the largest force, or the least, from which a sensor counts as saturated ..."""
-FLAT_SHARE = 0.02
-"""... if they are this share of all rows."""
 SAME_DIRECTION = 0.05
 """The same of zero directions [rad]."""
 
@@ -69,6 +64,15 @@ class Measurements:
         if not self.turned:
             inputs[:, 2] = 0.0
         return inputs
+
+    def thrust(self) -> tuple[Array, float]:
+        """Returns the forces along the thrust's mean direction, across it and along the shaft (n, 3) [N], and
+        the angle [rad] from the zero direction to that direction."""
+        force, phi = self.force, self.command[:, 2]
+        planar = (force[:, 1] + 1j * force[:, 2]) * np.exp(-1j * phi)
+        lean = float(np.angle(planar.sum()))
+        planar *= np.exp(-1j * lean)
+        return np.stack([planar.real, planar.imag, force[:, 0]], axis=-1), lean
 
     def without(self, places: NDArray[np.bool_]) -> "Measurements":
         """The samples but those (n,) that are marked."""
@@ -203,7 +207,7 @@ def _checked(read: list[tuple[Columns, tuple[str, ...]]], source: str) -> Measur
     if not force[:, 1:].any():
         raise DataError(f"{source}: Fy and Fz are 0 throughout; such a fin drives nothing")
     power = gathered("P")
-    _check_sensors(source, command, force, power, places, turned)
+    check_sensors(source, command, force, power, places, turned)
     if power is not None and power.min() < -0.02 * np.abs(power).max():
         raise DataError(
             f"{source}: column P has {power.min():.4g} W, expected the mean power that drives the fin"
@@ -219,28 +223,3 @@ def _checked(read: list[tuple[Columns, tuple[str, ...]]], source: str) -> Measur
         mean = np.mean(given, axis=0)
         deviation = np.stack([mean if column is None else column for column in spread], axis=-1)
     return Measurements(command, force, deviation, power, places, tuple(notes), turned)
-
-
-def _check_sensors(
-    source: str, command: Array, force: Array, power: Array | None, places: tuple[str, ...], turned: bool
-) -> None:
-    """Refuse columns that never change, and those that stop at one value again and again."""
-    nothing = ROUNDED * np.abs(force).max()
-    columns = dict(zip(("Fx", "Fy", "Fz"), force.T, strict=True)) | ({} if power is None else {"P": power})
-    for name, column in columns.items():
-        needed = name == "P" or (turned and name != "Fx")
-        if np.ptp(column) == 0.0 and (needed or abs(column[0]) > nothing):
-            raise DataError(
-                f"{source}: column {name} is {column[0]:.4g} throughout; is the sensor connected?"
-            )
-        values, counts = np.unique(column, return_counts=True)
-        # A coarse sensor repeats all its values.
-        usual = int(counts[1:-1][np.abs(values[1:-1]) > nothing].max(initial=1))
-        for extreme in values[[0, -1]]:
-            there = np.flatnonzero(column == extreme)
-            many = len(np.unique(command[there], axis=0))
-            if abs(extreme) > nothing and many >= max(FLAT_TOP, FLAT_SHARE * len(column), 3 * usual):
-                raise DataError(
-                    f"{places[there[0]]}, column {name}: is exactly {extreme:.4g} as in {len(there) - 1} "
-                    "other rows, and beyond it in none; the sensor is saturated, measure in a wider range"
-                )

@@ -1,0 +1,40 @@
+"""Samples that contradict all others: a wrong unit, a bump of the rig, a cell that slipped."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from finlab.fit.gaussian_process import Component
+from finlab.fit.measurements import Measurements
+
+OUTLIER = 5.0
+"""Error, over the usual one, beyond which a sample is left out."""
+ROUNDS = 3
+"""Fits that look for such samples, each without those that the one before has found."""
+
+
+def find_outliers(measurements: Measurements) -> NDArray[np.bool_]:
+    """Returns which samples (n,) lie far off a fit to the others.
+
+    Wild samples bend the first fit, so that their neighbours look wild, too: those that a fit without the
+    suspects explains are taken back.
+    """
+    turned, _ = measurements.thrust()
+    largest = float(np.quantile(np.linalg.norm(measurements.force, axis=-1), 0.98))
+    values = turned / largest
+    # Who knows that a sample is bad has not been contradicted by it.
+    told = 0.0 if measurements.deviation is None else measurements.deviation[:, 1:].max(axis=1) / largest
+    inputs = measurements.scaled(measurements.command)
+    out = np.zeros(len(inputs), dtype=bool)
+    for _ in range(ROUNDS):
+        kept, before = ~out, out
+        along = Component(inputs[kept], values[kept, 0], wild=True)
+        across = Component(inputs[kept], values[kept, 1], size=along.mean, wild=True)
+        size = along.expect(inputs)
+        out = np.zeros_like(out)
+        for component, value in ((along, values[:, 0]), (across, values[:, 1])):
+            error, deviation = component.unseen(inputs, value, size)
+            error[kept], deviation[kept] = component.left_out, component.left_out_deviation
+            out |= np.abs(error) > OUTLIER * np.maximum(deviation, told)
+        if (out == before).all():
+            break
+    return np.asarray(out)
