@@ -10,7 +10,7 @@ from typing import Annotated
 from tyro.conf import arg
 from tyro.extras import SubcommandApp
 
-from finlab.cli import eval_allocation, eval_closed_loop, eval_fit
+from finlab.cli import eval_allocation, eval_closed_loop, eval_fit, eval_robots
 from finlab.cli.eval_arguments import Checkpoint, Count, Folder, Name, Names, Output, check_folders
 from finlab.cli.inputs import check_positive
 
@@ -131,6 +131,7 @@ for verb in (
     eval_closed_loop.velocity,
     eval_closed_loop.monitor,
     eval_fit.fit,
+    eval_robots.robots,
     training,
     report,
 ):

@@ -44,6 +44,8 @@ INNER_SHARE = 0.3
 """Amplitude of the forces that cancel, as a share of the largest force of a fin."""
 REDRAW_S = 3.1
 """Time after which each fin has another amplitude [s]."""
+TURN_RAD_S = 0.8
+"""Fastest that a fin is turned [rad/s]: one that turns fast paddles, which hides what its beat gives."""
 BOUNDS = (1.5, 0.5, 0.35)
 """Horizontal distance [m], change of depth [m] and roll or pitch [rad] at which the excitation has faded."""
 PERIOD_S = 0.1
@@ -132,6 +134,7 @@ class ExcitingAllocator(Allocator):
         self._largest = np.linalg.norm(self._plant.forces(self._plant.upper), axis=-1)
         self._phase = self._rng.uniform(0.0, 2 * math.pi, (len(self._inner), 2))
         self._calls = 0
+        self._direction: Array | None = None
         shares = np.linspace(0.0, 1.0, 13), np.linspace(0.0, 1.0, 41)
         grid = np.stack(np.meshgrid(*shares, indexing="ij"), axis=-1).reshape(-1, 1, 2)
         lower, upper = self._plant.lower[:, :2], self._plant.upper[:, :2]
@@ -162,6 +165,13 @@ class ExcitingAllocator(Allocator):
         inner = INNER_SHARE * float(self._largest.mean()) * swing @ self._inner if len(k) else 0.0
         force = (self._to_force @ target + inner).reshape(-1, 2)
         size, direction = np.hypot(*force.T), np.arctan2(force[:, 1], force[:, 0])
+        if self._direction is not None:
+            most = TURN_RAD_S * PERIOD_S
+            turn = wrapped(direction - self._direction)
+            # What is not yet turned gives only its part along the force; across and against it, nothing.
+            direction = self._direction + np.clip(turn, -most, most)
+            size = size * np.maximum(np.cos(turn - np.clip(turn, -most, most)), 0.0)
+        self._direction = direction
         tried = self._grid.copy()
         tried[..., 2] = direction
         tried = self._plant.feasible(tried)

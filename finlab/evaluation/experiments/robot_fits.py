@@ -18,7 +18,7 @@ from finlab.evaluation.experiments.closed_loop_runs import follow_row, over_seed
 from finlab.evaluation.progress import progress
 from finlab.evaluation.statistics.tables import Row
 from finlab.fit.robot.fitted_layout import write_robot
-from finlab.fit.robot.robot_fit import fit_robot
+from finlab.fit.robot.robot_fit import RobotFit, fit_robot
 from finlab.fit.robot.swim_file import read_swim
 from finlab.layout import FinModelSpec, Layout, load_layout
 from finlab.physics import TableLaw, plant_of, write_table
@@ -58,25 +58,32 @@ def robot_fit_rows(
             folder = Path(name) / plant
             folder.mkdir()
             began = time.process_time()
-            fitted, used = _fitted(layout, plant, folder, seed)
+            fitted, fit = _fitted(layout, plant, folder, seed)
+            used = [trial.name for trial in fit.trials if trial.used]
             row: Row = {"plant": plant, "used": ", ".join(used), "fit_s": time.process_time() - began}
+            row["trusted"] = "no" if fit.doubts() else "yes"
             row |= _wrench_errors(layout, fitted, allocator, plant, targets, seed)
             robots = {"drawn": layout, "fitted": fitted, "true": true_layout(plant, layout, folder)}
-            for which, robot in robots.items():
-                if robot is not None:
-                    row |= _closed_loop(which, robot, layout, allocator, plant, runs, seed)
-            rows.append(row)
+            loops = {
+                which: _closed_loop(robot, layout, allocator, plant, runs, seed)
+                for which, robot in robots.items()
+                if robot is not None
+            }
+            for loop in loops.values() if "true" in loops else ():
+                loop["depth_over_true"] = loop["depth_rmse"] / loops["true"]["depth_rmse"]
+                loop["power_over_true"] = loop["torque_w"] / loops["true"]["torque_w"]
+            rows.append(row | {"loops": loops})
     return rows
 
 
-def _fitted(layout: Layout, plant: str, folder: Path, seed: int) -> tuple[Layout, list[str]]:
-    """The layout that five minutes of swimming give, read back from its file, and what it uses besides."""
+def _fitted(layout: Layout, plant: str, folder: Path, seed: int) -> tuple[Layout, RobotFit]:
+    """The layout that five minutes of swimming give, read back from its file, and the fit."""
     log = folder / "log.npz"
     excitation(layout, LONGEST_S, plant=plant, seed=seed).run().save(log)
     fit = fit_robot(layout, [read_swim(log, layout)])
     path = folder / "fitted.yaml"
     write_robot(fit, path)
-    return load_layout(path), [trial.name for trial in fit.trials if trial.used]
+    return load_layout(path), fit
 
 
 def _wrench_errors(
@@ -101,9 +108,7 @@ def _wrench_errors(
     return row | {"times_smaller": row["before_mean"] / row["after_mean"]}
 
 
-def _closed_loop(
-    which: str, robot: Layout, drawn: Layout, allocator: Allocator, plant: str, runs: int, seed: int
-) -> Row:
+def _closed_loop(robot: Layout, drawn: Layout, allocator: Allocator, plant: str, runs: int, seed: int) -> Row:
     """Depth error [m] and power [W] of circles by an allocator that believes in a layout."""
     rows = []
     for run in range(runs):
@@ -111,7 +116,7 @@ def _closed_loop(
         loop = ClosedLoop(robot, allocator, path, plant=plant, truth=drawn, seed=seed + run)
         rows.append(follow_row(loop.run()))
     means = over_seeds(rows)
-    return {f"{which}_{name}": means[name] for name in ("ate", "depth_rmse", "torque_w")}
+    return {name: means[name] for name in ("ate", "depth_rmse", "torque_w")}
 
 
 def true_wrench(plant: str, layout: Layout, command: Array, velocity: Array) -> Array:

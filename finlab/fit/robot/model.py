@@ -7,6 +7,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.fit.robot.equations import Bodies
 from finlab.fit.robot.swim import Swim
+from finlab.fit.robot.swing import swing_forces
 from finlab.fit.robot.unknowns import Unknowns, blocks_of
 from finlab.layout import Layout
 from finlab.layout.arrays import force_columns
@@ -56,6 +57,7 @@ class RobotModel:
         """Amplitudes and frequencies between which nearly all were; the law is told no further."""
         self._shapes = self.shape_terms(self.motion)
         self.length = plant.blade.length
+        self._beat = np.concatenate([swing_forces(layout, swim.command) for swim in swims])
         self.velocity = np.zeros((len(self.motion), 6))
         """How the robot moved through the water (M, 6) [m/s, rad/s], as far as is known."""
 
@@ -86,6 +88,9 @@ class RobotModel:
             foot = foot_velocity(position, columns, self.velocity)[:, None]
             kept -= inflow_terms(force, self.motion, foot, self.length) @ inflow
         mean = (force * kept[..., None]).mean(axis=1)
+        beat = unknowns.part("beat", vector)
+        if beat is not None:
+            mean[..., 1:] += self._beat @ beat
         wrench: Array = mean.reshape(len(mean), -1) @ columns.reshape(-1, 6)
         wrench[:, [0, 1, 5]] += unknowns.of("bias", vector)
         return wrench

@@ -6,6 +6,7 @@ from finlab.fit.robot.robot_fit import UNTOLD, RobotFit
 from finlab.physics.table_file import DOUBT
 
 MEANINGS = {
+    "beat": "forces that swing within the beat",
     "shape": "thrust that grows otherwise with amplitude and frequency",
     "jets": "what fins take from each other by their jets",
     "inflow": "what speed through the water takes",

@@ -142,7 +142,7 @@ def fit_robot(layout: Layout, swims: Sequence[Swim], tried: Sequence[str] = RESI
         vector, start = fitted.vector, fitted.start
         deviation = _deviation(fitted, deviation)
         _keep_velocity(model, fitted, windows)
-    fitted, trials = _with_what_helps(model, windows, deviation, fitted, tried)
+    fitted, deviation, trials = _with_what_helps(model, windows, deviation, fitted, tried)
     deviation = _deviation(fitted, deviation)
     _keep_velocity(model, fitted, windows)
     fitted = fit_windows(model, fitted.unknowns, windows, deviation, fitted.vector, fitted.start)
@@ -153,8 +153,8 @@ def fit_robot(layout: Layout, swims: Sequence[Swim], tried: Sequence[str] = RESI
 
 def _with_what_helps(
     model: RobotModel, windows: Windows, deviation: Array, fitted: Fitted, left: Sequence[str]
-) -> tuple[Fitted, tuple[Trial, ...]]:
-    """The fit with all that helps on windows not seen, and what was tried."""
+) -> tuple[Fitted, Array, tuple[Trial, ...]]:
+    """The fit with all that helps on windows not seen, deviations (12,), and what was tried."""
     trials: list[Trial] = []
     left = list(left)
     here = _unseen(model, fitted.unknowns, windows, deviation, fitted.vector)
@@ -172,10 +172,13 @@ def _with_what_helps(
             trials += [Trial(one[2], one[0], one[1], False) for one in tried]
             break
         trials.append(Trial(name, gain, error, True))
-        fitted = fit_windows(model, unknowns, windows, deviation, begin, fitted.start)
-        here = there
         left.remove(name)
-    return fitted, tuple(trials)
+        fitted = fit_windows(model, unknowns, windows, deviation, begin, fitted.start)
+        deviation = _deviation(fitted, deviation)
+        fitted = fit_windows(model, unknowns, windows, deviation, fitted.vector, fitted.start)
+        _keep_velocity(model, fitted, windows)
+        here = _unseen(model, unknowns, windows, deviation, fitted.vector) if left else there
+    return fitted, deviation, tuple(trials)
 
 
 def _unseen(

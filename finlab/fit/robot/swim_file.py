@@ -72,7 +72,7 @@ def _log(path: Path, layout: Layout) -> Swim:
         raise DataError(f"{path}: expected a row every {STEP_S:g} s, as finlab simulate writes them")
     _check_duration(len(time) * STEP_S, path)
     command, motion = command[:, order], motion[:, order]
-    return Swim(path.name, between(motion, command), only_new(measured))
+    return Swim(path.name, between(motion, command), only_new(measured), command)
 
 
 def _check_duration(seconds: float, path: Path) -> None:
@@ -112,7 +112,8 @@ def _csv(path: Path, layout: Layout) -> Swim:
     _check_commands(command, lines, layout, path)
     grid = np.arange(time[0], time[-1], STEP_S)
     held = np.searchsorted(time, grid + 1e-6, side="right") - 1
-    return Swim(path.name, replay(layout, command[held]), _on_grid(time, only_new(measured), grid), True)
+    command, measured = command[held], _on_grid(time, only_new(measured), grid)
+    return Swim(path.name, replay(layout, command), measured, command, True)
 
 
 class _Column(NamedTuple):

@@ -15,8 +15,8 @@ BASE = (
     *("buoyancy", "lift", "current", "inertia", "linear", "quadratic"),
 )
 """Blocks that every fit looks for."""
-RESIDUAL = ("shape", "jets", "inflow")
-"""What is looked for besides, where it helps: another law of thrust, jets, inflow."""
+RESIDUAL = ("beat", "shape", "jets", "inflow")
+"""What is looked for besides, where it helps: forces within the beat, another law of thrust, jets, inflow."""
 
 SAME_SCALE = 0.003
 """How far the common scale of all inertia may be off, as a share."""
@@ -67,6 +67,7 @@ def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
         block("inertia", [f"inertia with water in {axis}, logarithm" for axis in AXES], 0.1, "", False),
         block("linear", [f"linear damping in {axis}" for axis in AXES], damping[0], "N s/m, N m s", False),
         block("quadratic", [f"quadratic damping in {axis}" for axis in AXES], damping[1], "", False),
+        block("beat", [f"force within the beat, {k}" for k in range(1, 8)], 1.0, ""),
         block("shape", [f"thrust by {name}" for name in shape], (0.5, 0.5, 0.3, 0.3, 0.3), ""),
         block("jets", [*jets, *form], np.array([0.15] * len(jets) + [0.7, 0.4]), ""),
         block("inflow", ["inflow", "inflow squared"], 0.4, ""),

@@ -43,7 +43,7 @@ def truth(drawn: Layout) -> Layout:
 @pytest.fixture(scope="module")
 def fit(drawn: Layout, truth: Layout) -> RobotFit:
     command, measured = swim(truth, 60.0, seed=1)
-    return fit_robot(drawn, [Swim("made up", replay(drawn, command), only_new(measured), True)])
+    return fit_robot(drawn, [Swim("made up", replay(drawn, command), only_new(measured), command, True)])
 
 
 def test_strengths_directions_and_centre_are_found_within_their_errors(fit: RobotFit) -> None:
@@ -60,7 +60,7 @@ def test_strengths_directions_and_centre_are_found_within_their_errors(fit: Robo
 
 def test_what_is_not_there_is_not_used_and_nothing_is_doubted(fit: RobotFit) -> None:
     assert fit.doubts() == ()
-    assert not any(trial.used for trial in fit.trials) and len(fit.trials) == 3
+    assert not any(trial.used for trial in fit.trials) and len(fit.trials) == 4
     assert fit.explained > 0.8
     text = "\n".join(summary(fit))
     assert "tried, and no help" in text and "common scale" in text and "nominal servos" in text
@@ -95,7 +95,7 @@ def test_a_fin_that_never_works_is_said_to_be_unknown(drawn: Layout) -> None:
     motion = replay(lost, command)
     whole = np.zeros((*motion.shape[:2], 3, 3))
     whole[:, :, [0, 2]] = motion
-    found = fit_robot(drawn, [Swim("two fins", whole, only_new(measured))], tried=())
+    found = fit_robot(drawn, [Swim("two fins", whole, only_new(measured), whole[:, 0])], tried=())
     assert any("front_left" in doubt for doubt in found.doubts())
     assert "strength of front_left, logarithm" in found.untold()
     assert summary(found)[0].startswith("not to be trusted")
@@ -104,7 +104,8 @@ def test_a_fin_that_never_works_is_said_to_be_unknown(drawn: Layout) -> None:
 def test_a_layout_with_an_interaction_is_not_fitted_again(drawn: Layout) -> None:
     with pytest.raises(DataError, match="has an interaction already"):
         fit_robot(
-            replace(drawn, interaction=Interaction()), [Swim("x", np.zeros((1, 2, 3, 3)), np.zeros((1, 12)))]
+            replace(drawn, interaction=Interaction()),
+            [Swim("x", np.zeros((1, 2, 3, 3)), np.zeros((1, 12)), np.zeros((1, 3, 3)))],
         )
 
 
