@@ -31,7 +31,7 @@ from finlab.sim.plants import make_plant
 
 FASTEST = np.array([0.2, 0.03, 0.06, 0.1, 0.1, 0.3])
 """Speeds through the water [m/s, rad/s] at which targets are asked lie within these, either way."""
-SETTLE_S, MEAN_S = 2.0, 8.0
+SETTLE_S, MEAN_S = 2.0, 10.0
 """Time after which, and over which, forces are averaged that swing within the beat."""
 TABLE = 9
 """Amplitudes and frequencies at which the mean law of a soft fin is tabulated."""
@@ -141,7 +141,10 @@ def _mean_force(force: FinForce, layout: Layout, command: Array, water: Array) -
         step = force.step(motion, dt, water)
         if k * dt >= SETTLE_S:
             forces.append(step)
-    return np.asarray(np.mean(forces, axis=0))
+    # Each fin over whole beats of its own, or what swings within the beat would be left.
+    beats = np.maximum(np.floor(MEAN_S * command[:, 1]), 1.0) / np.maximum(command[:, 1], 1.0 / MEAN_S)
+    whole = np.minimum(np.rint(beats / dt).astype(int), len(forces))
+    return np.array([np.mean(forces[-count:], axis=0)[i] for i, count in enumerate(whole)])
 
 
 def true_layout(plant: str, layout: Layout, folder: Path) -> Layout | None:

@@ -7,6 +7,7 @@ derivatives by differences, all swims integrated side by side; the windows' stat
 normal equations. Each unknown is believed to lie within its scale of what the layout says.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -32,6 +33,8 @@ MOST_STEPS = 12
 """Most Gauss-Newton steps."""
 SETTLED = 1e-4
 """Relative gain below which they end."""
+FOLDS = 6
+"""Parts into which windows are dealt for cross-validation."""
 CLIP = 4.0
 """Residuals beyond this many deviations count like this many: a rare outlier must not rule."""
 
@@ -123,19 +126,45 @@ def fit_windows(
     return Fitted(unknowns, vector, start, at.information, at.scores, at.residual, at.state)
 
 
-def score(
-    model: RobotModel, fitted: Fitted, windows: Windows, deviation: Array, most_steps: int = 4
-) -> Array:
-    """Half the squared residuals (W,) of windows that the fit has not seen; only how they begin is found."""
-    nothing = np.zeros(fitted.unknowns.size)
-    start = windows.start.copy()
-    for _ in range(most_steps):
-        at = _Linear.at(model, fitted.unknowns, windows, deviation, fitted.vector, start, only_start=True)
-        start = start + at.step_of_starts(nothing)
-    state = _simulated(model, fitted.unknowns, windows, fitted.vector, start)
-    weighted = _clipped(_residual(windows, state, deviation))
-    result: Array = 0.5 * np.nansum(weighted**2, axis=(0, 1))
-    return result
+def unseen_gains(
+    model: RobotModel, fitted: Fitted, windows: Windows, deviation: Array, names: Sequence[str]
+) -> dict[str, Array]:
+    """By how much more blocks of unknowns would lessen half the squared residuals of windows not seen.
+
+    Cross-validation to second order about the fit: the windows are dealt to some folds, and the normal
+    equations of all windows but those of a fold tell the change of the unknowns, with a block and without it.
+
+    Returns:
+        (W,) for each block's name.
+    """
+    whole = Unknowns(model.blocks, (*fitted.unknowns.names, *names))
+    vector = whole.taken_over(fitted.unknowns, fitted.vector)
+    at = _Linear.at(model, whole, windows, deviation, vector, fitted.start)
+    believed = np.eye(whole.size) + np.outer(whole.gauge, whole.gauge)
+    fold = np.arange(windows.start.shape[1]) % FOLDS
+    known = np.zeros(whole.size, bool)
+    for name in fitted.unknowns.names:
+        known[whole.place(name)] = True
+
+    def gain(chosen: NDArray[np.bool_]) -> Array:
+        """What windows gain by changes of the chosen unknowns that the others ask for (W,)."""
+        found = np.empty(len(fold))
+        here = np.flatnonzero(chosen)
+        for k in range(FOLDS):
+            seen, unseen = fold != k, np.flatnonzero(fold == k)
+            information = at.own_information[seen].sum(axis=0) + believed
+            pull = at.scores[seen].sum(axis=0) - believed @ vector
+            change = np.linalg.solve(information[np.ix_(here, here)], pull[here])
+            own = at.own_information[np.ix_(unseen, here, here)]
+            found[unseen] = at.scores[np.ix_(unseen, here)] @ change - 0.5 * (own @ change) @ change
+        return found
+
+    before, gains = gain(known), {}
+    for name in names:
+        chosen = known.copy()
+        chosen[whole.place(name)] = True
+        gains[name] = gain(chosen) - before
+    return gains
 
 
 @dataclass(frozen=True)
@@ -145,7 +174,10 @@ class _Linear:
     cost: float
     gradient: Array
     information: Array
+    own_information: Array
+    """What each window brings to it (W, size, size)."""
     scores: Array
+    """And to the gradient (W, size)."""
     residual: Array
     state: Array
     inner: Array
@@ -164,10 +196,9 @@ class _Linear:
         deviation: Array,
         vector: Array,
         start: Array,
-        only_start: bool = False,
     ) -> "_Linear":
-        n = 0 if only_start else unknowns.size
-        vectors = np.concatenate([vector[None], vector + DIFFERENCE * np.eye(unknowns.size)[:n]])
+        n = unknowns.size
+        vectors = np.concatenate([vector[None], vector + DIFFERENCE * np.eye(n)])
         n_all, w = 1 + n + 12, start.shape[1]
         wrench = _wrenches(model, unknowns, windows, vectors)
         wrench = np.concatenate([wrench, np.repeat(wrench[:, :, :1], 12, axis=2)], axis=2)
@@ -194,11 +225,12 @@ class _Linear:
         own = by[:, :n] @ by[:, :n].swapaxes(1, 2)
         whole = own - mixed.swapaxes(1, 2) @ inner @ mixed
         scores = np.einsum("wkm,wm->wk", by[:, :n], r) - np.einsum("wkn,wkl,wl->wn", mixed, inner, pull)
-        believed = np.eye(unknowns.size) + np.outer(unknowns.gauge, unknowns.gauge)
+        believed = np.eye(n) + np.outer(unknowns.gauge, unknowns.gauge)
         return cls(
             cost=_half(left, start, windows, unknowns, vector),
-            gradient=scores.sum(axis=0) - (believed @ vector)[:n],
-            information=whole.sum(axis=0) + believed[:n, :n],
+            gradient=scores.sum(axis=0) - believed @ vector,
+            information=whole.sum(axis=0) + believed,
+            own_information=whole,
             scores=scores,
             residual=residual,
             state=state[:, :, 0],
@@ -215,7 +247,7 @@ class _Linear:
 
     def step_of_starts(self, change: Array) -> Array:
         """Changes of the beginnings (12, W) that go with those of the unknowns (size,)."""
-        pull = self.pull - self.mixed @ change[: self.mixed.shape[2]]
+        pull = self.pull - self.mixed @ change
         result: Array = (self.inner @ pull[..., None])[..., 0].T * START_DEVIATION[:, None]
         return result
 

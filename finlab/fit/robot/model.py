@@ -52,7 +52,7 @@ class RobotModel:
         """Thrust [N] at which a jet takes half of what a very strong one takes."""
         self.middle = [float(np.median(self.motion[..., k][working])) for k in range(2)]
         """Amplitude [rad] and frequency [Hz] at which a fin has the strength that is told."""
-        ends = [np.quantile(self.motion[..., k][working], (0.02, 0.98)) for k in range(2)]
+        ends = [np.quantile(self.motion[..., k][working], (0.005, 0.995)) for k in range(2)]
         self.seen = [(max(float(low), 1e-3), max(float(high), 2e-3)) for low, high in ends]
         """Amplitudes and frequencies between which nearly all were; the law is told no further."""
         self._shapes = self.shape_terms(self.motion)
@@ -62,11 +62,13 @@ class RobotModel:
         """How the robot moved through the water (M, 6) [m/s, rad/s], as far as is known."""
 
     def shape_terms(self, command: Array) -> Array:
-        """Terms (..., 5) of the logarithm of a fin's true law over the layout's, for commands (..., 3)."""
+        """Terms (..., 5) of the logarithm of a fin's true law over the layout's, for commands (..., 3): other
+        powers of amplitude and frequency, and what bends them further out."""
         (low_a, high_a), (low_f, high_f) = self.seen
-        a = np.log(np.clip(command[..., 0], low_a, high_a) / self.middle[0])
-        f = np.log(np.clip(command[..., 1], low_f, high_f) / self.middle[1])
-        return np.stack([a, f, a * a, a * f, f * f], axis=-1)
+        a = np.clip(command[..., 0], low_a, high_a) / self.middle[0]
+        f = np.clip(command[..., 1], low_f, high_f) / self.middle[1]
+        p, q = a - 1.0, f - 1.0
+        return np.stack([np.log(a), np.log(f), p * p, p * q, q * q], axis=-1)
 
     def wrench(self, unknowns: Unknowns, vector: Array) -> Array:
         """Mean wrench (M, 6) of each step for one vector (size,) of unknowns."""

@@ -5,15 +5,14 @@ only where it lessens the error on windows that its fit has not seen.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.robot.equations import body_velocity
-from finlab.fit.robot.estimate import DEVIATION, Fitted, Windows, cut, fit_windows, score
+from finlab.fit.robot.estimate import DEVIATION, Fitted, Windows, cut, fit_windows, unseen_gains
 from finlab.fit.robot.model import RobotModel
 from finlab.fit.robot.swim import ANGLES, CHANNELS, Swim, smoothed
 from finlab.fit.robot.unknowns import BASE, RESIDUAL, Unknowns
@@ -29,8 +28,6 @@ WEAKLY_KNOWN = 0.1
 """Standard error of a fin's strength beside those of the others, as a share, that is worth a doubt."""
 DEVIATION_RANGE = (0.1, 30.0)
 """Deviations of sensors within these multiples of what is believed."""
-UNSEEN_STEPS = 6
-"""Gauss-Newton steps of fits to one half of the windows, which begin at the fit to all."""
 ROUNDS = 2
 """Times that deviations are estimated and the base fitted again."""
 
@@ -157,47 +154,27 @@ def _with_what_helps(
     """The fit with all that helps on windows not seen, deviations (12,), and what was tried."""
     trials: list[Trial] = []
     left = list(left)
-    here = _unseen(model, fitted.unknowns, windows, deviation, fitted.vector)
     while left:
-        tried = []
-        for name in left:
-            unknowns = Unknowns(model.blocks, (*fitted.unknowns.names, name))
-            begin = unknowns.taken_over(fitted.unknowns, fitted.vector)
-            there = _unseen(model, unknowns, windows, deviation, begin)
-            gains = here - there
-            error = float(gains.std(ddof=1) / np.sqrt(len(gains))) if len(gains) > 1 else np.inf
-            tried.append((float(gains.mean()), error, name, unknowns, begin, there))
-        gain, error, name, unknowns, begin, there = max(tried, key=lambda one: one[0])
-        if not gain > SURE * error:
-            trials += [Trial(one[2], one[0], one[1], False) for one in tried]
+        gains = unseen_gains(model, fitted, windows, deviation, left)
+        tried = [Trial(name, float(gain.mean()), _error_of_mean(gain), False) for name, gain in gains.items()]
+        best = max(tried, key=lambda trial: trial.gain)
+        if not best.gain > SURE * best.error:
+            trials += tried
             break
-        trials.append(Trial(name, gain, error, True))
-        left.remove(name)
-        fitted = fit_windows(model, unknowns, windows, deviation, begin, fitted.start)
-        deviation = _deviation(fitted, deviation)
-        fitted = fit_windows(model, unknowns, windows, deviation, fitted.vector, fitted.start)
-        _keep_velocity(model, fitted, windows)
-        here = _unseen(model, unknowns, windows, deviation, fitted.vector) if left else there
+        trials.append(replace(best, used=True))
+        left.remove(best.name)
+        unknowns = Unknowns(model.blocks, (*fitted.unknowns.names, best.name))
+        vector = unknowns.taken_over(fitted.unknowns, fitted.vector)
+        for _ in range(ROUNDS):
+            fitted = fit_windows(model, unknowns, windows, deviation, vector, fitted.start)
+            vector, deviation = fitted.vector, _deviation(fitted, deviation)
+            _keep_velocity(model, fitted, windows)
     return fitted, deviation, tuple(trials)
 
 
-def _unseen(
-    model: RobotModel, unknowns: Unknowns, windows: Windows, deviation: Array, vector: Array
-) -> Array:
-    """Half squared errors (W,) of windows by fits to the other half of them."""
-    count = windows.start.shape[1]
-    found = np.zeros(count)
-    for fold in (0, 1):
-        seen, unseen = (np.flatnonzero(np.arange(count) % 2 == side) for side in (1 - fold, fold))
-        fitted = fit_windows(
-            model, unknowns, _some(windows, seen), deviation, vector, most_steps=UNSEEN_STEPS
-        )
-        found[unseen] = score(model, fitted, _some(windows, unseen), deviation)
-    return found
-
-
-def _some(windows: Windows, chosen: NDArray[np.intp]) -> Windows:
-    return Windows(windows.step[chosen], windows.measured[..., chosen], windows.start[:, chosen])
+def _error_of_mean(gain: Array) -> float:
+    """Standard error of the mean of (W,) windows."""
+    return float(gain.std(ddof=1) / np.sqrt(len(gain))) if len(gain) > 1 else np.inf
 
 
 def _deviation(fitted: Fitted, deviation: Array) -> Array:

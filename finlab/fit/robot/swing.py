@@ -6,10 +6,11 @@ servos are nominal. As those of a rigid plate (`finlab.physics.blade`) they are
 - of the water that it carries: minus the change of m L^2 / 2 theta' along the plate's normal;
 - of its drag, rho Cd W L^3 / 6 theta' |theta'| against the normal;
 - both of a tip that lags by a quarter of a beat;
-- the pulses of its thrust, two in each beat, in phase with it and a quarter of a pulse behind;
-- m L^2 / 2 times the squared speed at which its zero direction turns, along that direction.
+- the pulses of its thrust, two in each beat: m L^2 / 2 (theta'^2 - its mean) along the zero direction, the
+  same of the tip that lags, and of both together.
 
-A fit finds how much there is of each. None has a mean over a whole beat of a fin that does not turn.
+A fit finds how much there is of each, and how that changes with the frequency. None has a mean over a whole
+beat of a fin that does not turn.
 """
 
 import math
@@ -24,7 +25,7 @@ from finlab.physics.fin_motion import FinMotion
 
 MOMENTS = 10
 """Moments of each step at which the fins are looked at."""
-TERMS = 7
+TERMS = 14
 """Forces whose shares are looked for."""
 
 
@@ -32,18 +33,17 @@ def swing_forces(layout: Layout, command: Array) -> Array:
     """Mean forces of each step along (e_h, e_z) [N], (N, n, 2, TERMS), under commands (N, n, 3)."""
     plant, fins = plant_of(layout), FinMotion(layout)
     steps, n = command.shape[:2]
-    motion, beat = np.empty((steps * MOMENTS, n, 3)), np.empty((steps * MOMENTS, n, 4))
+    motion, beat = np.empty((steps * MOMENTS, n, 3)), np.empty((steps * MOMENTS, n, 3))
     for k in range(steps * MOMENTS):
         fins.step(command[k // MOMENTS], STEP_S / MOMENTS)
         motion[k], beat[k] = (
             fins.command,
-            np.stack([fins.phase, fins.angle, fins.speed, fins.direction_rate], axis=-1),
+            np.stack([fins.phase, fins.angle, fins.speed], axis=-1),
         )
     phase, angle, speed = beat[..., 0], beat[..., 1] + math.pi, beat[..., 2]  # it points away from its thrust
     normal = np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
     along = np.stack([np.cos(motion[..., 2]), np.sin(motion[..., 2])], axis=-1)
     late = 2.0 * math.pi * motion[..., 0] * motion[..., 1] * np.sin(phase)
-    thrust = np.linalg.norm(plant.force(motion), axis=-1) * (motion[..., 0] > 0.0)
     blade = plant.blade
     inertia = 0.5 * blade.virtual_mass * blade.length**2
     resistance = blade.drag_per_length * blade.length**3 / 3.0
@@ -52,6 +52,8 @@ def swing_forces(layout: Layout, command: Array) -> Array:
         carried = (inertia * own)[..., None] * normal
         terms.append(-np.diff(carried, axis=0, prepend=np.zeros((1, n, 2))) * (MOMENTS / STEP_S))
     terms += [-(resistance * own * np.abs(own))[..., None] * normal for own in (speed, late)]
-    terms += [(thrust * pulse)[..., None] * along for pulse in (np.cos(2.0 * phase), np.sin(2.0 * phase))]
-    terms.append((inertia * beat[..., 3] ** 2)[..., None] * along)
+    mean = 0.5 * (2.0 * math.pi * motion[..., 0] * motion[..., 1]) ** 2
+    pulses = speed * speed - mean, late * late - mean, speed * late
+    terms += [(inertia * pulse)[..., None] * along for pulse in pulses]
+    terms += [(motion[..., 1] - 1.0)[..., None] * term for term in terms]
     return np.asarray(np.stack(terms, axis=-1).reshape(steps, MOMENTS, n, 2, TERMS).mean(axis=1))

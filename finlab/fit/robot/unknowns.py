@@ -50,7 +50,13 @@ def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
     ) -> Block:
         return Block(name, tuple(labels), unit, np.broadcast_to(scale, len(labels)).astype(float), force)
 
-    shape = ("amplitude", "frequency", "amplitude^2", "amplitude x frequency", "frequency^2")
+    shape = (
+        "power of amplitude",
+        "power of frequency",
+        "amplitude^2",
+        "amplitude x frequency",
+        "frequency^2",
+    )
     jets = [
         f"{kind} jet of {a} on {b}" for a in names for b in names if a != b for kind in ("wide", "narrow")
     ]
@@ -67,7 +73,7 @@ def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
         block("inertia", [f"inertia with water in {axis}, logarithm" for axis in AXES], 0.1, "", False),
         block("linear", [f"linear damping in {axis}" for axis in AXES], damping[0], "N s/m, N m s", False),
         block("quadratic", [f"quadratic damping in {axis}" for axis in AXES], damping[1], "", False),
-        block("beat", [f"force within the beat, {k}" for k in range(1, 8)], 1.0, ""),
+        block("beat", [f"force within the beat, {k}" for k in range(1, 15)], 1.0, ""),
         block("shape", [f"thrust by {name}" for name in shape], (0.5, 0.5, 0.3, 0.3, 0.3), ""),
         block("jets", [*jets, *form], np.array([0.15] * len(jets) + [0.7, 0.4]), ""),
         block("inflow", ["inflow", "inflow squared"], 0.4, ""),

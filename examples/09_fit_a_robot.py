@@ -1,0 +1,33 @@
+"""From a swim to a robot that is not built as drawn: where its fins and its centre of gravity really are.
+
+You will see what the fit is worth, and what an allocation for the drawn robot and for the fitted one gives.
+"""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import finlab
+from finlab.fit.robot.fitted_layout import write_robot
+from finlab.fit.robot.report import summary
+from finlab.fit.robot.robot_fit import fit_robot
+from finlab.fit.robot.swim_file import read_swim
+from finlab.sim.excite import excitation
+
+TARGET = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
+
+
+def main() -> None:
+    drawn = finlab.load_layout("A")
+    with TemporaryDirectory() as folder:
+        log, path = Path(folder) / "log.npz", Path(folder) / "mine.yaml"
+        # A real robot writes a CSV file instead; 10_swim_from_rosbag.py makes one of a rosbag.
+        excitation(drawn, 60.0, plant="offset").run().save(log)
+        fit = fit_robot(drawn, [read_swim(log, drawn)], tried=())
+        print("\n".join(summary(fit)))
+        fitted = write_robot(fit, path)
+    for robot in (drawn, fitted):
+        print(finlab.load_allocator().allocate(robot, TARGET))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,59 @@
+"""From a rosbag to a CSV file that `finlab fit robot` reads; `pip install rosbags`, no ROS.
+
+You will see how it is called, or, given a bag and a file to write, how many rows were written. Odometry is
+taken from nav_msgs/Odometry (pose in the world, z up; twist in the body frame), commands from a
+std_msgs/Float64MultiArray with A [rad], f [Hz], phi [rad] of each fin in order: change TOPICS to yours.
+"""
+
+import csv
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+TOPICS = {"odometry": "/odometry", "commands": "/fins/command"}
+FINS = ("front_right", "front_left", "back_left", "back_right")
+POSE = ("x", "y", "z", "roll", "pitch", "yaw", "u", "v", "w", "p", "q", "r")
+
+
+def row_of(message: Any) -> list[float]:
+    """Position, attitude angles, velocity and rates of an odometry message."""
+    at, q = message.pose.pose.position, message.pose.pose.orientation
+    roll = math.atan2(2 * (q.w * q.x + q.y * q.z), 1 - 2 * (q.x**2 + q.y**2))
+    pitch = math.asin(max(-1.0, min(1.0, 2 * (q.w * q.y - q.z * q.x))))
+    yaw = math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y**2 + q.z**2))
+    linear, angular = message.twist.twist.linear, message.twist.twist.angular
+    speed = [part for v in (linear, angular) for part in (v.x, v.y, v.z)]
+    return [at.x, at.y, at.z, roll, pitch, yaw, *speed]
+
+
+def convert(bag: Path, output: Path) -> int:
+    """Writes the CSV file; one row for each odometry message once there is a command."""
+    from rosbags.highlevel import AnyReader
+
+    command: list[float] | None = None
+    rows: list[list[float]] = []
+    with AnyReader([bag]) as reader:
+        chosen = [c for c in reader.connections if c.topic in TOPICS.values()]
+        for connection, nanoseconds, raw in reader.messages(connections=chosen):
+            message: Any = reader.deserialize(raw, connection.msgtype)
+            if connection.topic == TOPICS["commands"]:
+                command = [float(value) for value in message.data]
+            elif command is not None:
+                rows.append([nanoseconds * 1e-9, *row_of(message), *command])
+    names = [f"{fin}.{part}" for fin in FINS for part in ("A", "f", "phi")]
+    with output.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file).writerows([["t", *POSE, *names], *rows])
+    return len(rows)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) == 3 and Path(sys.argv[1]).exists():
+        print(
+            convert(Path(sys.argv[1]), Path(sys.argv[2])),
+            "rows; finlab fit robot A",
+            sys.argv[2],
+            "-o my.yaml",
+        )
+    else:
+        print("usage: python 10_swim_from_rosbag.py BAG swim.csv")
