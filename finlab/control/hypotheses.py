@@ -135,7 +135,8 @@ class Hypotheses:
         self.misfit = min(max(self.misfit * math.exp(ADAPTING * surprise), 1.0), MOST_MISFIT)
         self.state = self.state + gain @ missed
         self.off -= self.off[:, :, rows] @ gain.T
-        self.covariance = covariance - gain @ covariance[rows]
+        left = covariance - gain @ covariance[rows]
+        self.covariance = 0.5 * (left + left.T)  # what rounding makes uneven would grow
         better = 0.5 * (self.distance - distance)
         if besides is not None:
             better += besides

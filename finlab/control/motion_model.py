@@ -57,13 +57,15 @@ class MotionModel:
         self._slopes = np.zeros((size, size))
         self._slopes[range(3, 6), range(11, 14)] = 1.0 / self.inertia[3:]
         height = (body.center_of_buoyancy_m or zeros)[2]
-        righting = -self._vehicle.lift * height / self.inertia[3:5]
-        self._slopes[range(3, 5), range(6, 8)] = righting
-        self._slopes[range(6, 8), range(3, 5)] = 1.0
-        # To second order, for roll swings within half a second.
-        self._slopes[range(6, 8), range(6, 8)] = 0.5 * period_s * righting
+        # Roll swings within a second: an oscillation over a period is a turn, and a step along it would grow.
+        # (Of a robot that is heavy at the top the frequency is imaginary, and the cosine a hyperbolic one.)
+        swing = np.sqrt(self._vehicle.lift * height / self.inertia[3:5] + 1e-9j)
+        sine, cosine = np.sin(swing * period_s), np.cos(swing * period_s)
+        self._slopes[range(3, 5), range(6, 8)] = (-swing * sine).real / period_s
+        self._slopes[range(6, 8), range(3, 5)] = (sine / swing).real / period_s
+        self._slopes[range(6, 8), range(6, 8)] = (cosine.real - 1.0) / period_s
         self._swing = np.zeros(6)
-        self._swing[3:5] = 0.5 * period_s * righting
+        self._swing[3:5] = (cosine.real - 1.0) / period_s
         self._force = np.zeros((2, layout.n_fins, 6))
 
     def step(
