@@ -21,10 +21,12 @@ APART = 0.2
 """A level this near to a fin's strength is no event."""
 
 
-EXPECTED_SURPRISE, MOST_SURPRISE = 1.3, 4.0
+EXPECTED_SURPRISE, MOST_SURPRISE = 1.0, 4.0
 """Squared distance per measured number, in variances, from which the model is trusted less; and the most."""
-ADAPTING = 0.03
+ADAPTING = 0.1
 """How fast, per tick."""
+MOST_FREEDOM = 16.0
+"""Most that the strengths, too, are given more freedom then (a variance)."""
 MOST_MISFIT = 1e5
 """Most that the disturbance of the motion grows to (a variance)."""
 
@@ -108,9 +110,9 @@ class Hypotheses:
         self.off[:, -1, MOTION] += turned[:, None] * step.turned
         self.covariance = step.transition @ self.covariance @ forward
         variance = self.covariance.ravel()[:: len(self.state) + 1]
-        variance += self._noise * dt
+        variance += self._noise * (dt * min(self.misfit, MOST_FREEDOM))
         variance[MOTION] += self._motion_noise * (self.misfit * dt)
-        excess = variance[STRENGTH] / self._most
+        excess = variance[STRENGTH] / (self._most * min(self.misfit, MOST_FREEDOM))
         if excess.max() > 1.0:
             scale = 1.0 / np.sqrt(np.maximum(excess, 1.0))
             self.covariance[:, STRENGTH] *= scale

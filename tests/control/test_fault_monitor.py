@@ -143,11 +143,31 @@ def test_what_is_announced_is_told_to_the_monitor(layout_a: Layout, analytic: Al
     assert loop.failed == () and np.isfinite(loop.step().command).all()
 
 
-def test_a_model_that_does_not_fit_raises_no_alarm(layout_a: Layout, analytic: Allocator) -> None:
-    """Beating fins shake the robot by several newtons of which the model knows nothing."""
-    loop = swim(layout_a, analytic, [], plant="ripple")
-    until(loop, 30.0)
+@pytest.mark.parametrize("plant", ["ripple", "flexible"])
+def test_a_model_that_does_not_fit_raises_no_alarm(layout_a: Layout, analytic: Allocator, plant: str) -> None:
+    """Fins that shake the robot by several newtons, or thrust otherwise than the model says."""
+    loop = swim(layout_a, analytic, [], plant=plant)
+    until(loop, 25.0)
     assert loop.failed == () and loop.health is None
+
+
+def test_long_swims_keep_the_covariance_sound(layout_a: Layout) -> None:
+    """Three minutes at rest: it neither grows nor becomes uneven."""
+    monitor = FaultMonitor(layout_a)
+    still = np.tile([0.0, 0.1, 0.0], (4, 1))
+    rng = np.random.default_rng(1)
+    seen = Measurement(0.0, np.zeros(3), 0.0, np.zeros(3), 0.0, np.zeros(3), 0.0, 0.0)
+    for _ in range(1800):
+        noise = 0.01 * rng.standard_normal(8)
+        monitor.step(
+            seen._replace(velocity=noise[:3], rates=noise[3:6], roll=noise[6], pitch=noise[7]),
+            still,
+        )
+    covariance = monitor._beliefs.covariance
+    np.testing.assert_array_equal(covariance, covariance.T)
+    values = np.linalg.eigvalsh(covariance)
+    assert values[0] > 0.0 and values[-1] < 0.1
+    assert monitor.broken == ()
 
 
 def test_the_last_fin_that_works_is_never_called_lost(layout_a: Layout) -> None:
