@@ -51,7 +51,10 @@ def swing_forces(layout: Layout, command: Array) -> Array:
     for own in (speed, late):
         carried = (inertia * own)[..., None] * normal
         terms.append(-np.diff(carried, axis=0, prepend=np.zeros((1, n, 2))) * (MOMENTS / STEP_S))
-    terms += [-(resistance * own * np.abs(own))[..., None] * normal for own in (speed, late)]
+    # Along the plate as it stands, the drag of a tip that lags would have a mean, which is thrust.
+    across = np.stack([-along[..., 1], along[..., 0]], axis=-1)
+    for own, axis in ((speed, normal), (late, across)):
+        terms.append(-(resistance * own * np.abs(own))[..., None] * axis)
     mean = 0.5 * (2.0 * math.pi * motion[..., 0] * motion[..., 1]) ** 2
     pulses = speed * speed - mean, late * late - mean, speed * late
     terms += [(inertia * pulse)[..., None] * along for pulse in pulses]
