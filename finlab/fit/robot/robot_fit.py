@@ -18,7 +18,7 @@ from finlab.fit.robot.swim import ANGLES, CHANNELS, Swim, smoothed
 from finlab.fit.robot.unknowns import BASE, RESIDUAL, Unknowns
 from finlab.layout import Layout
 
-SURE = 2.0
+SURE = 3.0
 """Standard errors by which what is kept must lessen the error on windows not seen."""
 UNTOLD = 0.7
 """Share of what was doubtful before that must be left for the data to have told nothing."""
