@@ -18,7 +18,8 @@ BEYOND = 1e-6
 
 
 def fin_notes(layout: Layout) -> tuple[str, ...]:
-    """Returns a sentence for each fin that cannot rest, and for each that may leave its table.
+    """Returns a sentence for each fin that cannot rest, and for each that may leave its table; before them,
+    why the layout itself is not to be trusted, where its description begins so.
 
     Neither is an error: a servo may be stuck, or a fin may have been damaged so that it runs on.
     """
@@ -27,7 +28,9 @@ def fin_notes(layout: Layout) -> tuple[str, ...]:
 
 @lru_cache(maxsize=256)
 def _made(layout: Layout, stamps: tuple[tuple[int, int] | None, ...]) -> tuple[str, ...]:
-    return tuple(
+    first = layout.description.partition("\n")[0]
+    head = (f"layout {layout.name} is {first}",) if first.startswith(DOUBT) else ()
+    return head + tuple(
         note.replace("{name}", fin.name)
         for fin, stamp in zip(layout.fins, stamps, strict=True)
         for note in _notes_of(fin.model, fin.limits, stamp)

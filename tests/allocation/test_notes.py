@@ -63,3 +63,12 @@ def test_a_table_without_thrust_within_the_limits_is_refused(tmp_path: Path) -> 
         DataError, match="gives no thrust within the fin's limits, amplitudes 0.05 to 0.2 rad"
     ):
         load_allocator("analytic").allocate(layout, [0.5, 0, 0, 0, 0, 0])
+
+
+def test_a_layout_whose_fit_is_doubtful_says_so_with_every_answer() -> None:
+    from dataclasses import replace
+
+    plain = robot(Limits())
+    doubted = replace(plain, description="not to be trusted: it hardly moved\nfitted to 40 s of swimming")
+    assert fin_notes(doubted) == ("layout two is not to be trusted: it hardly moved",)
+    assert fin_notes(replace(plain, description="fitted to 40 s of swimming")) == ()
