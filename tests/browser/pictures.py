@@ -167,7 +167,7 @@ def _swim(page: Page) -> None:
     page.page.get_by_role("button", name="2", exact=True).locator("visible=true").first.click()
     page.until(lambda: page.view.swimming.time > 42.0)
     page.press("Pause")
-    page.page.wait_for_timeout(8000)  # plots come late where there is no graphics card
+    page.page.wait_for_timeout(25000)  # plots come late where there is no graphics card
 
 
 def _view(page: Page) -> None:
