@@ -62,13 +62,13 @@ class RobotModel:
         """How the robot moved through the water (M, 6) [m/s, rad/s], as far as is known."""
 
     def shape_terms(self, command: Array) -> Array:
-        """Terms (..., 5) of the logarithm of a fin's true law over the layout's, for commands (..., 3): other
-        powers of amplitude and frequency, and what bends them further out."""
+        """Terms (..., 5) of the logarithm of a fin's true law over the layout's, for commands (..., 3): a
+        polynomial, so that it ends somewhere where fins hardly beat."""
         (low_a, high_a), (low_f, high_f) = self.seen
         a = np.clip(command[..., 0], low_a, high_a) / self.middle[0]
         f = np.clip(command[..., 1], low_f, high_f) / self.middle[1]
         p, q = a - 1.0, f - 1.0
-        return np.stack([np.log(a), np.log(f), p * p, p * q, q * q], axis=-1)
+        return np.stack([p, q, p * p, p * q, q * q], axis=-1)
 
     def wrench(self, unknowns: Unknowns, vector: Array) -> Array:
         """Mean wrench (M, 6) of each step for one vector (size,) of unknowns."""

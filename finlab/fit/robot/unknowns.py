@@ -51,8 +51,8 @@ def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
         return Block(name, tuple(labels), unit, np.broadcast_to(scale, len(labels)).astype(float), force)
 
     shape = (
-        "power of amplitude",
-        "power of frequency",
+        "amplitude",
+        "frequency",
         "amplitude^2",
         "amplitude x frequency",
         "frequency^2",
