@@ -7,15 +7,13 @@ import numpy as np
 
 from finlab.fit.fin_fit import BAND, FinFit
 from finlab.fit.thrust_curves import ThrustCurve
-from webapp.markup.mode_plot import Axis, cost_axis
+from webapp.markup.mode_plot import BOTTOM, RIGHT, TOP, WIDTH, axes, cost_axis
 from webapp.markup.words import three_digits
 from webapp.tasks.fitting import Fitted
 from webapp.theme import BLUE, GREEN, ORANGE, css
 
-WIDTH, HEIGHT = 388, 214
-"""Of the plot [px]."""
-LEFT, RIGHT, TOP, BOTTOM = 44, 8, 24, 34
-"""Its margins [px]."""
+LEFT, HEIGHT = 44, 214
+"""Left margin and height of the plot [px]."""
 COLORS = (ORANGE, GREEN, BLUE)
 """Of the curves, from the lowest frequency to the highest."""
 MOST_NAMED = 8
@@ -93,7 +91,7 @@ def thrust_plot(curves: tuple[ThrustCurve, ...]) -> str:
     def path(values: np.ndarray, amplitudes: np.ndarray) -> str:
         return " ".join(f"{x(a):.1f},{y(v):.1f}" for a, v in zip(amplitudes, values, strict=True))
 
-    parts = [_axes(across, up)]
+    parts = [axes(across, up, LEFT, HEIGHT, upright=False)]
     for curve, color in zip(curves, COLORS, strict=False):
         dots = "".join(f"<circle cx='{x(a):.1f}' cy='{y(v):.1f}' r='1.7'/>" for a, v in curve.samples)
         parts.append(f"<g fill='{css(color, 0.5)}'>{dots}</g>")
@@ -109,19 +107,3 @@ def thrust_plot(curves: tuple[ThrustCurve, ...]) -> str:
         low, high = curve.band
         parts.append(f"<text x='{place + 19}' y='14'>{low:.1f} to {high:.1f} Hz</text>")
     return f"<svg class='plot' viewBox='0 0 {WIDTH} {HEIGHT}'>{''.join(parts)}</svg>"
-
-
-def _axes(across: Axis, up: Axis) -> str:
-    """The grid with its labels."""
-    floor, parts = HEIGHT - BOTTOM, []
-    for value, label in up.ticks:
-        at = floor - up.share(value) * (floor - TOP)
-        parts.append(f"<path d='M{LEFT} {at:.1f}H{WIDTH - RIGHT}' class='grid'/>")
-        parts.append(f"<text x='{LEFT - 5}' y='{at + 4:.1f}' text-anchor='end'>{label}</text>")
-    for value, label in across.ticks:
-        at = LEFT + across.share(value) * (WIDTH - LEFT - RIGHT)
-        parts.append(f"<text x='{at:.1f}' y='{floor + 14}' text-anchor='middle'>{label}</text>")
-    turned = f"translate(10 {(TOP + floor) / 2}) rotate(-90)"
-    parts.append(f"<text x='{(LEFT + WIDTH) / 2}' y='{HEIGHT - 5}' text-anchor='middle'>{across.word}</text>")
-    parts.append(f"<text transform='{turned}' text-anchor='middle'>{up.word}</text>")
-    return "".join(parts)

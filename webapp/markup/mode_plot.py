@@ -112,7 +112,7 @@ def mode_plot(
         x = LEFT + across.share(float(point[0])) * (WIDTH - LEFT - RIGHT)
         return x, height - BOTTOM - up.share(float(point[1])) * (height - BOTTOM - TOP)
 
-    parts = [_legend(samples is not None), _axes(across, up, height)]
+    parts = [_legend(samples is not None), axes(across, up, LEFT, height)]
     if samples is not None:
         parts.append(_sample_dots([place(point) for point in raw], modes, sample, picker))
     places = _apart([place(point) for point in refined])
@@ -181,18 +181,20 @@ def _legend(sampled: bool) -> str:
     return "".join(parts)
 
 
-def _axes(across: Axis, up: Axis, height: int) -> str:
-    """The grid with its labels."""
+def axes(across: Axis, up: Axis, left: float, height: float, *, upright: bool = True) -> str:
+    """The grid of a plot `height` [px] high with its labels, those of the axis that goes up within `left` [px];
+    with upright lines, or without."""
     floor, parts = height - BOTTOM, []
     for value, label in up.ticks:
         at = floor - up.share(value) * (floor - TOP)
-        parts.append(f"<path d='M{LEFT} {at:.1f}H{WIDTH - RIGHT}' class='grid'/>")
-        parts.append(f"<text x='{LEFT - 5}' y='{at + 4:.1f}' text-anchor='end'>{label}</text>")
+        parts.append(f"<path d='M{left} {at:.1f}H{WIDTH - RIGHT}' class='grid'/>")
+        parts.append(f"<text x='{left - 5}' y='{at + 4:.1f}' text-anchor='end'>{label}</text>")
     for value, label in across.ticks:
-        at = LEFT + across.share(value) * (WIDTH - LEFT - RIGHT)
-        parts.append(f"<path d='M{at:.1f} {TOP}V{floor}' class='grid'/>")
+        at = left + across.share(value) * (WIDTH - left - RIGHT)
+        if upright:
+            parts.append(f"<path d='M{at:.1f} {TOP}V{floor}' class='grid'/>")
         parts.append(f"<text x='{at:.1f}' y='{floor + 14}' text-anchor='middle'>{label}</text>")
     turned = f"translate(10 {(TOP + floor) / 2}) rotate(-90)"
-    parts.append(f"<text x='{(LEFT + WIDTH) / 2}' y='{height - 5}' text-anchor='middle'>{across.word}</text>")
+    parts.append(f"<text x='{(left + WIDTH) / 2}' y='{height - 5}' text-anchor='middle'>{across.word}</text>")
     parts.append(f"<text transform='{turned}' text-anchor='middle'>{up.word}</text>")
     return "".join(parts)
