@@ -45,6 +45,8 @@ LARGEST_BUNDLE = 100_000_000
 MOST_FILES = len(LARGEST) + 16
 """Most files; a robot has up to 16 fins, each with a table at most."""
 REQUIRED = (GRAPH, ABOUT, COMPILED, CHECKSUMS)
+UNREADABLE = (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, ValueError, zlib.error)
+"""What reading a zip archive ends with that is damaged, locked or none."""
 VERSION_1 = "network.onnx"
 """A file that only bundles of version 1 hold."""
 
@@ -101,7 +103,7 @@ def read_bundle_files(path: str | os.PathLike[str]) -> dict[str, bytes]:
             _read_archive(files)
     except OSError as error:
         raise DataError(f"{source}: cannot be read: {error.strerror or error}") from None
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, ValueError, zlib.error) as error:
+    except UNREADABLE as error:
         reason = str(error).splitlines()[0][:80] if str(error) else type(error).__name__
         raise DataError(f"{source}: is neither a bundle's folder nor its zip archive ({reason})") from None
     check_bundle_files(files, source)

@@ -4,11 +4,10 @@ import hashlib
 import io
 import tempfile
 import zipfile
-import zlib
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
-from finlab.bundle_files import LARGEST_BUNDLE, LARGEST_TABLE, MOST_FILES
+from finlab.bundle_files import ABOUT, LARGEST_BUNDLE, LARGEST_TABLE, MOST_FILES, UNREADABLE
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.layout import FinModelSpec, Layout, load_layout
 from finlab.layout.reading import MAX_BYTES
@@ -81,7 +80,7 @@ def _unpacked(packed: Path, source: str, folder: Path) -> Path:
         with zipfile.ZipFile(packed) as archive:
             entries = [entry for entry in archive.infolist() if not entry.is_dir()]
             names = [entry.filename for entry in entries]
-            if "bundle.json" in names:
+            if ABOUT in names:
                 return packed
             layouts = [name for name in names if name.endswith(LAYOUTS)]
             if len(layouts) != 1 or len(names) > MOST_FILES:
@@ -103,7 +102,7 @@ def _unpacked(packed: Path, source: str, folder: Path) -> Path:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_bytes(content)
             return folder / layouts[0]
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, ValueError, zlib.error) as error:
+    except UNREADABLE as error:
         raise LayoutError(f"cannot be read as a zip archive: {error}", source=source) from None
 
 
