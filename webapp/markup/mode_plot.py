@@ -182,8 +182,8 @@ def _legend(sampled: bool) -> str:
 
 
 def axes(across: Axis, up: Axis, left: float, height: float, *, upright: bool = True) -> str:
-    """The grid of a plot `height` [px] high with its labels, those of the axis that goes up within `left` [px];
-    with upright lines, or without."""
+    """The grid of a plot `height` [px] high with labels, those of the axis that goes up within `left` [px];
+    upright lines or none."""
     floor, parts = height - BOTTOM, []
     for value, label in up.ticks:
         at = floor - up.share(value) * (floor - TOP)
