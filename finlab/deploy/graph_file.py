@@ -82,6 +82,8 @@ def _document_of(graph: LayoutGraph) -> dict[str, Any]:
             "model": entry["model"],
             "healthy": fin.name not in graph.failed,
         }
+        if "servo" in entry:
+            node["servo"] = entry["servo"]
         nodes.append(node)
     return {
         "format": GRAPH_FORMAT,

@@ -19,3 +19,4 @@ from finlab.layout.load import load_layout as load_layout
 from finlab.layout.random import layout_from_arrays as layout_from_arrays
 from finlab.layout.random import random_layout as random_layout
 from finlab.layout.random import random_layouts as random_layouts
+from finlab.layout.servo import Servo as Servo

@@ -17,6 +17,7 @@ from finlab.layout.fin import Fin, FinModelSpec, Limits
 from finlab.layout.interaction import Interaction, Jet
 from finlab.layout.layout import MAX_FINS, Layout
 from finlab.layout.rules import mapping, number, shown, text, under
+from finlab.layout.servo import SERVO_KEYS, Servo
 from finlab.whole_file import write_whole
 
 FORMAT = "finlab-layout"
@@ -110,7 +111,7 @@ def _layout(data: Any, folder: Path) -> Layout:
 
 
 def _fin(data: Any, folder: Path) -> Fin:
-    keys = ("name", "position_m", "mounting_angle_deg", "limits", "model")
+    keys = ("name", "position_m", "mounting_angle_deg", "limits", "model", "servo")
     data = mapping(data, "", keys, required=("name", "position_m", "mounting_angle_deg"))
     degrees = number(data["mounting_angle_deg"], "mounting_angle_deg", -360.0, 360.0)
     with under("limits"):
@@ -118,7 +119,10 @@ def _fin(data: Any, folder: Path) -> Fin:
         limits = Limits(**{_LIMIT_FIELDS[key]: value for key, value in given.items()})
     with under("model"):
         model = _model({"type": "drag"} if data.get("model") is None else data["model"], folder)
-    return Fin(data["name"], data["position_m"], math.radians(degrees), limits, model)
+    with under("servo"):
+        driven = mapping({} if data.get("servo") is None else data["servo"], "", tuple(SERVO_KEYS))
+        servo = Servo(**{SERVO_KEYS[key]: value for key, value in driven.items()})
+    return Fin(data["name"], data["position_m"], math.radians(degrees), limits, model, servo)
 
 
 def _model(data: Any, folder: Path) -> FinModelSpec:
@@ -161,7 +165,7 @@ def _absolute(path: str, folder: Path) -> str:
 
 def _fin_to_dict(fin: Fin) -> dict[str, Any]:
     limits = {key: list(getattr(fin.limits, field)) for key, field in _LIMIT_FIELDS.items()}
-    return {
+    data = {
         "name": fin.name,
         "position_m": list(fin.position),
         # Degrees from radians carry a rounding error of 1e-14; twelve digits give back what people wrote.
@@ -169,6 +173,11 @@ def _fin_to_dict(fin: Fin) -> dict[str, Any]:
         "limits": limits,
         "model": {"type": fin.model.type, **dict(fin.model.parameters)},
     }
+    own = {key: getattr(fin.servo, field) for key, field in SERVO_KEYS.items()}
+    usual = Servo()
+    if servo := {key: value for key, value in own.items() if value != getattr(usual, SERVO_KEYS[key])}:
+        data["servo"] = servo
+    return data
 
 
 def _plain(value: Any) -> Any:

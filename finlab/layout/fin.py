@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from finlab.errors import LayoutError
 from finlab.layout.rules import MAX_NAME_LENGTH, interval, number, numbers, text
+from finlab.layout.servo import Servo
 
 
 @dataclass(frozen=True)
@@ -175,6 +176,8 @@ class Fin:
     """What the fin may be commanded."""
     model: FinModelSpec = FinModelSpec()
     """Which law gives its force."""
+    servo: Servo = Servo()
+    """How fast it comes to what it is told."""
 
     def __post_init__(self) -> None:
         x, y, z = numbers(self.position, "position_m", 3, -MAX_POSITION, MAX_POSITION)

@@ -84,6 +84,17 @@ class Layout:
         """Greatest amplitude [rad], frequency [Hz] and zero direction [rad] of each fin (n, 3); read-only."""
         return _read_only([fin.limits.upper for fin in self.fins])
 
+    @cached_property
+    def servo_poles(self) -> Array:
+        """Double poles of amplitude, frequency and zero direction of each fin (n, 3) [rad/s]; read-only."""
+        servos = [fin.servo for fin in self.fins]
+        return _read_only([(s.amplitude_pole, s.frequency_pole, s.direction_pole) for s in servos])
+
+    @cached_property
+    def speed_limit(self) -> Array:
+        """How fast each fin can turn (n,) [rad/s]; read-only."""
+        return _read_only([fin.servo.speed_limit for fin in self.fins])
+
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the fins, in order."""

@@ -164,15 +164,16 @@ def _document(data: Mapping[str, Any], found: GraphText) -> GraphDocument:
     if not isinstance(nodes, list):
         raise LayoutError(f"expected a list of fins, got {shown(nodes)}", "graph.nodes")
     keys = ("id", "position_m", "mounting_angle_rad", "limits", "model", "healthy")
+    carried = ("position_m", "limits", "model", "servo")
     angles, fins = [], []
     for i, node in enumerate(nodes):
         with under(f"graph.nodes[{i}]"):
-            mapping(node, "", keys, required=keys)
+            mapping(node, "", (*keys, "servo"), required=keys)
             if not isinstance(node["healthy"], bool):
                 raise LayoutError(f"expected true or false, got {shown(node['healthy'])}", "healthy")
             angles.append(number(node["mounting_angle_rad"], "mounting_angle_rad", -math.tau, math.tau))
         fin = {"name": node["id"], "mounting_angle_deg": math.degrees(angles[-1])}
-        fins.append(fin | {key: node[key] for key in ("position_m", "limits", "model")})
+        fins.append(fin | {key: node[key] for key in carried if key in node})
     about = mapping(data["layout"], "layout", ABOUT, ("name",))
     head = {"format": FORMAT, "version": VERSION, "frame": data["frame"]}
     layout = parse_layout({**head, **about, "fins": fins}, found.source, found.folder)

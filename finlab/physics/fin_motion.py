@@ -1,85 +1,124 @@
 """How fins follow their commands (second-order lag, the servo's speed limit, flapping), and their power.
 
-Amplitude and zero direction each follow their command through a critically damped filter
-x'' = k (k/4 (x* - x) - x'), a double pole at k/2. The gains are those of the oscillators that drive the fins
-in U-CAT's open simulator (eeUVsim: k = 15 for the amplitude, 7 for the zero direction). Frequency changes at
-once, with the phase kept.
+Amplitude, frequency and zero direction each follow their command through the critically damped filters of
+`finlab.layout.Servo`. A fin that is told another frequency goes on from where it is in its beat.
 """
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.layout.angles import is_full_turn, wrapped
+from finlab.layout.angles import TURN, is_full_turn
 from finlab.physics.blade import Blade
 
+CREEP = 0.1
+"""Share of its speed that a servo turns its fin with, however fast that flaps."""
 
-@dataclass(frozen=True)
-class Servo:
-    """What drives one fin."""
 
-    amplitude_pole: float = 7.5
-    """Double pole of the amplitude [rad/s]; eeUVsim's k_amp = 15."""
-    direction_pole: float = 3.5
-    """Double pole of the zero direction [rad/s]; eeUVsim's k_zd = 7."""
-    speed_limit: float = 4 * math.pi
-    """Fastest that the fin turns [rad/s]; two turns a second in U-CAT's UWSim plug-in. It cuts the amplitude
-    of fast flapping and slows the turning of a fin that flaps."""
+class LagStep(NamedTuple):
+    """The exact step of critically damped filters towards aims that stay: for an error e = x - aim,
+    e <- kept e + carried x' and x' <- driven e + slowed x'."""
+
+    kept: Array
+    """Share of the error that is left."""
+    carried: Array
+    """What the rate adds to it [s]."""
+    driven: Array
+    """What the error adds to the rate [1/s]."""
+    slowed: Array
+    """Share of the rate that is left."""
+
+    @classmethod
+    def of(cls, pole: Array, dt: float) -> "LagStep":
+        """The step over `dt` [s] of filters with double poles [rad/s], of any shape."""
+        decay = np.exp(-pole * dt)
+        return cls((1.0 + pole * dt) * decay, dt * decay, -(pole**2) * dt * decay, (1.0 - pole * dt) * decay)
 
 
 class FinMotion:
     """Angles of the fins of one layout over time; all arrays are (n,)."""
 
-    def __init__(self, layout: Layout, servo: Servo | None = None) -> None:
-        """Starts at rest: no amplitude, zero directions at the middle of their arcs."""
-        self.servo = Servo() if servo is None else servo
+    def __init__(self, layout: Layout) -> None:
+        """Starts at rest: no amplitude, no frequency, zero directions at the middle of their arcs."""
         lower, upper = layout.lower[:, 2], layout.upper[:, 2]
         self._turns_fully = is_full_turn(upper - lower)
-        n = layout.n_fins
-        self.amplitude = np.zeros(n)
-        """Half amplitude [rad]."""
-        self.amplitude_rate = np.zeros(n)
-        """[rad/s]."""
-        self.frequency = np.zeros(n)
-        """[Hz]."""
-        self.direction = 0.5 * (lower + upper)
-        """Zero direction [rad], counted on over the seam."""
-        self.direction_rate = np.zeros(n)
-        """[rad/s]."""
-        self.phase = np.zeros(n)
+        self._poles = np.ascontiguousarray(layout.servo_poles.T)
+        self._speed_limit = layout.speed_limit
+        self._creep = CREEP * self._speed_limit
+        # Half amplitude [rad], frequency [Hz], zero direction [rad] counted on over the seam; rates per s.
+        self._value = np.zeros((3, layout.n_fins))
+        self._value[2] = 0.5 * (lower + upper)
+        self._rate = np.zeros((3, layout.n_fins))
+        self.phase = np.zeros(layout.n_fins)
         """Phase of the flapping [rad]."""
+        self._dt = math.nan
+        self._lag: LagStep
 
     def step(self, command: Array, dt: float) -> None:
         """Follows a command (n, 3) for `dt` [s]; a fin whose row is NaN stops at once and hangs still."""
-        lost = np.isnan(command[:, 0])
-        known = np.where(lost[:, None], 0.0, command)
-        self.frequency = known[:, 1]
-        self.phase = np.mod(self.phase + 2 * math.pi * self.frequency * dt, 2 * math.pi)
-        swing = 2 * math.pi * self.frequency
-        aim = np.minimum(known[:, 0], self.servo.speed_limit / np.maximum(swing, 1e-9))
-        self.amplitude, self.amplitude_rate = _follow(
-            self.amplitude, self.amplitude_rate, aim, self.servo.amplitude_pole, dt
-        )
-        turn = known[:, 2] - self.direction
-        turn = np.where(self._turns_fully, wrapped(turn), turn)
-        before = self.direction
-        after, rate = _follow(before, self.direction_rate, before + turn, self.servo.direction_pole, dt)
+        if dt != self._dt:
+            self._dt, self._lag = dt, LagStep.of(self._poles, dt)
+        lag, before, aim = self._lag, self._value, command.T.copy()
+        lost = np.isnan(aim[0])
+        some_lost = bool(lost.any())
+        if some_lost:
+            aim[:, lost] = before[:, lost]
+        aim[0] = np.minimum(aim[0], self._speed_limit / (TURN * np.maximum(aim[1], 1e-9)))
+        turn = aim[2] - before[2]
+        aim[2] = before[2] + np.where(self._turns_fully, turn - TURN * np.round(turn / TURN), turn)
+        error = before - aim
+        value = aim + lag.kept * error + lag.carried * self._rate
+        rate = lag.driven * error + lag.slowed * self._rate
+        swing = TURN * value[1]
         # What flapping leaves of the servo's speed is there to turn the fin.
-        spare = np.maximum(self.servo.speed_limit - self.amplitude * swing, 0.1 * self.servo.speed_limit)
-        self.direction = before + np.clip(after - before, -spare * dt, spare * dt)
-        self.direction_rate = np.clip(rate, -spare, spare)
-        if lost.any():
-            self.amplitude[lost] = self.amplitude_rate[lost] = self.direction_rate[lost] = 0.0
-            self.direction[lost] = before[lost]
+        value[0] = np.minimum(value[0], self._speed_limit / np.maximum(swing, 1e-9))
+        spare = np.maximum(self._speed_limit - value[0] * swing, self._creep)
+        turned = np.minimum(np.maximum(value[2] - before[2], -spare * dt), spare * dt)
+        value[2] = before[2] + turned
+        rate[2] = np.minimum(np.maximum(rate[2], -spare), spare)
+        if some_lost:
+            value[:2, lost], value[2, lost], rate[:, lost] = 0.0, before[2, lost], 0.0
+        self.phase = np.mod(self.phase + (0.5 * TURN * dt) * (before[1] + value[1]), TURN)
+        self._value, self._rate = value, rate
+
+    @property
+    def amplitude(self) -> Array:
+        """Half amplitude [rad]; a view, and so are the next four."""
+        amplitude: Array = self._value[0]
+        return amplitude
+
+    @property
+    def frequency(self) -> Array:
+        """[Hz]."""
+        frequency: Array = self._value[1]
+        return frequency
+
+    @property
+    def direction(self) -> Array:
+        """Zero direction [rad], counted on over the seam."""
+        direction: Array = self._value[2]
+        return direction
+
+    @property
+    def amplitude_rate(self) -> Array:
+        """[rad/s]."""
+        rate: Array = self._rate[0]
+        return rate
+
+    @property
+    def direction_rate(self) -> Array:
+        """[rad/s]."""
+        rate: Array = self._rate[2]
+        return rate
 
     @property
     def command(self) -> Array:
-        """What the fins do now, as a command (n, 3)."""
-        return np.stack([self.amplitude, self.frequency, self.direction], axis=-1)
+        """What the fins do now, as a command (n, 3); a copy."""
+        command: Array = self._value.T.copy()
+        return command
 
     @property
     def angle(self) -> Array:
@@ -89,7 +128,7 @@ class FinMotion:
     @property
     def speed(self) -> Array:
         """The fins' angular speeds [rad/s]."""
-        swing = 2 * math.pi * self.frequency
+        swing = TURN * self.frequency
         return (
             self.direction_rate
             + self.amplitude_rate * np.sin(self.phase)
@@ -99,18 +138,12 @@ class FinMotion:
     @property
     def acceleration(self) -> Array:
         """The fins' angular accelerations [rad/s^2], those of the flapping; turning adds little."""
-        swing = 2 * math.pi * self.frequency
-        return swing * (
-            2 * self.amplitude_rate * np.cos(self.phase) - self.amplitude * swing * np.sin(self.phase)
+        swing, faster = TURN * self.frequency, TURN * self._rate[1]
+        cosine = np.cos(self.phase)
+        return (
+            swing * (2 * self.amplitude_rate * cosine - self.amplitude * swing * np.sin(self.phase))
+            + self.amplitude * faster * cosine
         )
-
-
-def _follow(value: Array, rate: Array, aim: Array, pole: float, dt: float) -> tuple[Array, Array]:
-    """Exact step of the critically damped filter towards a constant aim."""
-    error = value - aim
-    slope = rate + pole * error
-    decay = math.exp(-pole * dt)
-    return aim + (error + slope * dt) * decay, (rate - pole * slope * dt) * decay
 
 
 class FinPower(NamedTuple):

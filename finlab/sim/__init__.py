@@ -6,7 +6,6 @@
 World: z up. Body: x forward, y left, z up. SI and radians.
 """
 
-from finlab.physics.fin_motion import Servo as Servo
 from finlab.physics.vehicle import Vehicle as Vehicle
 from finlab.sim.closed_loop import ClosedLoop as ClosedLoop
 from finlab.sim.fin_fault import FinFault as FinFault

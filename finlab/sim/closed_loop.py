@@ -20,7 +20,7 @@ from finlab.control import (
 )
 from finlab.layout import Layout
 from finlab.physics import plant_of
-from finlab.physics.fin_motion import FinMotion, Servo, fin_power
+from finlab.physics.fin_motion import FinMotion, fin_power
 from finlab.physics.vehicle import STATE_SIZE, Vehicle, complete_body, quaternion_of_yaw
 from finlab.sim.fin_fault import FinFault, names_of
 from finlab.sim.log import RunLog, Tick, log_of_ticks
@@ -50,7 +50,6 @@ class ClosedLoop:
         plant: str = "mean",
         steady: bool = False,
         sensors: SensorSettings | None = None,
-        servo: Servo | None = None,
         current: Sequence[float] = (0.0, 0.0, 0.0),
         failures: Sequence[FinFault | tuple[str, float]] = (),
         announced: bool = True,
@@ -70,7 +69,6 @@ class ClosedLoop:
             plant: what the fins really do; see `PLANTS`.
             steady: whether the allocator is given its previous command, so that fins turn little per tick.
             sensors: rates and noise; the defaults of `SensorSettings`.
-            servo: what drives the fins.
             current: velocity of the water (3,) in the world [m/s].
             failures: what becomes of fins, and when; (name, time [s]) is a fin that is lost.
             announced: whether the allocator is told of what happens; else it goes on as before, unless a
@@ -96,7 +94,7 @@ class ClosedLoop:
         self.seed = seed
         truth = layout if truth is None else truth
         self.vehicle = Vehicle(complete_body(truth), current)
-        self.fins = FinMotion(truth, servo)
+        self.fins = FinMotion(truth)
         """The fins' motion: amplitude, frequency, zero direction and phase of each."""
         self._fin_force = make_plant(plant, truth)
         self._plant = plant_of(layout)

@@ -3,14 +3,16 @@
 import numpy as np
 
 from finlab.control.nominal_lag import NominalLag
-from finlab.layout import Layout
+from finlab.layout import Layout, Servo
 from finlab.physics.fin_motion import FinMotion
 
 
 def test_it_follows_as_the_simulated_servo_does(layout_a: Layout) -> None:
     rng = np.random.default_rng(5)
-    lag, motion = NominalLag(layout_a, 0.1), FinMotion(layout_a)
-    low, high = layout_a.lower, layout_a.upper
+    slow = Servo(amplitude_pole=3.0, frequency_pole=2.0, direction_pole=1.5)
+    layout = layout_a.replace_fin("back_left", servo=slow)
+    lag, motion = NominalLag(layout, 0.1), FinMotion(layout)
+    low, high = layout.lower, layout.upper
     for _ in range(40):
         command = low + rng.uniform(size=low.shape) * (high - low) * (0.9, 0.9, 0.5)
         for _ in range(10):
@@ -20,4 +22,4 @@ def test_it_follows_as_the_simulated_servo_does(layout_a: Layout) -> None:
     motion.step(command, 0.1)
     still = lag.step(command)
     np.testing.assert_allclose(still[1], motion.command[1], atol=0.02)
-    assert still[1, 0] == 0.0 and lag.direction[1] == still[1, 2]
+    assert still[1, 0] == still[1, 1] == 0.0 and lag.direction[1] == still[1, 2]

@@ -95,6 +95,13 @@ BAD = [
     ),
     ("fins[0].limits", edited("fins", 0, "limits", value=[1, 2]), "expected keys and values"),
     ("fins[0].limits.amplitude", edited("fins", 0, "limits", "amplitude", value=[0, 1]), "unknown key"),
+    ("fins[0].servo", edited("fins", 0, "servo", value=[1, 2]), "expected keys and values"),
+    ("fins[0].servo.speed", edited("fins", 0, "servo", value={"speed": 3}), "unknown key"),
+    (
+        "fins[0].servo.speed_limit_rad_s",
+        edited("fins", 0, "servo", value={"speed_limit_rad_s": 0}),
+        "must be above 0",
+    ),
     (
         "fins[0].limits.amplitude_rad",
         edited("fins", 0, "limits", "amplitude_rad", value=[0.6, 0.05]),

@@ -12,6 +12,7 @@ from finlab import layout as layout_package
 from finlab.assets import shipped_layouts
 from finlab.layout.body import BODY_KEYS, HULL_KEYS, HULL_SHAPES
 from finlab.layout.fin import FIN_MODELS
+from finlab.layout.servo import SERVO_KEYS
 
 SCHEMA = json.loads((Path(layout_package.__file__).parent / "layout.schema.json").read_text())
 VALIDATOR = jsonschema.Draft202012Validator(SCHEMA)
@@ -47,6 +48,7 @@ def test_what_the_reader_refuses_does_not_fit(data, why):
 def test_the_schema_lists_the_keys_the_reader_knows():
     definitions = SCHEMA["$defs"]
     assert set(definitions["body"]["properties"]) == set(BODY_KEYS)
+    assert set(definitions["servo"]["properties"]) == set(SERVO_KEYS)
     shape, mesh = definitions["hull"]["oneOf"]
     assert set(shape["properties"]) | set(mesh["properties"]) == set(HULL_KEYS)
     assert tuple(shape["properties"]["shape"]["enum"]) == HULL_SHAPES

@@ -1,15 +1,16 @@
 """How fins follow their commands: lag, limits, and the power of their beating."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from finlab.assets import shipped_layouts
-from finlab.layout import Layout, load_layout
+from finlab.layout import Layout, Servo, load_layout
 from finlab.physics.blade import OWN_INERTIA, Blade
-from finlab.physics.fin_motion import FinMotion, Servo, fin_power
+from finlab.physics.fin_motion import FinMotion, fin_power
 
 DT = 0.01
 
@@ -17,6 +18,11 @@ DT = 0.01
 @pytest.fixture(scope="module")
 def pair() -> Layout:
     return load_layout(shipped_layouts()["pair"])
+
+
+def driven(layout: Layout, servo: Servo) -> Layout:
+    """The layout with the same servo at all fins."""
+    return replace(layout, fins=tuple(replace(fin, servo=servo) for fin in layout.fins))
 
 
 def flapping(layout: Layout, amplitude: float, frequency: float, direction: float) -> FinMotion:
@@ -28,11 +34,17 @@ def flapping(layout: Layout, amplitude: float, frequency: float, direction: floa
 
 def test_the_filters_are_critically_damped_and_exact(pair: Layout) -> None:
     """Against the differential equation x'' = k (k/4 (x* - x) - x') by SciPy."""
-    motion, command = FinMotion(pair), np.array([[0.3, 1.0, 1.2], [0.5, 0.7, -0.4]])
+    slow = Servo(amplitude_pole=3.0, frequency_pole=5.0, direction_pole=2.0)
+    layout = pair.replace_fin(pair.names[1], servo=slow)
+    motion, command = FinMotion(layout), np.array([[0.3, 1.0, 1.2], [0.5, 0.7, -0.4]])
     for _ in range(37):
         motion.step(command, DT)
-    for value, aim, k in ((motion.amplitude, command[:, 0], 15.0), (motion.direction, command[:, 2], 7.0)):
-        for i in range(2):
+    for value, aim, gains in (
+        (motion.amplitude, command[:, 0], (15.0, 6.0)),
+        (motion.frequency, command[:, 1], (15.0, 10.0)),
+        (motion.direction, command[:, 2], (7.0, 4.0)),
+    ):
+        for i, k in enumerate(gains):
             exact = solve_ivp(
                 lambda _, y, k=k, goal=aim[i]: [y[1], k * (k / 4 * (goal - y[0]) - y[1])],
                 (0.0, 37 * DT),
@@ -41,6 +53,19 @@ def test_the_filters_are_critically_damped_and_exact(pair: Layout) -> None:
                 atol=1e-12,
             )
             assert value[i] == pytest.approx(exact.y[0, -1], abs=1e-8)
+
+
+def test_the_phase_is_the_integral_of_the_frequency(pair: Layout) -> None:
+    """Told another frequency, a fin gathers speed and goes on from where it is in its beat."""
+    motion = flapping(pair, 0.3, 1.0, 0.0)
+    turned, last = 0.0, motion.phase.copy()
+    for k in range(200):
+        motion.step(np.tile([0.3, 1.0 if k < 20 else 2.0, 0.0], (2, 1)), DT)
+        step = float(np.mod(motion.phase - last, 2 * math.pi)[0])
+        assert step <= 2 * math.pi * 2.0 * DT + 1e-9
+        turned, last = turned + step, motion.phase.copy()
+    # The area between a step of 1 Hz and its answer through a double pole p is 2 / p.
+    assert turned == pytest.approx(2 * math.pi * (0.2 + 1.8 * 2.0 - 2.0 / 7.5), rel=1e-3)
 
 
 def test_fins_turn_the_short_way_over_the_seam(pair: Layout) -> None:
@@ -52,13 +77,16 @@ def test_fins_turn_the_short_way_over_the_seam(pair: Layout) -> None:
 
 
 def test_speed_limit_cuts_fast_flapping_and_turning(pair: Layout) -> None:
-    motion = FinMotion(pair, Servo(speed_limit=4.0))
+    motion = FinMotion(driven(pair, Servo(speed_limit=4.0)))
     speeds = []
     for _ in range(300):
         motion.step(np.tile([0.6, 2.0, 3.1], (2, 1)), DT)
-        speeds.append(np.abs(motion.amplitude * 2 * math.pi * 2.0).max())
-    assert max(speeds) <= 4.0 + 1e-9
-    free, slow = FinMotion(pair), FinMotion(pair, Servo(speed_limit=0.5))
+        speeds.append(np.abs(motion.amplitude * 2 * math.pi * motion.frequency).max())
+    assert speeds[-1] == pytest.approx(4.0) and max(speeds) <= 4.0 + 1e-9
+    for _ in range(30):  # the frequency falls, the amplitude may grow again
+        motion.step(np.tile([0.6, 1.0, 3.1], (2, 1)), DT)
+        assert np.abs(motion.amplitude * 2 * math.pi * motion.frequency).max() <= 4.0 + 1e-9
+    free, slow = FinMotion(pair), FinMotion(driven(pair, Servo(speed_limit=0.5)))
     for _ in range(50):
         for each in (free, slow):
             each.step(np.tile([0.05, 0.1, 3.0], (2, 1)), DT)
@@ -70,7 +98,7 @@ def test_a_lost_fin_stops_where_it_is(pair: Layout) -> None:
     command = motion.command.copy()
     command[0] = np.nan
     motion.step(command, DT)
-    assert motion.amplitude[0] == motion.speed[0] == 0.0
+    assert motion.amplitude[0] == motion.frequency[0] == motion.speed[0] == 0.0
     assert motion.direction[0] == 0.8
 
 

@@ -54,16 +54,13 @@ def replay(layout: Layout, command: Array) -> Array:
 
 
 def between(ends: Array, command: Array) -> Array:
-    """What fins did (N, SUBSTEPS, n, 3) by what they did at the end of each step (N, n, 3).
-
-    Frequencies change at once with the command (N, n, 3); a fin without a command is lost and hangs still.
-    """
+    """What fins did (N, SUBSTEPS, n, 3) by what they did at the end of each step (N, n, 3); a fin without a
+    command (N, n, 3) is lost and hangs still."""
     before = np.concatenate([ends[:1], ends[:-1]])
     share = (np.arange(SUBSTEPS) + 0.5)[:, None, None] / SUBSTEPS
     motion: Array = before[:, None] + share * (ends - before)[:, None]
     lost = np.asarray(~np.isfinite(command[..., 0]))
-    motion[..., 1] = np.where(lost, 0.0, command[..., 1])[:, None]
-    motion[..., 0] = np.where(lost[:, None], 0.0, motion[..., 0])
+    motion[..., :2] = np.where(lost[:, None, :, None], 0.0, motion[..., :2])
     return motion
 
 
