@@ -140,10 +140,9 @@ class FinMotion:
         """The fins' angular accelerations [rad/s^2], those of the flapping; turning adds little."""
         swing, faster = TURN * self.frequency, TURN * self._rate[1]
         cosine = np.cos(self.phase)
-        return (
-            swing * (2 * self.amplitude_rate * cosine - self.amplitude * swing * np.sin(self.phase))
-            + self.amplitude * faster * cosine
-        )
+        beating = 2 * self.amplitude_rate * cosine - self.amplitude * swing * np.sin(self.phase)
+        acceleration: Array = swing * beating + self.amplitude * faster * cosine
+        return acceleration
 
 
 class FinPower(NamedTuple):
