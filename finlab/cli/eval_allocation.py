@@ -75,8 +75,8 @@ def wrench(
         rows += wrench_rows(found, part)
         intervals += interval_rows(found, part)
         energies += [{"split": part, **row} for row in energy_comparison(found)]
+        run.write(rows=rows, intervals=intervals, energies=energies)
         print(("\n" if k else "") + wrench_report(found, part, single=single))
-    run.write(rows=rows, intervals=intervals, energies=energies)
 
 
 def cost(
@@ -108,9 +108,9 @@ def cost(
     rows = []
     for name, aim in product(cost_sets(cases.split), aims):
         found = cost_rows(name, allocators, aim, n_starts=starts, **drawn)
-        print("\n" + to_text(*cost_tables(found)))
         rows += found
-    run.write(rows=rows)
+        run.write(rows=rows)
+        print("\n" + to_text(*cost_tables(found)))
 
 
 def network(
@@ -311,6 +311,6 @@ def fuzz(
         seed=seed,
         first_robot=first,
     )
-    print(fuzz_report(counts))
     run.write(rows=[count.row() for count in counts])
+    print(fuzz_report(counts))
     return None if all(count.clean for count in counts) else 1

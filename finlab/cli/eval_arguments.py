@@ -150,11 +150,11 @@ class ClosedLoopRuns:
         methods, seeds = run.methods(self.methods), range(self.seed, self.seed + self.runs)
         return run_all(scenarios, methods, seeds, self.plant, steady=self.steady)
 
-    def save(self, name: str, draw: Callable[[], Picture]) -> None:
-        """Draw into the folder, where one was named, and say so."""
-        if self.figures is not None:
-            path = draw().save(self.figures / f"{name}.png")
-            print(f"\n{path}: written.")
+    def save(self, name: str, draw: Callable[[], Picture]) -> list[str]:
+        """Draw into the folder, where one was named; returns the sentence that says so."""
+        if self.figures is None:
+            return []
+        return [f"{draw().save(self.figures / f'{name}.png')}: written."]
 
 
 def open_layouts(names: str) -> list[Layout]:

@@ -33,8 +33,8 @@ def trajectory(
     found = loop.swim(experiment.trajectory_scenarios(robots, path), run)
     rows = experiment.trajectory_rows(found)
     about = f"Trajectory {path.name}: {path.length_m:.1f} m in {path.duration_s:.0f} s; plant {loop.plant}."
-    run.show(*INTRODUCTION, *trajectory_blocks(rows), about, rows=rows)
-    loop.save("trajectory", lambda: draw_layouts([(key, track_of(log)) for key, log in found], rows))
+    saved = loop.save("trajectory", lambda: draw_layouts([(key, track_of(log)) for key, log in found], rows))
+    run.show(*INTRODUCTION, *trajectory_blocks(rows), about, *saved, rows=rows)
 
 
 def faults(
@@ -59,8 +59,8 @@ def faults(
     cases = all_faults(robot, path.duration_s / 2)
     rows = fault_rows(cases, loop.swim(fault_scenarios(robot, path, cases), run))
     about = f"Layout {robot.name}, {path.name} of {path.duration_s:.0f} s; plant {loop.plant}."
-    run.show(*INTRODUCTION, *fault_blocks(rows), about, rows=rows)
-    loop.save("faults", lambda: draw_faults(rows))
+    saved = loop.save("faults", lambda: draw_faults(rows))
+    run.show(*INTRODUCTION, *fault_blocks(rows), about, *saved, rows=rows)
 
 
 def velocity(
@@ -90,8 +90,8 @@ def velocity(
     found = loop.swim(experiment.velocity_scenarios(robot, duration_s=duration), run)
     rows = experiment.velocity_rows(found)
     about = f"Layout {robot.name}; plant {loop.plant}."
-    run.show(*INTRODUCTION, *velocity_blocks(rows, baseline), about, rows=rows)
-    loop.save("velocity", lambda: draw_velocity(found))
+    saved = loop.save("velocity", lambda: draw_velocity(found))
+    run.show(*INTRODUCTION, *velocity_blocks(rows, baseline), about, *saved, rows=rows)
 
 
 def monitor(

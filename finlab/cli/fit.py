@@ -48,6 +48,10 @@ def fin(
     measurements = read_measurements(data, Conventions(angles, amplitude, frequency, sensor_turn, lever))
     fit = fit_fin(measurements, seed)
     write_fin(fit, output)
+    if page:
+        from finlab.evaluation.report.fin_fit_page import write_fin_fit_page
+
+        write_fin_fit_page(fit, output.with_suffix(".html"))
     print("\n".join(summary(fit)))
     for clause in thin_regions(fit):
         print(f"data are thin: {clause}")
@@ -56,9 +60,6 @@ def fin(
         print("  " + "  ".join(f"{value:7.3f}" for value in command))
     print(f"{output}: name it in a layout, model: {{type: table, path: {output.name}}}")
     if page:
-        from finlab.evaluation.report.fin_fit_page import write_fin_fit_page
-
-        write_fin_fit_page(fit, output.with_suffix(".html"))
         print(output.with_suffix(".html"))
 
 

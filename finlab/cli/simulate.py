@@ -110,14 +110,17 @@ def simulate(
             found.note(loop)
             bar.update(loop.period_s)
     log = loop.log
-    print("\n".join([excitation_summary(log) if excite else summary(log), *found.sentences]))
+    written = ""
     if output is not None:
         from finlab.evaluation.plots.closed_loop_run import save_pictures
 
         output.mkdir(parents=True, exist_ok=True)
         log.save(output / "log.npz")
         names = ", ".join(path.name for path in save_pictures(log, output))
-        print(f"\n{output}: written log.npz, {names}.")
+        written = f"\n{output}: written log.npz, {names}."
+    print("\n".join([excitation_summary(log) if excite else summary(log), *found.sentences]))
+    if written:
+        print(written)
 
 
 def summary(log: RunLog) -> str:

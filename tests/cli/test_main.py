@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from finlab.cli import main
+from tests.fit.cell import columns_of, commands, measured, soft, write
 
 FINLAB = [sys.executable, "-m", "finlab"]
 
@@ -72,6 +73,20 @@ def test_reader_that_went_away_is_no_error_message() -> None:
     done = subprocess.run(command, stdout=write_end, stderr=subprocess.PIPE, text=True, timeout=30)
     os.close(write_end)
     assert (done.returncode, done.stderr) == (141, "")
+
+
+def test_files_are_written_before_anything_is_printed(tmp_path: Path) -> None:
+    cell = write(tmp_path / "cell.csv", columns_of(commands(60), measured(soft(), commands(60))))
+    read_end, write_end = os.pipe()
+    os.close(read_end)
+    command = [*FINLAB, "fit", "fin", str(cell), "-o", str(tmp_path / "fin.csv")]
+    unbuffered = os.environ | {"PYTHONUNBUFFERED": "1"}
+    done = subprocess.run(
+        command, stdout=write_end, stderr=subprocess.PIPE, text=True, timeout=60, env=unbuffered
+    )
+    os.close(write_end)
+    assert (done.returncode, done.stderr) == (141, "")
+    assert (tmp_path / "fin.csv").exists() and "</html>" in (tmp_path / "fin.html").read_text()
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux's always-full device")
