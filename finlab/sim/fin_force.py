@@ -57,7 +57,7 @@ class RippleForce:
     """The mean force in two pulses per cycle, and a ripple of mean zero on top.
 
     The ripple is what a rigid plate of `Blade` feels normal to itself: the momentum of the water that it
-    carries, m L^2/2 theta', and the drag of its strips, 1/8 rho Cd W L^4 theta' |theta'|. Over a cycle both
+    carries, m L^2/2 theta', and the drag of its strips, 1/6 rho Cd W L^3 theta' |theta'|. Over a cycle both
     have mean zero, so the mean force stays the fin law's. The fin points away from its thrust.
     """
 
@@ -76,7 +76,7 @@ class RippleForce:
         angle, speed = motion.angle + math.pi, motion.speed
         normal = np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
         momentum = 0.5 * self.blade.virtual_mass * length**2 * speed[:, None] * normal
-        drag = self.blade.drag * speed * np.abs(speed)
+        drag = self.blade.force_drag * speed * np.abs(speed)
         force[:, 1:] -= (momentum - self._momentum) / dt + drag[:, None] * normal
         self._momentum = momentum
         return force

@@ -46,7 +46,7 @@ def swing_forces(layout: Layout, command: Array) -> Array:
     late = 2.0 * math.pi * motion[..., 0] * motion[..., 1] * np.sin(phase)
     blade = plant.blade
     inertia = 0.5 * blade.virtual_mass * blade.length**2
-    resistance = blade.drag_per_length * blade.length**3 / 3.0
+    resistance = blade.force_drag
     terms = []
     for own in (speed, late):
         carried = (inertia * own)[..., None] * normal
