@@ -14,6 +14,7 @@ from finlab.sim.log import Tick as Tick
 from finlab.sim.log import load_log as load_log
 from finlab.sim.plants import PLANTS as PLANTS
 from finlab.sim.sensors import NO_NOISE as NO_NOISE
+from finlab.sim.sensors import NOISE_ALONE as NOISE_ALONE
 from finlab.sim.sensors import SensorSettings as SensorSettings
 from finlab.sim.task import SHIPPED as SHIPPED
 from finlab.sim.task import Cruise as Cruise

@@ -286,7 +286,7 @@ class ClosedLoop:
             wrench = wrenches.sum(axis=0)
             self.state = self.vehicle.step(self.state, wrench.tolist(), dt)
             if k + 1 < n_steps:  # the sample at the end belongs to the next period
-                self._sensors.measure(time + (k + 1) * dt, self.state)
+                self._sensors.sample(time + (k + 1) * dt, self.state)
             power = fin_power(self.fins, self._blade)
             mean += wrenches / n_steps
             inertial += power.inertial / n_steps

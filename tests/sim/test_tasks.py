@@ -1,4 +1,4 @@
-"""Trajectories, shipped and from files, and what sensors see of a robot."""
+"""Trajectories, shipped and from files."""
 
 from pathlib import Path
 
@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from finlab.errors import DataError
-from finlab.sim import SHIPPED, SensorSettings, make_trajectory
-from finlab.sim.sensors import Sensors
+from finlab.sim import SHIPPED, make_trajectory
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -53,20 +52,3 @@ def test_unknown_names_and_durations(tmp_path: Path) -> None:
         make_trajectory("spiral")
     with pytest.raises(DataError, match="12 to 3600"):
         make_trajectory("circle", 1.0)
-
-
-def test_sensors_sample_at_their_rates_with_their_noise() -> None:
-    sensors = Sensors(SensorSettings(), np.random.default_rng(0))
-    state = np.zeros(13)
-    state[:4] = (1.0, 2.0, -3.0, 1.0)
-    state[7] = 0.2
-    seen = [sensors.measure(0.01 * k, state) for k in range(6000)]
-    changes = {
-        "marker": len({s.position[0] for s in seen}),
-        "dvl": len({s.velocity[0] for s in seen}),
-        "pressure": len({s.depth for s in seen}),
-        "imu": len({s.rates[2] for s in seen}),
-    }
-    assert changes == {"marker": 600, "dvl": 300, "pressure": 1200, "imu": 3000}
-    depth = np.unique([s.depth for s in seen])
-    assert depth.mean() == pytest.approx(3.0, abs=1e-3) and depth.std() == pytest.approx(0.005, rel=0.1)

@@ -1,0 +1,84 @@
+"""What sensors see of a robot: rates, noise, bias, delay and losses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from finlab.arrays import Array
+from finlab.control import Measurement
+from finlab.errors import FinlabError
+from finlab.physics.vehicle import euler
+from finlab.sim import NO_NOISE, NOISE_ALONE, SensorSettings
+from finlab.sim.sensors import Sensors
+
+STATE = np.zeros(13)
+STATE[:4] = (1.0, 2.0, -3.0, 1.0)
+STATE[7] = 0.2
+
+
+def seen(settings: SensorSettings, steps: int, seed: int = 0) -> list[Measurement]:
+    """What sensors say of a robot that stays as it is, every 0.01 s."""
+    sensors = Sensors(settings, np.random.default_rng(seed))
+    return [sensors.measure(0.01 * k, STATE) for k in range(steps)]
+
+
+def new(values: list[float] | Array) -> int:
+    """How many times a value is another one than before."""
+    return 1 + int((np.diff(values) != 0.0).sum())
+
+
+def test_they_sample_at_their_rates_with_their_noise() -> None:
+    found = seen(NOISE_ALONE, 6000)
+    assert new([s.position[0] for s in found]) == 600 and new([s.velocity[0] for s in found]) == 300
+    assert new([s.depth for s in found]) == 1200 and new([s.rates[2] for s in found]) == 3000
+    assert np.std([s.depth for s in found]) == pytest.approx(0.005, rel=0.1)
+
+
+def test_each_run_has_biases_of_its_own() -> None:
+    off = np.array(
+        [[np.mean([s.depth for s in seen(SensorSettings(), 500, seed)]) - 3.0] for seed in range(60)]
+    )
+    assert off.std() == pytest.approx(0.01, rel=0.3) and abs(off.mean()) < 0.005
+    again = [[s.as_array() for s in seen(SensorSettings(), 50, seed)] for seed in (3, 3, 4)]
+    np.testing.assert_array_equal(again[0], again[1])
+    assert (np.array(again[0]) != np.array(again[2])).any()
+
+
+def test_perfect_sensors_say_what_is_true_at_once() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        state = rng.standard_normal(13)
+        state[3:7] /= np.linalg.norm(state[3:7])
+        found = Sensors(NO_NOISE, rng).measure(0.0, state)
+        np.testing.assert_allclose(
+            found.as_array(), [*state[:3], *euler(state[3:7]), *state[7:]], rtol=1e-12, atol=1e-12
+        )
+
+
+def test_what_is_late_is_of_a_while_ago() -> None:
+    settings = replace(NO_NOISE, marker_rate_hz=50.0).later(0.1)
+    sensors, state = Sensors(settings, np.random.default_rng(0)), STATE.copy()
+    for k in range(100):
+        state[:3] = 0.02 * k
+        found = sensors.measure(0.02 * k, state)
+        assert found.position[0] == pytest.approx(0.02 * max(k - 5, 0)), "at rest before the beginning"
+        assert found.depth <= 0.0
+    assert settings.dvl_delay_s == pytest.approx(0.1) and NO_NOISE.dvl_delay_s == 0.0
+
+
+@pytest.mark.parametrize("burst_s", [0.0, 1.0])
+def test_lost_samples_leave_the_last_ones_standing(burst_s: float) -> None:
+    settings = replace(NO_NOISE, pressure_depth_m=0.01).losing(0.3, burst_s)
+    found = np.array([s.depth for s in seen(settings, 100_000)])[::5]
+    fresh = np.diff(found) != 0.0
+    assert fresh.mean() == pytest.approx(0.7, abs=0.03)
+    begins = int((fresh[1:] & ~fresh[:-1]).sum())
+    longest = (~fresh).sum() / begins * 0.05  # mean length of a gap [s]
+    assert longest == pytest.approx(burst_s or 0.05 / 0.7, rel=0.15)
+
+
+def test_what_no_sensor_has_is_refused() -> None:
+    for wrong in ({"dvl_rate_hz": 0.0}, {"imu_delay_s": -0.1}, {"marker_dropout": 1.0}, {"burst_s": np.nan}):
+        with pytest.raises(FinlabError, match=next(iter(wrong))):
+            SensorSettings(**wrong)
