@@ -145,7 +145,7 @@ def fit_fin(
     Args:
         measurements: at least `MIN_SAMPLES`.
         seed: draws the samples that are kept where there are more than `MOST_SAMPLES`.
-        progress: told in a few words what comes next.
+        progress: told in a few words what comes next, before each step; what it raises ends the fit.
     """
     tell = progress or (lambda _: None)
     notes = list(measurements.notes)
@@ -157,18 +157,18 @@ def fit_fin(
         drawn = np.random.default_rng(seed).permutation(len(measurements)) >= MOST_SAMPLES
         notes.append(f"{MOST_SAMPLES} of {len(measurements)} samples, drawn at random, are used")
         measurements = measurements.without(drawn)
-    tell("looking for samples that contradict the others")
-    bad = find_outliers(measurements)
+    bad = find_outliers(measurements, tell)
     outliers = tuple(place for place, out in zip(measurements.places, bad, strict=True) if out)
     if outliers:
         shown = ", ".join(outliers[:5]) + (" ..." if len(outliers) > 5 else "")
         notes.append(f"{len(outliers)} of {len(bad)} samples contradict the others and are left out: {shown}")
         measurements = measurements.without(bad)
-    tell("fitting forces and power" if measurements.power is not None else "fitting forces")
-    return _fitted(measurements, outliers, tuple(notes))
+    return _fitted(measurements, outliers, tuple(notes), tell)
 
 
-def _fitted(measurements: Measurements, outliers: tuple[str, ...], notes: tuple[str, ...]) -> FinFit:
+def _fitted(
+    measurements: Measurements, outliers: tuple[str, ...], notes: tuple[str, ...], tell: Callable[[str], None]
+) -> FinFit:
     turned, lean = measurements.thrust()
     largest = float(np.linalg.norm(measurements.force, axis=-1).max())
     inputs = measurements.scaled(measurements.command)
@@ -177,10 +177,15 @@ def _fitted(measurements: Measurements, outliers: tuple[str, ...], notes: tuple[
         # Deviations of the two axes across the shaft stay what they are in a frame that turns between them.
         planar = np.mean(measurements.deviation[:, 1:] ** 2, axis=-1) / largest**2
         variance = [planar, planar, measurements.deviation[:, 0] ** 2 / largest**2]
+    tell("fitting the thrust")
     along = Component(inputs, turned[:, 0] / largest, variance[0])
-    across, sideways = (Component(inputs, turned[:, k] / largest, variance[k], along.mean) for k in (1, 2))
+    tell("fitting the force across the thrust")
+    across = Component(inputs, turned[:, 1] / largest, variance[1], along.mean)
+    tell("fitting the force along the shaft")
+    sideways = Component(inputs, turned[:, 2] / largest, variance[2], along.mean)
     power, largest_power = None, 1.0
     if measurements.power is not None:
+        tell("fitting power")
         largest_power = float(measurements.power.max())
         power = Component(inputs, np.sqrt(np.maximum(measurements.power, 0.0) / largest_power))
     return FinFit(

@@ -1,5 +1,7 @@
 """Samples that contradict all others: a wrong unit, a bump of the rig, a cell that slipped."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,11 +14,11 @@ ROUNDS = 3
 """Fits that look for such samples, each without those that the one before has found."""
 
 
-def find_outliers(measurements: Measurements) -> NDArray[np.bool_]:
+def find_outliers(measurements: Measurements, tell: Callable[[str], None]) -> NDArray[np.bool_]:
     """Returns which samples (n,) lie far off a fit to the others.
 
     Wild samples bend the first fit, so that their neighbours look wild, too: those that a fit without the
-    suspects explains are taken back.
+    suspects explains are taken back. `tell` is called before each step.
     """
     turned, _ = measurements.thrust()
     largest = float(np.quantile(np.linalg.norm(measurements.force, axis=-1), 0.98))
@@ -27,7 +29,9 @@ def find_outliers(measurements: Measurements) -> NDArray[np.bool_]:
     out = np.zeros(len(inputs), dtype=bool)
     for _ in range(ROUNDS):
         kept, before = ~out, out
+        tell("looking for samples that contradict the others")
         along = Component(inputs[kept], values[kept, 0], wild=True)
+        tell("looking for samples that contradict the others, across the thrust")
         across = Component(inputs[kept], values[kept, 1], size=along.mean, wild=True)
         size = along.expect(inputs)
         out = np.zeros_like(out)

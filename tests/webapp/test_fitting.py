@@ -15,6 +15,7 @@ import pytest
 
 from finlab import load_allocator
 from finlab.errors import DataError, FinlabError, LayoutError
+from finlab.fit import outliers
 from finlab.layout import Layout, load_layout
 from finlab.physics.table_file import DOUBT, table_bytes
 from tests.fit.cell import columns_of, commands, measured, soft, write
@@ -195,6 +196,29 @@ def test_what_was_cancelled_or_left_comes_to_nothing(tmp_path: Path, worker: Wor
     done = threading.Event()
     worker.submit("after", done.set, lambda _: None)
     assert done.wait(60) and opened.session.state == before and opened.stages == []
+
+
+def test_a_cancelled_fit_ends_at_its_next_step(
+    tmp_path: Path, worker: Worker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened, begun, gate = Opened(worker), threading.Event(), threading.Event()
+    steps: list[int] = []
+    component = outliers.Component
+
+    def held(*args: Any, **options: Any) -> object:
+        steps.append(len(steps))
+        begun.set()
+        assert gate.wait(30)
+        return component(*args, **options)
+
+    monkeypatch.setattr(outliers, "Component", held)
+    opened.fitting.start("back_left", "cell.csv", cell(tmp_path))
+    assert begun.wait(30)
+    opened.fitting.forget()
+    gate.set()
+    done = threading.Event()
+    worker.submit("after", done.set, lambda _: None)
+    assert done.wait(60) and steps == [0] and opened.told == []
 
 
 def test_a_fin_that_became_another_meanwhile_is_left_alone(tmp_path: Path, worker: Worker) -> None:

@@ -142,11 +142,11 @@ class Fitting(Newest[Upload, Fitted]):
             try:
                 if not upload.is_noisy and _is_table(path):
                     return Fitted(done, stored_table(upload.content, table_folder()))
-                return self._fit_measurements(path, done)
+                return self._fit_measurements(path, upload, done)
             except FinlabError as error:
                 raise type(error)(str(error).replace(f"{folder}/", "")) from None
 
-    def _fit_measurements(self, path: Path, done: Upload) -> Fitted:
+    def _fit_measurements(self, path: Path, upload: Upload, done: Upload) -> Fitted:
         try:
             from finlab.fit.advice import next_measurements, thin_regions
             from finlab.fit.fin_file import fin_csv
@@ -155,17 +155,21 @@ class Fitting(Newest[Upload, Fitted]):
             from finlab.fit.thrust_curves import thrust_curves
         except ImportError as error:
             raise FinlabError(f"fitting needs {error.name}; run: pip install 'finlab[fit]'") from None
-        fit = fit_fin(read_measurements([path]), progress=self._tell)
-        self._tell("writing the table")
+        tell = partial(self._tell, upload)
+        fit = fit_fin(read_measurements([path]), progress=tell)
+        tell("writing the table")
         model = stored_table(fin_csv(fit).encode(), table_folder())
         curves = tuple(thrust_curves(fit, CURVES))
         return Fitted(done, model, fit, curves, thin_regions(fit), next_measurements(fit))
 
-    def _tell(self, words: str) -> None:
-        self._loop.post(partial(self._note, self._round, words))
+    def _tell(self, upload: Upload, words: str) -> None:
+        """On the worker's thread, before each step: a fit for which nobody waits any more ends here."""
+        if upload is not self.question:
+            raise FinlabError("cancelled")
+        self._loop.post(partial(self._note, upload, words))
 
-    def _note(self, begun: object, words: str) -> None:
-        if begun is self._round and self.busy:
+    def _note(self, upload: Upload, words: str) -> None:
+        if upload is self.question and self.busy:
             self.progress = words
             self._context.changed()
 
