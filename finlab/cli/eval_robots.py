@@ -15,7 +15,7 @@ def robots(
     layout: Annotated[str, arg(metavar="LAYOUT")] = "A",
     plants: Names = "offset,wake,inflow,flexible",
     targets: Count = 100,
-    runs: Count = 2,
+    runs: Count = 16,
     method: Name = "search",
     seed: Count = 0,
     output: Annotated[Output, arg(name="")] = OUTPUT,
@@ -25,8 +25,8 @@ def robots(
     Args:
         layout: layout file or the name of a shipped layout.
         plants: what the fins truly do, names with commas between.
-        targets: wrenches asked before and after.
-        runs: closed loops with each layout.
+        targets: wrenches asked of the layout as drawn, the fitted one and the true one.
+        runs: closed loops with each of them; a run takes some seconds.
         method: who answers.
         seed: draws everything.
     """

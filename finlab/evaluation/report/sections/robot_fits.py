@@ -7,11 +7,12 @@ from finlab.evaluation.report.document import Block, Column, Row, Table
 ERRORS = (
     Column("plant", "plant", "code"),
     Column("used", "used besides"),
-    Column("before_mean", "err_norm before, mean", "error"),
-    Column("after_mean", "after", "error"),
+    Column("drawn_mean", "err_norm as drawn, mean", "error"),
+    Column("fitted_mean", "fitted", "error"),
+    Column("true_mean", "true model", "error"),
     Column("times_smaller", "times smaller", "three"),
-    Column("before_median", "median before", "error"),
-    Column("after_median", "after", "error"),
+    Column("drawn_median", "median as drawn", "error"),
+    Column("fitted_median", "fitted", "error"),
     Column("trusted", "trusted"),
     Column("fit_s", "fit [s]", "three"),
 )
@@ -20,9 +21,11 @@ LOOPS = (
     Column("believed", "believed"),
     Column("ate", "ATE [m]", "metres"),
     Column("depth_rmse", "depth RMSE [m]", "metres"),
+    Column("depth_rmse_over_true", "over true model", "ratio", "depth_rmse_over_true_interval"),
+    Column("depth_under_way", "under way [m]", "metres"),
+    Column("depth_under_way_over_true", "over true model", "ratio", "depth_under_way_over_true_interval"),
     Column("torque_w", "torque power [W]", "three"),
-    Column("depth_over_true", "depth over true model", "three"),
-    Column("power_over_true", "power over true model", "three"),
+    Column("torque_w_over_true", "over true model", "ratio", "torque_w_over_true_interval"),
 )
 
 
@@ -37,14 +40,14 @@ def robot_fit_blocks(rows: Sequence[Row], layout: str, targets: int, runs: int) 
         "## Fitted robots",
         (
             f"Layout {layout} swam five minutes of excitation on each plant, with sensor noise, and was "
-            f"fitted. {targets} wrenches of random commands are asked of the layout as drawn (before) and of "
-            "the fitted one (after), at random speeds through the water; what the fins then truly give tells "
-            "the error."
+            f"fitted. {targets} wrenches of random commands are asked of the layout as drawn, of the fitted "
+            "one and of the true model, at random speeds through the water; what fins then truly give tells "
+            "the error. The true model is a layout made from the plant itself, as well as layouts can say it."
         ),
         Table(ERRORS, rows),
         (
-            f"Closed loops: {runs} circles with each layout that the allocator believes in. The true model "
-            "is a layout that says all that there is to know, where one can."
+            f"Closed loops: {runs} circles from rest with each layout that the allocator believes in, and "
+            "intervals in which the ratios of another seed should land. Under way: the depth from 15 s on."
         ),
         Table(LOOPS, loops),
     ]
