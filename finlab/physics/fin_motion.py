@@ -12,7 +12,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.angles import TURN, is_full_turn
-from finlab.physics.blade import Blade
+from finlab.physics.blade import COPPER_LOSS, Blade
 
 CREEP = 0.1
 """Share of its speed that a servo turns its fin with, however fast that flaps."""
@@ -146,16 +146,22 @@ class FinMotion:
 
 
 class FinPower(NamedTuple):
-    """Power of each fin (n,) [W] at one moment, by two measures."""
+    """Power of each fin (n,) [W] at one moment, by three measures."""
 
     inertial: Array
     """|I alpha omega|, the paper's: what turns the fin's own inertia, braking counted like driving."""
     torque: Array
     """max(tau omega, 0): inertia, carried water and drag together, nothing won back by braking."""
+    driving: Array
+    """The same and the heat in the motor's windings, copper_loss tau^2: what a battery gives, but for the
+    electronics. Its mean over a steady beat is `Blade.driving_power`."""
 
 
-def fin_power(motion: FinMotion, blade: Blade) -> FinPower:
-    """The power of fins as they move now; the torque is that of a rigid plate in still water."""
+def fin_power(motion: FinMotion, blade: Blade, copper_loss: float = COPPER_LOSS) -> FinPower:
+    """The power of fins as they move now; the torque is that of a rigid plate in still water, and
+    `copper_loss` the heat in its motor [W/(N m)^2]."""
     speed, acceleration = motion.speed, motion.acceleration
     torque = blade.inertia * acceleration + blade.drag * speed * np.abs(speed)
-    return FinPower(np.abs(blade.own_inertia * acceleration * speed), np.maximum(torque * speed, 0.0))
+    mechanical = np.maximum(torque * speed, 0.0)
+    inertial = np.abs(blade.own_inertia * acceleration * speed)
+    return FinPower(inertial, mechanical, mechanical + copper_loss * torque * torque)

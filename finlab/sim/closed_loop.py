@@ -20,6 +20,7 @@ from finlab.control import (
 )
 from finlab.layout import Layout
 from finlab.physics import plant_of
+from finlab.physics.blade import COPPER_LOSS
 from finlab.physics.fin_motion import FinMotion, fin_power
 from finlab.physics.vehicle import STATE_SIZE, Vehicle, complete_body, quaternion_of_yaw
 from finlab.sim.fin_fault import FinFault, names_of
@@ -56,6 +57,7 @@ class ClosedLoop:
         monitor: FaultMonitor | None = None,
         servo_feedback: bool = False,
         truth: Layout | None = None,
+        copper_loss: float = COPPER_LOSS,
         seed: int = 0,
     ) -> None:
         """Puts the robot at rest at the start of its task.
@@ -77,6 +79,7 @@ class ClosedLoop:
             servo_feedback: whether the servos report their motion to the monitor.
             truth: the robot that really swims, where `layout` is only what the allocator believes of it; it
                 has the same fins.
+            copper_loss: heat in the fins' motors [W/(N m)^2] that counts as `driving_power`.
             seed: of the sensors' noise and of the allocator.
 
         Raises:
@@ -98,7 +101,7 @@ class ClosedLoop:
         """The fins' motion: amplitude, frequency, zero direction and phase of each."""
         self._fin_force = make_plant(plant, truth)
         self._plant = plant_of(layout)
-        self._blade = plant_of(truth).blade
+        self._blade, self._copper_loss = plant_of(truth).blade, copper_loss
         self._sensors = Sensors(SensorSettings() if sensors is None else sensors, np.random.default_rng(seed))
         self._pending = sorted(events, key=lambda event: event.time_s)
         self.announced, self.monitor, self.servo_feedback = announced, monitor, servo_feedback
@@ -277,7 +280,7 @@ class ClosedLoop:
         for name in names_of(self.broken, "weak"):
             share[self.layout.index(name)] *= self.broken[name].share
         mean = np.zeros((self.layout.n_fins, 6))
-        inertial, torque = np.zeros(self.layout.n_fins), np.zeros(self.layout.n_fins)
+        power = np.zeros((3, self.layout.n_fins))
         for k in range(n_steps):
             self.fins.step(moved, dt)
             force = self._fin_force.step(self.fins, dt, self.vehicle.velocity_in_water(self.state))
@@ -287,10 +290,10 @@ class ClosedLoop:
             self.state = self.vehicle.step(self.state, wrench.tolist(), dt)
             if k + 1 < n_steps:  # the sample at the end belongs to the next period
                 self._sensors.sample(time + (k + 1) * dt, self.state)
-            power = fin_power(self.fins, self._blade)
-            mean += wrenches / n_steps
-            inertial += power.inertial / n_steps
-            torque += power.torque / n_steps
+            mean += wrenches
+            power += fin_power(self.fins, self._blade, self._copper_loss)
+        mean /= n_steps
+        power /= n_steps
         return Tick(
             time=time,
             position=before[:3].copy(),
@@ -306,8 +309,9 @@ class ClosedLoop:
             fin_motion=self.fins.command,
             fin_angle=self.fins.angle,
             fin_force=mean[:, :3],
-            inertial_power=inertial,
-            torque_power=torque,
+            inertial_power=power[0],
+            torque_power=power[1],
+            driving_power=power[2],
             alive=alive,
             **self._suspicion(),
             solve_ms=solve_ms,

@@ -11,7 +11,7 @@ from finlab.arrays import AnyArray
 from finlab.errors import DataError
 
 FORMAT = "finlab-swim"
-VERSION = 2
+VERSION = 3
 
 
 class Tick(NamedTuple):
@@ -51,6 +51,8 @@ class Tick(NamedTuple):
     """|I alpha omega| of each fin (n,), mean over the period [W]."""
     torque_power: AnyArray
     """max(torque times speed, 0) of each fin (n,), mean over the period [W]."""
+    driving_power: AnyArray
+    """The same with the heat in the motors' windings (n,), mean over the period [W]."""
     alive: AnyArray
     """Which fins move as told, stuck and weak ones among them (n,)."""
     fault_probability: AnyArray

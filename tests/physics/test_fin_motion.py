@@ -102,17 +102,19 @@ def test_a_lost_fin_stops_where_it_is(pair: Layout) -> None:
     assert motion.direction[0] == 0.8
 
 
-def test_mean_inertial_power_is_what_a_sinusoid_has(pair: Layout) -> None:
-    """Mean of |I alpha omega| over a cycle: I A^2 (2 pi f)^3 / pi."""
+def test_mean_power_is_what_a_sinusoid_has(pair: Layout) -> None:
+    """Mean of |I alpha omega| over a cycle: I A^2 (2 pi f)^3 / pi; the others have closed forms, too."""
     amplitude, frequency = 0.4, 1.25
     motion = flapping(pair, amplitude, frequency, 0.0)
     command = motion.command.copy()
-    inertial, torque = [], []
+    inertial, torque, driving = [], [], []
     for _ in range(10 * round(1 / (frequency * DT))):
         motion.step(command, DT)
-        power = fin_power(motion, Blade())
+        power = fin_power(motion, Blade(), 0.7)
         inertial.append(power.inertial[0])
         torque.append(power.torque[0])
+        driving.append(power.driving[0])
     swing = 2 * math.pi * frequency
     assert np.mean(inertial) == pytest.approx(OWN_INERTIA * amplitude**2 * swing**3 / math.pi, rel=0.01)
-    assert np.mean(torque) > np.mean(inertial)
+    assert np.mean(torque) == pytest.approx(Blade().power(amplitude, frequency), rel=0.01)
+    assert np.mean(driving) == pytest.approx(Blade().driving_power(amplitude, frequency, 0.7), rel=0.01)

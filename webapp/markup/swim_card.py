@@ -75,7 +75,8 @@ def swim_card(swimming: Swimming) -> str:
     header = (
         "<tr><th>method</th>"
         "<th title='root mean square distance from where it should be'>off the path [cm]</th>"
-        "<th title='the same of the depth'>depth [cm]</th><th title='inertial, mean'>power [W]</th></tr>"
+        "<th title='the same of the depth'>depth [cm]</th>"
+        "<th title='mean, with motor losses'>power [W]</th></tr>"
     )
     return (
         f"<div class='fl'><div class='said'>{head}</div><table>{header}{''.join(rows)}</table>{warning}</div>"

@@ -124,7 +124,7 @@ class Swimmer:
         """Swim for one control period."""
         tick = self._last = self.swim.step()
         off = tick.position - tick.reference
-        power = float(tick.inertial_power.sum())
+        power = float(tick.driving_power.sum())
         head = (tick.time, float(np.linalg.norm(off)), abs(float(off[2])), power, tick.solve_ms)
         force = np.linalg.norm(tick.fin_force, axis=1)
         suspicion = tick.fault_probability

@@ -11,6 +11,7 @@ from finlab.evaluation.report.document import Block, Column, Figure, Row, Table,
 POWER = (
     Column("inertial_w", "inertial power [W]", "three"),
     Column("torque_w", "torque power [W]", "three"),
+    Column("driving_w", "with motor losses [W]", "three"),
 )
 ERRORS = (
     Column("ate", "ATE [m]", "metres"),
@@ -20,7 +21,7 @@ ERRORS = (
 )
 PRINTED = {"ours": "paper's method, printed", "baseline": "paper's baseline, printed"}
 WHAT = (Column("method", "method"), Column("runs", "runs", "count"))
-COMPARED = ("inertial_w", "torque_w", "mae")
+COMPARED = ("inertial_w", "torque_w", "driving_w", "mae")
 """What a speed's rows are compared by with the baseline's."""
 FAULT_WORDS = {"healthy": "healthy", "one_fin": "one fin lost", "two_fins": "two fins lost"}
 
@@ -114,6 +115,8 @@ def velocity_blocks(rows: Sequence[Row], baseline: str = "analytic") -> list[Blo
         Column("inertial_w_change", f"to {baseline}", "change"),
         Column("torque_w", "torque power [W]", "three"),
         Column("torque_w_change", f"to {baseline}", "change"),
+        Column("driving_w", "with motor losses [W]", "three"),
+        Column("driving_w_change", f"to {baseline}", "change"),
         Column("mae", "speed error [m/s]", "metres"),
         Column("mae_std", "spread", "error"),
         Column("mae_change", f"to {baseline}", "change"),
@@ -122,7 +125,7 @@ def velocity_blocks(rows: Sequence[Row], baseline: str = "analytic") -> list[Blo
     )
     note = (
         "*Runs from rest. Inertial power is the paper's sum of |I alpha omega|; torque power adds the water "
-        "that fins carry and their drag.*"
+        "that fins carry and their drag, and the last one the heat in their motors.*"
     )
     return ["### Speed and power", Table(columns, shown), note]
 
