@@ -24,6 +24,7 @@ from finlab.physics.blade import COPPER_LOSS
 from finlab.physics.fin_motion import FinMotion, fin_power
 from finlab.physics.vehicle import STATE_SIZE, Vehicle, complete_body, quaternion_of_yaw
 from finlab.sim.fin_fault import FinFault, names_of
+from finlab.sim.hanging_fin import HangingFins
 from finlab.sim.log import RunLog, Tick, log_of_ticks
 from finlab.sim.plants import make_plant
 from finlab.sim.sensors import Sensors, SensorSettings
@@ -100,6 +101,7 @@ class ClosedLoop:
         self.fins = FinMotion(truth)
         """The fins' motion: amplitude, frequency, zero direction and phase of each."""
         self._fin_force = make_plant(plant, truth)
+        self._hanging = HangingFins(truth)
         self._plant = plant_of(layout)
         self._blade, self._copper_loss = plant_of(truth).blade, copper_loss
         self._sensors = Sensors(SensorSettings() if sensors is None else sensors, np.random.default_rng(seed))
@@ -182,8 +184,8 @@ class ClosedLoop:
 
         Args:
             name: of the fin.
-            kind: lost (hangs still), weak (gives a share of its thrust), stuck (beats but no longer turns) or
-                whole.
+            kind: lost (hangs still and drags), weak (gives a share of its thrust), stuck (beats but no longer
+                turns) or whole.
             share: of the thrust that a weak fin gives.
             announced: whether the allocator knows at once; by default as the swim was made.
 
@@ -275,17 +277,20 @@ class ClosedLoop:
         dt = self.period_s / n_steps
         moved, commanded = self._moved(command), np.isfinite(command[:, :1])
         alive = self._alive()
-        works = np.isfinite(moved[:, 0])
-        share = np.where(works, 1.0, 0.0)
+        hangs = np.isnan(moved[:, 0])
+        some_hang = bool(hangs.any())
+        share = np.ones(self.layout.n_fins)
         for name in names_of(self.broken, "weak"):
             share[self.layout.index(name)] *= self.broken[name].share
         mean = np.zeros((self.layout.n_fins, 6))
         power = np.zeros((3, self.layout.n_fins))
         for k in range(n_steps):
             self.fins.step(moved, dt)
-            force = self._fin_force.step(self.fins, dt, self.vehicle.velocity_in_water(self.state))
+            water = self.vehicle.velocity_in_water(self.state)
+            force = self._fin_force.step(self.fins, dt, water) * share[:, None]
+            if some_hang:
+                force[hangs] = self._hanging.force(self.fins.direction, water)[hangs]
             wrenches = np.einsum("nk,nkw->nw", force, self._fin_force.columns)
-            wrenches *= share[:, None]
             wrench = wrenches.sum(axis=0)
             self.state = self.vehicle.step(self.state, wrench.tolist(), dt)
             if k + 1 < n_steps:  # the sample at the end belongs to the next period

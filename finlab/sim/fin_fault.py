@@ -7,8 +7,8 @@ from typing import NamedTuple
 from finlab.errors import FinlabError
 
 KINDS = ("lost", "weak", "stuck", "whole")
-"""What can become of a fin: it hangs still; it gives a share of its thrust; it beats but no longer turns; it
-works again as it should."""
+"""What can become of a fin: it hangs still and drags; it gives a share of its thrust; it beats but no longer
+turns; it works again as it should."""
 
 
 class FinFault(NamedTuple):

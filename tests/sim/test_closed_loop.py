@@ -46,7 +46,8 @@ def test_fins_fail_and_mend(layout_a: Layout, analytic: Allocator) -> None:
     ticks = [swim.step() for _ in range(8)]
     lost = layout_a.index("front_left")
     assert [bool(tick.alive[lost]) for tick in ticks] == [True] * 5 + [False] * 3
-    assert np.isnan(ticks[-1].command[lost]).all() and (ticks[-1].fin_force[lost] == 0.0).all()
+    assert np.isnan(ticks[-1].command[lost]).all()
+    assert np.abs(ticks[-1].fin_force[lost]).max() < 0.01, "it hangs, and the robot is slow"
     swim.mend("front_left")
     assert swim.step().alive.all() and swim.failed == ()
     swim.fail("front_left")
@@ -113,7 +114,9 @@ def test_what_becomes_of_fins_without_a_word(layout_a: Layout, analytic: Allocat
     assert set(swim.broken) == {"front_left", "back_right"}
     assert np.isfinite(log.command).all(), "the allocator goes on as before"
     assert not log.alive[after, lost].any() and log.alive[~after].all()
-    assert (log.fin_force[after, lost] == 0.0).all()
+    foot = log.motion[:, :3] + np.cross(log.motion[:, 3:], layout_a.position[lost])
+    braked = (log.fin_force[:, lost] * foot).sum(axis=1)[after]
+    assert braked.sum() < 0.0 and braked.max() < 1e-6, "a fin that hangs still drags"
     assert np.ptp(log.fin_motion[after, stuck, 2]) < 1e-9 and np.ptp(log.command[after, stuck, 2]) > 0.02
     law = np.linalg.norm(swim._plant.fin_forces(log.fin_motion), axis=-1)
     share = np.linalg.norm(log.fin_force, axis=-1)[:, weak] / law[:, weak]

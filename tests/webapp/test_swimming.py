@@ -99,7 +99,7 @@ def test_fins_break_and_are_mended_while_it_swims(swimming: Swimming) -> None:
     until(lambda: swimming.swimmers[0].shown.failed == ("front_left",))
     swimming.step()
     until(lambda: swimming.time > 0)
-    assert not swimming.swimmers[0].shown.force[1].any()
+    assert swimming.swimmers[0].shown.force[1].max() < 1e-6  # it hangs, and the robot is at rest
     for name in ("front_right", "back_left"):
         swimming.toggle(name)
         until(lambda name=name: name in swimming.swimmers[0].shown.failed)
