@@ -11,6 +11,7 @@ from tyro.conf import Positional, UseAppendAction, arg
 
 if TYPE_CHECKING:
     from finlab.sim import ClosedLoop, FinFault, RunLog
+    from finlab.sim.water import Water
 
 
 def simulate(
@@ -27,6 +28,7 @@ def simulate(
     plant: Annotated[str, arg(metavar="NAME")] = "mean",
     gains: Annotated[str, arg(metavar="NAME|FILE")] = "waypoint",
     current: Annotated[tuple[float, float, float], arg(metavar="VX VY VZ")] = (0.0, 0.0, 0.0),
+    waves: Annotated[tuple[float, float], arg(metavar="HEIGHT SECONDS")] = (0.0, 3.0),
     steady: bool = False,
     noise: bool = True,
     seed: Annotated[int, arg(metavar="N")] = 0,
@@ -54,6 +56,7 @@ def simulate(
             (centre of gravity and fins not where the layout says).
         gains: waypoint, waypoint_paper (proportional terms alone), or a YAML file.
         current: velocity of the water in the world [m/s].
+        waves: significant height [m] and peak period [s] of waves that run along the world's x.
         steady: tell the allocator its previous command.
         noise: whether the sensors are noisy.
         seed: of the noise.
@@ -73,6 +76,7 @@ def simulate(
     robot = open_robot(layout)
     failures = [FinFault(name, 0.0) for name in robot.failed] + [_failure(text) for text in fail]
     _check_folder(output)
+    water = _water(current, waves, seed)
     sensors = None if noise else NO_NOISE
     if excite:
         if fail or monitor:
@@ -81,7 +85,7 @@ def simulate(
             )
         swum = robot.layout.without(robot.failed) if robot.failed else robot.layout
         whole = LONGEST_S if duration is None else duration
-        loop = excitation(swum, whole, plant=plant, sensors=sensors, current=current, seed=seed)
+        loop = excitation(swum, whole, plant=plant, sensors=sensors, water=water, seed=seed)
         failures = []
     else:
         controller = WaypointController(load_gains(WaypointGains, gains))
@@ -93,7 +97,7 @@ def simulate(
             plant=plant,
             steady=steady,
             sensors=sensors,
-            current=current,
+            water=water,
             failures=failures,
             announced=announced,
             monitor=FaultMonitor(robot.layout, period_s=controller.period_s) if monitor else None,
@@ -201,6 +205,13 @@ def _failure(text: str) -> FinFault:
             f"for what is no loss, got {text!r:.60}"
         )
     return fault
+
+
+def _water(current: tuple[float, float, float], waves: tuple[float, float], seed: int) -> Water:
+    """How the water moves."""
+    from finlab.sim.water import SteadyCurrent, Waves
+
+    return Waves(*waves, current=current, seed=seed) if waves[0] else SteadyCurrent(current)
 
 
 def _check_folder(output: Path | None) -> None:

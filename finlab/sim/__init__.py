@@ -21,3 +21,9 @@ from finlab.sim.task import Cruise as Cruise
 from finlab.sim.task import Task as Task
 from finlab.sim.task import Trajectory as Trajectory
 from finlab.sim.task import make_trajectory as make_trajectory
+from finlab.sim.water import Flow as Flow
+from finlab.sim.water import SteadyCurrent as SteadyCurrent
+from finlab.sim.water import Still as Still
+from finlab.sim.water import TurningCurrent as TurningCurrent
+from finlab.sim.water import Water as Water
+from finlab.sim.water import Waves as Waves

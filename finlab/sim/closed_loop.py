@@ -29,6 +29,7 @@ from finlab.sim.log import RunLog, Tick, log_of_ticks
 from finlab.sim.plants import make_plant
 from finlab.sim.sensors import Sensors, SensorSettings
 from finlab.sim.task import Cruise, Task
+from finlab.sim.water import Still, Water
 
 
 class ClosedLoop:
@@ -52,7 +53,7 @@ class ClosedLoop:
         plant: str = "mean",
         steady: bool = False,
         sensors: SensorSettings | None = None,
-        current: Sequence[float] = (0.0, 0.0, 0.0),
+        water: Water | None = None,
         failures: Sequence[FinFault | tuple[str, float]] = (),
         announced: bool = True,
         monitor: FaultMonitor | None = None,
@@ -72,7 +73,7 @@ class ClosedLoop:
             plant: what the fins really do; see `PLANTS`.
             steady: whether the allocator is given its previous command, so that fins turn little per tick.
             sensors: rates and noise; the defaults of `SensorSettings`.
-            current: velocity of the water (3,) in the world [m/s].
+            water: how it moves, such as `SteadyCurrent` or `Waves`; it is still by default.
             failures: what becomes of fins, and when; (name, time [s]) is a fin that is lost.
             announced: whether the allocator is told of what happens; else it goes on as before, unless a
                 monitor notices.
@@ -97,7 +98,8 @@ class ClosedLoop:
         self.steady = steady
         self.seed = seed
         truth = layout if truth is None else truth
-        self.vehicle = Vehicle(complete_body(truth), current)
+        self.vehicle = Vehicle(complete_body(truth))
+        self.water: Water = Still() if water is None else water
         self.fins = FinMotion(truth)
         """The fins' motion: amplitude, frequency, zero direction and phase of each."""
         self._fin_force = make_plant(plant, truth)
@@ -150,6 +152,7 @@ class ClosedLoop:
             controller=self.controller.name,
             task=self.task.name,
             plant=self.plant,
+            water=self.water.name,
             seed=self.seed,
         )
 
@@ -286,6 +289,9 @@ class ClosedLoop:
         power = np.zeros((3, self.layout.n_fins))
         for k in range(n_steps):
             self.fins.step(moved, dt)
+            self.vehicle.current, self.vehicle.acceleration = self.water.flow(
+                self.state[:3].tolist(), time + (k + 0.5) * dt
+            )
             water = self.vehicle.velocity_in_water(self.state)
             force = self._fin_force.step(self.fins, dt, water) * share[:, None]
             if some_hang:
@@ -304,6 +310,7 @@ class ClosedLoop:
             position=before[:3].copy(),
             quaternion=before[3:7].copy(),
             motion=before[7:].copy(),
+            flow=np.array(self.water.flow(before[:3].tolist(), time).velocity),
             measured=now.as_array(),
             reference=setpoint.position,
             reference_surge=setpoint.surge,

@@ -24,6 +24,7 @@ from finlab.physics import plant_of
 from finlab.physics.vehicle import complete_body
 from finlab.sim.closed_loop import ClosedLoop
 from finlab.sim.sensors import SensorSettings
+from finlab.sim.water import Water
 
 LONGEST_S = 300.0
 """Longest swim [s]."""
@@ -187,7 +188,7 @@ def excitation(
     *,
     plant: str = "mean",
     sensors: SensorSettings | None = None,
-    current: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    water: Water | None = None,
     seed: int = 0,
 ) -> ClosedLoop:
     """The swim, ready to be run.
@@ -197,7 +198,7 @@ def excitation(
         duration_s: how long [s].
         plant: what the fins really do; see `PLANTS`.
         sensors: rates and noise; the defaults of `SensorSettings`.
-        current: velocity of the water in the world [m/s].
+        water: how it moves; it is still by default.
         seed: of the excitation and of the sensors' noise.
 
     Raises:
@@ -212,6 +213,6 @@ def excitation(
         ExcitingController(layout, seed),
         plant=plant,
         sensors=sensors,
-        current=current,
+        water=water,
         seed=seed,
     )

@@ -25,6 +25,8 @@ class Tick(NamedTuple):
     """Attitude (4,) as w, x, y, z, body to world."""
     motion: AnyArray
     """Velocity (3,) [m/s] and angular rates (3,) [rad/s] in the body frame."""
+    flow: AnyArray
+    """Velocity of the water (3,) where the robot is, in the world [m/s]."""
     measured: AnyArray
     """What the sensors said last (12,): position [m], roll, pitch, yaw [rad], velocity [m/s] and angular
     rates [rad/s] in the body frame."""
@@ -81,6 +83,8 @@ class RunLog:
     """Name of the trajectory or cruise."""
     plant: str
     """How the fins' forces were simulated."""
+    water: str
+    """How the water moved."""
     seed: int
     """Seed of the sensors' noise."""
     columns: dict[str, AnyArray]

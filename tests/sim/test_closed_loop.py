@@ -8,7 +8,18 @@ import pytest
 from finlab.allocation.allocator import Allocator
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.layout import Layout
-from finlab.sim import NO_NOISE, ClosedLoop, Cruise, FinFault, RunLog, Tick, load_log, make_trajectory
+from finlab.sim import (
+    NO_NOISE,
+    ClosedLoop,
+    Cruise,
+    FinFault,
+    RunLog,
+    SteadyCurrent,
+    Tick,
+    Waves,
+    load_log,
+    make_trajectory,
+)
 from finlab.sim.log import log_of_ticks
 
 
@@ -61,8 +72,23 @@ def test_fins_fail_and_mend(layout_a: Layout, analytic: Allocator) -> None:
 
 
 def test_a_robot_is_carried_by_a_current_but_tracks(layout_a: Layout, analytic: Allocator) -> None:
-    log = swum(ClosedLoop(layout_a, analytic, make_trajectory("circle"), current=(0.04, 0.0, 0.0)), 20.0)
+    log = swum(
+        ClosedLoop(layout_a, analytic, make_trajectory("circle"), water=SteadyCurrent((0.04, 0.0, 0.0))), 20.0
+    )
     assert np.linalg.norm(log.position - log.reference, axis=1).max() < 0.4
+
+
+def test_waves_carry_a_robot_to_and_fro_but_not_away(layout_a: Layout, analytic: Allocator) -> None:
+    waves = Waves(height_m=0.15, period_s=2.5, seed=1)
+    calm, rough = (
+        swum(ClosedLoop(layout_a, analytic, Cruise(0.1), sensors=NO_NOISE, water=water), 15.0)
+        for water in (None, waves)
+    )
+    late = calm.time > 5.0
+    assert (calm.water, rough.water) == ("still", "waves")
+    shaken = (rough.position - calm.position)[late]
+    assert 0.003 < shaken[:, 2].std() < 0.1 and np.abs(shaken[:, :2]).max() < 0.4
+    np.testing.assert_allclose(rough.flow[-1], waves.flow(rough.position[-1], rough.time[-1]).velocity)
 
 
 def test_what_is_delivered_follows_what_is_allocated(layout_a: Layout, analytic: Allocator) -> None:
@@ -99,7 +125,10 @@ def test_logs_survive_the_disk(layout_a: Layout, analytic: Allocator, tmp_path: 
 
 def log_of_ticks_like(log: object, ticks: list[Tick]) -> object:
     """The same log made anew from its ticks."""
-    about = {name: getattr(log, name) for name in ("layout", "fins", "method", "controller", "task", "plant")}
+    about = {
+        name: getattr(log, name)
+        for name in ("layout", "fins", "method", "controller", "task", "plant", "water")
+    }
     return log_of_ticks(ticks, seed=log.seed, **about)  # type: ignore[attr-defined]
 
 

@@ -14,7 +14,7 @@ from finlab.evaluation.experiments.closed_loop_runs import Row, absolute_error
 from finlab.evaluation.progress import progress
 from finlab.layout import Layout
 from finlab.physics import plant_of
-from finlab.sim import ClosedLoop, FinFault, RunLog, Trajectory
+from finlab.sim import ClosedLoop, FinFault, RunLog, SteadyCurrent, Trajectory
 
 FOUND_WITHIN_S = 3.0
 """Time in which a loss should be found [s]."""
@@ -105,7 +105,12 @@ def swim_losses(
     losses = []
     for seed, layout, fin, at, current in progress(cases, "swim"):
         failures = [] if fin is None else [FinFault(fin, at)]
-        options: dict[str, Any] = {"failures": failures, "current": current, "plant": plant, "seed": seed}
+        options: dict[str, Any] = {
+            "failures": failures,
+            "water": SteadyCurrent(current),
+            "plant": plant,
+            "seed": seed,
+        }
         told = ClosedLoop(layout, allocator, trajectory, **options).run()
         for reports in feedback:
             monitor = TimedMonitor(layout)
