@@ -26,6 +26,7 @@ from finlab.physics.vehicle import STATE_SIZE, Vehicle, complete_body, quaternio
 from finlab.sim.fin_fault import FinFault, names_of
 from finlab.sim.hanging_fin import HangingFins
 from finlab.sim.log import RunLog, Tick, log_of_ticks
+from finlab.sim.perturbed import checked_truth
 from finlab.sim.plants import make_plant
 from finlab.sim.sensors import Sensors, SensorSettings
 from finlab.sim.task import Cruise, Task
@@ -79,13 +80,14 @@ class ClosedLoop:
                 monitor notices.
             monitor: watches the robot, tells the allocator what it finds, and is told what is announced.
             servo_feedback: whether the servos report their motion to the monitor.
-            truth: the robot that really swims, where `layout` is only what the allocator believes of it; it
-                has the same fins.
+            truth: the robot that really swims, such as `perturbed(layout, damping=2.0)`, where `layout` is
+                only what allocator, controller and monitor believe of it; it has the same fins.
             copper_loss: heat in the fins' motors [W/(N m)^2] that counts as `driving_power`.
             seed: of the sensors' noise and of the allocator.
 
         Raises:
-            FinlabError: an unknown fin, plant or kind of failure, or a time that is none.
+            FinlabError: an unknown fin, plant or kind of failure, a time that is none, or a truth that has
+                other fins.
         """
         events = [FinFault(*failure).checked() for failure in failures]
         layout.indices([event.fin for event in events])
@@ -97,7 +99,7 @@ class ClosedLoop:
         self.plant = plant
         self.steady = steady
         self.seed = seed
-        truth = layout if truth is None else truth
+        truth = layout if truth is None else checked_truth(layout, truth)
         self.vehicle = Vehicle(complete_body(truth))
         self.water: Water = Still() if water is None else water
         self.fins = FinMotion(truth)

@@ -1,0 +1,93 @@
+"""The robot that really swims, where its layout is not quite right.
+
+    ClosedLoop(layout, allocator, task, truth=perturbed(layout, damping=2.0))
+
+Controllers, gains and allocators go on believing the layout; only the simulated body and fins are others.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from finlab.errors import LayoutError
+from finlab.layout import Body, Layout
+from finlab.layout.rules import number, numbers
+from finlab.physics.vehicle import Vehicle, complete_body
+
+MOST = 100.0
+"""Largest factor."""
+
+
+def perturbed(
+    layout: Layout,
+    *,
+    damping: float = 1.0,
+    added_mass: float = 1.0,
+    inertia: float = 1.0,
+    buoyancy: float = 1.0,
+    gravity_offset_m: Sequence[float] = (0.0, 0.0, 0.0),
+    ballasted: bool = False,
+    thrust: Mapping[str, float] | None = None,
+) -> Layout:
+    """A layout's robot with some numbers changed; what its body does not say is U-CAT's, as in any swim.
+
+    Args:
+        layout: what is believed.
+        damping: factor of linear and quadratic damping.
+        added_mass: factor of the added mass.
+        inertia: factor of the moments of inertia; the mass stays, and with it the weight.
+        buoyancy: factor of the buoyant force; 1.01 is a robot that rises.
+        gravity_offset_m: where the centre of gravity truly is, as the layout's frame sees it (3,) [m]. Fins
+            and centre of buoyancy stay where they are on the hull, so the robot lies askew.
+        ballasted: whether weights have brought it level again, the centre of buoyancy as far above the true
+            centre of gravity as the layout says.
+        thrust: share of its law's thrust that each named fin gives; fins that are tables take a
+            `FinFault(name, 0.0, "weak", share)` instead.
+
+    Raises:
+        LayoutError: a factor is not above 0, a fin is unknown, or a fin that is a table is to be scaled.
+    """
+    factors = {"damping": damping, "added_mass": added_mass, "inertia": inertia, "buoyancy": buoyancy}
+    for name, factor in factors.items():
+        number(factor, name, high=MOST, positive=True)
+    away = numbers(gravity_offset_m, "gravity_offset_m", 3, -1.0, 1.0)
+    body = complete_body(layout)
+    center = body.center_of_buoyancy_m or (0.0, 0.0, 0.0)
+    changed = replace(
+        body,
+        linear_damping=_scaled(body.linear_damping, damping),
+        quadratic_damping=_scaled(body.quadratic_damping, damping),
+        added_mass=_scaled(body.added_mass, added_mass),
+        inertia_kgm2=_scaled(body.inertia_kgm2, inertia),
+        buoyancy_n=buoyancy * _lift(body),
+        center_of_buoyancy_m=center if ballasted else _moved(center, away),
+    )
+    shares = dict(thrust or {})
+    layout.indices(tuple(shares))
+    fins = []
+    for fin in layout.fins:
+        x, y, z = _moved(fin.position, away)
+        moved = replace(fin, position=(x, y, z))
+        if (share := shares.get(fin.name, 1.0)) != 1.0:
+            moved = replace(moved, model=fin.model.scaled(number(share, fin.name, high=MOST, positive=True)))
+        fins.append(moved)
+    return replace(layout, fins=tuple(fins), body=changed)
+
+
+def checked_truth(layout: Layout, truth: Layout) -> Layout:
+    """The true robot; a `LayoutError` where it does not have the fins of the layout that is believed."""
+    if truth.names != layout.names:
+        known, found = ", ".join(layout.names), ", ".join(truth.names)
+        raise LayoutError(f"truth: expected the fins of {layout.name}, {known}, got {found}")
+    return truth
+
+
+def _scaled(values: Sequence[float] | None, factor: float) -> tuple[float, ...] | None:
+    return None if values is None else tuple(factor * value for value in values)
+
+
+def _moved(point: Sequence[float], away: Sequence[float]) -> tuple[float, ...]:
+    return tuple(a - b for a, b in zip(point, away, strict=True))
+
+
+def _lift(body: Body) -> float:
+    return Vehicle(body).lift

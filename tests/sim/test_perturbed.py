@@ -1,0 +1,83 @@
+"""Robots that are not as their layouts say."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from finlab.allocation.allocator import Allocator
+from finlab.errors import LayoutError
+from finlab.layout import FinModelSpec, Layout, load_layout
+from finlab.physics import plant_of
+from finlab.physics.vehicle import Vehicle, complete_body, euler
+from finlab.sim import NO_NOISE, ClosedLoop, make_trajectory, perturbed
+
+
+def test_nothing_changed_is_the_same_robot(layout_a: Layout) -> None:
+    same = perturbed(layout_a)
+    assert same.fins == layout_a.fins
+    believed, true = Vehicle(complete_body(layout_a)), Vehicle(complete_body(same))
+    rng = np.random.default_rng(0)
+    state, wrench = rng.standard_normal(13).tolist(), rng.standard_normal(6).tolist()
+    assert true.derivative(state, wrench) == believed.derivative(state, wrench)
+
+
+def test_each_factor_scales_what_it_names(layout_a: Layout) -> None:
+    true = complete_body(perturbed(layout_a, damping=2.0, added_mass=0.7, inertia=1.3, buoyancy=1.01))
+    body = complete_body(layout_a)
+    for key, factor in (
+        ("linear_damping", 2.0),
+        ("quadratic_damping", 2.0),
+        ("added_mass", 0.7),
+        ("inertia_kgm2", 1.3),
+    ):
+        np.testing.assert_allclose(getattr(true, key), factor * np.array(getattr(body, key)))
+    assert Vehicle(true).lift == pytest.approx(1.01 * Vehicle(body).lift) and true.mass_kg == body.mass_kg
+
+
+def test_weight_elsewhere_is_felt_by_fins_and_buoyancy(layout_a: Layout) -> None:
+    """A robot whose weight lies 2 cm ahead hangs with its nose down, its buoyancy above its weight."""
+    true = perturbed(layout_a, gravity_offset_m=(0.02, 0.0, 0.0))
+    np.testing.assert_allclose(true.position, layout_a.position - (0.02, 0.0, 0.0))
+    height = complete_body(layout_a).center_of_buoyancy_m[2]  # type: ignore[index]
+    vehicle, state = Vehicle(complete_body(true)), np.zeros(13)
+    state[3] = 1.0
+    for _ in range(6000):
+        state = vehicle.step(state, [0.0] * 6, 0.02)
+    pitch = euler(state[3:7])[1]
+    assert pitch == pytest.approx(math.atan2(0.02, height), abs=5e-3), "positive with the nose down"
+    level = perturbed(layout_a, gravity_offset_m=(0.02, 0.0, 0.0), ballasted=True)
+    assert complete_body(level).center_of_buoyancy_m == complete_body(layout_a).center_of_buoyancy_m
+    np.testing.assert_allclose(level.position, true.position)
+
+
+def test_a_torn_fin_gives_a_share_of_its_thrust(layout_a: Layout) -> None:
+    true = perturbed(layout_a, thrust={"back_left": 0.7})
+    command = np.tile([0.4, 1.2, 0.5], (4, 1))
+    share = np.linalg.norm(plant_of(true).forces(command), axis=1)
+    share /= np.linalg.norm(plant_of(layout_a).forces(command), axis=1)
+    expected = np.where(np.arange(4) == layout_a.index("back_left"), 0.7, 1.0)
+    np.testing.assert_allclose(share, expected)
+
+
+def test_the_robot_swims_otherwise_than_believed(layout_a: Layout, analytic: Allocator) -> None:
+    paths = []
+    for truth in (None, perturbed(layout_a, damping=2.0)):
+        loop = ClosedLoop(layout_a, analytic, make_trajectory("circle", 20.0), sensors=NO_NOISE, truth=truth)
+        paths.append(loop.run().position)
+    assert np.abs(paths[0] - paths[1]).max() > 0.05
+
+
+def test_what_makes_no_sense_is_refused(layout_a: Layout, analytic: Allocator) -> None:
+    for wrong in ({"damping": 0.0}, {"buoyancy": math.nan}, {"thrust": {"front_left": -0.1}}):
+        with pytest.raises(LayoutError):
+            perturbed(layout_a, **wrong)  # type: ignore[arg-type]
+    with pytest.raises(LayoutError, match="no fin 'tail'"):
+        perturbed(layout_a, thrust={"tail": 0.5})
+    measured = replace(layout_a.fins[0], model=FinModelSpec("table", (("path", "x.csv"),)))
+    table = replace(layout_a, fins=(measured, *layout_a.fins[1:]))
+    with pytest.raises(LayoutError, match="table cannot be scaled"):
+        perturbed(table, thrust={"front_right": 0.5})
+    with pytest.raises(LayoutError, match="truth: expected the fins of A"):
+        ClosedLoop(layout_a, analytic, make_trajectory("circle"), truth=load_layout("pair"))
