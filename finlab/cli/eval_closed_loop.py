@@ -22,7 +22,7 @@ def trajectory(
 
     Args:
         layouts: names or files with commas between.
-        trajectory: circle, lissajous, square, or a CSV file with the columns t, x, y, z.
+        trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
     """
     from finlab.evaluation.experiments import trajectory_and_velocity as experiment
     from finlab.evaluation.plots.closed_loop_experiments import draw_layouts, track_of
@@ -47,7 +47,7 @@ def faults(
 
     Args:
         layout: layout file or the name of a shipped layout.
-        trajectory: circle, lissajous, square, or a CSV file with the columns t, x, y, z.
+        trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
     """
     from finlab.cli.inputs import open_robot
     from finlab.evaluation.experiments.faults import all_faults, fault_rows, fault_scenarios
@@ -109,7 +109,7 @@ def monitor(
 
     Args:
         layouts: names or files with commas between.
-        trajectory: circle, lissajous, square, or a CSV file with the columns t, x, y, z.
+        trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
         method: the allocator.
         plant: how the fins' forces are simulated; see finlab simulate --help.
         seed: the first seed of times, currents and noise.

@@ -39,7 +39,7 @@ def simulate(
 
     Args:
         layout: layout file, layout graph file, or the name of a shipped layout.
-        trajectory: circle, lissajous, square, or a CSV file with the columns t, x, y, z.
+        trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
         excite: shake every axis and fin on the spot instead, for at most 300 s, within bounds of depth and
             attitude; `finlab fit robot` learns the robot from the log.
         fail: a fin and when it is lost, such as front_left@30; or what else becomes of it:

@@ -1,4 +1,4 @@
-"""What a robot is to do: follow a path over time (circle, lissajous, square, or from a file) or cruise."""
+"""What a robot is to do: follow a path over time, shipped or from a file, keep a place, or cruise."""
 
 import csv
 import math
@@ -84,8 +84,8 @@ class Trajectory:
 
     def setpoint(self, time: float) -> Setpoint:
         """The position at `time` [s] and the speed there."""
-        ahead, behind = self.position(time + STEP_S / 2), self.position(time - STEP_S / 2)
-        return Setpoint(self.position(time), float(np.linalg.norm(ahead - behind)) / STEP_S)
+        here, ahead, behind = self.position(np.array([time, time + STEP_S / 2, time - STEP_S / 2]))
+        return Setpoint(here, float(np.linalg.norm(ahead - behind)) / STEP_S)
 
     def start(self) -> tuple[Array, float]:
         """The first position, and the heading of the first horizontal metre or of what there is."""
@@ -165,7 +165,25 @@ def square(duration_s: float = 90.0) -> Trajectory:
     return Trajectory("square", np.array(time), path)
 
 
-SHIPPED: dict[str, Callable[..., Trajectory]] = {"circle": circle, "lissajous": lissajous, "square": square}
+def dive(duration_s: float = 60.0) -> Trajectory:
+    """Straight ahead for 6 m, down from 1 m to 2 m and up again, at slopes of up to 28 degrees."""
+    time, share = _eased(duration_s)
+    depth = 1.0 + 0.5 * (1.0 - np.cos(2 * math.pi * share))
+    return Trajectory("dive", time, np.stack([6.0 * share, np.zeros_like(share), -depth], axis=-1))
+
+
+def station(duration_s: float = 60.0) -> Trajectory:
+    """Stay where it began, at 1 m depth."""
+    return Trajectory("station", np.array([0.0, duration_s]), np.tile([0.0, 0.0, -1.0], (2, 1)))
+
+
+SHIPPED: dict[str, Callable[..., Trajectory]] = {
+    "circle": circle,
+    "lissajous": lissajous,
+    "square": square,
+    "dive": dive,
+    "station": station,
+}
 """Trajectories by name; each takes its duration [s]."""
 
 
@@ -173,7 +191,7 @@ def make_trajectory(source: str | Path, duration_s: float | None = None) -> Traj
     """A shipped trajectory by name, or one from a file.
 
     Args:
-        source: circle, lissajous, square, or a CSV file with the columns t, x, y, z.
+        source: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
         duration_s: time for a shipped one [s]; a file brings its own.
 
     Raises:

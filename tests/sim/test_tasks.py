@@ -21,6 +21,16 @@ def test_shipped_trajectories_start_gently_and_stay_slow(name: str) -> None:
     np.testing.assert_allclose(path.position(path.duration_s + 9.0), path.samples[-1])
 
 
+def test_a_dive_goes_down_and_up_again_and_a_station_nowhere() -> None:
+    down = make_trajectory("dive").samples
+    assert down[:, 2].max() == pytest.approx(-1.0) and down[:, 2].min() == pytest.approx(-2.0, abs=1e-3)
+    assert down[0, 2] == pytest.approx(down[-1, 2]) and down[-1, 0] == pytest.approx(6.0)
+    step = np.diff(down, axis=0)
+    assert np.degrees(np.arctan2(np.abs(step[:, 2]), step[:, 0])).max() == pytest.approx(27.6, abs=0.1)
+    place = make_trajectory("station", 30.0)
+    assert place.length_m == 0.0 and place.setpoint(12.0).surge == 0.0 and place.duration_s == 30.0
+
+
 def test_a_file_of_positions(tmp_path: Path) -> None:
     file = tmp_path / "line.csv"
     file.write_text("z, t, x, y\n-1,0,0,0\n-1,10,1,2\n")
@@ -48,7 +58,7 @@ def test_bad_files_are_one_sentence(tmp_path: Path, content: str, message: str) 
 
 
 def test_unknown_names_and_durations(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="circle, lissajous, square or a CSV file"):
+    with pytest.raises(DataError, match="circle, lissajous, square, dive, station or a CSV file"):
         make_trajectory("spiral")
     with pytest.raises(DataError, match="12 to 3600"):
         make_trajectory("circle", 1.0)
