@@ -52,6 +52,7 @@ class FinMotion:
         self._value = np.zeros((3, layout.n_fins))
         self._value[2] = 0.5 * (lower + upper)
         self._rate = np.zeros((3, layout.n_fins))
+        self._change = np.zeros((3, layout.n_fins))
         self.phase = np.zeros(layout.n_fins)
         """Phase of the flapping [rad]."""
         self._dt = math.nan
@@ -82,6 +83,7 @@ class FinMotion:
         if some_lost:
             value[:2, lost], value[2, lost], rate[:, lost] = 0.0, before[2, lost], 0.0
         self.phase = np.mod(self.phase + (0.5 * TURN * dt) * (before[1] + value[1]), TURN)
+        self._change = (rate - self._rate) / dt
         self._value, self._rate = value, rate
 
     @property
@@ -135,14 +137,19 @@ class FinMotion:
             + self.amplitude * swing * np.cos(self.phase)
         )
 
-    @property
-    def acceleration(self) -> Array:
-        """The fins' angular accelerations [rad/s^2], those of the flapping; turning adds little."""
-        swing, faster = TURN * self.frequency, TURN * self._rate[1]
-        cosine = np.cos(self.phase)
-        beating = 2 * self.amplitude_rate * cosine - self.amplitude * swing * np.sin(self.phase)
-        acceleration: Array = swing * beating + self.amplitude * faster * cosine
-        return acceleration
+    def speed_and_acceleration(self) -> tuple[Array, Array]:
+        """The fins' angular speeds [rad/s] and accelerations [rad/s^2], those of servos that change their aim
+        as means over the last step."""
+        sine, cosine = np.sin(self.phase), np.cos(self.phase)
+        swing = TURN * self._value[1]
+        fast, growth = self._value[0] * swing, self._rate[0]
+        speed = self._rate[2] + growth * sine + fast * cosine
+        acceleration = (
+            self._change[2]
+            + (self._change[0] - fast * swing) * sine
+            + (2.0 * growth * swing + (TURN * self._value[0]) * self._rate[1]) * cosine
+        )
+        return speed, acceleration
 
 
 class FinPower(NamedTuple):
@@ -160,7 +167,7 @@ class FinPower(NamedTuple):
 def fin_power(motion: FinMotion, blade: Blade, copper_loss: float = COPPER_LOSS) -> FinPower:
     """The power of fins as they move now; the torque is that of a rigid plate in still water, and
     `copper_loss` the heat in its motor [W/(N m)^2]."""
-    speed, acceleration = motion.speed, motion.acceleration
+    speed, acceleration = motion.speed_and_acceleration()
     torque = blade.inertia * acceleration + blade.drag * speed * np.abs(speed)
     mechanical = np.maximum(torque * speed, 0.0)
     inertial = np.abs(blade.own_inertia * acceleration * speed)

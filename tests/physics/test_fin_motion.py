@@ -102,6 +102,21 @@ def test_a_lost_fin_stops_where_it_is(pair: Layout) -> None:
     assert motion.direction[0] == 0.8
 
 
+def test_accelerations_are_those_of_the_speed(pair: Layout) -> None:
+    """Fins that beat, grow, gather speed and turn at once."""
+    motion, dt = flapping(pair, 0.2, 1.0, 0.3), 1e-4
+    command = np.array([[0.5, 1.7, 1.8], [0.1, 0.4, -0.9]])
+    angles, speeds, found = [], [], []
+    for _ in range(3000):
+        motion.step(command, dt)
+        speed, acceleration = motion.speed_and_acceleration()
+        np.testing.assert_allclose(speed, motion.speed)
+        angles.append(motion.angle), speeds.append(speed), found.append(acceleration)
+    np.testing.assert_allclose(np.diff(angles, axis=0)[5:] / dt, speeds[6:], atol=0.02)
+    np.testing.assert_allclose(np.diff(speeds, axis=0)[5:] / dt, found[6:], atol=0.1)
+    assert np.abs(found).max() > 20.0
+
+
 def test_mean_power_is_what_a_sinusoid_has(pair: Layout) -> None:
     """Mean of |I alpha omega| over a cycle: I A^2 (2 pi f)^3 / pi; the others have closed forms, too."""
     amplitude, frequency = 0.4, 1.25
