@@ -140,10 +140,13 @@ class Vehicle:
         """Velocity relative to the water and angular rates (6,) of a state, body frame [m/s, rad/s]."""
         velocity = state[7:].copy()
         if any(self.current):
-            w, axis, current = state[3], state[4:7], np.array(self.current)
+            w, x, y, z = state[3:7].tolist()
+            cx, cy, cz = self.current
             # The current as the body sees it: turned by the conjugate quaternion.
-            across = 2.0 * np.cross(current, axis)
-            velocity[:3] -= current + w * across - np.cross(axis, across)
+            ax, ay, az = 2 * (cy * z - cz * y), 2 * (cz * x - cx * z), 2 * (cx * y - cy * x)
+            velocity[0] -= cx + w * ax - (y * az - z * ay)
+            velocity[1] -= cy + w * ay - (z * ax - x * az)
+            velocity[2] -= cz + w * az - (x * ay - y * ax)
         return velocity
 
     def step(self, state: Array, wrench: Sequence[float], dt: float) -> Array:

@@ -48,8 +48,9 @@ class MeanForce:
     def step(self, motion: FinMotion, dt: float, water: Array = STILL) -> Array:
         command = motion.command
         command[:, 2] = wrapped(command[:, 2])
-        result = self._plant.forces(command)
-        result[(motion.amplitude <= 0.0) | (motion.frequency <= 0.0)] = 0.0
+        result = self._plant.force(command)
+        # One that does not beat gives nothing, whatever its law.
+        result *= ((command[:, 0] > 0.0) & (command[:, 1] > 0.0))[:, None]
         return result
 
 

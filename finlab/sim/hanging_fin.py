@@ -9,6 +9,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Layout
+from finlab.layout.arrays import force_columns
 from finlab.physics import plant_of
 
 DRAG_COEFFICIENT = 1.2
@@ -23,9 +24,8 @@ class HangingFins:
         """Takes the true robot."""
         blade = plant_of(layout).blade
         self._resistance = 0.5 * blade.density * DRAG_COEFFICIENT * blade.width * blade.length
-        self._position = layout.position
-        cosine, sine = np.cos(layout.mounting_angle), np.sin(layout.mounting_angle)
-        self._horizontal = np.stack([-sine, cosine, np.zeros_like(sine)], axis=-1)
+        # What a newton does to the robot is what the robot's motion does to the fin's foot.
+        self._foot = force_columns(layout.position, layout.mounting_angle)[:, 1:]
 
     def force(self, direction: Array, water: Array) -> Array:
         """Force (n, 3) [N] of each fin in its own frame (shaft, e_h, e_z), as if all hung still.
@@ -34,11 +34,9 @@ class HangingFins:
             direction: zero directions (n,) at which they hang [rad].
             water: how the robot moves through the water (6,) [m/s, rad/s], body frame.
         """
-        speed = water[:3] + np.cross(water[3:], self._position)
         # Across the plate, which lies along the shaft and the zero direction.
         normal = np.stack([-np.sin(direction), np.cos(direction)], axis=-1)
-        along = np.stack([(speed * self._horizontal).sum(axis=-1), speed[:, 2]], axis=-1)
-        across = (along * normal).sum(axis=-1)
+        across = (self._foot @ water * normal).sum(axis=-1)
         force = np.zeros((len(direction), 3))
         force[:, 1:] = (-self._resistance * across * np.abs(across))[:, None] * normal
         return force

@@ -14,7 +14,6 @@ from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.physics.fin_motion import FinMotion
-from finlab.physics.wrench import body_force
 from finlab.sim.fin_force import STILL, MeanForce
 
 MOST = 0.4
@@ -29,14 +28,13 @@ class InflowForce:
     def __init__(self, layout: Layout) -> None:
         self._mean = MeanForce(layout)
         self.columns = self._mean.columns
-        self._position, self._angle = layout.position, layout.mounting_angle
         self._length = plant_of(layout).blade.length
 
     def step(self, motion: FinMotion, dt: float, water: Array = STILL) -> Array:
         force = self._mean.step(motion, dt, water)
-        along = body_force(force, self._angle)
-        along /= np.maximum(np.linalg.norm(along, axis=-1), 1e-9)[:, None]
-        speed = np.einsum("nk,nk->n", water[:3] + np.cross(water[3:], self._position), along)
+        # What a newton does to the robot is what the robot's motion does to the fin's foot.
+        foot = self.columns @ water
+        speed = (foot * force).sum(axis=-1) / np.maximum(np.linalg.norm(force, axis=-1), 1e-9)
         tip = 2 * math.pi * motion.frequency * motion.amplitude * self._length
         result: Array = force * (1.0 - MOST * np.tanh(speed / np.maximum(tip, 1e-3)))[:, None]
         return result
