@@ -106,7 +106,7 @@ class FaultMonitor:
         beliefs.predict(step, self.period_s)
         besides = None
         if reported is not None:
-            besides = report_evidence(reported, self._expected(), other, len(LEVELS) + 1)
+            besides = report_evidence(reported, self._expected(reported), other, len(LEVELS) + 1)
         beliefs.update(seen, m.velocity is last, besides)
         self._judge(other)
         return self.verdict()
@@ -167,9 +167,10 @@ class FaultMonitor:
         self._since += fresh[:, -1] * (turn - TURN * np.round(turn / TURN))
         return np.where(np.isnan(self._held), self._since, np.nan)
 
-    def _expected(self) -> Array:
-        """What the fins should do (n, 3) if they are what they are taken for."""
+    def _expected(self, reported: Array) -> Array:
+        """What the fins should do (n, 3) if they are what they are taken for, whichever way they turn."""
         expected = self._model.fins.motion.copy()
+        expected[:, 2] = np.where(self._model.unsure, reported[:, 2], expected[:, 2])
         expected[:, 2] = np.where(np.isnan(self._held), expected[:, 2], self._held)
         return expected
 
@@ -179,10 +180,14 @@ class FaultMonitor:
         if self._weak.any():
             strength = beliefs.strength
             gone = self._weak & (strength < LOST_BELOW)
-            if (self._lost | gone).sum() < self.layout.n_fins:
+            if gone.any() and (self._lost | gone).sum() < self.layout.n_fins:
                 self._lost |= gone
                 self._weak &= ~gone
+                for fin in np.flatnonzero(gone):
+                    beliefs.believe(int(fin), 0.0)
             self._weak &= strength < WHOLE_ABOVE
+        if beliefs.doubt < self.settings.threshold:
+            return
         by_kind = beliefs.probability
         total = by_kind.sum(axis=1)
         fin = int(total.argmax())

@@ -45,8 +45,11 @@ class Hypotheses:
         self.state = np.zeros(size)
         """State z (14 + n) that is taken for true."""
         self.state[STRENGTH] = 1.0
-        self.off: Array = np.zeros((n_fins, len(LEVELS) + 1, size))
+        m = len(LEVELS) + 1
+        self._rows: Array = np.zeros((1 + n_fins * m, size))
+        self.off: Array = self._rows[1:].reshape(n_fins, m, size)
         """How the states of the beliefs differ from it (n, m, 14 + n)."""
+        self._strengths_off: Array = np.einsum("iki->ik", self.off[:, :, STRENGTH])
         variance = np.zeros(size)
         variance[MOTION] = variance[TILT] = 1e-4
         variance[CURRENT], variance[TORQUE] = s.current**2, s.torque**2
@@ -59,9 +62,12 @@ class Hypotheses:
         motion = np.array([s.force_noise**2] * 3 + [s.torque_noise**2] * 3) / inertia**2
         self._noise, self._motion_noise = noise, motion
         self._sensors = np.diag([s.velocity_noise**2] * 3 + [s.rate_noise**2] * 3 + [s.tilt_noise**2] * 2)
+        self._slow_sensors = self._sensors[3:, 3:].copy()
         self._most = np.full(n_fins, s.strength**2)
-        self.probability: Array = np.zeros((n_fins, len(LEVELS) + 1))
+        self.probability: Array = np.zeros((n_fins, m))
         """Probability (n, m) of each belief."""
+        self.doubt = 0.0
+        """Their sum: how likely it is that what is taken for true is not."""
         self._age_s = 0.0
         self.misfit = 1.0
         """How many times as much (a variance) the motion is disturbed as the settings say, at least 1."""
@@ -79,14 +85,11 @@ class Hypotheses:
         often = np.full(jump.shape[1], (1.0 - LOSSES) / (jump.shape[1] - 1))
         often[0] = LOSSES
         self._rate = np.where(possible, self.settings.failures * often, 0.0)
+        self._any = float(self._rate.sum())
         self.off[:] = 0.0
-        self._strengths_off()[:] = jump
+        self._strengths_off[:] = jump
         self.probability = self._rate * self.settings.doubt_s
-
-    def _strengths_off(self) -> Array:
-        """The part (n, m) of `off` that is about the strength of the fin in question; a view."""
-        view: Array = np.einsum("iki->ik", self.off[:, :, STRENGTH])
-        return view
+        self.doubt = float(self.probability.sum())
 
     def feed(self, dt: float) -> Array:
         """What is taken for true may have ended just now; returns how much (n, m) of each belief is new."""
@@ -94,27 +97,32 @@ class Hypotheses:
         if self._age_s < self.settings.settle_s:
             self._settle()
             return np.ones_like(self.probability)
-        new = self._rate * (dt * (1.0 - self.probability.sum()))
-        self.probability *= 1.0 - dt / self.settings.doubt_s
+        fresh, kept = dt * (1.0 - self.doubt), 1.0 - dt / self.settings.doubt_s
+        new = self._rate * fresh
+        self.probability *= kept
         self.probability += new
+        self.doubt = self.doubt * kept + self._any * fresh
         share: Array = new / np.maximum(self.probability, 1e-300)
         self.off *= (1.0 - share)[:, :, None]
-        self._strengths_off()[:] += share * self._jump
+        self._strengths_off += share * self._jump
         return share
 
     def predict(self, step: Step, dt: float) -> None:
         """All beliefs over one period."""
-        turned = self.strength + self._strengths_off()[:, -1]
+        turned = self.strength + self._strengths_off[:, -1]
         forward = step.transition.T
-        self.state, self.off = step.state, self.off @ forward
+        self.state = step.state
+        self._rows[:] = self._rows @ forward
         self.off[:, -1, MOTION] += turned[:, None] * step.turned
         self.covariance = step.transition @ self.covariance @ forward
+        if step.noise is not None:
+            self.covariance[MOTION, MOTION] += step.noise
         variance = self.covariance.ravel()[:: len(self.state) + 1]
         variance += self._noise * (dt * min(self.misfit, MOST_FREEDOM))
         variance[MOTION] += self._motion_noise * (self.misfit * dt)
-        excess = variance[STRENGTH] / (self._most * min(self.misfit, MOST_FREEDOM))
-        if excess.max() > 1.0:
-            scale = 1.0 / np.sqrt(np.maximum(excess, 1.0))
+        most = self._most * min(self.misfit, MOST_FREEDOM)
+        if (variance[STRENGTH] > most).any():
+            scale = np.sqrt(np.minimum(most / variance[STRENGTH], 1.0))
             self.covariance[:, STRENGTH] *= scale
             self.covariance[STRENGTH] *= scale[:, None]
 
@@ -123,28 +131,30 @@ class Hypotheses:
 
         `besides` holds the logarithms (n, m) of what else speaks for each belief.
         """
-        rows = slice(3 if slow else 0, 8)
-        covariance = self.covariance
-        inverse = np.linalg.inv(covariance[rows, rows] + self._sensors[rows, rows])
-        gain = covariance[:, rows] @ inverse
-        missed = seen[rows] - self.state[rows]
-        others = missed - self.off[:, :, rows]
-        distance = (others @ inverse * others).sum(axis=-1)
-        self.distance = float(missed @ inverse @ missed)
+        rows, sensors = (slice(3, 8), self._slow_sensors) if slow else (slice(0, 8), self._sensors)
+        seen_by = self.covariance[rows]
+        inverse = np.linalg.inv(seen_by[:, rows] + sensors)
+        missed = (seen - self.state[:8])[rows] - self._rows[:, rows]  # the first is of what is taken for true
+        weighted = missed @ inverse
+        distance = np.einsum("ij,ij->i", weighted, missed)
+        self.distance = float(distance[0])
         # Where fins are not what the model says, even the best belief is far off: trust it less.
-        least = min(float(distance.min()), self.distance)
-        surprise = min(least / len(inverse), MOST_SURPRISE) - EXPECTED_SURPRISE
+        surprise = min(float(distance.min()) / len(inverse), MOST_SURPRISE) - EXPECTED_SURPRISE
         self.misfit = min(max(self.misfit * math.exp(ADAPTING * surprise), 1.0), MOST_MISFIT)
-        self.state = self.state + gain @ missed
-        self.off -= self.off[:, :, rows] @ gain.T
-        left = covariance - gain @ covariance[rows]
+        correction = weighted @ seen_by
+        self.state = self.state + correction[0]
+        correction -= correction[0]
+        self._rows += correction
+        left = self.covariance - seen_by.T @ (inverse @ seen_by)
         self.covariance = 0.5 * (left + left.T)  # what rounding makes uneven would grow
-        better = 0.5 * (self.distance - distance)
+        better = (0.5 * (self.distance - distance[1:])).reshape(self.probability.shape)
         if besides is not None:
             better += besides
         best = max(float(better.max()), 0.0)
         weight = self.probability * np.exp(better - best)
-        self.probability = weight / (weight.sum() + (1.0 - self.probability.sum()) * math.exp(-best))
+        total = float(weight.sum())
+        whole = total + (1.0 - self.doubt) * math.exp(-best)
+        self.probability, self.doubt = weight / whole, total / whole
 
     @property
     def strength(self) -> Array:

@@ -15,6 +15,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.control.nominal_lag import NominalLag
 from finlab.layout import Body, Layout
+from finlab.layout.angles import is_full_turn
 from finlab.physics import plant_of
 from finlab.physics.vehicle import Vehicle, complete_body
 
@@ -22,6 +23,10 @@ MOTION, TILT, CURRENT, TORQUE = slice(0, 6), slice(6, 8), slice(8, 11), slice(11
 FIRST_FIN = 14
 STRENGTH = slice(FIRST_FIN, None)
 """Where what is in the state."""
+ABOUT_FACE = -0.9
+"""Cosine of the angle to a direction below which a fin that is told to turn there may go either way round."""
+UNSURE_S = 1.2
+"""How long its direction is unknown then [s]."""
 
 
 class Step(NamedTuple):
@@ -30,10 +35,12 @@ class Step(NamedTuple):
     state: Array
     """The state (14 + n) at the end of the period."""
     transition: Array
-    """Its derivatives (14 + n, 14 + n) by the state at the beginning, but for the couplings between axes and
-    Munk's moments, which small differences hardly feel."""
+    """Its derivatives (14 + n, 14 + n) by the state at the beginning, but for what two rates do together and
+    for heeling out of the level."""
     turned: Array
     """What the velocities (n, 6) gain besides if one fin points the other way, at strength 1."""
+    noise: Array | None = None
+    """Covariance (6, 6) of what the velocities gain besides while a fin may turn either way round."""
 
 
 class MotionModel:
@@ -47,26 +54,29 @@ class MotionModel:
         self.inertia = np.array(self._vehicle.inertia)
         """Mass and moments (6,), those of the water that goes along included [kg, kg m^2]."""
         zeros = (0.0,) * 6
-        self._linear = np.array(body.linear_damping or zeros) / self.inertia
-        self._quadratic = 2.0 * np.array(body.quadratic_damping or zeros) / self.inertia
+        self._linear, self._quadratic = body.linear_damping or zeros, body.quadratic_damping or zeros
         self._dt = period_s
         self.fins = NominalLag(layout, period_s)
         """What the fins do, if they follow their commands."""
         size = FIRST_FIN + layout.n_fins
-        self._one = np.eye(size)
-        self._slopes = np.zeros((size, size))
-        self._slopes[range(3, 6), range(11, 14)] = 1.0 / self.inertia[3:]
+        self._constant = np.eye(size)
+        self._constant[range(3, 6), range(11, 14)] = period_s / self.inertia[3:]
+        self._gain = period_s / self.inertia
         height = (body.center_of_buoyancy_m or zeros)[2]
         # Roll swings within a second: an oscillation over a period is a turn, and a step along it would grow.
         # (Of a robot that is heavy at the top the frequency is imaginary, and the cosine a hyperbolic one.)
         swing = np.sqrt(self._vehicle.lift * height / self.inertia[3:5] + 1e-9j)
         sine, cosine = np.sin(swing * period_s), np.cos(swing * period_s)
-        self._slopes[range(3, 5), range(6, 8)] = (-swing * sine).real / period_s
-        self._slopes[range(6, 8), range(3, 5)] = (sine / swing).real / period_s
-        self._slopes[range(6, 8), range(6, 8)] = (cosine.real - 1.0) / period_s
-        self._swing = np.zeros(6)
-        self._swing[3:5] = (cosine.real - 1.0) / period_s
+        self._constant[range(3, 5), range(6, 8)] = (-swing * sine).real
+        self._constant[range(6, 8), range(3, 5)] = (sine / swing).real
+        self._constant[range(6, 8), range(6, 8)] = cosine.real
+        self._swing = tuple(cosine.real.tolist())
         self._force = np.zeros((2, layout.n_fins, 6))
+        self._thrust = np.zeros((layout.n_fins, 3))
+        self._turns_fully = is_full_turn(layout.upper[:, 2] - layout.lower[:, 2])
+        self._unsure_s = np.zeros(layout.n_fins)
+        self.unsure = self._unknown = np.zeros(layout.n_fins, dtype=bool)
+        """Which fins (n,) were told to turn about just now, so that nobody knows which way round they go."""
 
     def step(
         self, state: Array, yaw: float, command: Array, reported: Array | None, held: Array, other: Array
@@ -81,28 +91,49 @@ class MotionModel:
             held: zero directions (n,) that are believed [rad]; NaN where fins turn as commanded.
             other: zero directions (n,) as they might be instead [rad]; NaN likewise.
         """
-        dt = self._dt
         wrench, turned = self._wrenches(command, reported, held, other)
+        motion, current = state[MOTION].tolist(), state[CURRENT].tolist()
         roll, pitch = state[TILT].tolist()
-        quaternion = _quaternion(roll, pitch, yaw - dt * float(state[5]))
+        quaternion = _quaternion(roll, pitch, yaw - self._dt * motion[5])
         rotation = _rotation(*quaternion)
-        motion, current = state[MOTION], state[CURRENT]
-        self._vehicle.current = tuple(current.tolist())
+        self._vehicle.current = tuple(current)
         thrust = state[STRENGTH] @ wrench
         thrust[3:] += state[TORQUE]
-        moved = self._carried([0.0, 0.0, 0.0, *quaternion, *motion.tolist()], thrust.tolist())
+        moved = self._carried([0.0, 0.0, 0.0, *quaternion, *motion], thrust.tolist())
         after = state.copy()
         after[:8] = (*moved[7:], *_tilt(*moved[3:7]))
-        flow = motion.copy()
-        flow[:3] -= current @ rotation
-        damping = -np.expm1(-dt * (self._linear + self._quadratic * np.abs(flow))) / dt
-        slopes = self._slopes.copy()
-        slopes.ravel()[: 6 * len(slopes) : len(slopes) + 1] = self._swing - damping
-        slopes[:3, CURRENT] = damping[:3, None] * rotation.T
-        slopes[MOTION, STRENGTH] = (wrench / self.inertia).T
-        slopes *= dt
-        slopes += self._one
-        return Step(after, slopes, dt / self.inertia * turned)
+        gained = wrench * self._gain
+        transition = self._constant.copy()
+        by_flow = np.array(self._by_flow(motion, (np.array(current) @ rotation).tolist()))
+        transition[MOTION, MOTION] += by_flow
+        transition[MOTION, CURRENT] = by_flow[:, :3] @ -rotation.T
+        transition[MOTION, STRENGTH] = gained.T
+        return Step(after, transition, self._gain * turned, self._either_way())
+
+    def _by_flow(self, motion: list[float], current: list[float]) -> list[list[float]]:
+        """What velocities and rates gain over a period (6, 6) per unit of velocity in the water and of rate.
+
+        Damping, Coriolis' forces and Munk's moments: unknown water that streams past turns the robot.
+        """
+        u, v, w, p, q, r = *(a - b for a, b in zip(motion[:3], current, strict=True)), *motion[3:]
+        mx, my, mz, ix, iy, iz = inertia = self._vehicle.inertia
+        dt = self._dt
+        # A damping that is strong over a period brings to rest, not beyond it.
+        dx, dy, dz, dp, dq, dr = (
+            math.expm1(-dt * (a + 2.0 * b * abs(c)) / m)
+            for a, b, c, m in zip(self._linear, self._quadratic, (u, v, w, p, q, r), inertia, strict=True)
+        )
+        kx, ky, kz = dt / mx, dt / my, dt / mz
+        roll, pitch, yaw = dt * (my - mz) / ix, dt * (mz - mx) / iy, dt * (mx - my) / iz
+        sx, sy = self._swing
+        return [
+            [dx, kx * my * r, -kx * mz * q, 0.0, -kx * mz * w, kx * my * v],
+            [-ky * mx * r, dy, ky * mz * p, ky * mz * w, 0.0, -ky * mx * u],
+            [kz * mx * q, -kz * my * p, dz, -kz * my * v, kz * mx * u, 0.0],
+            [0.0, roll * w, roll * v, sx - 1.0 + dp, 0.0, 0.0],
+            [pitch * w, 0.0, pitch * u, 0.0, sy - 1.0 + dq, 0.0],
+            [yaw * v, yaw * u, 0.0, 0.0, 0.0, dr],
+        ]
 
     def _carried(self, body: list[float], wrench: list[float]) -> list[float]:
         """A body's state (13,) after the period, by the midpoint rule in plain floats, which are fast."""
@@ -114,18 +145,35 @@ class MotionModel:
         self, command: Array, reported: Array | None, held: Array, other: Array
     ) -> tuple[Array, Array]:
         """Wrench (n, 6) of each fin at full strength, mean over the period, and what it gains turned."""
+        facing = np.cos(command[:, 2] - self.fins.direction) < ABOUT_FACE
         does = self.fins.step(command)
+        self._unsure_s -= self._dt
+        self._unsure_s[facing & self._turns_fully] = UNSURE_S
+        self.unsure = self._unsure_s > 0.0
+        self._unknown = self.unsure
         if reported is not None:
-            does = np.where(np.isnan(reported), does, reported)
+            silent = np.isnan(reported)
+            does = np.where(silent, does, reported)
+            self._unknown = self.unsure & silent[:, 2]
         both = np.empty((2, *does.shape))
         both[:] = does
         directions = np.array([held, other])
         np.copyto(both[:, :, 2], directions, where=~np.isnan(directions))
         force = self._plant.force(both)
         force *= does[:, :1] * does[:, 1:2] > 0.0  # one that does not beat gives nothing, whatever its law
+        self._thrust = force[0]
         now = np.matmul(force[:, :, None, :], self._plant.columns)[:, :, 0]
         mean, self._force = 0.5 * (self._force + now), now
         return mean[0], mean[1] - mean[0]
+
+    def _either_way(self) -> Array | None:
+        """What the velocities may gain besides (6, 6), a covariance, by fins that were told to turn about."""
+        if not self._unknown.any():
+            return None
+        most = 2.0 * np.linalg.norm(self._thrust[self._unknown], axis=-1)
+        gained = (most[:, None, None] * self._plant.columns[self._unknown, 1:] * self._gain).reshape(-1, 6)
+        noise: Array = gained.T @ gained
+        return noise
 
 
 def _quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
