@@ -71,10 +71,12 @@ class FaultMonitor:
         self.settings = MonitorSettings() if settings is None else settings
         self._model = MotionModel(layout, body, period_s)
         self._beliefs = Hypotheses(layout.n_fins, self._model.inertia, self.settings)
-        self._probe = Probe(layout, self.settings.probe_every_s, period_s)
+        self._probe = Probe(layout, self.settings, period_s)
         n = layout.n_fins
         self._weak = np.zeros(n, dtype=bool)
         self._lost = np.zeros(n, dtype=bool)
+        self._told = np.zeros(n, dtype=bool)
+        self._silent = True
         self._held = np.full(n, np.nan)
         self._since = self._model.fins.direction.copy()
         self._coarse = np.ones(n)
@@ -98,6 +100,7 @@ class FaultMonitor:
         beliefs, m = self._beliefs, measurement
         seen = np.array([*m.velocity.tolist(), *m.rates.tolist(), m.roll, m.pitch])
         last, self._velocity = self._velocity, m.velocity
+        self._silent = reported is None
         if last is None or command is None:
             beliefs.state[:8] = seen
             return self.verdict()
@@ -114,20 +117,26 @@ class FaultMonitor:
     def tell(self, name: str, strength: float = 1.0, stuck: float = math.nan) -> Verdict:
         """Somebody knows what has become of a fin: its strength, and where it is stuck [rad] if it is.
 
+        A fin that is said to be lost is left alone until somebody says otherwise: no probe moves it.
+
         Raises:
             LayoutError: there is no fin of that name.
         """
         fin = self.layout.index(name)
         self._beliefs.believe(fin, strength)
         self._mark(fin, strength, stuck)
+        self._told[fin] = self._lost[fin]
         return self.verdict()
 
     def probed(self, command: Array) -> Array:
-        """The command (n, 3) with a short, small beat now and then of fins that are taken for lost.
+        """The command (n, 3) with what keeps the fins known.
 
-        A lost fin gives nothing by it; of one that has been repaired the robot feels it, and takes it back.
+        Now and then a fin that the monitor has called lost beats for two seconds: if it gives nothing by it,
+        it is lost, and of one that has been repaired the robot feels it, and takes it back. Where servos do
+        not report, fins that all but rest push a little, see `MonitorSettings.least_push`.
         """
-        return self._probe.added(command, self._lost, self._model.fins.direction)
+        lost, direction = self._lost & ~self._told, self._model.fins.direction
+        return self._probe.added(command, lost, direction, steadily=self._silent)
 
     def verdict(self) -> Verdict:
         """What is believed now."""
@@ -183,8 +192,8 @@ class FaultMonitor:
             if gone.any() and (self._lost | gone).sum() < self.layout.n_fins:
                 self._lost |= gone
                 self._weak &= ~gone
-                for fin in np.flatnonzero(gone):
-                    beliefs.believe(int(fin), 0.0)
+                for index in np.flatnonzero(gone):
+                    beliefs.believe(int(index), 0.0)
             self._weak &= strength < WHOLE_ABOVE
         if beliefs.doubt < self.settings.threshold:
             return
@@ -199,6 +208,7 @@ class FaultMonitor:
         if level == 0.0 and self._lost.sum() == self.layout.n_fins - 1:
             return  # the last one that works
         beliefs.adopt(fin, kind)
+        self._told[fin] = False
         self._mark(fin, level, float(other[fin]) if turned else float(self._held[fin]))
 
     def _mark(self, fin: int, strength: float, stuck: float) -> None:

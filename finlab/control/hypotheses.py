@@ -11,7 +11,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.control.monitor_settings import MonitorSettings
-from finlab.control.motion_model import CURRENT, FIRST_FIN, MOTION, STRENGTH, TILT, TORQUE, Step
+from finlab.control.motion_model import CURRENT, FIRST_FIN, MOTION, RISING, STRENGTH, TILT, TORQUE, Step
 
 LEVELS = (0.0, 0.35, 0.7, 1.0)
 """Strengths that a fin may suddenly have."""
@@ -56,8 +56,10 @@ class Hypotheses:
         variance[STRENGTH] = s.strength**2
         self.covariance = np.diag(variance)
         """Covariance (14 + n, 14 + n) of each."""
+        variance[RISING] = s.rising_current**2
         noise = np.zeros(size)
         noise[CURRENT], noise[TORQUE] = s.current_drift**2, s.torque_drift**2
+        noise[RISING] *= (s.rising_current / s.current) ** 2
         noise[STRENGTH] = s.strength_drift**2
         motion = np.array([s.force_noise**2] * 3 + [s.torque_noise**2] * 3) / inertia**2
         self._noise, self._motion_noise = noise, motion

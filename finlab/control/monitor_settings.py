@@ -21,6 +21,8 @@ class MonitorSettings:
     """Of the current that is expected [m/s]."""
     current_drift: float = 0.002
     """Of its change [m/s], per root of a second."""
+    rising_current: float = 0.01
+    """The same of a current that rises or sinks [m/s]; its drift is as much smaller."""
     torque: float = 0.03
     """Of a torque that stays [N m]."""
     torque_drift: float = 0.005
@@ -39,5 +41,8 @@ class MonitorSettings:
     """Time at the start in which current and trim are learnt and nothing is suspected [s]."""
     probe_every_s: float = 20.0
     """Time after which a fin that is taken for lost is tried again [s]; 0 for never."""
+    least_push: float = 0.5
+    """Force [N] that every fin gives at least, up or down where it is told to rest, so that its loss shows; 0
+    for none. Only where servos do not report. Costs power, where fins would rest."""
     threshold: float = 0.995
     """Probability of a fin's failure from which it is acted on."""

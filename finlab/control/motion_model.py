@@ -20,6 +20,7 @@ from finlab.physics import plant_of
 from finlab.physics.vehicle import Vehicle, complete_body
 
 MOTION, TILT, CURRENT, TORQUE = slice(0, 6), slice(6, 8), slice(8, 11), slice(11, 14)
+RISING = 10
 FIRST_FIN = 14
 STRENGTH = slice(FIRST_FIN, None)
 """Where what is in the state."""

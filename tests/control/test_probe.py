@@ -1,0 +1,73 @@
+"""Pushes that keep fins known: of those that all but rest, and of those that are taken for lost."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from finlab.control import FaultMonitor, Measurement, MonitorSettings
+from finlab.control.probe import FORCE_N, Probe
+from finlab.layout import Layout
+from finlab.physics import plant_of
+
+LEAST = MonitorSettings().least_push
+NONE = np.zeros(4, dtype=bool)
+
+
+def forces(layout: Layout, command: np.ndarray) -> np.ndarray:
+    return plant_of(layout).forces(command)[:, 1:]
+
+
+def test_fins_that_all_but_rest_push_up_and_down(layout_a: Layout) -> None:
+    probe = Probe(layout_a, MonitorSettings(), 0.1)
+    command = np.array([[0.5, 1.5, 0.2], [0.5, 0.3, 0.0], [np.nan] * 3, [0.5, 0.2, 1.0]])
+    before = forces(layout_a, command)
+    after = forces(layout_a, probe.added(command, NONE, np.zeros(4), steadily=True))
+    np.testing.assert_array_equal(after[[0, 2]], before[[0, 2]])
+    for fin in (1, 3):
+        assert np.linalg.norm(before[fin]) < LEAST
+        assert np.linalg.norm(after[fin]) == pytest.approx(LEAST, rel=0.05)
+        assert after[fin, 0] == pytest.approx(before[fin, 0], abs=0.02), "what it pushes ahead is kept"
+    assert after[1, 1] * after[3, 1] < 0.0, "together they lift little"
+    command[1, 2] = np.pi  # now it is told to push astern: the side stays
+    again = forces(layout_a, probe.added(command, NONE, np.zeros(4), steadily=True))
+    np.testing.assert_allclose(again[1], after[1] * [-1.0, 1.0], atol=1e-6)
+
+
+def test_no_push_where_none_is_wanted(layout_a: Layout) -> None:
+    command = np.tile([0.5, 0.3, 0.0], (4, 1))
+    none = Probe(layout_a, replace(MonitorSettings(), least_push=0.0), 0.1)
+    assert none.added(command, NONE, np.zeros(4), steadily=True) is command
+    assert Probe(layout_a, MonitorSettings(), 0.1).added(command, NONE, np.zeros(4)) is command
+    still = Measurement(0.0, np.zeros(3), 0.0, np.zeros(3), 0.0, np.zeros(3), 0.0, 0.0)
+    monitor = FaultMonitor(layout_a)
+    assert (monitor.probed(command) != command).any()
+    monitor.step(still, command, np.zeros((4, 3)))
+    assert monitor.probed(command) is command, "servos that report give fins at rest away"
+
+
+def test_a_lost_fin_is_probed_unless_somebody_said_that_it_is_lost(layout_a: Layout) -> None:
+    settings = replace(MonitorSettings(), probe_every_s=3.0, least_push=0.0)
+    command = np.tile([0.5, 1.0, 0.0], (4, 1))
+    command[2] = np.nan
+    told = FaultMonitor(layout_a, settings=settings)
+    told.tell(layout_a.names[2], 0.0)
+    found = FaultMonitor(layout_a, settings=settings)
+    found._lost[2] = True
+    beats = [np.isfinite(found.probed(command)[2, 0]) for _ in range(90)]
+    assert beats == [30 <= k % 60 < 50 or k >= 60 and k < 80 for k in range(1, 91)]
+    assert all(np.isnan(told.probed(command)[2, 0]) for _ in range(90))
+    for _ in range(30):
+        probed = found.probed(command)
+    push = forces(layout_a, probed)[2]
+    assert push[1] == pytest.approx(FORCE_N, rel=0.05) and abs(push[0]) < 1e-9
+
+
+def test_a_push_stays_within_the_fins_arc(layout_a: Layout) -> None:
+    narrow = replace(layout_a.fins[0].limits, zero_direction=(-0.4, 0.6))
+    layout = replace(layout_a, fins=(replace(layout_a.fins[0], limits=narrow), *layout_a.fins[1:]))
+    probe = Probe(layout, MonitorSettings(), 0.1)
+    command = np.tile([0.5, 0.2, 0.0], (4, 1))
+    for _ in range(3):
+        pushed = probe.added(command, NONE, np.zeros(4), steadily=True)
+        assert (pushed >= layout.lower - 1e-12).all() and (pushed <= layout.upper + 1e-12).all()
