@@ -208,12 +208,13 @@ class _Linear:
             begin[k, 1 + n + k] += DIFFERENCE * START_DEVIATION[k]
         bodies = Bodies(*(part[..., None] for part in model.bodies(unknowns, vectors)))
         state = integrate(begin, wrench, bodies, STEP_S)
-        residual = _residual(windows, state[:, :, 0], deviation)
+        sensed = model.sensed(unknowns, vectors, state)
+        residual = _residual(windows, sensed[:, :, 0], deviation)
         weighted = _clipped(residual)
         with np.errstate(invalid="ignore"):  # an outlier pulls with constant force
             weight = np.where(np.abs(weighted) > CLIP, CLIP / np.abs(weighted), 1.0) / deviation[:, None]
         known = np.isfinite(residual)
-        slopes = (state[:, :, 1:] - state[:, :, :1]) / DIFFERENCE
+        slopes = (sensed[:, :, 1:] - sensed[:, :, :1]) / DIFFERENCE
         slopes *= np.where(known, weight, 0.0)[:, :, None]
         left = np.where(known, weighted, 0.0)
         by = np.moveaxis(slopes, (2, 3), (0, 1)).reshape(n + 12, w, -1).swapaxes(0, 1)  # (W, n + 12, L 12)
@@ -264,10 +265,11 @@ def _wrenches(model: RobotModel, unknowns: Unknowns, windows: Windows, vectors: 
 
 
 def _simulated(model: RobotModel, unknowns: Unknowns, windows: Windows, vector: Array, start: Array) -> Array:
-    """States (L, 12, W)."""
+    """What sensors see of simulated states (L, 12, W)."""
     wrench = _wrenches(model, unknowns, windows, vector[None])[:, :, 0]
     with np.errstate(all="ignore"):  # a step too far may make a robot take off
-        return integrate(start, wrench, model.bodies(unknowns, vector[None]), STEP_S)
+        state = integrate(start, wrench, model.bodies(unknowns, vector[None]), STEP_S)
+        return model.sensed(unknowns, vector[None], state[:, :, None])[:, :, 0]
 
 
 def _residual(windows: Windows, state: Array, deviation: Array) -> Array:

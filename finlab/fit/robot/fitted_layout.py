@@ -25,8 +25,9 @@ GRID = (17, 17, 16)
 """Amplitudes, frequencies and zero directions of a fin that becomes a table."""
 STRENGTH = {"drag": "drag_coefficient", "soft": "k"}
 """Parameter of a fin's model that its thrust is proportional to."""
-LEANS = (3.0, 0.01)
-"""Standard errors, and angle [rad], from which a fin's lean counts."""
+LEANS = (3.0, 0.03)
+"""Standard errors, and angle [rad], from which a fin's lean counts; an IMU that is mounted askew looks like a
+smaller one."""
 LEAST_SHARE = 0.005
 """Smallest share of a jet that is worth its line."""
 

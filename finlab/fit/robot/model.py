@@ -6,9 +6,9 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.fit.robot.equations import Bodies
-from finlab.fit.robot.swim import Swim
+from finlab.fit.robot.swim import STEP_S, Swim
 from finlab.fit.robot.swing import swing_forces
-from finlab.fit.robot.unknowns import Unknowns, blocks_of
+from finlab.fit.robot.unknowns import SENSORS, Unknowns, blocks_of
 from finlab.layout import Layout
 from finlab.layout.arrays import force_columns
 from finlab.physics import plant_of
@@ -60,6 +60,8 @@ class RobotModel:
         self._beat = np.concatenate([swing_forces(layout, swim.command) for swim in swims])
         self.velocity = np.zeros((len(self.motion), 6))
         """How the robot moved through the water (M, 6) [m/s, rad/s], as far as is known."""
+        self.late = [0] * len(SENSORS)
+        """Whole steps by which each sensor is late, as far as is known."""
 
     def shape_terms(self, command: Array) -> Array:
         """Terms (..., 5) of the logarithm of a fin's true law over the layout's, for commands (..., 3): a
@@ -112,6 +114,18 @@ class RobotModel:
             (self.center + unknowns.of("buoyancy", vectors)).T,
             unknowns.of("current", vectors).T,
         )
+
+    def sensed(self, unknowns: Unknowns, vectors: Array, state: Array) -> Array:
+        """What late sensors say of states (L, 12, B, W) of L steps under B vectors (B, size): where the robot
+        was `late` steps before, and from there on along its slope."""
+        slope, said, step = np.gradient(state, STEP_S, axis=0), np.empty_like(state), np.arange(len(state))
+        delays = unknowns.of("delay", vectors).T
+        for delay, late, channels in zip(delays, self.late, SENSORS.values(), strict=True):
+            before = np.clip(step - late, 0, len(state) - 1)
+            rest = delay - STEP_S * (step - before)[:, None]
+            for k in channels:
+                said[:, k] = state[before, k] - rest[..., None] * slope[before, k]
+        return said
 
 
 def leaned(force: Array, lean: Array) -> Array:

@@ -14,7 +14,7 @@ from finlab.errors import DataError
 from finlab.fit.robot.equations import body_velocity
 from finlab.fit.robot.estimate import DEVIATION, Fitted, Windows, cut, fit_windows, unseen_gains
 from finlab.fit.robot.model import RobotModel
-from finlab.fit.robot.swim import ANGLES, CHANNELS, Swim, smoothed
+from finlab.fit.robot.swim import ANGLES, CHANNELS, STEP_S, Swim, smoothed
 from finlab.fit.robot.unknowns import BASE, RESIDUAL, Unknowns
 from finlab.layout import Layout
 
@@ -87,9 +87,10 @@ class RobotFit:
         return self.fitted.unknowns.part(name, self.error)
 
     def untold(self) -> tuple[str, ...]:
-        """What the data cannot tell: nearly as doubtful as before."""
-        labels = self.fitted.unknowns.labels
-        return tuple(label for label, error in zip(labels, self.error, strict=True) if error > UNTOLD)
+        """What the data cannot tell of the robot: nearly as doubtful as before."""
+        unknowns, error = self.fitted.unknowns, self.error
+        error[unknowns.place("delay")] = 0.0  # of the sensors, and no part of a layout
+        return tuple(label for label, own in zip(unknowns.labels, error, strict=True) if own > UNTOLD)
 
     def doubts(self) -> tuple[str, ...]:
         """Why the fit should not be trusted; empty where it may."""
@@ -138,10 +139,10 @@ def fit_robot(layout: Layout, swims: Sequence[Swim], tried: Sequence[str] = RESI
         fitted = fit_windows(model, unknowns, windows, deviation, vector, start)
         vector, start = fitted.vector, fitted.start
         deviation = _deviation(fitted, deviation)
-        _keep_velocity(model, fitted, windows)
+        _keep_motion(model, fitted, windows)
     fitted, deviation, trials = _with_what_helps(model, windows, deviation, fitted, tried)
     deviation = _deviation(fitted, deviation)
-    _keep_velocity(model, fitted, windows)
+    _keep_motion(model, fitted, windows)
     fitted = fit_windows(model, fitted.unknowns, windows, deviation, fitted.vector, fitted.start)
     if not np.isfinite(fitted.vector).all():
         raise DataError(f"{swims[0].name}: the fit goes astray; is the layout that of the robot that swam?")
@@ -168,7 +169,7 @@ def _with_what_helps(
         for _ in range(ROUNDS):
             fitted = fit_windows(model, unknowns, windows, deviation, vector, fitted.start)
             vector, deviation = fitted.vector, _deviation(fitted, deviation)
-            _keep_velocity(model, fitted, windows)
+            _keep_motion(model, fitted, windows)
     return fitted, deviation, tuple(trials)
 
 
@@ -189,8 +190,9 @@ def _deviation(fitted: Fitted, deviation: Array) -> Array:
     return np.asarray(np.clip(found, DEVIATION_RANGE[0] * DEVIATION, DEVIATION_RANGE[1] * DEVIATION))
 
 
-def _keep_velocity(model: RobotModel, fitted: Fitted, windows: Windows) -> None:
-    """Tells the model how the robot moved through the water, by the simulated swim."""
+def _keep_motion(model: RobotModel, fitted: Fitted, windows: Windows) -> None:
+    """Tells the model how the robot moved through the water in the simulated swim, how late sensors are."""
+    model.late = [round(float(delay) / STEP_S) for delay in fitted.unknowns.of("delay", fitted.vector)]
     # Backwards, since what fills up a window repeats its last step.
     steps, states = windows.step.T[::-1], fitted.state[::-1].swapaxes(1, 2)
     model.velocity[steps] = states[..., 6:]

@@ -48,8 +48,9 @@ def replay(layout: Layout, command: Array) -> Array:
     motion = np.empty((len(command), SUBSTEPS, *command.shape[1:]))
     for k, row in enumerate(command):
         for s in range(SUBSTEPS):
-            fins.step(row, STEP_S / SUBSTEPS)
+            fins.step(row, 0.5 * STEP_S / SUBSTEPS)
             motion[k, s] = fins.command
+            fins.step(row, 0.5 * STEP_S / SUBSTEPS)
     return motion
 
 

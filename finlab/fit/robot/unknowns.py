@@ -12,11 +12,19 @@ AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 """Names of the body's axes of motion."""
 BASE = (
     *("strength", "mounting", "lean", "center", "bias"),
-    *("buoyancy", "lift", "current", "inertia", "linear", "quadratic"),
+    *("buoyancy", "lift", "current", "inertia", "linear", "quadratic", "delay"),
 )
 """Blocks that every fit looks for."""
 RESIDUAL = ("beat", "shape", "jets", "inflow")
 """What is looked for besides, where it helps: forces within the beat, another law of thrust, jets, inflow."""
+
+SENSORS = {
+    "position and heading": (0, 1, 5),
+    "depth": (2,),
+    "attitude and rates": (3, 4, 9, 10, 11),
+    "velocity": (6, 7, 8),
+}
+"""What comes from one sensor, and is late together: channels of a swim."""
 
 SAME_SCALE = 0.003
 """How far the common scale of all inertia may be off, as a share."""
@@ -73,6 +81,7 @@ def blocks_of(names: Sequence[str], damping: Array) -> dict[str, Block]:
         block("inertia", [f"inertia with water in {axis}, logarithm" for axis in AXES], 0.1, "", False),
         block("linear", [f"linear damping in {axis}" for axis in AXES], damping[0], "N s/m, N m s", False),
         block("quadratic", [f"quadratic damping in {axis}" for axis in AXES], damping[1], "", False),
+        block("delay", [f"delay of {sensor}" for sensor in SENSORS], 0.05, "s", False),
         block("beat", [f"force within the beat, {k}" for k in range(1, 15)], 1.0, ""),
         block("shape", [f"thrust by {name}" for name in shape], (0.5, 0.5, 0.3, 0.3, 0.3), ""),
         block("jets", [*jets, *form], np.array([0.15] * len(jets) + [0.7, 0.4]), ""),

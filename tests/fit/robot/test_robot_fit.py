@@ -90,6 +90,21 @@ def test_the_hull_moves_with_the_centre(fit: RobotFit, tmp_path: Path) -> None:
     np.testing.assert_allclose(fitted.body.hull.center_m, -CENTER, atol=0.004)
 
 
+def test_late_sensors_are_found_out(drawn: Layout, truth: Layout) -> None:
+    command, measured = swim(truth, 60.0, seed=1)
+    late = measured.copy()
+    late[2:, 6:9] = measured[:-2, 6:9]
+    late[1:, [0, 1, 5]] = measured[:-1, [0, 1, 5]]
+    made = Swim("late", replay(drawn, command)[2:], late[2:], command[2:], True)
+    found = fit_robot(drawn, [made], tried=())
+    delay, error = found.part("delay"), found.part_error("delay")
+    assert delay is not None and error is not None
+    # The made-up swims themselves take forces from the ends of steps of 0.02 s.
+    np.testing.assert_array_less(np.abs(delay - [0.1, 0.0, 0.0, 0.2]), np.maximum(4.0 * error, 0.02))
+    for name, (strength, own) in strengths(found).items():
+        assert strength == pytest.approx(STRENGTH[name], abs=max(4.0 * own, 0.02))
+
+
 def test_a_fin_that_never_works_is_said_to_be_unknown(drawn: Layout) -> None:
     lost = replace(drawn, fins=tuple(fin for i, fin in enumerate(drawn.fins) if i != 1))
     command, measured = swim(lost, 60.0, seed=2)

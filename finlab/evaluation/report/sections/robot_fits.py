@@ -46,8 +46,9 @@ def robot_fit_blocks(rows: Sequence[Row], layout: str, targets: int, runs: int) 
         ),
         Table(ERRORS, rows),
         (
-            f"Closed loops: {runs} circles from rest with each layout that the allocator believes in, and "
-            "intervals in which the ratios of another seed should land. Under way: the depth from 15 s on."
+            f"Closed loops: {runs} circles from rest with each layout that the allocator believes, sensors "
+            "with noise alone, and intervals in which the ratios of another seed should land. Under way: the "
+            "depth from 15 s on."
         ),
         Table(LOOPS, loops),
     ]
