@@ -101,6 +101,7 @@ def monitor(
     plant: Name = "mean",
     seed: Count = 0,
     seeds: Count = 4,
+    whole: Count = 0,
     run: Annotated[MethodRun, arg(name="")] = RUN,
 ) -> None:
     """Lose each fin while swimming without telling the allocator; how soon and how surely a monitor finds it.
@@ -114,15 +115,25 @@ def monitor(
         plant: how the fins' forces are simulated; see finlab simulate --help.
         seed: the first seed of times, currents and noise.
         seeds: how many; each loses every fin of every layout once, and swims once without a loss.
+        whole: more seeds without a loss, for the false alarms: with four layouts ten make an hour.
     """
     from finlab.cli.inputs import check_positive
     from finlab.evaluation.experiments.fault_monitoring import monitoring_rows, swim_losses
     from finlab.evaluation.report.sections.fault_monitoring import monitoring_blocks
     from finlab.sim import make_trajectory
 
-    check_positive(seeds=seeds)
+    check_positive(seeds=seeds, whole=whole or None)
     robots, path = open_layouts(layouts), make_trajectory(trajectory)
-    losses = swim_losses(robots, path, run.method(method), range(seed, seed + seeds), plant=plant)
+    end = seed + seeds
+    losses = swim_losses(
+        robots,
+        path,
+        run.method(method),
+        range(seed, end),
+        plant=plant,
+        whole_seeds=range(end, end + whole),
+    )
     rows = monitoring_rows(losses)
     about = f"{path.name} of {path.duration_s:.0f} s by {method}; plant {plant}; {seeds} seeds from {seed}."
+    about += f" Besides, {whole} seeds of whole swims." if whole else ""
     run.show(*monitoring_blocks(rows), about, rows=rows)

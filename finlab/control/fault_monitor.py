@@ -20,6 +20,8 @@ LOST_BELOW = 0.2
 """A strength below which a fin is given up as lost."""
 WHOLE_ABOVE = 0.9
 """A strength from which a fin that was weak is whole again."""
+HOLD_S = 0.2
+"""A belief is acted on once it has been certain for so long [s]: a single odd sample decides nothing."""
 COARSE = 0.05
 """The allocator is told of strengths in steps of this size, so that it need not think anew at every tick."""
 
@@ -77,6 +79,7 @@ class FaultMonitor:
         self._lost = np.zeros(n, dtype=bool)
         self._told = np.zeros(n, dtype=bool)
         self._silent = True
+        self._suspect, self._sure = 0, 0
         self._held = np.full(n, np.nan)
         self._since = self._model.fins.direction.copy()
         self._coarse = np.ones(n)
@@ -195,12 +198,13 @@ class FaultMonitor:
                 for index in np.flatnonzero(gone):
                     beliefs.believe(int(index), 0.0)
             self._weak &= strength < WHOLE_ABOVE
-        if beliefs.doubt < self.settings.threshold:
-            return
         by_kind = beliefs.probability
         total = by_kind.sum(axis=1)
         fin = int(total.argmax())
-        if total[fin] < self.settings.threshold:
+        sure = float(total[fin]) >= self.settings.threshold
+        self._sure = (self._sure + 1 if fin == self._suspect else 1) if sure else 0
+        self._suspect = fin
+        if self._sure * self.period_s < HOLD_S - 1e-9:
             return
         kind = int(by_kind[fin].argmax())
         turned = kind == len(LEVELS)

@@ -23,9 +23,9 @@ class MonitorSettings:
     """Of its change [m/s], per root of a second."""
     rising_current: float = 0.01
     """The same of a current that rises or sinks [m/s]; its drift is as much smaller."""
-    torque: float = 0.03
-    """Of a torque that stays [N m]."""
-    torque_drift: float = 0.005
+    torque: float = 0.1
+    """Of a torque that stays [N m]; what a tilt sensor that sits askew makes of the hull's weight is one."""
+    torque_drift: float = 0.003
     """Of its change [N m], per root of a second."""
     strength: float = 0.05
     """Of the strength of a whole or a lost fin, and the most that is ever unknown of one that rests."""
@@ -44,5 +44,5 @@ class MonitorSettings:
     least_push: float = 0.5
     """Force [N] that every fin gives at least, up or down where it is told to rest, so that its loss shows; 0
     for none. Only where servos do not report. Costs power, where fins would rest."""
-    threshold: float = 0.995
-    """Probability of a fin's failure from which it is acted on."""
+    threshold: float = 0.97
+    """Probability of a fin's failure from which it is acted on, if it holds for two tenths of a second."""

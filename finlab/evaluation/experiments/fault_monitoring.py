@@ -56,7 +56,7 @@ class Loss(NamedTuple):
     ate: float
     """Absolute trajectory error of the whole swim [m]."""
     ate_announced: float
-    """That of the announced loss [m]."""
+    """That of the announced loss [m]; NaN where nothing is lost."""
     tick_ms: float
     """Processor's time of the monitor per tick [ms]."""
 
@@ -82,6 +82,7 @@ def swim_losses(
     seeds: Sequence[int],
     feedback: Sequence[bool] = (False, True),
     plant: str = "mean",
+    whole_seeds: Sequence[int] = (),
 ) -> list[Loss]:
     """Every fin of every layout lost once per seed, at a random time in a random current; and whole swims.
 
@@ -92,12 +93,13 @@ def swim_losses(
         seeds: of times, currents and noise.
         feedback: without and with what servos report.
         plant: how fin forces are simulated.
+        whole_seeds: of more swims without a loss, one per layout, in which false alarms are counted.
     """
     cases = []
-    for seed in seeds:
+    for seed in (*seeds, *whole_seeds):
         rng = np.random.default_rng([seed, 14])
         for layout in layouts:
-            for fin in (None, *layout.names):
+            for fin in (None, *layout.names) if seed in seeds else (None,):
                 at = float(rng.uniform(QUIET_S, trajectory.duration_s - QUIET_S))
                 speed, heading = rng.uniform(0.0, CURRENT_M_S), rng.uniform(0.0, 2 * math.pi)
                 current = (speed * math.cos(heading), speed * math.sin(heading), 0.0)
@@ -111,7 +113,7 @@ def swim_losses(
             "plant": plant,
             "seed": seed,
         }
-        told = ClosedLoop(layout, allocator, trajectory, **options).run()
+        told = None if fin is None else ClosedLoop(layout, allocator, trajectory, **options).run()
         for reports in feedback:
             monitor = TimedMonitor(layout)
             swim = ClosedLoop(
@@ -127,7 +129,7 @@ def swim_losses(
     return losses
 
 
-def _loss(swim: ClosedLoop, monitor: TimedMonitor, fin: str | None, at: float, told: RunLog) -> Loss:
+def _loss(swim: ClosedLoop, monitor: TimedMonitor, fin: str | None, at: float, told: RunLog | None) -> Loss:
     """Swims to the end and counts."""
     names = swim.layout.names
     called: set[str] = set()
@@ -157,7 +159,7 @@ def _loss(swim: ClosedLoop, monitor: TimedMonitor, fin: str | None, at: float, t
         false_alarms=false_alarms,
         whole_s=min(at, swim.time),
         ate=absolute_error(log.position, log.reference),
-        ate_announced=absolute_error(told.position, told.reference),
+        ate_announced=math.nan if told is None else absolute_error(told.position, told.reference),
         tick_ms=1e3 * monitor.spent_s / log.n_ticks,
     )
 

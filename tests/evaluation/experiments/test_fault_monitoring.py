@@ -40,10 +40,11 @@ def test_shares_hours_and_ratios() -> None:
 def test_a_loss_is_swum_beside_an_announced_one(layout_a: Layout, analytic: Allocator) -> None:
     time = np.array([0.0, 24.0])
     line = Trajectory("line", time, np.outer(time, [0.12, 0.0, 0.0]) + [0.0, 0.0, -1.0])
-    losses = swim_losses([layout_a], line, analytic, [1], feedback=[True])
-    assert [loss.fin for loss in losses] == [None, *layout_a.names]
+    losses = swim_losses([layout_a], line, analytic, [1], feedback=[True], whole_seeds=[2])
+    assert [loss.fin for loss in losses] == [None, *layout_a.names, None]
+    assert losses[-1].whole_s == pytest.approx(24.0) and losses[-1].ate != losses[0].ate
     assert all(loss.false_alarms == 0 and loss.tick_ms > 0.0 for loss in losses)
-    assert all(loss.right and loss.found_s < 1.0 for loss in losses[1:])
+    assert all(loss.right and loss.found_s < 1.0 for loss in losses[1:-1])
     assert 0.5 < losses[1].ate / losses[1].ate_announced < 2.0 and losses[1].ate != losses[1].ate_announced
 
 
