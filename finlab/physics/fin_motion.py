@@ -51,6 +51,7 @@ class FinMotion:
         # Half amplitude [rad], frequency [Hz], zero direction [rad] counted on over the seam; rates per s.
         self._value = np.zeros((3, layout.n_fins))
         self._value[2] = 0.5 * (lower + upper)
+        self._before = self._value
         self._rate = np.zeros((3, layout.n_fins))
         self._change = np.zeros((3, layout.n_fins))
         self.phase = np.zeros(layout.n_fins)
@@ -82,9 +83,10 @@ class FinMotion:
         rate[2] = np.minimum(np.maximum(rate[2], -spare), spare)
         if some_lost:
             value[:2, lost], value[2, lost], rate[:, lost] = 0.0, before[2, lost], 0.0
+            before = np.where(lost, value, before)
         self.phase = np.mod(self.phase + (0.5 * TURN * dt) * (before[1] + value[1]), TURN)
         self._change = (rate - self._rate) / dt
-        self._value, self._rate = value, rate
+        self._before, self._value, self._rate = before, value, rate
 
     @property
     def amplitude(self) -> Array:
@@ -120,6 +122,12 @@ class FinMotion:
     def command(self) -> Array:
         """What the fins do now, as a command (n, 3); a copy."""
         command: Array = self._value.T.copy()
+        return command
+
+    @property
+    def mean_command(self) -> Array:
+        """The same as a mean over the last step (n, 3)."""
+        command: Array = 0.5 * (self._before + self._value).T
         return command
 
     @property

@@ -37,7 +37,7 @@ class FinForce(Protocol):
 
 
 class MeanForce:
-    """The fin law of the layout with the motion of now: no ripple."""
+    """The fin law of the layout: no ripple."""
 
     step_s = 0.02
 
@@ -46,7 +46,7 @@ class MeanForce:
         self.columns = self._plant.columns
 
     def step(self, motion: FinMotion, dt: float, water: Array = STILL) -> Array:
-        command = motion.command
+        command = motion.mean_command
         command[:, 2] = wrapped(command[:, 2])
         result = self._plant.force(command)
         # One that does not beat gives nothing, whatever its law.

@@ -72,7 +72,7 @@ def _log(path: Path, layout: Layout) -> Swim:
         raise DataError(f"{path}: expected a row every {STEP_S:g} s, as finlab simulate writes them")
     _check_duration(len(time) * STEP_S, path)
     command, motion = command[:, order], motion[:, order]
-    return Swim(path.name, between(motion, command), only_new(measured), command)
+    return Swim(path.name, between(layout, motion, command), only_new(measured), command)
 
 
 def _check_duration(seconds: float, path: Path) -> None:
