@@ -150,7 +150,7 @@ class FaultMonitor:
         failed: tuple[str, ...] = ()
         health = None
         broken = self._lost | self._weak | stuck
-        if broken.any():
+        if True in broken.tolist():
             names = self.layout.names
             # The last but one belief is a whole fin, the last one of a stuck fin that it turns again.
             whole = by_kind[:, -2] + np.where(stuck, by_kind[:, -1], 0.0)
@@ -189,7 +189,7 @@ class FaultMonitor:
     def _judge(self, other: Array) -> None:
         """Acts on what has become all but certain."""
         beliefs = self._beliefs
-        if self._weak.any():
+        if True in self._weak.tolist():
             strength = beliefs.strength
             gone = self._weak & (strength < LOST_BELOW)
             if gone.any() and (self._lost | gone).sum() < self.layout.n_fins:
@@ -198,6 +198,9 @@ class FaultMonitor:
                 for index in np.flatnonzero(gone):
                     beliefs.believe(int(index), 0.0)
             self._weak &= strength < WHOLE_ABOVE
+        if beliefs.doubt < self.settings.threshold:
+            self._sure = 0
+            return
         by_kind = beliefs.probability
         total = by_kind.sum(axis=1)
         fin = int(total.argmax())

@@ -123,7 +123,7 @@ class Hypotheses:
         variance += self._noise * (dt * min(self.misfit, MOST_FREEDOM))
         variance[MOTION] += self._motion_noise * (self.misfit * dt)
         most = self._most * min(self.misfit, MOST_FREEDOM)
-        if (variance[STRENGTH] > most).any():
+        if True in (variance[STRENGTH] > most).tolist():
             scale = np.sqrt(np.minimum(most / variance[STRENGTH], 1.0))
             self.covariance[:, STRENGTH] *= scale
             self.covariance[STRENGTH] *= scale[:, None]
@@ -139,9 +139,11 @@ class Hypotheses:
         missed = (seen - self.state[:8])[rows] - self._rows[:, rows]  # the first is of what is taken for true
         weighted = missed @ inverse
         distance = np.einsum("ij,ij->i", weighted, missed)
-        self.distance = float(distance[0])
+        # The built-in functions are quicker than numpy's for so few numbers.
+        distances = distance.tolist()
+        self.distance, least = distances[0], min(distances)
         # Where fins are not what the model says, even the best belief is far off: trust it less.
-        surprise = min(float(distance.min()) / len(inverse), MOST_SURPRISE) - EXPECTED_SURPRISE
+        surprise = min(least / len(inverse), MOST_SURPRISE) - EXPECTED_SURPRISE
         self.misfit = min(max(self.misfit * math.exp(ADAPTING * surprise), 1.0), MOST_MISFIT)
         correction = weighted @ seen_by
         self.state = self.state + correction[0]
@@ -152,9 +154,9 @@ class Hypotheses:
         better = (0.5 * (self.distance - distance[1:])).reshape(self.probability.shape)
         if besides is not None:
             better += besides
-        best = max(float(better.max()), 0.0)
+        best = max(0.0, *better.ravel().tolist())
         weight = self.probability * np.exp(better - best)
-        total = float(weight.sum())
+        total = sum(weight.ravel().tolist())
         whole = total + (1.0 - self.doubt) * math.exp(-best)
         self.probability, self.doubt = weight / whole, total / whole
 

@@ -75,7 +75,7 @@ class MotionModel:
         self._force = np.zeros((2, layout.n_fins, 6))
         self._thrust = np.zeros((layout.n_fins, 3))
         self._turns_fully = is_full_turn(layout.upper[:, 2] - layout.lower[:, 2])
-        self._unsure_s = np.zeros(layout.n_fins)
+        self._unsure_s, self._any_unsure = np.zeros(layout.n_fins), False
         self.unsure = self._unknown = np.zeros(layout.n_fins, dtype=bool)
         """Which fins (n,) were told to turn about just now, so that nobody knows which way round they go."""
 
@@ -146,11 +146,13 @@ class MotionModel:
         self, command: Array, reported: Array | None, held: Array, other: Array
     ) -> tuple[Array, Array]:
         """Wrench (n, 6) of each fin at full strength, mean over the period, and what it gains turned."""
-        facing = np.cos(command[:, 2] - self.fins.direction) < ABOUT_FACE
+        facing = (np.cos(command[:, 2] - self.fins.direction) < ABOUT_FACE) & self._turns_fully
         does = self.fins.step(command)
-        self._unsure_s -= self._dt
-        self._unsure_s[facing & self._turns_fully] = UNSURE_S
-        self.unsure = self._unsure_s > 0.0
+        if self._any_unsure or True in facing.tolist():
+            self._unsure_s -= self._dt
+            self._unsure_s[facing] = UNSURE_S
+            self.unsure = self._unsure_s > 1e-9
+            self._any_unsure = True in self.unsure.tolist()
         self._unknown = self.unsure
         if reported is not None:
             silent = np.isnan(reported)
@@ -169,7 +171,7 @@ class MotionModel:
 
     def _either_way(self) -> Array | None:
         """What the velocities may gain besides (6, 6), a covariance, by fins that were told to turn about."""
-        if not self._unknown.any():
+        if not self._any_unsure or not self._unknown.any():
             return None
         most = 2.0 * np.linalg.norm(self._thrust[self._unknown], axis=-1)
         gained = (most[:, None, None] * self._plant.columns[self._unknown, 1:] * self._gain).reshape(-1, 6)
