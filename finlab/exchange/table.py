@@ -56,7 +56,7 @@ def read_csv(path: str | os.PathLike[str]) -> Layout:
 
 
 def write_csv(layout: Layout, path: str | os.PathLike[str]) -> None:
-    """Write every column of every fin; fin models are not part of it.
+    """Write every column of every fin; fin models and servos are not part of it.
 
     Raises:
         LayoutError: the file cannot be written.

@@ -70,7 +70,7 @@ class FinMotion:
             aim[:, lost] = before[:, lost]
         aim[0] = np.minimum(aim[0], self._speed_limit / (TURN * np.maximum(aim[1], 1e-9)))
         turn = aim[2] - before[2]
-        aim[2] = before[2] + np.where(self._turns_fully, turn - TURN * np.round(turn / TURN), turn)
+        aim[2] = before[2] + np.where(self._turns_fully, turn - TURN * np.rint(turn / TURN), turn)
         error = before - aim
         value = aim + lag.kept * error + lag.carried * self._rate
         rate = lag.driven * error + lag.slowed * self._rate
