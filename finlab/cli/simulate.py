@@ -26,7 +26,8 @@ def simulate(
     objective: Literal["power", "effort"] = "power",
     duration: Annotated[float | None, arg(metavar="SECONDS")] = None,
     plant: Annotated[str, arg(metavar="NAME")] = "mean",
-    gains: Annotated[str, arg(metavar="NAME|FILE")] = "waypoint",
+    controller: Literal["waypoint", "tracking"] = "waypoint",
+    gains: Annotated[str | None, arg(metavar="NAME|FILE")] = None,
     current: Annotated[tuple[float, float, float], arg(metavar="VX VY VZ")] = (0.0, 0.0, 0.0),
     waves: Annotated[tuple[float, float], arg(metavar="HEIGHT SECONDS")] = (0.0, 3.0),
     steady: bool = False,
@@ -54,7 +55,10 @@ def simulate(
         plant: what the fins really do: mean (the fin law), ripple (within the flapping cycle), flexible (fins
             with soft tips), wake (fins in each other's jets), inflow (thrust falls with speed) or offset
             (centre of gravity and fins not where the layout says).
-        gains: waypoint, waypoint_paper (proportional terms alone), or a YAML file.
+        controller: waypoint (heads for a point ahead, as in the paper) or tracking (follows velocity and
+            acceleration, learns current and unknown forces; its gains follow from the robot).
+        gains: of the waypoint controller: waypoint, waypoint_paper (proportional terms alone), or a YAML
+            file.
         current: velocity of the water in the world [m/s].
         waves: significant height [m] and peak period [s] of waves that run along the world's x.
         steady: tell the allocator its previous command.
@@ -67,7 +71,13 @@ def simulate(
     from tqdm import tqdm
 
     from finlab.cli.inputs import open_robot
-    from finlab.control import FaultMonitor, WaypointController, WaypointGains, load_gains
+    from finlab.control import (
+        FaultMonitor,
+        TrackingController,
+        WaypointController,
+        WaypointGains,
+        load_gains,
+    )
     from finlab.errors import FinlabError
     from finlab.evaluation.method_specs import load_method_spec
     from finlab.sim import NO_NOISE, ClosedLoop, FinFault, make_trajectory
@@ -88,19 +98,25 @@ def simulate(
         loop = excitation(swum, whole, plant=plant, sensors=sensors, water=water, seed=seed)
         failures = []
     else:
-        controller = WaypointController(load_gains(WaypointGains, gains))
+        if controller == "tracking" and gains is not None:
+            raise FinlabError("--gains: those of the tracking controller follow from the robot; leave it out")
+        pilot = (
+            TrackingController(robot.layout)
+            if controller == "tracking"
+            else WaypointController(load_gains(WaypointGains, gains or "waypoint"))
+        )
         loop = ClosedLoop(
             robot.layout,
             load_method_spec(method, checkpoint, objective),
             make_trajectory(trajectory, duration),
-            controller,
+            pilot,
             plant=plant,
             steady=steady,
             sensors=sensors,
             water=water,
             failures=failures,
             announced=announced,
-            monitor=FaultMonitor(robot.layout, period_s=controller.period_s) if monitor else None,
+            monitor=FaultMonitor(robot.layout, period_s=pilot.period_s) if monitor else None,
             servo_feedback=servo_feedback,
             seed=seed,
         )

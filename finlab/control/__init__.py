@@ -4,9 +4,6 @@ Any object with the shape of `Controller` plugs into `finlab.sim.ClosedLoop`.
 """
 
 from finlab.control.completion import Completion as Completion
-from finlab.control.controllers import Controller as Controller
-from finlab.control.controllers import Measurement as Measurement
-from finlab.control.controllers import Setpoint as Setpoint
 from finlab.control.controllers import VelocityController as VelocityController
 from finlab.control.controllers import WaypointController as WaypointController
 from finlab.control.fault_monitor import FaultMonitor as FaultMonitor
@@ -15,4 +12,11 @@ from finlab.control.gains import WAYPOINT_GAINS as WAYPOINT_GAINS
 from finlab.control.gains import VelocityGains as VelocityGains
 from finlab.control.gains import WaypointGains as WaypointGains
 from finlab.control.gains import load_gains as load_gains
+from finlab.control.measurement import Controller as Controller
+from finlab.control.measurement import Measurement as Measurement
+from finlab.control.measurement import Setpoint as Setpoint
 from finlab.control.monitor_settings import MonitorSettings as MonitorSettings
+from finlab.control.observer import MotionObserver as MotionObserver
+from finlab.control.tracking_controller import TrackingController as TrackingController
+from finlab.control.tracking_controller import TrackingGains as TrackingGains
+from finlab.control.tracking_controller import gains_for as gains_for

@@ -1,69 +1,16 @@
-"""Controllers: measurements and a setpoint in, a wrench out; the paper's two, and odometry."""
+"""The paper's two controllers, of waypoints and of speed, and odometry."""
 
 import math
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from finlab.arrays import Array
 from finlab.control.filters import LowPass, Pid
 from finlab.control.gains import VelocityGains, WaypointGains, load_gains
+from finlab.control.measurement import STILL, Measurement, Setpoint
 from finlab.layout.angles import wrapped
-
-
-class Measurement(NamedTuple):
-    """The newest sample of every sensor. World: z up; body: x forward, y left, z up."""
-
-    time: float
-    """Now [s]; a slow sensor's sample may be older."""
-    position: Array
-    """Position (3,) in the world [m], from the markers that a camera sees."""
-    yaw: float
-    """Heading from the world's x, counter-clockwise [rad], from the same markers."""
-    velocity: Array
-    """Velocity (3,) over ground in the body frame [m/s], from the DVL."""
-    depth: float
-    """Depth below the world's origin, -z [m], from the pressure."""
-    rates: Array
-    """Angular rates (3,) in the body frame [rad/s], from the IMU."""
-    roll: float
-    """Roll [rad], from the IMU."""
-    pitch: float
-    """Pitch [rad], positive with the nose down, from the IMU."""
-
-    def as_array(self) -> Array:
-        """Position, roll, pitch, yaw, velocity and rates side by side (12,), as a log keeps them."""
-        pose = [*self.position[:2], -self.depth, self.roll, self.pitch, self.yaw]
-        return np.array([*pose, *self.velocity, *self.rates])
-
-
-class Setpoint(NamedTuple):
-    """What the robot should do now; a controller takes what it needs."""
-
-    position: Array
-    """Waypoint (3,) in the world [m]; x and y may be NaN where only depth counts."""
-    surge: float
-    """Speed along x [m/s]."""
-
-
-class Controller(Protocol):
-    """Turns measurements into a wrench; called at a fixed rate."""
-
-    name: str
-    """What it is called in logs and tables."""
-    axes: tuple[str, ...]
-    """Axes of the wrench that it commands; the others are to stay as near zero as the fins can hold them."""
-    lead_s: float
-    """How far ahead of now [s] the waypoint should be taken from a trajectory."""
-    period_s: float
-    """Time between calls [s]."""
-
-    def reset(self) -> None:
-        """Forget everything, as before the first call."""
-
-    def wrench(self, measurement: Measurement, setpoint: Setpoint) -> Array:
-        """Returns the wrench (6,) [N, N m] in the body frame."""
-        ...
+from finlab.physics.vehicle import to_world
 
 
 class VelocityController:
@@ -86,7 +33,7 @@ class VelocityController:
         self._surge = Pid(g.surge, g.max_surge, g.period_s)
         self._depth = Pid(g.depth, g.max_heave, g.period_s)
 
-    def wrench(self, measurement: Measurement, setpoint: Setpoint) -> Array:
+    def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array = STILL) -> Array:
         """Returns the wrench (6,) towards the speed and depth asked for [N, N m]."""
         g = self.gains
         surge = self._surge.step(setpoint.surge - self._speed.step(float(measurement.velocity[0])))
@@ -116,7 +63,7 @@ class WaypointController:
         """Forget the pose."""
         self._odometry = Odometry(self.gains.odometry_filter_s, self.gains.climb_filter_s, self.period_s)
 
-    def wrench(self, measurement: Measurement, setpoint: Setpoint) -> Array:
+    def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array = STILL) -> Array:
         """Returns the wrench (6,) towards the waypoint [N, N m]."""
         g = self.gains
         position, heading, climb = self._odometry.step(measurement)
@@ -164,19 +111,18 @@ class Odometry:
         else:
             turned = self._pose.yaw + float(measurement.rates[2]) * self.period_s
             yaw = turned + self._share * float(wrapped(measurement.yaw - turned))
-            moved = self._pose.position + _to_world(measurement, yaw) * self.period_s
+            moved = (
+                self._pose.position
+                + to_world(measurement.velocity, measurement.roll, measurement.pitch, yaw) * self.period_s
+            )
             position = moved + self._share * (seen - moved)
-        climb = self._climb.step(float(_to_world(measurement, yaw)[2]))
+        climb = self._climb.step(
+            float(to_world(measurement.velocity, measurement.roll, measurement.pitch, yaw)[2])
+        )
         self._pose = Pose(position, float(wrapped(yaw)), climb)
         return self._pose
 
 
-def _to_world(measurement: Measurement, yaw: float) -> Array:
-    """The measured velocity (3,) in the world [m/s], turned by roll, pitch and a heading."""
-    u, v, w = measurement.velocity.tolist()
-    cr, sr = math.cos(measurement.roll), math.sin(measurement.roll)
-    cp, sp = math.cos(measurement.pitch), math.sin(measurement.pitch)
-    cy, sy = math.cos(yaw), math.sin(yaw)
-    v, w = cr * v - sr * w, sr * v + cr * w
-    u, w = cp * u + sp * w, -sp * u + cp * w
-    return np.array([cy * u - sy * v, sy * u + cy * v, w])
+def _over_ground(measurement: Measurement, yaw: float) -> Array:
+    """The measured velocity (3,) in the world [m/s], for a heading [rad]."""
+    return to_world(measurement.velocity, measurement.roll, measurement.pitch, yaw)

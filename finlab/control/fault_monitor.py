@@ -7,8 +7,8 @@ import numpy as np
 
 from finlab.allocation.health import Health
 from finlab.arrays import Array
-from finlab.control.controllers import Measurement
 from finlab.control.hypotheses import LEVELS, Hypotheses
+from finlab.control.measurement import Measurement
 from finlab.control.monitor_settings import MonitorSettings
 from finlab.control.motion_model import MotionModel
 from finlab.control.probe import Probe

@@ -52,6 +52,30 @@ def quaternion_of_yaw(yaw: float) -> tuple[float, float, float, float]:
     return (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
 
 
+def quaternion_of(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
+    """The attitude (w, x, y, z) after turns about z, then y, then x [rad]."""
+    cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
+    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
+    cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+def to_world(velocity: Array, roll: float, pitch: float, yaw: float) -> Array:
+    """A velocity in the body frame, the first three of an array, in the world (3,) [m/s]."""
+    u, v, w = velocity[:3].tolist()
+    cr, sr = math.cos(roll), math.sin(roll)
+    cp, sp = math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    v, w = cr * v - sr * w, sr * v + cr * w
+    u, w = cp * u + sp * w, -sp * u + cp * w
+    return np.array([cy * u - sy * v, sy * u + cy * v, w])
+
+
 def euler(quaternion: ArrayLike) -> Array:
     """Roll, pitch, yaw (..., 3) [rad], turned about z, then y, then x; pitch is positive nose down."""
     w, x, y, z = np.moveaxis(np.asarray(quaternion, dtype=np.float64), -1, 0)

@@ -18,6 +18,7 @@ from finlab.control import (
     Verdict,
     WaypointController,
 )
+from finlab.control.nominal_lag import NominalLag
 from finlab.layout import Layout
 from finlab.physics import plant_of
 from finlab.physics.blade import COPPER_LOSS
@@ -94,8 +95,9 @@ class ClosedLoop:
         self.layout = layout
         self.allocator = allocator
         self.task = task
-        usual = VelocityController if isinstance(task, Cruise) else WaypointController
-        self.controller = usual() if controller is None else controller
+        if controller is None:
+            controller = VelocityController() if isinstance(task, Cruise) else WaypointController()
+        self.controller = controller
         self.plant = plant
         self.steady = steady
         self.seed = seed
@@ -121,6 +123,7 @@ class ClosedLoop:
         self._ticks: list[Tick] = []
         self._command: Array | None = None
         self.period_s = self.controller.period_s
+        self._lag, self._gave = NominalLag(layout, self.period_s), np.zeros(6)
         """Length of a step [s]."""
         start, heading = task.start()
         self.state = np.zeros(STATE_SIZE)
@@ -230,9 +233,8 @@ class ClosedLoop:
         if self.monitor is not None:
             reported = self.fins.command if self.servo_feedback else None
             self.verdict = self.monitor.step(now, self._command, reported)
-        asked = self._complete()(
-            self.controller.wrench(now, self.task.setpoint(time + self.controller.lead_s))
-        )
+        setpoint = self.task.setpoint(time + self.controller.lead_s)
+        asked = self._complete()(self.controller.wrench(now, setpoint, self._given()))
         previous = self._command if self.steady else None
         answer = self.allocator.allocate(
             self.layout.moving((*now.velocity, *now.rates)),  # what speed takes from fins, where known
@@ -255,6 +257,15 @@ class ClosedLoop:
         while not self.done:
             self.step()
         return self.log
+
+    def _given(self) -> Array:
+        """Wrench (6,) of the fins over the last period, if they do what they were told [N, N m]."""
+        if self._command is None:
+            return self._gave
+        motion = self._lag.step(self._command)
+        force = self._plant.force(motion) * (motion[:, :1] * motion[:, 1:2] > 0.0)
+        before, self._gave = self._gave, force.ravel() @ self._plant.columns.reshape(-1, 6)
+        return 0.5 * (before + self._gave)
 
     def _complete(self) -> Completion:
         """What completes the controller's wrench for the fins that work now."""

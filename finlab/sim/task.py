@@ -32,7 +32,8 @@ class Cruise:
 
     def setpoint(self, time: float) -> Setpoint:
         """The same at all times."""
-        return Setpoint(np.array([np.nan, np.nan, -self.depth]), self.speed)
+        velocity = np.array([self.speed, 0.0, 0.0])
+        return Setpoint(np.array([np.nan, np.nan, -self.depth]), self.speed, velocity)
 
     def start(self) -> tuple[Array, float]:
         """At depth, heading along x."""
@@ -43,6 +44,8 @@ RAMP_S = 6.0
 """Time in which a shipped trajectory picks up its speed from rest [s]."""
 STEP_S = 0.05
 """Spacing of the samples of a shipped trajectory [s]."""
+SLOPE_S = 0.2
+"""Time on both sides from which a trajectory's velocity and acceleration are taken [s]; files are coarse."""
 SHORTEST_S = 1.0
 """Least duration [s]; ten control periods."""
 MAX_BYTES = 20_000_000
@@ -83,9 +86,11 @@ class Trajectory:
         return np.stack([np.interp(time, self.time, axis) for axis in self.samples.T], axis=-1)
 
     def setpoint(self, time: float) -> Setpoint:
-        """The position at `time` [s] and the speed there."""
-        here, ahead, behind = self.position(np.array([time, time + STEP_S / 2, time - STEP_S / 2]))
-        return Setpoint(here, float(np.linalg.norm(ahead - behind)) / STEP_S)
+        """Position, velocity and acceleration at `time` [s]."""
+        behind, here, ahead = self.position(np.array([time - SLOPE_S, time, time + SLOPE_S]))
+        velocity = (ahead - behind) / (2 * SLOPE_S)
+        speed = math.sqrt(velocity @ velocity)
+        return Setpoint(here, speed, velocity, (ahead - 2 * here + behind) / SLOPE_S**2)
 
     def start(self) -> tuple[Array, float]:
         """The first position, and the heading of the first horizontal metre or of what there is."""

@@ -105,7 +105,7 @@ def test_fins_at_rest_cannot_be_told(layout_a: Layout, analytic: Allocator) -> N
     monitor, fin = FaultMonitor(layout_a), layout_a.index("front_left")
     watch, command = loop.controller.wrench, None
     seen: list[Measurement] = []
-    loop.controller.wrench = lambda m, s: (seen.append(m), watch(m, s))[1]  # type: ignore[func-returns-value, method-assign]
+    loop.controller.wrench = lambda m, s, g: (seen.append(m), watch(m, s, g))[1]  # type: ignore[func-returns-value, method-assign]
     verdicts = []
     while loop.time < 20.0:
         tick = loop.step()

@@ -1,0 +1,75 @@
+"""What controllers are given, and what they are: measurements and a setpoint in, a wrench out."""
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from finlab.arrays import Array
+
+STILL = np.zeros(6)
+"""No wrench."""
+
+
+class Measurement(NamedTuple):
+    """The newest sample of every sensor. World: z up; body: x forward, y left, z up."""
+
+    time: float
+    """Now [s]; a slow sensor's sample may be older."""
+    position: Array
+    """Position (3,) in the world [m], from the markers that a camera sees."""
+    yaw: float
+    """Heading from the world's x, counter-clockwise [rad], from the same markers."""
+    velocity: Array
+    """Velocity (3,) over ground in the body frame [m/s], from the DVL."""
+    depth: float
+    """Depth below the world's origin, -z [m], from the pressure."""
+    rates: Array
+    """Angular rates (3,) in the body frame [rad/s], from the IMU."""
+    roll: float
+    """Roll [rad], from the IMU."""
+    pitch: float
+    """Pitch [rad], positive with the nose down, from the IMU."""
+
+    def as_array(self) -> Array:
+        """Position, roll, pitch, yaw, velocity and rates side by side (12,), as a log keeps them."""
+        pose = [*self.position[:2], -self.depth, self.roll, self.pitch, self.yaw]
+        return np.array([*pose, *self.velocity, *self.rates])
+
+
+class Setpoint(NamedTuple):
+    """What the robot should do now; a controller takes what it needs."""
+
+    position: Array
+    """Waypoint (3,) in the world [m]; x and y may be NaN where only depth counts."""
+    surge: float
+    """Speed along x [m/s]."""
+    velocity: Array = np.zeros(3)
+    """Velocity (3,) of the waypoint in the world [m/s]."""
+    acceleration: Array = np.zeros(3)
+    """Its acceleration (3,) [m/s^2]."""
+
+
+class Controller(Protocol):
+    """Turns measurements into a wrench; called at a fixed rate."""
+
+    name: str
+    """What it is called in logs and tables."""
+    axes: tuple[str, ...]
+    """Axes of the wrench that it commands; the others are to stay as near zero as the fins can hold them."""
+    lead_s: float
+    """How far ahead of now [s] the waypoint should be taken from a trajectory."""
+    period_s: float
+    """Time between calls [s]."""
+
+    def reset(self) -> None:
+        """Forget everything, as before the first call."""
+
+    def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array) -> Array:
+        """Returns the wrench (6,) [N, N m] in the body frame.
+
+        Args:
+            measurement: the newest samples.
+            setpoint: what to do.
+            given: wrench (6,) that the fins have given since the last call, as far as known [N, N m].
+        """
+        ...

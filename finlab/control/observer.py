@@ -1,0 +1,163 @@
+"""Where a robot is and how it moves, and what nobody told it of: from sensors and from its own model.
+
+An extended Kalman filter holds surge, sway, heave and yaw rate, the accelerations along surge, heave and
+yaw that the model does not explain (a wrong damping or buoyancy, a weak fin), and the current, which shows in
+how the water carries the robot sideways. It is carried on by what the fins give, not by what was asked of
+them, so nothing winds up where a wrench is out of reach. Pose comes from these velocities, corrected slowly
+by markers, pressure and the IMU's tilt.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.control.filters import LowPass
+from finlab.control.measurement import Measurement
+from finlab.layout import Body, Layout
+from finlab.layout.angles import wrapped
+from finlab.physics import plant_of
+from finlab.physics.vehicle import Vehicle, complete_body, quaternion_of, to_world
+
+AXES = [0, 1, 2, 5]
+"""Surge, sway, heave and yaw among the six."""
+MOTION, UNKNOWN, CURRENT = slice(0, 4), slice(4, 7), slice(7, 9)
+DRIVEN = [0, 2, 3]
+"""Where what is in the state, and which of the motions the unknown accelerations (3,) change."""
+UNKNOWN_FORCE = 0.006
+"""Unknown force that comes and goes, per root of a second, as a share of what all fins can give together."""
+LASTING_FORCE = 0.003
+"""The same of the change of what stays."""
+CURRENT_SPEED, CURRENT_CHANGE = 0.05, 0.002
+"""Expected current [m/s], and its change per root of a second."""
+VELOCITY_NOISE, RATE_NOISE = 0.02, 0.02
+"""Expected noise of a measured velocity [m/s] and yaw rate [rad/s], with what the fins' beat adds."""
+POSE_S, TILT_S = 1.5, 1.0
+"""Time constants with which poses and tilts that are seen correct those that are counted on [s]."""
+
+
+class Estimate(NamedTuple):
+    """What is believed of now. World: z up; body: x forward, y left, z up."""
+
+    position: Array
+    """Position (3,) in the world [m]."""
+    roll: float
+    """[rad]."""
+    pitch: float
+    """[rad], positive with the nose down."""
+    yaw: float
+    """Heading [rad], wrapped."""
+    velocity: Array
+    """Velocity (3,) over ground in the body frame [m/s]."""
+    yaw_rate: float
+    """[rad/s]."""
+    world_velocity: Array
+    """The velocity (3,) in the world [m/s]."""
+    current: Array
+    """Horizontal velocity (2,) of the water in the world [m/s]."""
+    drift: Array
+    """Acceleration (4,) along surge, sway, heave and yaw that there would be without any thrust [m/s^2,
+    rad/s^2]."""
+
+
+class MotionObserver:
+    """Watches one robot; to be called once a period."""
+
+    def __init__(self, layout: Layout, period_s: float, body: Body | None = None) -> None:
+        """Takes a layout, the time between calls [s] and the body; by default the layout's, completed by
+        U-CAT's."""
+        body = complete_body(layout) if body is None else body
+        self._vehicle, self._dt = Vehicle(body), period_s
+        self.inertia = np.array(self._vehicle.inertia)[AXES]
+        """Mass and moment (4,) with those of the water that goes along [kg, kg m^2]."""
+        zeros = (0.0,) * 6
+        damping = np.array([body.linear_damping or zeros, body.quadratic_damping or zeros])
+        self._linear, self._quadratic = damping[:, AXES] / self.inertia
+        strength = strongest_wrench(layout)[AXES] / self.inertia
+        self._noise = period_s * np.concatenate(
+            [
+                (UNKNOWN_FORCE * strength) ** 2,
+                (LASTING_FORCE * strength[DRIVEN]) ** 2,
+                [CURRENT_CHANGE**2] * 2,
+            ]
+        )
+        self._sensors = np.array([VELOCITY_NOISE] * 3 + [RATE_NOISE]) ** 2
+        self._transition = np.eye(9)
+        self._transition[DRIVEN, range(4, 7)] = period_s
+        self._pose_share = LowPass(POSE_S, period_s).share
+        self._tilt_share = LowPass(TILT_S, period_s).share
+        self._state = np.zeros(9)
+        self._covariance = np.diag([*self._sensors, *self._noise[UNKNOWN] * 100.0, *[CURRENT_SPEED**2] * 2])
+        self._last_velocity: Array | None = None
+        self._estimate: Estimate | None = None
+
+    def step(self, measurement: Measurement, wrench: Array) -> Estimate:
+        """Takes a measurement and the wrench (6,) that the fins have given since the last one, as far as
+        known [N, N m]; returns what is believed."""
+        m, before = measurement, self._estimate
+        position = np.array([m.position[0], m.position[1], -m.depth])
+        roll, pitch, yaw = m.roll, m.pitch, m.yaw
+        if before is None:
+            self._state[MOTION] = self._seen(m)
+        else:
+            self._predict(before, wrench)
+            self._correct(m)
+            dt, tilt = self._dt, self._tilt_share
+            roll, pitch = before.roll + dt * float(m.rates[0]), before.pitch + dt * float(m.rates[1])
+            roll, pitch = roll + tilt * (m.roll - roll), pitch + tilt * (m.pitch - pitch)
+            yaw = before.yaw + dt * float(self._state[3])
+            yaw = float(wrapped(yaw + self._pose_share * float(wrapped(m.yaw - yaw))))
+            counted = before.position + dt * to_world(self._state, roll, pitch, yaw)
+            position = counted + self._pose_share * (position - counted)
+        self._last_velocity = m.velocity
+        self._estimate = self._believed(m, position, roll, pitch, yaw)
+        return self._estimate
+
+    def _seen(self, m: Measurement) -> Array:
+        return np.array([*m.velocity.tolist(), float(m.rates[2])])
+
+    def _predict(self, before: Estimate, wrench: Array) -> None:
+        """The state over one period, and how much less is known of it."""
+        dt, state, transition = self._dt, self._state, self._transition
+        cosine, sine = math.cos(before.yaw), math.sin(before.yaw)
+        c, d = state[CURRENT].tolist()
+        flow = state[MOTION].copy()
+        flow[:2] -= cosine * c + sine * d, cosine * d - sine * c
+        kept = np.exp(-dt * (self._linear + 2.0 * self._quadratic * np.abs(flow)))
+        transition[range(4), range(4)] = kept
+        carried = 1.0 - kept[:2]
+        transition[0, CURRENT] = carried[0] * cosine, carried[0] * sine
+        transition[1, CURRENT] = -carried[1] * sine, carried[1] * cosine
+        state[MOTION] += dt * (before.drift + wrench[AXES] / self.inertia)
+        self._covariance = transition @ self._covariance @ transition.T
+        self._covariance.ravel()[::10] += self._noise
+
+    def _correct(self, m: Measurement) -> None:
+        """What the sensors have seen; a velocity counts where it is a new one."""
+        rows = slice(3 if m.velocity is self._last_velocity else 0, 4)
+        covariance = self._covariance
+        spread = covariance[rows, rows] + np.diag(self._sensors[rows])
+        gain = np.linalg.solve(spread, covariance[rows]).T
+        self._state += gain @ (self._seen(m) - self._state[MOTION])[rows]
+        self._covariance = covariance - gain @ covariance[rows]
+
+    def _believed(self, m: Measurement, position: Array, roll: float, pitch: float, yaw: float) -> Estimate:
+        u, v, w, r, by_surge, by_heave, by_yaw, c, d = self._state.tolist()
+        attitude = quaternion_of(roll, pitch, yaw)
+        self._vehicle.current = (c, d, 0.0)
+        slopes = self._vehicle.derivative(
+            [0.0, 0.0, 0.0, *attitude, u, v, w, *m.rates[:2].tolist(), r], (0.0,) * 6
+        )
+        drift = np.array([slopes[7] + by_surge, slopes[8], slopes[9] + by_heave, slopes[12] + by_yaw])
+        velocity, current = self._state[:3].copy(), self._state[CURRENT].copy()
+        world = to_world(velocity, roll, pitch, yaw)
+        return Estimate(position, roll, pitch, yaw, velocity, r, world, current, drift)
+
+
+def strongest_wrench(layout: Layout) -> Array:
+    """Sizes (6,) [N, N m] of what all fins give along each axis if every one does its best for it."""
+    plant = plant_of(layout)
+    most = np.abs(plant.force(plant.upper)).max(axis=-1)
+    reach: Array = (most[:, None] * np.linalg.norm(plant.columns[:, 1:], axis=1)).sum(axis=0)
+    return reach

@@ -1,0 +1,127 @@
+"""The controller of trajectories: where to go next, how fast, and which wrench that takes.
+
+One law for all robots and methods, by backstepping through three loops. The path loop turns what is missing
+of the position into a velocity over ground; the heading loop points the robot so that it moves that way, with
+the sideslip that it has in a turn; the velocity loops ask for the wrench that the robot's own model needs for
+the acceleration, with the reference's, and against what the observer cannot explain. All gains follow from
+one number, how fast the fins turn (`gains_for`).
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from finlab.arrays import Array
+from finlab.control.measurement import Measurement, Setpoint
+from finlab.control.observer import AXES, Estimate, MotionObserver, strongest_wrench
+from finlab.layout import Layout
+from finlab.layout.angles import wrapped
+
+
+@dataclass(frozen=True)
+class TrackingGains:
+    """Bandwidths [rad/s] of the loops, and bounds."""
+
+    velocity: float
+    """Of surge and heave speed, and of the yaw rate."""
+    heading: float
+    """Of the heading."""
+    path: float
+    """Of the position."""
+    max_wrench: tuple[float, ...]
+    """Largest wrench that is asked for (6,) [N, N m]; zero on axes that are not commanded."""
+    max_speed: float = 0.5
+    """Largest velocity over ground that is asked for [m/s]."""
+    max_yaw_rate: float = 0.6
+    """Largest yaw rate that is asked for [rad/s]."""
+    slow: float = 0.04
+    """Velocity over ground [m/s] below which the robot turns less and less to where it should go, and rather
+    swims backwards than turn about: where it keeps a place, that changes all the time."""
+
+
+def gains_for(layout: Layout) -> TrackingGains:
+    """The gains for one robot, by one rule.
+
+    The fins' slowest double pole p is a delay of 2 / p in every loop. Velocities close at 0.35 p, a phase of
+    40 degrees at their bandwidth for the fins; the heading, and the path round it, a bit more than two and
+    five times slower than what they command. At most 70 % of what all fins could do for an axis is asked for.
+    """
+    pole = float(layout.servo_poles.min())
+    most = 0.7 * strongest_wrench(layout)
+    return TrackingGains(
+        velocity=0.4 * pole,
+        heading=0.25 * pole,
+        path=0.065 * pole,
+        max_wrench=(float(most[0]), 0.0, float(most[2]), 0.0, 0.0, float(most[5])),
+    )
+
+
+class TrackingController:
+    """Follows a trajectory in surge, heave and yaw."""
+
+    name = "tracking"
+    axes: tuple[str, ...] = ("Fx", "Fz", "Tz")
+    lead_s = 0.0
+    period_s = 0.1
+
+    def __init__(self, layout: Layout, gains: TrackingGains | None = None) -> None:
+        """Takes the robot as its designer knows it, and gains; by default those of `gains_for`."""
+        self.layout = layout
+        self.gains = gains_for(layout) if gains is None else gains
+        self._most = np.array(self.gains.max_wrench)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all that was seen."""
+        self._observer = MotionObserver(self.layout, self.period_s)
+        self.estimate: Estimate | None = None
+        """What was believed at the last call."""
+
+    def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array) -> Array:
+        """Returns the wrench (6,) along the trajectory [N, N m]; `given` is that of the fins until now."""
+        g = self.gains
+        now = self.estimate = self._observer.step(measurement, given)
+        wanted = self._velocity(now, setpoint)
+        u_wanted, yaw_rate = self._surge_and_turn(now, wanted, setpoint)
+        cy, sy = math.cos(now.yaw), math.sin(now.yaw)
+        ax, ay, az = setpoint.acceleration.tolist()
+        inertia, drift = self._observer.inertia, now.drift
+        result = np.zeros(6)
+        for axis, miss, ahead in (
+            (0, u_wanted - float(now.velocity[0]), cy * ax + sy * ay),
+            (2, float(wanted[2] - now.world_velocity[2]), az),
+            (3, yaw_rate - now.yaw_rate, 0.0),
+        ):
+            result[AXES[axis]] = inertia[axis] * (ahead + g.velocity * miss - drift[axis])
+        return result.clip(-self._most, self._most)
+
+    def _velocity(self, now: Estimate, setpoint: Setpoint) -> Array:
+        """Velocity over ground (3,) to go with [m/s]."""
+        missing = setpoint.position - now.position
+        missing[np.isnan(missing)] = 0.0  # where only the depth counts
+        wanted: Array = setpoint.velocity + self.gains.path * missing
+        speed = math.sqrt(wanted @ wanted)
+        return wanted * min(1.0, self.gains.max_speed / max(speed, 1e-9))
+
+    def _surge_and_turn(self, now: Estimate, wanted: Array, setpoint: Setpoint) -> tuple[float, float]:
+        """Surge speed over ground [m/s] and yaw rate [rad/s] that bring the robot to a velocity (3,)."""
+        g = self.gains
+        cosine, sine = math.cos(now.yaw), math.sin(now.yaw)
+        c, d = now.current.tolist()
+        x, y = float(wanted[0]) - c, float(wanted[1]) - d  # through the water
+        speed = math.hypot(x, y)
+        forward = cosine * x + sine * y
+        sideways = float(now.velocity[1]) - (cosine * d - sine * c)
+        slip = math.asin(min(max(sideways / max(speed, g.slow), -0.7), 0.7))
+        course, surge = math.atan2(y, x), cosine * float(wanted[0]) + sine * float(wanted[1])
+        if forward >= 0.0 or speed >= g.slow:
+            heading = course - slip
+            surge = max(surge, cosine * c + sine * d)
+        else:
+            heading = course + math.pi + slip
+        vx, vy = float(setpoint.velocity[0]) - c, float(setpoint.velocity[1]) - d
+        ax, ay, _ = setpoint.acceleration.tolist()
+        turning = (vx * ay - vy * ax) / max(vx * vx + vy * vy, g.slow**2)
+        rate = min(1.0, speed / g.slow) * (turning + g.heading * float(wrapped(heading - now.yaw)))
+        return surge, min(max(rate, -g.max_yaw_rate), g.max_yaw_rate)

@@ -1,0 +1,98 @@
+"""The observer against robots that are simulated exactly, so that what it should find is known."""
+
+import math
+
+import numpy as np
+import pytest
+
+from finlab import load_layout
+from finlab.control import Measurement, MotionObserver
+from finlab.control.observer import Estimate, strongest_wrench
+from finlab.layout import Layout
+from finlab.physics.vehicle import Vehicle, complete_body, euler
+from finlab.sim.perturbed import perturbed
+
+PERIOD_S = 0.1
+
+
+@pytest.fixture(scope="module")
+def robot() -> Layout:
+    return load_layout("A")
+
+
+def watched(
+    robot: Layout,
+    wrench: list[float],
+    seconds: float,
+    *,
+    truth: Layout | None = None,
+    current: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    said: list[float] | None = None,
+) -> tuple[Estimate, np.ndarray]:
+    """What an observer believes at the end of a swim under a constant wrench, and what is true."""
+    vehicle = Vehicle(complete_body(truth or robot))
+    vehicle.current = current
+    observer = MotionObserver(robot, PERIOD_S)
+    state = np.zeros(13)
+    state[3] = 1.0
+    for tick in range(round(seconds / PERIOD_S)):
+        roll, pitch, yaw = euler(state[3:7]).tolist()
+        seen = Measurement(
+            tick * PERIOD_S, state[:3], yaw, state[7:10].copy(), -state[2], state[10:], roll, pitch
+        )
+        found = observer.step(seen, np.array(said or wrench) if tick else np.zeros(6))
+        before = state
+        for _ in range(5):
+            state = vehicle.step(state, wrench, PERIOD_S / 5)
+    return found, before
+
+
+def test_a_robot_that_moves_as_its_model_is_followed(robot: Layout) -> None:
+    found, state = watched(robot, [4.0, 0.0, 0.5, 0.0, 0.0, 0.1], 20.0)
+    assert found.position == pytest.approx(state[:3], abs=5e-3)
+    assert found.velocity == pytest.approx(state[7:10], abs=2e-3)
+    assert found.yaw_rate == pytest.approx(state[12], abs=2e-3)
+    assert np.abs(found.current).max() < 2e-3
+
+
+@pytest.mark.parametrize("direction", [0.0, 1.0, 2.5])
+def test_a_current_across_is_found_where_the_robot_turns(robot: Layout, direction: float) -> None:
+    water = (0.06 * math.cos(direction), 0.06 * math.sin(direction), 0.0)
+    found, _ = watched(robot, [4.0, 0.0, 0.0, 0.0, 0.0, 0.08], 60.0, current=water)
+    assert found.current == pytest.approx(water[:2], abs=0.012)
+
+
+def test_a_force_that_nobody_told_of_becomes_drift(robot: Layout) -> None:
+    light = perturbed(robot, buoyancy=1.01)
+    found, state = watched(robot, [3.0, 0.0, 0.0, 0.0, 0.0, 0.0], 60.0, truth=light)
+    lift = 0.01 * 19.0 * 9.81
+    observer = MotionObserver(robot, PERIOD_S)
+    # At the speed that it has come to, drag and lift are in balance: no drift is left, though the model of
+    # the drawn robot alone would have it slowed down.
+    assert state[9] > 0.03
+    assert abs(found.drift[2]) < 0.15 * lift / observer.inertia[2]
+
+
+def test_what_fins_could_not_give_is_not_taken_for_a_current(robot: Layout) -> None:
+    """Twice the wrench is asked for; the observer hears of what is given."""
+    found, state = watched(robot, [3.0, 0.0, 0.0, 0.0, 0.0, 0.0], 30.0)
+    misled, _ = watched(robot, [3.0, 0.0, 0.0, 0.0, 0.0, 0.0], 30.0, said=[6.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    drag = -3.0 / MotionObserver(robot, PERIOD_S).inertia[0]
+    assert found.drift[0] == pytest.approx(drag, rel=0.05)
+    assert misled.drift[0] < 1.5 * drag
+    assert found.velocity[0] == pytest.approx(state[7], abs=2e-3)
+
+
+def test_an_old_velocity_counts_once(robot: Layout) -> None:
+    observer, velocity = MotionObserver(robot, PERIOD_S), np.array([0.1, 0.0, 0.0])
+    held = Measurement(0.0, np.zeros(3), 0.0, velocity, 1.0, np.zeros(3), 0.0, 0.0)
+    for _ in range(30):
+        found = observer.step(held, np.zeros(6))
+    # Nothing drives the robot and no new velocity comes: by its own model it has all but stopped.
+    assert 0.0 < found.velocity[0] < 0.04
+
+
+def test_the_strongest_wrench_is_what_the_plant_gives_along_each_axis(robot: Layout) -> None:
+    reach = strongest_wrench(robot)
+    assert reach[2] == pytest.approx(4 * 4.737 * 2.1**2 * math.sin(0.6) ** 2, rel=1e-3)
+    assert reach[0] == pytest.approx(reach[2] * math.sin(math.radians(60.0)), rel=1e-3)

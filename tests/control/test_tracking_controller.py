@@ -1,0 +1,84 @@
+"""The tracking controller, in single calls and in swims beside the waypoint controller."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from finlab import load_allocator, load_layout
+from finlab.control import (
+    Controller,
+    Measurement,
+    Setpoint,
+    TrackingController,
+    WaypointController,
+    gains_for,
+)
+from finlab.layout import Layout, Servo
+from finlab.sim import ClosedLoop, make_trajectory
+from finlab.sim.perturbed import perturbed
+from finlab.sim.water import SteadyCurrent, Water
+
+
+@pytest.fixture(scope="module")
+def robot() -> Layout:
+    return load_layout("A")
+
+
+def first_wrench(robot: Layout, setpoint: Setpoint, yaw: float = 0.0) -> np.ndarray:
+    still = Measurement(0.0, np.array([0.0, 0.0, -1.0]), yaw, np.zeros(3), 1.0, np.zeros(3), 0.0, 0.0)
+    return TrackingController(robot).wrench(still, setpoint, np.zeros(6))
+
+
+def test_all_gains_follow_from_the_slowest_fin(robot: Layout) -> None:
+    slow = replace(robot, fins=(replace(robot.fins[0], servo=Servo(direction_pole=1.75)), *robot.fins[1:]))
+    fast, halved = gains_for(robot), gains_for(slow)
+    for name in ("velocity", "heading", "path"):
+        assert getattr(halved, name) == pytest.approx(0.5 * getattr(fast, name))
+    assert halved.max_wrench == fast.max_wrench
+
+
+def test_it_pushes_towards_a_point_ahead_and_above(robot: Layout) -> None:
+    wrench = first_wrench(robot, Setpoint(np.array([1.0, 0.0, -0.5]), 0.1, np.array([0.1, 0.0, 0.0])))
+    assert wrench[0] > 1.0 and wrench[2] > 1.0
+    assert wrench[[1, 3, 4]] == pytest.approx(0.0)
+    assert abs(wrench[5]) < 1e-9
+
+
+def test_it_turns_to_the_side_on_which_the_path_goes_on(robot: Layout) -> None:
+    left = Setpoint(np.array([0.0, 0.0, -1.0]), 0.1, np.array([0.0, 0.1, 0.0]))
+    assert first_wrench(robot, left)[5] > 0.1
+    assert first_wrench(robot, left, yaw=math.pi)[5] < -0.1
+
+
+def test_near_its_place_it_backs_rather_than_turns_about(robot: Layout) -> None:
+    behind = Setpoint(np.array([-0.05, 0.0, -1.0]), 0.0)
+    wrench = first_wrench(robot, behind)
+    assert wrench[0] < 0.0
+    assert abs(wrench[5]) < 0.02
+
+
+def test_no_more_than_the_bounds_is_asked_for(robot: Layout) -> None:
+    far = Setpoint(np.array([90.0, 90.0, 90.0]), 0.0)
+    wrench, most = first_wrench(robot, far), np.array(gains_for(robot).max_wrench)
+    assert (np.abs(wrench) <= most + 1e-12).all()
+
+
+def error(robot: Layout, pilot: Controller, truth: Layout | None = None, water: Water | None = None) -> float:
+    """Root mean square distance from a circle [m]."""
+    loop = ClosedLoop(robot, load_allocator(), make_trajectory("circle"), pilot, truth=truth, water=water)
+    log = loop.run()
+    return float(np.sqrt(((log.position - log.reference) ** 2).sum(1).mean()))
+
+
+@pytest.mark.parametrize(
+    ("damping", "current", "share"), [(1.0, 0.0, 0.9), (2.0, 0.0, 0.5), (0.5, 0.0, 0.5), (1.0, 0.07, 0.6)]
+)
+def test_it_stays_nearer_to_a_path_than_a_robot_that_heads_for_waypoints(
+    robot: Layout, damping: float, current: float, share: float
+) -> None:
+    """The plant is not what the controller was told, but in the first case."""
+    truth, water = perturbed(robot, damping=damping), SteadyCurrent((current, 0.0, 0.0))
+    mine = error(robot, TrackingController(robot), truth, water)
+    assert mine < share * error(robot, WaypointController(), truth, water)
