@@ -144,6 +144,20 @@ def test_what_is_announced_is_told_to_the_monitor(layout_a: Layout, analytic: Al
     assert loop.failed == () and np.isfinite(loop.step().command).all()
 
 
+def test_a_single_odd_sample_decides_nothing(layout_a: Layout) -> None:
+    monitor, nowhere = FaultMonitor(layout_a), np.full(4, np.nan)
+    beliefs = monitor._beliefs
+    before = beliefs.probability.copy(), beliefs.doubt
+    for sure in (True, False, True):
+        beliefs.probability, beliefs.doubt = before[0].copy(), before[1]
+        if sure:
+            beliefs.probability[2, 0] = beliefs.doubt = 0.99
+        monitor._judge(nowhere)
+        assert monitor.broken == ()
+    monitor._judge(nowhere)
+    assert monitor.broken == (layout_a.names[2],), "the second in a row decides"
+
+
 @pytest.mark.parametrize("plant", ["ripple", "flexible"])
 def test_a_model_that_does_not_fit_raises_no_alarm(layout_a: Layout, analytic: Allocator, plant: str) -> None:
     """Fins that shake the robot by several newtons, or thrust otherwise than the model says."""

@@ -51,3 +51,5 @@ def test_a_loss_is_swum_beside_an_announced_one(layout_a: Layout, analytic: Allo
 def test_the_verb_refuses_no_seeds(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["eval", "monitor", "--seeds", "0"]) == 2
     assert "seeds" in capsys.readouterr().err
+    assert main(["eval", "monitor", "--whole", "-1"]) == 2
+    assert "whole" in capsys.readouterr().err
