@@ -50,7 +50,9 @@ def limit_turn(prepared: Prepared, previous: Array, aim: Array, width: float) ->
         idle_direction=np.clip(ahead, lower[:, 2], upper[:, 2]),
     )
     commands = replace(prepared.commands, lower=lower, upper=upper, full_turn=full_turn)
-    return prepared._replace(planar=planar, commands=commands, arcs=None)
+    # Within narrow arcs, cheaper commands of many fins for effort are those that the next tick has to leave.
+    unsettled = prepared.unsettled and planar.convex
+    return prepared._replace(planar=planar, commands=commands, arcs=None, unsettled=unsettled)
 
 
 def unwrap_to_arc(near: Prepared, command: Array) -> Array:

@@ -117,6 +117,14 @@ def test_the_path_is_still_tracked_at_about_the_same_cost(
     assert steady.cost.mean() < {"power": 1.002, "effort": 1.05}[method.objective.name] * free.cost.mean()
 
 
+@pytest.mark.parametrize("name", ["hexa", "octo"])
+def test_many_fins_for_effort_track_at_about_the_same_cost(name: str) -> None:
+    search, layout, path = load_allocator(objective="effort"), load_layout(name), smooth_path(0)[:100]
+    free, steady = (drive(search, layout, path, steady=told) for told in (False, True))
+    assert steady.error.max() < 1e-5
+    assert steady.cost.mean() < 1.04 * free.cost.mean()
+
+
 def test_commands_stay_inside_the_limits_across_the_seam(steady: Drive, penta: Layout) -> None:
     lower, upper = limits(penta)
     assert ((steady.command >= lower) & (steady.command <= upper)).all()
