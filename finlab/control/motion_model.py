@@ -17,7 +17,7 @@ from finlab.control.nominal_lag import NominalLag
 from finlab.layout import Body, Layout
 from finlab.layout.angles import is_full_turn
 from finlab.physics import plant_of
-from finlab.physics.vehicle import Vehicle, complete_body
+from finlab.physics.vehicle import Vehicle, complete_body, quaternion_of
 
 MOTION, TILT, CURRENT, TORQUE = slice(0, 6), slice(6, 8), slice(8, 11), slice(11, 14)
 RISING = 10
@@ -95,7 +95,7 @@ class MotionModel:
         wrench, turned = self._wrenches(command, reported, held, other)
         motion, current = state[MOTION].tolist(), state[CURRENT].tolist()
         roll, pitch = state[TILT].tolist()
-        quaternion = _quaternion(roll, pitch, yaw - self._dt * motion[5])
+        quaternion = quaternion_of(roll, pitch, yaw - self._dt * motion[5])
         rotation = _rotation(*quaternion)
         self._vehicle.current = tuple(current)
         thrust = state[STRENGTH] @ wrench
@@ -177,19 +177,6 @@ class MotionModel:
         gained = (most[:, None, None] * self._plant.columns[self._unknown, 1:] * self._gain).reshape(-1, 6)
         noise: Array = gained.T @ gained
         return noise
-
-
-def _quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
-    """Angles about z, then y, then x [rad], as w, x, y, z."""
-    cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
-    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
-    cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
-    return (
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    )
 
 
 def _tilt(w: float, x: float, y: float, z: float) -> tuple[float, float]:
