@@ -83,7 +83,7 @@ def draw_errors(log: RunLog) -> Picture:
 
 
 def draw_commands(log: RunLog) -> Picture:
-    """Amplitude, frequency and zero direction of each fin: commanded and, thin, what the servo did."""
+    """Amplitude, frequency and zero direction of each fin: thin as commanded, thick what the servo did."""
     labels = ("amplitude [deg]", "frequency [Hz]", "zero direction [deg]")
     scale = np.array([180 / np.pi, 1.0, 180 / np.pi])
     with picture(3, 1, height=6.2, sharex=True) as drawn:
@@ -95,8 +95,7 @@ def draw_commands(log: RunLog) -> Picture:
                     asked, did = _broken(asked), _broken(did)
                 did = np.where(log.alive[:, i], did, np.nan)
                 axis.plot(log.time, asked * scale[k], color=colour, lw=0.9, alpha=0.55)
-                if k != 1:
-                    axis.plot(log.time, did * scale[k], color=colour, lw=1.7, label=name)
+                axis.plot(log.time, did * scale[k], color=colour, lw=1.7, label=name)
             axis.set_ylabel(label)
         drawn.axes[0].set_title("Thin: command. Thick: the fin, behind its servo.")
         drawn.axes[2].set(ylim=(-185, 185), yticks=[-180, -90, 0, 90, 180], xlabel="time [s]")
