@@ -10,7 +10,7 @@ from typing import Annotated
 from tyro.conf import arg
 from tyro.extras import SubcommandApp
 
-from finlab.cli import eval_allocation, eval_closed_loop, eval_fit, eval_robots
+from finlab.cli import eval_allocation, eval_closed_loop, eval_fit, eval_robots, eval_swims
 from finlab.cli.eval_arguments import Checkpoint, Count, Folder, Name, Names, Output, check_folders
 from finlab.cli.inputs import check_positive
 
@@ -130,6 +130,7 @@ for verb in (
     eval_closed_loop.faults,
     eval_closed_loop.velocity,
     eval_closed_loop.monitor,
+    eval_swims.swims,
     eval_fit.fit,
     eval_robots.robots,
     training,

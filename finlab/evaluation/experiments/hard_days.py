@@ -1,0 +1,224 @@
+"""Hard days: named swims in which something is not as the designer of the robot assumed. Plain data.
+
+What a day says is what is true; allocator, controller and monitor believe the layout, but for fins that are
+the robot's own (`fins`) and for what is announced.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from itertools import combinations, islice
+from typing import Any, Literal, NamedTuple
+
+from finlab.allocation.allocator import Allocator
+from finlab.control import Completion, FaultMonitor
+from finlab.control.tracking_controller import TrackingController
+from finlab.errors import DataError
+from finlab.evaluation.splits import make_split
+from finlab.layout import Layout, load_layout
+from finlab.layout.fin import FinModelSpec
+from finlab.sim import (
+    ClosedLoop,
+    FinFault,
+    SensorSettings,
+    SteadyCurrent,
+    Still,
+    Trajectory,
+    TurningCurrent,
+    Water,
+    Waves,
+    make_trajectory,
+    perturbed,
+)
+
+PAPERS = ("A", "B", "C", "D")
+"""The layouts of the paper."""
+TWO = ("A", "C")
+"""Those that swim most of the days: a symmetric one and one that is not."""
+CURRENT = (0.05, -0.05, 0.0)
+"""7 cm/s across the path [m/s]."""
+MEASURED_SOFT = FinModelSpec("soft", (("d", 0.1), ("e", 0.15), ("phi_e", 0.5), ("x0", 1.0)))
+"""Saturates within reach, and is uneven and askew, as fins of silicone are when measured."""
+
+Kind = Literal["nominal", "law kept", "hard"]
+"""As believed; fins that obey the law that methods were given, while body, water or sensors do not; and fins
+that do not obey it, are lost, or cannot do what is asked."""
+
+
+@dataclass(frozen=True)
+class HardDay:
+    """One scenario."""
+
+    name: str
+    """For `--scenarios`."""
+    about: str
+    """What is hard, in a sentence."""
+    kind: Kind
+    """Which goal counts."""
+    layouts: tuple[str, ...] = TWO
+    """Names of shipped layouts that swim it."""
+    trajectory: str = "lissajous"
+    """Of `finlab.sim.SHIPPED`."""
+    duration_s: float | None = None
+    """How long it takes [s]; None for the trajectory's own time."""
+    fins: Literal["own", "soft", "mixed"] = "own"
+    """Whose laws all methods are given: the layout's, `MEASURED_SOFT`, or those of split `fins-mixed`, which
+    are others for each seed."""
+    truth: Mapping[str, Any] = field(default_factory=dict)
+    """What the body really is: options of `finlab.sim.perturbed`."""
+    water: Water = Still()
+    """How it moves; waves are others for each seed."""
+    plant: str = "mean"
+    """What the fins really do."""
+    sensors: SensorSettings = SensorSettings()
+    """Noise, bias, delay and losses."""
+    weak: float | None = None
+    """Share of its thrust that one fin gives, each in its turn, without anybody knowing."""
+    lost: int = 0
+    """How many fins are lost half-way, each and each pair in its turn."""
+    announced: bool = True
+    """Whether allocator and controller are told of a loss; else a `FaultMonitor` has to find it."""
+
+    def path(self) -> Trajectory:
+        """What is followed."""
+        return make_trajectory(self.trajectory, self.duration_s)
+
+    def cases(self) -> list["Case"]:
+        """Every swim of one seed: each layout, with each fin or pair that is weak or lost."""
+        found = []
+        for name in self.layouts:
+            names = load_layout(name).names
+            affected = 1 if self.weak is not None else self.lost
+            found += [Case(name, fins) for fins in combinations(names, affected)]
+        return found
+
+    def robot(self, layout: str, seed: int) -> Layout:
+        """The robot that methods believe in; the seed draws mixed fins."""
+        robot = load_layout(layout)
+        if self.fins == "own":
+            return robot
+        models = [MEASURED_SOFT] * robot.n_fins
+        if self.fins == "mixed":
+            cases = make_split("fins-mixed", robot.n_fins, 1, seed)
+            models = list(islice((fin.model for case in cases for fin in case.layout.fins), robot.n_fins))
+        fins = tuple(replace(fin, model=own) for fin, own in zip(robot.fins, models, strict=True))
+        return replace(robot, fins=fins)
+
+    def obstacle(self, case: "Case") -> str | None:
+        """Why a swim would be hopeless; None where it is not."""
+        if (
+            not self.lost
+            or Completion(load_layout(case.layout), case.fins, TrackingController.axes).controllable
+        ):
+            return None
+        return (
+            f"{case.layout} without {' and '.join(case.fins)}: the fins that are left cannot give surge, "
+            "heave and yaw independently"
+        )
+
+    def swim(self, case: "Case", allocator: Allocator, seed: int, *, steady: bool = False) -> ClosedLoop:
+        """The swim, ready to start.
+
+        Args:
+            case: of `cases()`.
+            allocator: the method.
+            seed: of noise, biases, waves and mixed fins.
+            steady: whether the allocator is given its previous command.
+        """
+        robot, path = self.robot(case.layout, seed), self.path()
+        weak = {} if self.weak is None else dict.fromkeys(case.fins, self.weak)
+        failures = [FinFault(fin, 0.5 * path.duration_s) for fin in case.fins] if self.lost else []
+        water = replace(self.water, seed=seed) if isinstance(self.water, Waves) else self.water
+        return ClosedLoop(
+            robot,
+            allocator,
+            path,
+            TrackingController(robot),
+            plant=self.plant,
+            steady=steady,
+            sensors=self.sensors,
+            water=water,
+            failures=failures,
+            announced=self.announced,
+            monitor=None if self.announced else FaultMonitor(robot),
+            truth=perturbed(robot, thrust=weak, **self.truth),
+            seed=seed,
+        )
+
+
+class Case(NamedTuple):
+    """One swim of a day."""
+
+    layout: str
+    """Name of the layout."""
+    fins: tuple[str, ...]
+    """Names of the fins that are weak or lost."""
+
+
+HARD_DAYS = (
+    HardDay("nominal", "Everything is as drawn; sensors are noisy, biased and late.", "nominal", PAPERS),
+    HardDay("damping-half", "The body is damped half as much.", "law kept", truth={"damping": 0.5}),
+    HardDay("damping-double", "The body is damped twice as much.", "law kept", truth={"damping": 2.0}),
+    HardDay("current", "A current of 7 cm/s.", "law kept", water=SteadyCurrent(CURRENT)),
+    HardDay(
+        "current-turns",
+        "A current of 7 cm/s that turns by a right angle within 5 s.",
+        "law kept",
+        water=TurningCurrent(CURRENT),
+    ),
+    HardDay("buoyant", "The robot is 1 % too buoyant.", "law kept", truth={"buoyancy": 1.01}),
+    HardDay("heavy", "The robot is 1 % too heavy for its buoyancy.", "law kept", truth={"buoyancy": 0.99}),
+    HardDay(
+        "gravity-off",
+        "The centre of gravity is 2 cm ahead of where it is drawn; weights have brought the robot level.",
+        "law kept",
+        truth={"gravity_offset_m": (0.02, 0.0, 0.0), "ballasted": True},
+    ),
+    HardDay("late", "All sensors are 100 ms later.", "law kept", sensors=SensorSettings().later(0.1)),
+    HardDay("circle", "A circle.", "law kept", trajectory="circle"),
+    HardDay("dive", "Down by a metre and up again.", "law kept", trajectory="dive"),
+    HardDay("square", "A square with stops at its corners.", "law kept", trajectory="square"),
+    HardDay("waves", "Keep a place in waves of 0.2 m.", "law kept", trajectory="station", water=Waves()),
+    HardDay("hexa", "Six fins.", "law kept", ("hexa",)),
+    HardDay("octo", "Eight fins.", "law kept", ("octo",)),
+    HardDay(
+        "fins-mixed", "Each fin of A is of a kind of its own, known to all.", "law kept", ("A",), fins="mixed"
+    ),
+    HardDay("fins-soft", "A has soft fins as measured, known to all.", "law kept", ("A",), fins="soft"),
+    HardDay("weak", "One fin gives 70 % of its thrust, and nobody knows.", "hard", ("A",), weak=0.7),
+    HardDay("lost-one", "One fin is lost half-way, announced.", "hard", ("A",), lost=1),
+    HardDay(
+        "lost-one-unannounced",
+        "One fin is lost half-way, and a monitor has to find out.",
+        "hard",
+        ("A",),
+        lost=1,
+        announced=False,
+    ),
+    HardDay("lost-two", "Two fins are lost half-way, announced.", "hard", ("A",), lost=2),
+    HardDay(
+        "lost-two-unannounced",
+        "Two fins are lost half-way, and a monitor has to find out.",
+        "hard",
+        ("A",),
+        lost=2,
+        announced=False,
+    ),
+    HardDay("restricted", "Stops keep the fins within arcs.", "hard", ("restricted",)),
+    HardDay("saturated", "The path asks for more than the fins can give.", "hard", duration_s=36.0),
+    HardDay("flexible", "Fins have soft tips that nobody knows of.", "hard", plant="flexible"),
+    HardDay("wake", "Fins weaken each other by their jets.", "hard", plant="wake"),
+    HardDay("inflow", "Thrust falls with speed.", "hard", plant="inflow"),
+)
+"""The suite, in the order in which it is printed."""
+
+
+def choose_days(names: str) -> list[HardDay]:
+    """The days of some names with commas between, or `all`; a `DataError` where there is none of a name."""
+    known = {day.name: day for day in HARD_DAYS}
+    chosen = [name.strip() for name in names.split(",") if name.strip()]
+    if chosen == ["all"]:
+        return list(HARD_DAYS)
+    if not chosen or (unknown := [name for name in chosen if name not in known]):
+        got = unknown[0] if chosen else names
+        raise DataError(f"scenarios: expected all, or some of {', '.join(known)}, got {got!r:.60}")
+    return [known[name] for name in dict.fromkeys(chosen)]

@@ -1,0 +1,68 @@
+"""Hard days: who swims them how well, in a table, and where our method does not lead in words."""
+
+from collections.abc import Sequence
+
+from finlab.control.completion import LEVER_M
+from finlab.evaluation.experiments.closed_loop_runs import LOST_M, RTE_DELTA_S
+from finlab.evaluation.experiments.hard_days import HardDay
+from finlab.evaluation.experiments.swims import GAP_N
+from finlab.evaluation.report.document import Block, Column, Row, Table, method_row
+
+WHAT = (Column("scenario", "scenario"), Column("method", "method"), Column("swims", "swims", "count"))
+ERRORS = (
+    Column("ate", "ATE [m]", "metres", "ate_interval"),
+    Column("ate_ratio", "over best", "ratio"),
+    Column("rte", "RTE [m]", "metres"),
+    Column("depth_rmse", "depth RMSE [m]", "metres"),
+    Column("driving_w", "power [W]", "three", "driving_w_interval"),
+    Column("driving_w_ratio", "over best", "ratio"),
+    Column("peak_w", "peak [W]", "three"),
+    Column("lost", "lost", "count"),
+    Column("verdict", "verdict"),
+)
+STEPS = (
+    Column("turn", "turn [rad]", "three"),
+    Column("frequency_step", "frequency [Hz]", "three"),
+    Column("amplitude_step", "amplitude [rad]", "three"),
+    Column("rests_per_min", "rest and work / min", "three"),
+    Column("out_of_reach", "out of reach", "share"),
+    Column("cpu_s_per_min", "CPU s / min", "three"),
+)
+LEADS = "error better, power better"
+
+
+def swim_blocks(days: Sequence[HardDay], rows: Sequence[Row], hopeless: Sequence[Row]) -> list[Block]:
+    """What the days are, errors and watts, steps per tick, and what is not won."""
+    shown = [method_row(row) for row in rows]
+    blocks: list[Block] = [
+        "### Hard days",
+        "\n".join(f"- `{day.name}` ({', '.join(day.layouts)}): {day.about}" for day in days),
+        Table((*WHAT, *ERRORS), shown),
+        (
+            f"*Means over swims; peaks are the largest. RTE over {RTE_DELTA_S:g} s. Power with the motors' "
+            "losses. Intervals over seeds by bootstrap, where another seed should land; a verdict needs "
+            "intervals that do not overlap. Best: the least of the baselines that keep their reference, "
+            f"for error and power each. Lost: swims that were ever farther than {LOST_M:g} m away.*"
+        ),
+        Table((*WHAT, *STEPS), shown),
+        (
+            "*Largest change of a command from tick to tick, of fins that beat before and after; changes of "
+            f"all fins between rest and work; share of ticks at which commands miss more than {GAP_N:g} N of "
+            f"what is asked, torques at {LEVER_M:g} m; processor's time, simulation included.*"
+        ),
+    ]
+    if hopeless:
+        blocks += ["Not swum:", "\n".join(f"- `{row['scenario']}`: {row['reason']}." for row in hopeless)]
+    if sentences := [_sentence(row) for row in rows if row.get("verdict", LEADS) != LEADS]:
+        blocks += ["Not won in error and power both:", "\n".join(f"- {sentence}" for sentence in sentences)]
+    return blocks
+
+
+def _sentence(row: Row) -> str:
+    about = f"`{row['scenario']}`, `{row['method']}`: {row['verdict'] or 'one seed has no interval'}"
+    if "ate_ratio" not in row:
+        return f"{about}."
+    return (
+        f"{about}; error {row['ate_ratio']:.2f} of that of `{row['ate_best']}`, power "
+        f"{row['driving_w_ratio']:.2f} of that of `{row['driving_w_best']}`."
+    )
