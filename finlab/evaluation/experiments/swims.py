@@ -12,7 +12,7 @@ from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
 from finlab.control.completion import LEVER_M
 from finlab.evaluation.experiments.closed_loop_runs import LOST_M, Row, follow_row
-from finlab.evaluation.experiments.hard_days import HardDay
+from finlab.evaluation.experiments.hard_days import HardDay, Kind
 from finlab.evaluation.progress import progress
 from finlab.evaluation.statistics.bootstrap import Interval, mean_interval
 from finlab.layout.angles import wrapped
@@ -23,8 +23,14 @@ GAP_N = 0.1
 of reach [N]."""
 OURS = ("search", "mdn")
 """Beginnings of our methods' names; all others are baselines."""
-LED = ("ate", "driving_w")
-"""What methods are compared by with the best baseline."""
+TITLES = {"ate": "error", "driving_w": "power"}
+"""What methods are compared by with the best baseline, in words."""
+GOALS: dict[Kind, dict[str, float]] = {
+    "nominal": {"ate": 0.95, "driving_w": 0.95},
+    "law kept": {"ate": 1.02, "driving_w": 1.02},
+    "hard": {"ate": 0.7},
+}
+"""Largest ratio to the best baseline that is aimed at, by kind of day."""
 FIGURES = (
     *("ate", "rte", "depth_rmse", "driving_w", "peak_w", "out_of_reach", "rests_per_min", "cpu_s_per_min"),
     *("turn", "frequency_step", "amplitude_step"),
@@ -138,7 +144,7 @@ def _row(scenario: str, method: str, swims: Sequence[Swim]) -> Row:
     for key in FIGURES:
         values = np.array([swim.figures[key] for swim in swims])
         row[key] = float(values.max() if key in LARGEST else values.mean())
-        if key in LED and len(set(seed.tolist())) > 1:
+        if key in TITLES and len(set(seed.tolist())) > 1:
             row[f"{key}_interval"] = list(mean_interval(values, seed))
     return row
 
@@ -153,7 +159,7 @@ def _against(row: Row, rows: Sequence[Row]) -> Row:
         return {"verdict": "the only one that keeps its path"}
     found: dict[str, Any] = {}
     words = []
-    for key, title in zip(LED, ("error", "power"), strict=True):
+    for key, title in TITLES.items():
         best = min(keeping or baselines, key=lambda other: float(other[key]))
         found |= {f"{key}_ratio": row[key] / best[key], f"{key}_best": best["method"]}
         if (interval := f"{key}_interval") in row and interval in best:
@@ -161,6 +167,28 @@ def _against(row: Row, rows: Sequence[Row]) -> Row:
             words.append(f"{title} {found[f'{key}_verdict']}")
     lost = ["loses its path"] if row["lost"] and keeping else []
     return {**found, "verdict": ", ".join(lost + words)}
+
+
+def goal_sentences(days: Sequence[HardDay], rows: Sequence[Row]) -> list[str]:
+    """For each kind of day and figure in words: which days miss what is aimed at, by which method."""
+    sentences = []
+    for kind, goals in GOALS.items():
+        names = {day.name for day in days if day.kind == kind}
+        mine = [row for row in rows if row["scenario"] in names and "verdict" in row]
+        for key, goal in goals.items() if mine else ():
+            missed = [
+                f"`{row['method']}` on `{row['scenario']}` ({row[ratio]:.2f})"
+                for row in mine
+                if row.get(ratio := f"{key}_ratio", 0.0) > goal  # without a ratio no baseline keeps its path
+            ]
+            title = TITLES[key]
+            found = (
+                f"{len(mine) - len(missed)} of {len(mine)} at most {goal:g} of the best baseline's {title}"
+            )
+            sentences.append(
+                f"Days of kind {kind!r}: {found}" + (f"; not {', '.join(missed)}" if missed else "")
+            )
+    return sentences
 
 
 def compare(own: Interval, other: Interval) -> str:

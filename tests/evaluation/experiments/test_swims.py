@@ -15,6 +15,7 @@ from finlab.evaluation.experiments.swims import (
     FIGURES,
     Swim,
     compare,
+    goal_sentences,
     not_swum,
     swim_all,
     swim_figures,
@@ -156,6 +157,30 @@ def test_who_alone_keeps_the_path_and_who_loses_it() -> None:
     lost = [swim._replace(figures={**swim.figures, "max": 3.0}) for swim in ours]
     kept = [swim._replace(figures={**swim.figures, "max": 0.1}) for swim in theirs]
     assert swim_rows([*lost, *kept])[0]["verdict"].startswith("loses its path")
+
+
+def test_goals_depend_on_the_kind_of_day() -> None:
+    def row(scenario: str, ate: float, watts: float) -> dict[str, Any]:
+        ratios = {"ate_ratio": ate, "driving_w_ratio": watts}
+        return {"scenario": scenario, "method": "search", "verdict": "", **ratios}
+
+    rows = [
+        row("nominal", 0.9, 0.96),
+        row("current", 1.0, 1.02),
+        row("late", 1.03, 0.5),
+        row("wake", 0.6, 9.0),
+    ]
+    rows.append({"scenario": "weak", "method": "search", "verdict": "the only one that keeps its path"})
+    rows.append({"scenario": "late", "method": "analytic"})
+    assert goal_sentences(HARD_DAYS, rows) == [
+        "Days of kind 'nominal': 1 of 1 at most 0.95 of the best baseline's error",
+        "Days of kind 'nominal': 0 of 1 at most 0.95 of the best baseline's power"
+        "; not `search` on `nominal` (0.96)",
+        "Days of kind 'law kept': 1 of 2 at most 1.02 of the best baseline's error"
+        "; not `search` on `late` (1.03)",
+        "Days of kind 'law kept': 2 of 2 at most 1.02 of the best baseline's power",
+        "Days of kind 'hard': 2 of 2 at most 0.7 of the best baseline's error",
+    ]
 
 
 def test_one_seed_has_no_interval_and_no_verdict() -> None:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from finlab.control.completion import LEVER_M
 from finlab.evaluation.experiments.closed_loop_runs import LOST_M, RTE_DELTA_S
 from finlab.evaluation.experiments.hard_days import HardDay
-from finlab.evaluation.experiments.swims import GAP_N
+from finlab.evaluation.experiments.swims import GAP_N, goal_sentences
 from finlab.evaluation.report.document import Block, Column, Row, Table, method_row
 
 WHAT = (Column("scenario", "scenario"), Column("method", "method"), Column("swims", "swims", "count"))
@@ -48,13 +48,16 @@ def swim_blocks(days: Sequence[HardDay], rows: Sequence[Row], hopeless: Sequence
         (
             "*Largest change of a command from tick to tick, of fins that beat before and after; changes of "
             f"all fins between rest and work; share of ticks at which commands miss more than {GAP_N:g} N of "
-            f"what is asked, torques at {LEVER_M:g} m; processor's time, simulation included.*"
+            f"what is asked, torques at {LEVER_M:g} m, by the law that methods know, a monitor's probing "
+            "included; processor's time, simulation included.*"
         ),
     ]
     if hopeless:
         blocks += ["Not swum:", "\n".join(f"- `{row['scenario']}`: {row['reason']}." for row in hopeless)]
     if sentences := [_sentence(row) for row in rows if row.get("verdict", LEADS) != LEADS]:
         blocks += ["Not won in error and power both:", "\n".join(f"- {sentence}" for sentence in sentences)]
+    if goals := goal_sentences(days, rows):
+        blocks += ["Goals:", "\n".join(f"- {sentence}." for sentence in goals)]
     return blocks
 
 
