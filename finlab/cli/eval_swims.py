@@ -19,7 +19,7 @@ def swims(
 ) -> None:
     """Swim hard days: other bodies, water, sensors and fins than believed; errors, watts and who leads.
 
-    One tracking controller for all. A method takes about four minutes of the processor per seed.
+    One tracking controller for all. A method takes about two minutes of the processor per seed.
 
     Args:
         scenarios: all, or names with commas between: nominal, damping-half, damping-double, current,
