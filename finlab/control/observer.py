@@ -15,6 +15,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.control.filters import LowPass
 from finlab.control.measurement import Measurement
+from finlab.forces.envelopes import largest_forces
 from finlab.layout import Body, Layout
 from finlab.layout.angles import wrapped
 from finlab.physics import plant_of
@@ -157,7 +158,7 @@ class MotionObserver:
 
 def strongest_wrench(layout: Layout) -> Array:
     """Sizes (6,) [N, N m] of what all fins give along each axis if every one does its best for it."""
-    plant = plant_of(layout)
-    most = np.abs(plant.force(plant.upper)).max(axis=-1)
-    reach: Array = (most[:, None] * np.linalg.norm(plant.columns[:, 1:], axis=1)).sum(axis=0)
+    columns = plant_of(layout).columns[:, 1:]
+    # Not that of the largest command: a soft fin may push more with a smaller one.
+    reach: Array = (largest_forces(layout)[:, None] * np.linalg.norm(columns, axis=1)).sum(axis=0)
     return reach
