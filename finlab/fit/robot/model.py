@@ -94,7 +94,8 @@ class RobotModel:
         mean = (force * kept[..., None]).mean(axis=1)
         beat = unknowns.part("beat", vector)
         if beat is not None:
-            mean[..., 1:] += self._beat @ beat
+            mean -= beat[-1] * np.gradient(mean, STEP_S, axis=0)
+            mean[..., 1:] += self._beat @ beat[:-1]
         wrench: Array = mean.reshape(len(mean), -1) @ columns.reshape(-1, 6)
         wrench[:, [0, 1, 5]] += unknowns.of("bias", vector)
         return wrench
