@@ -8,7 +8,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.control.filters import LowPass, Pid
 from finlab.control.gains import VelocityGains, WaypointGains, load_gains
-from finlab.control.measurement import STILL, Measurement, Setpoint
+from finlab.control.measurement import NO_WRENCH, Measurement, Setpoint
 from finlab.layout.angles import wrapped
 from finlab.physics.vehicle import to_world
 
@@ -33,7 +33,7 @@ class VelocityController:
         self._surge = Pid(g.surge, g.max_surge, g.period_s)
         self._depth = Pid(g.depth, g.max_heave, g.period_s)
 
-    def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array = STILL) -> Array:
+    def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array = NO_WRENCH) -> Array:
         """Returns the wrench (6,) towards the speed and depth asked for [N, N m]."""
         g = self.gains
         surge = self._surge.step(setpoint.surge - self._speed.step(float(measurement.velocity[0])))
@@ -63,7 +63,7 @@ class WaypointController:
         """Forget the pose."""
         self._odometry = Odometry(self.gains.odometry_filter_s, self.gains.climb_filter_s, self.period_s)
 
-    def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array = STILL) -> Array:
+    def wrench(self, measurement: Measurement, setpoint: Setpoint, given: Array = NO_WRENCH) -> Array:
         """Returns the wrench (6,) towards the waypoint [N, N m]."""
         g = self.gains
         position, heading, climb = self._odometry.step(measurement)
@@ -111,14 +111,9 @@ class Odometry:
         else:
             turned = self._pose.yaw + float(measurement.rates[2]) * self.period_s
             yaw = turned + self._share * float(wrapped(measurement.yaw - turned))
-            moved = (
-                self._pose.position
-                + to_world(measurement.velocity, measurement.roll, measurement.pitch, yaw) * self.period_s
-            )
+            moved = self._pose.position + _over_ground(measurement, yaw) * self.period_s
             position = moved + self._share * (seen - moved)
-        climb = self._climb.step(
-            float(to_world(measurement.velocity, measurement.roll, measurement.pitch, yaw)[2])
-        )
+        climb = self._climb.step(float(_over_ground(measurement, yaw)[2]))
         self._pose = Pose(position, float(wrapped(yaw)), climb)
         return self._pose
 

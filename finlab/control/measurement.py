@@ -6,8 +6,8 @@ import numpy as np
 
 from finlab.arrays import Array
 
-STILL = np.zeros(6)
-"""No wrench."""
+NO_WRENCH = np.zeros(6)
+"""Of fins that have given nothing."""
 
 
 class Measurement(NamedTuple):

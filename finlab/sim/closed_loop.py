@@ -18,6 +18,7 @@ from finlab.control import (
     Verdict,
     WaypointController,
 )
+from finlab.control.measurement import NO_WRENCH
 from finlab.control.nominal_lag import NominalLag
 from finlab.layout import Layout
 from finlab.physics import plant_of
@@ -123,8 +124,8 @@ class ClosedLoop:
         self._ticks: list[Tick] = []
         self._command: Array | None = None
         self.period_s = self.controller.period_s
-        self._lag, self._gave = NominalLag(layout, self.period_s), np.zeros(6)
         """Length of a step [s]."""
+        self._lag, self._gave = NominalLag(layout, self.period_s), NO_WRENCH
         start, heading = task.start()
         self.state = np.zeros(STATE_SIZE)
         """State (13,): position (world), quaternion (w, x, y, z), velocity and rates (body); SI."""
