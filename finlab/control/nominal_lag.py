@@ -36,7 +36,7 @@ class NominalLag:
 
     def step(self, command: Array) -> Array:
         """Follows a command (n, 3) for one period; returns what the fins do (n, 3). NaN rows hang still."""
-        lag, before, aim = self._lag, self._value, command.T.copy()
+        before, aim = self._value, command.T.copy()
         rests = np.isnan(aim[0])
         some_rest = bool(rests.any())
         if some_rest:
@@ -44,9 +44,7 @@ class NominalLag:
         np.minimum(aim[0], self._swing / np.maximum(aim[1], 1e-9), out=aim[0])
         turn = aim[2] - before[2]
         aim[2] = before[2] + np.where(self._full, turn - TURN * np.round(turn / TURN), turn)
-        error = before - aim
-        value = aim + lag.kept * error + lag.carried * self._rate
-        rate = lag.driven * error + lag.slowed * self._rate
+        value, rate = self._lag.follow(before, self._rate, aim)
         np.minimum(value[0], self._swing / np.maximum(value[1], 1e-9), out=value[0])
         if some_rest:
             value[:2, rests], value[2, rests], rate[:, rests] = 0.0, before[2, rests], 0.0

@@ -37,6 +37,11 @@ class LagStep(NamedTuple):
         decay = np.exp(-pole * dt)
         return cls((1.0 + pole * dt) * decay, dt * decay, -(pole**2) * dt * decay, (1.0 - pole * dt) * decay)
 
+    def follow(self, value: Array, rate: Array, aim: Array) -> tuple[Array, Array]:
+        """Values and rates after the step."""
+        error = value - aim
+        return aim + self.kept * error + self.carried * rate, self.driven * error + self.slowed * rate
+
 
 class FinMotion:
     """Angles of the fins of one layout over time; all arrays are (n,)."""
@@ -63,7 +68,7 @@ class FinMotion:
         """Follows a command (n, 3) for `dt` [s]; a fin whose row is NaN stops at once and hangs still."""
         if dt != self._dt:
             self._dt, self._lag = dt, LagStep.of(self._poles, dt)
-        lag, before, aim = self._lag, self._value, command.T.copy()
+        before, aim = self._value, command.T.copy()
         lost = np.isnan(aim[0])
         some_lost = bool(lost.any())
         if some_lost:
@@ -71,9 +76,7 @@ class FinMotion:
         aim[0] = np.minimum(aim[0], self._speed_limit / (TURN * np.maximum(aim[1], 1e-9)))
         turn = aim[2] - before[2]
         aim[2] = before[2] + np.where(self._turns_fully, turn - TURN * np.rint(turn / TURN), turn)
-        error = before - aim
-        value = aim + lag.kept * error + lag.carried * self._rate
-        rate = lag.driven * error + lag.slowed * self._rate
+        value, rate = self._lag.follow(before, self._rate, aim)
         swing = TURN * value[1]
         # What flapping leaves of the servo's speed is there to turn the fin.
         value[0] = np.minimum(value[0], self._speed_limit / np.maximum(swing, 1e-9))
