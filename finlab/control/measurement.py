@@ -1,5 +1,6 @@
 """What controllers are given, and what they are: measurements and a setpoint in, a wrench out."""
 
+import math
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -47,6 +48,8 @@ class Setpoint(NamedTuple):
     """Velocity (3,) of the waypoint in the world [m/s]."""
     acceleration: Array = np.zeros(3)
     """Its acceleration (3,) [m/s^2]."""
+    onward: float = math.nan
+    """Heading [rad] in which the path goes on from here, where it rests, too; NaN where it goes nowhere."""
 
 
 class Controller(Protocol):

@@ -36,8 +36,8 @@ class TrackingGains:
     max_yaw_rate: float = 0.6
     """Largest yaw rate that is asked for [rad/s]."""
     slow: float = 0.04
-    """Velocity over ground [m/s] below which the robot turns less and less to where it should go, and rather
-    swims backwards than turn about: where it keeps a place, that changes all the time."""
+    """Velocity through the water [m/s] below which the robot turns less and less to where it should go, which
+    changes all the time where it keeps a place, and more and more to where the path goes on."""
 
 
 def gains_for(layout: Layout) -> TrackingGains:
@@ -111,17 +111,18 @@ class TrackingController:
         c, d = now.current.tolist()
         x, y = float(wanted[0]) - c, float(wanted[1]) - d  # through the water
         speed = math.hypot(x, y)
-        forward = cosine * x + sine * y
         sideways = float(now.velocity[1]) - (cosine * d - sine * c)
         slip = math.asin(min(max(sideways / max(speed, g.slow), -0.7), 0.7))
-        course, surge = math.atan2(y, x), cosine * float(wanted[0]) + sine * float(wanted[1])
-        if forward >= 0.0 or speed >= g.slow:
-            heading = course - slip
+        surge = cosine * float(wanted[0]) + sine * float(wanted[1])
+        if speed >= g.slow:
             surge = max(surge, cosine * c + sine * d)
-        else:
-            heading = course + math.pi + slip
+        # At rest it turns to where the path goes on, or stays as it is; a bit off its place it rather backs
+        # than turns about.
+        onward = now.yaw if math.isnan(setpoint.onward) else setpoint.onward
+        rest = max(g.slow - speed, 0.0)
+        heading = math.atan2(y + rest * math.sin(onward), x + rest * math.cos(onward)) - slip
         vx, vy = float(setpoint.velocity[0]) - c, float(setpoint.velocity[1]) - d
         ax, ay, _ = setpoint.acceleration.tolist()
         turning = (vx * ay - vy * ax) / max(vx * vx + vy * vy, g.slow**2)
-        rate = min(1.0, speed / g.slow) * (turning + g.heading * float(wrapped(heading - now.yaw)))
+        rate = turning + g.heading * float(wrapped(heading - now.yaw))
         return surge, min(max(rate, -g.max_yaw_rate), g.max_yaw_rate)

@@ -44,8 +44,10 @@ RAMP_S = 6.0
 """Time in which a shipped trajectory picks up its speed from rest [s]."""
 STEP_S = 0.05
 """Spacing of the samples of a shipped trajectory [s]."""
-SLOPE_S = 0.2
-"""Time on both sides from which a trajectory's velocity and acceleration are taken [s]; files are coarse."""
+SLOPE_S = (0.2, 1.0)
+"""Least and most time on both sides from which a trajectory's velocity and acceleration are taken [s]."""
+RESTING = 0.005
+"""Horizontal speed [m/s] below which a trajectory counts as resting."""
 SHORTEST_S = 1.0
 """Least duration [s]; ten control periods."""
 MAX_BYTES = 20_000_000
@@ -80,6 +82,11 @@ class Trajectory:
         self.time = time
         self.samples = position
         self.duration_s = float(time[-1])
+        # Over less than the samples' spacing the acceleration would be a row of spikes.
+        self._slope_s = float(np.clip(np.median(np.diff(time)), *SLOPE_S))
+        along = np.diff(position[:, :2], axis=0)
+        self._moves = np.flatnonzero(np.hypot(*along.T) > RESTING * np.diff(time))
+        self._headings = np.arctan2(along[self._moves, 1], along[self._moves, 0])
 
     def position(self, time: float | Array) -> Array:
         """Position (..., 3) [m] at times (...,) [s]; beyond the ends as at the ends."""
@@ -87,10 +94,20 @@ class Trajectory:
 
     def setpoint(self, time: float) -> Setpoint:
         """Position, velocity and acceleration at `time` [s]."""
-        behind, here, ahead = self.position(np.array([time - SLOPE_S, time, time + SLOPE_S]))
-        velocity = (ahead - behind) / (2 * SLOPE_S)
+        dt = self._slope_s
+        behind, here, ahead = self.position(np.array([time - dt, time, time + dt]))
+        velocity = (ahead - behind) / (2 * dt)
         speed = math.sqrt(velocity @ velocity)
-        return Setpoint(here, speed, velocity, (ahead - 2 * here + behind) / SLOPE_S**2)
+        acceleration = (ahead - 2 * here + behind) / dt**2
+        return Setpoint(here, speed, velocity, acceleration, self._onward(time))
+
+    def _onward(self, time: float) -> float:
+        """Heading [rad] of the first piece from `time` [s] on that does not rest; else that of the last."""
+        if not len(self._moves):
+            return math.nan
+        piece = np.searchsorted(self.time, time, side="right") - 1
+        following = np.searchsorted(self._moves, piece)
+        return float(self._headings[min(following, len(self._headings) - 1)])
 
     def start(self) -> tuple[Array, float]:
         """The first position, and the heading of the first horizontal metre or of what there is."""

@@ -59,15 +59,29 @@ def test_near_its_place_it_backs_rather_than_turns_about(robot: Layout) -> None:
     assert abs(wrench[5]) < 0.02
 
 
+def test_where_the_path_rests_it_turns_to_where_the_path_goes_on(robot: Layout) -> None:
+    here = Setpoint(np.array([0.0, 0.0, -1.0]), 0.0, onward=0.5 * math.pi)
+    wrench = first_wrench(robot, here)
+    assert abs(wrench[0]) < 0.02
+    assert wrench[5] > 0.5
+    assert first_wrench(robot, here, yaw=0.5 * math.pi) == pytest.approx(0.0, abs=1e-9)
+
+
 def test_no_more_than_the_bounds_is_asked_for(robot: Layout) -> None:
     far = Setpoint(np.array([90.0, 90.0, 90.0]), 0.0)
     wrench, most = first_wrench(robot, far), np.array(gains_for(robot).max_wrench)
     assert (np.abs(wrench) <= most + 1e-12).all()
 
 
-def error(robot: Layout, pilot: Controller, truth: Layout | None = None, water: Water | None = None) -> float:
-    """Root mean square distance from a circle [m]."""
-    loop = ClosedLoop(robot, load_allocator(), make_trajectory("circle"), pilot, truth=truth, water=water)
+def error(
+    robot: Layout,
+    pilot: Controller,
+    truth: Layout | None = None,
+    water: Water | None = None,
+    path: str = "circle",
+) -> float:
+    """Root mean square distance from a path [m]."""
+    loop = ClosedLoop(robot, load_allocator(), make_trajectory(path), pilot, truth=truth, water=water)
     log = loop.run()
     return float(np.sqrt(((log.position - log.reference) ** 2).sum(1).mean()))
 
@@ -82,3 +96,7 @@ def test_it_stays_nearer_to_a_path_than_a_robot_that_heads_for_waypoints(
     truth, water = perturbed(robot, damping=damping), SteadyCurrent((current, 0.0, 0.0))
     mine = error(robot, TrackingController(robot), truth, water)
     assert mine < share * error(robot, WaypointController(), truth, water)
+
+
+def test_it_stops_at_corners_and_sets_off_again(robot: Layout) -> None:
+    assert error(robot, TrackingController(robot), path="square") < 0.04

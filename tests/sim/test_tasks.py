@@ -31,6 +31,25 @@ def test_a_dive_goes_down_and_up_again_and_a_station_nowhere() -> None:
     assert place.length_m == 0.0 and place.setpoint(12.0).surge == 0.0 and place.duration_s == 30.0
 
 
+def test_a_path_says_where_it_goes_on_while_it_rests() -> None:
+    path = make_trajectory("square")
+    turns = [path.setpoint(time) for time in (5.0, 18.0, 41.0, 63.0, 89.0)]
+    assert [bool(np.any(turn.velocity)) for turn in turns] == [True, False, False, False, False]
+    onward = [turn.onward for turn in turns]
+    np.testing.assert_allclose(onward, np.array([0.0, 0.5, 1.0, -0.5, -0.5]) * np.pi, atol=1e-6)
+    assert np.isnan(make_trajectory("station").setpoint(12.0).onward)
+
+
+def test_coarse_samples_of_a_smooth_path_have_a_smooth_acceleration() -> None:
+    """The square's legs, 41 samples each, are cubics over time."""
+    path = make_trajectory("square")
+    leg = 0.17 * path.duration_s
+    for time in np.linspace(1.0, leg - 1.0, 50):
+        setpoint, done = path.setpoint(time), time / leg
+        assert setpoint.velocity[0] == pytest.approx(12.0 / leg * done * (1.0 - done), abs=2e-3)
+        assert setpoint.acceleration[0] == pytest.approx(12.0 / leg**2 * (1.0 - 2.0 * done), abs=1e-3)
+
+
 def test_a_file_of_positions(tmp_path: Path) -> None:
     file = tmp_path / "line.csv"
     file.write_text("z, t, x, y\n-1,0,0,0\n-1,10,1,2\n")
