@@ -35,6 +35,7 @@ def simulate(
     seed: Annotated[int, arg(metavar="N")] = 0,
     checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
     output: Annotated[Path | None, arg(metavar="FOLDER", aliases=["-o"])] = None,
+    animate: bool = False,
 ) -> None:
     """Let a robot follow a trajectory in simulation, and say how well it did.
 
@@ -65,8 +66,9 @@ def simulate(
         noise: whether the sensors are noisy.
         seed: of the noise.
         checkpoint: trained checkpoint; the shipped one of the method by default.
-        output: new or empty folder for the log (log.npz) and pictures; without it only the summary is
-            printed.
+        output: new or empty folder for the log (log.npz, and log.csv for other programs) and pictures;
+            without it only the summary is printed.
+        animate: write swim.gif into the folder, too: the swim from above, played in a quarter of a minute.
     """
     from tqdm import tqdm
 
@@ -86,6 +88,8 @@ def simulate(
     robot = open_robot(layout)
     failures = [FinFault(name, 0.0) for name in robot.failed] + [_failure(text) for text in fail]
     _check_folder(output)
+    if animate and output is None:
+        raise FinlabError("--animate: expected a folder for swim.gif; name one with --output")
     water = _water(current, waves, seed)
     sensors = None if noise else NO_NOISE
     if excite:
@@ -132,12 +136,18 @@ def simulate(
     log = loop.log
     written = ""
     if output is not None:
+        from finlab.evaluation.plots.animation import Swum, save_animation
         from finlab.evaluation.plots.closed_loop_run import save_pictures
+        from finlab.sim.log_csv import save_csv
 
         output.mkdir(parents=True, exist_ok=True)
         log.save(output / "log.npz")
-        names = ", ".join(path.name for path in save_pictures(log, output))
-        written = f"\n{output}: written log.npz, {names}."
+        save_csv(log, output / "log.csv")
+        pictures = save_pictures(log, output)
+        if animate:
+            pictures.append(save_animation([Swum(log.method, log, loop.layout)], output / "swim.gif"))
+        names = ", ".join(path.name for path in pictures)
+        written = f"\n{output}: written log.npz, log.csv, {names}."
     print("\n".join([excitation_summary(log) if excite else summary(log), *found.sentences]))
     if written:
         print(written)

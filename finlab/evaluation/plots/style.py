@@ -69,14 +69,14 @@ def picture(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(_LOOK):
+    with matplotlib.rc_context(LOOK):
         figure = Figure(figsize=(WIDTH, height), layout="constrained")
         FigureCanvasAgg(figure)
         axes = list(figure.subplots(rows, columns, squeeze=False, **options).flat)
         yield Picture(figure, axes)
         names: dict[str, Any] = {}
         for axis in axes:
-            _clean(axis, grid)
+            clean(axis, grid)
             for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
                 names.setdefault(label, handle)
         if legend and names:
@@ -106,7 +106,7 @@ class Picture:
         import matplotlib
 
         text = io.StringIO()
-        with matplotlib.rc_context({**_LOOK, "svg.hashsalt": name}):
+        with matplotlib.rc_context({**LOOK, "svg.hashsalt": name}):
             self.figure.savefig(
                 text, format="svg", dpi=160, transparent=True, metadata={"Date": None, "Creator": None}
             )
@@ -120,7 +120,7 @@ def mark_printed(axis: Axes, value: float, words: str) -> None:
     axis.annotate(words, place, xycoords=above, fontsize=8, color=SOFT, ha="center", annotation_clip=False)
 
 
-def _clean(axis: Axes, grid: str) -> None:
+def clean(axis: Axes, grid: str) -> None:
     axis.grid(True, axis=grid, color=LINE, linewidth=0.7)  # type: ignore[arg-type]
     axis.set_axisbelow(True)
     for side in ("top", "right"):
@@ -130,7 +130,7 @@ def _clean(axis: Axes, grid: str) -> None:
     axis.tick_params(colors=SOFT, labelcolor=INK, length=3, width=0.7, which="both")
 
 
-_LOOK: Any = {
+LOOK: Any = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
     "font.size": FONT,

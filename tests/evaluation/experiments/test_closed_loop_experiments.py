@@ -100,12 +100,16 @@ def test_simulate_writes_a_log_and_pictures(tmp_path: Path, capsys: pytest.Captu
     path.write_text("t,x,y,z\n0,0,0,-1\n8,1,0,-1\n")
     out = tmp_path / "out"
     argv = ["simulate", "A", "--trajectory", str(path), "--method", "analytic", "--fail", "front_left@4"]
-    assert main([*argv, "--output", str(out)]) == 0
+    assert main([*argv, "--animate"]) == 2
+    assert "--animate: expected a folder" in capsys.readouterr().err
+    assert main([*argv, "--animate", "--output", str(out)]) == 0
     printed = capsys.readouterr().out
     assert "ATE" in printed and "lost: front_left" in printed
     log = load_log(out / "log.npz")
     assert log.task == "line" and not log.alive[-1, log.fins.index("front_left")]
     assert all(is_small_png(out / f"{name}.png") for name in ("path", "errors", "commands", "wrench"))
+    assert (out / "swim.gif").read_bytes()[:3] == b"GIF" and "log.csv, path.png" in printed
+    assert (out / "log.csv").read_text().count("\n") == 1 + log.n_ticks
     assert main([*argv, "--output", str(out)]) == 2
     assert "expected a new or empty folder" in capsys.readouterr().err
 
