@@ -26,7 +26,7 @@ def simulate(
     objective: Literal["power", "effort"] = "power",
     duration: Annotated[float | None, arg(metavar="SECONDS")] = None,
     plant: Annotated[str, arg(metavar="NAME")] = "mean",
-    controller: Literal["waypoint", "tracking"] = "waypoint",
+    controller: Literal["tracking", "waypoint"] = "tracking",
     gains: Annotated[str | None, arg(metavar="NAME|FILE")] = None,
     current: Annotated[tuple[float, float, float], arg(metavar="VX VY VZ")] = (0.0, 0.0, 0.0),
     waves: Annotated[tuple[float, float], arg(metavar="HEIGHT SECONDS")] = (0.0, 3.0),
@@ -56,10 +56,10 @@ def simulate(
         plant: what the fins really do: mean (the fin law), ripple (within the flapping cycle), flexible (fins
             with soft tips), wake (fins in each other's jets), inflow (thrust falls with speed) or offset
             (centre of gravity and fins not where the layout says).
-        controller: waypoint (heads for a point ahead, as in the paper) or tracking (follows velocity and
-            acceleration, learns current and unknown forces; its gains follow from the robot).
-        gains: of the waypoint controller: waypoint, waypoint_paper (proportional terms alone), or a YAML
-            file.
+        controller: tracking (follows velocity and acceleration, learns current and unknown forces; its gains
+            follow from the robot) or waypoint (heads for a point ahead, as in the paper).
+        gains: of the waypoint controller alone: waypoint, waypoint_paper (proportional terms alone), or a
+            YAML file.
         current: velocity of the water in the world [m/s].
         waves: significant height [m] and peak period [s] of waves that run along the world's x.
         steady: tell the allocator its previous command.
@@ -103,7 +103,10 @@ def simulate(
         failures = []
     else:
         if controller == "tracking" and gains is not None:
-            raise FinlabError("--gains: those of the tracking controller follow from the robot; leave it out")
+            raise FinlabError(
+                "--gains: those of the tracking controller follow from the robot; leave it out, or add "
+                "--controller waypoint"
+            )
         pilot = (
             TrackingController(robot.layout)
             if controller == "tracking"

@@ -18,6 +18,7 @@ class VelocityController:
 
     name = "velocity"
     axes: tuple[str, ...] = ("Fx", "Fz", "Tz")
+    needs_given = False
     lead_s = 0.0
 
     def __init__(self, gains: VelocityGains | None = None) -> None:
@@ -51,6 +52,7 @@ class WaypointController:
 
     name = "waypoint"
     axes: tuple[str, ...] = ("Fx", "Fz", "Tz")
+    needs_given = False
 
     def __init__(self, gains: WaypointGains | None = None) -> None:
         """Takes gains; the shipped file `waypoint` by default."""

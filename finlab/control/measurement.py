@@ -63,6 +63,8 @@ class Controller(Protocol):
     """How far ahead of now [s] the waypoint should be taken from a trajectory."""
     period_s: float
     """Time between calls [s]."""
+    needs_given: bool
+    """Whether `wrench` wants to know what the fins have given; else it is told zero, which costs no time."""
 
     def reset(self) -> None:
         """Forget everything, as before the first call."""

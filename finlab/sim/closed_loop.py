@@ -14,9 +14,9 @@ from finlab.control import (
     Controller,
     FaultMonitor,
     Measurement,
+    TrackingController,
     VelocityController,
     Verdict,
-    WaypointController,
 )
 from finlab.control.measurement import NO_WRENCH
 from finlab.control.nominal_lag import NominalLag
@@ -71,8 +71,8 @@ class ClosedLoop:
             layout: the robot; what its body does not say is U-CAT's.
             allocator: any method.
             task: a `Trajectory` or a `Cruise`.
-            controller: by default the waypoint controller for trajectories, the velocity controller for
-                cruises.
+            controller: by default the tracking controller of the layout for trajectories, the velocity
+                controller for cruises.
             plant: what the fins really do; see `PLANTS`.
             steady: whether the allocator is given its previous command, so that fins turn little per tick.
             sensors: rates and noise; the defaults of `SensorSettings`.
@@ -97,7 +97,7 @@ class ClosedLoop:
         self.allocator = allocator
         self.task = task
         if controller is None:
-            controller = VelocityController() if isinstance(task, Cruise) else WaypointController()
+            controller = VelocityController() if isinstance(task, Cruise) else TrackingController(layout)
         self.controller = controller
         self.plant = plant
         self.steady = steady
@@ -261,8 +261,8 @@ class ClosedLoop:
 
     def _given(self) -> Array:
         """Wrench (6,) of the fins over the last period, if they do what they were told [N, N m]."""
-        if self._command is None:
-            return self._gave
+        if self._command is None or not self.controller.needs_given:
+            return NO_WRENCH
         motion = self._lag.step(self._command)
         force = self._plant.force(motion) * (motion[:, :1] * motion[:, 1:2] > 0.0)
         before, self._gave = self._gave, force.ravel() @ self._plant.columns.reshape(-1, 6)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from finlab.allocation.allocator import Allocator
-from finlab.control import FaultMonitor, Measurement, MonitorSettings
+from finlab.control import FaultMonitor, Measurement, MonitorSettings, WaypointController
 from finlab.errors import LayoutError
 from finlab.layout import Layout
 from finlab.sim import NOISE_ALONE, ClosedLoop, FinFault, RunLog, SteadyCurrent, make_trajectory
@@ -85,7 +85,7 @@ def test_a_stuck_fin_is_told_from_a_lost_one(layout_a: Layout, analytic: Allocat
 
 def test_a_repaired_fin_is_taken_back(layout_a: Layout, analytic: Allocator) -> None:
     events = [FinFault("back_right", 10.0), FinFault("back_right", 15.0, "whole")]
-    loop = swim(layout_a, analytic, events)
+    loop = swim(layout_a, analytic, events, controller=WaypointController())  # which asks more of that fin
     until(loop, 15.0)
     assert loop.failed == ("back_right",)
     until(loop, 60.0)

@@ -13,10 +13,11 @@ import numpy as np
 
 from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
+from finlab.control import VelocityController, WaypointController
 from finlab.errors import DataError
 from finlab.evaluation.progress import progress
 from finlab.layout import Layout
-from finlab.sim import ClosedLoop, RunLog, Task
+from finlab.sim import ClosedLoop, Cruise, RunLog, Task
 
 Row = dict[str, Any]
 
@@ -107,7 +108,7 @@ def run_all(
     *,
     steady: bool = False,
 ) -> list[Run]:
-    """Every scenario with every method and seed, one after the other.
+    """Every scenario with every method and seed, one after the other, with the paper's controllers.
 
     Args:
         scenarios: what is swum.
@@ -120,7 +121,8 @@ def run_all(
     every = list(product(scenarios, allocators.items(), seeds))
     for (label, layout, task, failures), (name, allocator), seed in progress(every, "run"):
         options: dict[str, Any] = {"failures": failures, "plant": plant, "steady": steady, "seed": seed}
-        done.append(((label, name), ClosedLoop(layout, allocator, task, **options).run()))
+        pilot = VelocityController() if isinstance(task, Cruise) else WaypointController()
+        done.append(((label, name), ClosedLoop(layout, allocator, task, pilot, **options).run()))
     return done
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
-from finlab.control import FaultMonitor, Measurement, Verdict
+from finlab.control import FaultMonitor, Measurement, Verdict, WaypointController
 from finlab.evaluation.experiments.closed_loop_runs import Row, absolute_error
 from finlab.evaluation.progress import progress
 from finlab.layout import Layout
@@ -113,13 +113,16 @@ def swim_losses(
             "plant": plant,
             "seed": seed,
         }
-        told = None if fin is None else ClosedLoop(layout, allocator, trajectory, **options).run()
+        told = None
+        if fin is not None:
+            told = ClosedLoop(layout, allocator, trajectory, WaypointController(), **options).run()
         for reports in feedback:
             monitor = TimedMonitor(layout)
             swim = ClosedLoop(
                 layout,
                 allocator,
                 trajectory,
+                WaypointController(),
                 announced=False,
                 monitor=monitor,
                 servo_feedback=reports,

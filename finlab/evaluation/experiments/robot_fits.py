@@ -15,6 +15,7 @@ import numpy as np
 
 from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
+from finlab.control import WaypointController
 from finlab.evaluation.experiments.closed_loop_runs import absolute_error, depth_error
 from finlab.evaluation.experiments.true_robots import true_layout, true_wrench
 from finlab.evaluation.progress import progress
@@ -115,7 +116,7 @@ def _closed_loops(
     for run in range(runs):
         path = make_trajectory("circle")
         options: dict[str, Any] = {"plant": plant, "truth": drawn, "sensors": NOISE_ALONE, "seed": seed + run}
-        log = ClosedLoop(robot, allocator, path, **options).run()
+        log = ClosedLoop(robot, allocator, path, WaypointController(), **options).run()
         late = log.time >= UNDER_WAY_S
         rows.append(
             {
