@@ -30,6 +30,7 @@ from webapp.tasks.fitting import Fitting
 from webapp.tasks.improving import Improver
 from webapp.tasks.solver import Solver
 from webapp.tasks.sweeping import Sweep
+from webapp.tasks.swim_files import SwimFiles
 from webapp.tasks.swimming import Swimming
 from webapp.theme import VERMILLION
 from webapp.viser_internals import limit_uploads
@@ -85,6 +86,8 @@ class Page(ABC):
         """Other methods on the same question."""
         self.swimming = Swimming(context, self._swam)
         """A robot that swims."""
+        self.swim_files = SwimFiles(context, self.swimming, self._swam)
+        """What can be taken home of that."""
         self.sweep = Sweep(context)
         """A component of the target on its way through a range."""
         self.exports = Exports(context)

@@ -23,6 +23,8 @@ MISSING = VERMILLION
 """What is left undone, and every warning."""
 OTHER: Rgb = (170, 68, 153)
 """The second of two robots that swim the same way."""
+KEPT: Rgb = (214, 131, 0)
+"""A swim that was kept to compare others with."""
 DEAD: Rgb = (150, 154, 158)
 """A failed fin."""
 

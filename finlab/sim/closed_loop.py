@@ -104,6 +104,7 @@ class ClosedLoop:
         self.seed = seed
         truth = layout if truth is None else checked_truth(layout, truth)
         self.vehicle = Vehicle(complete_body(truth))
+        """The body that really swims; it may be replaced on the way, as may the water."""
         self.water: Water = Still() if water is None else water
         self.fins = FinMotion(truth)
         """The fins' motion: amplitude, frequency, zero direction and phase of each."""

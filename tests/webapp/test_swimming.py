@@ -10,6 +10,7 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
+from finlab.sim import make_trajectory
 from tests.webapp.loops import page_of
 from tests.webapp.stand_in import load_stand_in
 from webapp.markup.corner import swim_corner
@@ -18,8 +19,9 @@ from webapp.session.files import read_path
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan, SwimSettings
 from webapp.tasks.background import Worker
+from webapp.tasks.moment import ERROR, FORCES, POINTS, TIME
+from webapp.tasks.pace import LAG_S
 from webapp.tasks.solver import Solver
-from webapp.tasks.swimmer import ERROR, FORCES, LAG_S, POINTS, TIME
 from webapp.tasks.swimming import Swimming
 
 UCAT = load_layout(shipped_layouts()["ucat"])
@@ -50,7 +52,7 @@ def begin(swimming: Swimming, **settings: Any) -> None:
 
 
 def test_swims_to_the_end_and_tells_how(swimming: Swimming) -> None:
-    assert "Start" in swim_card(swimming)
+    assert "Start" in swim_card(swimming, SwimSettings())
     begin(swimming, methods=("analytic", "qp"))
     while not swimming.done:
         swimming.tick(0.05)
@@ -61,15 +63,16 @@ def test_swims_to_the_end_and_tells_how(swimming: Swimming) -> None:
     assert record.shape == (20, FORCES + 8) and np.isfinite(record).all()
     assert np.all(np.diff(record[:, TIME]) > 0) and record[0, ERROR] < 0.1
     assert second.shown.record[-1, TIME] == record[-1, TIME], "both swim the same way at the same time"
-    assert first.track_error is not None and first.track_error < 0.3
-    assert "arrived" in swim_card(swimming) and "qp" in swim_card(swimming)
+    figures = first.shown.figures
+    assert figures is not None and figures.track_m < 0.3
+    assert "arrived" in swim_card(swimming, SwimSettings()) and "qp" in swim_card(swimming, SwimSettings())
     assert "arrived" in swim_corner(swimming, 2.0)
     swimming.set_running(True)
     assert not swimming.running, "there is no way left"
 
 
 def test_a_slow_machine_drops_time_instead_of_piling_it_up(swimming: Swimming) -> None:
-    begin(swimming, path="circle")
+    begin(swimming, path=make_trajectory("circle"))
     for _ in range(100):
         swimming.tick(1.0)  # a hundred seconds pass while the first stretch is swum
     until(lambda: not swimming._stretch.busy)
@@ -87,7 +90,7 @@ def test_pause_step_and_speed(swimming: Swimming) -> None:
     for wrong in (float("nan"), 0.0, "2", 99.0):
         with pytest.raises(FinlabError):
             SwimSettings().with_value("speed", wrong)
-    assert "paused" in swim_card(swimming)
+    assert "paused" in swim_card(swimming, SwimSettings())
 
 
 def test_fins_break_and_are_mended_while_it_swims(swimming: Swimming) -> None:
@@ -103,7 +106,7 @@ def test_fins_break_and_are_mended_while_it_swims(swimming: Swimming) -> None:
     for name in ("front_right", "back_left"):
         swimming.toggle(name)
         until(lambda name=name: name in swimming.swimmers[0].shown.failed)
-    assert "drift off" in swim_card(swimming)
+    assert "drift off" in swim_card(swimming, SwimSettings())
     with pytest.raises(FinlabError, match="last fin"):
         swimming.toggle("back_right")
     swimming.toggle("front_left")
@@ -117,13 +120,13 @@ def test_bad_plans_and_methods_out_of_order(swimming: Swimming) -> None:
         with pytest.raises(FinlabError, match=wrong):
             settings.with_value(key, wrong)
     swimming._solver = Solver(load=lambda *_, **__: load_stand_in("slsqp"))
-    swimming.start(Plan(UCAT, (), "circle", ("qp",)))
+    swimming.start(Plan(UCAT, (), make_trajectory("circle"), ("qp",)))
     until(lambda: bool(swimming.notes))  # type: ignore[attr-defined]
     assert not swimming.active
 
 
 def test_a_long_record_is_thinned(swimming: Swimming) -> None:
-    begin(swimming, path="circle")
+    begin(swimming, path=make_trajectory("circle"))
     swimming.set_running(False)
     swimmer = swimming.swimmers[0]
     for _ in range(POINTS + 50):
@@ -139,7 +142,7 @@ def test_files_with_ways_are_checked() -> None:
 
 
 def test_a_fin_that_breaks_without_a_word_is_found(swimming: Swimming) -> None:
-    begin(swimming, path="circle")
+    begin(swimming, path=make_trajectory("circle"))
     swimming.set_running(False)
     swimmer = swimming.swimmers[0]
     while swimmer.swim.time < 12.0:
@@ -147,18 +150,18 @@ def test_a_fin_that_breaks_without_a_word_is_found(swimming: Swimming) -> None:
     swimming.toggle("front_left", announced=False)
     until(lambda: swimming.swimmers[0].shown.lost == ("front_left",))
     assert swimmer.shown.failed == () and swimmer.shown.found == ()
-    assert "does not know yet" in swim_card(swimming)
+    assert "does not know yet" in swim_card(swimming, SwimSettings())
     while not swimmer.swim.failed and swimmer.swim.time < 20.0:
         swimmer.step()
     swimmer.shown = swimmer.moment()
     ((name, seconds),) = swimmer.shown.found
     assert (name, swimmer.shown.failed) == ("front_left", ("front_left",)) and 0.0 < seconds < 8.0
-    assert f"found front_left lost {seconds:.1f} s after" in swim_card(swimming)
+    assert f"found front_left lost {seconds:.1f} s after" in swim_card(swimming, SwimSettings())
     doubts = swimmer.shown.record[:, FORCES + 4 :]
     assert doubts[-1, UCAT.index("front_left")] > 0.99 and doubts[0].max() < 0.1
     swimming.toggle("front_left", announced=False)
     until(lambda: swimming.swimmers[0].shown.lost == ())
-    assert "front_left works, but the allocator takes it for lost" in swim_card(swimming)
+    assert "front_left works, but the allocator takes it for lost" in swim_card(swimming, SwimSettings())
 
 
 def test_whether_the_allocator_is_told_is_a_setting() -> None:

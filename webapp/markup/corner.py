@@ -4,14 +4,14 @@ import math
 from html import escape
 
 from finlab.allocation.allocation import Allocation
-from webapp.markup.swim_card import pace_words
+from webapp.markup.swim_card import pace_words, robots
 from webapp.markup.words import objective_of, reach_sentence, small, three_digits
 from webapp.scene.wrench_nodes import set_scale
 from webapp.session.state import State
 from webapp.tasks.analyst import Findings
-from webapp.tasks.swimmer import ERROR
+from webapp.tasks.moment import ERROR
 from webapp.tasks.swimming import Swimming
-from webapp.theme import ASKED, DEAD, DELIVERED, MISSING, OTHER, TORQUE_SCALE, css, look
+from webapp.theme import ASKED, DEAD, DELIVERED, MISSING, TORQUE_SCALE, css, look
 
 ARROWS = (("asked", 0.65), ("delivered", 1.0), ("missing", 1.0))
 """Words and opacities of the three arrows."""
@@ -125,31 +125,31 @@ def _figures(allocation: Allocation, raw: bool, least: bool) -> list[str]:
 
 
 def swim_corner(swimming: Swimming, newtons: float) -> str:
-    """The same while robots swim."""
-    first = swimming.swimmers[0]
+    """The same while robots swim, in the upper left corner: below lies the time."""
+    first, shown = swimming.swimmers[0], swimming.seen[0]
     trails = "".join(
         f"<svg width='44' height='10'><path d='M0 5H44' stroke='{css(color)}' stroke-width='3.5'/></svg>"
-        f"<span>{word}</span>"
+        f"<span>{escape(word)}</span>"
         for word, color in (
             ("the path", ASKED),
-            *((s.method, c) for s, c in zip(swimming.swimmers, (DELIVERED, OTHER), strict=False)),
+            *((f"{name}, {robot.about}", color) for robot, _, color, name in robots(swimming)),
         )
     )
-    alive = len(first.fins) - len(first.shown.lost)
-    off = f"{100 * float(first.shown.record[-1, ERROR]):.1f}" if len(first.shown.record) else "–"
+    alive = len(first.fins) - len(shown.lost)
+    off = f"{100 * float(shown.record[-1, ERROR]):.1f}" if len(shown.record) else "–"
     parts = [
-        f"<b>{escape(first.swim.layout.name)}</b>",
+        f"<b>{escape(first.layout.name)}</b>",
         f"<span>{alive} of {len(first.fins)} fins</span>",
-        f"<span><b>{first.shown.time:.1f}</b> s of {first.duration_s:.0f} s</span>",
+        f"<span><b>{shown.time:.1f}</b> s of {first.duration_s:.0f} s</span>",
         f"<span><span class='dim'>off the path</span> <b>{off}</b> cm</span>",
         f"<span>{pace_words(swimming)}</span>",
     ]
     scale = f"<div class='dim scales'>arrow 0.1 m = {newtons:g} N</div>"
-    return _cards(f"<div class='fl-legend'>{trails}</div>{scale}", parts)
+    return _cards(f"<div class='fl-legend'>{trails}</div>{scale}", parts, "fl-corner fl-upper")
 
 
-def _cards(legend: str, status: list[str]) -> str:
+def _cards(legend: str, status: list[str], where: str = "fl-corner") -> str:
     return (
-        f"<div class='fl-corner'><div class='fl fl-card fl-legend-card'>{legend}</div>"
+        f"<div class='{where}'><div class='fl fl-card fl-legend-card'>{legend}</div>"
         f"<div class='fl fl-card fl-status'>{''.join(status)}</div></div>"
     )

@@ -71,13 +71,15 @@ class LinePlot:
         """Other words at the axes."""
         put(self._plot, axes=_axes(title, below))
 
-    def draw(self, x: Array, lines: Sequence[Array], ends: tuple[float, float]) -> None:
-        """Draw lines over `x`, between two ends of the vertical axis.
+    def draw(
+        self, x: Array, lines: Sequence[Array], ends: tuple[float, float], across: float | None = None
+    ) -> None:
+        """Draw lines over `x`, between two ends of the vertical axis; from 0 to `across` where that is given.
 
         The scale is fixed: lines that hold no numbers would spoil an automatic one.
         """
         rest = [np.full(len(x), np.nan)] * (self._n_lines - len(lines))
-        put(self._plot, scales=_scales(ends))
+        put(self._plot, scales=_scales(ends, across))
         put(self._plot, data=tuple(np.ascontiguousarray(line) for line in (x, *lines, *rest)))
 
 
@@ -86,8 +88,20 @@ def top_of(lines: Iterable[Array], least: float) -> float:
     return ROOM * nice_limit(max(float(np.nanmax(line, initial=least)) for line in lines) / 1.2)
 
 
-def _scales(ends: tuple[float, float]) -> dict[str, uplot.Scale]:
-    return {"x": uplot.Scale(time=False), "y": uplot.Scale(auto=False, range=ends)}
+def with_cursor(
+    x: Array, lines: Sequence[Array], at: float, ends: tuple[float, float]
+) -> tuple[Array, list[Array]]:
+    """`x` and lines with one place more, where the lines go on, and before them an upright line there."""
+    place = int(np.searchsorted(x, at))
+    widened = [np.insert(line, place, [np.interp(at, x, line)] * 2) for line in lines]
+    upright = np.full(len(x) + 2, np.nan)
+    upright[place : place + 2] = ends
+    return np.insert(x, place, [at, at]), [upright, *widened]
+
+
+def _scales(ends: tuple[float, float], across: float | None = None) -> dict[str, uplot.Scale]:
+    x = uplot.Scale(time=False) if across is None else uplot.Scale(time=False, range=(0.0, across))
+    return {"x": x, "y": uplot.Scale(auto=False, range=ends)}
 
 
 def _axes(title: str, below: str) -> tuple[uplot.Axis, uplot.Axis]:

@@ -1,54 +1,57 @@
-"""Watch the robot swim: a path, a method or two, fins that break; plots of what happens."""
+"""Let the robot swim: a scenario, a method or two, what goes wrong on the way, and what it took."""
 
-import time
 from functools import partial
 from typing import Any
 
-import numpy as np
 import viser
 
 from finlab.sim import PLANTS, SHIPPED, Trajectory
-from webapp.handles import Changes, hold_kind, option_index, put
+from webapp.handles import hold_kind, option_index, put
+from webapp.markup.scenario import scenario_card
 from webapp.markup.swim_card import swim_card
 from webapp.page import Page
 from webapp.panels.damage import FinButtons
-from webapp.panels.line_plot import FIN_LINES, LinePlot, top_of
+from webapp.panels.timeline import Timeline
 from webapp.session.files import read_path
-from webapp.session.state import AXIS_UNITS, AXIS_WORDS, COMPARED
-from webapp.session.swim_plan import ALONE, OWN, SPEEDS
-from webapp.tasks.swimmer import ASKED as ASKED_COLUMN
-from webapp.tasks.swimmer import DELIVERED as DELIVERED_COLUMN
-from webapp.tasks.swimmer import ERROR, FORCES, TIME
-from webapp.tasks.swimming import Swimming
-from webapp.theme import ASKED, DELIVERED, OTHER, css
-
-EVERY_S = 0.2
-"""Least time between two drawings [s]."""
-SMALL = 0.01
-"""What the vertical axes show at least."""
-PLOT_PX = 76
-"""Height of a plot [px]: four fit below the buttons."""
-CERTAIN = 114.0
-"""End of the axis of probabilities [%]: some room above what is certain."""
+from webapp.session.scenarios import SCENARIOS
+from webapp.session.state import AXIS_WORDS, COMPARED
+from webapp.session.swim_plan import ALONE, CONTROLLERS, NUMBERS, OWN, SPEEDS
 
 
 class SwimTab:
-    """Widgets of one tab."""
+    """Widgets of one tab, and the window with the plots."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
-        self._page = page
+        self._page, self._gui = page, gui
         self._own: Trajectory | None = None
-        rival = "A second robot on the same path, with another method."
-        forces = "The fin law, its ripple, or what no layout says: soft fins, jets, inflow, offsets."
-        speed = "Simulated time per real time; a slow machine falls short of it."
+        day = "A day that is not as the designer assumed; it sets path, water, body, sensors and fins."
+        self._bind("scenario", gui.add_dropdown("Scenario", tuple(SCENARIOS), hint=day), live=True)
+        self._about = gui.add_html("")
         self._path = gui.add_dropdown("Path", tuple(SHIPPED), hint="Where to swim.")
-        settings: dict[str, Any] = {
-            "path": self._path,
-            "method": gui.add_dropdown("Method", COMPARED, hint="Who allocates, ten times a second."),
-            "rival": gui.add_dropdown("Beside", (ALONE, *COMPARED), hint=rival),
-            "plant": gui.add_dropdown("Fin forces", tuple(PLANTS), hint=forces),
+        self._bind("path", self._path)
+        rival = "A second robot on the same path, with another method."
+        self._bind("method", gui.add_dropdown("Method", COMPARED, hint="Who allocates, ten times a second."))
+        self._bind("rival", gui.add_dropdown("Beside", (ALONE, *COMPARED), hint=rival))
+        self._add_run()
+        self._add_disturbances()
+        self._card = gui.add_html("")
+        keeps = {"Keep this swim": page.swimming.keep, "Forget it": page.swimming.forget_kept}
+        page.add_buttons("Compare", keeps, hint="Keep it in orange, and swim again with something changed.")
+        files = {
+            "Table (CSV)": page.swim_files.table,
+            "Plots (PNG)": page.swim_files.pictures,
+            "Film (GIF)": page.swim_files.animation,
         }
+        page.add_buttons(
+            "Save", files, hint="The log with units, pictures, an animation; made on the server."
+        )
+        self._making = gui.add_progress_bar(0.0, visible=False)
+        self._add_more()
+        self._timeline = Timeline(gui, page)
+
+    def _add_run(self) -> None:
+        page = self._page
         runs = {
             "Start": self._start,
             "Pause": self._hold,
@@ -57,11 +60,12 @@ class SwimTab:
             "End": page.scenery.end_swim,
         }
         self._run = page.add_buttons("Run", runs, hint="Step swims for 0.1 s; B pauses or goes on.")
-        settings["speed"] = gui.add_slider("Speed", *SPEEDS, 0.1, 1.0, hint=speed)
-        for key, widget in settings.items():
-            page.bind(widget, partial(page.session.set_swim, key), partial(self._setting, key))
-        follow = gui.add_checkbox("Follow", False, hint="The camera goes along with the first robot.")
-        page.on_change(follow, page.scenery.swim.look)
+        speed = "Simulated time per real time; a slow machine falls short of it."
+        self._bind("speed", self._gui.add_slider("Speed", *SPEEDS, 0.1, 1.0, hint=speed))
+
+    def _add_disturbances(self) -> None:
+        """What can go wrong at any moment."""
+        page = self._page
         self._fins = FinButtons(
             page,
             "Break a fin",
@@ -70,14 +74,40 @@ class SwimTab:
             lambda name: page.swimming.toggle(name, page.session.swim.announced),
         )
         tells = "The allocator is told. Off: a monitor must find out from how the robot moves."
-        page.bind(
-            gui.add_checkbox("Announced", True, hint=tells),
-            partial(page.session.set_swim, "announced"),
-            partial(self._setting, "announced"),
-        )
-        self._card = gui.add_html("")
-        self._plots = SwimPlots(gui)
+        self._bind("announced", self._gui.add_checkbox("Announced", True, hint=tells))
+        now = "At once, while it swims."
+        for key, label, step, hint in (
+            ("current_cm_s", "Current [cm/s]", 0.1, f"How fast the water flows. {now}"),
+            ("heading_deg", "flows to [°]", 1.0, f"0 is the world's x, 90 its y. {now}"),
+            ("waves_cm", "Waves [cm]", 1.0, f"Significant height; period 3 s; they fade with depth. {now}"),
+            ("buoyancy_percent", "Buoyancy [%]", 0.1, f"More than it should have; it rises by itself. {now}"),
+        ):
+            self._bind(key, self._gui.add_slider(label, *NUMBERS[key], step, 0.0, hint=hint), live=True)
+
+    def _add_more(self) -> None:
+        gui, page = self._gui, self._page
         with gui.add_folder("More", expand_by_default=False):
+            steers = "Tracking learns the current and other forces; waypoint is the paper's way."
+            self._bind("controller", gui.add_dropdown("Controller", CONTROLLERS, hint=steers))
+            forces = "The fin law, its ripple, or what no layout says: soft fins, jets, inflow, offsets."
+            self._bind("plant", gui.add_dropdown("Fin forces", tuple(PLANTS), hint=forces))
+            for key, label, step, hint in (
+                ("pack_wh", "Battery [Wh]", 1.0, "What is in it, for how long and how far it lasts."),
+                (
+                    "electronics_w",
+                    "Other load [W]",
+                    0.5,
+                    "Computer, sensors, lights: what takes power besides the fins.",
+                ),
+            ):
+                low, high = NUMBERS[key]
+                first = getattr(page.session.swim, key)
+                self._bind(key, gui.add_number(label, first, min=low, max=high, step=step, hint=hint))
+            wrench = "Asked in blue, delivered in green, of the first robot."
+            self._axis = gui.add_dropdown("Plot the wrench of", AXIS_WORDS, hint=wrench)
+            hold_kind(self._axis)
+            follow = gui.add_checkbox("Follow", False, hint="The camera goes along with the first robot.")
+            page.on_change(follow, page.scenery.swim.look)
             page.add_upload(
                 "Open a path (CSV)",
                 self._take_path,
@@ -85,12 +115,18 @@ class SwimTab:
                 mime_type=".csv",
                 hint="A table with the columns t [s], x, y, z [m].",
             )
-            wrench = "Asked in blue, delivered in green, of the first robot."
-            self._axis = gui.add_dropdown("Plot the wrench of", AXIS_WORDS, hint=wrench)
-            hold_kind(self._axis)
 
-    def _setting(self, key: str) -> object:
-        return getattr(self._page.session.swim, key)
+    def _bind(self, key: str, widget: Any, live: bool = False) -> None:
+        """A widget for a setting of swims; what is `live` acts on the robots that swim, too."""
+        session = self._page.session
+        act = partial(self._meet, key) if live else partial(session.set_swim, key)
+        self._page.bind(widget, act, lambda: getattr(session.swim, key))
+
+    def _meet(self, key: str, value: Any) -> None:
+        """Another water or buoyancy, at once."""
+        session = self._page.session
+        session.set_swim(key, value)
+        self._page.swimming.meet(session.swim.water, session.swim.truth["buoyancy"])
 
     def _take_path(self, name: str, content: bytes) -> None:
         self._own = read_path(name, content)
@@ -106,53 +142,18 @@ class SwimTab:
 
     def refresh(self) -> None:
         """Write how the swim goes."""
-        swimming, speed = self._page.swimming, self._page.session.swim.speed
-        if swimming.pace.speed != speed:
-            swimming.pace.set_speed(speed)
+        swimming, settings = self._page.swimming, self._page.session.swim
+        if swimming.pace.speed != settings.speed:
+            swimming.pace.set_speed(settings.speed)
         swimmers = swimming.swimmers
         names = swimmers[0].fins if swimmers else self._page.session.state.layout.names
         lost = swimmers[0].shown.lost if swimmers else self._page.session.state.failed
         paused = swimming.active and not swimming.running and not swimming.done
+        put(self._about, content=scenario_card(settings))
         put(self._run, options=("Start", "Go on" if paused else "Pause", "Step", "End"))
         self._fins.refresh(names, lost)
-        put(self._card, content=swim_card(swimming))
-        self._plots.refresh(swimming, option_index(self._axis))
-
-
-class SwimPlots:
-    """Four plots over time."""
-
-    def __init__(self, gui: viser.GuiApi) -> None:
-        """Build them, empty."""
-        self._drawn = 0.0
-        self._changes = Changes()
-        self._error = LinePlot(gui, (css(DELIVERED), css(OTHER)), "off [cm]", height=PLOT_PX)
-        self._wrench = LinePlot(gui, (css(ASKED), css(DELIVERED)), "surge [N]", height=PLOT_PX)
-        self._force = LinePlot(gui, FIN_LINES, "fins [N]", height=PLOT_PX)
-        self._broken = LinePlot(gui, FIN_LINES, "broken %", "time [s]", height=PLOT_PX + 24)
-
-    def refresh(self, swimming: Swimming, axis: int) -> None:
-        """Draw errors, one axis of the wrench, forces and the monitor's doubts, but no more often than an eye
-        can follow."""
-        swimmers = swimming.swimmers
-        moments = tuple(swimmer.shown for swimmer in swimmers)
-        for plot in (self._error, self._wrench, self._force, self._broken):
-            plot.show(bool(swimmers))
-        soon = time.monotonic() - self._drawn < EVERY_S and swimming.running
-        if not moments or soon or not len(moments[0].record) or not self._changes(axis, *moments):
-            return
-        self._drawn = time.monotonic()
-        record = moments[0].record
-        seconds = np.ascontiguousarray(record[:, TIME])
-        lines = [
-            100 * np.interp(seconds, m.record[:, TIME], m.record[:, ERROR]) for m in moments if len(m.record)
-        ]
-        self._error.draw(seconds, lines, (0.0, top_of(lines, SMALL)))
-        both = [record[:, column + axis] for column in (ASKED_COLUMN, DELIVERED_COLUMN)]
-        self._wrench.name(f"{AXIS_WORDS[axis]} [{AXIS_UNITS[axis]}]", "")
-        self._wrench.draw(seconds, both, (-top_of([-both[0], -both[1]], SMALL), top_of(both, SMALL)))
-        n_fins = len(swimmers[0].fins)
-        forces = list(record[:, FORCES : FORCES + n_fins].T)
-        self._force.draw(seconds, forces, (0.0, top_of(forces, SMALL)))
-        doubts = list(100.0 * record[:, FORCES + n_fins :].T)
-        self._broken.draw(seconds, doubts, (0.0, CERTAIN))
+        put(self._card, content=swim_card(swimming, settings))
+        making = self._page.swim_files
+        put(self._making, visible=bool(making.making), value=round(100.0 * making.share, 1))
+        self._timeline.axis = option_index(self._axis)
+        self._timeline.refresh()

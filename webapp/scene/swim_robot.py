@@ -6,12 +6,12 @@ import viser
 from finlab.arrays import Array
 from finlab.layout import Layout
 from webapp.handles import put
-from webapp.scene.fin_node import FinShapes, Flapping, quaternion
+from webapp.scene.fin_node import LIMP, FinShapes, Flapping, quaternion
 from webapp.scene.meshes.hull import hull_of
 from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, joined, tube
 from webapp.scene.overlays import NO_LINE
 from webapp.scene.shape import Shape
-from webapp.tasks.swimmer import PLACE, Moment
+from webapp.tasks.moment import PLACE, Moment
 from webapp.theme import ASKED, DELIVERED, LIGHT, Rgb
 
 TRAIL_POINTS = 250
@@ -46,6 +46,7 @@ class SwimRobot:
         self._ahead: Moment | None = None
         self._behind: Moment | None = None
         self._clock = 0.0
+        self._stood = False
 
     def begin(self, layout: Layout, moment: Moment) -> None:
         """Take the shape of a layout and stand at the start."""
@@ -67,6 +68,7 @@ class SwimRobot:
         self._names = layout.names
         self._flap(moment)
         self._ahead = self._behind = moment
+        self._stood = False
         self._clock = moment.time
         put(self._trail, points=NO_LINE, colors=self._color)
         put(self._root, visible=True)
@@ -83,12 +85,36 @@ class SwimRobot:
         put(self._root, visible=False)
         put(self._trail, visible=False)
 
-    def take(self, moment: Moment, scale: float) -> None:
-        """Swim on to a moment; arrows are `scale` [m/N] long."""
-        if self._ahead is None or moment is self._ahead:
+    def take(self, moment: Moment, scale: float, trail: bool = True) -> None:
+        """Swim on to a moment; arrows are `scale` [m/N] long. Where it stood, it is there at once."""
+        if self._stood:
+            self.stand(moment, scale, trail)
+            self._stood = False
+        if self._is_at(moment) or self._ahead is None:
             return
         self._behind, self._ahead = self._ahead, moment
         self._clock = self._behind.time
+        self._draw(moment, scale, trail)
+
+    def stand(self, moment: Moment, scale: float, trail: bool = True) -> None:
+        """Be at a moment at once, with the blades as they were; without a `trail` that of before stays."""
+        if self._stood and self._is_at(moment):
+            return
+        self._stood = True
+        self._behind = self._ahead = moment
+        self._clock = moment.time
+        self._draw(moment, scale, trail)
+        put(self._root, position=moment.pose[:3], wxyz=moment.pose[3:])
+        for node, angle, name in zip(self._fins, moment.angle.tolist(), self._names, strict=False):
+            node.pose(LIMP if name in moment.lost else angle)
+
+    def _is_at(self, moment: Moment) -> bool:
+        """Whether this moment is shown already."""
+        ahead = self._ahead
+        return ahead is not None and (moment.time, moment.lost) == (ahead.time, ahead.lost)
+
+    def _draw(self, moment: Moment, scale: float, trail: bool = True) -> None:
+        """Everything but pose and blades."""
         top = np.array([0.0, 0.0, self._top])
         for shape, wrench, thickness in zip(
             self._wrench, (moment.asked, moment.delivered), (0.009, 0.006), strict=True
@@ -97,7 +123,11 @@ class SwimRobot:
         self._flap(moment)
         for node, force, angle in zip(self._fins, moment.force, self._angles, strict=False):
             node.push(force * scale, angle, 0.006)
-        places = moment.record[:, PLACE : PLACE + 3]
+        if trail:
+            self.draw_trail(moment.record[:, PLACE : PLACE + 3])
+
+    def draw_trail(self, places: Array) -> None:
+        """Where it was (N, 3) [m]."""
         places = places[:: max(1, len(places) // TRAIL_POINTS)]
         if len(places) > 1:
             points = np.stack([places[:-1], places[1:]], axis=1).astype(np.float32)
@@ -112,7 +142,7 @@ class SwimRobot:
 
     def animate(self, elapsed: float) -> None:
         """Move on by some simulated time [s], towards the last moment and never beyond it."""
-        if self._ahead is None or self._behind is None:
+        if self._ahead is None or self._behind is None or self._ahead is self._behind:
             return
         now = min(self._clock + elapsed, self._ahead.time)
         passed, self._clock = now - self._clock, now

@@ -1,23 +1,28 @@
-"""The water while robots swim: the way to go, where they should be, and up to two of them."""
+"""The water while robots swim: the way to go, where they should be, up to two of them, and a kept one."""
 
 from typing import Any
 
 import numpy as np
 import viser
 
+from finlab.layout import Layout
 from webapp.handles import put
 from webapp.scene.shape import UNLIT, Shape
 from webapp.scene.stage import add_floor, aim_camera, paint_floor
 from webapp.scene.swim_robot import SwimRobot, goal
 from webapp.scene.wrench_nodes import LENGTH
+from webapp.tasks.moment import PLACE, Moment
+from webapp.tasks.recorded import Recorded
 from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming
-from webapp.theme import ASKED, DELIVERED, OTHER
+from webapp.theme import ASKED, DELIVERED, KEPT, OTHER
 
 ARROWS_N = 1.0
 """Force that an arrow of 0.1 m stands for while robots swim [N]: one for all, so that they compare."""
-ROBOTS = ((DELIVERED, None), (OTHER, 0.45))
-"""Colours of the robots' trails, and how opaque the robots are."""
+ROBOTS = ((DELIVERED, None), (OTHER, 0.45), (KEPT, 0.35))
+"""Colours of the robots' trails, and how opaque the robots are; the last one is that of the kept swim."""
+SCALE = LENGTH / ARROWS_N
+"""Length of arrows [m/N]."""
 DEPTH_BELOW = 0.6
 """How far the floor is below the deepest point of the way [m]."""
 
@@ -35,44 +40,73 @@ class SwimScene:
         )
         fade: dict[str, Any] = {"fade_distance": 14.0, "fade_strength": 1.4, "shadow_opacity": 0.18}
         self._floor = add_floor(scene, "/swim/floor", 14.0, 0.25, 1.0, visible=False, **fade)
-        self._robots: list[SwimRobot] = []
+        self._robots: dict[int, SwimRobot] = {}
         self._shown: tuple[Swimmer, ...] = ()
+        self._kept: Recorded | None = None
         self._followed: np.ndarray | None = None
 
     def refresh(self, dark: bool) -> None:
-        """Show the newest moment."""
-        swimmers = self._swimming.swimmers
+        """Show the moment that is looked at."""
+        swimming = self._swimming
+        swimmers = swimming.swimmers
         visible = bool(swimmers)
         put(self._goal.node, visible=visible)
         put(self._reference, visible=visible)
         put(self._floor, visible=visible)
         paint_floor(self._floor, dark)
         if not visible:
-            for robot in self._robots:
+            for robot in self._robots.values():
                 robot.hide()
-            self._shown = ()
+            self._shown, self._kept = (), None
             return
+        moments = swimming.seen
         if swimmers != self._shown:
-            self._begin()
-        put(self._reference, position=swimmers[0].shown.reference)
-        for robot, swimmer in zip(self._robots, swimmers, strict=False):
-            robot.take(swimmer.shown, LENGTH / ARROWS_N)
+            self._begin(moments)
+        put(self._reference, position=moments[0].reference)
+        for k, moment in enumerate(moments):
+            if swimming.at is None:
+                self._robots[k].take(moment, SCALE)
+            else:
+                self._robots[k].stand(moment, SCALE)
+        self._refresh_kept()
 
-    def _begin(self) -> None:
+    def _begin(self, moments: tuple[Moment, ...]) -> None:
         """Another swim: its robots, its way, and the camera where all of it can be seen."""
-        swimming = self._swimming
-        self._shown = swimming.swimmers
-        while len(self._robots) < len(swimming.swimmers):  # the second one is made when it is first needed
-            k = len(self._robots)
-            self._robots.append(SwimRobot(self._client.scene, f"/swim/robot{k}", *ROBOTS[k]))
-        for robot in self._robots[len(swimming.swimmers) :]:
-            robot.hide()
-        for robot, swimmer in zip(self._robots, swimming.swimmers, strict=False):
-            robot.begin(swimmer.swim.layout, swimmer.shown)
-        path = swimming.swimmers[0].path
+        self._shown = self._swimming.swimmers
+        for k, robot in self._robots.items():
+            if k >= len(self._shown):
+                robot.hide()
+        self._kept = None
+        for k, (swimmer, moment) in enumerate(zip(self._shown, moments, strict=True)):
+            self._robot(k, swimmer.layout, moment)
+        path = self._shown[0].path
         self._goal.show(goal, path)
         put(self._floor, position=np.array([0.0, 0.0, path[:, 2].min() - DEPTH_BELOW]))
         self.look(follow=False)
+
+    def _robot(self, k: int, layout: Layout, moment: Moment) -> SwimRobot:
+        """A robot at its start; it is made when it is first needed."""
+        if k not in self._robots:
+            self._robots[k] = SwimRobot(self._client.scene, f"/swim/robot{k}", *ROBOTS[k])
+        self._robots[k].begin(layout, moment)
+        return self._robots[k]
+
+    def _refresh_kept(self) -> None:
+        """The swim that was kept: its whole trail, and its robot where it was at this time."""
+        swimming, last = self._swimming, len(ROBOTS) - 1
+        kept = swimming.kept
+        if kept is None:
+            if self._kept is not None:
+                self._robots[last].hide()
+        else:
+            moment = kept.moment(swimming.seen_time)
+            if kept is not self._kept:
+                self._robot(last, kept.layout, moment).draw_trail(kept.line[:, PLACE : PLACE + 3])
+            if swimming.at is None:
+                self._robots[last].take(moment, SCALE, trail=False)
+            else:
+                self._robots[last].stand(moment, SCALE, trail=False)
+        self._kept = kept
 
     def look(self, follow: bool) -> None:
         """Let the camera go along with the first robot, or stand where the whole path can be seen."""
@@ -85,7 +119,9 @@ class SwimScene:
         else:
             path = self._shown[0].path
             low, high = path.min(axis=0), path.max(axis=0)
-            self._look_at((low + high) / 2, max(0.75 * float(np.linalg.norm((high - low)[:2])), 1.2))
+            distance = max(0.85 * float(np.linalg.norm((high - low)[:2])), 1.2)
+            # The lower part of the view is behind the plots, so the path belongs into the upper one.
+            self._look_at((low + high) / 2 + distance * np.array([-0.1, -0.22, 0.0]), distance)
 
     def _look_at(self, middle: np.ndarray, distance: float) -> None:
         """Move the camera to where it sees a point (3,) from a distance [m]."""
@@ -98,7 +134,7 @@ class SwimScene:
         if not swimming.swimmers or swimming.swimmers != self._shown:
             return
         rate = swimming.pace.rate or swimming.pace.speed
-        for robot in self._robots[: len(swimming.swimmers)]:
+        for robot in self._robots.values():
             robot.animate(elapsed * rate)
         if self._followed is not None:
             step = self._robots[0].place - self._followed

@@ -117,7 +117,8 @@ class Workers:
     searches: Worker = field(default_factory=Worker)
     """Better layouts: up to minutes."""
     fits: Worker = field(default_factory=Worker)
-    """Fins fitted to measurements: seconds."""
+    """Fins fitted to measurements, and files of swims: seconds. Both draw with matplotlib, which is for one
+    thread."""
 
     def stop(self) -> None:
         """End all threads."""

@@ -5,14 +5,18 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from finlab.control import FaultMonitor
+from finlab.control import Controller, FaultMonitor, TrackingController, WaypointController
 from finlab.errors import FinlabError
-from finlab.sim import ClosedLoop, make_trajectory
+from finlab.layout import Layout
+from finlab.sim import ClosedLoop, Water, perturbed
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
-from webapp.tasks.swimmer import Moment, Pace, Swimmer
+from webapp.tasks.moment import Moment
+from webapp.tasks.pace import Pace
+from webapp.tasks.recorded import Recorded
+from webapp.tasks.swimmer import Swimmer
 
 BUDGET_S = 0.06
 """Longest time on the worker before the others have their turn [s]."""
@@ -44,7 +48,11 @@ class Swimming:
         """Whether the clock runs."""
         self.pace = Pace()
         """At what speed it is to go, and goes."""
-        self._acts: deque[Callable[[ClosedLoop], None]] = deque()
+        self.at: float | None = None
+        """The moment that is looked at again [s]; None for the newest one."""
+        self.kept: Recorded | None = None
+        """A swim that was put aside to compare others with."""
+        self._acts: deque[Callable[[Swimmer], None]] = deque()
 
     @property
     def active(self) -> bool:
@@ -72,7 +80,7 @@ class Swimming:
         return self.swimmers[0].shown.time if self.swimmers else 0.0
 
     def start(self, plan: Plan) -> None:
-        """Begin at the beginning; a swim that is under way is given up."""
+        """Begin at the beginning; a swim that is under way is given up, one that was kept stays."""
         self.stop()
         self.running = True
         self._start.ask(plan)
@@ -81,18 +89,26 @@ class Swimming:
         return tuple(self._swimmer(plan, method) for method in plan.methods)
 
     def _swimmer(self, plan: Plan, method: str) -> Swimmer:
-        path = make_trajectory(plan.path) if isinstance(plan.path, str) else plan.path
-        allocator = self._solver.allocator(State(plan.layout, method=method, objective=plan.objective))
-        failures = [(name, 0.0) for name in plan.failed]
+        layout = plan.layout
+        allocator = self._solver.allocator(State(layout, method=method, objective=plan.objective))
         swim = ClosedLoop(
-            plan.layout,
+            layout,
             allocator,
-            path,
+            plan.path,
+            _controller(plan.controller, layout),
             plant=plan.plant,
-            failures=failures,
-            monitor=FaultMonitor(plan.layout),
+            sensors=plan.sensors,
+            water=plan.water,
+            failures=plan.losses,
+            announced=plan.announced,
+            monitor=FaultMonitor(layout),
+            truth=perturbed(layout, **plan.truth),
         )
-        return Swimmer(method, swim)
+        for name in plan.failed:
+            swim.fail(name, announced=True)
+        for name in plan.weak:
+            swim.fail(name, "weak", plan.share, announced=False)
+        return Swimmer(method, plan, swim)
 
     def _begin(self) -> None:
         if self._start.error is not None:
@@ -109,13 +125,14 @@ class Swimming:
         """Give up and forget."""
         self._start.forget()
         self._stretch.forget()
-        self.swimmers, self.running = (), False
+        self.swimmers, self.running, self.at = (), False, None
         self._acts.clear()
         self.pace.start_anew()
 
     def set_running(self, running: bool) -> None:
         """Let the clock run, or hold it."""
         self.running = running and self.active and not self.done
+        self.at = None
         self.pace.start_anew()
 
     def step(self) -> None:
@@ -132,9 +149,66 @@ class Swimming:
         if not broken and len(lost) + 1 >= len(self.swimmers[0].fins):
             raise FinlabError(f"{name} is the last fin that works; mend another one first")
         kind = "whole" if broken else "lost"
-        self._acts.append(lambda swim: swim.fail(name, kind, announced=announced))
+        self._act(lambda swimmer: swimmer.swim.fail(name, kind, announced=announced))
+
+    def meet(self, water: Water, buoyancy: float) -> None:
+        """Before the next step of all robots the water becomes another, and their buoyancy (a factor)."""
+        if self.active:
+            self._act(lambda swimmer: swimmer.meet(water, buoyancy))
+
+    def _act(self, act: Callable[[Swimmer], None]) -> None:
+        self._acts.append(act)
         if not self.running:
             self._submit(0)
+
+    def look_at(self, time: float) -> None:
+        """Hold the clock, and look at an earlier moment [s]; at the newest one where it is not earlier.
+
+        Raises:
+            FinlabError: nothing has been swum yet.
+        """
+        self._check_swum()
+        self.set_running(False)
+        self.at = None if time > self.time - 0.5 * self.swimmers[0].period_s else max(0.0, time)
+
+    @property
+    def seen(self) -> tuple[Moment, ...]:
+        """The moments of all robots that are looked at."""
+        if self.at is None:
+            return tuple(swimmer.shown for swimmer in self.swimmers)
+        return tuple(swimmer.recorded().moment(self.at) for swimmer in self.swimmers)
+
+    @property
+    def seen_time(self) -> float:
+        """Their time [s]."""
+        return self.time if self.at is None else self.at
+
+    def keep(self) -> None:
+        """Put the first robot's swim aside, so far as it has come, to compare others with.
+
+        Raises:
+            FinlabError: nothing has been swum yet.
+        """
+        self._check_swum()
+        self.kept = self.swimmers[0].recorded()
+
+    def forget_kept(self) -> None:
+        """Compare with nothing."""
+        self.kept = None
+
+    def records(self) -> tuple[Recorded, ...]:
+        """All robots' swims so far, and last the one that was kept.
+
+        Raises:
+            FinlabError: nothing has been swum yet.
+        """
+        self._check_swum()
+        kept = () if self.kept is None else (self.kept,)
+        return (*(swimmer.recorded() for swimmer in self.swimmers), *kept)
+
+    def _check_swum(self) -> None:
+        if self.time == 0.0:
+            raise FinlabError("nothing has been swum yet; press Start")
 
     def tick(self, elapsed: float) -> None:
         """Time has passed on the wall [s]; swim that far, if the last stretch is done."""
@@ -154,7 +228,7 @@ class Swimming:
         while self._acts:
             act = self._acts.popleft()
             for swimmer in swimmers:
-                act(swimmer.swim)
+                act(swimmer)
         while done < stretch.n_steps and not swimmers[0].swim.done:
             for swimmer in swimmers:
                 swimmer.step()
@@ -174,3 +248,7 @@ class Swimming:
         if self.done:
             self.running = False
         self._changed()
+
+
+def _controller(name: str, layout: Layout) -> Controller:
+    return TrackingController(layout) if name == "tracking" else WaypointController()

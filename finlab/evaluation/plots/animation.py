@@ -15,8 +15,9 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.evaluation.plots.closed_loop_run import failures
+from finlab.evaluation.plots.compared_runs import RUN_COLOURS, distance_cm, smooth_power
 from finlab.evaluation.plots.shape_from_above import ShapeFromAbove
-from finlab.evaluation.plots.style import BLUE, GREY, INK, LOOK, ORANGE, PURPLE, SKY, SOFT, VERMILION, clean
+from finlab.evaluation.plots.style import GREY, INK, LOOK, SKY, SOFT, VERMILION, clean
 from finlab.layout import Layout
 from finlab.sim import RunLog
 
@@ -24,16 +25,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from PIL.Image import Image
 
-COLOURS = (BLUE, ORANGE, PURPLE)
-"""Of the robots, in their order."""
 SUFFIXES = (".gif", ".webp")
 """Kinds of files."""
 SIZE = (9.6, 5.4)
 """Width and height of a picture [in]."""
 DPI = 80
 """Pixels per inch."""
-SMOOTH_S = 1.0
-"""Over which power is averaged [s]; within the beat and from tick to tick it jumps."""
 MARGIN_M = 0.5
 """Room around the path [m]."""
 CURRENT_S = 6.0
@@ -91,8 +88,8 @@ def animation(
         raise DataError(
             f"animation: expected a file that ends in {' or '.join(SUFFIXES)}, got {suffix!r:.20}"
         )
-    if not 1 <= len(robots) <= len(COLOURS):
-        raise DataError(f"animation: expected one to {len(COLOURS)} robots, got {len(robots)}")
+    if not 1 <= len(robots) <= len(RUN_COLOURS):
+        raise DataError(f"animation: expected one to {len(RUN_COLOURS)} robots, got {len(robots)}")
     if short := [robot.name for robot in robots if robot.log.n_ticks < 2]:
         raise DataError(f"animation: {short[0]} has not swum yet; let it swim first")
     times = np.linspace(0.0, max(r.log.time[-1] for r in robots), max(2, round(seconds * rate)))
@@ -136,7 +133,7 @@ class _Film:
         axis, first = self._above, self._robots[0].log
         axis.plot(*first.reference[:, :2].T, color=GREY, lw=2.4, label="path")
         self._trails, self._shapes = [], []
-        for robot, colour in zip(self._robots, COLOURS, strict=False):
+        for robot, colour in zip(self._robots, RUN_COLOURS, strict=False):
             (trail,) = axis.plot([], [], color=colour, lw=1.6, label=robot.name, animated=True)
             self._trails.append(trail)
             self._moving.append(trail)
@@ -172,7 +169,7 @@ class _Film:
             if k == 0:
                 first = self._robots[0].log
                 axis.plot(first.time, -first.reference[:, 2], color=GREY, lw=2.0)
-            for robot, colour in zip(self._robots, COLOURS, strict=False):
+            for robot, colour in zip(self._robots, RUN_COLOURS, strict=False):
                 values = _values(robot.log, k)
                 axis.plot(robot.log.time, values, color=colour, lw=1.0, alpha=0.3)
                 (line,) = axis.plot([], [], color=colour, lw=1.6, animated=True)
@@ -238,14 +235,7 @@ class _Film:
 
 def _values(log: RunLog, k: int) -> Array:
     """Depth [m], distance from the path [cm] or power [W] over time (N,)."""
-    if k == 0:
-        return np.asarray(-log.position[:, 2])
-    if k == 1:
-        return np.asarray(100.0 * np.linalg.norm(np.nan_to_num(log.position - log.reference), axis=1))
-    power = log.driving_power.sum(axis=1)
-    ones = np.ones(min(len(power), round(SMOOTH_S / float(log.time[1] - log.time[0]))))
-    smooth: Array = np.convolve(power, ones, "same") / np.convolve(np.ones(len(power)), ones, "same")
-    return smooth
+    return (lambda log: -log.position[:, 2], distance_cm, smooth_power)[k](log)
 
 
 def _tick(log: RunLog, time: float) -> int:

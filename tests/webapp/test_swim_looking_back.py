@@ -1,0 +1,208 @@
+"""Swims that are looked at again, put aside, compared and taken home."""
+
+import io
+import zipfile
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from finlab.errors import FinlabError
+from finlab.layout import load_layout
+from finlab.sim import make_trajectory
+from tests.webapp.loops import page_of
+from tests.webapp.test_swimming import until
+from webapp.markup.corner import swim_corner
+from webapp.markup.swim_card import swim_card
+from webapp.panels.line_plot import with_cursor
+from webapp.session.swim_plan import Plan, SwimSettings
+from webapp.tasks.background import Worker
+from webapp.tasks.moment import POWER, TIME, Figures
+from webapp.tasks.swim_files import SwimFiles
+from webapp.tasks.swimming import Swimming
+
+UCAT = load_layout("ucat")
+
+
+class Shelf:
+    """A page's tasks, and what was sent to its browser."""
+
+    def __init__(self) -> None:
+        self.worker, self.sent, self.notes = Worker(), {}, []  # type: ignore[var-annotated]
+        client = SimpleNamespace(send_file_download=lambda name, data, **_: self.sent.update({name: data}))
+        context = page_of(self.worker, client=client, notify=lambda _, text: self.notes.append(text))
+        self.swimming = Swimming(context, lambda: None)
+        self.told: list[float] = []
+        self.files = SwimFiles(context, self.swimming, lambda: self.told.append(self.files.share))
+
+    def swim(self, seconds: float, *methods: str, scenario: str = "nominal") -> None:
+        plan = Plan(UCAT, (), make_trajectory("circle"), methods, scenario=scenario)
+        self.swimming.start(plan)
+        until(lambda: bool(self.swimming.swimmers))
+        self.swimming.set_running(False)
+        for swimmer in self.swimming.swimmers:
+            while swimmer.swim.time < seconds - 1e-6:
+                swimmer.step()
+            swimmer.shown = swimmer.moment()
+
+
+@pytest.fixture
+def shelf() -> Iterator[Shelf]:
+    shelf = Shelf()
+    yield shelf
+    shelf.swimming.stop()
+    shelf.worker.stop()
+
+
+def test_any_moment_can_be_looked_at_again(shelf: Shelf) -> None:
+    swimming = shelf.swimming
+    with pytest.raises(FinlabError, match="nothing has been swum"):
+        swimming.look_at(1.0)
+    shelf.swim(6.0, "analytic")
+    swimming.toggle("front_left")
+    until(lambda: swimming.swimmers[0].shown.lost != ())
+    swimmer = swimming.swimmers[0]
+    while swimmer.swim.time < 8.0:
+        swimmer.step()
+    swimmer.shown = swimmer.moment()
+    swimming.look_at(3.0)
+    log, (seen,) = swimmer.recorded().log, swimming.seen
+    k = 30
+    assert seen.time == pytest.approx(3.0) and log.time[k] == pytest.approx(3.0)
+    assert seen.pose == pytest.approx([*log.position[k], *log.quaternion[k]])
+    assert seen.angle == pytest.approx(log.fin_angle[k]) and seen.force == pytest.approx(log.fin_force[k])
+    assert seen.lost == seen.failed == () and seen.controllable
+    assert seen.record[-1, TIME] == pytest.approx(3.0)
+    assert "looking back" in swim_card(swimming, SwimSettings()) and "4 of 4" in swim_corner(swimming, 1.0)
+    swimming.look_at(7.5)
+    assert swimming.seen[0].lost == swimming.seen[0].failed == ("front_left",)
+    assert "3 of 4 fins" in swim_corner(swimming, 1.0)
+    swimming.look_at(7.98)
+    assert swimming.at is None and swimming.seen[0] is swimmer.shown, "that is the newest moment"
+    swimming.look_at(2.0)
+    swimming.set_running(True)
+    assert swimming.at is None, "who goes on, goes on from where it was"
+
+
+def test_watts_and_what_a_pack_lasts(shelf: Shelf) -> None:
+    shelf.swim(10.0, "analytic")
+    swimmer = shelf.swimming.swimmers[0]
+    figures, log = swimmer.shown.figures, swimmer.recorded().log
+    assert isinstance(figures, Figures)
+    power = log.driving_power.sum(axis=1)
+    off = np.linalg.norm(log.position - log.reference, axis=1)
+    assert figures.mean_w == pytest.approx(power.mean()) and figures.now_w == pytest.approx(
+        power[-10:].mean()
+    )
+    assert figures.energy_wh == pytest.approx(power.sum() * 0.1 / 3600)
+    assert figures.track_m == pytest.approx(np.sqrt((off**2).mean()))
+    assert figures.depth_m == pytest.approx(np.sqrt(((log.position - log.reference)[:, 2] ** 2).mean()))
+    way = np.linalg.norm(np.diff(log.position, axis=0), axis=1).sum()
+    assert figures.speed_m_s == pytest.approx(way / 10.0)
+    exact = figures._replace(mean_w=2.0, now_w=3.25, energy_wh=0.0042, speed_m_s=0.1)
+    swimmer.shown = swimmer.shown._replace(figures=exact)
+    card = swim_card(shelf.swimming, SwimSettings(pack_wh=50.0))
+    assert "<td>2.00 W</td><td>3.25 W</td>" in card and "50 Wh, the fins alone" in card
+    assert "<td>4.2 mWh</td><td>25.0 h</td><td>9.00 km</td>" in card
+    card = swim_card(shelf.swimming, SwimSettings(pack_wh=50.0, electronics_w=8.0))
+    assert "<td>5.00 h</td><td>1.80 km</td>" in card and "fins and 8 W" in card
+    swimmer.shown = swimmer.shown._replace(figures=exact._replace(speed_m_s=0.001))
+    assert "<td>25.0 h</td><td>–</td>" in swim_card(shelf.swimming, SwimSettings(pack_wh=50.0))
+
+
+def test_a_swim_is_put_aside_and_stays_as_it_was(shelf: Shelf) -> None:
+    swimming = shelf.swimming
+    with pytest.raises(FinlabError, match="nothing has been swum"):
+        swimming.keep()
+    shelf.swim(4.0, "analytic", scenario="first")
+    swimming.keep()
+    kept = swimming.kept
+    assert kept is not None and kept.log.n_ticks == 40
+    swimming.swimmers[0].step()
+    assert swimming.kept is kept and kept.log.n_ticks == 40
+    shelf.swim(2.0, "qp", scenario="second")
+    assert swimming.kept is kept
+    card, corner = swim_card(swimming, SwimSettings()), swim_corner(swimming, 1.0)
+    assert "kept: analytic" in card and "qp" in card
+    assert "kept: analytic, first, tracking" in corner and "qp, second, tracking" in corner
+    at_two = kept.moment(2.0)
+    assert f"{100 * at_two.figures.track_m:.1f} cm" in card, "both up to the same time"  # type: ignore[union-attr]
+    assert kept.moment(99.0).time == pytest.approx(3.9)
+    assert [record.method for record in swimming.records()] == ["qp", "analytic"]
+    swimming.forget_kept()
+    assert "kept" not in swim_card(swimming, SwimSettings())
+
+
+def test_the_cursor_of_a_plot_stands_upright() -> None:
+    x, line = np.array([0.0, 1.0, 2.0]), np.array([0.0, 10.0, 20.0])
+    shown, (upright, drawn) = with_cursor(x, [line], 1.5, (-1.0, 9.0))
+    assert shown.tolist() == [0.0, 1.0, 1.5, 1.5, 2.0] and drawn.tolist() == [0.0, 10.0, 15.0, 15.0, 20.0]
+    assert upright[2:4].tolist() == [-1.0, 9.0] and np.isnan(upright[[0, 1, 4]]).all()
+
+
+def test_the_log_is_sent_as_a_table(shelf: Shelf) -> None:
+    with pytest.raises(FinlabError, match="nothing has been swum"):
+        shelf.files.table()
+    shelf.swim(2.0, "analytic")
+    shelf.files.table()
+    until(lambda: bool(shelf.sent))
+    ((name, content),) = shelf.sent.items()
+    assert name == "ucat_analytic_nominal_tracking.csv" and shelf.files.making == ""
+    header, *rows = content.decode().splitlines()
+    assert header.startswith("t [s],x [m],") and len(rows) == 20
+
+
+def test_several_robots_are_sent_as_an_archive(shelf: Shelf) -> None:
+    shelf.swim(1.0, "analytic", "qp")
+    shelf.swimming.keep()
+    shelf.files.table()
+    until(lambda: bool(shelf.sent))
+    names = zipfile.ZipFile(io.BytesIO(shelf.sent["ucat_analytic_nominal_tracking_csv.zip"])).namelist()
+    assert names == [
+        "ucat_analytic_nominal_tracking.csv",
+        "ucat_qp_nominal_tracking.csv",
+        "ucat_analytic_nominal_tracking_3.csv",
+    ]
+
+
+def test_pictures_and_films_are_made_beside_the_page(shelf: Shelf) -> None:
+    pytest.importorskip("matplotlib")
+    shelf.swim(0.2, "analytic")
+    with pytest.raises(FinlabError, match="too little"):
+        shelf.files.animation()
+    shelf.swim(2.0, "analytic")
+    shelf.files.pictures()
+    assert shelf.files.making.endswith("_plots.zip")
+    with pytest.raises(FinlabError, match="is being made; wait for it"):
+        shelf.files.animation()
+    until(lambda: not shelf.files.making)
+    archive = zipfile.ZipFile(io.BytesIO(shelf.sent["ucat_analytic_nominal_tracking_plots.zip"]))
+    pictures = {name.rpartition("/")[2] for name in archive.namelist()}
+    assert pictures == {"path.png", "errors.png", "commands.png", "wrench.png", "compared.png"}
+    shelf.told.clear()
+    shelf.files.animation()
+    until(lambda: not shelf.files.making)
+    film: Any = Image.open(io.BytesIO(shelf.sent["ucat_analytic_nominal_tracking.gif"]))
+    assert film.n_frames == 150
+    assert shelf.told[0] == 0.0 and shelf.told[-1] == 0.0 and len(shelf.told) > 10
+    assert max(shelf.told) > 0.9 and np.all(np.diff(shelf.told[:-1]) > 0)
+
+
+def test_what_fails_is_told(shelf: Shelf, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: Any, **__: Any) -> bytes:
+        raise FinlabError("the ink has dried")
+
+    monkeypatch.setattr("webapp.tasks.swim_files.animation", broken)
+    shelf.swim(1.0, "analytic")
+    shelf.files.animation()
+    until(lambda: bool(shelf.notes))
+    assert shelf.notes == ["the ink has dried"] and shelf.files.making == "" and not shelf.sent
+
+
+def test_power_is_a_column_of_the_record(shelf: Shelf) -> None:
+    shelf.swim(1.0, "analytic")
+    recorded = shelf.swimming.swimmers[0].recorded()
+    assert recorded.rows[:, POWER] == pytest.approx(recorded.log.driving_power.sum(axis=1))

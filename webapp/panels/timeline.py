@@ -1,0 +1,145 @@
+"""A window over the view while robots swim: a slider of time, and plots of what happens."""
+
+import time
+
+import numpy as np
+import viser
+
+from finlab.arrays import Array
+from webapp.handles import Changes, put
+from webapp.page import Page
+from webapp.panels.line_plot import FIN_LINES, LinePlot, top_of, with_cursor
+from webapp.session.state import AXIS_UNITS, AXIS_WORDS
+from webapp.tasks.moment import ASKED as ASKED_COLUMN
+from webapp.tasks.moment import DELIVERED as DELIVERED_COLUMN
+from webapp.tasks.moment import DEPTH_ERROR, ERROR, FORCES, POWER, TIME
+from webapp.tasks.swimming import Swimming
+from webapp.theme import ASKED, DELIVERED, KEPT, OTHER, css
+
+EVERY_S = 0.2
+"""Least time between two drawings [s]."""
+SMALL = 0.01
+"""What the vertical axes show at least."""
+PLOT_PX = 78
+"""Height of a plot [px]."""
+SIZE_PX = (960, 304)
+"""Width and height of the window [px]."""
+EDGE_PX = 12
+"""Between the window and the edges of the view [px]."""
+CERTAIN = 114.0
+"""End of the axis of probabilities [%]: some room above what is certain."""
+CURSOR = "rgba(120,130,140,.9)"
+"""Colour of the moment that is looked at."""
+SMOOTH = 1.0
+"""Time over which plotted power is averaged [s]."""
+
+
+class Timeline:
+    """Widgets of the window, and the plots."""
+
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
+        """Build it, hidden."""
+        self._page = page
+        self.axis = 0
+        """Which axis of the wrench is plotted."""
+        self._window = gui.add_panel(visible=False)
+        with self._window.add_tab("Swim over time", viser.Icon.CHART_LINE):
+            gui.add_html("<div class='fl-timeline'></div>")
+            self._slider = gui.add_slider(
+                "At [s]", 0.0, 90.0, 0.1, 0.0, hint="Hold the swim, and look at any moment of it again."
+            )
+            page.on_change(self._slider, page.swimming.look_at)
+            self._plots = SwimPlots(gui)
+        width, height = SIZE_PX
+        self._window.float(x=EDGE_PX, y=-EDGE_PX, width=width, height=height)
+
+    def refresh(self) -> None:
+        """Write the time, and draw."""
+        swimming = self._page.swimming
+        put(self._window, visible=bool(swimming.swimmers))
+        if not swimming.swimmers:
+            return
+        put(self._slider, max=round(swimming.swimmers[0].duration_s, 1), value=round(swimming.seen_time, 1))
+        self._plots.refresh(swimming, self.axis)
+
+
+class SwimPlots:
+    """Six plots over time."""
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        """Build them, empty."""
+        self._drawn = 0.0
+        self._changes = Changes()
+        robots, wrench = (css(DELIVERED), css(OTHER), css(KEPT)), (css(ASKED), css(DELIVERED))
+
+        def plot(colors: tuple[str, ...], title: str, below: str = "") -> LinePlot:
+            height = PLOT_PX + (24 if below else 0)
+            return LinePlot(
+                gui, (CURSOR, *colors), title, below, height=height, widths=(1.0, 1.5), visible=True
+            )
+
+        self._error = plot(robots, "off [cm]")
+        self._depth = plot(robots, "z off [cm]")
+        self._power = plot(robots, "power [W]")
+        self._wrench = plot(wrench, "surge [N]", "time [s]")
+        self._force = plot(FIN_LINES, "fins [N]", "time [s]")
+        self._broken = plot(FIN_LINES, "broken %", "time [s]")
+
+    def refresh(self, swimming: Swimming, axis: int) -> None:
+        """Draw errors, power, one axis of the wrench, forces and the monitor's doubts, but no more often than
+        an eye can follow."""
+        swimmers, kept, at = swimming.swimmers, swimming.kept, swimming.at
+        moments = tuple(swimmer.shown for swimmer in swimmers)
+        soon = time.monotonic() - self._drawn < EVERY_S and swimming.running
+        if soon or not len(moments[0].record) or not self._changes(axis, at, kept, *moments):
+            return
+        self._drawn = time.monotonic()
+        record = moments[0].record
+        records = [moment.record for moment in moments if len(moment.record)]
+        others = [None] * (2 - len(records)) + [None if kept is None else kept.line]
+        seconds = np.ascontiguousarray(record[:, TIME])
+        if kept is not None:  # which may have swum for longer
+            seconds = np.append(seconds, kept.line[kept.line[:, TIME] > seconds[-1], TIME])
+        end = swimmers[0].duration_s
+        for plot, column, scale in (
+            (self._error, ERROR, 100.0),
+            (self._depth, DEPTH_ERROR, 100.0),
+            (self._power, POWER, 1.0),
+        ):
+            lines = [_line(rows, column, seconds, scale) for rows in (*records, *others)]
+            self._draw(plot, seconds, lines, (0.0, top_of(lines, SMALL)), at, end)
+        seconds = np.ascontiguousarray(record[:, TIME])
+        both = [record[:, column + axis] for column in (ASKED_COLUMN, DELIVERED_COLUMN)]
+        self._wrench.name(f"{AXIS_WORDS[axis]} [{AXIS_UNITS[axis]}]", "time [s]")
+        ends = (-top_of([-both[0], -both[1]], SMALL), top_of(both, SMALL))
+        self._draw(self._wrench, seconds, both, ends, at, end)
+        n_fins = len(swimmers[0].fins)
+        forces = list(record[:, FORCES : FORCES + n_fins].T)
+        self._draw(self._force, seconds, forces, (0.0, top_of(forces, SMALL)), at, end)
+        doubts = list(100.0 * record[:, FORCES + n_fins :].T)
+        self._draw(self._broken, seconds, doubts, (0.0, CERTAIN), at, end)
+
+    def _draw(
+        self,
+        plot: LinePlot,
+        seconds: Array,
+        lines: list[Array],
+        ends: tuple[float, float],
+        at: float | None,
+        end: float,
+    ) -> None:
+        if at is None:
+            plot.draw(seconds, [np.full(len(seconds), np.nan), *lines], ends, end)
+        else:
+            plot.draw(*with_cursor(seconds, lines, at, ends), ends, end)
+
+
+def _line(rows: Array | None, column: int, seconds: Array, scale: float) -> Array:
+    """A column of a record at some times; NaN after its end, or where there is no record."""
+    if rows is None:
+        return np.full(len(seconds), np.nan)
+    values = rows[:, column]
+    if column == POWER and len(rows) > 1:
+        ones = np.ones(max(1, min(len(rows), round(SMOOTH / float(rows[1, TIME] - rows[0, TIME])))))
+        values = np.convolve(values, ones, "same") / np.convolve(np.ones(len(rows)), ones, "same")
+    return scale * np.interp(seconds, rows[:, TIME], values, right=np.nan)
