@@ -115,6 +115,13 @@ class MotionObserver:
         self._estimate = self._believed(m, position, roll, pitch, yaw)
         return self._estimate
 
+    def swayed(self, sway: float, surge: float, yaw_rate: float) -> float:
+        """Sideways speed [m/s] a period after `sway` [m/s] by the model, in a turn [rad/s] at a speed through
+        the water [m/s]."""
+        damping = float(self._linear[1]) + float(self._quadratic[1]) * abs(sway)
+        pushed = float(self.inertia[0] / self.inertia[1]) * surge * yaw_rate
+        return math.exp(-self._dt * damping) * sway - self._dt * pushed
+
     def _seen(self, m: Measurement) -> Array:
         return np.array([*m.velocity.tolist(), float(m.rates[2])])
 

@@ -109,3 +109,12 @@ def test_the_strongest_wrench_is_what_the_plant_gives_along_each_axis(robot: Lay
     reach = strongest_wrench(robot)
     assert reach[2] == pytest.approx(4 * 4.737 * 2.1**2 * math.sin(0.6) ** 2, rel=1e-3)
     assert reach[0] == pytest.approx(reach[2] * math.sin(math.radians(60.0)), rel=1e-3)
+
+
+def test_a_steady_turn_carries_the_robot_out_of_it(robot: Layout) -> None:
+    """Sideways speed where added mass and damping balance, by hand: 100.7 v + 260 v |v| = -59 u r."""
+    observer, sway = MotionObserver(robot, 0.01), 0.0
+    for _ in range(1000):
+        sway = observer.swayed(sway, 0.1, 0.5)
+    assert sway < 0.0
+    assert 100.7 * sway - 260.0 * sway**2 == pytest.approx(-59.0 * 0.1 * 0.5, rel=0.02)
