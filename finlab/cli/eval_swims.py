@@ -1,6 +1,6 @@
 """`finlab eval swims`: the suite of hard days."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from tyro.conf import arg
 
@@ -14,22 +14,24 @@ def swims(
     methods: Names = "search,analytic,on-board",
     seed: Count = 0,
     seeds: Count = 5,
+    controller: Literal["tracking", "waypoint"] = "tracking",
     steady: bool = False,
     run: Annotated[MethodRun, arg(name="")] = RUN,
 ) -> None:
     """Swim hard days: other bodies, water, sensors and fins than believed; errors, watts and who leads.
 
-    One tracking controller for all. A method takes about two minutes of the processor per seed.
+    One controller for all. A method takes about two minutes of the processor per seed.
 
     Args:
-        scenarios: all, or names with commas between: nominal, damping-half, damping-double, current,
-            current-turns, buoyant, heavy, gravity-off, late, circle, dive, square, waves, hexa, octo,
-            fins-mixed, fins-soft, weak, lost-one, lost-one-unannounced, lost-two, lost-two-unannounced,
-            restricted, saturated, flexible, wake, inflow.
+        scenarios: all, or names with commas between: nominal, damping-half, damping-double, parameters-low,
+            parameters-high, current, current-turns, buoyant, heavy, gravity-off, late, circle, dive, square,
+            waves, hexa, octo, fins-mixed, fins-soft, weak, lost-one, lost-one-unannounced, lost-two,
+            lost-two-unannounced, restricted, saturated, flexible, wake, inflow.
         methods: names with commas between; on-board is U-CAT's own law at a fixed frequency. Slow ones
             (sqp, multistart, paper) are best tried on a few scenarios.
         seed: the first seed of noise, biases, waves and mixed fins.
         seeds: how many; verdicts need two or more.
+        controller: tracking, or waypoint (heads for a point ahead, as in the paper).
         steady: tell the allocators their previous command.
     """
     from finlab.cli.inputs import check_positive
@@ -39,9 +41,11 @@ def swims(
 
     check_positive(seeds=seeds)
     days = choose_days(scenarios)
-    done = swim_all(days, run.methods(methods), range(seed, seed + seeds), steady=steady)
+    done = swim_all(
+        days, run.methods(methods), range(seed, seed + seeds), steady=steady, controller=controller
+    )
     rows, hopeless = swim_rows(done), not_swum(days)
-    about = f"{seeds} seeds from {seed}."
+    about = f"{controller.capitalize()} controller, {seeds} seeds from {seed}."
     run.show(
         *swim_blocks(days, rows, hopeless),
         about,

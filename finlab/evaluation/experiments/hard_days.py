@@ -4,14 +4,13 @@ What a day says is what is true; allocator, controller and monitor believe the l
 the robot's own (`fins`) and for what is announced.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import combinations, islice
 from typing import Any, Literal, NamedTuple
 
 from finlab.allocation.allocator import Allocator
-from finlab.control import Completion, FaultMonitor
-from finlab.control.tracking_controller import TrackingController
+from finlab.control import Completion, Controller, FaultMonitor, TrackingController, WaypointController
 from finlab.errors import DataError
 from finlab.evaluation.splits import make_split
 from finlab.layout import Layout, load_layout
@@ -38,6 +37,12 @@ CURRENT = (0.05, -0.05, 0.0)
 """7 cm/s across the path [m/s]."""
 MEASURED_SOFT = FinModelSpec("soft", (("d", 0.1), ("e", 0.15), ("phi_e", 0.5), ("x0", 1.0)))
 """Saturates within reach, and is uneven and askew, as fins of silicone are when measured."""
+
+CONTROLLERS: dict[str, Callable[[Layout], Controller]] = {
+    "tracking": TrackingController,
+    "waypoint": lambda _: WaypointController(),
+}
+"""Who steers, by name; each is made for the robot that is believed in."""
 
 Kind = Literal["nominal", "law kept", "hard"]
 """As believed; fins that obey the law that methods were given, while body, water or sensors do not; and fins
@@ -115,7 +120,15 @@ class HardDay:
             "heave and yaw independently"
         )
 
-    def swim(self, case: "Case", allocator: Allocator, seed: int, *, steady: bool = False) -> ClosedLoop:
+    def swim(
+        self,
+        case: "Case",
+        allocator: Allocator,
+        seed: int,
+        *,
+        steady: bool = False,
+        controller: str = "tracking",
+    ) -> ClosedLoop:
         """The swim, ready to start.
 
         Args:
@@ -123,6 +136,7 @@ class HardDay:
             allocator: the method.
             seed: of noise, biases, waves and mixed fins.
             steady: whether the allocator is given its previous command.
+            controller: one of `CONTROLLERS`.
         """
         robot, path = self.robot(case.layout, seed), self.path()
         weak = {} if self.weak is None else dict.fromkeys(case.fins, self.weak)
@@ -132,7 +146,7 @@ class HardDay:
             robot,
             allocator,
             path,
-            TrackingController(robot),
+            CONTROLLERS[controller](robot),
             plant=self.plant,
             steady=steady,
             sensors=self.sensors,
@@ -158,6 +172,20 @@ HARD_DAYS = (
     HardDay("nominal", "Everything is as drawn; sensors are noisy, biased and late.", "nominal", PAPERS),
     HardDay("damping-half", "The body is damped half as much.", "law kept", truth={"damping": 0.5}),
     HardDay("damping-double", "The body is damped twice as much.", "law kept", truth={"damping": 2.0}),
+    HardDay(
+        "parameters-low",
+        "Damping, added mass and inertia are 30 % less than drawn.",
+        "law kept",
+        PAPERS,
+        truth={"damping": 0.7, "added_mass": 0.7, "inertia": 0.7},
+    ),
+    HardDay(
+        "parameters-high",
+        "Damping, added mass and inertia are 30 % more than drawn.",
+        "law kept",
+        PAPERS,
+        truth={"damping": 1.3, "added_mass": 1.3, "inertia": 1.3},
+    ),
     HardDay("current", "A current of 7 cm/s.", "law kept", water=SteadyCurrent(CURRENT)),
     HardDay(
         "current-turns",

@@ -88,7 +88,12 @@ def _largest(values: Array, where: NDArray[np.bool_]) -> float:
 
 
 def swim_all(
-    days: Sequence[HardDay], methods: Mapping[str, Allocator], seeds: Sequence[int], *, steady: bool = False
+    days: Sequence[HardDay],
+    methods: Mapping[str, Allocator],
+    seeds: Sequence[int],
+    *,
+    steady: bool = False,
+    controller: str = "tracking",
 ) -> list[Swim]:
     """Every day with every method and seed; hopeless cases are left out (`not_swum`).
 
@@ -97,13 +102,14 @@ def swim_all(
         methods: allocators by name.
         seeds: at least one; the same noise for every method.
         steady: whether the allocators are given their previous command.
+        controller: one of `CONTROLLERS`, for all methods.
     """
     cases = [(day, case) for day in days for case in day.cases() if day.obstacle(case) is None]
     swims = []
     for (day, case), (name, allocator), seed in progress(
         list(product(cases, methods.items(), seeds)), "swim", "hard days"
     ):
-        loop = day.swim(case, allocator, seed, steady=steady)
+        loop = day.swim(case, allocator, seed, steady=steady, controller=controller)
         start = time.process_time()
         log = loop.run()
         figures = swim_figures(log, time.process_time() - start)

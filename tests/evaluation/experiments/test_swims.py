@@ -25,6 +25,7 @@ from finlab.evaluation.on_board import OnBoard
 from finlab.evaluation.report.sections.swims import swim_blocks
 from finlab.evaluation.report.text import to_text
 from finlab.evaluation.statistics.bootstrap import Interval
+from finlab.physics.vehicle import Vehicle, complete_body
 from finlab.sim import RunLog
 
 DAYS = {day.name: day for day in HARD_DAYS}
@@ -53,6 +54,14 @@ def test_what_is_true_is_not_what_is_believed(analytic: Allocator) -> None:
         DAYS["waves"].swim(Case("A", ()), analytic, seed).water.flow([0, 0, -1], 1.0) for seed in (1, 2)
     )
     assert one != other
+
+
+def test_a_body_that_is_drawn_too_large_and_who_steers_it(analytic: Allocator) -> None:
+    low = DAYS["parameters-low"].swim(Case("B", ()), analytic, 0, controller="waypoint")
+    drawn, true = low.layout, low.vehicle
+    assert low.controller.name == "waypoint" and drawn == DAYS["nominal"].robot("B", 0)
+    moments = np.array(true.inertia[3:]) / np.array(Vehicle(complete_body(drawn)).inertia[3:])
+    np.testing.assert_allclose(moments, 0.7)
 
 
 def test_fins_of_a_day_are_known_and_drawn_by_the_seed() -> None:
