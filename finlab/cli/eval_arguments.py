@@ -132,8 +132,6 @@ class ClosedLoopRuns:
     """Of the first run; the others follow on."""
     plant: Name = "mean"
     """One of mean, ripple, flexible, wake, inflow, offset."""
-    steady: bool = False
-    """Tell the allocator its previous command."""
     figures: Folder = None
     """Existing folder for pictures."""
 
@@ -148,7 +146,7 @@ class ClosedLoopRuns:
         from finlab.evaluation.experiments.closed_loop_runs import run_all
 
         methods, seeds = run.methods(self.methods), range(self.seed, self.seed + self.runs)
-        return run_all(scenarios, methods, seeds, self.plant, steady=self.steady)
+        return run_all(scenarios, methods, seeds, self.plant)
 
     def save(self, name: str, draw: Callable[[], Picture]) -> list[str]:
         """Draw into the folder, where one was named; returns the sentence that says so."""

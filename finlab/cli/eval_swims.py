@@ -15,7 +15,6 @@ def swims(
     seed: Count = 0,
     seeds: Count = 5,
     controller: Literal["tracking", "waypoint"] = "tracking",
-    steady: bool = False,
     run: Annotated[MethodRun, arg(name="")] = RUN,
 ) -> None:
     """Swim hard days: other bodies, water, sensors and fins than believed; errors, watts and who leads.
@@ -32,7 +31,6 @@ def swims(
         seed: the first seed of noise, biases, waves and mixed fins.
         seeds: how many; verdicts need two or more.
         controller: tracking, or waypoint (heads for a point ahead, as in the paper).
-        steady: tell the allocators their previous command.
     """
     from finlab.cli.inputs import check_positive
     from finlab.evaluation.experiments.hard_days import choose_days
@@ -41,9 +39,7 @@ def swims(
 
     check_positive(seeds=seeds)
     days = choose_days(scenarios)
-    done = swim_all(
-        days, run.methods(methods), range(seed, seed + seeds), steady=steady, controller=controller
-    )
+    done = swim_all(days, run.methods(methods), range(seed, seed + seeds), controller=controller)
     rows, hopeless = swim_rows(done), not_swum(days)
     about = f"{controller.capitalize()} controller, {seeds} seeds from {seed}."
     run.show(

@@ -30,7 +30,6 @@ def simulate(
     gains: Annotated[str | None, arg(metavar="NAME|FILE")] = None,
     current: Annotated[tuple[float, float, float], arg(metavar="VX VY VZ")] = (0.0, 0.0, 0.0),
     waves: Annotated[tuple[float, float], arg(metavar="HEIGHT SECONDS")] = (0.0, 3.0),
-    steady: bool = False,
     noise: bool = True,
     seed: Annotated[int, arg(metavar="N")] = 0,
     checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
@@ -62,7 +61,6 @@ def simulate(
             YAML file.
         current: velocity of the water in the world [m/s].
         waves: significant height [m] and peak period [s] of waves that run along the world's x.
-        steady: tell the allocator its previous command.
         noise: whether the sensors are noisy.
         seed: of the noise.
         checkpoint: trained checkpoint; the shipped one of the method by default.
@@ -118,7 +116,6 @@ def simulate(
             make_trajectory(trajectory, duration),
             pilot,
             plant=plant,
-            steady=steady,
             sensors=sensors,
             water=water,
             failures=failures,

@@ -110,7 +110,7 @@ def serve(robot: "Robot", arguments: argparse.Namespace) -> int:
     else:
         transport = LoopbackUdp(arguments.udp)
         print(f"listening on 127.0.0.1:{transport.port}", file=sys.stderr, flush=True)
-    Server(robot, timing, arguments.steady).run(transport)
+    Server(robot, timing).run(transport)
     return 0
 
 
@@ -147,7 +147,6 @@ def _parser() -> argparse.ArgumentParser:
     loop.add_argument(
         "--watchdog-s", type=float, default=1.0, metavar="S", help="silence before the fins rest; 0: never"
     )
-    loop.add_argument("--steady", action="store_true", help="let fins turn slowly between answers")
     return parser
 
 

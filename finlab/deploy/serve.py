@@ -12,6 +12,7 @@ status     meaning
 `error`    the request was not understood; `error` holds one sentence and there are no commands
 =========  ============================================================================================
 
+From one answer to the next, commands change no faster than the servos' rates allow in a tick of 0.1 s.
 Only the newest request counts: those that waited behind it are skipped, since a robot wants the present, not
 the past. A late answer is thrown away.
 """
@@ -36,6 +37,8 @@ MAX_LINE = 65_536
 """Longest request that is read [bytes]."""
 KEYS = ("wrench", "id", "failed", "policy")
 """What a request may hold."""
+RECENT_S = 0.5
+"""Age [s] up to which the last commands bind the next ones by the servos' rates."""
 
 
 class Transport(Protocol):
@@ -61,11 +64,12 @@ class Timing:
 class Server:
     """Answers requests until they end."""
 
-    def __init__(self, robot: Robot, timing: Timing, steady: bool = False) -> None:
-        """Make it; `steady` lets fins turn slowly from one answer to the next (`previous`)."""
-        self._robot, self._timing, self._steady = robot, timing, steady
+    def __init__(self, robot: Robot, timing: Timing) -> None:
+        """Make it."""
+        self._robot, self._timing = robot, timing
         self._worker = ThreadPoolExecutor(1)
         self._sent: Array | None = None  # the last commands, None while the fins rest
+        self._sent_at = 0.0
         self._failed: tuple[str, ...] = ()
         self._busy: Future[Allocation] | None = None
 
@@ -110,12 +114,13 @@ class Server:
             "power": answer.power,
             "solve_ms": answer.solve_ms,
         }
-        self._sent = answer.command
+        self._sent, self._sent_at = answer.command, time.monotonic()
         return reply
 
     def _solve(self, request: Mapping[str, Any], start: float) -> Allocation:
         """The robot's answer, or `TooLate` when the deadline passes first."""
-        previous = self._sent if self._steady else None
+        fresh = time.monotonic() - self._sent_at < RECENT_S
+        previous = self._sent if fresh else None
 
         def work() -> Allocation:
             return self._robot.allocate(

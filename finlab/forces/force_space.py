@@ -64,7 +64,8 @@ class PlanarProblem(NamedTuple):
     turning_is_free: bool
     """Whether zero directions cost nothing."""
     idle_direction: Array
-    """Zero direction (n,) [rad] to which a fin at rest turns: the cheapest one."""
+    """Zero direction (n,) [rad] to which a fin at rest turns: the cheapest one; NaN where it turns to where
+    it would be pulled."""
     convex: bool
     """Whether cost grows faster than force."""
 
@@ -263,7 +264,7 @@ def realize(problem: PlanarProblem, planar: Planar, rests: float | None = None) 
     command, cost = planar.command, planar.row[..., COST].sum(-1)
     direction = command[..., 2]
     if rests is not None or problem.turning_is_free:
-        np.copyto(direction, problem.idle_direction, where=idle)
+        np.copyto(direction, problem.idle_direction, where=idle & np.isfinite(problem.idle_direction))
     if not problem.turning_is_free:
         turn = np.where(fins.half >= np.pi, wrapped(direction), direction)
         cost = cost + (problem.direction_cost * turn * turn).sum(-1)

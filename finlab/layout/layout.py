@@ -91,6 +91,13 @@ class Layout:
         return _read_only([(s.amplitude_pole, s.frequency_pole, s.direction_pole) for s in servos])
 
     @cached_property
+    def servo_rates(self) -> Array:
+        """How fast the commands of each fin change at most from tick to tick (n, 3) [rad/s, Hz/s, rad/s];
+        read-only."""
+        servos = [fin.servo for fin in self.fins]
+        return _read_only([(s.amplitude_rate, s.frequency_rate, s.direction_rate) for s in servos])
+
+    @cached_property
     def speed_limit(self) -> Array:
         """How fast each fin can turn (n,) [rad/s]; read-only."""
         return _read_only([fin.servo.speed_limit for fin in self.fins])

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from finlab.layout.rules import number
 
 MAX_RATE = 1000.0
-"""Largest pole and speed [rad/s]; a hundred times what such servos reach."""
+"""Largest pole, speed and rate [per second]; a hundred times what such servos reach."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +31,23 @@ class Servo:
     """Fastest that the fin turns [rad/s]; two turns a second in U-CAT's UWSim plug-in. It cuts the amplitude
     of fast flapping and slows the turning of a fin that flaps."""
 
+    amplitude_rate: float = 1.0
+    """How fast the commanded amplitude changes at most from tick to tick [rad/s]: what the filter above
+    follows with a delay of two tenths of the amplitude."""
+    frequency_rate: float = 3.0
+    """The same of the commanded frequency [Hz/s]."""
+    direction_rate: float = 5.0
+    """The same of the commanded zero direction [rad/s]. A fin that is told to turn back all at once pushes
+    wherever it points meanwhile; one that is told step by step leaves the others time to make up for it."""
+
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = number(getattr(self, field.name), f"{field.name}_rad_s", high=MAX_RATE, positive=True)
-            object.__setattr__(self, field.name, value)
+        for key, name in SERVO_KEYS.items():
+            value = number(getattr(self, name), key, high=MAX_RATE, positive=True)
+            object.__setattr__(self, name, value)
 
 
-SERVO_KEYS = {f"{field.name}_rad_s": field.name for field in fields(Servo)}
+SERVO_KEYS = {
+    f"{field.name}_{'hz' if field.name == 'frequency_rate' else 'rad'}_s": field.name
+    for field in fields(Servo)
+}
 """Keys of `servo` in a layout file -> fields."""

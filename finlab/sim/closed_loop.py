@@ -54,7 +54,6 @@ class ClosedLoop:
         controller: Controller | None = None,
         *,
         plant: str = "mean",
-        steady: bool = False,
         sensors: SensorSettings | None = None,
         water: Water | None = None,
         failures: Sequence[FinFault | tuple[str, float]] = (),
@@ -74,7 +73,6 @@ class ClosedLoop:
             controller: by default the tracking controller of the layout for trajectories, the velocity
                 controller for cruises.
             plant: what the fins really do; see `PLANTS`.
-            steady: whether the allocator is given its previous command, so that fins turn little per tick.
             sensors: rates and noise; the defaults of `SensorSettings`.
             water: how it moves, such as `SteadyCurrent` or `Waves`; it is still by default.
             failures: what becomes of fins, and when; (name, time [s]) is a fin that is lost.
@@ -100,7 +98,6 @@ class ClosedLoop:
             controller = VelocityController() if isinstance(task, Cruise) else TrackingController(layout)
         self.controller = controller
         self.plant = plant
-        self.steady = steady
         self.seed = seed
         truth = layout if truth is None else checked_truth(layout, truth)
         self.vehicle = Vehicle(complete_body(truth))
@@ -237,12 +234,11 @@ class ClosedLoop:
             self.verdict = self.monitor.step(now, self._command, reported)
         setpoint = self.task.setpoint(time + self.controller.lead_s)
         asked = self._complete()(self.controller.wrench(now, setpoint, self._given()))
-        previous = self._command if self.steady else None
         answer = self.allocator.allocate(
             self.layout.moving((*now.velocity, *now.rates)),  # what speed takes from fins, where known
             asked,
             failed=self.failed,
-            previous=previous,
+            previous=self._command,
             health=self.health,
             seed=self.seed,
         )

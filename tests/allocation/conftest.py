@@ -8,13 +8,7 @@ import numpy as np
 import pytest
 
 from finlab.allocation import load_allocator
-from finlab.allocation.search.prepared import Prepared
 from finlab.allocation.search.search_allocator import SearchAllocator
-from finlab.arrays import Array
-from finlab.layout import load_layout
-
-Flip = tuple[Prepared, Array, Array, Array, Array]
-"""A prepared robot, its previous command, the normalized target, and the answers with and without it."""
 
 
 @pytest.fixture
@@ -43,20 +37,3 @@ def search() -> SearchAllocator:
 def effort() -> SearchAllocator:
     """The same with the paper's effort kept least."""
     return load_allocator(objective="effort")
-
-
-@pytest.fixture
-def flip(effort: SearchAllocator) -> Flip:
-    """A robot whose sway falls by 0.2 N a tick, through zero and on: its fins have to turn over soon."""
-    layout = load_layout("A")
-    before = effort.allocate(layout, [0.0, 0.6, 1.5, 0.0, 0.0, 0.0])
-    target = np.array([0.0, 0.4, 1.5, 0.0, 0.0, 0.0])
-    near = effort.allocate(layout, target, previous=before.command).command
-    far = effort.allocate(layout, target).command
-    return (
-        effort.pipeline.prepare(layout),
-        before.command,
-        target / effort.normalization.std,
-        near,
-        far[None],
-    )

@@ -160,7 +160,7 @@ def test_deadlines_are_positive_and_finite(
     timings: list[Timing] = []
 
     class Spy(Server):
-        def __init__(self, robot: Robot, timing: Timing, steady: bool = False) -> None:
+        def __init__(self, robot: Robot, timing: Timing) -> None:
             timings.append(timing)
 
         def run(self, transport: Any) -> None:

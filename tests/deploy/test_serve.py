@@ -16,7 +16,7 @@ import pytest
 from finlab.allocation import Allocation
 from finlab.deploy.bundle import Bundle
 from finlab.deploy.robot import Robot, parse_robot
-from finlab.deploy.serve import MAX_LINE, Server, Timing
+from finlab.deploy.serve import MAX_LINE, RECENT_S, Server, Timing
 from finlab.deploy.transport import LoopbackUdp, StandardStreams
 from finlab.errors import FinlabError
 
@@ -50,9 +50,9 @@ class Script:
         self.sent.append(json.loads(line))
 
 
-def served(robot: Robot, *requests: Any, timing: Timing | None = None, steady: bool = False) -> Script:
+def served(robot: Robot, *requests: Any, timing: Timing | None = None) -> Script:
     script = Script(*requests)
-    Server(robot, timing or Timing(), steady).run(script)
+    Server(robot, timing or Timing()).run(script)
     return script
 
 
@@ -137,12 +137,23 @@ def test_first_answer_too_late_is_neutral(robot: Robot) -> None:
     np.testing.assert_array_equal(np.array(late["command"]), robot.neutral())
 
 
-def test_steady_turns_fins_slowly(robot: Robot) -> None:
-    wrenches = [[1, 0, 0.5, 0, 0, 0.1], [0.9, 0.1, 0.5, 0, 0, 0.1]]
-    replies = served(robot, *({"wrench": w} for w in wrenches), steady=True).sent
+def test_commands_change_no_faster_than_servos_do(robot: Robot) -> None:
+    wrenches = [[1, 0, 0.5, 0, 0, 0.1], [-1, 0.1, 0.5, 0, 0, 0.1]]
+    replies = served(robot, *({"wrench": w} for w in wrenches)).sent
     before = np.array(replies[0]["command"])
     truth = robot.allocate(wrenches[1], previous=before)
+    assert truth.err_norm > 0.1  # forwards and backwards are ticks apart
     np.testing.assert_allclose(np.array(replies[1]["command"]), truth.command, atol=1e-9)
+
+
+def test_commands_of_long_ago_bind_no_more(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    server = Server(robot, Timing())
+    forwards, backwards = (json.dumps({"wrench": [x, 0, 0.5, 0, 0, 0]}).encode() for x in (1, -1))
+    server.answer(forwards)
+    assert server.answer(backwards)["err_norm"] > 0.1
+    later = time.monotonic() + RECENT_S
+    monkeypatch.setattr(time, "monotonic", lambda: later)
+    assert server.answer(backwards)["err_norm"] < 1e-5
 
 
 def test_streams_keep_only_the_newest_request() -> None:

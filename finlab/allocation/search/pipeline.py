@@ -24,7 +24,7 @@ from finlab.allocation.search.prepared import (
     resting_fins,
     resting_seeds,
 )
-from finlab.allocation.search.receding_horizon import plan_ahead
+from finlab.allocation.search.rate_limits import planar_force, within_rates
 from finlab.allocation.search.refined_candidates import (
     MISSED,
     FallbackForces,
@@ -37,7 +37,6 @@ from finlab.allocation.search.refined_candidates import (
     refine_missed,
 )
 from finlab.allocation.search.settings import Settings
-from finlab.allocation.search.turn_limits import TURNS, limit_turn, planar_force, unwrap_to_arc
 from finlab.allocation.search.weighted_sum import minimize_weighted_sum
 from finlab.arrays import Array
 from finlab.errors import AllocationError
@@ -80,10 +79,13 @@ class SearchNumbers:
     """Steps of that search, enough to converge: alternatives are counted by their local minima."""
     alternative_error: float = 1e-3
     """Normalized error up to which another answer is an alternative."""
-    plan_lm_steps: int = 4
-    """Levenberg-Marquardt steps on a command of the receding horizon."""
-    passing_error: float = 5e-3
-    """Normalized error for a tick that is better than a fast turn: half of what counts as delivered."""
+    tick_lm_steps: int = 5
+    """Levenberg-Marquardt steps on a target that is out of reach within a tick: the next tick goes on."""
+    leaving_lm_steps: int = 10
+    """The same on the way to another allocation, from commands that are at the ends of their rates."""
+    worth_leaving: float = 0.03
+    """Share of its cost that a robot in motion must save in the end before its fins go towards another way,
+    which takes several ticks."""
 
 
 SEARCH = SearchNumbers()
@@ -183,32 +185,27 @@ class Pipeline:
     def _descend_from_previous(
         self, prepared: Prepared, target: Array, start: _Start, previous: Array
     ) -> RefinedCandidates:
-        """Answers that turn the fins as little as the target allows, with regard to the next ticks.
+        """Answers within what the fins may be told after a previous command (n, 3).
 
-        Fins at rest turn towards where they will be needed, or else where they would be cheapest.
+        Where cost grows faster than force there is but one valley, and the search goes on from where the
+        robot is. Otherwise the way that it moves now is kept, fins at rest turn to where they would be
+        cheapest, and where another way is worth it, all fins go towards that, dear as the steps may be.
         """
+        force = planar_force(prepared, previous)[None, None]
+        if self.objective.convex:
+            near = within_rates(prepared, previous, self.settings.period_s)
+            return self._descend(near, target, start._replace(seeds=force), keep_mode=True)
         free = self._descend(prepared, target, start)
-        aim = free.command[0, 0, :, 2]
-        force = planar_force(prepared, previous)
-        kept = force if start.seeds.ndim == 4 else np.hypot(*force)
-        start = start._replace(seeds=np.concatenate([kept[None, None], start.seeds], axis=1))
-        near = limit_turn(prepared, previous, aim, TURNS[0])
-        candidates = self._descend(near, target, start, known=free.command[0])
-        exact = exact_error(prepared)
-        plan = plan_ahead(prepared, previous, target[0], candidates.command[0, 0], free.command[0])
-        if plan is not None:
-            near = limit_turn(prepared, previous, plan.ready, TURNS[1])
-            ready = near.commands.feasible(unwrap_to_arc(near, plan.command))
-            fresh = np.full((1, 1), -1)
-            planned = refine_candidates(near, target, ready[None, None], fresh, SEARCH.plan_lm_steps)
-            if planned.error[0, 0] <= max(exact, candidates.error[0, 0]):
-                candidates = candidates.with_first(planned)
-        for width in TURNS[1:]:
-            if candidates.error[0, 0] <= (exact if width == TURNS[1] else SEARCH.passing_error):
-                break
-            near = limit_turn(prepared, previous, aim, width)
-            candidates = self._descend(near, target, start, known=free.command[0])
-        return candidates
+        near = within_rates(prepared, previous, self.settings.period_s, free.command[0, 0, :, 2])
+        kept = force if start.seeds.ndim == 4 else np.hypot(force[:, :, 0], force[:, :, 1])
+        start = start._replace(seeds=np.concatenate([kept, start.seeds], axis=1))
+        found = self._descend(near, target, start, keep_mode=True)
+        if free.cost[0, 0] < (1.0 - SEARCH.worth_leaving) * found.cost[0, 0]:
+            towards, fresh = near.commands.feasible(free.command[:, :1]), np.full((1, 1), -1)
+            other = refine_candidates(near, target, towards, fresh, SEARCH.leaving_lm_steps)
+            if other.error[0, 0] <= max(exact_error(prepared), found.error[0, 0]):
+                return found.with_first(other)
+        return found
 
     def _trade_error_for_energy(
         self, prepared: Prepared, target: Array, candidates: RefinedCandidates, previous: Array | None
@@ -218,7 +215,7 @@ class Pipeline:
         if weight == 0.0 or not isinstance(effort, EnergyMeter):
             return candidates
         if previous is not None:
-            prepared = limit_turn(prepared, previous, candidates.command[0, 0, :, 2], TURNS[0])
+            prepared = within_rates(prepared, previous, self.settings.period_s)
         rows, p, n, _ = candidates.command.shape
         start = prepared.commands.feasible(candidates.command.reshape(-1, n, 3))
         found, energy = minimize_weighted_sum(
@@ -230,31 +227,25 @@ class Pipeline:
         return RefinedCandidates._make(values.take(order, axis=0) for values in flat)
 
     def _descend(
-        self, prepared: Prepared, target: Array, start: _Start, known: Array | None = None
+        self, prepared: Prepared, target: Array, start: _Start, keep_mode: bool = False
     ) -> RefinedCandidates:
-        """Search from seeds, refine, and go on where that did not reach the target.
-
-        From tick to tick, `known` are commands (P, n, 3) that answer the single target whatever the turns:
-        the search in narrow arcs may miss them where they are within these.
-        """
+        """Search from seeds, refine, and go on where that did not reach the target."""
         # Fins that rest have hardly any slope: two steps where there are such.
-        keep_mode, steps = known is not None, self.settings.refine_steps + (not self.objective.convex)
-        steps += prepared.arcs is not None  # fins at stops are slower to mend
+        steps = self.settings.refine_steps + (not self.objective.convex)
+        steps += prepared.arcs is not None or keep_mode  # fins at stops are slower to mend
         command, origin, expected = self._search(
             prepared, target, start.seeds, keep_mode, near_best=start.near_best
         )
         searched = command[:, 0]
-        if known is not None:
-            within = prepared.commands.feasible(unwrap_to_arc(prepared, known))
-            command, steps = np.concatenate([command, within[None]], axis=1), steps + 1
-            origin = np.concatenate([origin, np.full((1, len(within)), -1)], axis=1)
         exact = exact_error(prepared)
         if prepared.unsettled:
             command = _cheaper(prepared, target, command)
         candidates = refine_candidates(prepared, target, command, origin, steps, keep_mode)
         candidates = RefinedCandidates._make(values[:, : self.settings.n_refined] for values in candidates)
         missed = candidates.error[:, 0] > exact
-        if missed.any():
+        if missed.any() and keep_mode:
+            improve(prepared, target, candidates, missed, None, SEARCH.tick_lm_steps)
+        elif missed.any():
             refine_missed(prepared, target, candidates, missed, start.fallback)
             searched = np.where(missed[:, None, None], candidates.command[:, 0], searched)
         if self.objective.convex:  # what was reached late, or became dear on the way, is made cheaper

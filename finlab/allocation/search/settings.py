@@ -27,6 +27,8 @@ class Settings:
     subsets: bool = True
     """Whether allocations that rest some fins are searched, where the objective may prefer them; of many fins
     also near the best that any method began with."""
+    period_s: float = 0.1
+    """Time between ticks [s], by which the previous command is taken to be old."""
     energy_tradeoff: float = 0.0
     """w of the weighted sum `err_norm^2 + w J_en` to minimize, with objective `effort`; 0: the least cost
     among exact answers."""

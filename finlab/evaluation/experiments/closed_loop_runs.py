@@ -105,8 +105,6 @@ def run_all(
     allocators: Mapping[str, Allocator],
     seeds: Sequence[int],
     plant: str = "mean",
-    *,
-    steady: bool = False,
 ) -> list[Run]:
     """Every scenario with every method and seed, one after the other, with the paper's controllers.
 
@@ -115,12 +113,11 @@ def run_all(
         allocators: methods by name.
         seeds: of the sensors' noise.
         plant: how fin forces are simulated.
-        steady: whether the allocators are given their previous command.
     """
     done = []
     every = list(product(scenarios, allocators.items(), seeds))
     for (label, layout, task, failures), (name, allocator), seed in progress(every, "run"):
-        options: dict[str, Any] = {"failures": failures, "plant": plant, "steady": steady, "seed": seed}
+        options: dict[str, Any] = {"failures": failures, "plant": plant, "seed": seed}
         pilot = VelocityController() if isinstance(task, Cruise) else WaypointController()
         done.append(((label, name), ClosedLoop(layout, allocator, task, pilot, **options).run()))
     return done

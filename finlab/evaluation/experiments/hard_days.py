@@ -126,7 +126,6 @@ class HardDay:
         allocator: Allocator,
         seed: int,
         *,
-        steady: bool = False,
         controller: str = "tracking",
     ) -> ClosedLoop:
         """The swim, ready to start.
@@ -135,7 +134,6 @@ class HardDay:
             case: of `cases()`.
             allocator: the method.
             seed: of noise, biases, waves and mixed fins.
-            steady: whether the allocator is given its previous command.
             controller: one of `CONTROLLERS`.
         """
         robot, path = self.robot(case.layout, seed), self.path()
@@ -148,7 +146,6 @@ class HardDay:
             path,
             CONTROLLERS[controller](robot),
             plant=self.plant,
-            steady=steady,
             sensors=self.sensors,
             water=water,
             failures=failures,

@@ -92,7 +92,6 @@ def swim_all(
     methods: Mapping[str, Allocator],
     seeds: Sequence[int],
     *,
-    steady: bool = False,
     controller: str = "tracking",
 ) -> list[Swim]:
     """Every day with every method and seed; hopeless cases are left out (`not_swum`).
@@ -101,7 +100,6 @@ def swim_all(
         days: of `HARD_DAYS`.
         methods: allocators by name.
         seeds: at least one; the same noise for every method.
-        steady: whether the allocators are given their previous command.
         controller: one of `CONTROLLERS`, for all methods.
     """
     cases = [(day, case) for day in days for case in day.cases() if day.obstacle(case) is None]
@@ -109,7 +107,7 @@ def swim_all(
     for (day, case), (name, allocator), seed in progress(
         list(product(cases, methods.items(), seeds)), "swim", "hard days"
     ):
-        loop = day.swim(case, allocator, seed, steady=steady, controller=controller)
+        loop = day.swim(case, allocator, seed, controller=controller)
         start = time.process_time()
         log = loop.run()
         figures = swim_figures(log, time.process_time() - start)

@@ -32,7 +32,6 @@ from finlab.allocation.search.refined_candidates import (
 )
 from finlab.allocation.search.search_allocator import CHUNK, SearchAllocator
 from finlab.allocation.search.settings import Settings
-from finlab.allocation.search.turn_limits import TURNS, limit_turn
 from finlab.assets import shipped_layouts
 from finlab.errors import AllocationError
 from finlab.evaluation.splits import make_split
@@ -222,25 +221,6 @@ def test_twins_that_must_give_more_than_one_can_work_unevenly(share: float) -> N
     target = Plant(pair).wrench(np.array([[0.6, 2.1, 0.4]] * 2)) * share
     size = np.linalg.norm(load_allocator(objective="effort").allocate(pair, target).fin_forces, axis=1)
     assert size.max() > 0.9 * 6.66 and size.min() < size.max() * (2.2 * share - 1.0)
-
-
-def test_arcs_are_narrowed_for_fins_that_point_somewhere(prepared: Prepared) -> None:
-    n = prepared.plant.n_fins
-    previous = drawn(prepared)
-    previous[0] = np.nan
-    near = limit_turn(prepared, previous, previous[:, 2], TURNS[0])
-    assert near.commands.full_turn[0] == prepared.commands.full_turn[0]
-    assert not near.commands.full_turn[1:].any()
-    assert near.planar.fins.half[0] == prepared.planar.fins.half[0]
-    assert (near.planar.fins.half[1:] <= TURNS[0] + 1e-12).all()
-    assert not near.planar.fins.turns_fully
-    middle = (near.planar.fins.middle - previous[:, 2])[1:]
-    assert (np.abs(middle) <= TURNS[0]).all()
-    if prepared.commands.full_turn.all():
-        np.testing.assert_allclose(near.planar.fins.half[1:], TURNS[0])
-        np.testing.assert_allclose(middle, 0.0, atol=1e-12)
-    assert limit_turn(prepared, previous, previous[:, 2], math.pi) is prepared
-    assert limit_turn(prepared, np.full((n, 3), np.nan), np.zeros(n), TURNS[0]) is prepared
 
 
 # What is searched.
@@ -532,10 +512,10 @@ def test_commands_are_refined_on_request(search: SearchAllocator) -> None:
 
 
 def test_constants_of_the_search_keep_their_order() -> None:
-    assert RANKING.exact_error < RANKING.error_resolution < SEARCH.alternative_error < SEARCH.passing_error
-    assert SEARCH.passing_error < SEARCH.promising_error < 0.1
+    assert RANKING.exact_error < RANKING.error_resolution < SEARCH.alternative_error
+    assert SEARCH.alternative_error < SEARCH.promising_error < 0.1
     assert 0.0 < RANKING.switch_gain < 0.1
     assert MISSED.first_lm_steps < MISSED.nearest_lm_steps < MISSED.last_lm_steps
     assert 0.0 < MISSED.needless_share < 0.01 and RANKING.exact_error < MISSED.needless_error < 1e-3
-    assert list(TURNS) == sorted(TURNS) and TURNS[-1] == math.pi
+    assert SEARCH.tick_lm_steps <= MISSED.nearest_lm_steps
     assert search_allocator.CHUNK > 100

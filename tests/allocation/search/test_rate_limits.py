@@ -1,0 +1,276 @@
+"""From tick to tick: with the previous command, commands change no faster than the servos are meant to."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from finlab.allocation import load_allocator
+from finlab.allocation.search.rate_limits import planar_force, within_rates
+from finlab.allocation.search.search_allocator import SearchAllocator
+from finlab.errors import CommandError
+from finlab.forces.force_space import SETTLED
+from finlab.layout import Layout, load_layout
+from finlab.layout.angles import wrapped
+from finlab.physics import Plant
+from tests.random_fins import random_robot
+
+TICKS = np.arange(150) * 0.1
+"""15 s at 10 Hz."""
+SLOW_PATH = np.array([0.98, 0.98, 1.4, 0.175, 0.175, 0.175])
+"""Amplitudes of the path [N, N m], about 0.7 standard deviations of what random commands give."""
+TARGET = [1.0, 0.5, 2.0, 0.0, 0.1, 0.1]
+STEP = np.array([0.1, 0.3, 0.5])
+"""What the usual servo's commands change by in a tick [rad, Hz, rad]."""
+
+
+class Drive(NamedTuple):
+    """Answers along a path."""
+
+    command: np.ndarray
+    """(T, n, 3)."""
+    cost: np.ndarray
+    """(T,), of the objective."""
+    error: np.ndarray
+    """(T,), by the plant."""
+
+    @property
+    def change(self) -> np.ndarray:
+        """What each command changes by from tick to tick (T - 1, n, 3), the shorter way round."""
+        change = np.diff(self.command, axis=0)
+        change[..., 2] = wrapped(change[..., 2])
+        return np.abs(change)
+
+
+def drive(method: SearchAllocator, layout: Layout, path: np.ndarray, *, bound: bool) -> Drive:
+    previous, results = None, []
+    for wrench in path:
+        result = method.allocate(layout, wrench, previous=previous)
+        previous = result.command if bound else None
+        results.append(result)
+    return Drive(
+        np.array([result.command for result in results]),
+        np.array([result.power if method.objective.name == "power" else result.energy for result in results]),
+        np.array([result.err_norm for result in results]),
+    )
+
+
+def smooth_path(seed: int) -> np.ndarray:
+    """Slow sines (T, 6) in all axes."""
+    rng = np.random.default_rng(seed)
+    return SLOW_PATH * np.sin(rng.uniform(0.15, 0.6, 6) * TICKS[:, None] + rng.uniform(0.0, 2.0 * math.pi, 6))
+
+
+@pytest.fixture(scope="module")
+def penta() -> Layout:
+    return load_layout("penta")
+
+
+@pytest.fixture(scope="module", params=["power", "effort"])
+def method(request: pytest.FixtureRequest) -> SearchAllocator:
+    return load_allocator(objective=request.param)
+
+
+@pytest.fixture(scope="module")
+def free(method: SearchAllocator, penta: Layout) -> Drive:
+    return drive(method, penta, smooth_path(0), bound=False)
+
+
+@pytest.fixture(scope="module")
+def steady(method: SearchAllocator, penta: Layout) -> Drive:
+    return drive(method, penta, smooth_path(0), bound=True)
+
+
+def test_no_command_changes_faster_than_its_servo(free: Drive, steady: Drive) -> None:
+    assert (steady.change <= STEP + 1e-9).all()
+    assert (free.change.max((0, 1)) > STEP)[2]  # left to themselves, fins turn by more
+
+
+def test_the_path_is_still_tracked_at_about_the_same_cost(
+    method: SearchAllocator, free: Drive, steady: Drive
+) -> None:
+    assert free.error.max() < 1e-5
+    assert steady.error.max() < 0.02 and np.median(steady.error) < 1e-6
+    assert steady.cost.mean() < {"power": 1.002, "effort": 1.06}[method.objective.name] * free.cost.mean()
+
+
+@pytest.mark.parametrize("name", ["hexa", "octo"])
+def test_many_fins_for_effort_track_at_about_the_same_cost(name: str) -> None:
+    search, layout, path = load_allocator(objective="effort"), load_layout(name), smooth_path(0)[:80]
+    free, steady = (drive(search, layout, path, bound=told) for told in (False, True))
+    assert steady.error.max() < 0.02
+    assert steady.cost.mean() < 1.06 * free.cost.mean()
+
+
+def test_rates_are_those_of_each_fin(search: SearchAllocator, penta: Layout) -> None:
+    first = replace(penta.fins[0], servo=replace(penta.fins[0].servo, frequency_rate=0.5, direction_rate=1.0))
+    other = replace(penta, fins=(first, *penta.fins[1:]))
+    ride = drive(search, other, smooth_path(1)[:60], bound=True)
+    assert (ride.change[:, 0] <= np.array([0.1, 0.05, 0.1]) + 1e-9).all()
+    assert (ride.change[:, 1:, 2] > 0.1).any()
+
+
+def test_ticks_may_be_longer(penta: Layout) -> None:
+    slow = load_allocator(period_s=0.4)
+    before = slow.allocate(penta, TARGET).command
+    after = slow.allocate(penta, -np.array(TARGET), previous=before).command
+    change = np.abs(after - before)
+    assert np.abs(wrapped(change[:, 2])).max() == pytest.approx(2.0)
+    assert change[:, 1].max() <= 1.2 + 1e-9
+
+
+def test_commands_stay_inside_the_limits_across_the_seam(steady: Drive, penta: Layout) -> None:
+    assert ((steady.command >= penta.lower) & (steady.command <= penta.upper)).all()
+    jumps = np.abs(np.diff(steady.command[..., 2], axis=0)) > math.pi
+    assert jumps.any()  # fins do pass the seam
+
+
+def test_a_fin_follows_a_turning_force_over_the_seam(search: SearchAllocator) -> None:
+    layout = load_layout("pair")
+    previous = None
+    for angle in np.linspace(0.0, 4.0 * math.pi, 80):
+        command = np.column_stack([np.full(2, 0.4), np.full(2, 1.5), np.full(2, wrapped(angle))])
+        result = search.allocate(layout, Plant(layout).wrench(command), previous=previous)
+        assert result.err_norm < 1e-5
+        assert ((result.command >= layout.lower) & (result.command <= layout.upper)).all()
+        previous = result.command
+
+
+def test_arcs_are_kept(search: SearchAllocator) -> None:
+    layout = load_layout("restricted")
+    ride = drive(search, layout, smooth_path(1)[:60], bound=True)
+    assert ((ride.command >= layout.lower) & (ride.command <= layout.upper)).all()
+
+
+def test_a_previous_command_that_is_the_answer_stays(
+    method: SearchAllocator, penta: Layout, free: Drive
+) -> None:
+    plant = Plant(penta)
+    for tick in (0, 50, 120):
+        before = free.command[tick]
+        result = method.allocate(penta, smooth_path(0)[tick], previous=before)
+        # The search ends where forces settle; asked again, the answer is the same.
+        step = 2.0 * SETTLED[0] * method.pipeline.prepare(penta).planar.fins.maximum.max()
+        np.testing.assert_allclose(result.fin_forces, plant.fin_forces(before), atol=step)
+        again = method.allocate(penta, smooth_path(0)[tick], previous=result.command)
+        np.testing.assert_allclose(again.fin_forces, result.fin_forces, atol=1e-3)
+        cost = result.power if method.objective.name == "power" else result.energy
+        assert cost < 1.005 * free.cost[tick]
+
+
+def test_the_first_tick_knows_no_past(free: Drive, steady: Drive) -> None:
+    np.testing.assert_array_equal(steady.command[0], free.command[0])
+
+
+def test_what_nothing_is_known_of_is_free(search: SearchAllocator, penta: Layout) -> None:
+    alone = search.allocate(penta, TARGET)
+    unknown = search.allocate(penta, TARGET, previous=np.full((5, 3), np.nan))
+    assert unknown.err_norm < 1e-5
+    np.testing.assert_allclose(unknown.command, alone.command, rtol=1e-4, atol=1e-4)
+
+
+def test_a_failed_fin_comes_back(search: SearchAllocator, penta: Layout) -> None:
+    lost = search.allocate(penta, TARGET, failed=["port_back"])
+    still = search.allocate(penta, TARGET, failed=["port_back"], previous=lost.command)
+    assert np.isnan(still.command[2]).all() and np.isfinite(still.command[[0, 1, 3, 4]]).all()
+    back = search.allocate(penta, TARGET, previous=lost.command)
+    assert np.isfinite(back.command).all() and back.err_norm < 1e-5
+    known = [0, 1, 3, 4]
+    assert (np.abs(back.command - lost.command)[known] <= STEP + 1e-9).all()
+
+
+def test_a_target_that_needs_a_turn_is_reached_tick_by_tick(method: SearchAllocator, penta: Layout) -> None:
+    """From rise to dive all fins turn by half a circle: seven ticks, in which less and less is missing."""
+    target = np.array([0.0, 0.0, 12.0, 0.0, 0.0, 0.0])
+    previous, missing = method.allocate(penta, target).command, []
+    for _ in range(12):
+        result = method.allocate(penta, -target, previous=previous)
+        previous = result.command
+        missing.append(result.err_norm)
+    assert missing[0] > 1.0 and (np.diff(missing) <= 1e-9).all()
+    assert missing[-1] < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("previous", "sentence"),
+    [
+        (np.zeros((4, 3)), "previous: expected a command of shape (5, 3) for layout 'penta'"),
+        (np.full((5, 3), np.inf), "previous: expected finite commands"),
+        ("yesterday", "previous: expected a command of shape (5, 3)"),
+    ],
+)
+def test_a_previous_that_is_no_command_is_refused(
+    previous: object, sentence: str, search: SearchAllocator, penta: Layout
+) -> None:
+    with pytest.raises(CommandError) as caught:
+        search.allocate(penta, TARGET, previous=previous)  # type: ignore[arg-type]
+    assert sentence in str(caught.value)
+
+
+def test_boxes_are_around_what_the_fins_were_told(search: SearchAllocator) -> None:
+    layout = load_layout("restricted")
+    prepared = search.pipeline.prepare(layout)
+    before = np.column_stack([[0.3, 0.08, 0.2, 0.5], [1.0, 2.0, 0.1, 0.4], [0.0, 1.6, np.nan, -0.6]])
+    near = within_rates(prepared, before, 0.1)
+    expected_lower = np.maximum(before - STEP, layout.lower)
+    expected_upper = np.minimum(before + STEP, layout.upper)
+    expected_lower[2], expected_upper[2] = layout.lower[2], layout.upper[2]
+    np.testing.assert_allclose(near.commands.lower, expected_lower)
+    np.testing.assert_allclose(near.commands.upper, expected_upper)
+    assert within_rates(prepared, np.full((4, 3), np.nan), 0.1) is prepared
+
+
+def test_arcs_go_over_the_seam_and_unknown_fins_stay_free(search: SearchAllocator, penta: Layout) -> None:
+    prepared = search.pipeline.prepare(penta)
+    direction = np.array([3.0, -2.5, 0.4, np.nan, -3.1])
+    near = within_rates(prepared, np.column_stack([np.full(5, 0.3), np.full(5, 1.0), direction]), 0.1)
+    known = [0, 1, 2, 4]
+    np.testing.assert_allclose(near.commands.lower[known, 2], direction[known] - 0.5)
+    np.testing.assert_allclose(near.commands.upper[known, 2], direction[known] + 0.5)
+    assert near.commands.full_turn.tolist() == [False, False, False, True, False]
+    np.testing.assert_allclose(near.planar.fins.half, [0.5, 0.5, 0.5, math.pi, 0.5])
+    assert near.arcs is None and prepared.commands.full_turn.all()
+
+
+def test_in_a_long_tick_a_fin_may_turn_anywhere(search: SearchAllocator, penta: Layout) -> None:
+    prepared = search.pipeline.prepare(penta)
+    near = within_rates(prepared, np.tile([0.3, 1.0, 0.5], (5, 1)), 0.7)
+    assert near.commands.full_turn.all() and near.planar.fins.turns_fully
+    np.testing.assert_array_equal(near.commands.lower[:, 2], penta.lower[:, 2])
+
+
+def test_arcs_of_forces_lean_as_measured_fins_do(search: SearchAllocator, tmp_path: Path) -> None:
+    """A measured fin's force points a little beside its zero direction."""
+    layout = random_robot(np.random.default_rng(4), ("table",), tmp_path, n_fins=(3, 5), limits="nominal")
+    prepared = search.pipeline.prepare(layout)
+    direction = np.linspace(-1.0, 1.0, layout.n_fins)
+    near = within_rates(prepared, np.column_stack([np.full((layout.n_fins, 2), 0.4), direction]), 0.06)
+    lean = prepared.planar.fins.lean(direction)
+    assert np.abs(lean).max() > 1e-3
+    np.testing.assert_allclose(near.planar.fins.middle, direction + lean, atol=1e-9)
+
+
+def test_a_full_circle_that_starts_elsewhere_is_kept(search: SearchAllocator, penta: Layout) -> None:
+    limits_of = replace(penta.fins[0].limits, zero_direction=(0.0, 2.0 * math.pi))
+    turned = replace(penta, fins=tuple(replace(fin, limits=limits_of) for fin in penta.fins))
+    previous = None
+    for surge in (1.0, 0.5, -0.5, -1.0):
+        for _ in range(8):
+            result = search.allocate(turned, [surge, 0.3, 0.5, 0.0, 0.0, 0.1], previous=previous)
+            previous = result.command
+            assert ((previous[:, 2] >= 0.0) & (previous[:, 2] <= 2.0 * math.pi)).all()
+        assert result.err_norm < 1e-5
+
+
+def test_planar_forces_of_a_command(search: SearchAllocator, penta: Layout) -> None:
+    command = np.tile([0.6, 2.1, 0.4], (5, 1))
+    command[4] = np.nan
+    force = planar_force(search.pipeline.prepare(penta), command)
+    command[4] = penta.lower[4]
+    np.testing.assert_allclose(force.T, Plant(penta).forces(command)[:, 1:], rtol=1e-12)
+    beyond = np.tile([9.0, 99.0, 0.4 + 2.0 * math.pi], (5, 1))
+    strongest = planar_force(search.pipeline.prepare(penta), beyond)
+    np.testing.assert_allclose(strongest, np.tile(force[:, :1], 5), rtol=1e-12)
