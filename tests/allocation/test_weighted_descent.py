@@ -233,7 +233,9 @@ def test_rows_do_not_see_each_other(plant: Plant) -> None:
     together = descend(plant, start, target, SIGMA, options, cost)
     for i in range(6):
         alone = descend(plant, start[i : i + 1], target[i : i + 1], SIGMA, options, cost)
-        np.testing.assert_allclose(together.command[i], alone.command[0], atol=1e-9)
+        # Where the objective is flat to rounding, commands may differ by its root.
+        np.testing.assert_allclose(together.objective[i], alone.objective[0], atol=1e-12)
+        np.testing.assert_allclose(together.command[i], alone.command[0], atol=1e-4)
         np.testing.assert_allclose(together.wrench[i], plant.wrench(together.command[i]), atol=1e-9)
 
 

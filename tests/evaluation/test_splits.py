@@ -36,7 +36,8 @@ def test_same_numbers_same_cases(split: str) -> None:
 def test_a_small_run_is_the_beginning_of_a_large_one(split: str) -> None:
     for small, large in zip(make_split(split, 2, 3, 5), make_split(split, 4, 8, 5), strict=False):
         assert small.layout == large.layout
-        np.testing.assert_array_equal(small.targets, large.targets[:3])
+        # Products of other sizes are rounded otherwise on some processors.
+        np.testing.assert_allclose(small.targets, large.targets[:3], rtol=1e-12, atol=1e-12)
 
 
 def test_seeds_and_splits_differ() -> None:

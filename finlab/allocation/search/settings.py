@@ -58,4 +58,5 @@ class SearchOptions(TypedDict, total=False):
     search_steps: int | None
     refine_steps: int
     subsets: bool
+    period_s: float
     energy_tradeoff: float
