@@ -159,14 +159,22 @@ def _compare(page: Page) -> None:
 
 def _swim(page: Page) -> None:
     page.tab("Swim")
-    page.choose("Beside", "analytic")
-    page.press("Start")
-    page.until(lambda: page.view.swimming.time > 0.5)
+    page.choose("Scenario", "lost-in-current")
     page.type("Speed", "8")
-    page.until(lambda: page.view.swimming.time > 25.0)
-    page.page.get_by_role("button", name="2", exact=True).locator("visible=true").first.click()
-    page.until(lambda: page.view.swimming.time > 42.0)
+    page.tab("More")
+    for controller in ("waypoint", "tracking"):
+        page.choose("Controller", controller)
+        page.until(lambda controller=controller: page.session.swim.controller == controller)
+        page.press("Start")
+        page.until(lambda: 0.0 < page.view.swimming.time < 20.0)
+        page.until(lambda: page.view.swimming.time > 66.0)
+        if controller == "waypoint":
+            page.press("Keep this swim")
+            page.until(lambda: page.view.swimming.kept is not None)
     page.press("Pause")
+    page.tab("More")
+    page.type("At [s]", "56")
+    page.until(lambda: page.view.swimming.at is not None)
     page.page.wait_for_timeout(25000)  # plots come late where there is no graphics card
 
 

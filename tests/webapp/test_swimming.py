@@ -14,7 +14,7 @@ from finlab.sim import make_trajectory
 from tests.webapp.loops import page_of
 from tests.webapp.stand_in import load_stand_in
 from webapp.markup.corner import swim_corner
-from webapp.markup.swim_card import swim_card
+from webapp.markup.swim_card import findings_words, swim_card
 from webapp.session.files import read_path
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan, SwimSettings
@@ -159,6 +159,9 @@ def test_a_fin_that_breaks_without_a_word_is_found(swimming: Swimming) -> None:
     assert f"found front_left lost {seconds:.1f} s after" in swim_card(swimming, SwimSettings())
     doubts = swimmer.shown.record[:, FORCES + 4 :]
     assert doubts[-1, UCAT.index("front_left")] > 0.99 and doubts[0].max() < 0.1
+    assert swimmer.shown.doubted == ("front_left",)
+    blind = swimmer.shown._replace(failed=(), found=())
+    assert "front_left is lost, and the monitor takes it for weak or stuck" in findings_words(blind)[0]
     swimming.toggle("front_left", announced=False)
     until(lambda: swimming.swimmers[0].shown.lost == ())
     assert "front_left works, but the allocator takes it for lost" in swim_card(swimming, SwimSettings())

@@ -137,11 +137,13 @@ def swim_corner(swimming: Swimming, newtons: float) -> str:
     )
     alive = len(first.fins) - len(shown.lost)
     off = f"{100 * float(shown.record[-1, ERROR]):.1f}" if len(shown.record) else "–"
+    power = "–" if shown.figures is None else f"{shown.figures.now_w:.1f}"
     parts = [
         f"<b>{escape(first.layout.name)}</b>",
         f"<span>{alive} of {len(first.fins)} fins</span>",
         f"<span><b>{shown.time:.1f}</b> s of {first.duration_s:.0f} s</span>",
         f"<span><span class='dim'>off the path</span> <b>{off}</b> cm</span>",
+        f"<span><span class='dim'>power</span> <b>{power}</b> W</span>",
         f"<span>{pace_words(swimming)}</span>",
     ]
     scale = f"<div class='dim scales'>arrow 0.1 m = {newtons:g} N</div>"

@@ -37,9 +37,9 @@ def findings_words(shown: Moment) -> list[str]:
     ]
     for name in shown.lost:
         if name not in shown.failed:
-            sentences.append(
-                f"<span class='missing'>{escape(name)} is lost, and the allocator does not know yet.</span>"
-            )
+            known = name in shown.doubted
+            rest = "the monitor takes it for weak or stuck" if known else "the allocator does not know yet"
+            sentences.append(f"<span class='missing'>{escape(name)} is lost, and {rest}.</span>")
     sentences += [
         f"<span class='missing'>{escape(name)} works, but the allocator takes it for lost.</span>"
         for name in shown.failed
@@ -88,7 +88,7 @@ def swim_card(swimming: Swimming, settings: SwimSettings) -> str:
         "<th title='at the mean speed over ground so far'>range</th></tr>"
     )
     return (
-        f"<div class='fl'><div class='said'>{head}</div><table>{header}{''.join(rows)}</table>"
+        f"<div class='fl swim'><div class='said'>{head}</div><table>{header}{''.join(rows)}</table>"
         f"<table>{pack_header}{''.join(packs)}</table>{_warnings(swimming, shown)}</div>"
     )
 

@@ -119,7 +119,7 @@ class SwimScene:
         else:
             path = self._shown[0].path
             low, high = path.min(axis=0), path.max(axis=0)
-            distance = max(0.85 * float(np.linalg.norm((high - low)[:2])), 1.2)
+            distance = max(0.75 * float(np.linalg.norm((high - low)[:2])), 1.2)
             # The lower part of the view is behind the plots, so the path belongs into the upper one.
             self._look_at((low + high) / 2 + distance * np.array([-0.1, -0.22, 0.0]), distance)
 

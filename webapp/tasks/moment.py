@@ -10,6 +10,8 @@ from finlab.sim.log import Tick
 
 POINTS = 300
 """Most points of a plotted line; a longer record is thinned out."""
+STRIDE = 50
+"""Periods between the places of which the distance swum is the sum: some waves long."""
 NOW = 10
 """Periods of which the present power is the mean: it jumps with every beat."""
 
@@ -35,7 +37,7 @@ class Figures(NamedTuple):
     energy_wh: float
     """Energy of that so far [Wh]."""
     speed_m_s: float
-    """Mean speed over ground [m/s]."""
+    """Mean speed over ground [m/s], without what waves and noise move it to and fro."""
 
 
 class Moment(NamedTuple):
@@ -63,6 +65,8 @@ class Moment(NamedTuple):
     """Those that the allocator takes for lost."""
     found: tuple[tuple[str, float], ...]
     """Those of which nobody told it, each with the time that the monitor needed to find out [s]."""
+    doubted: tuple[str, ...]
+    """Those that the monitor takes for broken in some way, more likely than not."""
     controllable: bool
     """Whether the working fins hold surge, heave and yaw."""
     done: bool
@@ -71,6 +75,11 @@ class Moment(NamedTuple):
     """What the swim has come to; None before the first step."""
     record: Array
     """Rows of ticks (N, 20 + 2 n), thinned out; `TIME` to `FORCES` say where what is."""
+
+
+def doubted(probability: Array, fins: tuple[str, ...]) -> tuple[str, ...]:
+    """The fins that are broken more likely than not, by probabilities (n,)."""
+    return tuple(name for name, chance in zip(fins, probability, strict=True) if chance > 0.5)
 
 
 def row_of(tick: Tick) -> Array:
@@ -92,7 +101,8 @@ def figures_of(rows: Array, period_s: float) -> Figures | None:
     if not len(rows):
         return None
     power, duration = rows[:, POWER], len(rows) * period_s
-    way = np.linalg.norm(np.diff(rows[:, PLACE : PLACE + 3], axis=0), axis=1).sum()
+    places = np.concatenate([rows[::STRIDE], rows[-1:]])[:, PLACE : PLACE + 3]
+    way = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
     return Figures(
         track_m=float(np.sqrt(np.mean(rows[:, ERROR] ** 2))),
         depth_m=float(np.sqrt(np.mean(rows[:, DEPTH_ERROR] ** 2))),

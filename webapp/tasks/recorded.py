@@ -9,7 +9,7 @@ from finlab.arrays import Array
 from finlab.control import Completion, TrackingController
 from finlab.layout import Layout
 from finlab.sim import RunLog
-from webapp.tasks.moment import Moment, figures_of, thinned
+from webapp.tasks.moment import Moment, doubted, figures_of, thinned
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +68,7 @@ class Recorded:
             lost=lost,
             failed=failed,
             found=tuple(item for item in self.found if item[0] in failed and item[0] in lost),
+            doubted=doubted(log.fault_probability[k], self.fins),
             controllable=self._controllable(failed),
             done=False,
             figures=figures_of(rows, self.period_s),

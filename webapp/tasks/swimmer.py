@@ -9,7 +9,7 @@ from finlab.physics.vehicle import Vehicle, complete_body
 from finlab.sim import ClosedLoop, RunLog, Tick, Water, perturbed
 from finlab.sim.log import log_of_ticks
 from webapp.session.swim_plan import Plan
-from webapp.tasks.moment import FORCES, POINTS, Moment, figures_of, row_of, thinned
+from webapp.tasks.moment import FORCES, POINTS, Moment, doubted, figures_of, row_of, thinned
 from webapp.tasks.recorded import Recorded
 
 
@@ -92,6 +92,7 @@ class Swimmer:
             lost=swim.lost,
             failed=swim.failed,
             found=tuple(self._found.items()),
+            doubted=() if last is None else doubted(last.fault_probability, self.fins),
             controllable=swim.controllable,
             done=swim.done,
             figures=figures_of(rows, self.period_s),
