@@ -25,6 +25,8 @@ OTHER: Rgb = (170, 68, 153)
 """The second of two robots that swim the same way."""
 KEPT: Rgb = (214, 131, 0)
 """A swim that was kept to compare others with."""
+WATER = SKY
+"""How the water flows."""
 DEAD: Rgb = (150, 154, 158)
 """A failed fin."""
 

@@ -22,6 +22,7 @@ from finlab.sim.task import Cruise as Cruise
 from finlab.sim.task import Task as Task
 from finlab.sim.task import Trajectory as Trajectory
 from finlab.sim.task import make_trajectory as make_trajectory
+from finlab.sim.water import Changing as Changing
 from finlab.sim.water import Flow as Flow
 from finlab.sim.water import SteadyCurrent as SteadyCurrent
 from finlab.sim.water import Still as Still

@@ -1,4 +1,5 @@
-"""How the water moves in which a robot swims: not at all, as a current, as one that turns, or in waves.
+"""How the water moves in which a robot swims: not at all, as a current, as one that turns, in waves, or as
+one of these that becomes another.
 
 World frame, z up, the still water's surface at z = 0. A robot is small beside what the water does, so it
 feels the velocity at its own place, without shear or rotation.
@@ -95,12 +96,52 @@ class TurningCurrent:
     def flow(self, position: Sequence[float], time: float) -> Flow:
         """The velocity of now, and how it turns."""
         x, y, z = self.velocity
-        share = min(max((time - self.time_s) / self.over_s, 0.0), 1.0)
-        angle = self.turn_rad * share * share * (3.0 - 2.0 * share)
-        rate = self.turn_rad * 6.0 * share * (1.0 - share) / self.over_s
+        share, slope = _smoothstep((time - self.time_s) / self.over_s)
+        angle, rate = self.turn_rad * share, self.turn_rad * slope / self.over_s
         c, s = math.cos(angle), math.sin(angle)
         u, v = c * x - s * y, s * x + c * y
         return Flow((u, v, z), (-rate * v, rate * u, 0.0))
+
+
+@dataclass(frozen=True)
+class Changing:
+    """Water that becomes another one on the way, as a gust comes and goes: a smoothstep."""
+
+    before: "Water"
+    """How it moves until then."""
+    after: "Water"
+    """How it moves once it has changed."""
+    time_s: float
+    """When it begins to change [s]."""
+    over_s: float = 4.0
+    """How long that takes [s], above 0."""
+
+    def __post_init__(self) -> None:
+        _finite("time_s", self.time_s)
+        _positive("over_s", self.over_s)
+
+    @property
+    def name(self) -> str:
+        """That of the water it becomes."""
+        return self.after.name
+
+    @property
+    def end_s(self) -> float:
+        """When it has changed [s]."""
+        return self.time_s + self.over_s
+
+    def flow(self, position: Sequence[float], time: float) -> Flow:
+        """Some of both."""
+        share, rate = _smoothstep((time - self.time_s) / self.over_s)
+        rate /= self.over_s
+        old, new = self.before.flow(position, time), self.after.flow(position, time)
+        pairs = list(zip(old.velocity, new.velocity, strict=True))
+        x, y, z = (a + share * (b - a) for a, b in pairs)
+        ax, ay, az = (
+            p + share * (q - p) + rate * (b - a)
+            for (a, b), p, q in zip(pairs, old.acceleration, new.acceleration, strict=True)
+        )
+        return Flow((x, y, z), (ax, ay, az))
 
 
 @dataclass(frozen=True)
@@ -166,6 +207,12 @@ class Waves:
         cx, cy, cz = self.current
         velocity = u + cx, v + cy, float(sine.sum()) + cz
         return Flow(velocity, (du, dv, -float(pace @ cosine)))
+
+
+def _smoothstep(x: float) -> tuple[float, float]:
+    """From 0 at x = 0 to 1 at x = 1, and its slope."""
+    x = min(max(x, 0.0), 1.0)
+    return x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x)
 
 
 def _vector(value: Sequence[float]) -> Vector:

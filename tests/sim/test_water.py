@@ -9,7 +9,7 @@ import pytest
 from finlab.errors import FinlabError
 from finlab.layout import Body
 from finlab.physics.vehicle import GRAVITY, Vehicle
-from finlab.sim import SteadyCurrent, Still, TurningCurrent, Water, Waves
+from finlab.sim import Changing, SteadyCurrent, Still, TurningCurrent, Water, Waves
 
 PLACE = (0.7, -0.3, -1.2)
 LONG = Waves(height_m=0.3, period_s=3.0, spread_rad=0.0, components=1, seed=4)
@@ -21,7 +21,13 @@ def velocity(water: Water, place: Sequence[float], time: float) -> np.ndarray:
 
 @pytest.mark.parametrize(
     "water",
-    [Still(), SteadyCurrent((0.1, 0.2, 0.0)), TurningCurrent((0.1, 0.0, 0.02), 1.2, 3.0, 4.0), Waves(seed=3)],
+    [
+        Still(),
+        SteadyCurrent((0.1, 0.2, 0.0)),
+        TurningCurrent((0.1, 0.0, 0.02), 1.2, 3.0, 4.0),
+        Waves(seed=3),
+        Changing(TurningCurrent((0.1, 0.0, 0.02), 1.2, 3.0, 4.0), Waves(seed=2), 2.0, 5.0),
+    ],
     ids=lambda water: water.name,
 )
 def test_accelerations_are_those_of_the_velocity(water: Water) -> None:
@@ -36,6 +42,15 @@ def test_a_current_turns_and_keeps_its_speed() -> None:
     np.testing.assert_allclose(velocity(water, PLACE, 29.0), (0.05, 0.0, 0.0))
     np.testing.assert_allclose(velocity(water, PLACE, 40.0), (0.0, 0.05, 0.0), atol=1e-12)
     assert np.linalg.norm(velocity(water, PLACE, 32.0)) == pytest.approx(0.05)
+
+
+def test_water_becomes_another() -> None:
+    before, after = SteadyCurrent((0.1, 0.0, 0.0)), SteadyCurrent((0.0, 0.0, -0.2))
+    water = Changing(before, after, 3.0, 2.0)
+    assert water.flow(PLACE, 2.9) == before.flow(PLACE, 2.9) and water.name == "current"
+    assert water.flow(PLACE, 5.1) == after.flow(PLACE, 5.1) and water.end_s == 5.0
+    np.testing.assert_allclose(velocity(water, PLACE, 4.0), (0.05, 0.0, -0.1))
+    assert water.flow(PLACE, 4.0).acceleration[2] == pytest.approx(-0.2 * 1.5 / 2.0)
 
 
 def test_one_wave_is_that_of_linear_theory() -> None:
@@ -114,6 +129,8 @@ def test_a_righting_body_leans_with_water_that_accelerates() -> None:
         lambda: Waves(height_m=0.0),
         lambda: Waves(period_s=-1.0),
         lambda: Waves(components=0),
+        lambda: Changing(Still(), Still(), math.nan),
+        lambda: Changing(Still(), Still(), 1.0, 0.0),
         lambda: Waves(spread_rad=-0.1),
     ],
 )

@@ -9,7 +9,7 @@ import pytest
 from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import HARD_DAYS
 from finlab.layout import Layout, load_layout
-from finlab.sim import FinFault, SteadyCurrent, Still, TurningCurrent, Waves
+from finlab.sim import Changing, FinFault, SteadyCurrent, Still, TurningCurrent, Waves
 from tests.webapp.loops import page_of
 from tests.webapp.test_swimming import SHORT, until
 from webapp.markup.scenario import scenario_card
@@ -131,11 +131,22 @@ def test_water_and_buoyancy_change_at_once(swimming: Swimming) -> None:
     damping = swim.vehicle._linear
     settings = settings.with_value("current_cm_s", 12.0).with_value("buoyancy_percent", 2.0)
     swimming.meet(settings.water, settings.truth["buoyancy"])
-    until(lambda: swim.water == SteadyCurrent((0.12, 0.0, 0.0)))
+    until(lambda: isinstance(swim.water, Changing))
+    assert swim.water == Changing(Still(), SteadyCurrent((0.12, 0.0, 0.0)), 0.1)
     assert swim.vehicle.lift == pytest.approx(1.02 * swim.vehicle.weight)
     assert swim.vehicle._linear == damping, "what else is true of the body stays"
-    before = swimming.time
-    swimming.step()
-    until(lambda: swimming.time > before)
-    assert swimming.swimmers[0].recorded().log.flow[-1] == pytest.approx([0.12, 0.0, 0.0])
-    assert np.all(swimming.swimmers[0].recorded().log.flow[0] == 0.0)
+    swimmer = swimming.swimmers[0]
+    while swim.time < 3.0:
+        swimmer.step()
+    assert 0.06 < swimmer.recorded().log.flow[-1, 0] < 0.12, "it is still on its way"
+    swimmer.meet(settings.water, 1.0)
+    assert swim.water.time_s == 0.1, "only the buoyancy has changed"
+    assert swim.vehicle.lift == pytest.approx(swim.vehicle.weight)
+    swimmer.meet(Still(), 1.0)
+    half = swim.water.flow([0.0, 0.0, -1.0], swim.time).velocity[0]
+    assert 0.06 < half < 0.12, "it goes on from there"
+    while swim.time < 9.0:
+        swimmer.step()
+    assert np.all(swimmer.recorded().log.flow[-1] == 0.0)
+    swimmer.meet(settings.water, 1.0)
+    assert swim.water.before == Still()

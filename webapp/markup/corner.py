@@ -3,6 +3,8 @@
 import math
 from html import escape
 
+import numpy as np
+
 from finlab.allocation.allocation import Allocation
 from webapp.markup.swim_card import pace_words, robots
 from webapp.markup.words import objective_of, reach_sentence, small, three_digits
@@ -11,7 +13,7 @@ from webapp.session.state import State
 from webapp.tasks.analyst import Findings
 from webapp.tasks.moment import ERROR
 from webapp.tasks.swimming import Swimming
-from webapp.theme import ASKED, DEAD, DELIVERED, MISSING, TORQUE_SCALE, css, look
+from webapp.theme import ASKED, DEAD, DELIVERED, MISSING, TORQUE_SCALE, WATER, css, look
 
 ARROWS = (("asked", 0.65), ("delivered", 1.0), ("missing", 1.0))
 """Words and opacities of the three arrows."""
@@ -135,6 +137,9 @@ def swim_corner(swimming: Swimming, newtons: float) -> str:
             *((f"{name}, {robot.about}", color) for robot, _, color, name in robots(swimming)),
         )
     )
+    speed = 100.0 * float(np.linalg.norm(shown.flow))
+    if speed >= 0.05:
+        trails += f"{_arrow(css(WATER), 0.9)}<span>water, {speed:.1f} cm/s</span>"
     alive = len(first.fins) - len(shown.lost)
     off = f"{100 * float(shown.record[-1, ERROR]):.1f}" if len(shown.record) else "–"
     power = "–" if shown.figures is None else f"{shown.figures.now_w:.1f}"

@@ -41,6 +41,11 @@ def findings_words(shown: Moment) -> list[str]:
             rest = "the monitor takes it for weak or stuck" if known else "the allocator does not know yet"
             sentences.append(f"<span class='missing'>{escape(name)} is lost, and {rest}.</span>")
     sentences += [
+        f"<span class='missing'>The monitor takes {escape(name)} for weak or stuck.</span>"
+        for name in shown.doubted
+        if name not in (*shown.failed, *shown.lost)
+    ]
+    sentences += [
         f"<span class='missing'>{escape(name)} works, but the allocator takes it for lost.</span>"
         for name in shown.failed
         if name not in shown.lost

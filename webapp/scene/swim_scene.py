@@ -7,6 +7,7 @@ import viser
 
 from finlab.layout import Layout
 from webapp.handles import put
+from webapp.scene.meshes.mesh import force_arrow
 from webapp.scene.shape import UNLIT, Shape
 from webapp.scene.stage import add_floor, aim_camera, paint_floor
 from webapp.scene.swim_robot import SwimRobot, goal
@@ -15,7 +16,7 @@ from webapp.tasks.moment import PLACE, Moment
 from webapp.tasks.recorded import Recorded
 from webapp.tasks.swimmer import Swimmer
 from webapp.tasks.swimming import Swimming
-from webapp.theme import ASKED, DELIVERED, KEPT, OTHER
+from webapp.theme import ASKED, DELIVERED, KEPT, OTHER, WATER
 
 ARROWS_N = 1.0
 """Force that an arrow of 0.1 m stands for while robots swim [N]: one for all, so that they compare."""
@@ -23,6 +24,8 @@ ROBOTS = ((DELIVERED, None), (OTHER, 0.45), (KEPT, 0.35))
 """Colours of the robots' trails, and how opaque the robots are; the last one is that of the kept swim."""
 SCALE = LENGTH / ARROWS_N
 """Length of arrows [m/N]."""
+FLOW_S = 6.0
+"""The arrow of the water is as long as its way in this time [s]."""
 DEPTH_BELOW = 0.6
 """How far the floor is below the deepest point of the way [m]."""
 
@@ -39,6 +42,7 @@ class SwimScene:
             "/swim/reference", 0.035, color=ASKED, visible=False, cast_shadow=False
         )
         fade: dict[str, Any] = {"fade_distance": 14.0, "fade_strength": 1.4, "shadow_opacity": 0.18}
+        self._water = Shape(scene, "/swim/water", WATER, opacity=0.9, visible=False, cast_shadow=False)
         self._floor = add_floor(scene, "/swim/floor", 14.0, 0.25, 1.0, visible=False, **fade)
         self._robots: dict[int, SwimRobot] = {}
         self._shown: tuple[Swimmer, ...] = ()
@@ -53,6 +57,7 @@ class SwimScene:
         put(self._goal.node, visible=visible)
         put(self._reference, visible=visible)
         put(self._floor, visible=visible)
+        put(self._water.node, visible=visible)
         paint_floor(self._floor, dark)
         if not visible:
             for robot in self._robots.values():
@@ -63,6 +68,7 @@ class SwimScene:
         if swimmers != self._shown:
             self._begin(moments)
         put(self._reference, position=moments[0].reference)
+        self._draw_water(moments[0].flow)
         for k, moment in enumerate(moments):
             if swimming.at is None:
                 self._robots[k].take(moment, SCALE)
@@ -90,6 +96,12 @@ class SwimScene:
             self._robots[k] = SwimRobot(self._client.scene, f"/swim/robot{k}", *ROBOTS[k])
         self._robots[k].begin(layout, moment)
         return self._robots[k]
+
+    def _draw_water(self, flow: np.ndarray) -> None:
+        """An arrow for the velocity of the water, beyond the path."""
+        path = self._shown[0].path
+        place = np.array([path[:, 0].min(), path[:, 1].max(), path[:, 2].mean()])
+        self._water.show(force_arrow, np.round(FLOW_S * flow, 2), place, 0.03)
 
     def _refresh_kept(self) -> None:
         """The swim that was kept: its whole trail, and its robot where it was at this time."""

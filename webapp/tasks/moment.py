@@ -59,6 +59,8 @@ class Moment(NamedTuple):
     """Wrench (6,) that the fins gave."""
     reference: Array
     """Where the robot should be (3,) [m]."""
+    flow: Array
+    """Velocity of the water where it is (3,), in the world [m/s]."""
     lost: tuple[str, ...]
     """Fins that are lost."""
     failed: tuple[str, ...]

@@ -65,6 +65,7 @@ class Recorded:
             asked=log.asked[k],
             delivered=log.delivered[k],
             reference=log.reference[k],
+            flow=log.flow[k],
             lost=lost,
             failed=failed,
             found=tuple(item for item in self.found if item[0] in failed and item[0] in lost),

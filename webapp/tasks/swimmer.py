@@ -6,7 +6,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.physics.vehicle import Vehicle, complete_body
-from finlab.sim import ClosedLoop, RunLog, Tick, Water, perturbed
+from finlab.sim import Changing, ClosedLoop, RunLog, SteadyCurrent, Tick, Water, perturbed
 from finlab.sim.log import log_of_ticks
 from webapp.session.swim_plan import Plan
 from webapp.tasks.moment import FORCES, POINTS, Moment, doubted, figures_of, row_of, thinned
@@ -26,6 +26,7 @@ class Swimmer:
         self.duration_s = swim.task.duration_s
         self.unknown_fins = swim.allocator.unknown_fins(swim.layout)
         """Fins that its method has not learned."""
+        self._water = swim.water
         self._rows: list[Array] = []
         self._ticks: list[Tick] = []
         self._found: dict[str, float] = {}
@@ -48,10 +49,21 @@ class Swimmer:
         self._note_findings()
 
     def meet(self, water: Water, buoyancy: float) -> None:
-        """From now on the water moves so, and the robot's buoyancy is its layout's by a factor."""
-        self.swim.water = water
+        """The water begins to become this; the robot's buoyancy is its layout's by a factor from now on."""
+        if water != self._water:
+            self._water = water
+            self.swim.water = Changing(self._water_now(), water, self.swim.time)
         truth = perturbed(self.layout, **{**self._plan.truth, "buoyancy": buoyancy})
         self.swim.vehicle = Vehicle(complete_body(truth))
+
+    def _water_now(self) -> Water:
+        """The water as it is, of which nothing is known but its velocity where it is just changing."""
+        swim = self.swim
+        if not isinstance(swim.water, Changing):
+            return swim.water
+        if swim.time >= swim.water.end_s:
+            return swim.water.after
+        return SteadyCurrent(swim.water.flow(swim.state[:3].tolist(), swim.time).velocity)
 
     def _note_findings(self) -> None:
         """When the monitor found out what nobody told; forgotten once the fin is whole or taken for it."""
@@ -89,6 +101,7 @@ class Swimmer:
             asked=np.zeros(6) if last is None else last.asked,
             delivered=np.zeros(6) if last is None else last.delivered,
             reference=swim.task.setpoint(swim.time).position,
+            flow=np.array(swim.water.flow(swim.state[:3].tolist(), swim.time).velocity),
             lost=swim.lost,
             failed=swim.failed,
             found=tuple(self._found.items()),
