@@ -32,7 +32,7 @@ LASTING_FORCE = 0.003
 """The same of the change of what stays."""
 CURRENT_SPEED, CURRENT_CHANGE = 0.05, 0.002
 """Expected current [m/s], and its change per root of a second."""
-VELOCITY_NOISE, RATE_NOISE = 0.02, 0.02
+VELOCITY_NOISE, RATE_NOISE = 0.02, 0.04
 """Expected noise of a measured velocity [m/s] and yaw rate [rad/s], with what the fins' beat adds."""
 POSE_S, TILT_S = 1.5, 1.0
 """Time constants with which poses and tilts that are seen correct those that are counted on [s]."""
