@@ -26,6 +26,8 @@ SCALE = LENGTH / ARROWS_N
 """Length of arrows [m/N]."""
 FLOW_S = 6.0
 """The arrow of the water is as long as its way in this time [s]."""
+BEYOND_M = 0.3
+"""How far it begins beyond the path [m]."""
 DEPTH_BELOW = 0.6
 """How far the floor is below the deepest point of the way [m]."""
 
@@ -100,7 +102,7 @@ class SwimScene:
     def _draw_water(self, flow: np.ndarray) -> None:
         """An arrow for the velocity of the water, beyond the path."""
         path = self._shown[0].path
-        place = np.array([path[:, 0].min(), path[:, 1].max(), path[:, 2].mean()])
+        place = np.array([path[:, 0].min() - BEYOND_M, path[:, 1].max() + BEYOND_M, path[:, 2].mean()])
         self._water.show(force_arrow, np.round(FLOW_S * flow, 2), place, 0.03)
 
     def _refresh_kept(self) -> None:

@@ -10,17 +10,15 @@ from finlab.sim.log import Tick
 
 POINTS = 300
 """Most points of a plotted line; a longer record is thinned out."""
-STRIDE = 50
-"""Periods between the places of which the distance swum is the sum: some waves long."""
 NOW = 10
 """Periods of which the present power is the mean: it jumps with every beat."""
 
 TIME, ERROR, DEPTH_ERROR, POWER, SOLVE_MS = range(5)
 """Columns of a record: time [s], distance from where it should be [m], that of the depth [m], driving power
 of all fins with motor losses [W], time of the allocation [ms]."""
-ASKED, DELIVERED, PLACE, FORCES = 5, 11, 17, 20
-"""First columns of the asked (6) and delivered (6) wrench [N, N m], the position (3) [m], and of
-the force of each fin (n) [N]; then comes the probability of each fin being broken (n)."""
+ASKED, DELIVERED, PLACE, WANTED, FORCES = 5, 11, 17, 20, 23
+"""First columns of the asked (6) and delivered (6) wrench [N, N m], the position (3) [m], where that should
+be (3) [m], and of the force of each fin (n) [N]; then comes the probability of each fin being broken (n)."""
 
 
 class Figures(NamedTuple):
@@ -37,7 +35,8 @@ class Figures(NamedTuple):
     energy_wh: float
     """Energy of that so far [Wh]."""
     speed_m_s: float
-    """Mean speed over ground [m/s], without what waves and noise move it to and fro."""
+    """Mean speed of its way over ground, or of that which it should have gone where that is shorter: waves
+    move a robot to and fro, and it gets nowhere [m/s]."""
 
 
 class Moment(NamedTuple):
@@ -76,7 +75,7 @@ class Moment(NamedTuple):
     figures: Figures | None
     """What the swim has come to; None before the first step."""
     record: Array
-    """Rows of ticks (N, 20 + 2 n), thinned out; `TIME` to `FORCES` say where what is."""
+    """Rows of ticks (N, 23 + 2 n), thinned out; `TIME` to `FORCES` say where what is."""
 
 
 def doubted(probability: Array, fins: tuple[str, ...]) -> tuple[str, ...]:
@@ -90,7 +89,9 @@ def row_of(tick: Tick) -> Array:
     power = float(tick.driving_power.sum())
     head = (tick.time, float(np.linalg.norm(off)), abs(float(off[2])), power, tick.solve_ms)
     force = np.linalg.norm(tick.fin_force, axis=1)
-    return np.concatenate([head, tick.asked, tick.delivered, tick.position, force, tick.fault_probability])
+    return np.concatenate(
+        [head, tick.asked, tick.delivered, tick.position, tick.reference, force, tick.fault_probability]
+    )
 
 
 def thinned(rows: Array) -> Array:
@@ -103,13 +104,12 @@ def figures_of(rows: Array, period_s: float) -> Figures | None:
     if not len(rows):
         return None
     power, duration = rows[:, POWER], len(rows) * period_s
-    places = np.concatenate([rows[::STRIDE], rows[-1:]])[:, PLACE : PLACE + 3]
-    way = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+    ways = [np.linalg.norm(np.diff(rows[:, at : at + 3], axis=0), axis=1).sum() for at in (PLACE, WANTED)]
     return Figures(
         track_m=float(np.sqrt(np.mean(rows[:, ERROR] ** 2))),
         depth_m=float(np.sqrt(np.mean(rows[:, DEPTH_ERROR] ** 2))),
         mean_w=float(power.mean()),
         now_w=float(power[-NOW:].mean()),
         energy_wh=float(power.mean()) * duration / 3600.0,
-        speed_m_s=float(way) / duration,
+        speed_m_s=float(min(ways)) / duration,
     )

@@ -33,8 +33,12 @@ DPI = 80
 """Pixels per inch."""
 MARGIN_M = 0.5
 """Room around the path [m]."""
-CURRENT_S = 6.0
-"""The arrow of the water is as long as the water's way in this time [s]."""
+FLOW_POINTS = 400.0
+"""Length of the water's arrow per velocity [points per m/s]."""
+LONGEST_POINTS = 64.0
+"""Length of the longest such arrow [points]."""
+FLOW_PLACE = np.array([40.0, 52.0])
+"""Its middle, from the lower left corner of the view from above [points]."""
 
 
 class Swum(NamedTuple):
@@ -151,8 +155,9 @@ class _Film:
         axis.set_title("From above")
         clean(axis, "both")
         self._water = axis.annotate(
-            "", (0.0, 0.0), (0.0, 0.0), arrowprops={"arrowstyle": "-|>", "color": SKY, "lw": 2.5}
-        )
+            "", (0.0, 0.0), (0.0, 0.0), xycoords="axes points", textcoords="axes points",
+            arrowprops={"arrowstyle": "-|>", "color": SKY, "lw": 2.5, "shrinkA": 0, "shrinkB": 0},
+        )  # fmt: skip
         self._water.set_animated(True)
         self._water_words = axis.text(
             0.02, 0.02, "", transform=axis.transAxes, color=SOFT, va="bottom", animated=True
@@ -223,13 +228,12 @@ class _Film:
 
     def _flow(self, flow: Array) -> None:
         """The arrow of the water, in the lower left corner."""
-        low, left = self._above.get_ylim()[0], self._above.get_xlim()[0]
         speed = float(np.linalg.norm(flow))
-        start = np.array([left + 0.35, low + 0.5])
-        away = CURRENT_S * flow[:2]
+        half = 0.5 * FLOW_POINTS * flow[:2]
+        half *= min(1.0, 0.5 * LONGEST_POINTS / max(float(np.linalg.norm(half)), 1e-9))
         self._water.set_visible(speed > 1e-6)
-        self._water.set_position(tuple(start - 0.5 * away))
-        self._water.xy = tuple(start + 0.5 * away)
+        self._water.set_position(tuple(FLOW_PLACE - half))
+        self._water.xy = tuple(FLOW_PLACE + half)
         self._water_words.set_text(f"water {100 * speed:.0f} cm/s" if speed > 1e-6 else "still water")
 
 

@@ -68,7 +68,11 @@ def test_lines_end_at_the_time_of_the_picture(log: RunLog, layout_a: Layout) -> 
     assert film._title.get_text().split()[:2] == ["2.0", "s"]
     assert film._water_words.get_text() == "water 5 cm/s"
     away = np.array(film._water.xy) - film._water.get_position()
-    assert away == pytest.approx(6.0 * np.array([0.04, 0.03]))
+    assert away == pytest.approx(400.0 * np.array([0.04, 0.03]))
+    film._flow(np.array([3.0, 4.0, 0.0]))
+    assert np.array(film._water.xy) - film._water.get_position() == pytest.approx([38.4, 51.2])
+    film._flow(np.zeros(3))
+    assert not film._water.get_visible() and film._water_words.get_text() == "still water"
     left, right = film._above.get_xlim()
     bottom, top = film._above.get_ylim()
     box = film._above.get_window_extent()
