@@ -1,8 +1,9 @@
-"""From tick to tick along smooth paths of wrenches: how far fins turn with and without the previous command.
+"""From tick to tick along smooth paths of wrenches: what changes with and without the previous command.
 
 A path is a sum of slow sines in every axis, brought into what the layout can push at all and scaled so that
 an even spread over the fins never asks for more than half of any fin's thrust. Each tick is one call of
-`allocate`; with `previous` it is given the last command. Every answer is scored by the plant.
+`allocate`; with `previous` it is given the last command. Every answer is scored by the plant, once as it is
+and once as fins deliver it that follow late.
 """
 
 from collections.abc import Sequence
@@ -11,7 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from finlab.allocation import Allocation, Allocator
+from finlab.allocation.judging import REACHED
 from finlab.arrays import Array
+from finlab.control.nominal_lag import NominalLag
 from finlab.evaluation.progress import progress
 from finlab.evaluation.statistics.tables import Row
 from finlab.forces.envelopes import largest_forces
@@ -19,7 +22,6 @@ from finlab.layout import Layout
 from finlab.layout.angles import wrapped
 from finlab.layout.arrays import layout_effectiveness
 from finlab.physics import Plant
-from finlab.physics.energy import command_energy
 
 TICKS, RATE = 600, 10.0
 """Length of a path, and ticks per second [Hz]: one minute."""
@@ -29,6 +31,8 @@ N_SINES = 3
 """Sines in each axis."""
 LOAD = 0.5
 """Largest share of a fin's thrust that an even spread of the path asks for."""
+SETTLING = 30
+"""Ticks in which fins come from rest to the first command."""
 DOMAIN = 0x57EAD
 """Leads the seed of every path."""
 GOAL = 0.2
@@ -40,12 +44,18 @@ WORKS = 1e-3
 class Rollout(NamedTuple):
     """What one method did along one path of T ticks."""
 
-    turn: Array
-    """What each fin turned from tick to tick (T - 1, n), the shorter way round [rad]."""
-    energy: Array
-    """Energy proxy (T,)."""
+    step: Array
+    """What each command changed by from tick to tick (T - 1, n, 3) [rad, Hz, rad], turns the shorter way
+    round."""
+    power: Array
+    """Mean mechanical power (T,) [W]."""
+    effort: Array
+    """The paper's J_en (T,)."""
     err_norm: Array
     """Normalized error (T,), by the plant."""
+    late: Array
+    """Normalized error (T,) of what fins give at the end of each tick, by the plant, as they follow with the
+    lags of their servos."""
     solve_ms: Array
     """Time of each call (T,) [ms]."""
 
@@ -79,11 +89,19 @@ def rollout(allocator: Allocator, layout: Layout, path: Array, *, steady: bool) 
     for wrench in path:
         previous = answers[-1].command if steady and answers else None
         answers.append(allocator.allocate(layout, wrench, previous=previous))
-    command = np.array([answer.command for answer in answers])
+    command, plant = np.array([answer.command for answer in answers]), Plant(layout)
+    lag = NominalLag(layout, 1.0 / RATE)
+    for _ in range(SETTLING):  # from rest to the first command
+        lag.step(command[0])
+    motion = np.array([lag.step(each) for each in command])
+    step = np.abs(np.diff(command, axis=0))
+    step[..., 2] = np.abs(wrapped(step[..., 2]))
     return Rollout(
-        turn=_turns(command[..., 2]),
-        energy=command_energy(command, layout.upper),
-        err_norm=allocator.normalization.error(Plant(layout).wrench(command), path),
+        step=step,
+        power=np.array([answer.power for answer in answers]),
+        effort=np.array([answer.energy for answer in answers]),
+        err_norm=allocator.normalization.error(plant.wrench(command), path),
+        late=allocator.normalization.error(plant.wrench(motion), path),
         solve_ms=np.array([answer.solve_ms for answer in answers]),
     )
 
@@ -98,14 +116,14 @@ def forced_turn(layout: Layout, path: Array) -> float | None:
         return None
     force = (path @ np.linalg.pinv(effectiveness).T).reshape(len(path), -1, 2)
     works = np.linalg.norm(force, axis=-1) > WORKS * largest_forces(layout)
-    turn = _turns(np.arctan2(force[..., 1], force[..., 0]))
+    turn = np.abs(wrapped(np.diff(np.arctan2(force[..., 1], force[..., 0]), axis=0)))
     return float(np.where(works[1:] & works[:-1], turn, 0.0).max())
 
 
 def steadiness_rows(
     allocator: Allocator, layouts: Sequence[Layout], *, n_paths: int = 3, ticks: int = TICKS, seed: int = 0
 ) -> list[Row]:
-    """One row per layout: the worst of its paths for turns, their mean for energy.
+    """One row per layout: the worst of its paths for changes, their mean for cost and lateness.
 
     Args:
         allocator: a method that knows `previous`.
@@ -125,25 +143,29 @@ def steadiness_rows(
 
 
 def _row(layout: Layout, free: list[Rollout], steady: list[Rollout], forced: list[float | None]) -> Row:
-    ratios = [b.turn.max() / max(a.turn.max(), 1e-9) for a, b in zip(free, steady, strict=True)]
-    energies = [b.energy.mean() / a.energy.mean() for a, b in zip(free, steady, strict=True)]
+    pairs = list(zip(free, steady, strict=True))
+    most = [[run.step.max(axis=(0, 1)) for run in pair] for pair in pairs]
+    turns = [after[2] / max(before[2], 1e-9) for before, after in most]
+    largest = np.max(most, axis=0)
     return {
         "layout": layout.name,
         "fins": layout.n_fins,
         "paths": len(free),
-        "turn_free": float(max(a.turn.max() for a in free)),
-        "turn_steady": float(max(b.turn.max() for b in steady)),
-        "turn_ratio": float(max(ratios)),
-        "steady": int(sum(ratio <= GOAL for ratio in ratios)),
+        "turn_free": float(largest[0, 2]),
+        "turn_steady": float(largest[1, 2]),
+        "turn_ratio": float(max(turns)),
+        "steady": int(sum(ratio <= GOAL for ratio in turns)),
         "forced": max((turn for turn in forced if turn is not None), default=None),
-        "energy_ratio": float(np.mean(energies)),
-        "energy_ratio_worst": float(max(energies)),
-        "err_norm_max": float(max(b.err_norm.max() for b in steady)),
-        "ms_free": float(np.median([a.solve_ms for a in free])),
-        "ms_steady": float(np.median([b.solve_ms for b in steady])),
+        "frequency_free": float(largest[0, 1]),
+        "frequency_steady": float(largest[1, 1]),
+        "amplitude_free": float(largest[0, 0]),
+        "amplitude_steady": float(largest[1, 0]),
+        "power_ratio": float(np.mean([b.power.mean() / a.power.mean() for a, b in pairs])),
+        "effort_ratio": float(np.mean([b.effort.mean() / a.effort.mean() for a, b in pairs])),
+        "late_free": float(np.mean([run.late.mean() for run in free])),
+        "late_steady": float(np.mean([run.late.mean() for run in steady])),
+        "err_norm_max": float(max(run.err_norm.max() for run in steady)),
+        "missed": float(np.mean([run.err_norm > REACHED for run in steady])),
+        "ms_free": float(np.median([run.solve_ms for run in free])),
+        "ms_steady": float(np.median([run.solve_ms for run in steady])),
     }
-
-
-def _turns(direction: Array) -> Array:
-    """Turns (T - 1, n) between directions (T, n), the shorter way round."""
-    return np.abs(wrapped(np.diff(direction, axis=0)))

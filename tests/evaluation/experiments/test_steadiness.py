@@ -34,7 +34,7 @@ def test_turns_are_forced_where_forces_are_unique() -> None:
     forced = forced_turn(pair, path)
     assert forced is not None
     # The pseudo-inverse answers with the only forces there are.
-    assert rollout(load_allocator("analytic"), pair, path, steady=True).turn.max() == pytest.approx(
+    assert rollout(load_allocator("analytic"), pair, path, steady=True).step[..., 2].max() == pytest.approx(
         forced, abs=1e-3
     )
     assert forced_turn(shipped("A"), path) is None
@@ -42,7 +42,8 @@ def test_turns_are_forced_where_forces_are_unique() -> None:
 
 def test_a_method_without_memory_turns_as_far_either_way() -> None:
     (row,) = steadiness_rows(load_allocator("analytic"), [shipped("A")], n_paths=2, ticks=30, seed=5000)
-    assert row["turn_ratio"] == row["energy_ratio"] == 1.0
+    assert row["turn_ratio"] == row["power_ratio"] == row["effort_ratio"] == 1.0
+    assert row["late_free"] == row["late_steady"] > 0.01
     assert row["paths"] == 2 and row["steady"] == 0 and row["err_norm_max"] < 1e-3
 
 
@@ -51,3 +52,11 @@ def test_the_verb_prints_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert "worst ratio" in capsys.readouterr().out
     assert main(["eval", "steadiness", "--layouts", " , "]) == 2
     assert "layouts: expected names" in capsys.readouterr().err
+
+
+def test_with_the_previous_command_rates_are_kept_and_fins_are_no_later() -> None:
+    (row,) = steadiness_rows(load_allocator(), [shipped("penta")], n_paths=1, ticks=200, seed=5000)
+    assert row["turn_free"] > 0.5 >= row["turn_steady"] - 1e-9
+    assert row["frequency_steady"] <= 0.3 + 1e-9 and row["amplitude_steady"] <= 0.1 + 1e-9
+    assert row["late_steady"] < 1.02 * row["late_free"]
+    assert row["missed"] < 0.05 and row["power_ratio"] < 1.01

@@ -70,9 +70,13 @@ def steadiness_blocks(rows: Sequence[Row], objective: str = "power") -> list[Blo
         Column("turn_ratio", "worst ratio", "ratio"),
         Column("steady", f"paths within {GOAL:g}", "count"),
         Column("forced", "forced [rad]", "three"),
-        Column("energy_ratio", "effort with / without", "ratio"),
-        Column("energy_ratio_worst", "worst path", "ratio"),
+        Column("frequency_steady", "frequency [Hz]", "three"),
+        Column("amplitude_steady", "amplitude [rad]", "three"),
+        Column(f"{objective}_ratio", f"{objective} with / without", "ratio"),
+        Column("missed", "ticks missed", "share"),
         Column("err_norm_max", "largest error", "error"),
+        Column("late_free", "late without", "three"),
+        Column("late_steady", "late with", "three"),
         Column("ms_free", "ms without", "three"),
         Column("ms_steady", "ms with", "three"),
     )
@@ -81,8 +85,10 @@ def steadiness_blocks(rows: Sequence[Row], objective: str = "power") -> list[Blo
         (
             f"Method `search` follows smooth random paths of wrenches at {RATE:g} Hz, with and without being "
             f"told its previous command; it keeps {objective} least, by each layout's own fins, and the "
-            "plant scores every tick. Turn: the largest of any fin in one tick. Forced: what any answer must "
-            "turn, where the fins' forces are unique."
+            "plant scores every tick. Turn, frequency, amplitude: the largest change of any fin's command in "
+            "one tick. Forced: what any answer must turn, where the fins' forces are unique. Missed: ticks "
+            "with an error above 0.01, which the rates of the servos allow no better. Late: mean error of "
+            "what fins give that follow with the lags of their servos."
         ),
         Table(columns, rows),
     ]
