@@ -145,6 +145,7 @@ def test_a_monitor_says_what_it_finds(tmp_path: Path, capsys: pytest.CaptureFixt
         (["simulate", "A", "--fail", "front_left@3:weak=2"], "expected NAME@SECONDS"),
         (["simulate", "A", "--fail", "tail@3", "--method", "analytic"], "no fin 'tail'"),
         (["simulate", "A", "--trajectory", "spiral", "--method", "analytic"], "circle, lissajous, square"),
+        (["simulate", "A", "--gains", "waypoint_paper"], "add --controller waypoint"),
         (["eval", "trajectory", "--runs", "0"], "runs: expected a number of at least 1"),
         (["eval", "faults", "--methods", ","], "methods: expected names"),
         (["eval", "velocity", "--duration", "5"], "more than 10 s"),
