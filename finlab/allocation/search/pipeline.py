@@ -24,7 +24,7 @@ from finlab.allocation.search.prepared import (
     resting_fins,
     resting_seeds,
 )
-from finlab.allocation.search.rate_limits import planar_force, within_rates
+from finlab.allocation.search.rate_limits import is_within_rates, planar_force, within_rates
 from finlab.allocation.search.refined_candidates import (
     MISSED,
     FallbackForces,
@@ -185,18 +185,24 @@ class Pipeline:
     def _descend_from_previous(
         self, prepared: Prepared, target: Array, start: _Start, previous: Array
     ) -> RefinedCandidates:
-        """Answers within what the fins may be told after a previous command (n, 3).
+        """Answers within what the fins may be told after a previous command (n, 3): mostly the cheapest one
+        of all is among them.
 
         Where cost grows faster than force there is but one valley, and the search goes on from where the
         robot is. Otherwise the way that it moves now is kept, fins at rest turn to where they would be
         cheapest, and where another way is worth it, all fins go towards that, dear as the steps may be.
         """
-        force = planar_force(prepared, previous)[None, None]
+        force, period = planar_force(prepared, previous)[None, None], self.settings.period_s
         if self.objective.convex:
-            near = within_rates(prepared, previous, self.settings.period_s)
-            return self._descend(near, target, start._replace(seeds=force), keep_mode=True)
+            start = start._replace(seeds=force)
         free = self._descend(prepared, target, start)
-        near = within_rates(prepared, previous, self.settings.period_s, free.command[0, 0, :, 2])
+        if not self.objective.convex:  # the first seed is how the robot moves now
+            free = free._replace(origin=np.where(free.origin < 0, -1, free.origin + 1))
+        if is_within_rates(prepared, previous, free.command[0, 0], period):
+            return free
+        if self.objective.convex:
+            return self._descend(within_rates(prepared, previous, period), target, start, keep_mode=True)
+        near = within_rates(prepared, previous, period, free.command[0, 0, :, 2])
         kept = force if start.seeds.ndim == 4 else np.hypot(force[:, :, 0], force[:, :, 1])
         start = start._replace(seeds=np.concatenate([kept, start.seeds], axis=1))
         found = self._descend(near, target, start, keep_mode=True)

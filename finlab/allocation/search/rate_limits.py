@@ -58,6 +58,13 @@ def within_rates(prepared: Prepared, previous: Array, period_s: float, aim: Arra
     return prepared._replace(planar=planar, commands=commands, arcs=None, unsettled=unsettled)
 
 
+def is_within_rates(prepared: Prepared, previous: Array, command: Array, period_s: float) -> bool:
+    """Whether a command (n, 3) may follow a previous one (n, 3); what nothing is known of may follow."""
+    change = np.abs(command - previous)
+    change[:, 2] = np.where(prepared.commands.full_turn, np.abs(wrapped(change[:, 2])), change[:, 2])
+    return not (change > prepared.plant.layout.servo_rates * period_s).any()
+
+
 def planar_force(prepared: Prepared, command: Array) -> Array:
     """Planar forces (2, n) [N] of a command (n, 3), horizontal and vertical; NaN commands count as rest."""
     problem = prepared.commands
