@@ -94,7 +94,7 @@ def test_from_tick_to_tick_candidates_keep_it_too(shipped: MdnAllocator) -> None
     assert again.candidates.source == alone.candidates.source
     np.testing.assert_array_equal(again.candidates.command, alone.candidates.command)
     away = all_kept.allocate(layout, -0.5 * np.array(TARGET), previous=alone.command).candidates
-    assert away is not None and away.source[0] == "the way it moves now"
+    assert away is not None and "the way it moves now" in away.source
 
 
 def test_insight_is_what_proposals_are_drawn_from(shipped: MdnAllocator, layout_a: Layout) -> None:
