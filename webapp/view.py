@@ -63,6 +63,7 @@ def add_commands(gui: viser.GuiApi, page: Page) -> None:
     add("Play the refinement", page.answering.play)
     add("Stop the sweep", page.sweep.stop)
     add("Swim: pause or go on", lambda: page.swimming.set_running(not page.swimming.running), "B")
+    add("Swim: keep it to compare others with", page.swimming.keep)
     add("Swim: back to the design", page.scenery.end_swim)
     add("Export the bundle for the robot", page.exports.bundle)
     add("Tour: start, or next stop", session.next_stop, "T")

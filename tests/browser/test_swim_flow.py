@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 
 def test_swims_loses_a_fin_and_goes_on(page: Any) -> None:
@@ -125,8 +126,16 @@ def test_a_robot_loses_a_fin_in_a_current_and_carries_on(page: Any, tmp_path: Pa
         header, *rows = archive.read(archive.namelist()[0]).decode().splitlines()
     assert header.startswith("t [s],x [m]") and len(rows) == round(held / 0.1)
 
+    with page.page.expect_download() as download:
+        page.press("Film (GIF)")
+        page.until(lambda: page.view.swim_files.share > 0.0)
+    download.value.save_as(tmp_path / "swim.gif")
+    assert Image.open(tmp_path / "swim.gif").n_frames == 150
+
     page.press("Go on")
     page.until(lambda: swimming.at is None and swimming.time > held)
+    page.type("Current [cm/s]", "0")
+    page.until(lambda: np.linalg.norm(swimming.swimmers[0].shown.flow) < 0.06)  # while it swims
     page.press("End")
     page.until(lambda: not swimming.active)
     page.press("Forget it")

@@ -83,6 +83,10 @@ def test_any_moment_can_be_looked_at_again(shelf: Shelf) -> None:
     swimming.look_at(7.98)
     assert swimming.at is None and swimming.seen[0] is swimmer.shown, "that is the newest moment"
     swimming.look_at(2.0)
+    swimming.toggle("front_left")
+    assert swimming.at is None, "what happens happens now"
+    until(lambda: swimming.seen[0].lost == ())
+    swimming.look_at(2.0)
     swimming.set_running(True)
     assert swimming.at is None, "who goes on, goes on from where it was"
 

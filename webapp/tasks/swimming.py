@@ -158,6 +158,7 @@ class Swimming:
 
     def _act(self, act: Callable[[Swimmer], None]) -> None:
         self._acts.append(act)
+        self.at = None  # what happens happens now
         if not self.running:
             self._submit(0)
 
