@@ -136,8 +136,9 @@ def simulate(
     log = loop.log
     written = ""
     if output is not None:
-        from finlab.evaluation.plots.animation import Swum, save_animation
+        from finlab.evaluation.plots.animation import save_animation
         from finlab.evaluation.plots.closed_loop_run import save_pictures
+        from finlab.evaluation.plots.film import Swum
         from finlab.sim.log_csv import save_csv
 
         output.mkdir(parents=True, exist_ok=True)

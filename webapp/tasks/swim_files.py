@@ -8,9 +8,10 @@ from functools import partial
 from pathlib import Path
 
 from finlab.errors import FinlabError
-from finlab.evaluation.plots.animation import Swum, animation
+from finlab.evaluation.plots.animation import animation
 from finlab.evaluation.plots.closed_loop_run import save_pictures
 from finlab.evaluation.plots.compared_runs import draw_compared
+from finlab.evaluation.plots.film import Swum
 from finlab.sim.log_csv import csv_of
 from webapp.session.files import file_stem
 from webapp.tasks.context import Context

@@ -4,7 +4,9 @@ from dataclasses import fields
 
 import numpy as np
 
+from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
+from finlab.control import Controller, FaultMonitor, TrackingController, WaypointController
 from finlab.physics.vehicle import Vehicle, complete_body
 from finlab.sim import Changing, ClosedLoop, RunLog, SteadyCurrent, Tick, Water, perturbed
 from finlab.sim.log import log_of_ticks
@@ -111,3 +113,27 @@ class Swimmer:
             figures=figures_of(rows, self.period_s),
             record=thinned(rows),
         )
+
+
+def closed_loop(plan: Plan, allocator: Allocator) -> ClosedLoop:
+    """The swim of a plan with an allocator, at its start."""
+    layout = plan.layout
+    steers: Controller = TrackingController(layout) if plan.controller == "tracking" else WaypointController()
+    swim = ClosedLoop(
+        layout,
+        allocator,
+        plan.path,
+        steers,
+        plant=plan.plant,
+        sensors=plan.sensors,
+        water=plan.water,
+        failures=plan.losses,
+        announced=plan.announced,
+        monitor=FaultMonitor(layout),
+        truth=perturbed(layout, **plan.truth),
+    )
+    for name in plan.failed:
+        swim.fail(name, announced=True)
+    for name in plan.weak:
+        swim.fail(name, "weak", plan.share, announced=False)
+    return swim

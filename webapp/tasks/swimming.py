@@ -5,10 +5,9 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from finlab.control import Controller, FaultMonitor, TrackingController, WaypointController
+from finlab.allocation.allocator import Allocator
 from finlab.errors import FinlabError
-from finlab.layout import Layout
-from finlab.sim import ClosedLoop, Water, perturbed
+from finlab.sim import Water
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan
 from webapp.tasks.background import Newest
@@ -16,7 +15,7 @@ from webapp.tasks.context import Context
 from webapp.tasks.moment import Moment
 from webapp.tasks.pace import Pace
 from webapp.tasks.recorded import Recorded
-from webapp.tasks.swimmer import Swimmer
+from webapp.tasks.swimmer import Swimmer, closed_loop
 
 BUDGET_S = 0.06
 """Longest time on the worker before the others have their turn [s]."""
@@ -86,29 +85,10 @@ class Swimming:
         self._start.ask(plan)
 
     def _made(self, plan: Plan) -> tuple[Swimmer, ...]:
-        return tuple(self._swimmer(plan, method) for method in plan.methods)
+        def allocator(method: str) -> Allocator:
+            return self._solver.allocator(State(plan.layout, method=method, objective=plan.objective))
 
-    def _swimmer(self, plan: Plan, method: str) -> Swimmer:
-        layout = plan.layout
-        allocator = self._solver.allocator(State(layout, method=method, objective=plan.objective))
-        swim = ClosedLoop(
-            layout,
-            allocator,
-            plan.path,
-            _controller(plan.controller, layout),
-            plant=plan.plant,
-            sensors=plan.sensors,
-            water=plan.water,
-            failures=plan.losses,
-            announced=plan.announced,
-            monitor=FaultMonitor(layout),
-            truth=perturbed(layout, **plan.truth),
-        )
-        for name in plan.failed:
-            swim.fail(name, announced=True)
-        for name in plan.weak:
-            swim.fail(name, "weak", plan.share, announced=False)
-        return Swimmer(method, plan, swim)
+        return tuple(Swimmer(method, plan, closed_loop(plan, allocator(method))) for method in plan.methods)
 
     def _begin(self) -> None:
         if self._start.error is not None:
@@ -249,7 +229,3 @@ class Swimming:
         if self.done:
             self.running = False
         self._changed()
-
-
-def _controller(name: str, layout: Layout) -> Controller:
-    return TrackingController(layout) if name == "tracking" else WaypointController()

@@ -16,7 +16,8 @@ pytest.importorskip("matplotlib")
 from matplotlib.figure import Figure  # noqa: E402
 from PIL import Image  # noqa: E402
 
-from finlab.evaluation.plots.animation import Swum, _Film, animation, save_animation  # noqa: E402
+from finlab.evaluation.plots.animation import animation, save_animation  # noqa: E402
+from finlab.evaluation.plots.film import Film, Swum  # noqa: E402
 from finlab.evaluation.plots.shape_from_above import BLADE_M, ShapeFromAbove, outline  # noqa: E402
 
 
@@ -61,7 +62,7 @@ def _turned(log: RunLog, k: int, point: np.ndarray) -> np.ndarray:
 
 
 def test_lines_end_at_the_time_of_the_picture(log: RunLog, layout_a: Layout) -> None:
-    film = _Film([Swum("search", log, layout_a), Swum("analytic", log, layout_a)])
+    film = Film([Swum("search", log, layout_a), Swum("analytic", log, layout_a)])
     film.frame(2.0)
     assert all(line.get_xdata()[-1] == pytest.approx(2.0) for line, *_ in film._lines)
     assert film._trails[0].get_xydata()[-1] == pytest.approx(log.position[20, :2])
