@@ -17,6 +17,9 @@ LENGTH_S = 2.0
 """How long a probe lasts [s]; a fin takes half a second to swing up, and a whole one to turn."""
 BUSY = 1.5
 """A fin is busy when it is told to push this many times the least."""
+FEWEST = 3
+"""Working fins from which on those that would rest push a little: two have none to spare, and would
+lead the robot off its course."""
 SIZES = 24
 """Points of the table from thrust to frequency."""
 
@@ -75,7 +78,7 @@ class Probe:
         ahead, size = force[:, 1], np.hypot(force[:, 1], force[:, 2])
         self._side[size > BUSY * self._least] = 0.0
         idle = np.flatnonzero(known & (size < self._least))
-        if not len(idle):
+        if not len(idle) or known.sum() < FEWEST:
             return command
         result = command.copy()
         for fin in idle.tolist():

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.health import Health
+from finlab.allocation.policy import Policy, as_policy
 from finlab.arrays import Array
 from finlab.control import (
     Completion,
@@ -54,6 +55,7 @@ class ClosedLoop:
         controller: Controller | None = None,
         *,
         plant: str = "mean",
+        policy: Policy | str = "direction",
         sensors: SensorSettings | None = None,
         water: Water | None = None,
         failures: Sequence[FinFault | tuple[str, float]] = (),
@@ -73,6 +75,8 @@ class ClosedLoop:
             controller: by default the tracking controller of the layout for trajectories, the velocity
                 controller for cruises.
             plant: what the fins really do; see `PLANTS`.
+            policy: what the allocator does with a wrench that is out of reach. In its own direction a smaller
+                one still turns the robot to where it should go; the nearest one may only push it on.
             sensors: rates and noise; the defaults of `SensorSettings`.
             water: how it moves, such as `SteadyCurrent` or `Waves`; it is still by default.
             failures: what becomes of fins, and when; (name, time [s]) is a fin that is lost.
@@ -98,6 +102,7 @@ class ClosedLoop:
             controller = VelocityController() if isinstance(task, Cruise) else TrackingController(layout)
         self.controller = controller
         self.plant = plant
+        self.policy = as_policy(policy)
         self.seed = seed
         truth = layout if truth is None else checked_truth(layout, truth)
         self.vehicle = Vehicle(complete_body(truth))
@@ -239,6 +244,7 @@ class ClosedLoop:
             asked,
             failed=self.failed,
             previous=self._command,
+            policy=self.policy,
             health=self.health,
             seed=self.seed,
         )

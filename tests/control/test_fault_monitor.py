@@ -18,11 +18,13 @@ PRIOR = 0.01
 
 
 def swim(layout: Layout, allocator: Allocator, failures: list[FinFault], **options: object) -> ClosedLoop:
-    """A swim with noise and a current, watched, of whose failures the allocator is not told."""
+    """A swim with noise and a current, watched, of whose failures the allocator is not told. By the controller
+    that the monitor's parameters were chosen with."""
     return ClosedLoop(
         layout,
         allocator,
         make_trajectory("lissajous"),
+        WaypointController(),
         announced=False,
         monitor=FaultMonitor(layout),
         sensors=NOISE_ALONE,
@@ -85,7 +87,7 @@ def test_a_stuck_fin_is_told_from_a_lost_one(layout_a: Layout, analytic: Allocat
 
 def test_a_repaired_fin_is_taken_back(layout_a: Layout, analytic: Allocator) -> None:
     events = [FinFault("back_right", 10.0), FinFault("back_right", 15.0, "whole")]
-    loop = swim(layout_a, analytic, events, controller=WaypointController())  # which asks more of that fin
+    loop = swim(layout_a, analytic, events)
     until(loop, 15.0)
     assert loop.failed == ("back_right",)
     until(loop, 60.0)

@@ -46,6 +46,15 @@ def test_no_push_where_none_is_wanted(layout_a: Layout) -> None:
     assert monitor.probed(command) is command, "servos that report give fins at rest away"
 
 
+def test_two_fins_push_no_more_than_they_are_told(layout_a: Layout) -> None:
+    command = np.tile([0.5, 0.3, 0.0], (4, 1))
+    command[:2] = np.nan
+    probe = Probe(layout_a, MonitorSettings(), 0.1)
+    assert probe.added(command, NONE, np.zeros(4), steadily=True) is command
+    command[1] = command[2]
+    assert probe.added(command, NONE, np.zeros(4), steadily=True) is not command
+
+
 def test_a_lost_fin_is_probed_unless_somebody_said_that_it_is_lost(layout_a: Layout) -> None:
     settings = replace(MonitorSettings(), probe_every_s=3.0, least_push=0.0)
     command = np.tile([0.5, 1.0, 0.0], (4, 1))

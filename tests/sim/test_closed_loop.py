@@ -5,9 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from finlab.allocation import load_allocator
 from finlab.allocation.allocator import Allocator
+from finlab.control import FaultMonitor
 from finlab.errors import DataError, FinlabError, LayoutError
-from finlab.layout import Layout
+from finlab.layout import Layout, load_layout
 from finlab.sim import (
     NO_NOISE,
     ClosedLoop,
@@ -176,3 +178,22 @@ def test_no_such_failures(layout_a: Layout, analytic: Allocator, kind: str, shar
         FinFault("front_left", 1.0, kind, share).checked()
     with pytest.raises(FinlabError, match="failure of front_left: expected"):
         ClosedLoop(layout_a, analytic, make_trajectory("circle")).fail("front_left", kind, share)
+
+
+def test_a_robot_that_cannot_do_all_keeps_turning_to_where_it_should_go() -> None:
+    """Two fins are left, and the path asks for more than they have: the nearest wrench has next to no yaw."""
+    layout, missed = load_layout("D"), {}
+    for policy in ("direction", "closest"):
+        path, lost = make_trajectory("lissajous"), [("front_right", 30.0)]
+        loop = ClosedLoop(
+            layout,
+            load_allocator(),
+            path,
+            policy=policy,
+            failures=lost,
+            monitor=FaultMonitor(layout),
+            seed=50,
+        )
+        log = loop.run()
+        missed[policy] = float(np.linalg.norm(log.position - log.reference, axis=1).mean())
+    assert missed["direction"] < 0.15 < missed["closest"]
