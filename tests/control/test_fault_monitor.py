@@ -18,8 +18,8 @@ PRIOR = 0.01
 
 
 def swim(layout: Layout, allocator: Allocator, failures: list[FinFault], **options: object) -> ClosedLoop:
-    """A swim with noise and a current, watched, of whose failures the allocator is not told. By the controller
-    that the monitor's parameters were chosen with."""
+    """A swim with noise and a current, watched, of whose failures the allocator is not told; by the
+    controller that the monitor's parameters were chosen with."""
     return ClosedLoop(
         layout,
         allocator,
