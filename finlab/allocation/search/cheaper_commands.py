@@ -38,6 +38,8 @@ PASSES = 4
 """Times that a step is solved, each time with the limits held that it would have crossed."""
 RIDGE = 1e-10
 """Relative regularization of the 6 x 6 systems."""
+HOPELESS = 1.0
+"""Normalized error from which on no steps are taken: none of these would end at the target."""
 
 
 class _Model(NamedTuple):
@@ -69,6 +71,12 @@ def cheaper_commands(
     """
     target = np.broadcast_to(target, (len(command), 6))
     start = refine(problem, target, command, BEFORE)
+    near = start.error <= HOPELESS
+    if not near.all():  # what is far out of reach would only drive the multipliers out of bounds
+        mixed: Array = start.command.copy()
+        if near.any():
+            mixed[near] = cheaper_commands(problem, cost, target[near], mixed[near], exact_error)
+        return mixed
     here, value, error = start.command, cost(start.command), start.error
     damping = np.full(len(here), DAMPING[0])
     multiplier: AnyArray | None = None

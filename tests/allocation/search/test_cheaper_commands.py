@@ -7,7 +7,7 @@ import pytest
 
 import finlab.allocation.search.cheaper_commands
 from finlab.allocation import load_allocator
-from finlab.allocation.search.cheaper_commands import cheaper_commands
+from finlab.allocation.search.cheaper_commands import BEFORE, cheaper_commands
 from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
 from finlab.arrays import Array
 from finlab.evaluation.splits import make_split
@@ -83,3 +83,18 @@ def test_tables_cost_what_many_starts_find(objective: Name, most: float, mean: f
             least = least_cost(case.layout, target, sigma, aim, n_starts=8, also=command)
             ratio.append(float(aim.meter(plant_of(case.layout))(command[None])[0]) / least)
     assert np.max(ratio) < most and np.mean(ratio) < mean
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("size", [30.0, 1e6])
+def test_what_is_far_out_of_reach_is_left_alone(size: float, tmp_path: Path) -> None:
+    problem, cost, target, command = question(robot("table", 1, tmp_path), "power")
+    alone = cheaper_commands(problem, cost, target, command, EXACT)
+    far = size * np.random.default_rng(0).standard_normal((12, 6))
+    mixed = cheaper_commands(
+        problem, cost, np.concatenate([far, target]), np.concatenate([command, command]), EXACT
+    )
+    assert np.isfinite(mixed).all() and (cost(alone) < cost(command)).any()
+    np.testing.assert_allclose(cost(mixed[12:]), cost(alone), rtol=1e-3)
+    hopeless = cheaper_commands(problem, cost, far, command, EXACT)
+    np.testing.assert_allclose(hopeless, refine(problem, far, command, BEFORE).command, atol=1e-9)
