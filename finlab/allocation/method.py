@@ -34,6 +34,8 @@ class Method(ABC):
     """Name of the checkpoint that the networks come from; None for methods without networks."""
     weights: TrainedWeights | None = None
     """The trained networks; None for methods without networks."""
+    policy_under_way: str = "closest"
+    """What a control loop asks for by default where a wrench is out of reach."""
     fin_model: FinModelSpec | None = None
     """Fin model that the networks have learned; None for methods that ask every fin's own model."""
 

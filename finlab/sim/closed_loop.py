@@ -55,7 +55,7 @@ class ClosedLoop:
         controller: Controller | None = None,
         *,
         plant: str = "mean",
-        policy: Policy | str = "direction",
+        policy: Policy | str | None = None,
         sensors: SensorSettings | None = None,
         water: Water | None = None,
         failures: Sequence[FinFault | tuple[str, float]] = (),
@@ -75,8 +75,8 @@ class ClosedLoop:
             controller: by default the tracking controller of the layout for trajectories, the velocity
                 controller for cruises.
             plant: what the fins really do; see `PLANTS`.
-            policy: what the allocator does with a wrench that is out of reach. In its own direction a smaller
-                one still turns the robot to where it should go; the nearest one may only push it on.
+            policy: what the allocator does with a wrench that is out of reach; by default its own
+                `policy_under_way`.
             sensors: rates and noise; the defaults of `SensorSettings`.
             water: how it moves, such as `SteadyCurrent` or `Waves`; it is still by default.
             failures: what becomes of fins, and when; (name, time [s]) is a fin that is lost.
@@ -102,7 +102,7 @@ class ClosedLoop:
             controller = VelocityController() if isinstance(task, Cruise) else TrackingController(layout)
         self.controller = controller
         self.plant = plant
-        self.policy = as_policy(policy)
+        self.policy = as_policy(allocator.policy_under_way if policy is None else policy)
         self.seed = seed
         truth = layout if truth is None else checked_truth(layout, truth)
         self.vehicle = Vehicle(complete_body(truth))
@@ -126,6 +126,7 @@ class ClosedLoop:
         self._completion: dict[tuple[str, ...], Completion] = {}
         self._ticks: list[Tick] = []
         self._command: Array | None = None
+        self._answered: Array | None = None  # the same, before a monitor's pushes
         self.period_s = self.controller.period_s
         """Length of a step [s]."""
         self._lag, self._gave = NominalLag(layout, self.period_s), NO_WRENCH
@@ -243,12 +244,12 @@ class ClosedLoop:
             self.layout.moving((*now.velocity, *now.rates)),  # what speed takes from fins, where known
             asked,
             failed=self.failed,
-            previous=self._command,
+            previous=self._answered,
             policy=self.policy,
             health=self.health,
             seed=self.seed,
         )
-        command = answer.command
+        self._answered = command = answer.command
         if self.monitor is not None:
             command = self.monitor.probed(command)
         tick = self._move(time, now, asked, command, answer.solve_ms)

@@ -213,7 +213,6 @@ def excitation(
         Stay(duration_s),
         ExcitingController(layout, seed),
         plant=plant,
-        policy="closest",  # every call is a tick: it is asked once
         sensors=sensors,
         water=water,
         seed=seed,

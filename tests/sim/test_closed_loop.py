@@ -1,12 +1,14 @@
 """The closed loop as a whole, with the quickest method."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from finlab.allocation import load_allocator
 from finlab.allocation.allocator import Allocator
+from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.control import FaultMonitor
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.layout import Layout, load_layout
@@ -196,4 +198,24 @@ def test_a_robot_that_cannot_do_all_keeps_turning_to_where_it_should_go() -> Non
         )
         log = loop.run()
         missed[policy] = float(np.linalg.norm(log.position - log.reference, axis=1).mean())
-    assert missed["direction"] < 0.15 < missed["closest"]
+    assert missed["direction"] < 0.1 and missed["direction"] < 0.8 * missed["closest"]
+    assert ClosedLoop(layout, load_allocator(), path).policy.kind == "direction"
+    assert ClosedLoop(layout, load_allocator("analytic"), path).policy.kind == "closest"
+
+
+def test_a_monitors_pushes_are_no_past_of_the_allocator() -> None:
+    """Fins that it makes push are answered as if they had not, so their next commands are not bound by it."""
+    layout, answers, given = load_layout("A"), [], []
+
+    class Watched(SearchAllocator):
+        def allocate(self, *args: Any, **options: Any) -> Any:
+            given.append(options["previous"])
+            answers.append(super().allocate(*args, **options))
+            return answers[-1]
+
+    allocator = Watched(load_allocator().normalization)
+    loop = ClosedLoop(layout, allocator, make_trajectory("lissajous"), monitor=FaultMonitor(layout))
+    told = [loop.step().command for _ in range(100)]
+    assert sum((command != answer.command).any() for command, answer in zip(told, answers, strict=True)) > 3
+    for before, after in zip(answers, given[1:], strict=False):
+        assert after is before.command

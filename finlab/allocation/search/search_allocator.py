@@ -56,6 +56,9 @@ class SearchAllocator(Allocator):
     """Exact on any fin whose law or table is known, without a network."""
 
     name = "search"
+    # A smaller wrench in the same direction still turns a robot to where it should go; the nearest one may
+    # only push it on.
+    policy_under_way = "direction"
     settings_class: type[Settings] = Settings
 
     def __init__(
