@@ -197,8 +197,8 @@ def test_a_robot_that_cannot_do_all_keeps_turning_to_where_it_should_go() -> Non
             seed=50,
         )
         log = loop.run()
-        missed[policy] = float(np.linalg.norm(log.position - log.reference, axis=1).mean())
-    assert missed["direction"] < 0.1 and missed["direction"] < 0.8 * missed["closest"]
+        missed[policy] = float(np.linalg.norm(log.position - log.reference, axis=1).max())
+    assert missed["direction"] < 0.2 and missed["direction"] < 0.8 * missed["closest"]
     assert ClosedLoop(layout, load_allocator(), path).policy.kind == "direction"
     assert ClosedLoop(layout, load_allocator("analytic"), path).policy.kind == "closest"
 
