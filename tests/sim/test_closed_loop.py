@@ -187,15 +187,7 @@ def test_a_robot_that_cannot_do_all_keeps_turning_to_where_it_should_go() -> Non
     layout, missed = load_layout("D"), {}
     for policy in ("direction", "closest"):
         path, lost = make_trajectory("lissajous"), [("front_right", 30.0)]
-        loop = ClosedLoop(
-            layout,
-            load_allocator(),
-            path,
-            policy=policy,
-            failures=lost,
-            monitor=FaultMonitor(layout),
-            seed=50,
-        )
+        loop = ClosedLoop(layout, load_allocator(), path, policy=policy, failures=lost, seed=51)
         log = loop.run()
         missed[policy] = float(np.linalg.norm(log.position - log.reference, axis=1).max())
     assert missed["direction"] < 0.2 and missed["direction"] < 0.8 * missed["closest"]
