@@ -38,6 +38,8 @@ PASSES = 4
 """Times that a step is solved, each time with the limits held that it would have crossed."""
 RIDGE = 1e-10
 """Relative regularization of the 6 x 6 systems."""
+ROUNDING = 1e-12
+"""Least share of a fin's largest curvature that another has; below, it could not be told from nothing."""
 HOPELESS = 1.0
 """Normalized error from which on no steps are taken: none of these would end at the target."""
 
@@ -140,7 +142,9 @@ def _step(
     curvature = model.by_cost - (model.by_force @ multiplier[:, None, None, :, None])[..., 0]
     size, axes = np.linalg.eigh(0.5 * (curvature + curvature.swapaxes(-1, -2)))
     usual = (np.abs(model.slope).mean((1, 2)) + 1e-12)[:, None, None]
-    size = np.maximum(np.abs(size), FLATTEST * usual) + damping[:, None, None] * usual
+    size = np.abs(size)
+    size = np.maximum(size, np.maximum(FLATTEST * usual, ROUNDING * size.max(-1, keepdims=True)))
+    size += damping[:, None, None] * usual
     curvature = (axes * size[..., None, :]) @ axes.swapaxes(-1, -2)
     span = np.where(problem.width > 0.0, problem.width, 1.0)
     low, high = (problem.lower - command) / span, (problem.upper - command) / span

@@ -10,9 +10,10 @@ from finlab.allocation import load_allocator
 from finlab.allocation.search.cheaper_commands import BEFORE, cheaper_commands
 from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
 from finlab.arrays import Array
+from finlab.evaluation.experiments.fuzz import hostile_robot, hostile_targets
 from finlab.evaluation.splits import make_split
-from finlab.layout import Layout
-from finlab.physics import plant_of
+from finlab.layout import FinModelSpec, Layout
+from finlab.physics import make_law, plant_of, write_table
 from finlab.physics.objective import CostMeter, Name, Objective
 from tests.allocation.search.reference import least_cost
 from tests.random_fins import random_robot
@@ -98,3 +99,15 @@ def test_what_is_far_out_of_reach_is_left_alone(size: float, tmp_path: Path) -> 
     np.testing.assert_allclose(cost(mixed[12:]), cost(alone), rtol=1e-3)
     hopeless = cheaper_commands(problem, cost, far, command, EXACT)
     np.testing.assert_allclose(hopeless, refine(problem, far, command, BEFORE).command, atol=1e-9)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("number", [5, 46])
+def test_hostile_robots_are_answered_in_numbers(number: int, tmp_path: Path) -> None:
+    """One was driven by targets far out of reach; on the other one curvature is nothing beside another."""
+    table = str(tmp_path / "forces.csv")
+    axes = np.linspace(0.0, 0.6, 7), np.linspace(0.0, 2.1, 6), np.linspace(-np.pi, np.pi, 13)
+    write_table(table, make_law(FinModelSpec()), *axes)
+    layout = hostile_robot(number, 2026, table)
+    answer = load_allocator().allocate_batch(layout, hostile_targets(layout, 300, number, 2026))
+    assert np.isfinite(answer.command).all() and np.isfinite(answer.err_norm).all()
