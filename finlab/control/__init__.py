@@ -17,6 +17,7 @@ from finlab.control.measurement import Measurement as Measurement
 from finlab.control.measurement import Setpoint as Setpoint
 from finlab.control.monitor_settings import MonitorSettings as MonitorSettings
 from finlab.control.observer import MotionObserver as MotionObserver
+from finlab.control.path_controllers import PATH_CONTROLLERS as PATH_CONTROLLERS
 from finlab.control.tracking_controller import TrackingController as TrackingController
 from finlab.control.tracking_controller import TrackingGains as TrackingGains
 from finlab.control.tracking_controller import gains_for as gains_for

@@ -7,7 +7,7 @@ from itertools import combinations
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from finlab.control import Completion, TrackingController
+from finlab.control import PATH_CONTROLLERS, Completion, TrackingController
 from finlab.errors import FinlabError
 from finlab.evaluation.experiments.hard_days import HardDay
 from finlab.layout import Layout
@@ -30,7 +30,7 @@ ALONE = "nobody"
 """Rival of a robot that swims alone."""
 OWN = "own path"
 """Name of a path from the user's file."""
-CONTROLLERS = ("tracking", "waypoint")
+CONTROLLERS = tuple(PATH_CONTROLLERS)
 """Who steers."""
 SPEEDS = (0.1, 8.0)
 """Simulated time per time on the wall that may be asked for."""

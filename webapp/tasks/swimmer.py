@@ -6,7 +6,7 @@ import numpy as np
 
 from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
-from finlab.control import Controller, FaultMonitor, TrackingController, WaypointController
+from finlab.control import PATH_CONTROLLERS, FaultMonitor
 from finlab.physics.vehicle import Vehicle, complete_body
 from finlab.sim import Changing, ClosedLoop, RunLog, SteadyCurrent, Tick, Water, perturbed
 from finlab.sim.log import log_of_ticks
@@ -118,12 +118,11 @@ class Swimmer:
 def closed_loop(plan: Plan, allocator: Allocator) -> ClosedLoop:
     """The swim of a plan with an allocator, at its start."""
     layout = plan.layout
-    steers: Controller = TrackingController(layout) if plan.controller == "tracking" else WaypointController()
     swim = ClosedLoop(
         layout,
         allocator,
         plan.path,
-        steers,
+        PATH_CONTROLLERS[plan.controller](layout),
         plant=plan.plant,
         sensors=plan.sensors,
         water=plan.water,

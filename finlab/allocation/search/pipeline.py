@@ -195,13 +195,14 @@ class Pipeline:
         force, period = planar_force(prepared, previous)[None, None], self.settings.period_s
         if self.objective.convex:
             start = start._replace(seeds=force)
-        free = self._descend(prepared, target, start)
-        if not self.objective.convex:  # the first seed is how the robot moves now
-            free = free._replace(origin=np.where(free.origin < 0, -1, free.origin + 1))
-        if is_within_rates(prepared, previous, free.command[0, 0], period):
-            return free
-        if self.objective.convex:
+            free = self._descend(prepared, target, start)
+            if is_within_rates(prepared, previous, free.command[0, 0], period):
+                return free
             return self._descend(within_rates(prepared, previous, period), target, start, keep_mode=True)
+        free = self._descend(prepared, target, start)
+        if is_within_rates(prepared, previous, free.command[0, 0], period):
+            # The first seed is how the robot moves now, which was not tried.
+            return free._replace(origin=np.where(free.origin < 0, -1, free.origin + 1))
         near = within_rates(prepared, previous, period, free.command[0, 0, :, 2])
         kept = force if start.seeds.ndim == 4 else np.hypot(force[:, :, 0], force[:, :, 1])
         start = start._replace(seeds=np.concatenate([kept, start.seeds], axis=1))

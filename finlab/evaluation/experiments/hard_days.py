@@ -4,13 +4,13 @@ What a day says is what is true; allocator, controller and monitor believe the l
 the robot's own (`fins`) and for what is announced.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import combinations, islice
 from typing import Any, Literal, NamedTuple
 
 from finlab.allocation.allocator import Allocator
-from finlab.control import Completion, Controller, FaultMonitor, TrackingController, WaypointController
+from finlab.control import PATH_CONTROLLERS, Completion, FaultMonitor, TrackingController
 from finlab.errors import DataError
 from finlab.evaluation.splits import make_split
 from finlab.layout import Layout, load_layout
@@ -37,12 +37,6 @@ CURRENT = (0.05, -0.05, 0.0)
 """7 cm/s across the path [m/s]."""
 MEASURED_SOFT = FinModelSpec("soft", (("d", 0.1), ("e", 0.15), ("phi_e", 0.5), ("x0", 1.0)))
 """Saturates within reach, and is uneven and askew, as fins of silicone are when measured."""
-
-CONTROLLERS: dict[str, Callable[[Layout], Controller]] = {
-    "tracking": TrackingController,
-    "waypoint": lambda _: WaypointController(),
-}
-"""Who steers, by name; each is made for the robot that is believed in."""
 
 Kind = Literal["nominal", "law kept", "hard"]
 """As believed; fins that obey the law that methods were given, while body, water or sensors do not; and fins
@@ -134,7 +128,7 @@ class HardDay:
             case: of `cases()`.
             allocator: the method.
             seed: of noise, biases, waves and mixed fins.
-            controller: one of `CONTROLLERS`.
+            controller: one of `finlab.control.PATH_CONTROLLERS`.
         """
         robot, path = self.robot(case.layout, seed), self.path()
         weak = {} if self.weak is None else dict.fromkeys(case.fins, self.weak)
@@ -144,7 +138,7 @@ class HardDay:
             robot,
             allocator,
             path,
-            CONTROLLERS[controller](robot),
+            PATH_CONTROLLERS[controller](robot),
             plant=self.plant,
             sensors=self.sensors,
             water=water,

@@ -100,7 +100,7 @@ def swim_all(
         days: of `HARD_DAYS`.
         methods: allocators by name.
         seeds: at least one; the same noise for every method.
-        controller: one of `CONTROLLERS`, for all methods.
+        controller: one of `finlab.control.PATH_CONTROLLERS`, for all methods.
     """
     cases = [(day, case) for day in days for case in day.cases() if day.obstacle(case) is None]
     swims = []
