@@ -18,8 +18,8 @@ from finlab.inference.surrogate import FinForces
 AT_LIMIT = 1e-9
 """How near [rad, Hz, rad] to a limit a command counts as being at it."""
 RIDGE = (1e-9, 1e-14)
-"""Regularization of the 6 x 6 systems: absolute, and relative to the largest squared derivative. Without the
-latter those of strong fins on long levers are singular to rounding."""
+"""Regularization of the 6 x 6 systems: absolute, and relative to their trace. Without the latter those of
+strong fins on long levers are singular to rounding."""
 
 
 class Limits(NamedTuple):
@@ -62,13 +62,6 @@ class CommandProblem:
     def width(self) -> AnyArray:
         """Ranges of the limits (n, 3)."""
         return self.upper - self.lower
-
-    @cached_property
-    def ridge(self) -> float:
-        """What regularizes the systems of each step: `RIDGE`, for derivatives of at most a turn of all fins'
-        largest forces."""
-        largest = 2 * np.pi * np.linalg.norm(self.fin.force(self.upper), axis=-1)
-        return RIDGE[0] + RIDGE[1] * float((largest[:, None, None] ** 2 * self.columns**2).sum())
 
     @cached_property
     def edges(self) -> tuple[AnyArray, AnyArray]:
@@ -216,20 +209,22 @@ def _step(problem: CommandProblem, at: _Evaluated, jacobian: AnyArray, damping: 
     rows, n, _ = at.command.shape
     free = jacobian.reshape(rows, 3 * n, 6)
     right = at.residual[..., None]
-    change = _smallest_change(free, right, damping + problem.ridge)
+    change = _smallest_change(free, right, damping)
     # Hold what is at a limit and would leave it, then solve again with the rest.
     low, high = problem.edges
     moved = change.reshape(rows, n, 3)
     out = (at.command <= low) & (moved < 0)
     out |= (at.command >= high) & (moved > 0)
     if out.any():
-        change = _smallest_change(free * ~out.reshape(rows, 3 * n, 1), right, damping + problem.ridge)
+        change = _smallest_change(free * ~out.reshape(rows, 3 * n, 1), right, damping)
     return change.reshape(rows, n, 3)
 
 
 def _smallest_change(free: AnyArray, right: AnyArray, damping: AnyArray) -> AnyArray:
     """The change (R, 3n, 1) that gives the wrenches (R, 6, 1) by a Jacobian (R, 3n, 6)."""
     gram = free.swapaxes(1, 2) @ free
-    gram.reshape(-1, 36)[:, ::7] += damping[:, None]
+    diagonal = gram.reshape(-1, 36)[:, ::7]
+    # By the derivatives themselves: no bound holds for fins whose force falls again, or rises from rest.
+    diagonal += (damping + RIDGE[0] + RIDGE[1] * np.einsum("ri->r", diagonal))[:, None]
     change: AnyArray = free @ solve(gram, right)
     return change

@@ -6,9 +6,9 @@ import warnings
 import numpy as np
 import pytest
 
-from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
+from finlab.allocation.search.levenberg_marquardt import CommandProblem, _smallest_change, refine
 from finlab.allocation.search.search_allocator import SearchAllocator
-from finlab.layout import Fin, Layout, Limits, random_layout
+from finlab.layout import Fin, FinModelSpec, Layout, Limits, random_layout
 
 
 def problem_of(search: SearchAllocator, layout: Layout) -> CommandProblem:
@@ -91,10 +91,21 @@ def test_hostile_layouts_give_numbers_inside_the_limits(
     assert (error(problem, target, refined.command) <= error(problem, target, starts) * (1 + 1e-12)).all()
 
 
-def test_strong_fins_on_long_levers_give_numbers(search: SearchAllocator) -> None:
-    """Their derivatives are large and of too low a rank: without a relative ridge a step is no number."""
-    limits = Limits((0.0, 1.5), (0.0, 20.0))
-    layout = Layout("far", tuple(Fin(f"f{i}", (8.0, 5.0, 1.0), 0.3 + i, limits) for i in range(3)))
+STRONG = {
+    "drag": (FinModelSpec(), Limits((0.0, 1.5), (0.0, 20.0))),
+    "soft": (FinModelSpec("soft", (("k", 20.0),)), Limits((1.5, 1.5), (0.1, 20.0), (0.3, 0.3))),
+}
+
+
+@pytest.mark.parametrize(("model", "limits"), STRONG.values(), ids=list(STRONG))
+def test_strong_fins_on_long_levers_give_numbers(
+    model: FinModelSpec, limits: Limits, search: SearchAllocator
+) -> None:
+    """Their derivatives are large and of too low a rank: without a relative ridge a step is no number.
+
+    The force of soft fins at their upper limits is nothing beside their largest.
+    """
+    layout = Layout("far", tuple(Fin(f"f{i}", (8.0, 5.0, 1.0), 0.3 + i, limits, model) for i in range(3)))
     problem = problem_of(search, layout)
     target = 1e3 * np.random.default_rng(0).normal(size=(200, 6))
     with warnings.catch_warnings():
@@ -190,7 +201,13 @@ def test_limits_as_each_type_sees_them(mixed: CommandProblem, kind: type[np.floa
     np.testing.assert_array_equal(given, command.astype(kind))
 
 
-def test_the_ridge_is_by_the_largest_derivatives(mixed: CommandProblem) -> None:
-    largest = 2 * math.pi * np.linalg.norm(mixed.fin.force(mixed.upper), axis=-1)
-    squares = sum(float(((largest[i] * mixed.columns[i]) ** 2).sum()) for i in range(2))
-    assert mixed.ridge == pytest.approx(1e-9 + 1e-14 * squares, rel=1e-12)
+def test_the_ridge_is_by_the_derivatives_themselves() -> None:
+    """One command changes its axis a thousand times more than another one does, or a million times."""
+    for large in (1e2, 1e4):
+        small, damping, right = 1e-4, 3e-10, np.ones((1, 6, 1))
+        free = np.zeros((1, 3, 6))
+        free[0, 0, 0], free[0, 1, 5] = large, small
+        change = _smallest_change(free, right, np.array([damping]))
+        ridge = damping + 1e-9 + 1e-14 * (large**2 + small**2)
+        expected = [1.0 / large, small / (small**2 + ridge), 0.0]
+        np.testing.assert_allclose(change[0, :, 0], expected, rtol=1e-6)
