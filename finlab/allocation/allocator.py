@@ -41,6 +41,7 @@ class Allocator(Method):
         *,
         failed: Sequence[str] = (),
         previous: ArrayLike | None = None,
+        reference: ArrayLike | None = None,
         policy: Policy | str = CLOSEST,
         health: Health | None = None,
         seed: int = 0,
@@ -53,13 +54,17 @@ class Allocator(Method):
             failed: names of fins that do not work; they leave the graph.
             previous: command (n, 3) of the previous tick: fins then turn slowly, and the robot changes the
                 way it moves only when that pays.
+            reference: wrenches (K, 6) that are expected to be asked for at the next K ticks. A method that
+                knows how late its fins follow answers the one that they will be in time for, which is then
+                the result's target; others answer the present one.
             policy: what to do when the wrench is out of reach; see `Policy`.
             health: fins that are weak, stuck at an angle or running on; the result's layout has the limits
                 that are left.
             seed: the same target, layout and seed give the same answer.
 
         Raises:
-            CommandError: the wrench is not six finite numbers, or `previous` has another shape.
+            CommandError: the wrench is not six finite numbers, or `previous` or `reference` has another
+                shape.
             AllocationError: the method does not know the policy.
             LayoutError: an unknown fin, or none left.
             DataError: a fin's force table cannot be read.
@@ -70,6 +75,9 @@ class Allocator(Method):
         fins = usable_fins(layout, failed, health)
         before = None if previous is None else check_previous(previous, layout)[fins.alive]
         start = time.perf_counter()
+        if reference is not None:
+            expected = check_wrenches(reference, single=False, name="reference")
+            target = self._in_time(fins.healthy, target, expected)
         solution = self._solve_by(policy, fins.healthy, target[None], seed=seed, previous=before)
         solve_ms = (time.perf_counter() - start) * 1e3
         command = fins.among_all(solution.command)

@@ -78,6 +78,10 @@ class Method(ABC):
         """The same method made again; those with networks override this."""
         return type(self)(self.normalization, **options)  # type: ignore[call-arg]
 
+    def _in_time(self, layout: Layout, target: Array, reference: Array) -> Array:
+        """Which wrench (6,) is answered: a target (6,), or one of those that are expected (K, 6)."""
+        return target
+
     @abstractmethod
     def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         """Solve for targets (N, 6) on a layout whose fins are all healthy.

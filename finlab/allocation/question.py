@@ -60,8 +60,9 @@ def usable_fins(layout: Layout, failed: Sequence[str], health: Health | None = N
     return Fins(layout, tuple(failed), layout.without(failed), alive)
 
 
-def check_wrenches(wrench: ArrayLike, *, single: bool) -> Array:
-    """One wrench (6,) or many (N, 6) as finite float64, or a `CommandError` that says what is wrong."""
+def check_wrenches(wrench: ArrayLike, *, single: bool, name: str = "wrench") -> Array:
+    """One wrench (6,) or many (N, 6) as finite float64, or a `CommandError` that says what is wrong with
+    what is called `name`."""
     expected = "six numbers [Fx, Fy, Fz, Tx, Ty, Tz]" if single else "an array of shape (N, 6)"
     try:
         array = np.array(wrench)
@@ -69,14 +70,14 @@ def check_wrenches(wrench: ArrayLike, *, single: bool) -> Array:
             raise TypeError("complex")
         array = array.astype(np.float64, copy=False)
     except (TypeError, ValueError) as error:
-        raise CommandError(f"wrench: expected {expected} in N and N m, got {wrench!r}") from error
+        raise CommandError(f"{name}: expected {expected} in N and N m, got {wrench!r}") from error
     if array.shape != (6,) if single else (array.ndim != 2 or array.shape[1] != 6):
-        raise CommandError(f"wrench: expected {expected} in N and N m, got an array of shape {array.shape}")
+        raise CommandError(f"{name}: expected {expected} in N and N m, got an array of shape {array.shape}")
     if not (np.abs(array) <= MAX_WRENCH).all():
         bad = ~(np.abs(array) <= MAX_WRENCH)
         axis = AXES[int(np.argwhere(bad)[0][-1])]
         value = array[bad][0]
-        raise CommandError(f"wrench: {axis} must be finite and at most {MAX_WRENCH:g} in size, got {value}")
+        raise CommandError(f"{name}: {axis} must be finite and at most {MAX_WRENCH:g} in size, got {value}")
     return array
 
 

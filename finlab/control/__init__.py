@@ -13,6 +13,7 @@ from finlab.control.gains import VelocityGains as VelocityGains
 from finlab.control.gains import WaypointGains as WaypointGains
 from finlab.control.gains import load_gains as load_gains
 from finlab.control.measurement import Controller as Controller
+from finlab.control.measurement import Foresighted as Foresighted
 from finlab.control.measurement import Measurement as Measurement
 from finlab.control.measurement import Setpoint as Setpoint
 from finlab.control.monitor_settings import MonitorSettings as MonitorSettings

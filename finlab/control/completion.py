@@ -46,5 +46,6 @@ class Completion:
         self.matrix[:, chosen] = np.where(np.abs(scaled) < 1e-9, 0.0, scaled)
 
     def __call__(self, wrench: Array) -> Array:
-        """The wrench (6,) whose wanted axes are asked for, whole."""
-        return self.matrix @ wrench
+        """Wrenches (..., 6) whose wanted axes are asked for, whole."""
+        whole: Array = wrench @ self.matrix.T
+        return whole

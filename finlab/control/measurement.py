@@ -1,7 +1,8 @@
 """What controllers are given, and what they are: measurements and a setpoint in, a wrench out."""
 
 import math
-from typing import NamedTuple, Protocol
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -77,4 +78,14 @@ class Controller(Protocol):
             setpoint: what to do.
             given: wrench (6,) that the fins have given since the last call, as far as known [N, N m].
         """
+        ...
+
+
+@runtime_checkable
+class Foresighted(Protocol):
+    """A controller that knows what its path will take."""
+
+    def ahead(self, setpoints: Sequence[Setpoint]) -> Array:
+        """Wrenches (K, 6) [N, N m] that will be asked for at K setpoints after the first, a period apart; the
+        first is that of the last call of `wrench`."""
         ...

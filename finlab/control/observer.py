@@ -122,6 +122,12 @@ class MotionObserver:
         pushed = float(self.inertia[0] / self.inertia[1]) * surge * yaw_rate
         return math.exp(-self._dt * damping) * sway - self._dt * pushed
 
+    def slowed_by(self, motion: Array) -> Array:
+        """Decelerations (..., 4) that the water gives motions (..., 4) through it, along surge, sway, heave
+        and yaw [m/s^2, rad/s^2]."""
+        slower: Array = (self._linear + self._quadratic * np.abs(motion)) * motion
+        return slower
+
     def _seen(self, m: Measurement) -> Array:
         return np.array([*m.velocity.tolist(), float(m.rates[2])])
 

@@ -8,11 +8,13 @@ one number, how fast the fins turn (`gains_for`).
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.control.feed_forward import wrenches_along
 from finlab.control.measurement import Measurement, Setpoint
 from finlab.control.observer import AXES, Estimate, MotionObserver, strongest_wrench
 from finlab.layout import Layout
@@ -77,6 +79,7 @@ class TrackingController:
         """Forget all that was seen."""
         self._observer = MotionObserver(self.layout, self.period_s)
         self._passing = 0.0
+        self._wrench = np.zeros(6)
         self.estimate: Estimate | None = None
         """What was believed at the last call."""
 
@@ -96,7 +99,16 @@ class TrackingController:
             (3, yaw_rate - now.yaw_rate, 0.0),
         ):
             result[AXES[axis]] = inertia[axis] * (ahead + g.velocity * miss - drift[axis])
-        return result.clip(-self._most, self._most)
+        self._wrench = result.clip(-self._most, self._most)
+        return self._wrench
+
+    def ahead(self, setpoints: Sequence[Setpoint]) -> Array:
+        """Wrenches (K, 6) that will be asked for at the K setpoints after the first, which is that of now:
+        the last one, and what the path will take more than now."""
+        current = np.zeros(2) if self.estimate is None else self.estimate.current
+        along = wrenches_along(self._observer, setpoints, current, self.gains.slow, self.period_s)
+        expected: Array = (self._wrench + along[1:] - along[0]).clip(-self._most, self._most)
+        return expected
 
     def _velocity(self, now: Estimate, setpoint: Setpoint) -> Array:
         """Velocity over ground (3,) to go with [m/s]."""

@@ -44,6 +44,7 @@ class Robot:
         *,
         failed: Sequence[str] = (),
         previous: ArrayLike | None = None,
+        reference: ArrayLike | None = None,
         policy: Policy | str = CLOSEST,
         seed: int = 0,
     ) -> Allocation:
@@ -54,7 +55,13 @@ class Robot:
         """
         lost = self.lost(failed)
         answer = self.allocator.allocate(
-            self.layout, wrench, failed=lost, previous=previous, policy=policy, seed=seed
+            self.layout,
+            wrench,
+            failed=lost,
+            previous=previous,
+            reference=reference,
+            policy=policy,
+            seed=seed,
         )
         works = [name not in lost for name in self.layout.names]
         if not np.isfinite(answer.command[works]).all():

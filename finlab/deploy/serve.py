@@ -1,7 +1,7 @@
 """`finlab-runtime serve`: targets in, commands out, as lines of JSON; safe when nobody speaks any more.
 
-A request is `{"wrench": [Fx, Fy, Fz, Tx, Ty, Tz]}`, with `id`, `failed` and `policy` if wanted. Each answer
-says in `status` what it is:
+A request is `{"wrench": [Fx, Fy, Fz, Tx, Ty, Tz]}`, with `id`, `failed`, `policy` and `reference`, the
+wrenches that are expected at the next ticks of 0.1 s, if wanted. Each answer says in `status` what it is:
 
 =========  ============================================================================================
 status     meaning
@@ -35,7 +35,7 @@ from finlab.errors import CommandError, FinlabError
 
 MAX_LINE = 65_536
 """Longest request that is read [bytes]."""
-KEYS = ("wrench", "id", "failed", "policy")
+KEYS = ("wrench", "id", "failed", "policy", "reference")
 """What a request may hold."""
 RECENT_S = 0.5
 """Age [s] up to which the last commands bind the next ones by the servos' rates."""
@@ -127,6 +127,7 @@ class Server:
                 request["wrench"],
                 failed=self._failed,
                 previous=previous,
+                reference=request.get("reference"),
                 policy=request.get("policy", "closest"),
             )
 

@@ -10,6 +10,7 @@ from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.single_target import SingleTarget
 from finlab.allocation.methods import LEARNED, load_allocator
 from finlab.errors import AllocationError
+from finlab.evaluation.ahead import AnalyticAhead
 from finlab.evaluation.on_board import OnBoard
 from finlab.inference.checkpoint import read_checkpoint, read_normalization, resolve_checkpoint
 from finlab.physics.objective import Name
@@ -18,6 +19,8 @@ SLOW = ("trf", "slsqp", "ipopt")
 """Methods that take a tenth of a second per target, each from several starts; they run on a subsample."""
 QUICK = ("search", "mdn", "paper", "qp", "sqp", "analytic", "multistart")
 """Methods that run on every target."""
+OWN = (OnBoard, AnalyticAhead)
+"""Methods that are for comparison alone."""
 _WITH_STARTS = re.compile(r"(\w+)-(\d+)")
 _WITH_OBJECTIVE = re.compile(r"(\w+)-(power|effort)")
 
@@ -58,15 +61,15 @@ def load_method_spec(
 
     Args:
         name: a method; `ipopt-32`, say, for 32 starts; `search-effort`, say, for an objective of its own; or
-            `on-board`, U-CAT's own method.
+            `on-board`, U-CAT's own method; or `analytic-ahead`, the pseudo-inverse told how late fins are.
         checkpoint: as in `load_allocator`.
         objective: what the methods that can choose keep least; each one's default where None.
 
     Raises:
         AllocationError: unknown method, or starts or an objective for a method that has none.
     """
-    if name == OnBoard.name:
-        return OnBoard(load_allocator("analytic", checkpoint=checkpoint).normalization)
+    if own := next((kind for kind in OWN if kind.name == name), None):
+        return own(load_allocator("analytic", checkpoint=checkpoint).normalization)
     if named := _WITH_OBJECTIVE.fullmatch(name):
         return load_allocator(named[1], checkpoint=checkpoint, objective=named[2])
     method, starts = method_and_starts(name)

@@ -1,6 +1,7 @@
 """A robot that swims: sensors, controller, allocator, fins and body, one control period at a time."""
 
 import math
+from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,7 +15,9 @@ from finlab.control import (
     Completion,
     Controller,
     FaultMonitor,
+    Foresighted,
     Measurement,
+    Setpoint,
     TrackingController,
     VelocityController,
     Verdict,
@@ -34,6 +37,9 @@ from finlab.sim.plants import make_plant
 from finlab.sim.sensors import Sensors, SensorSettings
 from finlab.sim.task import Cruise, Task
 from finlab.sim.water import Still, Water
+
+AHEAD = 10
+"""Ticks of which the allocator is told before."""
 
 
 class ClosedLoop:
@@ -101,6 +107,7 @@ class ClosedLoop:
         if controller is None:
             controller = VelocityController() if isinstance(task, Cruise) else TrackingController(layout)
         self.controller = controller
+        self._foresighted = controller if isinstance(controller, Foresighted) else None
         self.plant = plant
         self.policy = as_policy(allocator.policy_under_way if policy is None else policy)
         self.seed = seed
@@ -125,6 +132,7 @@ class ClosedLoop:
         """What the monitor believed at the last step; None without one."""
         self._completion: dict[tuple[str, ...], Completion] = {}
         self._ticks: list[Tick] = []
+        self._setpoints: deque[Setpoint] = deque()  # of this tick and the next ones
         self._command: Array | None = None
         self._answered: Array | None = None  # the same, before a monitor's pushes
         self.period_s = self.controller.period_s
@@ -239,12 +247,14 @@ class ClosedLoop:
             reported = self.fins.command if self.servo_feedback else None
             self.verdict = self.monitor.step(now, self._command, reported)
         setpoint = self.task.setpoint(time + self.controller.lead_s)
-        asked = self._complete()(self.controller.wrench(now, setpoint, self._given()))
+        whole = self._complete()
+        asked = whole(self.controller.wrench(now, setpoint, self._given()))
         answer = self.allocator.allocate(
             self.layout.moving((*now.velocity, *now.rates)),  # what speed takes from fins, where known
             asked,
             failed=self.failed,
             previous=self._answered,
+            reference=self._reference(time, whole),
             policy=self.policy,
             health=self.health,
             seed=self.seed,
@@ -252,7 +262,7 @@ class ClosedLoop:
         self._answered = command = answer.command
         if self.monitor is not None:
             command = self.monitor.probed(command)
-        tick = self._move(time, now, asked, command, answer.solve_ms)
+        tick = self._move(time, now, answer.target, command, answer.solve_ms)
         self._command = command
         self._ticks.append(tick)
         return tick
@@ -262,6 +272,16 @@ class ClosedLoop:
         while not self.done:
             self.step()
         return self.log
+
+    def _reference(self, time: float, whole: Completion) -> Array | None:
+        """The wrenches (K, 6) that will be asked for at the next ticks, where the controller can tell."""
+        if self._foresighted is None:
+            return None
+        while len(self._setpoints) <= AHEAD:
+            self._setpoints.append(self.task.setpoint(time + len(self._setpoints) * self.period_s))
+        expected = self._foresighted.ahead(self._setpoints)
+        self._setpoints.popleft()
+        return whole(expected)
 
     def _given(self) -> Array:
         """Wrench (6,) of the fins over the last period, if they do what they were told [N, N m]."""

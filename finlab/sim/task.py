@@ -93,12 +93,17 @@ class Trajectory:
         return np.stack([np.interp(time, self.time, axis) for axis in self.samples.T], axis=-1)
 
     def setpoint(self, time: float) -> Setpoint:
-        """Position, velocity and acceleration at `time` [s]."""
+        """Position, velocity and acceleration at `time` [s]; after the end at rest."""
+        here = self.position(time)
+        if time > self.duration_s:
+            return Setpoint(here, 0.0, onward=self._onward(time))
+        # A path may end under way: what would stop it there within a moment is no part of it.
         dt = self._slope_s
-        behind, here, ahead = self.position(np.array([time - dt, time, time + dt]))
+        middle = min(time, self.duration_s - dt)
+        behind, between, ahead = self.position(np.array([middle - dt, middle, middle + dt]))
         velocity = (ahead - behind) / (2 * dt)
         speed = math.sqrt(velocity @ velocity)
-        acceleration = (ahead - 2 * here + behind) / dt**2
+        acceleration = (ahead - 2 * between + behind) / dt**2
         return Setpoint(here, speed, velocity, acceleration, self._onward(time))
 
     def _onward(self, time: float) -> float:

@@ -222,6 +222,6 @@ def test_what_is_not_said_is_that_of_the_library(robot: Robot, monkeypatch: pyte
     hurt.allocate([1.0, 0.0, 0.5, 0.0, 0.0, 0.1])
     hurt.allocate([1.0, 0.0, 0.5, 0.0, 0.0, 0.1], failed=layout.names[:2], policy="direction", seed=5)
     assert asked == [
-        {"failed": layout.names[:1], "previous": None, "policy": CLOSEST, "seed": 0},
-        {"failed": layout.names[:2], "previous": None, "policy": "direction", "seed": 5},
+        {"failed": layout.names[:1], "previous": None, "reference": None, "policy": CLOSEST, "seed": 0},
+        {"failed": layout.names[:2], "previous": None, "reference": None, "policy": "direction", "seed": 5},
     ]

@@ -67,6 +67,8 @@ def test_answers_like_the_library(robot: Robot) -> None:
         truth.energy,
         truth.power,
     ]
+    ahead = served(robot, {**GOOD, "reference": [[2, 0, 0.5, 0, 0, 0.1]] * 9}).sent[0]
+    assert ahead["wrench"][0] == pytest.approx(2.0, abs=1e-3), "fins will have followed by then"
     assert end["status"] == "neutral" and end["command"][2] is None, "a lost fin gets no command at the end"
 
 
@@ -83,6 +85,7 @@ def test_answers_like_the_library(robot: Robot) -> None:
         ({**GOOD, "failed": ["nobody"]}, "no fin 'nobody'"),
         ({**GOOD, "policy": "hope"}, "policy: expected one of"),
         ({**GOOD, "policy": 3}, "policy: expected a name"),
+        ({**GOOD, "reference": [1, 0, 0, 0, 0, 0]}, r"reference: expected an array of shape \(N, 6\)"),
         ({"wrench": [float("nan")] * 6}, "Fx must be finite"),
     ],
 )

@@ -20,6 +20,11 @@ def test_methods_that_cannot_choose_are_left_as_they_are() -> None:
     assert "objective" not in methods["paper"].options and methods["search"].options["objective"] == "effort"
 
 
+def test_methods_for_comparison_alone() -> None:
+    for name in ("on-board", "analytic-ahead"):
+        assert load_method_spec(name).name == name
+
+
 def test_starts() -> None:
     assert load_method_spec("slsqp-32").options["n_starts"] == 32
     assert is_slow("slsqp-32") and is_slow("trf") and not is_slow("search-effort")

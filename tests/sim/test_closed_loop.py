@@ -207,7 +207,7 @@ def test_a_monitors_pushes_are_no_past_of_the_allocator() -> None:
 
     allocator = Watched(load_allocator().normalization)
     loop = ClosedLoop(layout, allocator, make_trajectory("lissajous"), monitor=FaultMonitor(layout))
-    told = [loop.step().command for _ in range(100)]
+    told = [loop.step().command for _ in range(200)]
     assert sum((command != answer.command).any() for command, answer in zip(told, answers, strict=True)) > 3
     for before, after in zip(answers, given[1:], strict=False):
         assert after is before.command

@@ -50,6 +50,16 @@ def test_coarse_samples_of_a_smooth_path_have_a_smooth_acceleration() -> None:
         assert setpoint.acceleration[0] == pytest.approx(12.0 / leg**2 * (1.0 - 2.0 * done), abs=1e-3)
 
 
+def test_a_path_that_ends_under_way_is_not_braked_for() -> None:
+    """What stops there is the swim, not the robot; after it everything rests."""
+    path = make_trajectory("lissajous")
+    last, before = path.setpoint(path.duration_s - 0.1), path.setpoint(path.duration_s - 1.0)
+    assert last.surge == pytest.approx(before.surge, rel=0.05)
+    assert np.linalg.norm(last.acceleration - before.acceleration) < 0.01
+    after = path.setpoint(path.duration_s + 0.1)
+    assert after.surge == 0.0 and not after.velocity.any() and not after.acceleration.any()
+
+
 def test_a_file_of_positions(tmp_path: Path) -> None:
     file = tmp_path / "line.csv"
     file.write_text("z, t, x, y\n-1,0,0,0\n-1,10,1,2\n")

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
+from finlab.allocation.in_time import in_time
 from finlab.allocation.judging import effort_of, power_of
 from finlab.allocation.policy import Policy
 from finlab.allocation.question import usable_fins
@@ -205,6 +206,9 @@ class SearchAllocator(Allocator):
         target = np.asarray(wrench, dtype=float)[None] / self.normalization.std
         found = refine(self.pipeline.prepare(layout).commands, target, command[None], n_steps)
         return np.asarray(found.command[0])
+
+    def _in_time(self, layout: Layout, target: Array, reference: Array) -> Array:
+        return in_time(layout, target, reference, self.settings.period_s)
 
     def _check_policy(self, policy: Policy) -> None:
         """All policies are known."""
