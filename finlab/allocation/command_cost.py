@@ -40,7 +40,7 @@ class CommandCost(ABC):
     """The weighted cost of a robot's commands."""
 
     def __init__(self, meter: CostMeter, weight: float) -> None:
-        """Make it of what tells the cost in its own unit."""
+        """Make it of the meter of the cost in its own unit."""
         self._told = meter
         self.weight = weight
         """What the cost in its own unit is multiplied by."""

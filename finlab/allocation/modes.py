@@ -64,7 +64,7 @@ class Mode(PlainData):
     turn: float | None
     """Largest turn from the previous command [rad]."""
     signature: ModeSignature
-    """What tells it from other ways."""
+    """What distinguishes it from other ways."""
     members: tuple[int, ...]
     """Places of the alternatives that do the same, best first."""
     sources: tuple[str, ...]

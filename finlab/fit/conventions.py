@@ -13,7 +13,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.layout.angles import TURN
+from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 
 UNITS = {
@@ -109,7 +109,7 @@ def _convert_angles(columns: Columns, conventions: Conventions) -> None:
     values, source = columns.values, columns.source
     angular = [name for name in ("A", "phi", "angle") if name in values and name not in columns.told]
     reach = {name: float(np.ptp(values[name]) if name != "A" else values[name].max()) for name in angular}
-    most = {"A": 2 * MAX_AMPLITUDE, "phi": TURN + 1e-3, "angle": 2 * TURN}
+    most = {"A": 2 * MAX_AMPLITUDE, "phi": TURN + FILE_TURN_TOLERANCE, "angle": 2 * TURN}
     beyond = [name for name in angular if reach[name] > most[name]]
     if conventions.angles == "deg" or (conventions.angles is None and beyond):
         for name in angular:

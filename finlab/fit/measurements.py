@@ -16,7 +16,7 @@ from finlab.errors import DataError
 from finlab.fit.conventions import Columns, Conventions, named_column, to_fin_frame
 from finlab.fit.sensor_checks import check_sensors
 from finlab.fit.time_series import cycle_means
-from finlab.layout.angles import TURN
+from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN
 from finlab.physics.table_file import row_numbers
 
 MAX_BYTES = 500_000_000
@@ -194,7 +194,7 @@ def _checked(read: list[tuple[Columns, tuple[str, ...]]], source: str) -> Measur
         )
     if phi is None:
         phi = np.zeros(n)
-    elif np.ptp(phi) > TURN + 1e-3:
+    elif np.ptp(phi) > TURN + FILE_TURN_TOLERANCE:
         raise DataError(
             f"{source}: the zero directions span {np.ptp(phi):.4g} rad; say their unit with --angles"
         )

@@ -14,7 +14,7 @@ MIN_AMPLITUDE = 0.02
 PER_CYCLE = 12
 """Fewest samples in a cycle whose mean counts."""
 START_UP = 2
-"""Cycles after the fin began, or was told something new, in which the water is not yet the cycle's own."""
+"""Cycles after the fin began, or its command changed, in which the water is not yet the cycle's own."""
 CHANGE = 0.12
 """Relative change of stroke or period from one cycle to the next that counts as something new."""
 SMALL_TURN = 0.06

@@ -5,7 +5,7 @@ whose few coordinates z are searched. A box of z holds each fin's force within a
 is at least that of the smallest force in it; or, all fins' slopes added before their sizes are taken, at
 least what a tangent less the cost's curvature allows. Boxes that cannot hold anything better than the answer
 are dropped, the others split. From seven fins on the boxes are too many: then what is proven by the end of
-the time is told, which is little.
+the time is returned, which is little.
 """
 
 import time
@@ -21,7 +21,7 @@ from finlab.layout.angles import wrapped
 TOLERANCE = 0.015
 """Share of the answer's cost by which it may exceed the bound; boxes this good are not split."""
 TIME_LIMIT_S = 5.0
-"""Processor time after which what is proven so far is told."""
+"""Processor time after which what is proven so far is returned."""
 MOST_BOXES = 200_000
 """Boxes that are split at once."""
 RANK_TOLERANCE = 1e-9

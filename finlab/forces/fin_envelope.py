@@ -36,7 +36,7 @@ CONVEX = 0.3
 """Least elasticity of the marginal cost that is followed; below it, and where cost is concave, a steeper
 quadratic is touched, which never overshoots."""
 STIFFEST = 10.0
-"""Largest elasticity that is told apart."""
+"""Elasticities above this one count as this one."""
 MARGINAL = 1e-3
 """Least marginal cost, as a share of the mean one."""
 NOISY = 0.004

@@ -12,6 +12,8 @@ TURN = 2.0 * math.pi
 """A full turn [rad]."""
 FULL_TURN_TOLERANCE = 1e-6
 """By how much [rad] an arc may fall short of a full turn and still be one."""
+FILE_TURN_TOLERANCE = 1e-3
+"""By how much [rad] zero directions in a file, which are rounded, may miss a full turn or exceed it."""
 
 
 def is_full_turn(arc: Any) -> Any:

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from finlab.errors import LayoutError
+from finlab.layout.angles import FULL_TURN_TOLERANCE, TURN
 from finlab.layout.rules import MAX_NAME_LENGTH, interval, number, numbers, text
 from finlab.layout.servo import Servo
 
@@ -145,7 +146,7 @@ class Limits:
             if most <= 0.0:
                 raise LayoutError("the maximum must be above 0; leave the fin out if it never moves", key)
         width = zero_direction[1] - zero_direction[0]
-        if width > 2 * math.pi + 1e-6:
+        if width > TURN + FULL_TURN_TOLERANCE:
             raise LayoutError(f"must span at most one turn (6.2832), got {width:.4f}", "zero_direction_rad")
         object.__setattr__(self, "amplitude", amplitude)
         object.__setattr__(self, "frequency", frequency)
@@ -177,7 +178,7 @@ class Fin:
     model: FinModelSpec = FinModelSpec()
     """Which law gives its force."""
     servo: Servo = Servo()
-    """How fast it comes to what it is told."""
+    """How fast it comes to what is commanded."""
 
     def __post_init__(self) -> None:
         x, y, z = numbers(self.position, "position_m", 3, -MAX_POSITION, MAX_POSITION)

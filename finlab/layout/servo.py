@@ -1,4 +1,4 @@
-"""What drives one fin: how fast it comes to what it is told."""
+"""What drives one fin: how fast it comes to what is commanded."""
 
 import math
 from dataclasses import dataclass, fields

@@ -1,7 +1,7 @@
 """How fins follow their commands (second-order lag, the servo's speed limit, flapping), and their power.
 
 Amplitude, frequency and zero direction each follow their command through the critically damped filters of
-`finlab.layout.Servo`. A fin that is told another frequency goes on from where it is in its beat.
+`finlab.layout.Servo`. A fin that is given another frequency goes on from where it is in its beat.
 """
 
 import math

@@ -75,7 +75,7 @@ class Objective:
         return np.asarray(self.weights.zero_direction / energy_scale(upper)[:, 2] ** 2)
 
     def meter(self, plant: Plant) -> "CostMeter":
-        """Returns what tells the cost of a robot's commands."""
+        """Returns the meter of the cost of a robot's commands."""
         if self.name == "power":
             return PowerMeter(plant, self.copper_loss)
         return EnergyMeter(plant.upper, self.weights)

@@ -96,7 +96,7 @@ class Plant:
 
     @property
     def parts(self) -> tuple[Any, Array]:
-        """What tells each fin's part of the wrench, by `force` and `force_and_slopes` in axes of its own, and
+        """What gives each fin's part of the wrench, by `force` and `force_and_slopes` in axes of its own, and
         the wrench (n, axes, 6) per unit of each; here the fins' forces."""
         return self, self.columns
 

@@ -39,7 +39,7 @@ class GridLaw(FinLaw):
         return found[..., 0, 0, 0, :], _slopes(found)
 
     def power(self, command: Values, copper_loss: float = 0.0) -> Values:
-        """See `FinLaw`. Measured power is told as it is, whatever the loss."""
+        """See `FinLaw`. Measured power stands as it is, whatever the loss."""
         if not self.has_power:
             return super().power(command, copper_loss)
         # A polynomial through points near zero may dip below.

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.bundle_files import TABLES, archive_around, read_bundle_files
 from finlab.errors import DataError
-from finlab.layout.angles import TURN
+from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.physics.fin_law import FinLaw
 from finlab.physics.table import TableLaw
@@ -172,7 +172,7 @@ def _check_units(rows: Array, source: str) -> None:
             "these look like beats per minute (rev/min); divide them by 60"
         )
     span = np.ptp(direction)
-    if span > TURN + 1e-3:
+    if span > TURN + FILE_TURN_TOLERANCE:
         hint = "; these look like degrees; write radians" if span > 2 * TURN else ""
         raise DataError(
             f"{source}: the zero directions phi span {span:.4g} rad, expected at most one turn (6.283){hint}"
@@ -226,7 +226,7 @@ def _grid(rows: Array, lines: NDArray[np.intp], source: str) -> tuple[list[Array
 def _close_circle(angle: Array, values: Array, source: str) -> tuple[bool, Array, Array]:
     """Returns whether the zero directions cover the circle, and the grid without a repeated end point."""
     span = angle[-1] - angle[0]
-    if abs(span - TURN) <= 1e-3:
+    if abs(span - TURN) <= FILE_TURN_TOLERANCE:
         forces = values[..., :3]
         scale = np.abs(forces).max()
         if not np.allclose(forces[:, :, 0], forces[:, :, -1], rtol=0.0, atol=0.05 * scale + 1e-12):

@@ -9,7 +9,7 @@ import pytest
 from finlab.analysis import score_card
 from finlab.analysis.score_card import quick_check
 from finlab.assets import shipped_layouts
-from finlab.errors import LayoutError
+from finlab.errors import FinlabError, LayoutError
 from finlab.layout import FinModelSpec, load_layout
 from tests.webapp.stand_in import StandIn
 from webapp.markup.comparison import comparison_table
@@ -101,7 +101,7 @@ def test_candidates_as_csv() -> None:
     assert answer.candidates is not None
     assert len(lines) == 1 + len(answer.candidates.energy)
     assert lines[0].startswith("err_norm,power_w,energy,source,front_right.amplitude_rad")
-    with pytest.raises(Exception, match="no candidates"):
+    with pytest.raises(FinlabError, match="no candidates"):
         files.candidates_csv(None)
 
 

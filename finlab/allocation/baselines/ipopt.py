@@ -42,7 +42,7 @@ class Formulas(NamedTuple):
     cost: Any
     """What the commands cost, weighed beside the squared error."""
     options: dict[str, Any]
-    """What IPOPT must be told."""
+    """Options of IPOPT."""
     called: Any
     """A callback to be kept alive; None where there is none."""
 

@@ -1,6 +1,6 @@
 """Method `mdn`: a mixture density network proposes ways to deliver a wrench, and each is searched to its end.
 
-The paper's idea with exact physics behind it. The network tells a joint mixture over the planar forces of all
+The paper's idea with exact physics behind it. The network gives a joint mixture over the planar forces of all
 fins; its components stand for different ways. Each proposal is where a search in force space of its own
 begins, with the fins' own laws, and so is each answer's name. What no component stands for is not found: that
 is what the method is compared for. The answers are exact because of the search, not because of the network.

@@ -42,7 +42,7 @@ def propose(
 
 
 def shares(root: AnyArray) -> AnyArray:
-    """Shares of the largest forces, none above one, from what the mixture tells: their roots."""
+    """Shares of the largest forces, none above one, from what the mixture gives: their roots."""
     size = np.abs(root)
     return np.asarray(root * np.minimum(size, 1.0 / np.maximum(size, 1e-9)))
 

@@ -44,7 +44,7 @@ class CommandProblem:
     fin: FinForces
     """What commands give: the fins' own laws, or a surrogate."""
     columns: AnyArray
-    """Normalized wrench (n, 3, 6) per newton of each fin's force along the axes in which `fin` tells it; six
+    """Normalized wrench (n, 3, 6) per newton of each fin's force along the axes in which `fin` gives it; six
     axes in place of three where each fin's command changes what the others give."""
     lower: AnyArray
     """Lower limits (n, 3)."""

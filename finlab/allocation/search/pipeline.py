@@ -185,8 +185,8 @@ class Pipeline:
     def _descend_from_previous(
         self, prepared: Prepared, target: Array, start: _Start, previous: Array
     ) -> RefinedCandidates:
-        """Answers within what the fins may be told after a previous command (n, 3): mostly the cheapest one
-        of all is among them.
+        """Answers within what the servos allow after a previous command (n, 3): mostly the cheapest one of
+        all is among them.
 
         Where cost grows faster than force there is but one valley, and the search goes on from where the
         robot is. Otherwise the way that it moves now is kept, fins at rest turn to where they would be

@@ -1,8 +1,8 @@
 """From tick to tick: commands change no faster than the fins' servos are meant to.
 
-Around the previous command each fin has a box of commands that it may be told next: amplitude, frequency and
+Around the previous command each fin has a box of commands that it may be given next: amplitude, frequency and
 zero direction, by the rates of its servo. The cheapest exact answer within these boxes is searched for as
-any other is; where none of them is exact, what comes nearest is told, and the next ticks go on from there.
+any other is; where none of them is exact, the answer is what comes nearest, and the next ticks go on from it.
 """
 
 from dataclasses import replace
@@ -16,7 +16,7 @@ from finlab.layout.angles import wrapped
 
 
 def within_rates(prepared: Prepared, previous: Array, period_s: float, aim: Array | None = None) -> Prepared:
-    """The layout with each fin kept within what it may be told after its previous command.
+    """The layout with each fin kept within what it may be commanded after its previous command.
 
     Args:
         prepared: the layout.

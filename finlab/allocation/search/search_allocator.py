@@ -43,7 +43,7 @@ CHUNK = 512
 
 
 class Beginning(NamedTuple):
-    """Where a search begins, other than from all fins and the sub-layouts; and how that is told."""
+    """Where a search begins, other than from all fins and the sub-layouts; and how that is named."""
 
     seeds: Array | None = None
     """Planar forces (N, S, 2, n) [N]; None for sizes of forces that all targets share."""

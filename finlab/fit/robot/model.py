@@ -18,7 +18,7 @@ from finlab.physics.vehicle import GRAVITY, complete_body
 TYPICAL_SPEED = np.array([0.2, 0.2, 0.2, 0.5, 0.5, 0.5])
 """At which linear and quadratic damping are compared [m/s, rad/s]."""
 NARROWNESS = 2.0
-"""Of jets, before a swim tells."""
+"""Of jets, before a swim is known."""
 DAMPING_DOUBT = 0.5
 """How far damping may be off, as a share of what the layout says."""
 
@@ -51,10 +51,10 @@ class RobotModel:
         self.half_thrust = 0.25 * float(np.linalg.norm(self.alone, axis=-1).mean()) + 1e-6
         """Thrust [N] at which a jet takes half of what a very strong one takes."""
         self.middle = [float(np.median(self.motion[..., k][working])) for k in range(2)]
-        """Amplitude [rad] and frequency [Hz] at which a fin has the strength that is told."""
+        """Amplitude [rad] and frequency [Hz] at which a fin has the strength that is given."""
         ends = [np.quantile(self.motion[..., k][working], (0.005, 0.995)) for k in range(2)]
         self.seen = [(max(float(low), 1e-3), max(float(high), 2e-3)) for low, high in ends]
-        """Amplitudes and frequencies between which nearly all were; the law is told no further."""
+        """Amplitudes and frequencies between which nearly all were; the law is fitted no further."""
         self._shapes = self.shape_terms(self.motion)
         self.length = plant.blade.length
         self._beat = np.concatenate([swing_forces(layout, swim.command) for swim in swims])

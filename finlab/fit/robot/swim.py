@@ -34,7 +34,7 @@ class Swim:
     """What the sensors said at the beginning of each step (N, 12), in the order of `CHANNELS`; NaN where
     there is nothing new."""
     command: Array
-    """What the fins were told for each step (N, n, 3), NaN for a fin that was lost."""
+    """What was commanded of the fins for each step (N, n, 3), NaN for a fin that was lost."""
     replayed: bool = False
     """Whether what the fins did was worked out from their commands, with nominal servos."""
 

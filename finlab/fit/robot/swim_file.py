@@ -1,7 +1,7 @@
 """Swims from files: a log of `finlab simulate`, or a CSV file of time, measurements and commands.
 
 A CSV file has a header and columns in any order: t [s]; of x, y, z [m], roll, pitch, yaw [rad], u, v, w
-[m/s], p, q, r [rad/s] what was measured; and FIN.A, FIN.f, FIN.phi for each fin, as it was told. World: z up;
+[m/s], p, q, r [rad/s] what was measured; and FIN.A, FIN.f, FIN.phi for each fin, as commanded. World: z up;
 body: x forward, y left, z up; pitch is positive nose down. Degrees stand in the header, `yaw [deg]`. A
 sensor's cell may be empty or repeat the last one where there is nothing new; a fin's three cells are empty
 where it was lost. Other columns are passed over.
@@ -199,7 +199,7 @@ def _check_measured(measured: Array, columns: list[_Column], path: Path) -> None
 
 
 def _check_commands(command: Array, lines: list[int], layout: Layout, path: Path) -> None:
-    """A fin is told three numbers that it can do, or none."""
+    """A fin is commanded by three numbers that it can do, or by none."""
     known = np.isfinite(command)
     half = np.argwhere(known.any(axis=2) & ~known.all(axis=2))
     if len(half):

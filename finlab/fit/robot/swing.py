@@ -31,7 +31,7 @@ from finlab.physics.fin_motion import FinMotion
 MOMENTS = 10
 """Moments of each step at which the fins are looked at."""
 KINDS = 10
-"""Forces that are told apart; the last three are of fins that turn."""
+"""Forces that are distinguished; the last three are of fins that turn."""
 TERMS = 3 * KINDS
 """Forces whose shares are looked for: each kind, and what it changes by with frequency and amplitude."""
 USUAL_HZ, USUAL_RAD = 1.0, 0.4

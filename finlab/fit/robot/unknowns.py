@@ -41,7 +41,7 @@ class Block:
     labels: tuple[str, ...]
     """What each is called in reports."""
     unit: str
-    """In which they are told."""
+    """In which they are given."""
     scale: Array
     """How far each may be off: one standard deviation of what is believed before a swim."""
     force: bool
@@ -111,7 +111,7 @@ class Unknowns:
         self.labels = tuple(label for block in self.blocks for label in block.labels)
         """What each is called."""
         self.units = tuple(block.unit for block in self.blocks for _ in block.labels)
-        """In which each is told."""
+        """In which each is given."""
         self.force = np.array([block.force for block in self.blocks for _ in block.labels])
         """Whether the wrench of the fins depends on each (size,)."""
 
