@@ -1,8 +1,9 @@
-"""The axes that a controller leaves open: as near zero as the fins can hold them.
+"""The axes that a controller leaves open: as near zero as the fins can hold them, or as they come.
 
-A controller commands some axes of the wrench and asks for zero on the others. Few fins, or few that are left,
-may not be able to hold those zeros: two fins have four forces to choose for six axes. A target that asks for
-the impossible spoils what the controller wants, so the open axes are set to what the fins give with it.
+A controller commands some axes of the wrench, holds others at zero, and may leave some free. Few fins, or few
+that are left, may not be able to hold zeros: two fins have four forces to choose for six axes. A target that
+asks for the impossible spoils what the controller wants, so the open axes are set to what the fins give with
+it; and free axes to what they give with the least force.
 """
 
 from collections.abc import Sequence
@@ -23,8 +24,10 @@ RANK_TOLERANCE = 1e-6
 class Completion:
     """Wanted axes to whole wrenches, for one layout with some fins lost. Linear in the wanted axes."""
 
-    def __init__(self, layout: Layout, failed: Sequence[str], axes: Sequence[str]) -> None:
-        """Prepares for the fins that work, at least one, and the wanted axes, by their names.
+    def __init__(
+        self, layout: Layout, failed: Sequence[str], axes: Sequence[str], free: Sequence[str] = ()
+    ) -> None:
+        """Prepares for the fins that work, at least one, the wanted and the free axes, by their names.
 
         Raises:
             LayoutError: an unknown name, or no fin is left.
@@ -32,14 +35,14 @@ class Completion:
         scale = np.array([1.0, 1.0, 1.0, 1 / LEVER_M, 1 / LEVER_M, 1 / LEVER_M])
         planar = layout_effectiveness(layout.without(failed) if failed else layout) * scale[:, None]
         chosen = np.array([axis in axes for axis in AXES])
-        wanted, rest = planar[chosen], planar[~chosen]
+        wanted, held = planar[chosen], planar[[axis not in (*axes, *free) for axis in AXES]]
         left, values, right = np.linalg.svd(wanted)
         rank = int((values > RANK_TOLERANCE * max(float(values[0]), 1e-9)).sum())
         self.controllable = rank == len(wanted)
         """Whether the working fins can give any small combination of the wanted axes."""
         inverse = right[:rank].T @ np.diag(1.0 / values[:rank]) @ left[:, :rank].T
-        free = right[rank:].T
-        give = inverse - free @ np.linalg.pinv(rest @ free, rcond=RANK_TOLERANCE) @ rest @ inverse
+        spare = right[rank:].T
+        give = inverse - spare @ np.linalg.pinv(held @ spare, rcond=RANK_TOLERANCE) @ held @ inverse
         scaled = planar @ give * scale[chosen] / scale[:, None]
         self.matrix = np.zeros((6, 6))
         """Wrench with the wanted axes filled in, to the whole wrench (6, 6)."""

@@ -18,6 +18,7 @@ class VelocityController:
 
     name = "velocity"
     axes: tuple[str, ...] = ("Fx", "Fz", "Tz")
+    free: tuple[str, ...] = ()
     needs_given = False
     lead_s = 0.0
 
@@ -52,6 +53,7 @@ class WaypointController:
 
     name = "waypoint"
     axes: tuple[str, ...] = ("Fx", "Fz", "Tz")
+    free: tuple[str, ...] = ()
     needs_given = False
 
     def __init__(self, gains: WaypointGains | None = None) -> None:

@@ -59,7 +59,10 @@ class Controller(Protocol):
     name: str
     """What it is called in logs and tables."""
     axes: tuple[str, ...]
-    """Axes of the wrench that it commands; the others are to stay as near zero as the fins can hold them."""
+    """Axes of the wrench that it commands; the others are to stay as near zero as the fins can hold them, but
+    for the free ones."""
+    free: tuple[str, ...]
+    """Axes that may be whatever the fins give along with the others at the least force."""
     lead_s: float
     """How far ahead of now [s] the waypoint should be taken from a trajectory."""
     period_s: float

@@ -64,6 +64,8 @@ class TrackingController:
 
     name = "tracking"
     axes: tuple[str, ...] = ("Fx", "Fz", "Tz")
+    # Sway that the observer knows of is headed against; roll and pitch would turn where the fins push.
+    free: tuple[str, ...] = ("Fy",)
     lead_s = 0.0
     period_s = 0.1
     needs_given = True

@@ -296,7 +296,8 @@ class ClosedLoop:
         """What completes the controller's wrench for the fins that work now."""
         failed = self.failed
         if failed not in self._completion:
-            self._completion[failed] = Completion(self.layout, failed, self.controller.axes)
+            controller = self.controller
+            self._completion[failed] = Completion(self.layout, failed, controller.axes, controller.free)
         return self._completion[failed]
 
     def _alive(self) -> NDArray[np.bool_]:
