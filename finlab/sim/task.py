@@ -90,17 +90,19 @@ class Trajectory:
 
     def position(self, time: float | Array) -> Array:
         """Position (..., 3) [m] at times (...,) [s]; beyond the ends as at the ends."""
-        return np.stack([np.interp(time, self.time, axis) for axis in self.samples.T], axis=-1)
+        found = np.empty((*np.shape(time), 3))
+        for k in range(3):
+            found[..., k] = np.interp(time, self.time, self.samples[:, k])
+        return found
 
     def setpoint(self, time: float) -> Setpoint:
         """Position, velocity and acceleration at `time` [s]; after the end at rest."""
-        here = self.position(time)
-        if time > self.duration_s:
-            return Setpoint(here, 0.0, onward=self._onward(time))
         # A path may end under way: what would stop it there within a moment is no part of it.
         dt = self._slope_s
         middle = min(time, self.duration_s - dt)
-        behind, between, ahead = self.position(np.array([middle - dt, middle, middle + dt]))
+        here, behind, between, ahead = self.position(np.array([time, middle - dt, middle, middle + dt]))
+        if time > self.duration_s:
+            return Setpoint(here, 0.0, onward=self._onward(time))
         velocity = (ahead - behind) / (2 * dt)
         speed = math.sqrt(velocity @ velocity)
         acceleration = (ahead - 2 * between + behind) / dt**2

@@ -218,8 +218,14 @@ class SearchAllocator(Allocator):
     ) -> Solution:
         if policy.is_plain:
             return self._solve(layout, target, seed=seed, previous=previous)
-        plain = self._solve(layout, target, seed=seed, previous=previous, fallback=lambda *_: None)
-        if self._reaches(layout, plain, target)[0]:
+        missed = []
+
+        def give_up(*_: object) -> None:
+            missed.append(True)
+
+        plain = self._solve(layout, target, seed=seed, previous=previous, fallback=give_up)
+        # What servos alone hold back is within reach, and comes at one of the next ticks.
+        if not missed or self._reaches(layout, plain, target)[0]:
             return plain
         # What the policy asks for within reach is one wrench; that one is then delivered as any other.
         std = self.normalization.std

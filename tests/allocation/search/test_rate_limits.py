@@ -3,12 +3,13 @@
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 from finlab.allocation import load_allocator
+from finlab.allocation.search import search_allocator
 from finlab.allocation.search.rate_limits import planar_force, within_rates
 from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.errors import CommandError
@@ -120,6 +121,26 @@ def test_ticks_may_be_longer(penta: Layout) -> None:
     change = np.abs(after - before)
     assert np.abs(wrapped(change[:, 2])).max() == pytest.approx(2.0)
     assert change[:, 1].max() <= 1.2 + 1e-9
+
+
+def test_what_servos_alone_hold_back_is_not_asked_for_anew(
+    penta: Layout, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The policies project targets that the fins cannot reach, not those that they reach some ticks later."""
+    projected: list[object] = []
+    within_reach = search_allocator._within_reach
+
+    def counted(*arguments: Any) -> Any:
+        projected.append(arguments)
+        return within_reach(*arguments)
+
+    monkeypatch.setattr(search_allocator, "_within_reach", counted)
+    method = load_allocator()
+    before = method.allocate(penta, TARGET).command
+    turned = method.allocate(penta, -np.array(TARGET), previous=before, policy="direction")
+    assert turned.err_norm > 0.01 and not projected
+    beyond = method.allocate(penta, -1e3 * np.array(TARGET), previous=before, policy="direction")
+    assert beyond.err_norm > 0.01 and len(projected) == 1
 
 
 def test_commands_stay_inside_the_limits_across_the_seam(steady: Drive, penta: Layout) -> None:
