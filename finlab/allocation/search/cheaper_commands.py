@@ -11,6 +11,7 @@ with H the curvature of cost minus multipliers times wrench, a block of 3 x 3 fo
 of the laws' slopes and made convex. Commands are counted in units of their ranges.
 """
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -20,28 +21,38 @@ from finlab.arrays import AnyArray, Array
 from finlab.forces.small_systems import solve
 from finlab.physics.objective import CostMeter
 
-STEPS = 6
-"""Most quadratic problems solved in turn."""
-SETTLED = 2e-3
-"""Share of its cost that some row must still have to gain for another step."""
-BEFORE, BACK, AFTER = 1, 1, 1
-"""Levenberg-Marquardt steps that bring commands onto the target: first, after each step, and in the end."""
-SPACING = 1e-4
-"""Of the commands whose slopes are compared, in ranges."""
-FLATTEST = 0.02
-"""Least curvature, as a share of the mean slope of the cost."""
-DAMPING = (1e-3, 0.2, 10.0)
-"""Curvature that is added at first, as such a share; its factors after steps that help and that do not."""
-LONGEST = 0.3
-"""Largest change of a command in one step, in ranges."""
-PASSES = 4
-"""Times that a step is solved, each time with the limits held that it would have crossed."""
-RIDGE = 1e-10
-"""Relative regularization of the 6 x 6 systems."""
-ROUNDING = 1e-12
-"""Least share of a fin's largest curvature that another has; below, it could not be told from nothing."""
-HOPELESS = 1.0
-"""Normalized error from which on no steps are taken: none of these would end at the target."""
+
+@dataclass(frozen=True)
+class DescentNumbers:
+    """How steps to cheaper commands are chosen."""
+
+    most_problems: int = 6
+    """Most quadratic problems solved in turn."""
+    settled: float = 2e-3
+    """Share of its cost that some row must still have to gain for another step."""
+    lm_steps: tuple[int, int, int] = (1, 1, 1)
+    """Levenberg-Marquardt steps that bring commands onto the target: first, after each step, in the end."""
+    spacing: float = 1e-4
+    """Of the commands whose slopes are compared, in ranges."""
+    flattest: float = 0.02
+    """Least curvature, as a share of the mean slope of the cost."""
+    damping: tuple[float, float, float] = (1e-3, 0.2, 10.0)
+    """Curvature added at first, as such a share; its factors after steps that help and that do not."""
+    longest: float = 0.3
+    """Largest change of a command in one step, in ranges."""
+    passes: int = 4
+    """Times that a step is solved, each time with the limits held that it would have crossed."""
+    ridge: float = 1e-10
+    """Relative regularization of the 6 x 6 systems."""
+    rounding: float = 1e-12
+    """Least share of a fin's largest curvature that another has; below, it differs from nothing by rounding
+    alone."""
+    hopeless: float = 1.0
+    """Normalized error from which on no steps are taken: none of these would end at the target."""
+
+
+DESCENT = DescentNumbers()
+"""What every descent uses."""
 
 
 class _Model(NamedTuple):
@@ -71,18 +82,19 @@ def cheaper_commands(
         command: where to start (R, n, 3).
         exact_error: normalized error up to which commands are exact.
     """
+    first_steps, steps_between, last_steps = DESCENT.lm_steps
     target = np.broadcast_to(target, (len(command), 6))
-    start = refine(problem, target, command, BEFORE)
-    near = start.error <= HOPELESS
+    start = refine(problem, target, command, first_steps)
+    near = start.error <= DESCENT.hopeless
     if not near.all():  # what is far out of reach would only drive the multipliers out of bounds
         mixed: Array = start.command.copy()
         if near.any():
             mixed[near] = cheaper_commands(problem, cost, target[near], mixed[near], exact_error)
         return mixed
     here, value, error = start.command, cost(start.command), start.error
-    damping = np.full(len(here), DAMPING[0])
+    damping = np.full(len(here), DESCENT.damping[0])
     multiplier: AnyArray | None = None
-    for _ in range(STEPS):
+    for _ in range(DESCENT.most_problems):
         model = _model(problem, cost, target, here)
         if multiplier is None:
             multiplier = _balance(model)
@@ -90,18 +102,18 @@ def cheaper_commands(
         # An error costs twice what the multipliers say, so that none is left for a gain.
         weight = 2.0 * np.linalg.norm(multiplier, axis=-1)
         gain = np.abs((model.slope * step).sum((1, 2))) + weight * error
-        if (gain <= SETTLED * value).all():
+        if (gain <= DESCENT.settled * value).all():
             break
         # Brought back onto the target, a long step is not refused for the error that its bend leaves.
-        there, _, new_error = refine(problem, target, here + step * problem.width, BACK)
+        there, _, new_error = refine(problem, target, here + step * problem.width, steps_between)
         new_value = cost(there)
         better = new_value + weight * new_error < value + weight * error
         here = np.where(better[:, None, None], there, here)
         value, error = np.where(better, new_value, value), np.where(better, new_error, error)
-        damping = np.where(better, damping * DAMPING[1], damping * DAMPING[2])
+        damping = np.where(better, damping * DESCENT.damping[1], damping * DESCENT.damping[2])
     if here is start.command:
         return here
-    found = refine(problem, target, here, AFTER)
+    found = refine(problem, target, here, last_steps)
     value = cost(start.command)
     keep = (found.error > exact_error) | ((cost(found.command) > value) & (start.error <= exact_error))
     return np.where(keep[:, None, None], start.command, found.command)
@@ -110,8 +122,8 @@ def cheaper_commands(
 def _model(problem: CommandProblem, cost: CostMeter, target: Array, command: Array) -> _Model:
     """The problems near commands (R, n, 3), by their slopes there and a little to the side."""
     rows, n, _ = command.shape
-    high = problem.edges[1] - SPACING * problem.width
-    apart = np.where(command > high, -SPACING, SPACING)
+    high = problem.edges[1] - DESCENT.spacing * problem.width
+    apart = np.where(command > high, -DESCENT.spacing, DESCENT.spacing)
     points = np.repeat(command[None], 4, axis=0)
     for k in range(3):
         points[k + 1, ..., k] += (apart * problem.width)[..., k]
@@ -143,7 +155,8 @@ def _step(
     size, axes = np.linalg.eigh(0.5 * (curvature + curvature.swapaxes(-1, -2)))
     usual = (np.abs(model.slope).mean((1, 2)) + 1e-12)[:, None, None]
     size = np.abs(size)
-    size = np.maximum(size, np.maximum(FLATTEST * usual, ROUNDING * size.max(-1, keepdims=True)))
+    least = np.maximum(DESCENT.flattest * usual, DESCENT.rounding * size.max(-1, keepdims=True))
+    size = np.maximum(size, least)
     size += damping[:, None, None] * usual
     curvature = (axes * size[..., None, :]) @ axes.swapaxes(-1, -2)
     span = np.where(problem.width > 0.0, problem.width, 1.0)
@@ -152,7 +165,7 @@ def _step(
     step: Array = np.zeros(command.shape)
     held: AnyArray = np.zeros(command.shape, bool)
     answer = multiplier
-    for _ in range(PASSES):
+    for _ in range(DESCENT.passes):
         free, answer = _free_step(model, curvature, np.where(held, step, 0.0), held)
         out = ((free < low) | (free > high)) & ~held
         step = np.clip(free, low, high)
@@ -160,7 +173,7 @@ def _step(
             break
         held |= out
     longest = np.abs(step).max((1, 2))
-    return step * np.minimum(1.0, LONGEST / np.maximum(longest, 1e-12))[:, None, None], answer
+    return step * np.minimum(1.0, DESCENT.longest / np.maximum(longest, 1e-12))[:, None, None], answer
 
 
 def _free_step(model: _Model, curvature: Array, fixed: Array, held: AnyArray) -> tuple[Array, Array]:
@@ -191,6 +204,6 @@ def _wrench_of(jacobian: Array, step: Array) -> Array:
 
 def _regular(gram: Array) -> Array:
     """Matrices (R, 6, 6), slightly regularized."""
-    size = RIDGE * np.trace(gram, axis1=1, axis2=2) + 1e-14
+    size = DESCENT.ridge * np.trace(gram, axis1=1, axis2=2) + 1e-14
     regular: Array = gram + size[:, None, None] * np.eye(6)
     return regular

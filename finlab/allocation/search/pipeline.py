@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation.search.cheaper_commands import cheaper_commands
 from finlab.allocation.search.prepared import (
-    MANY,
+    SEEDS,
     Prepared,
     neighbour_seeds,
     prepare,
@@ -63,7 +63,7 @@ class SearchNumbers:
     few_fins_steps: int = 8
     """The same for other costs with up to five fins."""
     many_fins_steps: int = 12
-    """The same from `MANY` fins on."""
+    """The same from `SEEDS.many` fins on."""
     near_best: int = 3
     """Allocations of so many fins near which more seeds are tried."""
     same_cost: float = 2e-4
@@ -145,7 +145,7 @@ class Pipeline:
         if seeds is None:
             own = prepared.seeds if self.settings.subsets else prepared.seeds[:1]
             seeds = own[None].repeat(len(target), axis=0)
-        many = prepared.plant.n_fins >= MANY
+        many = prepared.plant.n_fins >= SEEDS.many
         start = _Start(seeds, many and self.settings.subsets and not self.objective.convex, fallback)
         if previous is None:
             candidates = self._descend(prepared, target, start)
@@ -289,7 +289,7 @@ class Pipeline:
             works = None if works is None else np.repeat(works, n_arcs, axis=0)
         n_starts = seeds.shape[1]
         flat = target if rows == 1 else np.repeat(target, n_starts, axis=0)
-        usual = SEARCH.few_fins_steps if n < MANY else SEARCH.many_fins_steps
+        usual = SEARCH.few_fins_steps if n < SEEDS.many else SEARCH.many_fins_steps
         steps = (
             steps or self.settings.search_steps or (SEARCH.convex_steps if self.objective.convex else usual)
         )

@@ -1,5 +1,6 @@
 """What the search needs to know of a layout, computed once and kept."""
 
+from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
 
@@ -16,18 +17,27 @@ from finlab.layout import Layout
 from finlab.physics.objective import CostMeter, Objective
 from finlab.physics.plant import Plant, plant_of
 
-MAX_SUBSETS = 80
-"""Most sub-layouts that are searched."""
-MANY = 6
-"""Fins from which on effort has more local minima than sub-layouts are searched."""
-LEAST_WORKING = 2
-"""Fewest fins that work in a sub-layout; of two fins, one."""
-RESTING = 1e-3
-"""Share of its largest force at which a fin begins that is to rest."""
-WAKING = (0.1, 0.5)
-"""Least share of its largest force at which a fin begins that worked, and that of one that rested."""
-LEAST_SHARE = 0.05
-"""Least share of its largest force with which a fin begins where all work, some much harder than others."""
+
+@dataclass(frozen=True)
+class SeedNumbers:
+    """Where searches for the least effort begin, which has many local minima."""
+
+    most_subsets: int = 80
+    """Most sub-layouts that are searched."""
+    many: int = 6
+    """Fins from which on effort has more local minima than sub-layouts are searched."""
+    least_working: int = 2
+    """Fewest fins that work in a sub-layout; of two fins, one."""
+    resting: float = 1e-3
+    """Share of its largest force at which a fin begins that is to rest."""
+    waking: tuple[float, float] = (0.1, 0.5)
+    """Least share of its largest force at which a fin begins that worked, and that of one that rested."""
+    least_share: float = 0.05
+    """Least share of its largest force with which a fin begins where all work, some much harder."""
+
+
+SEEDS = SeedNumbers()
+"""What every layout is prepared by."""
 
 
 class Prepared(NamedTuple):
@@ -71,6 +81,8 @@ def prepare(
     if not objective.convex:
         rests = resting_seeds(fins.maximum, resting_fins(layout.n_fins))
         seeds = np.concatenate([rests, uneven_seeds(fins.maximum)])
+    tables = any(fin.model.type == "table" for fin in layout.fins)
+    unsettled = tables if objective.convex else layout.n_fins >= SEEDS.many
     strongest = np.tile(fins.maximum, 2)[:, None] * planar.columns
     return Prepared(
         plant,
@@ -79,7 +91,7 @@ def prepare(
         seeds,
         objective.meter(plant),
         arcs_to_search(fins, len(seeds)),
-        any(fin.model.type == "table" for fin in layout.fins) if objective.convex else layout.n_fins >= MANY,
+        unsettled,
         min(1.0, float(np.linalg.norm(strongest))),
     )
 
@@ -91,14 +103,15 @@ def resting_fins(n: int) -> tuple[tuple[int, ...], ...]:
     from the whole layout may miss.
     """
     fins = range(n)
-    most = min(2, max(n - LEAST_WORKING, n - 1 if n == 2 else 0))
+    most = min(2, max(n - SEEDS.least_working, n - 1 if n == 2 else 0))
     resting = [c for k in range(most + 1) for c in combinations(fins, k)]
-    if n - LEAST_WORKING > most:
-        resting += [tuple(i for i in fins if i not in pair) for pair in combinations(fins, LEAST_WORKING)]
-    return tuple(resting[:MAX_SUBSETS])
+    if n - SEEDS.least_working > most:
+        working = combinations(fins, SEEDS.least_working)
+        resting += [tuple(i for i in fins if i not in pair) for pair in working]
+    return tuple(resting[: SEEDS.most_subsets])
 
 
-def resting_seeds(maximum: Array, rests: tuple[tuple[int, ...], ...], left: float = RESTING) -> Array:
+def resting_seeds(maximum: Array, rests: tuple[tuple[int, ...], ...], left: float = SEEDS.resting) -> Array:
     """Seeds (S, n) [N] from largest forces (n,) in which some fins nearly rest, at the share that is left."""
     seeds = np.tile(maximum, (len(rests), 1))
     for row, fins in enumerate(rests):
@@ -114,7 +127,7 @@ def uneven_seeds(maximum: Array) -> Array:
     fin = np.arange(len(maximum))
     row = fin[:, None] + 1
     spread = (row * 0.6180339887 + fin * 0.7548776662) % 1.0
-    return maximum * (LEAST_SHARE + (1.0 - LEAST_SHARE) * spread**2)
+    return maximum * (SEEDS.least_share + (1.0 - SEEDS.least_share) * spread**2)
 
 
 def neighbour_seeds(size: Array, works: NDArray[np.bool_], maximum: Array) -> Array:
@@ -131,5 +144,5 @@ def neighbour_seeds(size: Array, works: NDArray[np.bool_], maximum: Array) -> Ar
     first, second = np.triu_indices(size.shape[1])
     one = np.eye(size.shape[1], dtype=bool)
     wanted = works[:, None] ^ (one[first] | one[second])
-    start = maximum * np.where(works, np.maximum(size / maximum, WAKING[0]), WAKING[1])
-    return np.where(wanted, start[:, None], RESTING * maximum)
+    start = maximum * np.where(works, np.maximum(size / maximum, SEEDS.waking[0]), SEEDS.waking[1])
+    return np.where(wanted, start[:, None], SEEDS.resting * maximum)

@@ -1,5 +1,6 @@
 """Going down to the next minimum of cost by the fins' own laws, under exact tracking."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 import finlab.allocation.search.cheaper_commands
 from finlab.allocation import load_allocator
-from finlab.allocation.search.cheaper_commands import BEFORE, cheaper_commands
+from finlab.allocation.search.cheaper_commands import DESCENT, cheaper_commands
 from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
 from finlab.arrays import Array
 from finlab.evaluation.experiments.fuzz import hostile_robot, hostile_targets
@@ -52,7 +53,7 @@ def test_is_as_exact_and_never_dearer(kind: str, limits: str, objective: Name, t
 
 def test_where_it_ends_is_a_minimum(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The cost's slope is one of the wrench's where no limit holds: nothing is left to gain at first."""
-    monkeypatch.setattr(finlab.allocation.search.cheaper_commands, "SETTLED", 0.0)
+    monkeypatch.setattr(finlab.allocation.search.cheaper_commands, "DESCENT", replace(DESCENT, settled=0.0))
     problem, cost, target, command = question(robot("drag", 1, tmp_path), "power")
     for _ in range(8):
         command = cheaper_commands(problem, cost, target, command, EXACT)
@@ -98,7 +99,8 @@ def test_what_is_far_out_of_reach_is_left_alone(size: float, tmp_path: Path) -> 
     assert np.isfinite(mixed).all() and (cost(alone) < cost(command)).any()
     np.testing.assert_allclose(cost(mixed[12:]), cost(alone), rtol=1e-3)
     hopeless = cheaper_commands(problem, cost, far, command, EXACT)
-    np.testing.assert_allclose(hopeless, refine(problem, far, command, BEFORE).command, atol=1e-9)
+    start = refine(problem, far, command, DESCENT.lm_steps[0]).command
+    np.testing.assert_allclose(hopeless, start, atol=1e-9)
 
 
 @pytest.mark.filterwarnings("error")

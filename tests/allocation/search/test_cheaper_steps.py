@@ -10,9 +10,7 @@ from scipy.optimize import minimize
 
 import finlab.allocation.search.cheaper_commands as module
 from finlab.allocation.search.cheaper_commands import (
-    DAMPING,
-    LONGEST,
-    SPACING,
+    DESCENT,
     _balance,
     _free_step,
     _Model,
@@ -115,7 +113,7 @@ def test_slopes_are_compared_within_the_limits_except_over_the_seam(problem: Com
         problem.full_turn,
     )
     cost = SimpleNamespace(slopes=lambda command: np.ones(command.shape))
-    command = np.stack([problem.lower, problem.upper, problem.upper - 0.5 * SPACING * problem.width])
+    command = np.stack([problem.lower, problem.upper, problem.upper - 0.5 * DESCENT.spacing * problem.width])
     _model(seen, cast(Any, cost), np.zeros((3, 6)), command)
     (points,) = asked
     points = points.reshape(4, 3, FINS, 3)
@@ -125,7 +123,7 @@ def test_slopes_are_compared_within_the_limits_except_over_the_seam(problem: Com
         sign = np.array([1.0, -1.0, -1.0])[:, None].repeat(FINS, 1)
         if k == 2:
             sign[:, problem.full_turn] = 1.0
-        np.testing.assert_allclose(moved[..., k], SPACING * sign, rtol=1e-6)
+        np.testing.assert_allclose(moved[..., k], DESCENT.spacing * sign, rtol=1e-6)
         assert (np.delete(moved, k, axis=-1) == 0.0).all()
 
 
@@ -185,13 +183,13 @@ def test_a_step_without_limits_is_free_and_at_most_as_long_as_allowed(problem: C
     nothing = np.zeros((ROWS, FINS, 3))
     free, known = _free_step(model, convex(model, multiplier, damping), nothing, nothing.astype(bool))
     np.testing.assert_allclose(answer, known, rtol=1e-6)
-    assert LONGEST < np.abs(free).max() < 0.5
+    assert DESCENT.longest < np.abs(free).max() < 0.5
     for row in range(ROWS):
         longest = np.abs(free[row]).max()
-        np.testing.assert_allclose(step[row], free[row] * min(1.0, LONGEST / longest), atol=1e-7)
+        np.testing.assert_allclose(step[row], free[row] * min(1.0, DESCENT.longest / longest), atol=1e-7)
     model = model._replace(missing=1e-3 * model.missing, slope=1e-3 * model.slope)
     short, _ = _step(far, model, command, multiplier, np.full(ROWS, 0.2))
-    assert 0.0 < np.abs(short).max() < LONGEST
+    assert 0.0 < np.abs(short).max() < DESCENT.longest
     np.testing.assert_allclose(
         np.einsum("rnij,rni->rj", model.jacobian, short), model.missing, rtol=1e-6, atol=1e-9
     )
@@ -230,7 +228,7 @@ def test_a_step_to_a_limit_is_the_cheapest_within_the_limits(problem: CommandPro
                 },
                 options={"maxiter": 300, "ftol": 1e-14},
             )
-            if known.success and np.abs(known.x).max() < LONGEST:
+            if known.success and np.abs(known.x).max() < DESCENT.longest:
                 compared += 1
                 np.testing.assert_allclose(step[row].ravel(), known.x, atol=1e-5)
                 assert step[row, 2, 0] == 0.0
@@ -254,10 +252,10 @@ def test_damping_falls_after_a_gain_and_grows_without_one(
         return taken(problem, model, command, multiplier, damping)
 
     monkeypatch.setattr(module, "_step", spied)
-    monkeypatch.setattr(module, "SETTLED", 0.0)
+    monkeypatch.setattr(module, "DESCENT", replace(DESCENT, settled=0.0))
     command = plant.sample(np.random.default_rng(7), (12,))
     cheaper_commands(problem, cost, problem.wrench(command), command, 1e-5)
-    assert len(seen) == 6 and (seen[0][0] == 1e-3).all() and DAMPING == (1e-3, 0.2, 10.0)
+    assert len(seen) == 6 and (seen[0][0] == 1e-3).all() and DESCENT.damping == (1e-3, 0.2, 10.0)
     for (before, start), (after, end) in zip(seen, seen[1:], strict=False):
         moved = (start != end).any((1, 2))
         np.testing.assert_allclose(after / before, np.where(moved, 0.2, 10.0))
@@ -274,7 +272,7 @@ def test_it_ends_when_no_row_has_more_to_gain(
         return taken(*given)
 
     monkeypatch.setattr(module, "_step", counted)
-    monkeypatch.setattr(module, "SETTLED", 1e9)
+    monkeypatch.setattr(module, "DESCENT", replace(DESCENT, settled=1e9))
     plant = plant_of(problem.fin.layout)  # type: ignore[attr-defined]
     command = plant.sample(np.random.default_rng(7), (4,))
     cheaper_commands(problem, Objective("power").meter(plant), problem.wrench(command), command, 1e-5)

@@ -12,7 +12,7 @@ from finlab.allocation import load_allocator
 from finlab.allocation.search import pipeline, search_allocator
 from finlab.allocation.search.pipeline import SEARCH
 from finlab.allocation.search.prepared import (
-    MAX_SUBSETS,
+    SEEDS,
     Prepared,
     neighbour_seeds,
     prepare,
@@ -143,7 +143,7 @@ def test_up_to_two_fins_rest_or_all_but_two(for_effort: Prepared, prepared: Prep
     ]
     if n > 4:
         expected += [tuple(i for i in range(n) if i not in pair) for pair in combinations(range(n), 2)]
-    expected = expected[:MAX_SUBSETS]
+    expected = expected[: SEEDS.most_subsets]
     assert list(resting_fins(n)) == expected
     rests, uneven = np.split(for_effort.seeds, [len(expected)])
     assert [tuple(np.flatnonzero(row < top)) for row in rests] == expected
@@ -155,7 +155,8 @@ def test_up_to_two_fins_rest_or_all_but_two(for_effort: Prepared, prepared: Prep
 
 
 @pytest.mark.parametrize(
-    ("n", "count"), [(1, 1), (2, 3), (3, 4), (4, 11), (5, 26), (8, 65), (9, MAX_SUBSETS), (16, MAX_SUBSETS)]
+    ("n", "count"),
+    [(1, 1), (2, 3), (3, 4), (4, 11), (5, 26), (8, 65), (9, SEEDS.most_subsets), (16, SEEDS.most_subsets)],
 )
 def test_how_many_sub_layouts_there_are(n: int, count: int) -> None:
     assert len(resting_fins(n)) == count
