@@ -85,7 +85,7 @@ def report(
         records: folder for the records; DIR/records by default.
         processes: parts that run at once; the number of cores by default.
         sections: run only some: wrench, cost, network, modes, unreachable, steadiness, latency, closed-loop,
-            ablation, temperature, training; the page shows what is there of all.
+            hard-days, ablation, temperature, training; the page shows what is there of all.
         as_is: do no work; make the page from what is there.
     """
     from finlab.evaluation.method_specs import Checkpoints

@@ -76,6 +76,8 @@ class HardDay:
     """How many fins are lost half-way, each and each pair in its turn."""
     announced: bool = True
     """Whether allocator and controller are told of a loss; else a `FaultMonitor` has to find it."""
+    reason: str = ""
+    """Why `search` need not lead there, as far as known: a sentence."""
 
     def path(self) -> Trajectory:
         """What is followed."""

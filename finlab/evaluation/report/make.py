@@ -21,6 +21,7 @@ from finlab.evaluation.report.sections import (
     questions,
     studies,
     summary,
+    swims,
     wrench_tracking,
 )
 from finlab.evaluation.report.sizes import Sizes
@@ -100,6 +101,7 @@ def result_blocks(results: Results, sizes: Sizes) -> list[Block]:
         "trajectory": lambda rows: closed_loop.trajectory_blocks(rows, results.tracks),
         "faults": closed_loop.fault_blocks,
         "velocity": closed_loop.velocity_blocks,
+        "swims": swims.day_blocks,
         "ablation": studies.ablation_blocks,
         "temperature": lambda rows: studies.temperature_blocks(rows, results.scatter),
         "training": lambda rows: studies.training_blocks(rows, sizes.of_table["training"]),
@@ -107,7 +109,7 @@ def result_blocks(results: Results, sizes: Sizes) -> list[Block]:
     blocks: list[Block] = []
     for table, make in makers.items():
         if table in tables:
-            if table in SWIMMERS and closed_loop.INTRODUCTION[0] not in blocks:
+            if table in (*SWIMMERS, "swims") and closed_loop.INTRODUCTION[0] not in blocks:
                 blocks += closed_loop.INTRODUCTION
             blocks += make(tables[table])
     return blocks

@@ -11,6 +11,7 @@ from typing import Any
 from finlab.errors import DataError
 from finlab.evaluation.experiments.ablation import REFINEMENTS, VARIANTS
 from finlab.evaluation.experiments.cost import OBJECTIVES, cost_sets
+from finlab.evaluation.experiments.hard_days import choose_days
 from finlab.evaluation.experiments.temperature import PAPER_TEMPERATURE, TEMPERATURES
 from finlab.evaluation.experiments.training_study import CHANGES
 from finlab.evaluation.method_specs import (
@@ -43,10 +44,13 @@ SWIMMERS = {
     "velocity": "search,search-effort,analytic,on-board",
 }
 """Experiment in closed loop -> methods that swim."""
+DAY_METHODS = "search,analytic,on-board"
+"""Methods that swim the hard days."""
 SECTIONS = {
     **{name: (name,) for name in ("wrench", "cost", "network", "modes", "unreachable", "steadiness")},
     "latency": ("latency", "first_answers"),
     "closed-loop": ("trajectory", "faults", "velocity"),
+    "hard-days": ("swims",),
     "ablation": ("ablation",),
     "temperature": ("temperature", "scatter"),
     "training": ("training",),
@@ -73,8 +77,8 @@ class Plan:
 
     tables: dict[str, dict[Any, Job]] = field(default_factory=dict)
     """Table -> jobs by what tells them apart: `wrench` by (split, method), `cost` by (set of cases,
-    objective), `network` by (fins, objective), `ablation` by (variant, refinement), `temperature` and
-    `training` by what is changed; the others are one job each, under the key ()."""
+    objective), `network` by (fins, objective), `swims` by the day, `ablation` by (variant, refinement),
+    `temperature` and `training` by what is changed; the others are one job each, under the key ()."""
 
     def only(self, sections: Collection[str]) -> "Plan":
         """The jobs of some sections."""
@@ -135,6 +139,8 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
     for table, swimmers in SWIMMERS.items():
         if table in sizes.of_table:
             add(table, (), ["search"], methods=swimmers)
+    for day in choose_days(sizes.of_table["swims"]["scenarios"]) if "swims" in sizes.of_table else ():
+        add("swims", (day.name,), ["search"], scenarios=day.name, methods=DAY_METHODS)
     if torch:
         tables["training"] = training_jobs(sizes.of_table["training"] | {"seed": seed}, runs)
     return Plan({table: jobs for table, jobs in tables.items() if jobs})

@@ -11,10 +11,12 @@ from finlab.evaluation.experiments.closed_loop_runs import Run, Scenario, run_al
 from finlab.evaluation.experiments.cost import cost_rows
 from finlab.evaluation.experiments.faults import all_faults, fault_rows, fault_scenarios
 from finlab.evaluation.experiments.first_answers import first_answer_rows
+from finlab.evaluation.experiments.hard_days import choose_days
 from finlab.evaluation.experiments.latency import latency_cases, latency_rows
 from finlab.evaluation.experiments.mode_coverage import mode_rows
 from finlab.evaluation.experiments.network import network_rows
 from finlab.evaluation.experiments.steadiness import steadiness_rows
+from finlab.evaluation.experiments.swims import swim_all
 from finlab.evaluation.experiments.temperature import refinement_columns, temperature_columns
 from finlab.evaluation.experiments.training_study import train_and_run
 from finlab.evaluation.experiments.trajectory_and_velocity import (
@@ -161,6 +163,14 @@ def velocity(*, methods: str, runs: int, seed: int, checkpoints: Checkpoints) ->
     """Rows of the velocity experiment on layout A."""
     scenarios = velocity_scenarios(load_layout("A"))
     return columns_of_rows(velocity_rows(_swim(scenarios, methods, runs, seed, checkpoints)))
+
+
+def swims(*, scenarios: str, methods: str, seeds: int, seed: int, checkpoints: Checkpoints) -> Columns:
+    """Swims of hard days, each with its figures."""
+    found = swim_all(
+        choose_days(scenarios), _allocators(methods.split(","), checkpoints), range(seed, seed + seeds)
+    )
+    return columns_of_rows([swim._asdict() for swim in found])
 
 
 def _swim(

@@ -154,6 +154,9 @@ def test_the_best_baseline_is_another_for_each_figure() -> None:
     assert all("verdict" not in row for row in others) and others[-1]["lost"] == 4
     text = to_text(*swim_blocks([DAYS["nominal"]], [own, *others], [])).replace("\n", " ")
     assert "error better, power level; error 0.51 of that of `analytic`, power 1.17 of that of" in text
+    known = replace(DAYS["nominal"], reason="Nobody knows why.")
+    told = " ".join(to_text(*swim_blocks([known], [own, *others], [])).split())
+    assert "board`. Nobody knows why." in told
 
 
 def test_who_alone_keeps_the_path_and_who_loses_it() -> None:

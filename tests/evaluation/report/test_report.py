@@ -31,6 +31,7 @@ TINY = Sizes(
         "steadiness": {"layouts": ["D"], "paths": 1, "ticks": 3},
         "latency": {"calls": 3, "budget_s": 0.5},
         "first_answers": {"robots": 1},
+        "swims": {"scenarios": "saturated", "seeds": 1},
         "ablation": cases(2, 2),
         "temperature": cases(2, 2),
         "training": cases(2, 2, preset="smoke", steps=4, batch_size=32),
@@ -113,8 +114,16 @@ def test_page_twin_pictures_and_rows_say_the_same(folder: Path, untrained_checkp
     assert {(row["fins"], row["objective"]) for row in tables["network"]} == {(4, "power"), (4, "effort")}
     assert [row["fins"] for row in tables["first_answers"]] == ["drag", "drag", "table", "table"]
     assert [row["layout"] for row in tables["steadiness"]] == ["D"]
-    for section in planning.SECTIONS:
-        assert section == "closed-loop" or section in tables  # nothing swims in a tiny report
+    for section, parts in planning.SECTIONS.items():
+        assert section == "closed-loop" or set(parts) & set(tables)  # hardly anything swims in a tiny report
+    swum = [(swim["scenario"], swim["layout"], swim["method"]) for swim in tables["swims"]]
+    assert swum == [
+        ("saturated", layout, method)
+        for layout in ("A", "C")
+        for method in ("search", "analytic", "on-board")
+    ]
+    for words in ("Hard days", "The path asks for more than the fins can give", "error, hard days"):
+        assert words in page and words in twin
 
 
 def test_every_method_says_what_it_was_given(folder: Path) -> None:

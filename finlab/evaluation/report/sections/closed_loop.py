@@ -30,7 +30,7 @@ INTRODUCTION = (
     "## Closed loop",
     (
         "A robot with six degrees of freedom swims in simulation, sensor noise and servo lag included; "
-        "the controllers are the paper's. The paper's runs took place in another simulator "
+        "the controllers are the paper's, but on hard days. The paper's runs took place in another simulator "
         "(trajectories) and in a pool (faults, speeds), on paths that it does not describe: its "
         "figures stand beside ours, not against them. All methods were given the laws by "
         "which the simulated fins push in plant `mean`, and none knows the soft fins of plant `flexible`; "

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from finlab.evaluation.experiments.cost import OBJECTIVES
+from finlab.evaluation.experiments.swims import TITLES, Swim, swim_rows
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.report.document import Block, Card, Column, Fold, Row, Table
 from finlab.evaluation.report.numbers import error, share, three
@@ -74,6 +75,9 @@ def comparisons(tables: Tables) -> list[Row]:
     found += compare("ATE", tables.get("trajectory", ()), "ate", lambda row: f"layouts {row['layout']}")
     faults = [row for row in tables.get("faults", ()) if row["controllable"]]
     found += compare("ATE, fins lost", faults, "ate", lambda row: row["fault"])
+    days = swim_rows([Swim(**swim) for swim in tables.get("swims", ())])
+    for value, title in TITLES.items():
+        found += compare(f"{title}, hard days", days, value, lambda row: row["scenario"])
     for measure, value in (("inertial power", "inertial_w"), ("speed error", "mae")):
         found += compare(measure, tables.get("velocity", ()), value, _speed, (OURS, "search-effort"))
     return found

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from finlab.control.completion import LEVER_M
 from finlab.evaluation.experiments.closed_loop_runs import LOST_M, RTE_DELTA_S
-from finlab.evaluation.experiments.hard_days import HardDay
-from finlab.evaluation.experiments.swims import GAP_N, goal_sentences
+from finlab.evaluation.experiments.hard_days import HARD_DAYS, HardDay
+from finlab.evaluation.experiments.swims import GAP_N, Swim, goal_sentences, not_swum, swim_rows
 from finlab.evaluation.report.document import Block, Column, Row, Table, method_row
 
 WHAT = (Column("scenario", "scenario"), Column("method", "method"), Column("swims", "swims", "count"))
@@ -27,6 +27,10 @@ STEPS = (
     Column("rests_per_min", "rest and work / min", "three"),
     Column("out_of_reach", "out of reach", "share"),
     Column("cpu_s_per_min", "CPU s / min", "three"),
+)
+ABOUT = (
+    "All methods swim with one controller, which follows position, velocity and acceleration, under the same "
+    "noise. `search` takes from it the wrenches that it expects, the others the present one."
 )
 LEADS = "error better, power better"
 
@@ -54,18 +58,30 @@ def swim_blocks(days: Sequence[HardDay], rows: Sequence[Row], hopeless: Sequence
     ]
     if hopeless:
         blocks += ["Not swum:", "\n".join(f"- `{row['scenario']}`: {row['reason']}." for row in hopeless)]
-    if sentences := [_sentence(row) for row in rows if row.get("verdict", LEADS) != LEADS]:
+    reasons = {day.name: day.reason for day in days}
+    missed = [row for row in rows if row.get("verdict", LEADS) != LEADS]
+    if sentences := [_sentence(row, reasons.get(row["scenario"], "")) for row in missed]:
         blocks += ["Not won in error and power both:", "\n".join(f"- {sentence}" for sentence in sentences)]
     if goals := goal_sentences(days, rows):
         blocks += ["Goals:", "\n".join(f"- {sentence}." for sentence in goals)]
     return blocks
 
 
-def _sentence(row: Row) -> str:
+def day_blocks(swims: Sequence[Row]) -> list[Block]:
+    """The section of a whole report, from single swims as `Swim` names their figures."""
+    done = [Swim(**swim) for swim in swims]
+    names = dict.fromkeys(swim.scenario for swim in done)
+    days = [day for day in HARD_DAYS if day.name in names]
+    title, *blocks = swim_blocks(days, swim_rows(done), not_swum(days))
+    return [title, ABOUT, *blocks]
+
+
+def _sentence(row: Row, reason: str) -> str:
     about = f"`{row['scenario']}`, `{row['method']}`: {row['verdict'] or 'one seed has no interval'}"
+    because = f" {reason}" if reason else ""
     if "ate_ratio" not in row:
-        return f"{about}."
+        return f"{about}.{because}"
     return (
         f"{about}; error {row['ate_ratio']:.2f} of that of `{row['ate_best']}`, power "
-        f"{row['driving_w_ratio']:.2f} of that of `{row['driving_w_best']}`."
+        f"{row['driving_w_ratio']:.2f} of that of `{row['driving_w_best']}`.{because}"
     )
