@@ -14,7 +14,7 @@ from finlab.control.completion import LEVER_M
 from finlab.evaluation.experiments.closed_loop_runs import LOST_M, Row, follow_row
 from finlab.evaluation.experiments.hard_days import HardDay, Kind
 from finlab.evaluation.progress import progress
-from finlab.evaluation.statistics.bootstrap import Interval, mean_interval
+from finlab.evaluation.statistics.bootstrap import Interval, mean_interval, spread_interval
 from finlab.layout.angles import wrapped
 from finlab.sim import RunLog
 
@@ -129,7 +129,8 @@ def swim_rows(swims: Sequence[Swim]) -> list[Row]:
     """One row per day and method: means over its swims, the largest steps and peaks, intervals over seeds.
 
     `ate_interval` and `driving_w_interval` are there from two seeds on. Our methods have `ate_ratio` and
-    `driving_w_ratio` over the least of the baselines that keep their reference, and verdicts.
+    `driving_w_ratio` over the least of the baselines that keep their reference, with intervals of their own,
+    swim against swim of the same seed, and verdicts by these.
     """
     groups: dict[tuple[str, str], list[Swim]] = {}
     for swim in swims:
@@ -137,7 +138,8 @@ def swim_rows(swims: Sequence[Swim]) -> list[Row]:
     rows = [_row(scenario, method, mine) for (scenario, method), mine in groups.items()]
     for row in rows:
         if row["method"].startswith(OURS):
-            row |= _against(row, [other for other in rows if other["scenario"] == row["scenario"]])
+            others = [other for other in rows if other["scenario"] == row["scenario"]]
+            row |= _against(row, others, groups)
     return rows
 
 
@@ -153,7 +155,7 @@ def _row(scenario: str, method: str, swims: Sequence[Swim]) -> Row:
     return row
 
 
-def _against(row: Row, rows: Sequence[Row]) -> Row:
+def _against(row: Row, rows: Sequence[Row], swims: Mapping[tuple[str, str], Sequence[Swim]]) -> Row:
     """Ratios and verdicts of one of our rows against the baselines among the rows of a scenario."""
     baselines = [other for other in rows if not other["method"].startswith(OURS)]
     keeping = [other for other in baselines if not other["lost"]]
@@ -166,8 +168,10 @@ def _against(row: Row, rows: Sequence[Row]) -> Row:
     for key, title in TITLES.items():
         best = min(keeping or baselines, key=lambda other: float(other[key]))
         found |= {f"{key}_ratio": row[key] / best[key], f"{key}_best": best["method"]}
-        if (interval := f"{key}_interval") in row and interval in best:
-            found[f"{key}_verdict"] = compare(Interval(*row[interval]), Interval(*best[interval]))
+        own, other = (swims[row["scenario"], method] for method in (row["method"], best["method"]))
+        if (interval := paired_interval(own, other, key)) is not None:
+            found[f"{key}_ratio_interval"] = [1.0 + end / best[key] for end in interval]
+            found[f"{key}_verdict"] = verdict_of(interval)
             words.append(f"{title} {found[f'{key}_verdict']}")
     lost = ["loses its path"] if row["lost"] and keeping else []
     return {**found, "verdict": ", ".join(lost + words)}
@@ -195,8 +199,22 @@ def goal_sentences(days: Sequence[HardDay], rows: Sequence[Row]) -> list[str]:
     return sentences
 
 
-def compare(own: Interval, other: Interval) -> str:
-    """Whether less is `better` or more `worse` beyond both intervals; else `level`."""
-    if own.high < other.low:
+def paired_interval(own: Sequence[Swim], other: Sequence[Swim], key: str) -> Interval | None:
+    """Where another seed should land: by how much a figure of one method is more than another's, each swim
+    against that of the same case and seed, by Student's t over seeds; None for a single seed."""
+    theirs = {(swim.layout, tuple(swim.fins), swim.seed): swim.figures[key] for swim in other}
+    by_seed: dict[int, list[float]] = {}
+    for swim in own:
+        more = swim.figures[key] - theirs[swim.layout, tuple(swim.fins), swim.seed]
+        by_seed.setdefault(swim.seed, []).append(more)
+    if len(by_seed) < 2:
+        return None
+    means = np.array([np.mean(values) for values in by_seed.values()])
+    return spread_interval(float(means.mean()), float(means.std(ddof=1)), len(means))
+
+
+def verdict_of(more: Interval) -> str:
+    """`better` where another seed, too, should land below nothing more, `worse` above it; else `level`."""
+    if more.high < 0.0:
         return "better"
-    return "worse" if own.low > other.high else "level"
+    return "worse" if more.low > 0.0 else "level"

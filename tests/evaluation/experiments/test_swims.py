@@ -14,12 +14,13 @@ from finlab.evaluation.experiments.hard_days import HARD_DAYS, Case, HardDay, ch
 from finlab.evaluation.experiments.swims import (
     FIGURES,
     Swim,
-    compare,
     goal_sentences,
     not_swum,
+    paired_interval,
     swim_all,
     swim_figures,
     swim_rows,
+    verdict_of,
 )
 from finlab.evaluation.on_board import OnBoard
 from finlab.evaluation.report.sections.swims import swim_blocks
@@ -134,10 +135,19 @@ def _swim(method: str, seed: int, ate: float, watts: float, farthest: float = 0.
     return Swim("nominal", method, "A", (), seed, figures)
 
 
-def test_intervals_that_do_not_overlap_decide() -> None:
-    assert compare(Interval(1.0, 2.0), Interval(2.1, 3.0)) == "better"
-    assert compare(Interval(1.0, 2.0), Interval(2.0, 3.0)) == "level"
-    assert compare(Interval(4.0, 5.0), Interval(2.0, 3.0)) == "worse"
+def test_swims_of_the_same_noise_are_held_against_each_other() -> None:
+    """Seeds differ by far more than methods do, but all in the same way."""
+    ours = [_swim("search", seed, 0.05 * seed, 1.0) for seed in range(1, 6)]
+    more = [0.004, 0.005, 0.006, 0.005, 0.005]
+    theirs = [_swim("analytic", seed, 0.05 * seed + more[seed - 1], 1.0) for seed in range(1, 6)]
+    interval = paired_interval(ours, theirs[::-1], "ate")
+    assert interval is not None and -0.007 < interval.low < -0.005 < interval.high < -0.003
+    assert verdict_of(interval) == "better" and verdict_of(Interval(-0.1, 0.1)) == "level"
+    assert verdict_of(Interval(0.1, 0.2)) == "worse"
+    assert paired_interval(ours[:1], theirs[:1], "ate") is None
+    row = swim_rows([*ours, *theirs])[0]
+    assert row["ate_ratio_interval"][0] < row["ate_ratio"] < row["ate_ratio_interval"][1] < 1.0
+    assert row["verdict"] == "error better, power level"
 
 
 def test_the_best_baseline_is_another_for_each_figure() -> None:

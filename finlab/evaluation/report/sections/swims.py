@@ -11,11 +11,11 @@ from finlab.evaluation.report.document import Block, Column, Row, Table, method_
 WHAT = (Column("scenario", "scenario"), Column("method", "method"), Column("swims", "swims", "count"))
 ERRORS = (
     Column("ate", "ATE [m]", "metres", "ate_interval"),
-    Column("ate_ratio", "over best", "ratio"),
+    Column("ate_ratio", "over best", "ratio", "ate_ratio_interval"),
     Column("rte", "RTE [m]", "metres"),
     Column("depth_rmse", "depth RMSE [m]", "metres"),
     Column("driving_w", "power [W]", "three", "driving_w_interval"),
-    Column("driving_w_ratio", "over best", "ratio"),
+    Column("driving_w_ratio", "over best", "ratio", "driving_w_ratio_interval"),
     Column("peak_w", "peak [W]", "three"),
     Column("lost", "lost", "count"),
     Column("verdict", "verdict"),
@@ -44,8 +44,9 @@ def swim_blocks(days: Sequence[HardDay], rows: Sequence[Row], hopeless: Sequence
         Table((*WHAT, *ERRORS), shown),
         (
             f"*Means over swims; peaks are the largest. RTE over {RTE_DELTA_S:g} s. Power with the motors' "
-            "losses. Intervals over seeds by bootstrap, where another seed should land; a verdict needs "
-            "intervals that do not overlap. Best: the least of the baselines that keep their reference, "
+            "losses. Intervals over seeds, where another seed should land: of means by bootstrap, of ratios "
+            "by Student's t, each swim against that of the same case and noise; a verdict needs an interval "
+            "without 1. Best: the least of the baselines that keep their reference, "
             f"for error and power each. Lost: swims that were ever farther than {LOST_M:g} m away.*"
         ),
         Table((*WHAT, *STEPS), shown),
