@@ -198,7 +198,7 @@ class FaultMonitor:
                 for index in np.flatnonzero(gone):
                     beliefs.believe(int(index), 0.0)
             self._weak &= strength < WHOLE_ABOVE
-        if beliefs.doubt < self.settings.threshold:
+        if beliefs.doubt < self.settings.threshold or not beliefs.settled:
             self._sure = 0
             return
         by_kind = beliefs.probability

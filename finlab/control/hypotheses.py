@@ -96,7 +96,7 @@ class Hypotheses:
     def feed(self, dt: float) -> Array:
         """What is taken for true may have ended just now; returns how much (n, m) of each belief is new."""
         self._age_s += dt
-        if self._age_s < self.settings.settle_s:
+        if not self.settled:
             self._settle()
             return np.ones_like(self.probability)
         fresh, kept = dt * (1.0 - self.doubt), 1.0 - dt / self.settings.doubt_s
@@ -159,6 +159,11 @@ class Hypotheses:
         total = sum(weight.ravel().tolist())
         whole = total + (1.0 - self.doubt) * math.exp(-best)
         self.probability, self.doubt = weight / whole, total / whole
+
+    @property
+    def settled(self) -> bool:
+        """Whether there was time to learn current and trim, so that beliefs count."""
+        return self._age_s >= self.settings.settle_s
 
     @property
     def strength(self) -> Array:

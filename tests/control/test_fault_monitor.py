@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from finlab.allocation import load_allocator
 from finlab.allocation.allocator import Allocator
 from finlab.control import FaultMonitor, Measurement, MonitorSettings, WaypointController
 from finlab.errors import LayoutError
-from finlab.layout import Layout
+from finlab.layout import Layout, load_layout
 from finlab.sim import NOISE_ALONE, ClosedLoop, FinFault, RunLog, SteadyCurrent, make_trajectory
 
 CURRENT = (0.03, -0.02, 0.0)
@@ -150,6 +151,7 @@ def test_a_single_odd_sample_decides_nothing(layout_a: Layout) -> None:
     monitor, nowhere = FaultMonitor(layout_a), np.full(4, np.nan)
     beliefs = monitor._beliefs
     before = beliefs.probability.copy(), beliefs.doubt
+    beliefs._age_s = monitor.settings.settle_s  # long enough under way to be believed
     for sure in (True, False, True):
         beliefs.probability, beliefs.doubt = before[0].copy(), before[1]
         if sure:
@@ -198,3 +200,21 @@ def test_the_last_fin_that_works_is_never_called_lost(layout_a: Layout) -> None:
         verdict = monitor.step(still._replace(velocity=np.zeros(3)), command)
     assert verdict.strength[0] < 0.9 or verdict.probability[0] > 0.5, "the case is not hard enough"
     assert layout_a.names[0] not in verdict.failed
+
+
+def test_nothing_is_suspected_before_current_and_trim_are_learnt() -> None:
+    """Soft tips that nobody knows of push otherwise than the model says from the first beat on."""
+    layout = load_layout("A")
+    monitor = FaultMonitor(layout)
+    swim = ClosedLoop(
+        layout,
+        load_allocator(),
+        make_trajectory("lissajous"),
+        monitor=monitor,
+        announced=False,
+        plant="flexible",
+        seed=0,
+    )
+    while swim.time < monitor.settings.settle_s - 0.05:
+        swim.step()
+        assert monitor.broken == ()
