@@ -17,6 +17,7 @@ from finlab.bundle_files import LARGEST_BUNDLE
 from finlab.errors import FinlabError
 from webapp.handles import Changes, on_user_change, put
 from webapp.markup.picking import chosen_button
+from webapp.number_fields import NumberField, NumberFields
 from webapp.scene.scenery import Scenery
 from webapp.session import Session
 from webapp.session.state import State
@@ -96,9 +97,12 @@ class Page(ABC):
         """What is seen beside the panel."""
         self.bound: list[Callable[[], None]] = []
         """Each writes what the session holds into a widget; the panel that is being built takes them."""
+        self.fields = NumberFields(client.gui)
+        """The boxes for numbers."""
         limit_uploads(client.gui, MAX_UPLOAD, self._refuse_upload)
         self._panels: list[Panel] = []
         self._panels, self._swim_panels = self._build()
+        self.fields.start()
         self._refresh()
         self._ask()
 
@@ -120,15 +124,23 @@ class Page(ABC):
 
     def do(self, act: Callable[[], object]) -> None:
         """Carry out an intent; a refusal becomes a note, and the page goes back to what the session holds."""
+        error = self.attempt(act)
+        if error is not None:
+            self.notify("Not possible", str(error))
+
+    def attempt(self, act: Callable[[], object]) -> FinlabError | None:
+        """Carry out an intent, and give back why it was refused; whoever asks says it where it belongs."""
         self._faults.clear()
+        refusal = None
         try:
             act()
         except FinlabError as error:
-            self.notify("Not possible", str(error))
+            refusal = error
         except Exception as error:  # the page must go on, whatever we have got wrong
             self.fault(error)
         self._ask()
         self._refresh()
+        return refusal
 
     def on_change(self, handle: Any, act: Callable[[Any], object]) -> None:
         """Carry out `act(value)` when the user changes an input."""
@@ -138,6 +150,24 @@ class Page(ABC):
         """An input that carries out `act(value)` when the user changes it, and else shows `value()`."""
         self.on_change(handle, act)
         self.bound.append(lambda: put(handle, value=value()))
+        return handle
+
+    def bind_number(
+        self, handle: Input, act: Callable[[Any], object], value: Callable[[], object], digits: int = 4
+    ) -> Input:
+        """A slider, number or vector for numbers, made just now: its boxes take texts with units and
+        arithmetic, and say below them what was refused. `digits` are shown behind the point."""
+        session = self.session
+        field = NumberField(
+            handle,
+            self.client.gui.add_html("", visible=False),
+            lambda asked: self.attempt(partial(act, asked)),
+            value,
+            lambda: (session.selected, session.state.layout.name),
+            digits,
+        )
+        on_user_change(handle, field.slide)
+        self.bound.append(self.fields.add(field))
         return handle
 
     def bind_display(self, handle: Input, key: str) -> Input:

@@ -59,6 +59,11 @@ def put_marks(slider: viser.GuiSliderHandle[float], marks: tuple[tuple[float, st
         slider._marks = wanted
 
 
+def uuid_of(handle: Any) -> str:
+    """What a handle is called in the page."""
+    return str(handle._impl.uuid)
+
+
 def run_script(gui: viser.GuiApi, source: str) -> None:
     """Run a script in the page, as viser does to bring its plots."""
     gui._websock_interface.queue_message(_messages.RunJavascriptMessage(source=source))

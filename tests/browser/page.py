@@ -81,6 +81,8 @@ class Page:
             self.view.scenery.robot.look_from("3D")
             done.set()
 
+        self.page.evaluate("document.activeElement?.blur()")
+        self.rest(100)
         self._served.server.get_event_loop().call_soon_threadsafe(self.view.do, restart)
         self.until(done.is_set)
         self.close_notes()

@@ -45,7 +45,7 @@ def test_hull_from_a_file_and_by_numbers(page: Any, tmp_path: Path, monkeypatch:
     page.until(lambda: page.vertices("/robot/hull") != before)
     page.choose("Shape", "torpedo")
     page.until(lambda: page.session.state.layout.body.hull.shape == "torpedo")
-    page.type("Gravity [m]", "0.02", place=0)
+    page.type("Centre of gravity [m]", "0.02", place=0)
     page.until(lambda: page.session.state.layout.body.hull.center_m[0] == -0.02)
     page.tab("Hull")
 

@@ -86,12 +86,12 @@ def test_copies_stand_around_another_axis(page: Any) -> None:
     page.node("/robot/fins/6/turn/blade")
 
 
-def test_bad_number_is_refused_with_a_note(page: Any) -> None:
+def test_bad_number_is_refused_below_its_box(page: Any) -> None:
     page.key("n")
     page.tab("Layout")
     before = page.session.state.layout
     page.type("Position [m]", "55", place=2)
-    page.until(lambda: any("z of front_right" in note for note in page.notes()))
+    page.until(lambda: "z of front_right" in "".join(page.page.locator(".fl.note:visible").all_inner_texts()))
     assert page.session.state.layout == before
 
 

@@ -62,18 +62,23 @@ class DamagePanel:
                 "Which fin", ("1",), hint="Also the one that is selected in the view."
             )
             page.on_change(self._fin, page.session.select)
-            page.bind(
+            page.bind_number(
                 gui.add_slider("Strength [%]", 100 * STRENGTH_RANGE[0], 100.0, 5.0, 100.0, hint=left),
                 lambda share: page.session.weaken(self._name, share / 100.0),
-                lambda: round(100.0 * dict(page.session.state.weak).get(self._name, 1.0), 1),
+                lambda: 100.0 * dict(page.session.state.weak).get(self._name, 1.0),
+                digits=1,
             )
             page.bind(
                 gui.add_checkbox("Stuck", False, hint=flaps),
-                lambda stuck: self._jam(stuck, self._angle.value),
+                lambda stuck: self._jam(stuck, 0.0),
                 lambda: self._stop is not None,
             )
-            self._angle = gui.add_slider("Stuck at [°]", -180.0, 180.0, 5.0, 0.0, hint=stays, visible=False)
-            page.on_change(self._angle, partial(self._jam, True))
+            self._angle = page.bind_number(
+                gui.add_slider("Stuck at [°]", -180.0, 180.0, 5.0, 0.0, hint=stays, visible=False),
+                partial(self._jam, True),
+                lambda: math.degrees(self._stop or 0.0),
+                digits=1,
+            )
             mends = {"This fin": lambda: page.session.mend(self._name), "All fins": page.session.mend_all}
             page.add_buttons("Repair", mends, hint="Whole again; can be undone like all else.")
 
@@ -95,5 +100,3 @@ class DamagePanel:
         """Write the damage of the fin."""
         put(self._fin, options=self._page.session.state.layout.names, value=self._name)
         put(self._angle, visible=self._stop is not None)
-        if self._stop is not None:
-            put(self._angle, value=round(math.degrees(self._stop), 1))

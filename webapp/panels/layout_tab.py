@@ -9,6 +9,7 @@ from typing import Any
 import viser
 
 from finlab.analysis.score_card import quick_check
+from finlab.layout import Fin
 from finlab.layout.body import HULL_SHAPES
 from webapp.handles import Changes, hold_kind, put
 from webapp.markup.score_card import check_card, warnings
@@ -19,7 +20,7 @@ from webapp.scene.meshes.mesh_hull import UNITS
 from webapp.session import ANGLE_STEPS, POSITION_STEPS
 from webapp.session.files import shipped, shipped_name, stored_hull
 from webapp.session.layout_edits import center_of_gravity
-from webapp.session.state import MAX_FINS
+from webapp.session.state import MAX_FINS, number
 
 NONE = "none"
 """Entry of the list of fins that selects nothing."""
@@ -46,15 +47,19 @@ class LayoutTab:
         self._fins = gui.add_dropdown("Fin", (NONE,), hint="Or click one in the view; N is next, X none.")
         page.on_change(self._fins, lambda name: session.select(None if name == NONE else name))
         with gui.add_folder("Place"):
-            self._position = gui.add_vector3(
-                "Position [m]", (0.0, 0.0, 0.0), step=0.005, hint="x forward, y left, z up."
+            about = "x forward, y left, z up."
+            self._position = page.bind_number(
+                gui.add_vector3("Position [m]", (0.0, 0.0, 0.0), step=0.005, hint=about),
+                self._move,
+                lambda: (0.0, 0.0, 0.0) if self._fin is None else self._fin.position,
             )
-            page.on_change(self._position, self._move)
-            self._angle = gui.add_slider(
-                "Shaft [°]", -180.0, 180.0, 1.0, 0.0, hint="Azimuth of the shaft, 0 is ahead."
+            about = "Azimuth of the shaft, 0 is ahead."
+            self._angle = page.bind_number(
+                gui.add_slider("Shaft [°]", -180.0, 180.0, 1.0, 0.0, hint=about),
+                self._turn,
+                lambda: 0.0 if self._fin is None else math.degrees(self._fin.mounting_angle),
+                digits=2,
             )
-            self._angle.precision = 1  # typed more finely than dragged
-            page.on_change(self._angle, self._turn)
             slides = "Fins slide on the hull's surface, shafts along its normal."
             snap_m = gui.add_dropdown("Snap place", tuple(POSITION_STEPS), hint="Grid for positions.")
             snap_deg = gui.add_dropdown("Snap turn", tuple(ANGLE_STEPS), hint="Grid for the shaft.")
@@ -89,6 +94,13 @@ class LayoutTab:
         self._hull = HullPanel(gui, page)
         self._changes = Changes()
 
+    @property
+    def _fin(self) -> Fin | None:
+        """The selected fin."""
+        session = self._page.session
+        layout = session.state.layout
+        return None if session.selected is None else layout.fins[layout.index(session.selected)]
+
     def _open(self, name: str) -> None:
         if name in shipped():
             self._page.session.open_layout(shipped()[name])
@@ -101,7 +113,8 @@ class LayoutTab:
     def _turn(self, degrees: float) -> None:
         session = self._page.session
         if session.selected is not None:
-            session.turn_fin(session.selected, math.radians(degrees))
+            checked = number(degrees, f"shaft of {session.selected} [°]", -3600.0, 3600.0)
+            session.turn_fin(session.selected, math.radians(checked))
 
     def _copy_around(self, count: int) -> None:
         self._page.session.ring_of_fins(count, RINGS.get(self._axis.value, "z"))
@@ -111,13 +124,8 @@ class LayoutTab:
         self._model.refresh()
         session, layout = self._page.session, self._page.session.state.layout
         put(self._fins, options=(NONE, *layout.names), value=session.selected or NONE)
-        selected = session.selected is not None
-        put(self._position, disabled=not selected)
-        put(self._angle, disabled=not selected)
-        if session.selected is not None:
-            fin = layout.fins[layout.index(session.selected)]
-            put(self._position, value=tuple(round(v, 4) for v in fin.position))
-            put(self._angle, value=round(math.degrees(fin.mounting_angle), 1))
+        put(self._position, disabled=session.selected is None)
+        put(self._angle, disabled=session.selected is None)
         self._hull.refresh()
         first = layout.description.strip().split("\n")[0]
         pairs = "".join(
@@ -141,16 +149,16 @@ class HullPanel:
             page.bind(shapes, self._choose_shape, lambda: self._shape or MESH)
             ends: dict[str, Any] = {"min": (0.02,) * 3, "max": (5.0,) * 3, "step": 0.01}
             sides = "Length, width and height of a shape."
-            self._size = page.bind(
+            self._size = page.bind_number(
                 gui.add_vector3("Size [m]", (0.5, 0.3, 0.2), **ends, hint=sides),
                 self._resize,
-                lambda: tuple(round(2 * v, 4) for v in hull_of(page.session.state.layout).half),
+                lambda: tuple(2 * v for v in hull_of(page.session.state.layout).half),
             )
             about = "Centre of gravity as seen from the hull's middle. Torques are about it."
-            page.bind(
-                gui.add_vector3("Gravity [m]", (0.0, 0.0, 0.0), step=0.005, hint=about),
+            page.bind_number(
+                gui.add_vector3("Centre of gravity [m]", (0.0, 0.0, 0.0), step=0.005, hint=about),
                 page.session.set_center_of_gravity,
-                lambda: tuple(round(v, 4) for v in center_of_gravity(page.session.state.layout)),
+                lambda: center_of_gravity(page.session.state.layout),
             )
             self._unit = gui.add_dropdown("Unit of file", tuple(UNITS), hint="What 1 means in the mesh file.")
             hold_kind(self._unit)

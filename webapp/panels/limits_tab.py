@@ -8,7 +8,7 @@ from typing import Any
 import viser
 
 from finlab.analysis import Improvement
-from webapp.handles import Changes, on_user_change, put
+from webapp.handles import Changes, put
 from webapp.markup.picking import chosen_button
 from webapp.markup.score_card import score_table
 from webapp.markup.words import fins_words, three_digits
@@ -99,15 +99,19 @@ class ImprovePanel:
             self._whose = gui.add_dropdown(
                 "Bounds of", (ALL,), hint="All fins, or one that gets bounds of its own."
             )
-            on_user_change(self._whose, lambda _: self.refresh())
-            self._reach = gui.add_vector3(
-                "Reach ± [m]", WAY[:3], min=(0.0,) * 3, max=(0.5,) * 3, step=0.01, hint="Along x, y and z."
+            page.on_change(self._whose, lambda _: None)
+            page.bind_number(
+                gui.add_vector3("Reach ± [m]", WAY[:3], step=0.01, hint="Along x, y and z."),
+                lambda reach: self._bound((*reach, self._way[3])),
+                lambda: self._way[:3],
             )
-            page.on_change(self._reach, lambda reach: self._bound((*reach, self._turn.value)))
-            self._turn = gui.add_slider(
-                "Turn ± [°]", 0.0, 180.0, 5.0, WAY[3], hint="How far its shaft may turn either way."
+            hint = "How far its shaft may turn either way."
+            page.bind_number(
+                gui.add_slider("Turn ± [°]", 0.0, 180.0, 5.0, WAY[3], hint=hint),
+                lambda turn: self._bound((*self._way[:3], turn)),
+                lambda: self._way[3],
+                digits=2,
             )
-            page.on_change(self._turn, lambda turn: self._bound((*self._reach.value, turn)))
             lines = "Wrenches, one line each: Fx Fy Fz Tx Ty Tz [N, N m]. Empty: the common ones."
             self._mission = page.bind(
                 gui.add_text("Mission", "", multiline=True, hint=lines, visible=False),
@@ -129,6 +133,11 @@ class ImprovePanel:
             self._verdict = page.add_buttons(
                 "Result", verdicts, visible=False, hint="Accepting can be undone."
             )
+
+    @property
+    def _way(self) -> tuple[float, ...]:
+        """How far the fin may go that the widgets are about, or all fins."""
+        return self._page.session.draft.way(self._whose.value)
 
     def _bound(self, way: tuple[float, ...]) -> None:
         whose = self._whose.value if self._whose.value in self._page.session.state.layout.names else ALL
@@ -181,9 +190,6 @@ class ImprovePanel:
         names, draft = self._page.session.state.layout.names, self._page.session.draft
         self._fins.refresh(names, held=draft.held)
         put(self._whose, options=(ALL, *names))
-        way = draft.way(self._whose.value)
-        put(self._reach, value=way[:3])
-        put(self._turn, value=way[3])
         mission = draft.goal == "power for a mission"
         put(self._mission, visible=mission)
         put(self._take, visible=mission)

@@ -1,7 +1,6 @@
 """Why one wrench has many answers: who answers, what is kept least, the modes, and where they come from."""
 
 from functools import partial
-from typing import Any
 
 import viser
 
@@ -26,6 +25,8 @@ ORIGINS = {
     "which leaves an error.",
 }
 """Where the answer and its modes come from, by method."""
+DRAWN = {"n_candidates": 64.0, "temperature": 0.02, "gamma": 0.01}
+"""What the widgets of drawing show at first."""
 
 
 class ModesTab:
@@ -48,13 +49,19 @@ class ModesTab:
             hint="Power in watts, or the paper's effort: for all answers, comparisons, sweeps and swims.",
         )
         self._origin = gui.add_html("")
-        self._settings: dict[str, Any] = {
-            "n_candidates": gui.add_slider("Candidates K", *CANDIDATE_RANGE, 1, 64, hint=count),
-            "temperature": gui.add_slider("Temperature T", *TEMPERATURE_RANGE, 0.01, 0.02, hint=stray),
-            "gamma": gui.add_slider("Effort weight γ", *GAMMA_RANGE, 0.005, 0.01, hint=weight),
+        self._settings = {
+            key: page.bind_number(
+                gui.add_slider(label, ends[0], ends[1], step, DRAWN[key], hint=hint),
+                partial(session.set_setting, key),
+                partial(self._setting, key),
+                digits,
+            )
+            for key, label, ends, step, digits, hint in (
+                ("n_candidates", "Candidates K", CANDIDATE_RANGE, 1.0, 0, count),
+                ("temperature", "Temperature T", TEMPERATURE_RANGE, 0.01, 4, stray),
+                ("gamma", "Effort weight γ", GAMMA_RANGE, 0.005, 4, weight),
+            )
         }
-        for key, widget in self._settings.items():
-            page.on_change(widget, partial(session.set_setting, key))
         self._picker = ModePicker(gui, page, 250, "fl-modes")
         self._table = gui.add_html("")
         self._play = page.add_button(
@@ -66,6 +73,10 @@ class ModesTab:
         self._step = gui.add_html("")
         self._proposals = ProposalPanel(gui, page)
 
+    def _setting(self, key: str) -> float:
+        """A setting in force; what the widget shows at first while the method has none of the kind."""
+        return float(self._page.session.state.drawing.get(key, DRAWN[key]))
+
     def refresh(self) -> None:
         """Write settings and candidates."""
         page, state = self._page, self._page.session.state
@@ -73,8 +84,6 @@ class ModesTab:
         drawing = state.drawing
         for key, widget in self._settings.items():
             put(widget, visible=key in drawing)
-            if key in drawing:
-                put(widget, value=drawing[key])
         put(self._play, visible=state.method == "mdn")
         self._picker.refresh()
         answering, picker = page.answering, self._picker

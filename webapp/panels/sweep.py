@@ -5,11 +5,11 @@ import time
 import numpy as np
 import viser
 
-from webapp.handles import hold_kind, on_user_change, option_index, put
+from webapp.handles import on_user_change, option_index, put
 from webapp.markup.words import small, three_digits
 from webapp.page import Page
 from webapp.panels.line_plot import FIN_LINES, LinePlot, top_of
-from webapp.session.state import AXIS_UNITS, AXIS_WORDS
+from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_TARGET, number
 from webapp.tasks.sweeping import Sweep
 
 EXACT = 0.01
@@ -25,15 +25,17 @@ class SweepPanel:
         """Build the widgets."""
         self._page = page
         self._drawn = 0.0
+        self._ends = (-5.0, 5.0)
         with gui.add_folder("Sweep an axis", expand_by_default=False):
             self._axis = gui.add_dropdown(
                 "Sweep", AXIS_WORDS, hint="Which component of the target goes through the range."
             )
             on_user_change(self._axis, lambda _: self._fit_range())
-            self._range = gui.add_vector2(
-                "From, to", (-5.0, 5.0), step=0.05, hint="Ends of the range [N or N m]."
+            page.bind_number(
+                gui.add_vector2("From, to", self._ends, step=0.05, hint="Ends of the range [N or N m]."),
+                self._set_ends,
+                lambda: self._ends,
             )
-            hold_kind(self._range)
             self._play = page.add_button("Play the sweep", self._toggle, hint="To and fro until you stop it.")
             self._plot = LinePlot(gui, FIN_LINES, "force of each fin [N]", height=170, widths=(2.0,))
             self._said = gui.add_html("")
@@ -43,7 +45,11 @@ class SweepPanel:
         if sweep.running:
             sweep.stop()
         else:
-            sweep.start(option_index(self._axis), *self._range.value)
+            sweep.start(option_index(self._axis), *self._ends)
+
+    def _set_ends(self, ends: tuple[float, float]) -> None:
+        low, high = (number(v, "end of the range", -MAX_TARGET, MAX_TARGET) for v in ends)
+        self._ends = low, high
 
     def _fit_range(self) -> None:
         """Half of what is within reach, both ways: the ends are where it becomes interesting."""
@@ -51,7 +57,8 @@ class SweepPanel:
         axis = option_index(self._axis)
         if ranges is not None and np.isfinite(ranges.high[axis]):
             low, high = float(ranges.low[axis]), float(ranges.high[axis])
-            put(self._range, value=(round(0.5 * low, 2), round(0.5 * high, 2)))
+            self._ends = round(0.5 * low, 2), round(0.5 * high, 2)
+            self._page.do(lambda: None)
 
     def refresh(self) -> None:
         """Write the state of the sweep; the plot at most a few times a second."""

@@ -61,7 +61,7 @@ class SwimTab:
         }
         self._run = page.add_buttons("Run", runs, hint="Step swims for 0.1 s; B pauses or goes on.")
         speed = "Simulated time per real time; a slow machine falls short of it."
-        self._bind("speed", self._gui.add_slider("Speed", *SPEEDS, 0.1, 1.0, hint=speed))
+        self._bind("speed", self._gui.add_slider("Speed", *SPEEDS, 0.1, 1.0, hint=speed), digits=2)
 
     def _add_disturbances(self) -> None:
         """What can go wrong at any moment."""
@@ -82,7 +82,8 @@ class SwimTab:
             ("waves_cm", "Waves [cm]", 1.0, f"Significant height; period 3 s; they fade with depth. {now}"),
             ("buoyancy_percent", "Buoyancy [%]", 0.1, f"More than it should have; it rises by itself. {now}"),
         ):
-            self._bind(key, self._gui.add_slider(label, *NUMBERS[key], step, 0.0, hint=hint), live=True)
+            slider = self._gui.add_slider(label, *NUMBERS[key], step, 0.0, hint=hint)
+            self._bind(key, slider, live=True, digits=3)
 
     def _add_more(self) -> None:
         gui, page = self._gui, self._page
@@ -100,9 +101,8 @@ class SwimTab:
                     "Computer, sensors, lights: what takes power besides the fins.",
                 ),
             ):
-                low, high = NUMBERS[key]
                 first = getattr(page.session.swim, key)
-                self._bind(key, gui.add_number(label, first, min=low, max=high, step=step, hint=hint))
+                self._bind(key, gui.add_number(label, first, step=step, hint=hint), digits=3)
             wrench = "Asked in blue, delivered in green, of the first robot."
             self._axis = gui.add_dropdown("Plot the wrench of", AXIS_WORDS, hint=wrench)
             hold_kind(self._axis)
@@ -116,11 +116,19 @@ class SwimTab:
                 hint="A table with the columns t [s], x, y, z [m].",
             )
 
-    def _bind(self, key: str, widget: Any, live: bool = False) -> None:
-        """A widget for a setting of swims; what is `live` acts on the robots that swim, too."""
+    def _bind(self, key: str, widget: Any, live: bool = False, digits: int | None = None) -> None:
+        """A widget for a setting of swims; what is `live` acts on the robots that swim, too. Numbers show
+        so many digits behind the point."""
         session = self._page.session
         act = partial(self._meet, key) if live else partial(session.set_swim, key)
-        self._page.bind(widget, act, lambda: getattr(session.swim, key))
+
+        def value() -> Any:
+            return getattr(session.swim, key)
+
+        if digits is None:
+            self._page.bind(widget, act, value)
+        else:
+            self._page.bind_number(widget, act, value, digits)
 
     def _meet(self, key: str, value: Any) -> None:
         """Another water or buoyancy, at once."""

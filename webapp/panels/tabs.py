@@ -20,10 +20,7 @@ from webapp.panels.wrench_tab import WrenchTab
 from webapp.scene.swim_scene import ARROWS_N
 from webapp.session.tour import STEPS
 from webapp.theme import ASKED, DELIVERED, MISSING, css
-from webapp.viser_internals import run_script
 
-NUMBER_FIELDS = files("webapp.panels").joinpath("number_fields.js").read_text("utf-8")
-"""Script that keeps number boxes to the user while he types."""
 PANEL_WIDTH = 410
 """Width of the panel beside the view [px]."""
 TABS: dict[str, Callable[[viser.GuiApi, Page], Panel]] = {
@@ -76,7 +73,6 @@ class Guarded:
 def build_panels(gui: viser.GuiApi, page: Page) -> tuple[list[Panel], list[Panel]]:
     """Build everything in the panel beside the view: all panels, and of these the ones that show a swim."""
     gui.add_html(STYLE)
-    run_script(gui, NUMBER_FIELDS)
     panels = {"Corner": Guarded(gui, page, Corner), "Header": Guarded(gui, page, Header)}
     tabs = gui.add_tab_group()
     for label, make in TABS.items():

@@ -45,10 +45,13 @@ class Timeline:
         self._window = gui.add_panel(visible=False)
         with self._window.add_tab("Swim over time", viser.Icon.CHART_LINE):
             gui.add_html("<div class='fl-timeline'></div>")
-            self._slider = gui.add_slider(
-                "At [s]", 0.0, 90.0, 0.1, 0.0, hint="Hold the swim, and look at any moment of it again."
+            hint, swimming = "Hold the swim, and look at any moment of it again.", page.swimming
+            self._slider = page.bind_number(
+                gui.add_slider("At [s]", 0.0, 90.0, 0.1, 0.0, hint=hint),
+                swimming.look_at,
+                lambda: swimming.seen_time if swimming.swimmers else 0.0,
+                digits=1,
             )
-            page.on_change(self._slider, page.swimming.look_at)
             self._plots = SwimPlots(gui)
         width, height = SIZE_PX
         self._window.float(x=EDGE_PX, y=-EDGE_PX, width=width, height=height)
@@ -59,7 +62,7 @@ class Timeline:
         put(self._window, visible=bool(swimming.swimmers))
         if not swimming.swimmers:
             return
-        put(self._slider, max=round(swimming.swimmers[0].duration_s, 1), value=round(swimming.seen_time, 1))
+        put(self._slider, max=round(swimming.swimmers[0].duration_s, 1))
         self._plots.refresh(swimming, self.axis)
 
 

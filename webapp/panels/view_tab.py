@@ -44,7 +44,9 @@ class ViewTab:
         looks = {view: partial(page.scenery.robot.look_from, view) for view in CAMERAS}
         page.add_buttons("Camera", looks, hint="Keys 1, 2, 3, 4.")
         speed = gui.add_slider("Motion speed", 0.05, 1.0, 0.05, 0.5, hint="1 is real time.")
-        page.bind_display(speed, "speed")
+        page.bind_number(
+            speed, partial(page.session.set_display, "speed"), lambda: page.session.display.speed, digits=3
+        )
         page.bind(
             gui.add_dropdown("Arrow scale", tuple(SCALES), hint="Force of an arrow of 0.1 m."),
             lambda entry: page.session.set_display("newtons", SCALES.get(entry)),

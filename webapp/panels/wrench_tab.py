@@ -85,24 +85,18 @@ class TargetPanel:
             hint="This axis alone, at a quarter of what the fins can give; press again to reverse it.",
         )
         gui.add_html(marker("fl-reach"))
-        self._sliders = [
-            gui.add_slider(
-                f"{AXES[k]} [{AXIS_UNITS[k]}]",
-                -10.0,
-                10.0,
-                0.01 if k < 3 else 0.001,
-                0.0,
-                hint=AXIS_WORDS[k].capitalize(),
-            )
-            for k in range(6)
-        ]
+        self._sliders = [self._add_slider(gui, k) for k in range(6)]
         self._end = gui.add_html(marker("fl-reach-end"))
-        for k, slider in enumerate(self._sliders):
-            page.on_change(slider, partial(self._set_target, k))
         self._changes = Changes()
 
-    def _set_target(self, axis: int, value: float) -> None:
-        self._page.session.set_target(axis, value)
+    def _add_slider(self, gui: viser.GuiApi, axis: int) -> viser.GuiSliderHandle[float]:
+        session, step = self._page.session, 0.01 if axis < 3 else 0.001
+        label, hint = f"{AXES[axis]} [{AXIS_UNITS[axis]}]", AXIS_WORDS[axis].capitalize()
+        return self._page.bind_number(
+            gui.add_slider(label, -10.0, 10.0, step, 0.0, hint=hint),
+            lambda value: session.set_target(axis, value),
+            lambda: session.state.target[axis],
+        )
 
     @property
     def reach(self) -> Array:
@@ -115,7 +109,7 @@ class TargetPanel:
         state = self._page.session.state
         for slider, value, reach in zip(self._sliders, state.target, self.reach, strict=True):
             end = slider_end(float(reach))
-            put(slider, min=min(-end, value), max=max(end, value), value=value)
+            put(slider, min=min(-end, value), max=max(end, value))
         ranges, error = self._page.ranging.findings, self._page.ranging.error
         if not self._changes(ranges, error):
             return
@@ -149,6 +143,6 @@ def _hint(axis: int, low: float, high: float, reach: float) -> str:
     word, unit = AXIS_WORDS[axis].capitalize(), AXIS_UNITS[axis]
     at_most = f"±{three_digits(reach)} {unit} if nothing else is asked to stay"
     if not np.isfinite(low):
-        return f"{word}: the other five are out of reach as they are. {at_most.capitalize()}."
+        return f"{word}: the other five are out of reach as they are; {at_most}."
     ends = f"{three_digits(low)} to {three_digits(high)} {unit}"
     return f"{word}: the marks show {ends}, what is within reach with the others as they are; {at_most}."
