@@ -11,7 +11,7 @@ from finlab.assets import shipped_checkpoints, shipped_layouts
 from finlab.deploy.bundle import make_bundle
 from finlab.deploy.graph import build_graph
 from finlab.deploy.graph_file import graph_bytes
-from finlab.errors import DataError
+from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, Layout, layout_to_dict, load_layout
 from finlab.layout.yaml_file import yaml_text
 from finlab.physics import make_law, plant_of
@@ -72,7 +72,7 @@ def test_a_table_fin_goes_through_the_whole_app(
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     session = Session(load_layout("ucat"))
-    session.open_layout(files.read_layout(*files.layout_file(tabled)))
+    session.open_layout(files.read_layout(*files.layout_file(tabled)).layout)
     for axis, value in enumerate(reachable(tabled)):
         session.set_target(axis, round(value, 4))
     reply = SOLVER.reply(session.state)
@@ -89,14 +89,14 @@ def test_a_table_fin_goes_through_the_whole_app(
     assert session.state == again.state
     allocator = SOLVER.loaded("search", "power")
     graph = graph_bytes(build_graph(tabled, allocator))
-    assert files.read_layout("tabled.graph.json", graph).fins[0].model.type == "table"
+    with pytest.raises(LayoutError, match=r"fin\.csv', which did not come along"):
+        files.read_layout("tabled.graph.json", graph)
     assert len(make_bundle(tabled, allocator).zip_bytes()) > len(graph), "the table travels along"
     assert command_line(session.state).startswith("finlab allocate tabled.yaml --wrench")
     assert export_line(session.state) == "finlab export tabled.yaml -o tabled --zip"
 
 
-def test_a_table_that_is_not_here_is_told_when_the_layout_is_opened(tabled: Layout, tmp_path: Path) -> None:
+def test_a_table_that_did_not_come_along_is_told_when_the_layout_is_opened(tabled: Layout) -> None:
     content = yaml_text(layout_to_dict(tabled)).encode()
-    (tmp_path / "fin.csv").unlink()
-    with pytest.raises(DataError, match="fin.csv"):
+    with pytest.raises(LayoutError, match="put the layout and its tables into one ZIP archive"):
         files.read_layout("other.yaml", content.replace(b"tabled", b"other"))

@@ -23,8 +23,8 @@ from tests.webapp.loops import page_of
 from webapp.markup.fin_model import model_card
 from webapp.markup.fit_card import fit_card
 from webapp.session import Session, files
+from webapp.session.companions import archive_of, read_archive, stored_table
 from webapp.session.layout_edits import with_model
-from webapp.session.table_files import archive_of, read_archive, stored_table
 from webapp.tasks import fitting
 from webapp.tasks.background import Worker
 from webapp.tasks.exports import Exports
@@ -288,7 +288,7 @@ def test_a_layout_carries_its_tables_elsewhere(tmp_path: Path, cache: Path) -> N
         DataError, match=r"holds 'my_robot\.yaml', .*; unpack it, and name the layout file in it"
     ):
         load_layout(tmp_path / name)
-    again = files.read_layout(name, content)
+    again = files.read_layout(name, content).layout
     assert again == layout and table_bytes(str(again.fins[2].model.values()["path"]))
     assert files.layout_file(load_layout("ucat"))[0] == "ucat.yaml"
 
@@ -304,7 +304,7 @@ def test_a_graph_file_travels_with_its_tables(tmp_path: Path, cache: Path, worke
     assert name == "my_robot.graph.zip"
     for path in cache.glob("*.csv"):
         path.unlink()
-    opened = files.read_layout(name, content)
+    opened = files.read_layout(name, content).layout
     assert opened.fins[2].model == layout.fins[2].model and table_bytes(
         dict(opened.fins[2].model.parameters)["path"]
     )
@@ -322,7 +322,7 @@ def test_a_bundle_opens_in_the_app(tmp_path: Path, cache: Path) -> None:
 
     layout = robot(tmp_path, cache)
     content = make_bundle(layout, load_allocator()).zip_bytes()
-    assert files.read_layout("robot.zip", content).fins[2].model == layout.fins[2].model
+    assert files.read_layout("robot.zip", content).layout.fins[2].model == layout.fins[2].model
     with pytest.raises(DataError, match=r"^robot\.zip: is neither"):
         files.read_layout("robot.zip", content.replace(b"finlab-graph", b"finlab-gr@ph"))
 
@@ -331,7 +331,7 @@ def test_a_bundle_opens_in_the_app(tmp_path: Path, cache: Path) -> None:
     ("parts", "sentence"),
     [
         ({"a.yaml": b"x", "b.yaml": b"y"}, "2 of them layouts; expected a bundle, or one layout file"),
-        ({"a.yaml": b"x", "../out.csv": b"y"}, "holds '../out.csv', expected a layout file and CSV tables"),
+        ({"a.yaml": b"x", "../out.csv": b"y"}, "holds '../out.csv', expected a layout file, CSV tables"),
         ({"a.yaml": b"x", "run.py": b"y"}, "holds 'run.py'"),
         ({"a.yaml": b"name: 3"}, "robot.zip/a.yaml: "),
     ],

@@ -76,7 +76,7 @@ def test_arrow_scale_fits_and_rests() -> None:
 
 def test_layout_files_go_out_and_come_back() -> None:
     layout = load_layout(shipped_layouts()["ucat"])
-    assert files.read_layout("x.yaml", files.layout_file(layout)[1]) == layout
+    assert files.read_layout("x.yaml", files.layout_file(layout)[1]).layout == layout
 
 
 @pytest.mark.parametrize(

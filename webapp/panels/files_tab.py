@@ -39,7 +39,11 @@ class FilesTab:
         self._command = gui.add_html("")
 
     def _open(self, name: str, content: bytes) -> None:
-        self._page.session.open_layout(files.read_layout(name, content))
+        opened = files.read_layout(name, content)
+        self._page.session.open_layout(opened.layout)
+        for file in opened.missing:
+            text = f"{file} did not come along, so a hull that fits is drawn; put both into one ZIP archive"
+            self._page.notify("Without its hull", text)
 
     def _send_layout(self) -> None:
         self._page.exports.download(*files.layout_file(self._page.session.state.layout))

@@ -1,21 +1,36 @@
-"""Force tables of fins: kept under a name made from their content, and carried along with layouts."""
+"""Files that belong to layouts, force tables and hulls: kept under names made from their content.
+
+A layout that a browser sends may name any path. None of them is ever opened: what is read came along with it.
+"""
 
 import hashlib
 import io
 import tempfile
 import zipfile
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
+from typing import NamedTuple
 
-from finlab.bundle_files import ABOUT, LARGEST_BUNDLE, LARGEST_TABLE, MOST_FILES, UNREADABLE
+from finlab.bundle_files import (
+    ABOUT,
+    LARGEST_BUNDLE,
+    LARGEST_TABLE,
+    MOST_FILES,
+    UNREADABLE,
+    read_bundle_files,
+)
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.layout import FinModelSpec, Layout, load_layout
+from finlab.layout.body import MESH_SUFFIXES
 from finlab.layout.reading import MAX_BYTES
-from finlab.physics.table_file import table_bytes
 from finlab.whole_file import write_whole
+from webapp.scene.meshes.mesh_hull import read_mesh
 
 LAYOUTS = (".yaml", ".yml", ".json")
 """How the layout's file in an archive may end."""
+TABLE_FOLDER, HULL_FOLDER = "tables", "hulls"
+"""Where files are kept, inside the app's own folder."""
 
 
 def stored_table(content: bytes, folder: Path) -> FinModelSpec:
@@ -25,13 +40,29 @@ def stored_table(content: bytes, folder: Path) -> FinModelSpec:
         FinlabError: it cannot be kept.
     """
     path = folder / f"{hashlib.sha256(content).hexdigest()}.csv"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FinlabError(f"{folder}: cannot be made: {error.strerror}") from None
-    if not path.exists():
-        write_whole(path, content, DataError)
+    _keep(path, content)
     return FinModelSpec("table", (("path", str(path)),))
+
+
+def with_hull_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
+    """A layout whose hull's mesh has a name that can travel, and its content by that name; as it is where its
+    hull is drawn from a shape.
+
+    Raises:
+        DataError: the mesh cannot be read.
+    """
+    hull = None if layout.body is None else layout.body.hull
+    if layout.body is None or hull is None or hull.mesh is None:
+        return layout, {}
+    path = Path(hull.mesh)
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise DataError(
+            f"{path.name}: the hull's file cannot be read: {error.strerror}; import it again"
+        ) from None
+    name = f"hull{path.suffix.lower()}"
+    return replace(layout, body=replace(layout.body, hull=replace(hull, mesh=name))), {name: content}
 
 
 def has_tables(layout: Layout) -> bool:
@@ -48,40 +79,103 @@ def archive_of(name: str, document: bytes, tables: dict[str, bytes]) -> bytes:
     return buffer.getvalue()
 
 
-def read_archive(source: str, content: bytes, folder: Path) -> Layout:
-    """The layout in a zip archive: a bundle, or a layout file with the force tables that it names.
+class Opened(NamedTuple):
+    """A layout that a browser sent."""
 
-    Its tables are kept in `folder`.
+    layout: Layout
+    """Every file that it names is kept in a folder of the app, under a name made from its content."""
+    missing: tuple[str, ...] = ()
+    """Files that it named and that did not come with it, though the layout makes sense without."""
+
+
+def read_archive(source: str, content: bytes, folder: Path) -> Opened:
+    """The layout in a zip archive: a bundle, or a layout file with the tables and the mesh that it names.
+
+    These are kept in folders inside `folder`.
 
     Raises:
-        LayoutError: it is no such archive, or its layout is none.
+        LayoutError: it is no such archive, its layout is none, or names a table that is not in it.
         DataError: a bundle that was changed, or a table that cannot be read.
     """
     with tempfile.TemporaryDirectory() as place:
         packed = Path(place) / "upload.zip"
         packed.write_bytes(content)
         try:
-            layout = load_layout(_unpacked(packed, source, Path(place) / "files"))
-            fins = tuple(
-                replace(fin, model=stored_table(table_bytes(str(fin.model.values()["path"])), folder))
-                if fin.model.type == "table"
-                else fin
-                for fin in layout.fins
-            )
+            file, parts = _unpacked(packed, source, Path(place) / "files")
+            return adopted(load_layout(file), parts, folder, source)
         except FinlabError as error:
             text = str(error).replace(str(packed), source).replace(f"{place}/files/", f"{source}/")
             raise type(error)(text) from None
-    return replace(layout, fins=fins)
 
 
-def _unpacked(packed: Path, source: str, folder: Path) -> Path:
-    """The layout's file of an archive, its tables beside it; the archive itself where it is a bundle."""
+def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: str) -> Opened:
+    """A layout from a stranger, and the files that came along kept in a folder; no other file is opened.
+
+    Args:
+        layout: it may name any path.
+        parts: contents of what came along, by the paths by which the layout can name it.
+        folder: where to keep them.
+        source: what to call the layout in errors.
+
+    Raises:
+        LayoutError: it names a force table that did not come along.
+        FinlabError: a file cannot be kept, or is no hull.
+    """
+    fins, missing = [], []
+    for fin in layout.fins:
+        if fin.model.type == "table":
+            path = str(fin.model.values()["path"])
+            if path not in parts:
+                raise LayoutError(
+                    f"fin {fin.name!r:.40} names the table {Path(path).name!r:.60}, which did not come "
+                    "along; put the layout and its tables into one ZIP archive, and open that",
+                    source=source,
+                )
+            fin = replace(fin, model=stored_table(parts[path], folder / TABLE_FOLDER))
+        fins.append(fin)
+    body = layout.body
+    if body is not None and body.hull is not None and body.hull.mesh is not None:
+        mesh = body.hull.mesh
+        if mesh in parts:
+            hull = replace(body.hull, mesh=stored_mesh(Path(mesh).name, parts[mesh], body.hull.scale, folder))
+            body = replace(body, hull=hull)
+        else:
+            missing.append(Path(mesh).name[-60:])
+            body = replace(body, hull=None)
+    return Opened(replace(layout, fins=tuple(fins), body=body), tuple(missing))
+
+
+def stored_mesh(name: str, content: bytes, scale: float, folder: Path) -> str:
+    """Path of a hull's mesh, which is checked and kept inside a folder under a name made from its content.
+
+    Raises:
+        FinlabError: it is no mesh, too large, or cannot be kept.
+    """
+    read_mesh(name, content, scale)
+    digest = hashlib.sha256(content).hexdigest()[:16]
+    path = folder / HULL_FOLDER / f"{digest}{Path(name).suffix.lower()}"
+    _keep(path, content)
+    return str(path)
+
+
+def _keep(path: Path, content: bytes) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FinlabError(f"{path.parent}: cannot be made: {error.strerror}") from None
+    if not path.exists():
+        write_whole(path, content, DataError)
+
+
+def _unpacked(packed: Path, source: str, folder: Path) -> tuple[Path, dict[str, bytes]]:
+    """What to load of an archive: its layout's file, or itself where it is a bundle; and its other files, by
+    the paths by which that can name them."""
     try:
         with zipfile.ZipFile(packed) as archive:
             entries = [entry for entry in archive.infolist() if not entry.is_dir()]
             names = [entry.filename for entry in entries]
             if ABOUT in names:
-                return packed
+                return packed, {f"{packed}/{name}": c for name, c in read_bundle_files(packed).items()}
             layouts = [name for name in names if name.endswith(LAYOUTS)]
             if len(layouts) != 1 or len(names) > MOST_FILES:
                 raise LayoutError(
@@ -89,7 +183,7 @@ def _unpacked(packed: Path, source: str, folder: Path) -> Path:
                     "layout file with its force tables",
                     source=source,
                 )
-            left = LARGEST_BUNDLE
+            parts, left = {}, LARGEST_BUNDLE
             for entry in entries:
                 _check_name(entry.filename, source)
                 with archive.open(entry) as stream:
@@ -98,10 +192,11 @@ def _unpacked(packed: Path, source: str, folder: Path) -> Path:
                 left -= len(content)
                 if len(content) > most or left < 0:
                     raise LayoutError(f"{entry.filename} in it is too large", source=source)
-                path = folder / entry.filename
-                path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_bytes(content)
-            return folder / layouts[0]
+                parts[str(folder / entry.filename)] = content
+            path = folder / layouts[0]
+            path.parent.mkdir(parents=True)
+            path.write_bytes(parts.pop(str(path)))
+            return path, parts
     except UNREADABLE as error:
         raise LayoutError(f"cannot be read as a zip archive: {error}", source=source) from None
 
@@ -109,6 +204,6 @@ def _unpacked(packed: Path, source: str, folder: Path) -> Path:
 def _check_name(name: str, source: str) -> None:
     """Refuse names that lead out of the folder, or that no layout needs."""
     path = PurePosixPath(name)
-    known = path.suffix.lower() in (".csv", *LAYOUTS)
+    known = path.suffix.lower() in (".csv", *MESH_SUFFIXES, *LAYOUTS)
     if path.is_absolute() or ".." in path.parts or "\\" in name or ":" in name or not known:
-        raise LayoutError(f"holds {name!r:.60}, expected a layout file and CSV tables", source=source)
+        raise LayoutError(f"holds {name!r:.60}, expected a layout file, CSV tables and a mesh", source=source)

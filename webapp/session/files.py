@@ -1,7 +1,6 @@
 """Layouts, hulls, paths and bundles as files that a browser sends and takes; the layouts that are shipped."""
 
 import csv
-import hashlib
 import io
 import os
 import re
@@ -21,9 +20,17 @@ from finlab.layout.yaml_file import parse_yaml, yaml_text
 from finlab.physics import plant_of
 from finlab.sim import Trajectory
 from finlab.sim.task import read_trajectory
-from webapp.scene.meshes.mesh_hull import UNITS, read_mesh
+from webapp.scene.meshes.mesh_hull import UNITS
+from webapp.session.companions import (
+    TABLE_FOLDER,
+    Opened,
+    adopted,
+    archive_of,
+    read_archive,
+    stored_mesh,
+    with_hull_inside,
+)
 from webapp.session.state import chosen
-from webapp.session.table_files import archive_of, read_archive
 
 MAX_PATH_BYTES = 2_000_000
 """Largest file of a way to swim that is taken."""
@@ -45,40 +52,45 @@ def file_stem(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_") or "layout"
 
 
-def read_layout(name: str, content: bytes) -> Layout:
-    """The layout in an uploaded layout file, graph file, bundle, or archive of a layout with its tables.
+def read_layout(name: str, content: bytes) -> Opened:
+    """The layout in an uploaded layout file, graph file, bundle, or archive of a layout with its files.
 
     Raises:
-        LayoutError: the file is too large, no text or no layout; the message names file and key.
-        DataError: a fin's force table is not on this computer, or cannot be read.
+        LayoutError: the file is too large, no text or no layout, or names a force table that did not come
+            along; the message names file and key.
+        DataError: a table cannot be read.
     """
     source = Path(str(name)).name[:80] or "upload"
     if source.lower().endswith(".zip"):
-        layout = read_archive(source, content, table_folder())
-        plant_of(layout)
-        return layout
+        opened = read_archive(source, content, cache_folder())
+    else:
+        opened = adopted(_read_alone(source, content), {}, cache_folder(), source)
+    plant_of(opened.layout)  # reads the tables of its fins
+    return opened
+
+
+def _read_alone(source: str, content: bytes) -> Layout:
+    """The layout in a file that came without others; nothing that it names is looked at."""
     if len(content) > MAX_BYTES:
         raise LayoutError(f"is larger than {MAX_BYTES:,} bytes, a layout has a few thousand", source=source)
     text = decode_text(content, source)
     if source.lower().endswith(SUFFIX):
-        layout = parse_graph_document(GraphText(text, source)).layout
-    else:
-        parse = parse_json if source.lower().endswith(".json") else parse_yaml
-        layout = parse_layout(parse(text, source), source=source)
-    plant_of(layout)  # reads the tables of its fins
-    return layout
+        return parse_graph_document(GraphText(text, source)).layout
+    parse = parse_json if source.lower().endswith(".json") else parse_yaml
+    return parse_layout(parse(text, source), source=source)
 
 
 def layout_file(layout: Layout) -> tuple[str, bytes]:
-    """Name and content of the layout's file: YAML, or where fins are known by tables an archive with them.
+    """Name and content of the layout's file: YAML, or an archive with the files that it names.
 
     Raises:
-        DataError: a table cannot be read, or is too large to travel.
+        DataError: a table or the hull's mesh cannot be read, or is too large to travel.
     """
     stem = file_stem(layout.name)
     inside, tables = with_tables_inside(layout)
-    text = yaml_text(layout_to_dict(inside)).encode()
-    return (f"{stem}.zip", archive_of(f"{stem}.yaml", text, tables)) if tables else (f"{stem}.yaml", text)
+    inside, hull = with_hull_inside(inside)
+    text, parts = yaml_text(layout_to_dict(inside)).encode(), {**tables, **hull}
+    return (f"{stem}.zip", archive_of(f"{stem}.yaml", text, parts)) if parts else (f"{stem}.yaml", text)
 
 
 def candidates_csv(allocation: Allocation | None) -> bytes:
@@ -108,7 +120,7 @@ def cache_folder() -> Path:
 
 def table_folder() -> Path:
     """Where the app keeps the force tables of fins."""
-    return cache_folder() / "tables"
+    return cache_folder() / TABLE_FOLDER
 
 
 def stored_hull(name: str, content: bytes, unit: str) -> Hull:
@@ -119,17 +131,7 @@ def stored_hull(name: str, content: bytes, unit: str) -> Hull:
     """
     chosen(unit, "unit", UNITS)
     short = Path(str(name)).name[-80:] or "upload"
-    read_mesh(short, content, UNITS[unit])
-    path = (
-        cache_folder() / "hulls" / f"{hashlib.sha256(content).hexdigest()[:16]}{Path(short).suffix.lower()}"
-    )
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if not path.exists():
-            path.write_bytes(content)
-    except OSError as error:
-        raise FinlabError(f"{short}: cannot be kept in {path.parent}: {error.strerror}") from None
-    return Hull(mesh=str(path), scale=UNITS[unit])
+    return Hull(mesh=stored_mesh(short, content, UNITS[unit], cache_folder()), scale=UNITS[unit])
 
 
 def read_path(name: str, content: bytes) -> Trajectory:

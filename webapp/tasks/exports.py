@@ -17,8 +17,8 @@ from finlab.deploy.graph_file import graph_bytes
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.scene.robot_scene import RobotScene
+from webapp.session.companions import archive_of, has_tables
 from webapp.session.files import file_stem
-from webapp.session.table_files import archive_of, has_tables
 from webapp.tasks.context import Context
 from webapp.viser_internals import start_server, stop_server
 

@@ -11,8 +11,8 @@ from finlab.arrays import Array
 from finlab.errors import DataError, FinlabError
 from finlab.layout import FinModelSpec, Layout
 from finlab.physics.table_file import read_table, table_bytes
+from webapp.session.companions import stored_table
 from webapp.session.files import table_folder
-from webapp.session.table_files import stored_table
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
 

@@ -1,0 +1,223 @@
+"""Layouts that a browser sends may name any path: no file of the server is opened for them."""
+
+import io
+import os
+import stat
+import sys
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import viser
+
+from finlab.errors import DataError, FinlabError, LayoutError
+from finlab.layout import FinModelSpec, layout_to_dict, load_layout
+from finlab.layout.yaml_file import yaml_text
+from finlab.physics import make_law
+from finlab.physics.table_file import write_table
+from tests.webapp.test_app import app, on_loop, server, until, view
+from webapp.scene.meshes.hull import hull_of
+from webapp.scene.meshes.mesh_hull import MeshHull
+from webapp.session import files
+from webapp.view import View
+
+__all__ = ["app", "server", "view"]
+
+SECRET = "root:x:0:0"
+EVIL = "<img src=x onerror=alert(1)><script>alert(2)</script>"
+opened: list[str] = []
+"""Every path that this process has opened since the list was emptied."""
+
+
+def _hear(event: str, arguments: tuple[Any, ...]) -> None:
+    if event == "open" and isinstance(arguments[0], (str, bytes, os.PathLike)):
+        opened.append(os.fsdecode(arguments[0]))
+
+
+sys.addaudithook(_hear)
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    yield tmp_path / "cache" / "finlab"
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> bytes:
+    """A force table that can be read."""
+    grid = [[0.05, 0.3, 0.6], [0.1, 1.0, 2.1], [-3.0, -1.5, 0.0, 1.5]]
+    write_table(tmp_path / "table.csv", make_law(FinModelSpec("soft")), *grid)  # type: ignore[arg-type]
+    return (tmp_path / "table.csv").read_bytes()
+
+
+def document(table: str = "", mesh: str = "", name: str = "robot") -> bytes:
+    values = layout_to_dict(load_layout("ucat")) | {"name": name, "description": name}
+    if table:
+        values["fins"][0]["model"] = {"type": "table", "path": table}
+    values["body"] = {"hull": {"mesh": mesh}} if mesh else {}
+    return yaml_text(values).encode()
+
+
+def packed(parts: dict[str, bytes], link: str = "") -> bytes:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, content in parts.items():
+            archive.writestr(name, content)
+        if link:
+            entry = zipfile.ZipInfo("table.csv")
+            entry.external_attr = (stat.S_IFLNK | 0o777) << 16
+            archive.writestr(entry, link)
+    return buffer.getvalue()
+
+
+def secrets_of(tmp_path: Path, table: bytes) -> tuple[str, ...]:
+    """Paths to something on this machine, each in another way."""
+    place = tmp_path / "private"
+    place.mkdir(exist_ok=True)
+    (place / "table.csv").write_bytes(table)
+    link = place / "link.csv"
+    link.unlink(missing_ok=True)
+    link.symlink_to(place / "table.csv")
+    climbing = os.path.relpath(place / "table.csv")
+    return (
+        "/etc/passwd",
+        "/dev/zero",
+        "/dev/stdin",
+        "/proc/self/environ",
+        str(place / "table.csv"),
+        str(link),
+        climbing,
+        f"{'../' * 20}{place / 'table.csv'}",
+        f"tables/../{climbing}",
+        "~/.ssh/id_rsa",
+        "table.csv",
+        "",
+        "a\0b",
+        "x" * 5000,
+    )
+
+
+def refused(name: str, content: bytes) -> str:
+    opened.clear()
+    with pytest.raises(FinlabError) as error:
+        files.read_layout(name, content)
+    return str(error.value)
+
+
+def seen_of(tmp_path: Path) -> list[str]:
+    """What was opened of this machine, beside Python's own files and what the upload was unpacked to."""
+    places = ("private", "passwd", "zero", "stdin", "environ", "id_rsa")
+    return [path for path in opened if any(place in path for place in places)]
+
+
+def test_no_path_of_a_layout_is_opened(tmp_path: Path, table: bytes, cache: Path) -> None:
+    for path in secrets_of(tmp_path, table):
+        text = document(path or "x.csv")
+        for name, content in (("robot.yaml", text), ("robot.zip", packed({"robot.yaml": text}))):
+            sentence = refused(name, content)
+            assert "did not come along" in sentence or "model" in sentence, sentence
+            assert SECRET not in sentence and seen_of(tmp_path) == [], path
+    assert not cache.exists()
+
+
+def test_links_and_climbing_names_in_an_archive_are_data(tmp_path: Path, table: bytes) -> None:
+    (path, *_) = secrets_of(tmp_path, table)
+    text = document("table.csv")
+    sentence = refused("robot.zip", packed({"robot.yaml": text}, link=path))
+    assert "column A is missing" in sentence and seen_of(tmp_path) == []
+    for name in ("../table.csv", "/table.csv", "a/../../table.csv", "..\\table.csv", "C:table.csv"):
+        assert "holds" in refused("robot.zip", packed({"robot.yaml": text, name: table}))
+    assert not (tmp_path / "table.csv").is_symlink()
+
+
+def test_no_mesh_of_the_server_is_opened(tmp_path: Path) -> None:
+    place = tmp_path / "private"
+    place.mkdir()
+    (place / "hull.stl").write_bytes(cube())
+    for path in (str(place / "hull.stl"), os.path.relpath(place / "hull.stl"), "/dev/zero.stl"):
+        text = document(mesh=path)
+        for name, content in (("robot.yaml", text), ("robot.zip", packed({"robot.yaml": text}))):
+            opened.clear()
+            found = files.read_layout(name, content)
+            assert found.missing == (Path(path).name,) and found.layout.body is not None
+            assert found.layout.body.hull is None and not isinstance(hull_of(found.layout), MeshHull)
+            assert seen_of(tmp_path) == []
+
+
+def cube() -> bytes:
+    import trimesh
+
+    return bytes(trimesh.creation.box((0.4, 0.2, 0.1)).export(file_type="stl"))
+
+
+def test_what_comes_along_is_kept_and_goes_along(tmp_path: Path, table: bytes, cache: Path) -> None:
+    text = document("forces/soft.csv", "shapes/hull.stl")
+    parts = {"a/robot.yaml": text, "a/forces/soft.csv": table, "a/shapes/hull.stl": cube()}
+    found = files.read_layout("robot.zip", packed(parts))
+    assert found.missing == () and isinstance(hull_of(found.layout), MeshHull)
+    path = str(found.layout.fins[0].model.values()["path"])
+    assert Path(path).parent == cache / "tables" and Path(path).read_bytes() == table
+    name, content = files.layout_file(found.layout)
+    assert name == "robot.zip" and str(tmp_path).encode() not in zipfile.ZipFile(io.BytesIO(content)).read(
+        "robot.yaml"
+    )
+    assert files.read_layout(name, content).layout == found.layout
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        archive.extractall(tmp_path / "elsewhere")
+    assert isinstance(hull_of(load_layout(tmp_path / "elsewhere" / "robot.yaml")), MeshHull)
+
+
+def test_a_bundle_names_only_what_is_in_it(tmp_path: Path, table: bytes) -> None:
+    import json
+
+    from finlab import load_allocator
+    from finlab.bundle_files import CHECKSUMS, GRAPH, checksums
+    from finlab.deploy.bundle import make_bundle
+    from finlab.layout.load import checksum_of
+
+    bundle = make_bundle(load_layout("ucat"), load_allocator()).zip_bytes()
+    with zipfile.ZipFile(io.BytesIO(bundle)) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    for path in secrets_of(tmp_path, table)[:9]:
+        graph = json.loads(parts[GRAPH])
+        graph["graph"]["nodes"][0]["model"] = {"type": "table", "path": path}
+        graph["checksum"] = checksum_of(graph)
+        forged = {**parts, GRAPH: json.dumps(graph).encode()}
+        del forged[CHECKSUMS]
+        forged[CHECKSUMS] = checksums(forged)
+        for name, content in (("robot.zip", packed(forged)), ("robot.graph.json", forged[GRAPH])):
+            sentence = refused(name, content)
+            assert "not in the bundle" in sentence or "did not come along" in sentence
+            assert seen_of(tmp_path) == [], path
+
+
+def test_a_mesh_that_names_other_files_reads_none(tmp_path: Path) -> None:
+    lines = "mtllib /etc/passwd,usemtl a,v 0 0 0,v 1 0 0,v 0 1 0,v 0 0 1,f 1 3 2,f 1 2 4,f 2 3 4,f 1 4 3,"
+    wavefront = lines.replace(",", "\n").encode()
+    opened.clear()
+    files.stored_hull("hull.obj", wavefront, "m")
+    assert seen_of(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    "content", [b"\xff\xfe", b"", b"[" * 100_000, b"a: &a [*a]", b"!!python/object:os.system x"]
+)
+def test_any_bytes_are_refused_in_a_sentence(content: bytes) -> None:
+    for name in ("a.yaml", "a.json", "a.zip", "a.graph.json", "../../etc/passwd.yaml"):
+        with pytest.raises((LayoutError, DataError)) as error:
+            files.read_layout(name, content)
+        assert "/etc" not in str(error.value).replace("passwd.yaml", "")
+
+
+def test_markup_in_names_and_descriptions_stays_text(server: viser.ViserServer, view: View) -> None:
+    layout = files.read_layout("robot.yaml", document(name=EVIL)).layout
+    on_loop(server, lambda: view.do(lambda: view.session.open_layout(layout)))
+    until(lambda: not view.busy and not view.analyst.busy)
+    containers = server.gui._container_handle_from_uuid.values()
+    handles = [handle for container in containers for handle in container._children.values()]
+    texts = [handle.content for handle in handles if isinstance(handle, viser.GuiHtmlHandle)]
+    assert any("&lt;img" in text for text in texts)
+    assert not any("<img" in text or "<script>alert" in text for text in texts)
