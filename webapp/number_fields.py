@@ -4,14 +4,15 @@ or refused in place. The other half, which keeps a box to the user while he type
 import json
 import re
 from collections.abc import Callable
+from functools import partial
 from html import escape
 from importlib.resources import files
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import viser
 
 from finlab.errors import FinlabError
-from webapp.handles import put
+from webapp.handles import on_user_change, put
 from webapp.markup.picking import marker
 from webapp.session.quantities import read_number
 from webapp.viser_internals import run_script, uuid_of
@@ -25,6 +26,7 @@ HOW = ("enter", "pause", "escape", "empty", "step")
 """What a user may do with a box: be done with a text, rest, give up, leave nothing, or go up and down."""
 
 Values = tuple[float, ...]
+Answer = TypeVar("Answer")
 
 
 class Note(NamedTuple):
@@ -165,9 +167,9 @@ class NumberField:
 class NumberFields:
     """All of one page, and the channel on which they tell what was typed."""
 
-    def __init__(self, gui: viser.GuiApi) -> None:
-        """Open the channel, a hidden box of text."""
-        self._gui = gui
+    def __init__(self, gui: viser.GuiApi, fault: Callable[[Exception], None]) -> None:
+        """Open the channel, a hidden box of text; `fault` is told what we have got wrong."""
+        self._gui, self._fault = gui, fault
         self._fields: dict[str, NumberField] = {}
         self._last = 0
         gui.add_html(f"<style>div:has(>.{CHANNEL}) + div {{ display: none; }}</style>{marker(CHANNEL)}")
@@ -182,6 +184,7 @@ class NumberFields:
         """One more; what comes back writes it, and lets go of a text in the page whose refusal is past."""
         uuid = uuid_of(field.handle)
         self._fields[uuid] = field
+        on_user_change(field.handle, lambda value: self._safely(partial(field.slide, value)))
 
         def write() -> None:
             if field.refresh():
@@ -193,6 +196,13 @@ class NumberFields:
         """All are there: let the page's half begin."""
         arguments = json.dumps([uuid_of(self._box), list(self._fields)])
         run_script(self._gui, f"{SCRIPT}\nfinlabFields.start(...{arguments});")
+
+    def _safely(self, act: Callable[[], Answer]) -> Answer | None:
+        try:
+            return act()
+        except Exception as error:  # the page must go on
+            self._fault(error)
+            return None
 
     def _hear(self, message: str) -> None:
         """What the page has typed and not been told about yet, oldest first; it may send anything."""
@@ -208,7 +218,7 @@ class NumberFields:
             if number <= self._last or uuid not in self._fields:
                 continue
             self._last = number
-            answer = self._fields[uuid].hear(place, how, text)
+            answer = self._safely(partial(self._fields[uuid].hear, place, how, text))
             if answer is not None:
                 answers.append((number, *answer))
         if answers:

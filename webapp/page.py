@@ -97,7 +97,7 @@ class Page(ABC):
         """What is seen beside the panel."""
         self.bound: list[Callable[[], None]] = []
         """Each writes what the session holds into a widget; the panel that is being built takes them."""
-        self.fields = NumberFields(client.gui)
+        self.fields = NumberFields(client.gui, self.fault)
         """The boxes for numbers."""
         limit_uploads(client.gui, MAX_UPLOAD, self._refuse_upload)
         self._panels: list[Panel] = []
@@ -166,7 +166,6 @@ class Page(ABC):
             lambda: (session.selected, session.state.layout.name),
             digits,
         )
-        on_user_change(handle, field.slide)
         self.bound.append(self.fields.add(field))
         return handle
 

@@ -27,6 +27,10 @@ KEPT: Rgb = (214, 131, 0)
 """A swim that was kept to compare others with."""
 WATER = SKY
 """How the water flows."""
+NEARLY: Rgb = (150, 112, 0)
+"""What could be had but is only nearly given."""
+UNLEARNED: Rgb = (112, 92, 168)
+"""What a method has not learned."""
 DEAD: Rgb = (150, 154, 158)
 """A failed fin."""
 
@@ -54,8 +58,8 @@ MODE_COLORS: tuple[Rgb, ...] = (
 )
 """One colour per mode, in order."""
 
-TORQUE_SCALE = math.pi
-"""Angle of a torque ring per newton metre [rad/(N m)]: 1 N m is half a turn."""
+HALF_TURN = math.pi
+"""Angle of the torque ring that the legend speaks of [rad]."""
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ def trained(browser: Any) -> Iterator[Page]:
 def test_search_answers_a_slider_and_a_failure(trained: Page) -> None:
     page = trained
     assert page.view.answering.best.method == "search" and page.view.answering.best.checkpoint is None
-    page.until(lambda: "Reachable" in page.text(".fl-status") and "least power" in page.text(".fl-status"))
+    page.until(lambda: "Exact" in page.text(".fl-status") and "least power" in page.text(".fl-status"))
     page.type("Fy [N]", "0.5")
     page.until(lambda: page.session.state.target[1] == 0.5 and not page.view.busy)
     page.until(lambda: "+0.50" in page.text(".bars"))

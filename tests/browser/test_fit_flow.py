@@ -27,7 +27,7 @@ def test_a_noisy_file_becomes_a_fin(page: Any, tmp_path: Path, monkeypatch: pyte
     page.press("On all like it")
     page.until(lambda: [fin.model.type for fin in page.session.state.layout.fins] == ["table"] * 4)
     page.until(lambda: not page.view.busy and page.view.shown.err_norm < 1e-3)
-    page.page.get_by_text("Reachable", exact=True).first.wait_for()
+    page.page.get_by_text("Exact", exact=True).first.wait_for()
 
     page.tab("Files")
     with page.page.expect_download() as download:

@@ -14,13 +14,13 @@ def test_slider_moves_numbers_and_arrows(page: Any) -> None:
     page.until(lambda: not page.view.busy)
     assert abs(page.view.shown.wrench[0] - asked) < 0.05
     page.until(lambda: page.vertices("/robot/wrench/delivered_force") != before)
-    page.until(lambda: "Reachable" in page.text(".fl-status"))
+    page.until(lambda: "Exact" in page.text(".fl-status"))
     assert page.problems == []
 
 
 def test_unreachable_wrench_is_said_in_words(page: Any) -> None:
     page.type("Fz [N]", "30")
-    page.until(lambda: "Not reachable" in page.text(".fl-status"))
+    page.until(lambda: "Out of reach" in page.text(".fl-status"))
     page.until(lambda: "left undone" in page.text(".said"))
     assert "at the limit" in page.text(".fl-status")
 
@@ -75,7 +75,7 @@ def test_method_that_fails_says_so_and_the_page_goes_on(page: Any) -> None:
     page.until(lambda: any("out of order" in note for note in page.notes()))
     page.key("Control+z")
     page.until(lambda: page.session.state.method == "search")
-    page.until(lambda: "Reachable" in page.text(".fl-status"))
+    page.until(lambda: "Exact" in page.text(".fl-status"))
 
 
 def test_one_axis_and_the_marks_of_its_reach(page: Any) -> None:

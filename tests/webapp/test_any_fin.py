@@ -1,5 +1,6 @@
 """Every layout answers with its own fins' physics, tables included, and only `paper` warns of fins."""
 
+import csv
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -11,16 +12,18 @@ from finlab.assets import shipped_checkpoints, shipped_layouts
 from finlab.deploy.bundle import make_bundle
 from finlab.deploy.graph import build_graph
 from finlab.deploy.graph_file import graph_bytes
+from finlab.deploy.record import allocation_record
 from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, Layout, layout_to_dict, load_layout
 from finlab.layout.yaml_file import yaml_text
 from finlab.physics import make_law, plant_of
 from finlab.physics.table_file import write_table
 from webapp.markup.snippets import command_line, export_line
-from webapp.markup.words import reach_sentence
+from webapp.markup.verdict import verdict_sentence
 from webapp.session import Session, files
 from webapp.session.session_files import restore, to_dict
 from webapp.session.state import OBJECTIVES, State
+from webapp.session.targets import PRESETS
 from webapp.tasks.solver import Solver
 
 SOLVER = Solver()
@@ -54,7 +57,7 @@ def test_every_shipped_layout_is_answered_exactly(name: str) -> None:
     for objective in OBJECTIVES:
         answer = SOLVER.solve(State(layout, target=reachable(layout), objective=objective))
         assert answer.err_norm < 1e-4 and answer.judged_by == "plant" and answer.power > 0.0
-        assert answer.notes == () and reach_sentence(answer) == "Reachable"
+        assert answer.notes == () and verdict_sentence(answer, True) == "Exact"
 
 
 @needs_network
@@ -64,7 +67,7 @@ def test_only_paper_warns_of_fins() -> None:
         answer = SOLVER.solve(replace(state, method=method))
         assert answer.err_norm < 1e-4 and answer.unknown_fins == ()
     warned = SOLVER.solve(replace(state, method="paper"))
-    assert reach_sentence(warned) == "Not learned: fins 1, 2, 3 and 4. Choose another method"
+    assert verdict_sentence(warned, True) == "Not learned: fins 1, 2, 3 and 4. Choose another method"
 
 
 def test_a_table_fin_goes_through_the_whole_app(
@@ -100,3 +103,31 @@ def test_a_table_that_did_not_come_along_is_told_when_the_layout_is_opened(table
     content = yaml_text(layout_to_dict(tabled)).encode()
     with pytest.raises(LayoutError, match="put the layout and its tables into one ZIP archive"):
         files.read_layout("other.yaml", content.replace(b"tabled", b"other"))
+
+
+@needs_network
+def test_one_error_everywhere() -> None:
+    """Status line, candidates, modes and file of a method with a learned model: all by the fins' own laws."""
+    layout = load_layout("ucat")
+    state = State(layout, target=PRESETS["Turn"], method="paper")
+    solver = Solver()
+    reply = solver.reply(state)
+    answer, plant = reply.answer, plant_of(layout)
+    assert answer.candidates is not None and answer.wrench_surrogate is not None
+    lines = list(csv.DictReader(files.candidates_csv(answer).decode().splitlines()))
+    modes = [mode for mode, _ in (*reply.modes.shown, *solver.modes(reply).shown)]
+    told = [
+        (c, e)
+        for found in (answer.candidates, answer.samples)
+        if found
+        for c, e in zip(found.command, found.err_norm, strict=True)
+    ]
+    for command, error in [*told, *((mode.command, mode.err_norm) for mode in modes)]:
+        missing = (np.array(state.target) - plant.wrench(command)) / answer.sigma
+        assert error == pytest.approx(float(np.linalg.norm(missing)), abs=1e-9)
+    assert float(lines[0]["err_norm"]) == pytest.approx(answer.err_norm, rel=1e-5)
+    rest = [float(value) for key, value in lines[0].items() if key.startswith("missing_")]
+    np.testing.assert_allclose(rest, answer.unallocated, rtol=1e-4, atol=1e-6)
+    assert reply.modes.shown[0].mode.err_norm == pytest.approx(answer.err_norm, rel=1e-9)
+    record = allocation_record(answer)
+    assert record["err_norm"] == answer.err_norm and record["unallocated"] == answer.unallocated.tolist()

@@ -38,7 +38,7 @@ COMPUTED = (
 )
 """Where a fault meets a worker's thread."""
 DRAWN = (
-    "webapp.markup.corner.reach_sentence",
+    "webapp.markup.corner.verdict_sentence",
     "webapp.panels.tabs.corner",
     "webapp.panels.wrench_tab.axis_reach",
     "webapp.panels.wrench_tab.slider_end",

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from finlab.allocation import load_allocator
 from finlab.analysis import score_card
 from finlab.analysis.score_card import quick_check
 from finlab.assets import shipped_layouts
@@ -15,24 +16,28 @@ from tests.webapp.stand_in import StandIn
 from webapp.markup.comparison import comparison_table
 from webapp.markup.corner import corner
 from webapp.markup.score_card import check_card, score_table, warnings
-from webapp.markup.words import authority_sentence, reach_sentence, rest_sentence
+from webapp.markup.verdict import Verdict, verdict_of, verdict_sentence
+from webapp.markup.words import authority_sentence, rest_sentence
 from webapp.scene.wrench_nodes import LENGTH, LONGEST, fitting_newtons
 from webapp.session import Session, files
 from webapp.session.state import State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust
 from webapp.session.tour import STEPS
 from webapp.tasks.analyst import Question, find
-from webapp.theme import DELIVERED, MISSING, css
+from webapp.tasks.solver import Solver, is_within
+from webapp.theme import DELIVERED, UNLEARNED, css
 
 
 def test_reachable_and_not() -> None:
     layout, allocator = load_layout(shipped_layouts()["ucat"]), StandIn()
     easy = allocator.allocate(layout, PRESETS["Turn"])
-    assert easy.reachable and reach_sentence(easy) == "Reachable"
+    assert easy.reachable and verdict_sentence(easy, True) == "Exact"
     assert rest_sentence(easy) == "Nothing is left undone."
     hard = allocator.allocate(layout, [0, 0, 60, 0, 0, 0])
     assert not hard.reachable
-    assert "of the heave force" in reach_sentence(hard) and "at the limit" in reach_sentence(hard)
+    told = verdict_sentence(hard, False)
+    assert told.startswith("Out of reach: ") and "of the heave force" in told and "at the limit" in told
+    assert not is_within(layout, (0, 0, 60, 0, 0, 0), ()) and is_within(layout, PRESETS["Turn"], ())
     assert "N of heave" in rest_sentence(hard) and rest_sentence(hard).endswith("left undone.")
 
 
@@ -43,14 +48,26 @@ def test_fins_that_were_not_learned_are_told_in_words_of_their_own() -> None:
     strange = replace(layout, fins=(*layout.fins[:2], other, layout.fins[3]))
     for wrench in (PRESETS["Turn"], [0, 0, 60, 0, 0, 0]):  # even where the numbers happen to fit
         answer = allocator.allocate(strange, wrench)
-        assert reach_sentence(answer) == "Not learned: fin 3. Choose another method"
+        assert verdict_sentence(answer, True) == "Not learned: fin 3. Choose another method"
         shown = corner(State(strange), "", answer, False, None)
-        assert css(MISSING) in shown and css(DELIVERED) not in shown and "reach" not in shown
+        assert css(UNLEARNED) in shown and css(DELIVERED) not in shown and "reach" not in shown
         comparison: Any = SimpleNamespace(state=State(strange), answers={"mdn": answer})
         assert "Not learned: fin 3" in comparison_table(comparison, None, False, "here")
-    assert "Not learned" not in reach_sentence(
-        allocator.allocate(strange, PRESETS["Turn"], failed=[other.name])
-    )
+    without = allocator.allocate(strange, PRESETS["Turn"], failed=[other.name])
+    assert verdict_of(without, True) is Verdict.EXACT
+
+
+def test_what_a_method_cannot_is_not_what_the_fins_cannot() -> None:
+    """A method that shares out a linear model misses what the others give exactly."""
+    layout = load_layout("mixed")
+    answer = load_allocator("qp").allocate(layout, PRESETS["Zero"])
+    assert not answer.reachable and is_within(layout, PRESETS["Zero"], ())
+    state = State(layout, target=PRESETS["Zero"], method="qp")
+    assert Solver().reply(state).in_reach
+    assert verdict_of(answer, True) is Verdict.APPROXIMATE
+    told = verdict_sentence(answer, True)
+    assert told.startswith("Approximate: ") and told.endswith("; the fins can, qp does not")
+    assert len({verdict.color for verdict in Verdict}) == len({verdict.value for verdict in Verdict}) == 4
 
 
 def test_robot_without_yaw_says_so() -> None:
@@ -100,7 +117,8 @@ def test_candidates_as_csv() -> None:
     lines = files.candidates_csv(answer).decode().splitlines()
     assert answer.candidates is not None
     assert len(lines) == 1 + len(answer.candidates.energy)
-    assert lines[0].startswith("err_norm,power_w,energy,source,front_right.amplitude_rad")
+    assert lines[0].startswith("err_norm,missing_Fx_n,missing_Fy_n,missing_Fz_n,missing_Tx_nm,")
+    assert "missing_Tz_nm,power_w,energy,source,front_right.amplitude_rad" in lines[0]
     with pytest.raises(FinlabError, match="no candidates"):
         files.candidates_csv(None)
 

@@ -10,7 +10,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES
 from finlab.arrays import Array
 from webapp.markup.words import damage_words, saturated
-from webapp.session.state import AXIS_UNITS, AXIS_WORDS, State
+from webapp.session.state import AXIS_WORDS, State
 from webapp.session.targets import nice_limit
 from webapp.theme import DEAD, css, fin_color
 
@@ -44,14 +44,18 @@ def wrench_bars(asked: ArrayLike, given: ArrayLike | None, sentence: str) -> str
         rows.append(_track(asked[k] / scale, None if given is None else given[k] / scale))
         rows.append(f"<span class='right asked'>{_value(asked[k], k)}</span>")
         rows.append(f"<span class='right given'>{'–' if given is None else _value(given[k], k)}</span>")
+        rest = None if given is None else _value(asked[k] - given[k], k)
+        kind = "missing" if rest is not None and float(rest.replace("−", "-")) else "dim"
+        rows.append(f"<span class='right {kind}'>{'–' if rest is None else rest}</span>")
     return f"<div class='fl'><div class='bars'>{''.join(rows)}</div><div class='said'>{sentence}</div></div>"
 
 
 def _header(scales: list[float]) -> str:
-    scale = f"±{scales[0]:g} {AXIS_UNITS[0]}, ±{scales[1]:g} {AXIS_UNITS[3]}"
+    scale = f"±{scales[0]:g} N, ±{scales[1]:g} N m"
     return (
-        f"<span></span><span class='dim' style='text-align:center'>{scale}</span>"
+        f"<span></span><span class='dim' style='text-align:center;white-space:nowrap'>{scale}</span>"
         "<b class='right asked'>asked</b><b class='right given'>delivered</b>"
+        "<b class='right missing'>missing</b>"
     )
 
 

@@ -6,9 +6,11 @@ from html import escape
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.judging import REACHED
 from webapp.markup.picking import pick
+from webapp.markup.verdict import verdict_of
 from webapp.markup.words import listed, objective_of, small, three_digits, unlearned_sentence
 from webapp.session.state import COMPARED
 from webapp.tasks.comparison import Comparison
+from webapp.theme import NEARLY, css
 
 ERRORS = (1e-12, 10.0)
 """Errors [σ] at both ends of their bars."""
@@ -24,13 +26,16 @@ def comparison_table(comparison: Comparison, shown: str | None, stale: bool, pic
             "</div>"
         )
     rows, others = [], []
+    in_reach = any(
+        isinstance(answer, Allocation) and answer.reachable for answer in comparison.answers.values()
+    )
     for k, method in enumerate(COMPARED):
         answer = comparison.answers.get(method)
         if isinstance(answer, Allocation) and answer.unknown_fins:
             words = unlearned_sentence(answer.layout, answer.unknown_fins)
             cells = f"<td colspan='4' class='words missing'>{words}</td>"
         elif isinstance(answer, Allocation):
-            color = "var(--fl-delivered)" if answer.reachable else "var(--fl-missing)"
+            color = css(verdict_of(answer, in_reach).color)
             cells = (
                 f"<td>{small(answer.err_norm)}{_bar(answer.err_norm, ERRORS, color)}</td>"
                 f"<td>{three_digits(answer.power)}</td><td>{three_digits(answer.energy)}</td>"
@@ -47,8 +52,9 @@ def comparison_table(comparison: Comparison, shown: str | None, stale: bool, pic
     if others:
         kept += f"; {listed(others)} keep{'s' * (len(others) == 1)} effort least whatever is asked"
     said = (
-        f"<div class='said'><span class='given'>Green</span>: delivered, up to {REACHED} σ. "
-        f"<span class='missing'>Orange</span>: something is missing. Bars are logarithmic. {kept}.</div>"
+        f"<div class='said'><span class='given'>Green</span>: exact, up to {REACHED} σ. "
+        f"<span style='color:{css(NEARLY)}'>Ochre</span>: approximate, another method is exact. "
+        f"<span class='missing'>Orange</span>: out of reach of all. Bars are logarithmic. {kept}.</div>"
     )
     note = "<div class='missing'>The question has changed since; compare again.</div>" if stale else ""
     body = "".join(rows)

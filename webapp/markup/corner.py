@@ -6,32 +6,36 @@ from html import escape
 import numpy as np
 
 from finlab.allocation.allocation import Allocation
+from finlab.allocation.policy import AXES
 from webapp.markup.swim_card import pace_words, robots
-from webapp.markup.words import objective_of, reach_sentence, small, three_digits
+from webapp.markup.verdict import verdict_of, verdict_sentence
+from webapp.markup.words import objective_of, small, three_digits
 from webapp.scene.wrench_nodes import set_scale
-from webapp.session.state import State
+from webapp.session.state import AXIS_UNITS, State
 from webapp.tasks.analyst import Findings
 from webapp.tasks.moment import ERROR
 from webapp.tasks.swimming import Swimming
-from webapp.theme import ASKED, DEAD, DELIVERED, MISSING, TORQUE_SCALE, WATER, css, look
+from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, WATER, css, look
 
 ARROWS = (("asked", 0.65), ("delivered", 1.0), ("missing", 1.0))
 """Words and opacities of the three arrows."""
 
 
-def legend(newtons: float, also: tuple[str, ...]) -> str:
+def legend(newtons: float, torque: float, cut: bool, also: tuple[str, ...]) -> str:
     """Arrows, scales, and rows of more.
 
     Args:
         newtons: force [N] that an arrow of 0.1 m stands for.
+        torque: torque [N m] that half a turn of a ring stands for.
+        cut: whether a ring would have to be longer than a turn.
         also: rows as `overlay_row` and the others here make them; empty ones are left out.
     """
     # By name, so that the dark theme can lighten them.
     rows = [f"{_arrow(f'var(--fl-{word})', alpha)}<span>{word}</span>" for word, alpha in ARROWS]
-    turn = math.degrees(TORQUE_SCALE)
+    ring = f"ring {math.degrees(HALF_TURN):.0f}° = {torque:g} N m{', cut off' if cut else ''}"
     return (
         f"<div class='fl-legend'>{''.join(rows)}{''.join(also)}</div><div class='dim scales'>"
-        f"arrow 0.1 m = {newtons:g} N<br>ring {turn:.0f}° = 1 N m</div>"
+        f"arrow 0.1 m = {newtons:g} N<br>{ring}</div>"
     )
 
 
@@ -85,6 +89,7 @@ def corner(
     error: str | None,
     raw: bool = False,
     least: bool = True,
+    in_reach: bool = False,
 ) -> str:
     """Legend and status line in the lower left corner of the page.
 
@@ -96,22 +101,27 @@ def corner(
         error: why there is no answer.
         raw: whether it is a raw command on show, of which nobody expects that it is exact.
         least: whether it is the answer itself, not another way to do the same.
+        in_reach: whether any command of the working fins gives what is asked.
     """
     fins = f"{len(state.healthy)} of {state.layout.n_fins} fins"
     parts = [f"<b>{escape(state.layout.name)}</b>", f"<span>{fins}</span>"]
     if error is not None:
         parts.append(f"<span class='missing'>{escape(error)}</span>")
     elif allocation is not None:
-        parts += _figures(allocation, raw, least)
+        parts += _figures(allocation, raw, least, in_reach)
     if error is None and (busy or allocation is None):
         parts.append("<span class='dim'>computing …</span>")
     return _cards(legend, parts)
 
 
-def _figures(allocation: Allocation, raw: bool, least: bool) -> list[str]:
+def _figures(allocation: Allocation, raw: bool, least: bool, in_reach: bool) -> list[str]:
     """Error, costs, time and verdict of what is on the robot."""
-    color = DEAD if raw else DELIVERED if allocation.reachable and not allocation.unknown_fins else MISSING
-    verdict = "Raw, not refined" if raw else reach_sentence(allocation)
+    color = DEAD if raw else verdict_of(allocation, in_reach).color
+    verdict = "Raw, not refined" if raw else verdict_sentence(allocation, in_reach)
+    rest = ", ".join(
+        f"{axis} {value:+.2g} {unit}"
+        for axis, value, unit in zip(AXES, allocation.unallocated, AXIS_UNITS, strict=True)
+    ).replace("-", "−")
     costs = []
     for word, value, unit in (("power", allocation.power, " W"), ("effort", allocation.energy, "")):
         kept = f"least {word}" if word == objective_of(allocation) and least else word
@@ -119,7 +129,8 @@ def _figures(allocation: Allocation, raw: bool, least: bool) -> list[str]:
         costs.append(f"<span><span class='dim'>{kept}</span> {cost}</span>")
     method, time = escape(allocation.method), three_digits(allocation.solve_ms)
     return [
-        f"<span><span class='dim'>error</span> <b class='err'>{small(allocation.err_norm)}</b> σ</span>",
+        f"<span title='missing, by the fins’ own laws: {rest}'><span class='dim'>error</span> "
+        f"<b class='err'>{small(allocation.err_norm)}</b> σ</span>",
         *costs,
         f"<span><span class='dim'>{method}</span> {time} ms</span>",
         f"<span class='pill' style='background:{css(color)}'>{escape(verdict)}</span>",

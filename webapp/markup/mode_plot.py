@@ -21,7 +21,7 @@ MOST_TICKS = 6
 EXACT = 1e-6
 """Error [σ] below which all answers are drawn as equally exact."""
 FAR = 2.0
-"""Samples that cost more than so many times the dearest mode stand at the edge, so that modes keep apart."""
+"""Samples that cost more than so many times the dearest mode are counted, not drawn: modes keep apart."""
 LEGEND = (("refined", 5.0, 6), ("on the robot", 0.0, 72), ("sampled", 2.6, 162))
 """Word, radius and place of what is drawn; radius 0 is the ring. The last one is for methods that sample."""
 DOT = 9
@@ -100,9 +100,9 @@ def mode_plot(
     if samples is not None:
         error = np.array([mode.err_norm for mode, _ in modes.shown])
         refined = np.stack([costs[:, 0], _logarithm(error)], axis=1)
-        raw_cost = np.minimum((samples.power, samples.energy)[order[0]], FAR * costs[:, 0].max())
-        raw = np.stack([raw_cost, _logarithm(samples.err_norm)], axis=1)
-    points = np.concatenate([refined, raw])
+        raw = np.stack([(samples.power, samples.energy)[order[0]], _logarithm(samples.err_norm)], axis=1)
+    near = raw[:, 0] <= FAR * costs[:, 0].max()
+    points = np.concatenate([refined, raw[near]])
     if not np.isfinite(points).all():
         return ""
     across = cost_axis(words[order[0]], points[:, 0])
@@ -114,9 +114,15 @@ def mode_plot(
 
     parts = [_legend(samples is not None), axes(across, up, LEFT, height)]
     if samples is not None:
-        parts.append(_sample_dots([place(point) for point in raw], modes, sample, picker))
-    places = _apart([place(point) for point in refined])
-    for k, (x, y) in reversed(list(enumerate(places))):  # the best one on top
+        dots = [place(point) if close else None for point, close in zip(raw, near, strict=True)]
+        parts.append(_sample_dots(dots, modes, sample, picker))
+    places = [place(point) for point in refined]
+    labels = list(enumerate(zip(_apart(places), places, strict=True)))
+    for k, ((x, y), (u, v)) in reversed(labels):  # the best one on top
+        if (x, y) != (u, v):
+            color = css(mode_color(k))
+            parts.append(f"<path d='M{u:.1f} {v:.1f}L{x:.1f} {y:.1f}' stroke='{color}'/>")
+            parts.append(f"<circle cx='{u:.1f}' cy='{v:.1f}' r='3.5' fill='{color}'/>")
         parts.append(
             f"<g class='pick' {pick(picker, k)}>"
             f"<circle cx='{x:.1f}' cy='{y:.1f}' r='8.5' fill='{css(mode_color(k))}'/>"
@@ -137,17 +143,23 @@ def _logarithm(error: Array) -> Array:
     return np.asarray(np.log10(np.maximum(error, EXACT)))
 
 
-def _sample_dots(places: list[tuple[float, float]], modes: Modes, sample: int | None, picker: str) -> str:
-    """Raw samples, and a ring around the one on the robot."""
+def _sample_dots(
+    places: list[tuple[float, float] | None], modes: Modes, sample: int | None, picker: str
+) -> str:
+    """Raw samples, a ring around the one on the robot, and how many have no place in the plot."""
     colors = sample_colors(modes, len(places))
     dots = [
-        f"<circle data-k='{k}' cx='{x:.1f}' cy='{y:.1f}' r='3' fill='{css(color, 0.6)}'/>"
-        for k, ((x, y), color) in enumerate(zip(places, colors, strict=True))
+        f"<circle data-k='{k}' cx='{place[0]:.1f}' cy='{place[1]:.1f}' r='3' fill='{css(color, 0.6)}'/>"
+        for k, (place, color) in enumerate(zip(places, colors, strict=True))
+        if place is not None
     ]
+    beyond = len(places) - len(dots)
+    told = f"<text x='{WIDTH - RIGHT}' y='14' text-anchor='end'>{beyond} dearer →</text>" if beyond else ""
     chosen = send(f"{picker}-{SAMPLES}", "event.target.dataset.k + ',' + Date.now()")
     click = f"if (event.target.dataset.k) {{ {chosen} }}"
-    ring = _ring(*places[sample], 6.5) if sample is not None and sample < len(places) else ""
-    return f'<g class="pick samples" onclick="{click}">{"".join(dots)}</g>{ring}'
+    chosen_place = places[sample] if sample is not None and sample < len(places) else None
+    ring = "" if chosen_place is None else _ring(*chosen_place, 6.5)
+    return f'<g class="pick samples" onclick="{click}">{"".join(dots)}</g>{ring}{told}'
 
 
 def _ring(x: float, y: float, radius: float) -> str:
@@ -155,10 +167,7 @@ def _ring(x: float, y: float, radius: float) -> str:
 
 
 def _apart(places: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Dots moved sideways within the plot, so that each can be clicked.
-
-    They go to the right where there is room, since none must look cheaper than it is.
-    """
+    """Where the numbers of dots stand, so that each can be clicked: on their dots, or beside crowded ones."""
     apart: list[tuple[float, float]] = []
     for x, y in places:
         rooms = [x + side * step for side in (1, -1) for step in range(0, WIDTH, 2)]

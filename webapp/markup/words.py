@@ -69,28 +69,6 @@ def unlearned_sentence(layout: Layout, fins: Sequence[str]) -> str:
     return f"Not learned: {fins_words([layout.index(name) for name in fins])}. Choose another method"
 
 
-def reach_sentence(allocation: Allocation) -> str:
-    """One sentence: reachable, or what is missing most and which fins are at their limits.
-
-    Where the method does not know the fins, that: limits are not what keeps it.
-    """
-    if allocation.unknown_fins:
-        return unlearned_sentence(allocation.layout, allocation.unknown_fins)
-    if allocation.reachable:
-        return "Reachable"
-    axis = int(np.argmax(np.abs(allocation.unallocated / allocation.sigma)))
-    target, given = allocation.target[axis], allocation.wrench[axis]
-    kind = "force" if axis < 3 else "torque"
-    if abs(target) > 1e-3 and -0.005 < given / target < 1.0:
-        sentence = f"Not reachable: {abs(100 * given / target):.0f} % of the {AXIS_WORDS[axis]} {kind}"
-    else:
-        sentence = (
-            f"Not reachable: {abs(given - target):.2g} {AXIS_UNITS[axis]} of {AXIS_WORDS[axis]} too much"
-        )
-    full = np.flatnonzero(saturated(allocation).any(axis=1))
-    return f"{sentence}; {fins_words(full.tolist())} at the limit" if len(full) else sentence
-
-
 def rest_sentence(allocation: Allocation) -> str:
     """One sentence on the unallocated wrench, axis by axis, leaving out what does not matter."""
     rest = allocation.unallocated

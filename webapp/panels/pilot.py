@@ -6,7 +6,7 @@ from typing import NamedTuple
 import viser
 
 from finlab.allocation.policy import KINDS
-from webapp.handles import on_user_change, put
+from webapp.handles import put
 from webapp.markup.picking import add_channel, send
 from webapp.page import Page
 from webapp.session.state import AXIS_WORDS
@@ -90,11 +90,11 @@ class PilotPanel:
         policies = "Come closest, keep the direction, or serve axes by priority, heave first."
         with gui.add_folder("Steer by hand", expand_by_default=False):
             self._axes = gui.add_dropdown("Stick for", tuple(PADS), hint="What up and sideways mean.")
-            on_user_change(self._axes, lambda _: self.refresh())
+            page.on_change(self._axes, lambda _: None)
             self._spring = gui.add_checkbox(
                 "Spring back", True, hint="Let go, and what was asked before comes back."
             )
-            on_user_change(self._spring, lambda _: self.refresh())
+            page.on_change(self._spring, lambda _: None)
             self._pad = gui.add_html("")
             add_channel(gui, CHANNEL, self._steer)
             grips = "Handles on the blue arrows in the view, for the force and the torque."

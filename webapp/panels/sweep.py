@@ -5,7 +5,7 @@ import time
 import numpy as np
 import viser
 
-from webapp.handles import on_user_change, option_index, put
+from webapp.handles import option_index, put
 from webapp.markup.words import small, three_digits
 from webapp.page import Page
 from webapp.panels.line_plot import FIN_LINES, LinePlot, top_of
@@ -30,7 +30,7 @@ class SweepPanel:
             self._axis = gui.add_dropdown(
                 "Sweep", AXIS_WORDS, hint="Which component of the target goes through the range."
             )
-            on_user_change(self._axis, lambda _: self._fit_range())
+            page.on_change(self._axis, lambda _: self._fit_range())
             page.bind_number(
                 gui.add_vector2("From, to", self._ends, step=0.05, hint="Ends of the range [N or N m]."),
                 self._set_ends,
@@ -58,7 +58,6 @@ class SweepPanel:
         if ranges is not None and np.isfinite(ranges.high[axis]):
             low, high = float(ranges.low[axis]), float(ranges.high[axis])
             self._ends = round(0.5 * low, 2), round(0.5 * high, 2)
-            self._page.do(lambda: None)
 
     def refresh(self) -> None:
         """Write the state of the sweep; the plot at most a few times a second."""

@@ -97,7 +97,17 @@ class Corner:
             content = swim_corner(page.swimming, ARROWS_N)
         else:
             state, least = page.session.state, page.shown is answering.best
-            content = corner(state, page.scenery.legend, page.shown, page.busy, answering.error, raw, least)
+            reply = answering.reply
+            content = corner(
+                state,
+                page.scenery.legend,
+                page.shown,
+                page.busy,
+                answering.error,
+                raw,
+                least,
+                reply is not None and reply.in_reach,
+            )
         put(self._content, content=content)
 
 

@@ -26,6 +26,8 @@ SIZE_PX = (960, 304)
 """Width and height of the window [px]."""
 EDGE_PX = 12
 """Between the window and the edges of the view [px]."""
+STEPS = (5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 90.0, 120.0, 180.0, 240.0)
+"""Where the axes of time may end [s]."""
 CERTAIN = 114.0
 """End of the axis of probabilities [%]: some room above what is certain."""
 CURSOR = "rgba(120,130,140,.9)"
@@ -103,7 +105,7 @@ class SwimPlots:
         seconds = np.ascontiguousarray(record[:, TIME])
         if kept is not None:  # which may have swum for longer
             seconds = np.append(seconds, kept.line[kept.line[:, TIME] > seconds[-1], TIME])
-        end = swimmers[0].duration_s
+        end = shown_until(float(seconds[-1]), swimmers[0].duration_s)
         for plot, column, scale in (
             (self._error, ERROR, 100.0),
             (self._depth, DEPTH_ERROR, 100.0),
@@ -135,6 +137,12 @@ class SwimPlots:
             plot.draw(seconds, [np.full(len(seconds), np.nan), *lines], ends, end)
         else:
             plot.draw(*with_cursor(seconds, lines, at, ends), ends, end)
+
+
+def shown_until(time: float, duration: float) -> float:
+    """Where the axes of time end [s]: a little beyond what has been swum, in steps that seldom jump."""
+    step = next((step for step in STEPS if 1.05 * time <= step), duration)
+    return min(step, duration) if time <= duration else time
 
 
 def _line(rows: Array | None, column: int, seconds: Array, scale: float) -> Array:

@@ -65,8 +65,10 @@ class WrenchTab:
         if answer is not None and answer.unknown_fins:
             sentence = f"<span class='missing'>{escape('; '.join(answer.notes))}.</span> {sentence}"
         elif answer is not None and not answer.reachable:
-            told = escape("; ".join((*answer.binding, *answer.notes)))
-            sentence = f"{sentence} {100 * answer.scale:.0f} % of what is asked, {told}."
+            told = escape(
+                "; ".join((f"{100 * answer.scale:.0f} % of what is asked", *answer.binding, *answer.notes))
+            )
+            sentence = f"{sentence} {told}."
         blind = authority_sentence(state.layout, state.failed, self._target.reach)
         return sentence if blind is None else f"<span class='missing'>{blind}</span> {sentence}"
 

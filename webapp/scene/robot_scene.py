@@ -11,14 +11,21 @@ from webapp.markup.words import damage_words, missing_part
 from webapp.scene.fin_node import FinNode, Flapping
 from webapp.scene.gizmos import Grips
 from webapp.scene.meshes.hull import hull_of
+from webapp.scene.meshes.mesh import LONGEST_TURN
 from webapp.scene.overlays import Ghost, Lines, Overlay, moved_fins
 from webapp.scene.stage import Stage, aim_camera
-from webapp.scene.wrench_nodes import LENGTH, AttainableNodes, WrenchNodes, fitting_newtons
+from webapp.scene.wrench_nodes import (
+    LENGTH,
+    AttainableNodes,
+    WrenchNodes,
+    fitting_newtons,
+    fitting_torque,
+)
 from webapp.session.state import State
 from webapp.tasks.analyst import Findings
 from webapp.tasks.context import Context
 from webapp.tasks.solver import Attention
-from webapp.theme import ASKED
+from webapp.theme import ASKED, HALF_TURN
 
 CAMERAS = {
     "3D": (0.48, 0.46, 0.58),
@@ -54,6 +61,10 @@ class RobotScene:
         self._flapping = Flapping()
         self.newtons = 1.0
         """Force [N] that an arrow of 0.1 m stands for at the moment."""
+        self.torque = 1.0
+        """Torque [N m] that half a turn of a ring stands for at the moment."""
+        self.cut = False
+        """Whether a ring is cut off."""
         self.look_from("3D")
 
     def show(self, visible: bool) -> None:
@@ -119,7 +130,12 @@ class RobotScene:
         given = None if allocation is None else allocation.wrench
         missing = np.zeros(6) if allocation is None else missing_part(allocation)
         top = hull.center[2] + hull.half[2]
-        self._wrench.refresh(target, given, missing, top, scale)
+        if self.grips.dragged is None:
+            torques = [target[3:], missing[3:], *([] if given is None else [given[3:]])]
+            most = float(max(np.linalg.norm(torque) for torque in torques))
+            self.torque = fitting_torque(most, self.torque)
+            self.cut = HALF_TURN * most / self.torque > LONGEST_TURN
+        self._wrench.refresh(target, given, missing, top, scale, HALF_TURN / self.torque)
         self.grips.refresh(display.grips, target, self._wrench.hub(top), scale)
         shown = self._session.selected if display.dimensions else None
         self._lines.refresh(state.layout, state.healthy, shown, display.graph, attention)

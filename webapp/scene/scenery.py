@@ -45,6 +45,8 @@ class Scenery:
         self.robot.show(not self.swims)
         self.legend = legend(
             self.robot.newtons,
+            self.robot.torque,
+            self.robot.cut,
             (
                 overlay_row(other, display.dark),
                 graph_row(display.graph, attention is not None, display.dark),

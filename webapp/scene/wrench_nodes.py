@@ -1,5 +1,7 @@
 """The robot's wrench above the hull (asked, delivered, missing), and the sets that it can attain."""
 
+import math
+
 import numpy as np
 import viser
 from numpy.typing import NDArray
@@ -7,17 +9,30 @@ from numpy.typing import NDArray
 from finlab.analysis import AttainableSet
 from finlab.arrays import Array
 from webapp.handles import put
-from webapp.scene.meshes.mesh import NOTHING, RING_RADIUS, Mesh, force_arrow, torque_ring, tube
+from webapp.scene.meshes.mesh import (
+    LONGEST_TURN,
+    NOTHING,
+    RING_RADIUS,
+    SMALLEST_TURN,
+    Mesh,
+    force_arrow,
+    torque_ring,
+    tube,
+)
 from webapp.scene.shape import UNLIT, Shape
 from webapp.session.display import NEWTONS
 from webapp.tasks.analyst import Findings
-from webapp.theme import ASKED, DEAD, DELIVERED, LIGHT, MISSING
+from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, LIGHT, MISSING
 
 LENGTH = 0.1
 """Length that the legend speaks of [m]."""
 LONGEST, SHORTEST = 0.42, 0.14
 """The longest arrow stays within these [m]; between them the scale is left alone, so it seldom jumps."""
 
+TORQUES = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+"""Torques [N m] that half a turn of a ring may stand for."""
+SHORTEST_TURN = math.radians(60.0)
+"""The longest ring is no shorter than this [rad], unless nothing is asked to speak of."""
 HEIGHT = 0.16
 """How far above the hull the arrows begin [m]; inside it they could not be seen."""
 LARGEST = 0.42
@@ -30,6 +45,14 @@ def fitting_newtons(largest: float, current: float) -> float:
     if largest < 1e-6 or SHORTEST <= length <= LONGEST:
         return current
     return next((step for step in NEWTONS if LENGTH * largest / step <= LONGEST), NEWTONS[-1])
+
+
+def fitting_torque(largest: float, current: float) -> float:
+    """Torque per half a turn [N m] for rings up to `largest` [N m]; `current` while that is good enough."""
+    turn = HALF_TURN * largest / current
+    if largest < TORQUES[0] / 100.0 or SHORTEST_TURN <= turn <= 0.95 * LONGEST_TURN:
+        return current
+    return next((step for step in TORQUES if HALF_TURN * largest / step <= 0.95 * LONGEST_TURN), TORQUES[-1])
 
 
 class WrenchNodes:
@@ -47,6 +70,15 @@ class WrenchNodes:
 
         self._asked = node("asked_force", ASKED, 0.4), node("asked_torque", ASKED, 0.4)
         self._given = node("delivered_force", DELIVERED, None), node("delivered_torque", DELIVERED, None)
+        place = (-1.1 * RING_RADIUS, 0.0, 0.05)
+        self._number = scene.add_label(
+            "/robot/wrench/torque",
+            "",
+            position=place,
+            anchor="bottom-center",
+            font_screen_scale=0.8,
+            visible=False,
+        )
         self._missing = node("missing_force", MISSING, None), node("missing_torque", MISSING, None)
 
     @staticmethod
@@ -54,7 +86,9 @@ class WrenchNodes:
         """Where the arrows begin (3,), given the height of the hull's top [m]."""
         return np.array([0.0, 0.0, top + HEIGHT])
 
-    def refresh(self, target: Array, wrench: Array | None, missing: Array, top: float, scale: float) -> None:
+    def refresh(
+        self, target: Array, wrench: Array | None, missing: Array, top: float, scale: float, turn: float
+    ) -> None:
         """Show a target (6,) and what is delivered of it (6,), None while unknown.
 
         Args:
@@ -63,16 +97,24 @@ class WrenchNodes:
             missing: the part (6,) of the difference that matters enough to be drawn.
             top: height of the hull's top [m].
             scale: length of a force arrow per newton [m/N].
+            turn: angle of a torque ring per newton metre [rad/(N m)].
         """
         put(self._root, position=self.hub(top))
         zero = np.zeros(3)
         self._asked[0].show(force_arrow, target[:3] * scale, zero, 0.011)
-        self._asked[1].show(torque_ring, target[3:], zero, 0.0085)
+        self._asked[1].show(torque_ring, target[3:] * turn, zero, 0.0085)
         given = np.zeros(6) if wrench is None else wrench
         self._given[0].show(force_arrow, given[:3] * scale, zero, 0.0065)
-        self._given[1].show(torque_ring, given[3:], zero, 0.005)
+        self._given[1].show(torque_ring, given[3:] * turn, zero, 0.005)
+        self._tell(target[3:], turn)
         self._missing[0].show(force_arrow, missing[:3] * scale, given[:3] * scale, 0.006)
-        self._missing[1].show(torque_ring, missing[3:], zero, 0.005, 1.35 * RING_RADIUS)
+        self._missing[1].show(torque_ring, missing[3:] * turn, zero, 0.005, 1.35 * RING_RADIUS)
+
+    def _tell(self, torque: Array, turn: float) -> None:
+        """The torque's size as a number beside its ring."""
+        size = float(np.linalg.norm(torque))
+        drawn = size * turn >= SMALLEST_TURN
+        put(self._number, visible=drawn, text=f"{size:.3g} N m" if drawn else "")
 
 
 class AttainableNodes:

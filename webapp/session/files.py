@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 
 from finlab.allocation.allocation import Allocation
+from finlab.allocation.policy import AXES
 from finlab.assets import shipped_layouts
 from finlab.deploy.bundle import with_tables_inside
 from finlab.errors import DataError, FinlabError, LayoutError
@@ -94,7 +95,10 @@ def layout_file(layout: Layout) -> tuple[str, bytes]:
 
 
 def candidates_csv(allocation: Allocation | None) -> bytes:
-    """The refined candidates of an answer, one line each, SI units and radians."""
+    """The refined candidates of an answer, one line each, SI units and radians.
+
+    The error is that of the fins' own laws, as everywhere: one figure, and what is missing along each axis.
+    """
     if allocation is None or allocation.candidates is None:
         raise FinlabError("there are no candidates to save; choose the method search, mdn or paper")
     candidates = allocation.candidates
@@ -105,10 +109,12 @@ def candidates_csv(allocation: Allocation | None) -> bytes:
         for name in allocation.layout.names
         for quantity in ("amplitude_rad", "frequency_hz", "zero_direction_rad")
     ]
-    writer.writerow(["err_norm", "power_w", "energy", "source", *columns])
+    missing = [f"missing_{axis}_{'n' if axis.startswith('F') else 'nm'}" for axis in AXES]
+    writer.writerow(["err_norm", *missing, "power_w", "energy", "source", *columns])
     for k, command in enumerate(candidates.command):
         values = [f"{v:.6g}" for v in command.ravel()]
-        told = (candidates.err_norm[k], candidates.power[k], candidates.energy[k])
+        rest = allocation.target - candidates.wrench[k]
+        told = (candidates.err_norm[k], *rest, candidates.power[k], candidates.energy[k])
         writer.writerow([*(f"{value:.6g}" for value in told), candidates.source[k], *values])
     return text.getvalue().encode()
 

@@ -121,8 +121,8 @@ class Exports:
         client, loop = self._context.client, self._context.loop
         try:
             picture = client.get_render(*PICTURE_SIZE, transport_format="png", timeout=30.0)
-        except (RuntimeError, TimeoutError) as error:
-            loop.post(partial(self._context.notify, "No picture", str(error)))
+        except Exception as error:  # nobody else would hear of it on this thread
+            loop.post(partial(self._context.notify, "No picture", str(error) or type(error).__name__))
             return
         content = iio.imwrite("<bytes>", picture, extension=".png")
         loop.post(partial(self.download, name, content))

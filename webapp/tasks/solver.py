@@ -1,7 +1,7 @@
 """From a state to an answer with all that a page shows of it: picks the allocator and keeps it."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -10,9 +10,14 @@ import numpy as np
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
+from finlab.allocation.judging import judge
 from finlab.allocation.methods import load_allocator
+from finlab.allocation.modes import Mode
+from finlab.allocation.solution import Candidates
 from finlab.arrays import Array
 from finlab.errors import AllocationError
+from finlab.forces.reach import axis_ranges
+from finlab.layout import Layout
 from webapp.session.state import State
 from webapp.tasks.mode_names import Modes, known_modes, listed_modes
 
@@ -44,6 +49,8 @@ class Reply:
     """How much its fins look at each other, for methods with a network."""
     modes: Modes
     """Those of its modes that are known anyway: a few."""
+    in_reach: bool
+    """Whether any command of the working fins gives what is asked."""
 
 
 class Solver:
@@ -93,16 +100,18 @@ class Solver:
         Raises:
             FinlabError: the method cannot be loaded or cannot answer.
         """
-        answer, failed = self.solve(state), state.failed
+        answer, failed = judged(self.solve(state)), state.failed
         healthy = answer.layout.without(failed) if failed else answer.layout
         insight = self.allocator(state).insight(healthy, state.target)
         modes = listed_modes(known_modes(answer), answer.samples)
         attention = None if insight is None else Attention(healthy.names, insight.attention)
-        return Reply(state, answer, attention, modes)
+        in_reach = answer.reachable or is_within(answer.layout, state.target, failed)
+        return Reply(state, answer, attention, modes, in_reach)
 
     def modes(self, reply: Reply) -> Modes:
         """All distinct ways to do what an answer does: a search of its own, tens of milliseconds."""
-        return listed_modes(reply.answer.explore(), reply.answer.samples)
+        answer = reply.answer
+        return listed_modes(judged_modes(answer, answer.explore()), answer.samples)
 
     def refinement(self, reply: Reply) -> tuple[Allocation, ...]:
         """The best raw candidate of an answer, what each step makes of it, and the answer itself at the end.
@@ -132,3 +141,45 @@ class Solver:
         return self.allocator(state).allocate(
             state.layout, state.target, failed=state.failed, policy=state.policy, health=state.health, seed=0
         )
+
+
+def judged(answer: Allocation) -> Allocation:
+    """An answer whose candidates and samples tell what the fins' own laws make of them, as it does itself.
+
+    A method with a learned model ranks them by what that believes.
+    """
+    if answer.wrench_surrogate is None:
+        return answer
+    told = (
+        None if found is None else _judged(answer, found) for found in (answer.candidates, answer.samples)
+    )
+    candidates, samples = told
+    return replace(answer, candidates=candidates, samples=samples)
+
+
+def _judged(answer: Allocation, found: Candidates) -> Candidates:
+    verdict = judge(answer.layout, found.command, np.tile(answer.target, (len(found), 1)), answer.sigma)
+    return replace(found, wrench=verdict.wrench, err_norm=verdict.err_norm)
+
+
+def judged_modes(answer: Allocation, modes: tuple[Mode, ...]) -> tuple[Mode, ...]:
+    """The same for modes."""
+    if answer.wrench_surrogate is None or not modes:
+        return modes
+    command = np.stack([mode.command for mode in modes])
+    verdict = judge(answer.layout, command, np.tile(answer.target, (len(modes), 1)), answer.sigma)
+    return tuple(
+        replace(mode, wrench=wrench, err_norm=float(error))
+        for mode, wrench, error in zip(modes, verdict.wrench, verdict.err_norm, strict=True)
+    )
+
+
+EDGE = 1e-4
+"""Share of a range by which a component may lie beyond its end and still count as within."""
+
+
+def is_within(layout: Layout, target: tuple[float, ...], failed: Collection[str]) -> bool:
+    """Whether the working fins can give a wrench (6,): no component is beyond its range beside the others."""
+    low, high = axis_ranges(layout, target, failed)
+    slack = EDGE * (np.abs(high) + np.abs(low)) + EDGE
+    return bool((np.isfinite(low) & (low - slack <= target) & (target <= high + slack)).all())

@@ -1,5 +1,6 @@
 """A triangle mesh, the surfaces that shapes are made of, and the arrows of forces and torques."""
 
+import math
 from functools import cache
 from typing import NamedTuple
 
@@ -7,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from webapp.theme import TORQUE_SCALE
 
 SHORTEST = 1e-3
 """Arrows shorter than this are not drawn [m]."""
-SMALLEST_TORQUE = 0.005
-"""Torques below this are not drawn [N m]."""
+SMALLEST_TURN, LONGEST_TURN = math.radians(3.0), math.radians(330.0)
+"""Rings shorter than this are not drawn, longer ones are cut off [rad]."""
 RING_RADIUS = 0.12
 """Radius of a torque ring [m]."""
 
@@ -115,22 +115,22 @@ def force_arrow(way: Array, start: Array, thickness: float) -> Mesh:
     return tube(np.asarray(start) + stations[:, None] * direction, radii, 18)
 
 
-def torque_ring(torque: Array, center: Array, thickness: float, radius: float = RING_RADIUS) -> Mesh:
-    """A ring arrow about a torque (3,) [N m] by the right-hand rule; its angle is the torque's size."""
-    size = float(np.linalg.norm(torque))
-    if size < SMALLEST_TORQUE:
+def torque_ring(turn: Array, center: Array, thickness: float, radius: float = RING_RADIUS) -> Mesh:
+    """A ring arrow about a vector (3,) [rad] by the right-hand rule: a torque times the rings' scale."""
+    size = float(np.linalg.norm(turn))
+    if size < SMALLEST_TURN:
         return NOTHING
-    axis = np.asarray(torque) / size
+    axis = np.asarray(turn) / size
     # The arrow starts astern, out of the way of the force arrow, which mostly points ahead.
     astern = np.array([-1.0, 0.0, 0.0]) if abs(axis[0]) < 0.9 else np.array([0.0, 0.0, 1.0])
     first = astern - axis * (astern @ axis)
     first /= np.linalg.norm(first)
     second = np.cross(axis, first)
-    angle = min(size * TORQUE_SCALE, np.radians(330.0))
+    angle = min(size, LONGEST_TURN)
     head = min(5.0 * thickness / radius, 0.6 * angle)
     body = np.linspace(0.0, angle - head, 40)
     tip = np.linspace(angle - head, angle, 8)
-    turn = np.concatenate([body, tip])
+    way = np.concatenate([body, tip])
     radii = np.concatenate([np.full(40, thickness), thickness * np.linspace(2.6, 0.02, 8)])
-    circle = np.cos(turn)[:, None] * first + np.sin(turn)[:, None] * second
+    circle = np.cos(way)[:, None] * first + np.sin(way)[:, None] * second
     return tube(np.asarray(center) + radius * circle, radii, 14, across=axis)
