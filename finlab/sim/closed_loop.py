@@ -278,7 +278,9 @@ class ClosedLoop:
         if self._foresighted is None:
             return None
         while len(self._setpoints) <= AHEAD:
-            self._setpoints.append(self.task.setpoint(time + len(self._setpoints) * self.period_s))
+            # What comes after the end is not swum: a path that ends under way is swum to its end.
+            after = min(time + len(self._setpoints) * self.period_s, self.task.duration_s)
+            self._setpoints.append(self.task.setpoint(after))
         expected = self._foresighted.ahead(self._setpoints)
         self._setpoints.popleft()
         return whole(expected)

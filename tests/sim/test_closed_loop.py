@@ -195,6 +195,14 @@ def test_a_robot_that_cannot_do_all_keeps_turning_to_where_it_should_go() -> Non
     assert ClosedLoop(layout, load_allocator("analytic"), path).policy.kind == "closest"
 
 
+def test_a_swim_ends_under_way(layout_a: Layout) -> None:
+    """What the allocator is told of the ticks to come holds no rest that nobody swims."""
+    swim = ClosedLoop(layout_a, load_allocator(), make_trajectory("circle", 20.0), sensors=NO_NOISE)
+    log = swim.run()
+    pushed = log.asked[:, 0]
+    assert pushed[-1] == pytest.approx(pushed[-20], rel=0.1) and pushed[-1] > 3.0
+
+
 def test_a_monitors_pushes_are_no_past_of_the_allocator() -> None:
     """Fins that it makes push are answered as if they had not, so their next commands are not bound by it."""
     layout, answers, given = load_layout("A"), [], []
