@@ -68,7 +68,8 @@ checkpoint-default:
 
 checkpoint-paper:
 	$(BIN)/finlab train surrogate -o runs/surrogate-paper
-	$(BIN)/finlab train allocator --surrogate runs/surrogate-paper -o runs/paper --batch-size 512 --learning-rate 4e-4 --steps 18000
+	$(BIN)/finlab train allocator --surrogate runs/surrogate-paper -o runs/paper-printed --layouts 100000 --commands 50 --stop-after 23452
+	$(BIN)/finlab train allocator --preset annealed --start runs/paper-printed --surrogate runs/surrogate-paper -o runs/paper --layouts 100000 --commands 50 --seed 1
 
 bench: setup
 	tools/bench

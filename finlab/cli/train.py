@@ -87,10 +87,13 @@ def allocator(
     output: _Output,
     surrogate: Annotated[Path, arg(metavar="NAME|FOLDER")],
     preset: _Preset = "paper",
+    start: Annotated[Path | None, arg(metavar="NAME|FOLDER")] = None,
     seed: Annotated[int, arg(metavar="N")] = 0,
     steps: _Count = None,
     batch_size: _Count = None,
     learning_rate: Annotated[float | None, arg(metavar="X")] = None,
+    layouts: _Count = None,
+    commands: _Count = None,
     stop_after: _Count = None,
 ) -> None:
     """Train the paper's network on a trained surrogate and write a whole checkpoint folder.
@@ -98,24 +101,32 @@ def allocator(
     Args:
         output: folder for checkpoint, log, loss curves and resume state.
         surrogate: checkpoint whose surrogate guides the training.
-        preset: recipe: paper or smoke.
+        preset: recipe: paper, annealed (to go on from a trained network) or smoke.
+        start: checkpoint whose network the training begins with, instead of random weights.
         seed: seed of the data and of the first weights.
         steps: optimizer steps instead of the recipe's.
         batch_size: samples per step, over all processes, instead of the recipe's.
         learning_rate: peak learning rate instead of the recipe's.
+        layouts: random layouts of the data set instead of the recipe's.
+        commands: random commands on each of them instead of the recipe's.
         stop_after: stop after so many steps; call again to go on.
     """
     from finlab.training.allocator import train_allocator
 
-    check_positive(steps=steps, batch_size=batch_size, stop_after=stop_after)
+    check_positive(
+        steps=steps, batch_size=batch_size, layouts=layouts, commands=commands, stop_after=stop_after
+    )
     checkpoint = train_allocator(
         preset,
         output,
         surrogate=surrogate,
+        start=start,
         seed=seed,
         steps=steps,
         batch_size=batch_size,
         learning_rate=learning_rate,
+        layouts=layouts,
+        commands=commands,
         stop_after=stop_after,
     )
     _report(output, checkpoint)

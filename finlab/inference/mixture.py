@@ -30,7 +30,8 @@ class MixtureArrays(NamedTuple):
         return np.asarray((self.weight[..., None] * self.mean).sum(2))
 
     def tempered(self, temperature: float, uniform: AnyArray, normal: AnyArray) -> AnyArray:
-        """Commands (N, K, n, 3) drawn at a temperature T from 0: weights to the power 1/T, variances times T.
+        """Commands (N, K, n, 3) drawn at a temperature T from 0: the weights are raised to the power 1/T, the
+        Gaussians keep their deviations (paper, command generation).
 
         Uniform numbers in [0, 1) (N, n, K) choose components, standard normal ones (N, n, K, 3) the rest.
         """
@@ -42,7 +43,7 @@ class MixtureArrays(NamedTuple):
         choice = np.minimum((uniform[..., None] > cumulative[..., None, :]).sum(-1), m - 1)
         choice = choice[..., None]
         mean, std = (np.take_along_axis(part, choice, axis=2) for part in (self.mean, self.std))
-        return np.asarray((mean + np.float32(math.sqrt(temperature)) * std * normal).swapaxes(1, 2))
+        return np.asarray((mean + std * normal).swapaxes(1, 2))
 
     def log_likelihood(self, x: AnyArray) -> AnyArray:
         """Log likelihood (N, K) of commands x (N, K, n, 3); zero directions are numbers as in the paper, no

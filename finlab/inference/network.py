@@ -21,8 +21,7 @@ class NumpyNetwork:
         w = layers.single_precision(weights)
         self.n_components = n_components
         self.graph = [_Graph(w, name, heads) for name in layers.names_of_layers(w, "graph")]
-        self.skip, self.join = layers.linear(w, "skip"), layers.linear(w, "join")
-        self.wrench = layers.linear(w, "wrench.0"), layers.linear(w, "wrench.2")
+        self.enter, self.wrench, self.join = (layers.linear(w, name) for name in ("enter", "wrench", "join"))
         names = layers.names_of_layers(w, "transformer.layers")
         self.transformer = [_Transformer(w, name, heads) for name in names]
         self.head, self.weight = (layers.linear(w, end).after_norm(w, "norm") for end in ("head", "weight"))
@@ -30,12 +29,10 @@ class NumpyNetwork:
     def __call__(self, x: AnyArray, target: AnyArray) -> MixtureArrays:
         """The mixtures for node features (N, n, F) and normalized, centred targets (N, 6)."""
         rows, n, _ = x.shape
-        flat = x.reshape(rows * n, -1)
-        hidden = flat
+        hidden = self.enter(x.reshape(rows * n, -1))
         for graph in self.graph:
-            hidden = layers.elu(graph(hidden, rows))
-        hidden += self.skip(flat)
-        wrench = self.wrench[1](layers.silu(self.wrench[0](target)))
+            hidden += layers.elu(graph(hidden, rows))
+        wrench = self.wrench(target)
         # The layer that sees fins and wrench side by side, as a sum of two products.
         weight, bias = self.join
         width = hidden.shape[-1]

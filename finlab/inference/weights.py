@@ -31,8 +31,8 @@ class SurrogateConfig:
 
     kind: ClassVar[str] = "mlp"
     """What it is called in files."""
-    hidden: tuple[int, ...] = (512, 64)
-    """Widths of the hidden layers."""
+    hidden: tuple[int, ...] = (512, 128)
+    """Widths of the hidden layers; the first is printed, the second is not."""
 
     def shapes(self) -> Shapes:
         """Shape of each array; a `ValueError` where there is no surrogate of these sizes."""
@@ -59,8 +59,8 @@ class NetworkConfig:
     """Number of GATv2 layers."""
     transformer_layers: int = 3
     """Number of Transformer encoder layers."""
-    feedforward: int = 256
-    """Hidden width of the Transformer's feed-forward blocks."""
+    feedforward: int = 512
+    """Hidden width of the Transformer's feed-forward blocks; not printed."""
     n_components: int = 8
     """Number M of mixture components."""
 
@@ -68,11 +68,11 @@ class NetworkConfig:
         """Shape of each array; a `ValueError` where there is no network of these sizes."""
         width, shapes = self.width, _ends(self, 6)
         for i in range(self.graph_layers):
-            name, n_in = f"graph.{i}", width if i else RAW_SIZE
+            name = f"graph.{i}"
             shapes |= {f"{name}.attention": (self.heads, width // self.heads), f"{name}.bias": (width,)}
-            shapes |= _linear(f"{name}.source", n_in, width) | _linear(f"{name}.target", n_in, width)
-        shapes |= _linear("skip", RAW_SIZE, width) | _linear("join", 2 * width, width)
-        shapes |= _linear("wrench.0", 6, width) | _linear("wrench.2", width, width)
+            shapes |= _linear(f"{name}.source", width, width) | _linear(f"{name}.target", width, width)
+        shapes |= _linear("enter", RAW_SIZE, width) | _linear("wrench", 6, width)
+        shapes |= _linear("join", 2 * width, width)
         for i in range(self.transformer_layers):
             name, look = f"transformer.layers.{i}", f"transformer.layers.{i}.self_attn"
             shapes |= {f"{look}.in_proj_weight": (3 * width, width), f"{look}.in_proj_bias": (3 * width,)}

@@ -95,7 +95,8 @@ def train(
     """
     folder.mkdir(parents=True, exist_ok=True)
     first = not dist.is_initialized() or dist.get_rank() == 0
-    optimizer = torch.optim.Adam(model.parameters(), lr=settings.learning_rate)
+    fused = next(model.parameters()).is_cuda  # one kernel for all parameters, where there is such a kernel
+    optimizer = torch.optim.Adam(model.parameters(), lr=settings.learning_rate, fused=fused)
     average = {k: v.detach().clone() for k, v in model.named_parameters()} if settings.ema else {}
     done, before = load_state(folder, model, optimizer, average, identity)
     wrapped = nn.parallel.DistributedDataParallel(model) if dist.is_initialized() else model

@@ -1,7 +1,6 @@
 """The terms of the paper's training loss. Each answers one number per sample (B,), so that any split of a
 batch over processes gives the same mean."""
 
-import torch
 from torch import Tensor
 
 from finlab.inference.normalization import clamp_to_limits, to_command, to_normalized
@@ -30,11 +29,10 @@ def sample_guidance(
     batch: Batch,
     target: Tensor,
     std: Tensor,
-    noise: torch.Generator,
-    share: tuple[slice, int] | None = None,
+    noise: tuple[Tensor, Tensor],
 ) -> Tensor:
-    """The paper's L_guide: squared normalized error of one sample; `share` as in `Mixture.sample`."""
-    raw = to_command(mixture.sample(noise, share), batch.lower, batch.upper)
+    """The paper's L_guide: squared normalized error of one sample; `noise` as `Mixture.sample` takes it."""
+    raw = to_command(mixture.sample(*noise), batch.lower, batch.upper)
     # The gradient passes the clamp, or samples outside the limits would teach nothing.
     command = raw + (clamp_to_limits(raw, batch.lower, batch.upper) - raw).detach()
     return tracking_error(surrogate, command, batch, target, std).square().sum(-1)

@@ -67,15 +67,23 @@ class ForwardSampler:
     def batch(self, step: int) -> Batch:
         """Returns batch number `step`."""
         rng = np.random.default_rng([self.seed, step])
-        layouts = random_layouts(rng, self.batch_size, self.n_fins, limits=self.varied_limits)
-        # The first fin of any reserved layout moves to the body's other side, where it is uniform as well.
-        layouts.position[find_reserved(layouts, shipped_reserved()), 0] *= -1.0
+        layouts = training_layouts(rng, self.batch_size, self.n_fins, self.varied_limits)
         share = rng.random(layouts.lower.shape)
         command = (layouts.lower + share * (layouts.upper - layouts.lower)) * layouts.mask[..., None]
         place = layouts.position, layouts.mounting_angle, layouts.mask
         wrench = assemble_wrench(self.fin_model, command, *place)
         arrays = (*layouts, command, wrench)
         return Batch._make(_tensor(part) for part in arrays)
+
+
+def training_layouts(
+    rng: np.random.Generator, n: int, n_fins: tuple[int, int] = TRAINING_FINS, varied_limits: float = 0.5
+) -> LayoutArrays:
+    """Returns n random layouts, none of them shipped; so large a share has limits of its own."""
+    layouts = random_layouts(rng, n, n_fins, limits=varied_limits)
+    # The first fin of any reserved layout moves to the body's other side, where it is uniform as well.
+    layouts.position[find_reserved(layouts, shipped_reserved()), 0] *= -1.0
+    return layouts
 
 
 def seeded_generator(seed: int, stream: int, device: torch.device | str = "cpu") -> torch.Generator:

@@ -72,6 +72,17 @@ def surrogate_of(weights: TrainedWeights) -> Surrogate:
     return surrogate.eval().requires_grad_(False)
 
 
+def load_network(model: nn.Module, weights: TrainedWeights) -> None:
+    """Put trained weights into a network; a `DataError` where their sizes differ."""
+    state = {key: torch.tensor(value) for key, value in weights.network.items()}
+    sizes = {key: value.shape for key, value in model.state_dict().items()}
+    if sizes != {key: value.shape for key, value in state.items()}:
+        raise DataError(
+            f"checkpoint {weights.name!r}: its network has other sizes; start from one of the same sizes"
+        )
+    model.load_state_dict(state)
+
+
 def state_of(tensors: Mapping[str, Tensor]) -> State:
     """The state of a module, or what was trained of it, as arrays."""
     return {key: value.detach().cpu().numpy() for key, value in tensors.items()}

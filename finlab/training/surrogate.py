@@ -14,8 +14,9 @@ from finlab.physics import FinLaw, make_law
 from finlab.training.device import Share, shared_training
 from finlab.training.loop import Terms, train
 from finlab.training.networks.surrogate import Surrogate
-from finlab.training.presets import PAPER_RECIPES, get_recipe
-from finlab.training.sampling import Batch, ForwardSampler
+from finlab.training.presets import PAPER_RECIPES, SampledTraining, get_recipe
+from finlab.training.recorded import recorded_samples
+from finlab.training.sampling import ForwardSampler
 from finlab.training.saving import save_checkpoint, state_of
 
 TRAIN_SEED = 20_000
@@ -29,30 +30,30 @@ def train_surrogate(
     out: Path,
     *,
     seed: int = 0,
-    steps: int | None = None,
     stop_after: int | None = None,
     fin_model: FinModelSpec | None = None,
+    **training: Any,
 ) -> TrainedWeights:
     """Train a preset's surrogate on a fin model, `drag` by default, and write a checkpoint folder without an
-    allocator network; `steps` stand for the preset's, other arguments as in `train_allocator`."""
+    allocator network; `training` are fields of `SampledTraining`, other arguments as in `train_allocator`."""
     recipe = get_recipe(PAPER_RECIPES, preset)
     spec = fin_model or FinModelSpec()
     model, written = make_law(spec), {"type": spec.type, **dict(spec.parameters)}
-    training = replace(recipe.surrogate_training, steps=steps or recipe.surrogate_training.steps)
+    settings = replace(recipe.surrogate_training, **{k: v for k, v in training.items() if v is not None})
     torch.manual_seed(seed)
     surrogate = Surrogate(recipe.surrogate)
     normalization = measure_normalization(model, seed)
     identity: dict[str, Any] = {
         "preset": preset,
         "seed": seed,
-        "training": asdict(training),
+        "training": asdict(settings),
         "surrogate": asdict(recipe.surrogate),
         "fin_model": written,
     }
-    with shared_training(training.batch_size) as share:
+    with shared_training(settings.batch_size) as share:
         surrogate.to(share.device)
-        terms = _wrench_terms(model, training.batch_size, seed, normalization, share)
-        weights = train(surrogate, terms, training, out, identity, stop_after=stop_after)
+        terms = _wrench_terms(model, settings, seed, normalization, share)
+        weights = train(surrogate, terms, settings, out, identity, stop_after=stop_after)
     surrogate.load_state_dict(weights, strict=True)
     surrogate.cpu().eval().requires_grad_(False)
     checkpoint = TrainedWeights(
@@ -62,7 +63,7 @@ def train_surrogate(
         surrogate_config=recipe.surrogate,
         surrogate=state_of(surrogate.state_dict()),
         preset=preset,
-        training={"surrogate": identity | {"samples": training.steps * training.batch_size}},
+        training={"surrogate": identity | {"samples": settings.steps * settings.batch_size}},
         metrics={"surrogate": surrogate_metrics(surrogate, model, seed + 1)},
     )
     return save_checkpoint(out, checkpoint) if share.first else checkpoint
@@ -88,14 +89,14 @@ def surrogate_metrics(surrogate: Surrogate, model: FinLaw, seed: int) -> dict[st
 
 
 def _wrench_terms(
-    model: FinLaw, batch_size: int, seed: int, normalization: Normalization, share: Share
+    model: FinLaw, training: SampledTraining, seed: int, normalization: Normalization, share: Share
 ) -> Terms:
     """The paper's L_phys: squared error of the normalized wrench of whole robots."""
-    sampler = ForwardSampler(TRAIN_SEED + seed, batch_size, fin_model=model)
+    samples = recorded_samples(model, training, TRAIN_SEED + seed, share.device)
     std = torch.tensor(normalization.std, dtype=torch.float32, device=share.device)
 
     def terms(net: nn.Module, step: int) -> dict[str, Tensor]:
-        b = Batch(*(t[share.rows].to(share.device) for t in sampler.batch(step)))
+        b = samples.batch(step, share.rows)
         wrench = net(b.command, b.position, b.mounting_angle, b.lower, b.upper, b.mask)
         return {"loss": ((wrench - b.wrench) / std).square().sum(-1).mean()}
 

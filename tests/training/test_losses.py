@@ -17,6 +17,8 @@ DRAG = make_law(FinModelSpec())
 
 B, N, M = 6, 4, 3
 STD = torch.tensor([1.4, 1.4, 2.0, 0.35, 0.35, 0.34])
+DRAW = torch.Generator().manual_seed(0)
+NOISE = torch.rand((B, N, 1), generator=DRAW), torch.randn((B, N, 3), generator=DRAW)
 
 
 def physics(
@@ -85,19 +87,17 @@ def test_sample_guidance_of_a_sharp_mixture_is_the_squared_error_of_its_mean(bat
     sharp = sharp._replace(
         log_std=sharp.log_std - 30.0, logits=torch.tensor([0.0, 60.0, 0.0]).expand(B, N, M)
     )
-    seeded = torch.Generator().manual_seed(0)
     target = target_of(batch)
-    exact = losses.sample_guidance(sharp, physics, batch, target, STD, seeded)  # type: ignore[arg-type]
+    exact = losses.sample_guidance(sharp, physics, batch, target, STD, NOISE)  # type: ignore[arg-type]
     torch.testing.assert_close(exact, torch.zeros(B), atol=1e-6, rtol=0.0)
-    off = losses.sample_guidance(sharp, physics, batch, target + 2.0, STD, seeded)  # type: ignore[arg-type]
+    off = losses.sample_guidance(sharp, physics, batch, target + 2.0, STD, NOISE)  # type: ignore[arg-type]
     torch.testing.assert_close(off, torch.full((B,), 6 * 4.0), atol=1e-3, rtol=0.0)
 
 
 def test_sample_guidance_teaches_even_from_outside_the_limits(batch: Batch) -> None:
     mixture = make_mixture(batch)
     mixture = mixture._replace(mean=(mixture.mean + 3.0).requires_grad_(True))
-    seeded = torch.Generator().manual_seed(0)
-    losses.sample_guidance(mixture, physics, batch, target_of(batch), STD, seeded).sum().backward()  # type: ignore[arg-type]
+    losses.sample_guidance(mixture, physics, batch, target_of(batch), STD, NOISE).sum().backward()  # type: ignore[arg-type]
     gradient = mixture.mean.grad
     assert gradient is not None and (gradient[batch.mask].abs().amax(dim=(1, 2)) > 0).any()
 

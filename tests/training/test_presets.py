@@ -20,6 +20,8 @@ def test_paper_is_as_printed() -> None:
     assert LOG_STD_BOUND == 3.0
     assert (paper.surrogate.kind, paper.surrogate.hidden[0]) == ("mlp", 512)
     assert (training.cosine, training.ema) == (False, 0.0)
+    assert (training.layouts, training.commands, training.batch_size) == (1000, 5000, 16_384)
+    assert training.learning_rate == 1e-4
     assert training.steps * training.batch_size == pytest.approx(575e6, rel=0.01)  # 5 M x 115 epochs
     assert training.guidance_start < training.guidance  # the weight is ramped
     assert training.entropy > 0
@@ -44,7 +46,7 @@ def test_every_recipe_has_the_shapes_that_files_are_held_against() -> None:
 
 
 def test_an_unknown_recipe_is_refused_with_the_names_that_exist() -> None:
-    with pytest.raises(DataError, match="preset: expected one of paper, smoke, got 'magic'"):
+    with pytest.raises(DataError, match="preset: expected one of paper, annealed, smoke, got 'magic'"):
         get_recipe(PAPER_RECIPES, "magic")
 
 

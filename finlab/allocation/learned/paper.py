@@ -16,7 +16,7 @@ from finlab.inference.features import raw_features
 from finlab.inference.mixture import MixtureArrays
 from finlab.inference.network import NumpyNetwork
 from finlab.inference.normalization import clamp_to_limits, to_command, to_normalized
-from finlab.inference.surrogate import LayoutSurrogate, surrogate_on
+from finlab.inference.surrogate import LayoutSurrogate, blocks_of, surrogate_on
 from finlab.inference.threads import single_threaded_products
 from finlab.inference.weights import NetworkConfig, TrainedWeights
 from finlab.layout import FinModelSpec, Layout
@@ -159,37 +159,51 @@ class PaperAllocator(Allocator):
         if kind == "none":
             return command
         if kind == "adam":
-            return self._adam(robot, flat, target, steps).reshape(shape)
+            parts = [self._adam(robot, flat[k], target[k], steps) for k in blocks_of(len(flat))]
+            return np.concatenate(parts).reshape(shape)
         return refine(robot.problem, target, flat, steps, damping=LM_DAMPING).command.reshape(shape)
 
     def _adam(self, robot: _Robot, command: AnyArray, target: AnyArray, steps: int) -> AnyArray:
-        """Adam on J for commands (R, n, 3) and normalized targets (R, 6); the last step of each.
+        """Adam on J for commands (R, n, 3) and normalized targets (R, 6); the best step of each.
 
-        It works in normalized coordinates, inside the limits, with a step that falls linearly.
+        It works in normalized coordinates, inside the limits, with a step that falls linearly. Zero
+        directions that turn fully go on beyond the seam.
         """
         lower, upper = robot.limits
         x, half = to_normalized(command, lower, upper), np.float32(0.5) * (upper - lower)
         mean, square = np.zeros_like(x), np.zeros_like(x)
         keep_mean, keep_square = ADAM_DECAY
-        for step in range(steps):
-            gradient = half * self._gradient(robot, to_command(x, lower, upper), target)
+        best, least = x.copy(), np.full(len(x), np.inf, np.float32)
+        for step in range(steps + 1):
+            score, slopes = self._score_and_slopes(robot, to_command(x, lower, upper), target)
+            better = score < least
+            best[better], least[better] = x[better], score[better]
+            if step == steps:
+                break
+            gradient = half * slopes
             mean += (1.0 - keep_mean) * (gradient - mean)
             square += (1.0 - keep_square) * (gradient * gradient - square)
             rate = ADAM_RATE * (1.0 - 0.95 * step / steps) / (1.0 - keep_mean ** (step + 1))
             size = np.sqrt(square / np.float32(1.0 - keep_square ** (step + 1)))
             x -= np.float32(rate) * mean / (size + np.float32(1e-8))
+            # A full turn is two units wide.
+            turned = np.remainder(x[..., 2] + np.float32(1.0), np.float32(2.0)) - np.float32(1.0)
+            x[..., 2] = np.where(robot.problem.full_turn, turned, x[..., 2])
             np.clip(x, -1.0, 1.0, out=x)
-        return np.asarray(to_command(x, lower, upper))
+        return np.asarray(to_command(best, lower, upper))
 
-    def _gradient(self, robot: _Robot, command: AnyArray, target: AnyArray) -> AnyArray:
-        """Derivatives (R, n, 3) of J by each command."""
-        rows, n, _ = command.shape
+    def _score_and_slopes(
+        self, robot: _Robot, command: AnyArray, target: AnyArray
+    ) -> tuple[AnyArray, AnyArray]:
+        """J (R,) of commands (R, n, 3), and its derivatives (R, n, 3) by them."""
+        rows = len(command)
         columns = robot.problem.columns_float32
-        force, slopes = robot.problem.fin.force_and_slopes(command)
+        force, pull = robot.surrogate.fins.force_and_pullback(command)
         error = force.reshape(rows, -1) @ columns - target
-        by_force = (2.0 * error @ columns.T).reshape(rows, n, 3)
-        by_command: AnyArray = (slopes @ by_force[..., None])[..., 0]
-        return by_command + np.float32(self.settings.gamma) * robot.energy.slopes(command)
+        gamma = np.float32(self.settings.gamma)
+        score = np.einsum("ri,ri->r", error, error) + gamma * robot.energy(command)
+        by_command = pull(2.0 * error @ columns.T)
+        return score, by_command + gamma * robot.energy.slopes(command)
 
     def _candidates(self, robot: _Robot, command: AnyArray, target: AnyArray, source: str) -> Candidates:
         """Candidates (K, n, 3) of a single target (6,), best first."""

@@ -30,7 +30,7 @@ class MdnSettings(Settings):
             )
 
 
-STEPS = {"none": 0, "adam": 80, "levenberg-marquardt": 20}
+STEPS = {"none": 0, "adam": 160, "levenberg-marquardt": 20}
 """Refinement -> its number of steps where the settings name none."""
 
 
@@ -48,7 +48,7 @@ class PaperSettings:
     """T of the sampling; 0.02 in the paper."""
     gamma: float = 1e-4
     """Weight of the energy in J = J_norm + gamma J_en."""
-    n_refined: int = 2
+    n_refined: int = 4
     """Best-ranked candidates that are refined."""
     refinement: str = "adam"
     """`adam`, `levenberg-marquardt` (ablation) or `none` (ablation)."""

@@ -79,16 +79,23 @@ def run_variant(allocator: Allocator, cases: Sequence[Case], *, seed: int = 0) -
 
 
 def variant_rows(variant: str, refinement: str, columns: Columns) -> list[Row]:
-    """The two rows of a variant, scored by the surrogate and by the plant, with the interval of the mean."""
+    """The two rows of a variant, scored by the surrogate and by the plant, with the intervals of the means.
+
+    `j_norm` is the paper's J_norm, the squared norm of the normalized error, `err_norm` its root.
+    """
     rows: list[Row] = []
     for scored_by, prefix in (("surrogate", "surrogate_"), ("plant", "")):
         error, physical = columns[f"{prefix}err_norm"], columns[f"{prefix}err_phys"]
+        square = error**2
         rows.append(
             {
                 "variant": variant,
                 "refinement": refinement,
                 "scored_by": scored_by,
                 "n": len(error),
+                "j_norm_mean": float(square.mean()),
+                "j_norm_mean_interval": list(mean_interval(square, columns["layout"])),
+                "j_norm_std": float(square.std()),
                 "err_norm_mean": float(error.mean()),
                 "err_norm_mean_interval": list(mean_interval(error, columns["layout"])),
                 "err_norm_std": float(error.std()),

@@ -36,7 +36,8 @@ class Change:
 CHANGES = {
     "recipe": Change("the recipe of the paper's network, at this budget"),
     "no_guidance": Change("imitation alone, no physics guidance", {"guidance": 0.0, "guidance_start": 0.0}),
-    "unramped": Change("guidance in full from the first step", {"guidance_start": 1.0}),
+    "weak_guidance": Change("guidance of a thousandth of the weight", {"guidance": 1.0}),
+    "unramped": Change("guidance in full from the first step", {"guidance_start": 1000.0}),
     "no_entropy": Change("no entropy term", {"entropy": 0.0}),
     "nominal_limits": Change("every layout with nominal limits", {"varied_limits": 0.0}),
     "one_component": Change("one Gaussian per fin instead of a mixture", network={"n_components": 1}),

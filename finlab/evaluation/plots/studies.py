@@ -51,7 +51,7 @@ COLOUR = {"adam": style.ORANGE, "levenberg-marquardt": style.BLUE}
 def ablation_dots(
     rows: Sequence[dict[str, Any]], printed: Mapping[str, float], titles: Mapping[str, str]
 ) -> Picture:
-    """Mean normalized error of each row; rows of `ablation_row`, `printed` by variant."""
+    """Mean J_norm of each row; rows of `variant_rows`, `printed` by variant."""
     variants = list(titles)
     with picture(height=3.1, legend=3) as view:
         (axis,) = view.axes
@@ -61,11 +61,11 @@ def ablation_dots(
                 place = [variants.index(row["variant"]) + 0.16 * (2 * k - 1) for row in mine]
                 look: dict[str, Any] = {"color": colour, "markerfacecolor": colour if filled else "white"}
                 label = f"{refinement}, scored by the {scored_by}"
-                axis.plot([row["err_norm_mean"] for row in mine], place, "o", ms=7, label=label, **look)
+                axis.plot([row["j_norm_mean"] for row in mine], place, "o", ms=7, label=label, **look)
         look = {"color": style.BLACK, "markerfacecolor": "none"}
         means = [printed[name] for name in variants]
         axis.plot(means, range(len(variants)), "D", ms=7, label="printed in the paper", **look)
-        axis.set(xscale="log", xlabel="mean normalized error")
+        axis.set(xscale="log", xlabel="mean J_norm")
         axis.set_yticks(range(len(variants)), [titles[name] for name in variants])
         axis.invert_yaxis()
         return view

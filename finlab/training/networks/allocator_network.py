@@ -6,8 +6,7 @@ it against `torch_geometric.nn.GATv2Conv`.
 """
 
 import math
-from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -39,7 +38,8 @@ class DenseGATv2(nn.Module):
         source = self.source(x).view(batch, 1, n, self.heads, -1)
         target = self.target(x).view(batch, n, 1, self.heads, -1)
         hidden = nn.functional.leaky_relu(source + target, 0.2)  # (B, n, n, heads, c)
-        score = (hidden * self.attention).sum(-1)  # (B, n, n, heads)
+        # One product with the attention vectors in block form, of which the gradient is a product as well.
+        score = hidden.flatten(-2) @ torch.block_diag(*self.attention[:, None]).T  # (B, n, n, heads)
         if mask is not None:
             score = score.masked_fill(~mask[:, None, :, None], float("-inf"))
         weight = score.softmax(dim=2)
@@ -63,23 +63,13 @@ class Mixture(NamedTuple):
         log_normal = (-0.5 * z.square() - self.log_std - 0.5 * math.log(2 * math.pi)).sum(-1)  # (B, n, M)
         return (torch.logsumexp(self.logits.log_softmax(-1) + log_normal, dim=-1) * mask).sum(1)
 
-    def sample(
-        self, generator: torch.Generator | None = None, share: tuple[slice, int] | None = None
-    ) -> Tensor:
-        """Draw normalized commands (B, n, 3).
-
-        `share` says which rows of a larger batch these are, and its size; the noise is that of the larger
-        batch, however it is shared among processes.
-        """
-        batch, n, m, _ = self.mean.shape
-        rows, total = share or (slice(0, batch), batch)
-        kind: dict[str, Any] = {"dtype": self.mean.dtype, "device": self.mean.device}
-        draw = torch.rand((total, n, 1), generator=generator, **kind)[rows]
-        noise = torch.randn((total, n, 3), generator=generator, **kind)[rows]
-        choice = (draw > self.logits.softmax(-1).cumsum(-1)).sum(-1).clamp(max=m - 1)
+    def sample(self, uniform: Tensor, normal: Tensor) -> Tensor:
+        """Normalized commands (B, n, 3), drawn by numbers uniform in [0, 1) (B, n, 1) and standard normal
+        ones (B, n, 3)."""
+        choice = (uniform > self.logits.softmax(-1).cumsum(-1)).sum(-1).clamp(max=self.mean.shape[2] - 1)
         index = choice[..., None, None].expand(-1, -1, 1, 3)
         mean, log_std = (part.gather(2, index)[:, :, 0] for part in (self.mean, self.log_std))
-        return mean + log_std.exp() * noise
+        return mean + log_std.exp() * normal
 
 
 class AllocatorNetwork(nn.Module):
@@ -90,10 +80,9 @@ class AllocatorNetwork(nn.Module):
         super().__init__()
         self.config = config
         width = config.width
-        sizes = [RAW_SIZE] + [width] * config.graph_layers
-        self.graph = nn.ModuleList(DenseGATv2(*ends, config.heads) for ends in pairwise(sizes))
-        self.skip = nn.Linear(RAW_SIZE, width)
-        self.wrench = nn.Sequential(nn.Linear(6, width), nn.SiLU(), nn.Linear(width, width))
+        self.enter = nn.Linear(RAW_SIZE, width)
+        self.graph = nn.ModuleList(DenseGATv2(width, width, config.heads) for _ in range(config.graph_layers))
+        self.wrench = nn.Linear(6, width)
         self.join = nn.Linear(2 * width, width)
         layer = nn.TransformerEncoderLayer(
             width, config.heads, config.feedforward, dropout=0.0, batch_first=True, norm_first=True
@@ -106,10 +95,9 @@ class AllocatorNetwork(nn.Module):
     def forward(self, x: Tensor, target: Tensor, mask: Tensor | None = None) -> Mixture:
         """The mixture for node features (B, n, 10) and normalized targets (B, 6); `mask` (B, n) is True where
         a fin exists, None where all do."""
-        hidden = x
+        hidden = self.enter(x)
         for layer in self.graph:
-            hidden = nn.functional.elu(layer(hidden, mask))
-        hidden = hidden + self.skip(x)
+            hidden = hidden + nn.functional.elu(layer(hidden, mask))
         wrench = self.wrench(target)[:, None].expand(-1, x.shape[1], -1)
         hidden = self.join(torch.cat([hidden, wrench], dim=-1))
         padding = None if mask is None else ~mask

@@ -16,6 +16,7 @@ from finlab.inference.checkpoint import read_checkpoint
 from finlab.inference.normalization import Normalization, clamp_to_limits, to_command, to_normalized
 from finlab.inference.weights import NetworkConfig, SurrogateConfig, TrainedWeights
 from finlab.layout import Fin, Layout, Limits, load_layout
+from finlab.layout.angles import is_full_turn
 from finlab.physics import Plant
 from finlab.physics.energy import command_energy
 from finlab.training.networks.allocator_network import AllocatorNetwork
@@ -191,18 +192,24 @@ def test_adam_goes_where_torch_goes(checkpoint: TrainedWeights, robot: Layout) -
     lower, upper = layout[2:]
     x = to_normalized(torch.tensor(start.command, dtype=torch.float32), lower, upper).requires_grad_(True)
     optimizer = torch.optim.Adam([x], lr=ADAM_RATE)
-    for step in range(25):
+    turns = torch.tensor(is_full_turn(robot.upper[:, 2] - robot.lower[:, 2]))
+    best, least = x.detach().clone(), torch.full((3,), torch.inf)
+    for step in range(26):
         optimizer.param_groups[0]["lr"] = ADAM_RATE * (1.0 - 0.95 * step / 25)
         command = to_command(x, lower, upper)
         error = (surrogate_of(checkpoint)(command, *layout) - wanted) / std
         a, f, d = (command / upper.abs()).unbind(-1)
         energy = (a * a + f * f + 0.1 * d * d + a * f).sum(-1)
+        score = error.square().sum(-1) + 0.05 * energy
+        better = score < least
+        best[better], least[better] = x.detach()[better], score.detach()[better]
         optimizer.zero_grad()
-        (error.square().sum(-1) + 0.05 * energy).sum().backward()
+        score.sum().backward()
         optimizer.step()
         with torch.no_grad():
+            x[..., 2] = torch.where(turns, (x[..., 2] + 1.0) % 2.0 - 1.0, x[..., 2])
             x.clamp_(-1.0, 1.0)
-    expected = to_command(x.detach(), lower, upper).numpy()
+    expected = to_command(best, lower, upper).numpy()
     assert np.abs(expected - start.command).max() > 0.1
     got = method.allocate(robot, target).candidates
     assert got is not None
@@ -210,6 +217,45 @@ def test_adam_goes_where_torch_goes(checkpoint: TrainedWeights, robot: Layout) -
     distance = np.abs(got.command[:, None] - expected[None]).max((2, 3))
     np.testing.assert_allclose(distance.min(1), 0.0, atol=2e-4)
     assert sorted(distance.argmin(1)) == [0, 1, 2]
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_adam_crosses_the_seam_of_a_full_turn_alone(
+    side: float, checkpoint: TrainedWeights, robot: Layout, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    paper = PaperAllocator(checkpoint)
+    prepared = paper._prepared(robot)
+    full = is_full_turn(robot.upper[:, 2] - robot.lower[:, 2])
+    assert full.any() and not full.all()
+    end = robot.upper if side > 0 else robot.lower
+    start = np.where([False, False, True], end, 0.5 * (robot.lower + robot.upper)).astype(np.float32)
+    scores = iter([2.0, 1.0])
+    push = np.zeros((1, *start.shape), np.float32)
+    push[..., 2] = -side
+    monkeypatch.setattr(paper, "_score_and_slopes", lambda *_: (np.array([next(scores)]), push))
+    turned = paper._adam(prepared, start[None], np.zeros((1, 6), np.float32), 1)[0, :, 2]
+    half = 0.5 * (robot.upper - robot.lower)[:, 2]
+    beyond = np.where(full, -end[:, 2] + side * ADAM_RATE * half, end[:, 2])
+    np.testing.assert_allclose(turned, beyond, atol=1e-5)
+
+
+def test_adam_keeps_its_best_step(
+    checkpoint: TrainedWeights, robot: Layout, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also the start, and also the step after the last change; for each candidate its own."""
+    paper = PaperAllocator(checkpoint)
+    prepared, middle = paper._prepared(robot), 0.5 * (robot.lower + robot.upper)
+    seen: list[np.ndarray] = []
+    scores = iter(np.array([[1.0, 5.0, 9.0], [2.0, 3.0, 8.0], [3.0, 4.0, 7.0]]))
+
+    def score(_: object, command: np.ndarray, __: object) -> tuple[np.ndarray, np.ndarray]:
+        seen.append(command.copy())
+        return next(scores), np.ones_like(command)
+
+    monkeypatch.setattr(paper, "_score_and_slopes", score)
+    start = np.repeat(middle[None].astype(np.float32), 3, axis=0)
+    got = paper._adam(prepared, start, np.zeros((3, 6), np.float32), 2)
+    np.testing.assert_allclose(got, [seen[0][0], seen[1][1], seen[2][2]], atol=1e-6)
 
 
 def test_levenberg_marquardt_reaches_what_the_surrogate_can_give(
@@ -291,7 +337,10 @@ def test_adams_first_step_is_its_rate_unless_the_gradient_is_tiny(
     half = (0.5 * (layout.upper - layout.lower)).astype(np.float32)
     middle = (0.5 * (layout.upper + layout.lower)).astype(np.float32)[None]
     for size, share in ((1e-8, 0.5), (3e-8, 0.75), (1.0, 1.0), (-1.0, -1.0)):
-        monkeypatch.setattr(paper, "_gradient", lambda *_, size=size: (np.float32(size) / half)[None])
+        scores, slopes = iter([2.0, 1.0]), (np.float32(size) / half)[None]
+        monkeypatch.setattr(
+            paper, "_score_and_slopes", lambda *_, s=scores, g=slopes: (np.array([next(s)]), g)
+        )
         command = paper._adam(robot, middle, np.zeros((1, 6), np.float32), 1)
         step = (command - middle)[0] / half
         np.testing.assert_allclose(step, np.full_like(step, -share * ADAM_RATE), rtol=1e-3)
@@ -303,12 +352,14 @@ def test_adams_gradient_is_that_of_the_score(checkpoint: TrainedWeights) -> None
     prepared, std = paper._prepared(robot), paper.normalization.std
     command = 0.4 * robot.lower + 0.6 * robot.upper
     target = np.array(TARGET) / std
-    slope = paper._gradient(prepared, command[None].astype(np.float32), target[None].astype(np.float32))[0]
+    single = command[None].astype(np.float32), target[None].astype(np.float32)
+    (value,), (slope,) = paper._score_and_slopes(prepared, *single)
 
     def score(at: np.ndarray) -> float:
         error = prepared.problem.wrench(at[None])[0] - target
         return float(error @ error + 0.3 * command_energy(at, robot.upper))
 
+    assert value == pytest.approx(score(command), rel=1e-5)
     expected = np.empty_like(command)
     for place in np.ndindex(command.shape):
         offset = np.zeros_like(command)
@@ -334,7 +385,7 @@ def test_random_starts_fill_the_limits(checkpoint: TrainedWeights, robot: Layout
     assert (drawn[0] != drawn[1]).any() and (paper._draw(mixture, 4) != drawn).any()
 
 
-@pytest.mark.parametrize(("refinement", "steps"), [("adam", 80), ("levenberg-marquardt", 20)])
+@pytest.mark.parametrize(("refinement", "steps"), [("adam", 160), ("levenberg-marquardt", 20)])
 def test_without_a_number_of_steps_it_takes_the_usual_one(
     refinement: str, steps: int, checkpoint: TrainedWeights, robot: Layout
 ) -> None:

@@ -132,7 +132,7 @@ def test_the_ablation_marks_who_refined_who_scored_and_what_is_printed() -> None
     size = {"adam": 1.0, "levenberg-marquardt": 10.0}
     scale = {"plant": 1.0, "surrogate": 0.1}
     rows = [
-        {"variant": v, "refinement": r, "scored_by": s, "err_norm_mean": size[r] * scale[s] * (k + 1)}
+        {"variant": v, "refinement": r, "scored_by": s, "j_norm_mean": size[r] * scale[s] * (k + 1)}
         for k, v in enumerate(VARIANTS)
         for r in size
         for s in scale

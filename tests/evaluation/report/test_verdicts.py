@@ -127,8 +127,8 @@ def test_the_summary_compares_every_table_it_has() -> None:
                 "variant": "ours",
                 "refinement": "adam",
                 "scored_by": "surrogate",
-                "err_norm_mean": 0.04,
-                "err_norm_mean_interval": (0.03, 0.05),
+                "j_norm_mean": 0.04,
+                "j_norm_mean_interval": (0.03, 0.05),
             }
         ],
         "latency": [
@@ -147,7 +147,7 @@ def test_the_summary_compares_every_table_it_has() -> None:
     assert found == [
         ("mean error", "id", "qp", LEADS),
         ("mean error", "id", "paper (printed)", LEADS),
-        ("mean error", "ablation by the surrogate", "paper (printed)", TRAILS),
+        ("J_norm", "ablation by the surrogate", "paper (printed)", TRAILS),
         ("power", "split id", "qp", LEADS),
         ("effort", "split id", "qp", TRAILS),
         ("time per call", "4 fins", "qp", TRAILS),

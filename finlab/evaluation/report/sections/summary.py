@@ -63,9 +63,9 @@ def comparisons(tables: Tables) -> list[Row]:
     for row in tables.get("ablation", ()):
         if (row["variant"], row["refinement"]) == ("ours", "adam"):
             means = {"paper (printed)": printed["ablation"]["ours"]["err_norm_mean"]}
-            beside = with_printed([{**row, "method": "paper"}], "err_norm_mean", means)
+            beside = with_printed([{**row, "method": "paper"}], "j_norm_mean", means)
             where = f"ablation by the {row['scored_by']}"
-            found += compare("mean error", beside, "err_norm_mean", where, ("paper",))
+            found += compare("J_norm", beside, "j_norm_mean", where, ("paper",))
     for objective in OBJECTIVES:
         costs = [
             row for row in tables.get("cost", ()) if row["objective"] == objective and row["fins"] == "all"
