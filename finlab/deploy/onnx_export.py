@@ -82,11 +82,10 @@ def _paper_network(state: State, sizes: Any) -> ModelProto:
     """Raw features of the fins and normalized, centred target in; a mixture over each fin's command,
     normalized between its limits, out."""
     g, width, heads, m = GraphBuilder(state), sizes.width, sizes.heads, sizes.n_components
-    hidden = "features"
+    hidden = g.linear("features", "enter")
     for i in range(sizes.graph_layers):
-        hidden = g("Elu", _attend(g, hidden, f"graph.{i}", heads, width))
-    hidden = g("Add", hidden, g.linear("features", "skip"))
-    wrench = g.linear(g.silu(g.linear("target", "wrench.0")), "wrench.2")
+        hidden = g("Add", hidden, g("Elu", _attend(g, hidden, f"graph.{i}", heads, width)))
+    wrench = g.linear("target", "wrench")
     # The layer that sees fins and wrench side by side, as a sum of two products.
     of_fins, of_wrench = g.parts(g.weight("join.weight"), width, width, axis=0)
     wrench = g("Add", g("MatMul", wrench, of_wrench), g.weight("join.bias"))
@@ -100,7 +99,7 @@ def _paper_network(state: State, sizes: Any) -> ModelProto:
     scaled = g("Mul", g("Sigmoid", spread), g.constant(2 * LOG_STD_BOUND))
     g("Exp", g("Sub", scaled, g.constant(LOG_STD_BOUND)), name="std")
     g("Softmax", g.linear(hidden, "weight"), axis=-1, name="weight")
-    n_features = state["skip.weight"].shape[1]
+    n_features = state["enter.weight"].shape[1]
     return g.model(
         "finlab network of method paper",
         {"features": ("N", "n", n_features), "target": ("N", 6)},

@@ -50,7 +50,7 @@ def test_training_goes_on_where_it_was(
         ("temperature --candidates 0", "candidates: expected a number of at least 1, got 0"),
         ("temperature --split nowhere", "split: expected one of id, ood"),
         ("training --steps 0", "steps: expected a number of at least 1, got 0"),
-        ("training --preset nothing", "preset: expected one of paper, smoke, got 'nothing'"),
+        ("training --preset nothing", "preset: expected one of paper, annealed, smoke, got 'nothing'"),
         ("report -o README.md", "out: expected a folder, got the file README.md"),
         ("report -o somewhere --processes 0", "processes: expected a number of at least 1, got 0"),
         ("report -o somewhere --checkpoint missing/folder", "missing/folder"),

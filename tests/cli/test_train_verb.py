@@ -52,7 +52,7 @@ def test_trains_the_network_over_forces_and_allocates_with_it(
 @pytest.mark.parametrize(
     ("argv", "message"),
     [
-        (["surrogate", "--preset", "magic"], "preset: expected one of paper, smoke"),
+        (["surrogate", "--preset", "magic"], "preset: expected one of paper, annealed, smoke"),
         (["mdn", "--preset", "paper"], "preset: expected one of default, smoke, got 'paper'"),
         (["mdn", "--minutes", "0"], "minutes: expected a number of at least 1, got 0"),
         (["surrogate", "--steps", "0"], "steps: expected a number of at least 1, got 0"),

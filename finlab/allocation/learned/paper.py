@@ -105,7 +105,8 @@ class PaperAllocator(Allocator):
             score = -mixture.log_likelihood(x)
         else:
             score = self._score(robot, sampled, wanted)
-        chosen = _take(sampled, np.argsort(score, axis=1, kind="stable")[:, : settings.n_refined])
+        sampled = _take(sampled, np.argsort(score, axis=1, kind="stable"))
+        chosen = sampled[:, : settings.n_refined]
         if not settings.mean_only:
             chosen = self._refine(robot, chosen, wanted)
         if not by_likelihood:  # without physics in the ranking the likeliest candidate stays the answer
@@ -206,13 +207,10 @@ class PaperAllocator(Allocator):
         return score, by_command + gamma * robot.energy.slopes(command)
 
     def _candidates(self, robot: _Robot, command: AnyArray, target: AnyArray, source: str) -> Candidates:
-        """Candidates (K, n, 3) of a single target (6,), best first."""
+        """Candidates (K, n, 3) of a single target (6,), in their order."""
         wrench = robot.surrogate.wrench(command).astype(np.float64)
-        error = self.normalization.error(wrench, target)
-        order = np.argsort(error, kind="stable")
-        inside = _inside(robot, command[order])
-        names = (source,) * len(order)
-        return Candidates(inside, wrench[order], error[order], *costs(robot.layout, inside), names)
+        error, inside = self.normalization.error(wrench, target), _inside(robot, command)
+        return Candidates(inside, wrench, error, *costs(robot.layout, inside), (source,) * len(command))
 
 
 def _take(command: AnyArray, index: AnyArray) -> AnyArray:
