@@ -127,7 +127,7 @@ def test_table_for_people(allocate: Callable[..., tuple[int, str, str]]) -> None
     labels = [line.split()[0] for line in lines if line]
     assert labels[5:10] == ["Fx", "asked", "delivered", "missing", "err_norm"]
     assert "1.000   0.000  -0.500     0.000     0.000     0.100" in out
-    assert re.search(r"err_norm \S+   power \d+\.\d{3} W   effort \d+\.\d{3}   .* ms   method search", out)
+    assert re.search(r"err_norm \S+   power \d+\.\d{3} W   effort \d+\.\d{3}   .* ms   method search\n", out)
 
 
 def test_says_in_words_what_is_not_reached(allocate: Callable[..., tuple[int, str, str]]) -> None:

@@ -104,6 +104,8 @@ def test_a_plant_asks_each_fin_for_its_own_power() -> None:
         np.testing.assert_allclose(
             plant.power_slopes(command, 0.3)[:, i], law.power_slopes(command[:, i], 0.3)
         )
+        without_loss = law.power_slopes(command[:, i], 0.0)
+        np.testing.assert_array_equal(plant.power_slopes(command)[:, i], without_loss)
     lost = command.copy()
     lost[:, 1] = np.nan
     assert np.isnan(plant.power(lost)[:, 1]).all() and np.isfinite(plant.power(lost)[:, [0, 2]]).all()
