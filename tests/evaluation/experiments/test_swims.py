@@ -208,6 +208,11 @@ def test_goals_depend_on_the_kind_of_day() -> None:
 def test_one_seed_has_no_interval_and_no_verdict() -> None:
     row, _ = swim_rows([_swim("search", 0, 0.1, 1.0), _swim("analytic", 0, 0.2, 2.0)])
     assert "ate_interval" not in row and row["verdict"] == "" and row["ate_ratio"] == 0.5
+    told = to_text(*swim_blocks([DAYS["nominal"]], [row], []))
+    assert "Not won" not in told
+    assert "one seed has no interval" in to_text(
+        *swim_blocks([DAYS["nominal"]], [{**row, "ate_ratio": 1.1}], [])
+    )
 
 
 def test_a_short_day(analytic: Allocator) -> None:
