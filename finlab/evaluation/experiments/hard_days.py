@@ -267,10 +267,7 @@ HARD_DAYS = (
         "Fins have soft tips that nobody knows of.",
         "hard",
         plant="flexible",
-        reason=(
-            "Least power beats slowly and widely, and there soft tips thrust least beside the law that "
-            "was given; a fixed 2 Hz is nearer to what they are stiff enough for."
-        ),
+        reason="All methods were given another law, and miss by it what they mean to give.",
     ),
     HardDay("wake", "Fins weaken each other by their jets.", "hard", plant="wake"),
     HardDay("inflow", "Thrust falls with speed.", "hard", plant="inflow"),
