@@ -71,6 +71,7 @@ class Page(ABC):
         self._loop = page = EventLoop(loop, self.fault)
         self._robot = _robot(session)
         self._faults: set[str] = set()
+        self._note: viser.NotificationHandle | None = None
         changed = self._refresh
         context = Context(client, session, solver, workers, page, self.do, changed, self.notify)
         self.answering = Answering(context)
@@ -97,6 +98,8 @@ class Page(ABC):
         """What is seen beside the panel."""
         self.bound: list[Callable[[], None]] = []
         """Each writes what the session holds into a widget; the panel that is being built takes them."""
+        self.tab = "Wrench"
+        """The tab that is open in the browser."""
         self.fields = NumberFields(client.gui, self.fault)
         """The boxes for numbers."""
         limit_uploads(client.gui, MAX_UPLOAD, self._refuse_upload)
@@ -221,8 +224,10 @@ class Page(ABC):
         self.on_change(self.client.gui.add_button_group(label, tuple(choices), hint=hint), act)
 
     def notify(self, title: str, body: str) -> None:
-        """Show a note to the user."""
-        self.client.add_notification(title, body, auto_close_seconds=8.0, color=VERMILLION)
+        """Show a note to the user, in place of the last one."""
+        if self._note is not None:
+            self._note.remove()
+        self._note = self.client.add_notification(title, body, auto_close_seconds=8.0, color=VERMILLION)
 
     def _refuse_upload(self, name: str, size: int) -> None:
         """Told when a browser offers a file that is too large to be taken at all."""
@@ -236,6 +241,7 @@ class Page(ABC):
             try:
                 self.sweep.note(self.answering)
                 # Before the panels: it settles the scale that the legend tells.
+                self.scenery.robot.editing = self.tab == "Layout"
                 self.scenery.refresh(self.answering, self.comparison, self.improver, self.analyst.findings)
             except Exception as error:
                 self.scenery.hide()

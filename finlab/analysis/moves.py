@@ -81,10 +81,12 @@ class Moves:
         fins: Sequence[str],
         bounds: Mapping[str, Bounds],
         pairs: Sequence[tuple[str, str]] = (),
+        grid: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         """Takes the fins to be moved, their bounds, and mirror pairs whose second follows the first.
 
-        A fin that is moved along with its twin needs no bounds of its own.
+        A fin that is moved along with its twin needs no bounds of its own. Free coordinates and angles
+        are multiples of the steps [m], [rad] of `grid` where these are above zero and the bounds hold one.
 
         Raises:
             LayoutError: a fin is unknown, none is named, one has no bounds, a pair is not mirrored or shares
@@ -120,13 +122,14 @@ class Moves:
             raise LayoutError("the bounds leave nothing free to move; widen them")
         self.lower, self.upper = box[self._free].T
         """Bounds of the free numbers (D,)."""
+        self._step = np.tile([grid[0]] * 3 + [grid[1]], len(leaders))[self._free]
         self.start = self._whole[self._free]
         """Where the fins are now, brought within bounds (D,)."""
 
     def geometry(self, vectors: Array) -> tuple[Array, Array]:
         """Returns positions (P, n, 3) [m] and mounting angles (P, n) [rad] of vectors (P, D)."""
         whole = np.tile(self._whole, (len(vectors), 1))
-        whole[:, self._free] = vectors
+        whole[:, self._free] = self._on_grid(vectors)
         moved = whole.reshape(len(vectors), len(self._lead), 4)
         position = np.tile(self.start_position, (len(vectors), 1, 1))
         angle = np.tile(self._angle, (len(vectors), 1))
@@ -136,6 +139,13 @@ class Moves:
                 position[:, twin] = moved[:, k, :3] * (1.0, -1.0, 1.0)
                 angle[:, twin] = -moved[:, k, 3]
         return position, angle
+
+    def _on_grid(self, vectors: Array) -> Array:
+        """Vectors (P, D) whose numbers are multiples of their steps, within bounds."""
+        step = np.where(self._step > 0.0, self._step, 1.0)
+        low, high = np.ceil(self.lower / step - 1e-9), np.floor(self.upper / step + 1e-9)
+        rounded = np.clip(np.round(vectors / step), low, high) * step
+        return np.where((self._step > 0.0) & (low <= high), rounded, vectors)
 
     def sets(self, vectors: Array) -> FinSets:
         """Returns what the fins can push once moved by vectors (P, D)."""

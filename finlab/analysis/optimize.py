@@ -18,7 +18,11 @@ from finlab.layout import Layout
 CLEARANCE = 0.10
 """Least distance between two fins [m], or what there is now if that is less."""
 PENALTY = 1e3
-"""Cost of fins that are too close, per metre; far beyond any goal."""
+"""Cost of fins that are too close or break another rule, per metre; far beyond any goal."""
+
+Rule = Callable[[Array, Array], Array]
+"""How far fins at positions (P, n, 3) [m] under mounting angles (P, n) [rad] break a rule (P,) [m]; 0 where
+they keep it."""
 
 
 @dataclass(frozen=True)
@@ -70,13 +74,15 @@ def optimize_layout(
     rounds: int = 40,
     seed: int = 0,
     clearance: float = CLEARANCE,
+    rule: Rule | None = None,
+    grid: tuple[float, float] = (0.0, 0.0),
     progress: Callable[[Progress], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> Improvement:
     """Moves fins to raise a goal, by SciPy's differential evolution.
 
     The same arguments and seed give the same layout. The present layout is among the first candidates, so the
-    result is never worse.
+    result is never worse, unless the present one breaks the rule: then the best that keeps it is the result.
 
     Args:
         layout: where to start; its limits and fin models stay.
@@ -88,6 +94,8 @@ def optimize_layout(
         rounds: most rounds of the search.
         seed: of its random numbers.
         clearance: least distance between fins [m]; fins that are closer already need not part.
+        rule: another one that the fins have to keep, such as to stand outside of a hull.
+        grid: steps [m], [rad] of the coordinates and angles that are found; 0 for any number.
         progress: called after each round.
         cancelled: asked after each round; the search stops when it answers True.
 
@@ -97,14 +105,17 @@ def optimize_layout(
     bounds = bounds or {}
     known = {name: bounds.get(name) or Bounds.around(layout.fins[layout.index(name)]) for name in fins}
     pairs = mirror_pairs(layout) if mirror is None else mirror
-    moves = Moves(layout, fins, known, pairs)
+    moves = Moves(layout, fins, known, pairs, grid)
+    broken = rule or (lambda position, angle: np.zeros(len(position)))
     measure = make_goal(goal, layout, mission)
     quick = make_goal(goal, layout, mission, fine=False)
     before = float(measure(fin_sets(layout))[0])
-    found, stopped = _search(moves, quick, before, clearance, rounds, seed, progress, cancelled)
+    found, stopped = _search(moves, quick, before, clearance, broken, rounds, seed, progress, cancelled)
     best = moves.moved(found)
     after = float(measure(fin_sets(best))[0])
-    improved = after > before + 1e-9 * abs(before)
+    wrong = [float(broken(known.position[None], known.mounting_angle[None])[0]) for known in (layout, best)]
+    better = after > before + 1e-9 * abs(before)
+    improved = wrong[1] <= 0.0 and (better or wrong[0] > 0.0)
     card = score_card(layout)
     return Improvement(
         layout=best if improved else layout,
@@ -124,6 +135,7 @@ def _search(
     measure: Goal,
     before: float,
     clearance: float,
+    rule: Rule,
     rounds: int,
     seed: int,
     progress: Callable[[Progress], None] | None,
@@ -137,7 +149,8 @@ def _search(
         nonlocal best
         columns = vectors.reshape(len(moves.start), -1).T
         value = measure(moves.sets(columns))
-        close = np.maximum(needed - _gaps(moves.geometry(columns)[0]), 0.0).sum(-1)
+        position, angle = moves.geometry(columns)
+        close = np.maximum(needed - _gaps(position), 0.0).sum(-1) + rule(position, angle)
         fine = value[close <= 0.0]
         best = max(best, float(fine.max())) if len(fine) else best
         return np.asarray(-value + PENALTY * close)

@@ -1,5 +1,6 @@
 """A real browser for the flows. Without Chromium they are skipped, loudly; on CI that is a failure."""
 
+import contextlib
 import os
 import shutil
 import tempfile
@@ -56,6 +57,13 @@ class Served:
 
 @pytest.fixture(scope="session")
 def served() -> Iterator[Served]:
+    """The app."""
+    with serving() as running:
+        yield running
+
+
+@contextlib.contextmanager
+def serving() -> Iterator[Served]:
     """The app with the stand-in allocator; no shadows and still fins, so that software rendering keeps up."""
     from finlab.assets import shipped_layouts
     from finlab.layout import load_layout

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from webapp.panels.tabs import TABS
 from webapp.session.search_request import SearchRequest
 from webapp.session.swim_plan import SwimSettings
 from webapp.viser_internals import run_script
@@ -129,6 +130,8 @@ class Page:
         """Open a tab of the panel."""
         self.page.get_by_text(name, exact=True).first.click()
         self._pause()
+        if name in TABS:
+            self.until(lambda: self.view.tab == name)
 
     def press(self, name: str) -> None:
         """Press a button that is shown."""

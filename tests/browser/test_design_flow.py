@@ -10,6 +10,7 @@ from webapp.session.state import COMPARED
 
 
 def test_linked_pair_follows_the_gizmo(page: Any) -> None:
+    page.tab("Layout")
     page.key("n")
     page.until(lambda: page.session.selected == "front_right")
     page.tab("Layout")

@@ -7,6 +7,7 @@ import pytest
 
 
 def test_gizmo_moves_a_fin(page: Any) -> None:
+    page.tab("Layout")
     page.key("n")
     page.until(lambda: page.session.selected == "front_right")
     page.look_from_above()

@@ -1,6 +1,7 @@
 """Links, rings, sticking to the hull, hulls from numbers and from files."""
 
 import math
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,13 @@ from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from finlab.layout.body import Hull
+from finlab.layout.layout import MAX_FINS
+from webapp.markup.score_card import warnings
 from webapp.scene.meshes.hull import hull_of
-from webapp.scene.meshes.mesh_hull import MAX_BYTES, read_mesh
+from webapp.scene.meshes.mesh_file import MAX_BYTES, MAX_FACES, MeshReport, read_mesh, simplified, turned
+from webapp.scene.meshes.mesh_hull import MeshHull
 from webapp.session import Session, layout_edits
-from webapp.session.files import stored_hull
+from webapp.session.files import reshaped_hull, stored_hull
 from webapp.session.targets import axis_reach
 
 
@@ -60,9 +64,10 @@ def test_ring_around_the_vertical_axis(session: Session) -> None:
     assert all(math.hypot(*fin.position[:2]) == pytest.approx(radius) for fin in new)
     turned = new[0].mounting_angle - first.mounting_angle
     assert math.cos(turned) == pytest.approx(0.0, abs=1e-9)
-    with pytest.raises(FinlabError, match="at most 8"):
+    session.ring_of_fins(8)
+    with pytest.raises(FinlabError, match="at most 16"):
         session.ring_of_fins(8)
-    assert session.state.layout.n_fins == 5
+    assert session.state.layout.n_fins == 12
 
 
 def test_stuck_fin_stands_off_the_surface_along_its_normal(session: Session) -> None:
@@ -118,12 +123,115 @@ def test_bad_meshes_are_refused_in_words() -> None:
         ("x.stl", b"", 1.0, "x.stl"),
         ("x.glb", b"glTF nonsense", 1.0, "GLB"),
         ("x.obj", b"v 0 0 nan\n", 1.0, "x.obj"),
+        ("x.obj", b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", 1.0, "1 of its 3 corners are not finite"),
+        (
+            "x.obj",
+            b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n",
+            1.0,
+            "is an open sheet, 4 of its",
+        ),
         ("x.stl", bytes(MAX_BYTES + 1), 1.0, "at most"),
     ):
         with pytest.raises(FinlabError, match=said):
             read_mesh(name, content, scale)
 
 
+def test_what_is_found_in_a_mesh_and_mended() -> None:
+    box = trimesh.creation.box((0.6, 0.2, 0.1)).subdivide().subdivide()
+    whole, report = read_mesh("box.stl", box.export(file_type="stl"), 1.0)
+    assert report == MeshReport(192, True, ()) and np.ptp(whole.vertices, axis=0) == pytest.approx(
+        (0.6, 0.2, 0.1)
+    )
+    faces = np.concatenate([box.faces[1:], box.faces[5:7], [[3, 3, 4]]])
+    faces[10] = faces[10][::-1]
+    worn = trimesh.Trimesh(box.vertices, faces, process=False)
+    _, report = read_mesh("box.stl", worn.export(file_type="stl"), 1.0)
+    told = "; ".join(report.mended)
+    assert report.is_watertight and report.triangles == 192
+    assert "1 triangles without an area" in told and "2 triangles that stood there twice" in told
+    assert "holes closed with 1 triangles" in told and "1 triangles turned outwards" in told
+
+
+def test_a_hull_from_a_file_is_turned_scaled_and_simplified(
+    session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    ball = trimesh.creation.icosphere(subdivisions=6)
+    ball.apply_scale((300.0, 100.0, 50.0))
+    assert len(ball.faces) > MAX_FACES
+    hull = stored_hull("ball.stl", ball.export(file_type="stl"), "mm")
+    session.import_hull(hull)
+    drawn = hull_of(session.state.layout)
+    assert isinstance(drawn, MeshHull) and drawn.report.is_watertight and drawn.report.triangles <= MAX_FACES
+    assert drawn.half == pytest.approx((0.3, 0.1, 0.05), rel=1e-2)
+    about_z = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    for change, half in (
+        (lambda mesh: turned(mesh, about_z), (0.1, 0.3, 0.05)),
+        (lambda mesh: mesh._replace(vertices=2.0 * mesh.vertices), (0.6, 0.2, 0.1)),
+        (lambda mesh: simplified(mesh, 500), (0.3, 0.1, 0.05)),
+    ):
+        session.import_hull(reshaped_hull(hull, change))
+        found = hull_of(session.state.layout)
+        assert isinstance(found, MeshHull) and found.half == pytest.approx(half, rel=3e-2)
+    assert found.report.triangles <= 500 and found.report.is_watertight
+    assert found.contains(np.array([[0.29, 0.0, 0.0], [0.0, 0.0, 0.06]])).tolist() == [True, False]
+    with pytest.raises(FinlabError, match="import a mesh first"):
+        reshaped_hull(Hull(shape="box", size_m=(1.0, 1.0, 1.0)), lambda mesh: mesh)
+
+
 def test_missing_mesh_file_is_no_disaster(session: Session) -> None:
     session.import_hull(Hull(mesh="/nowhere/hull.stl"))
     assert hull_of(session.state.layout).shape != "mesh"
+
+
+def test_new_fins_and_copies_stand_apart(session: Session) -> None:
+    for _ in range(4):
+        session.add_fin()
+    layout = session.state.layout
+    new = [fin.position for fin in layout.fins[4:]]
+    gaps = [math.dist(a.position, b.position) for a, b in combinations(layout.fins, 2)]
+    assert len(set(new)) == 4 and min(gaps) >= 0.12 and warnings(layout) == ()
+    for _ in range(3):
+        session.select("front_left")
+        session.duplicate_fin()
+    heights = [fin.position[2] for fin in session.state.layout.fins if fin.name.startswith("front_left")]
+    assert heights == pytest.approx([0.0, 0.05, 0.1, 0.15])
+    while session.state.layout.n_fins < MAX_FINS:
+        session.add_fin()
+    with pytest.raises(FinlabError, match=f"at most {MAX_FINS}"):
+        session.add_fin()
+
+
+def test_only_what_was_moved_snaps(session: Session) -> None:
+    session.set_display("position_snap", "5 cm")
+    session.set_display("angle_snap", "45°")
+    x, y, z = session.state.layout.fins[0].position
+    angle = session.state.layout.fins[0].mounting_angle
+    session.move_fin("front_right", (0.262, y, z))
+    assert session.state.layout.fins[0].position == (0.25, y, z)
+    for k in range(4):
+        session.drag_fin("front_right", (0.25, y, 0.01 * k), angle)
+    session.end_drag("front_right", (0.25, y, 0.04), angle)
+    fin = session.state.layout.fins[0]
+    assert fin.position == (0.25, y, 0.05) and fin.mounting_angle == angle
+    session.drag_fin("front_right", fin.position, angle + 0.1)
+    session.end_drag("front_right", fin.position, angle + 0.4)
+    turned_fin = session.state.layout.fins[0]
+    assert turned_fin.position == fin.position and turned_fin.mounting_angle == pytest.approx(-math.pi / 4)
+
+
+def test_a_hull_that_nobody_described_stays_while_fins_move() -> None:
+    session = Session(load_layout(shipped_layouts()["A"]))
+    assert session.state.layout.body is None or session.state.layout.body.hull is None
+    before = hull_of(session.state.layout)
+    name = session.state.layout.names[0]
+    for k in range(3):
+        session.drag_fin(name, (0.3 + 0.1 * k, -0.2, 0.0), 0.0)
+        assert hull_of(session.state.layout) == before
+    session.end_drag(name, (0.6, -0.2, 0.0), 0.0)
+    session.select(name)
+    session.delete_fin()
+    assert hull_of(session.state.layout) == before
+    session.undo()
+    session.undo()
+    assert session.state.layout == load_layout(shipped_layouts()["A"])

@@ -1,18 +1,23 @@
 """A search that is watched, stopped, taken or left; the analyst answers what came to rest."""
 
 import asyncio
+import math
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from finlab.analysis import mirror_pairs
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
-from finlab.layout import load_layout
+from finlab.layout import Fin, load_layout
 from tests.webapp.loops import page_of, running
+from webapp.markup.score_card import warnings
 from webapp.session import Session
+from webapp.session.room import Room
 from webapp.session.search_request import ALL, SearchRequest, parsed_mission
 from webapp.tasks.analyst import Findings, Question, find
 from webapp.tasks.background import Newest, Worker
@@ -104,3 +109,38 @@ def test_analyst_answers_only_the_question_that_stays() -> None:
     assert analyst.findings is not None
     assert analyst.findings.question.layout.fins[0].position[0] == pytest.approx(0.19)
     assert analyst.findings.before is not None
+
+
+def test_what_is_proposed_can_be_built() -> None:
+    """Outside of the hull, apart, symmetric, in whole millimetres and degrees; with figures that stay."""
+    ucat = load_layout(shipped_layouts()["ucat"])
+    inside = replace(ucat, fins=(*ucat.fins, Fin("tail", (-0.25753, 0.0, 0.0), math.pi)))
+    assert (
+        any("tail beats inside" in text for text in warnings(inside)) is False
+    )  # it points out of the stern
+    stuck = inside.replace_fin("tail", position=(-0.15, 0.0, 0.0))
+    assert any("tail beats inside" in text for text in warnings(stuck))
+    room = Room(stuck, 0.02)
+    assert room.broken(stuck.position[None], stuck.mounting_angle[None])[0] > 0.0
+    worker = Worker()
+    improver = Improver(page_of(worker))
+    request = SearchRequest().with_way(ALL, (0.15, 0.05, 0.05, 60.0))
+    improver.start(stuck, request)
+    until(lambda: improver.findings is not None)
+    found = improver.findings
+    assert found is not None and found.improved
+    layout = found.layout
+    assert warnings(layout) == ()
+    assert room.broken(layout.position[None], layout.mounting_angle[None])[0] == 0.0
+    assert [set(pair) for pair in mirror_pairs(layout)] == [set(pair) for pair in mirror_pairs(stuck)]
+    tail = layout.fins[-1]
+    assert tail.position[1] == 0.0 and tail.mounting_angle == math.pi
+    for fin in layout.fins:
+        assert fin.position == pytest.approx(np.round(fin.position, 3), abs=1e-12)
+        assert math.degrees(fin.mounting_angle) == pytest.approx(
+            round(math.degrees(fin.mounting_angle)), abs=1e-9
+        )
+    afterwards = find(Question(layout, (), layout, "none", True)).card
+    assert afterwards.authority.weakest == found.card_after.authority.weakest
+    assert [loss.weakest for loss in afterwards.losses] == [loss.weakest for loss in found.card_after.losses]
+    worker.stop()

@@ -4,23 +4,20 @@ import math
 from collections.abc import Callable
 from functools import partial
 from html import escape
-from typing import Any
 
 import viser
 
 from finlab.analysis.score_card import quick_check
 from finlab.layout import Fin
-from finlab.layout.body import HULL_SHAPES
+from finlab.layout.layout import MAX_FINS
 from webapp.handles import Changes, hold_kind, put
 from webapp.markup.score_card import check_card, warnings
 from webapp.page import Page
 from webapp.panels.fin_model import FinModelPanel
-from webapp.scene.meshes.hull import hull_of
-from webapp.scene.meshes.mesh_hull import UNITS
+from webapp.panels.hull_panel import HullPanel
 from webapp.session import ANGLE_STEPS, POSITION_STEPS
-from webapp.session.files import shipped, shipped_name, stored_hull
-from webapp.session.layout_edits import center_of_gravity
-from webapp.session.state import MAX_FINS, number
+from webapp.session.files import shipped, shipped_name
+from webapp.session.state import number
 
 NONE = "none"
 """Entry of the list of fins that selects nothing."""
@@ -28,11 +25,6 @@ RINGS = {"z, up": "z", "x, forward": "x", "y, to the left": "y"}
 """Axes that copies can stand around, by what they are called."""
 RING_SIZES = (2, 3, 4, 5, 6, 8)
 """How many fins can stand around an axis."""
-OWN = "(edited)"
-"""Entry of the list of layouts while the robot is none of them."""
-
-MESH = "mesh file"
-"""Entry of the list of shapes while the hull comes from a file."""
 
 
 class LayoutTab:
@@ -41,8 +33,8 @@ class LayoutTab:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page, session = page, page.session
-        layouts = gui.add_dropdown("Layout", (*shipped(), OWN), hint="Shipped layouts to start from.")
-        page.bind(layouts, self._open, lambda: shipped_name(session.state.layout) or OWN)
+        self._layouts = gui.add_dropdown("Layout", tuple(shipped()), hint="Shipped layouts to start from.")
+        page.on_change(self._layouts, self._open)
         self._about = gui.add_html("")
         self._fins = gui.add_dropdown("Fin", (NONE,), hint="Or click one in the view; N is next, X none.")
         page.on_change(self._fins, lambda name: session.select(None if name == NONE else name))
@@ -127,7 +119,13 @@ class LayoutTab:
         put(self._position, disabled=session.selected is None)
         put(self._angle, disabled=session.selected is None)
         self._hull.refresh()
+        name = shipped_name(layout)
+        own = f"{layout.name}, {'from a file' if layout == session.saved else 'edited'}"
+        put(self._layouts, options=tuple(shipped()) if name else (*shipped(), own), value=name or own)
         first = layout.description.strip().split("\n")[0]
+        known = {shipped_layout.description for shipped_layout in shipped().values()}
+        if name is None and layout.description in known:  # which is about another robot
+            first = f"Made from {layout.name}, and changed."
         pairs = "".join(
             f"<div>{escape(a)} ⇄ {escape(b)} move together.</div>" for a, b in session.state.links
         )
@@ -136,58 +134,3 @@ class LayoutTab:
         if self._changes(state.layout, state.weak, state.stuck, state.failed):
             quick = quick_check(state.able, state.failed)
             put(self._card, content=check_card(quick, len(state.healthy) > 1, warnings(layout)))
-
-
-class HullPanel:
-    """Widgets of one folder."""
-
-    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build the widgets."""
-        self._page = page
-        with gui.add_folder("Hull", expand_by_default=False):
-            shapes = gui.add_dropdown("Shape", (*HULL_SHAPES, MESH), hint="For looks and for sticking.")
-            page.bind(shapes, self._choose_shape, lambda: self._shape or MESH)
-            ends: dict[str, Any] = {"min": (0.02,) * 3, "max": (5.0,) * 3, "step": 0.01}
-            sides = "Length, width and height of a shape."
-            self._size = page.bind_number(
-                gui.add_vector3("Size [m]", (0.5, 0.3, 0.2), **ends, hint=sides),
-                self._resize,
-                lambda: tuple(2 * v for v in hull_of(page.session.state.layout).half),
-            )
-            about = "Centre of gravity as seen from the hull's middle. Torques are about it."
-            page.bind_number(
-                gui.add_vector3("Centre of gravity [m]", (0.0, 0.0, 0.0), step=0.005, hint=about),
-                page.session.set_center_of_gravity,
-                lambda: center_of_gravity(page.session.state.layout),
-            )
-            self._unit = gui.add_dropdown("Unit of file", tuple(UNITS), hint="What 1 means in the mesh file.")
-            hold_kind(self._unit)
-            page.add_upload(
-                "Import a hull (STL, OBJ, GLB)",
-                self._import,
-                icon=viser.Icon.UPLOAD,
-                mime_type=".stl,.obj,.glb,.ply",
-                hint="Up to 20 MB and 60,000 triangles.",
-            )
-
-    def _import(self, name: str, content: bytes) -> None:
-        self._page.session.import_hull(stored_hull(name, content, self._unit.value))
-
-    @property
-    def _shape(self) -> str | None:
-        """The hull's parametric shape; None where it comes from a file."""
-        shape = hull_of(self._page.session.state.layout).shape
-        return shape if shape in HULL_SHAPES else None
-
-    def _choose_shape(self, shape: str) -> None:
-        if shape != MESH:
-            x, y, z = hull_of(self._page.session.state.layout).half
-            self._page.session.set_hull(shape, (2 * x, 2 * y, 2 * z))
-
-    def _resize(self, size: tuple[float, float, float]) -> None:
-        if self._shape is not None:
-            self._page.session.set_hull(self._shape, size)
-
-    def refresh(self) -> None:
-        """Write the hull."""
-        put(self._size, disabled=self._shape is None)

@@ -112,6 +112,19 @@ class ImprovePanel:
                 lambda: self._way[3],
                 digits=2,
             )
+            page.bind_number(
+                gui.add_number(
+                    "Apart [m]", 0.02, step=0.01, hint="Least distance between what two fins sweep."
+                ),
+                partial(self._draft, SearchRequest.with_apart),
+                lambda: page.session.draft.apart_m,
+            )
+            hint = "Mirror pairs stay pairs, fins in the mirror plane stay in it."
+            page.bind(
+                gui.add_checkbox("Symmetric", True, hint=hint),
+                partial(self._draft, SearchRequest.with_symmetry),
+                lambda: page.session.draft.symmetric,
+            )
             lines = "Wrenches, one line each: Fx Fy Fz Tx Ty Tz [N, N m]. Empty: the common ones."
             self._mission = page.bind(
                 gui.add_text("Mission", "", multiline=True, hint=lines, visible=False),
@@ -129,6 +142,8 @@ class ImprovePanel:
             )
             self._card = gui.add_html("")
             gui.add_html(chosen_button("fl-verdict", 0))
+            hint = "Where the fins would stand, in green; off: as they stand now."
+            self._proposed = page.bind_display(gui.add_checkbox("Show after", True, hint=hint), "proposed")
             verdicts = {"Accept": self._accept, "Leave": page.improver.forget}
             self._verdict = page.add_buttons(
                 "Result", verdicts, visible=False, hint="Accepting can be undone."
@@ -173,6 +188,7 @@ class ImprovePanel:
         if progress is not None:
             put(self._bar, value=100.0 * progress.round / progress.n_rounds)
         put(self._verdict, visible=found is not None)
+        put(self._proposed, visible=found is not None and found.improved)
         text = ""
         if improver.error is not None:
             text = f"<div class='missing'>{escape(improver.error)}</div>"
@@ -205,4 +221,4 @@ def _before_and_after(found: Improvement) -> str:
     heading = f"<b>{goal.capitalize()}: {before}{unit} before, {after}{unit} after.</b>{stopped}"
     moved = fins_words([found.layout.index(name) for name in found.moved]).capitalize()
     table = score_table(found.layout, found.card_after, found.card_before)
-    return f"{heading} {moved} moved; the view shows them as ghosts.{table}"
+    return f"{heading} {moved} moved; the view shows them in green, with all fins whole.{table}"

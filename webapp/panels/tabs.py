@@ -8,6 +8,7 @@ import viser
 
 from webapp.handles import put
 from webapp.markup.corner import corner, swim_corner
+from webapp.markup.picking import add_channel
 from webapp.page import Page, Panel
 from webapp.panels.compare_tab import CompareTab
 from webapp.panels.files_tab import FilesTab
@@ -20,7 +21,12 @@ from webapp.panels.wrench_tab import WrenchTab
 from webapp.scene.swim_scene import ARROWS_N
 from webapp.session.tour import STEPS
 from webapp.theme import ASKED, DELIVERED, MISSING, css
+from webapp.viser_internals import run_script
 
+HABITS = files("webapp").joinpath("habits.js").read_text("utf-8")
+"""Script that mends what viser's page does otherwise."""
+NARROW = 1000
+"""Width of a window in which the panel has to shrink [px]."""
 PANEL_WIDTH = 410
 """Width of the panel beside the view [px]."""
 TABS: dict[str, Callable[[viser.GuiApi, Page], Panel]] = {
@@ -73,12 +79,31 @@ class Guarded:
 def build_panels(gui: viser.GuiApi, page: Page) -> tuple[list[Panel], list[Panel]]:
     """Build everything in the panel beside the view: all panels, and of these the ones that show a swim."""
     gui.add_html(STYLE)
+    add_habits(gui, page)
     panels = {"Corner": Guarded(gui, page, Corner), "Header": Guarded(gui, page, Header)}
     tabs = gui.add_tab_group()
     for label, make in TABS.items():
         with tabs.add_tab(label):
             panels[label] = Guarded(gui, page, make)
     return list(panels.values()), [panels["Corner"], panels["Swim"]]
+
+
+def add_habits(gui: viser.GuiApi, page: Page) -> None:
+    """Mend what viser's page does otherwise, and hear from it which tab is open, and how wide it is."""
+    width = 0
+
+    def hear(words: list[str]) -> None:
+        nonlocal width
+        tab, wide = words[0], int(words[-1]) if words[-1].isdecimal() else 0
+        if wide > width and width and width < NARROW:  # a panel that had to shrink does not grow by itself
+            gui.main_panel.set_width(PANEL_WIDTH)
+        width = wide or width
+        if tab in TABS and tab != page.tab:
+            page.tab = tab
+            page.do(lambda: None)
+
+    add_channel(gui, "fl-habits", hear)
+    run_script(gui, HABITS)
 
 
 class Corner:
@@ -119,6 +144,7 @@ class Header:
         self._page, session = page, page.session
         steps = {"Undo": session.undo, "Redo": session.redo, "Tour": session.next_stop}
         self._history = page.add_buttons("Session", steps, hint="Ctrl+Z, Ctrl+Shift+Z, T.")
+        self._steps = gui.add_html("")
         self._card = gui.add_html("", visible=False)
         stops = {"Back": session.previous_stop, "Next": session.next_stop, "End": session.end_tour}
         self._stops = page.add_buttons(
@@ -130,6 +156,8 @@ class Header:
         history = self._page.session.history
         undo, redo = history.undo_name or "nothing", history.redo_name or "nothing"
         put(self._history, hint=f"Undo: {undo} (Ctrl+Z). Redo: {redo} (Ctrl+Shift+Z). T starts a tour.")
+        again = f" · Redo: {escape(redo)}" if history.redo_name else ""
+        put(self._steps, content=f"<div class='fl dim steps'>Undo: {escape(undo)}{again}</div>")
         stop = self._page.session.stop
         put(self._card, visible=stop is not None, content="" if stop is None else tour_card(stop))
         put(self._stops, visible=stop is not None)

@@ -26,9 +26,11 @@ CONTRAST = 2.0
 
 
 class Ghost:
-    """Pale blades of some fins: where they stood, where a search puts them, or where one would land."""
+    """Blades of some fins: pale where they stood or one would land, full where a search puts them."""
 
-    def __init__(self, scene: viser.SceneApi, name: str, color: Rgb = DEAD, opacity: float = 0.3) -> None:
+    def __init__(
+        self, scene: viser.SceneApi, name: str, color: Rgb = DEAD, opacity: float | None = 0.3
+    ) -> None:
         """Build the node, showing nothing."""
         self._shape = Shape(scene, name, color, opacity=opacity, visible=False, **UNLIT)
 

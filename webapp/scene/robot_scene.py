@@ -25,7 +25,7 @@ from webapp.session.state import State
 from webapp.tasks.analyst import Findings
 from webapp.tasks.context import Context
 from webapp.tasks.solver import Attention
-from webapp.theme import ASKED, HALF_TURN
+from webapp.theme import ASKED, DELIVERED, HALF_TURN
 
 CAMERAS = {
     "3D": (0.48, 0.46, 0.58),
@@ -50,6 +50,7 @@ class RobotScene:
         self._wrench = WrenchNodes(scene)
         self._lines = Lines(scene)
         self._ghost = Ghost(scene, "/robot/ghost")
+        self._proposed = Ghost(scene, "/robot/proposed", DELIVERED, None)
         self._landing = Ghost(scene, "/robot/landing", ASKED, 0.45)
         self._overlay = Overlay(scene)
         self._attainable = AttainableNodes(scene)
@@ -58,6 +59,8 @@ class RobotScene:
         self._fins: list[FinNode] = []
         self.dragged: int | None = None
         """Place of the fin in the user's hand."""
+        self.editing = False
+        """Whether the selected fin has its gizmos: while the layout is edited."""
         self._flapping = Flapping()
         self.newtons = 1.0
         """Force [N] that an arrow of 0.1 m stands for at the moment."""
@@ -91,7 +94,7 @@ class RobotScene:
             allocation: the answer.
             other: another method's answer, whose forces are shown beside it.
             findings: what the layout can attain, where that is to be shown.
-            offered: a better layout, whose fins are shown as ghosts.
+            offered: a better layout, whose fins are shown beside the present ones.
             attention: how much the fins look at each other.
         """
         state, display = self._session.state, self._session.display
@@ -111,7 +114,8 @@ class RobotScene:
         for i, fin in enumerate(state.layout.fins):
             selected = fin.name == self._session.selected
             label = _label(state, i, selected) if display.labels else None
-            self._fins[i].place(fin, hull, selected, label, i == self.dragged)
+            gizmos = selected and self.editing and not display.grips
+            self._fins[i].place(fin, hull, gizmos, label, i == self.dragged)
             if fin.name in state.failed or allocation is None:
                 self._fins[i].command(None, np.zeros(3), 0.0, False)
             elif fits and np.isfinite(allocation.command[i, 0]):
@@ -121,7 +125,8 @@ class RobotScene:
                 self._fins[i].command(allocation.command[i], force * scale, angle, display.fans)
         if fits and allocation is not None:
             self._flapping.take(allocation.command)
-        left = offered or (self._session.saved if display.ghost else None)
+        self._proposed.show(moved_fins(offered if display.proposed else None, state.layout))
+        left = self._session.saved if display.ghost and offered is None else None
         self._ghost.show(moved_fins(left, state.layout))
         self._landing.show(self._landings())
         self._overlay.refresh(other, scale, display.dark)

@@ -25,7 +25,7 @@ from finlab.layout import FinModelSpec, Layout, load_layout
 from finlab.layout.body import MESH_SUFFIXES
 from finlab.layout.reading import MAX_BYTES
 from finlab.whole_file import write_whole
-from webapp.scene.meshes.mesh_hull import read_mesh
+from webapp.scene.meshes.mesh_file import MAX_FACES, read_mesh, simplified, stl_of
 
 LAYOUTS = (".yaml", ".yml", ".json")
 """How the layout's file in an archive may end."""
@@ -148,10 +148,15 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
 def stored_mesh(name: str, content: bytes, scale: float, folder: Path) -> str:
     """Path of a hull's mesh, which is checked and kept inside a folder under a name made from its content.
 
+    One of too many triangles is kept with fewer.
+
     Raises:
-        FinlabError: it is no mesh, too large, or cannot be kept.
+        FinlabError: it is no closed mesh, too large, or cannot be kept.
     """
-    read_mesh(name, content, scale)
+    mesh, report = read_mesh(name, content, scale)
+    if report.triangles > MAX_FACES:
+        fewer = simplified(mesh, MAX_FACES)
+        name, content = "hull.stl", stl_of(fewer._replace(vertices=fewer.vertices / scale))
     digest = hashlib.sha256(content).hexdigest()[:16]
     path = folder / HULL_FOLDER / f"{digest}{Path(name).suffix.lower()}"
     _keep(path, content)

@@ -47,6 +47,8 @@ class Display:
     """Fins slide on the hull, shafts along its normal."""
     ghost: bool = True
     """Show where moved fins stood when the layout was opened or saved."""
+    proposed: bool = True
+    """Show where a search for a better layout puts the fins."""
     grips: bool = False
     """Show handles on the arrows of the asked wrench."""
     drawn: str = "none"

@@ -62,12 +62,22 @@ class Editing(Core):
 
     def _placed(self, name: str, position: Vector, angle: float, step_m: float, step_rad: float) -> Layout:
         """The layout with a fin let go at a place, snapped to steps and stuck to the hull where wanted."""
-        layout = layout_edits.moved(self.state.layout, name, position, step_m)
-        layout = layout_edits.turned(layout, name, angle, step_rad)
+        before = self._untouched(name)
+        layout = layout_edits.moved(self.state.layout, name, position, step_m, before)
+        layout = layout_edits.turned(layout, name, angle, step_rad, before)
         return layout_edits.stuck(layout, name) if self.display.stick else layout
 
+    def _untouched(self, name: str) -> Fin | None:
+        """The fin before it was taken into the hand; None where it is not."""
+        history = self.history
+        if history.merge_key != f"drag {name}" or not history.past:
+            return None
+        layout = history.past[-1][1].layout
+        return layout.fins[layout.index(name)]
+
     def _drag(self, name: str, layout: Layout) -> None:
-        state = self.state.with_layout(followed(layout, self.state.links, name))
+        whole = layout_edits.keeping_hull(self.state.layout, followed(layout, self.state.links, name))
+        state = self.state.with_layout(whole)
         self._commit(f"Move {name}", state, f"drag {name}", timed=False)
 
     @property
@@ -131,13 +141,14 @@ class Editing(Core):
         """A parametric hull of a size [m]."""
         self._edit(f"Hull {shape}", layout_edits.shaped(self.state.layout, shape, size), f"hull {shape}")
 
-    def import_hull(self, hull: Hull) -> None:
-        """A hull from a mesh file."""
-        self._edit("Import hull", layout_edits.with_hull(self.state.layout, hull))
+    def import_hull(self, hull: Hull, name: str = "Import hull") -> None:
+        """A hull from a mesh file; `name` is that of the step."""
+        self._edit(name, layout_edits.with_hull(self.state.layout, hull))
 
     def set_center_of_gravity(self, center: Vector) -> None:
         """The centre of gravity at another place in the hull [m]."""
         self._edit("Move the centre of gravity", layout_edits.balanced(self.state.layout, center), "center")
 
     def _edit(self, name: str, layout: Layout, merge_key: str | None = None) -> None:
-        self._commit(name, self.state.with_layout(layout), merge_key)
+        whole = layout_edits.keeping_hull(self.state.layout, layout)
+        self._commit(name, self.state.with_layout(whole), merge_key)

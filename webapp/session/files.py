@@ -5,6 +5,8 @@ import io
 import os
 import re
 import tempfile
+from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -21,7 +23,9 @@ from finlab.layout.yaml_file import parse_yaml, yaml_text
 from finlab.physics import plant_of
 from finlab.sim import Trajectory
 from finlab.sim.task import read_trajectory
-from webapp.scene.meshes.mesh_hull import UNITS
+from webapp.scene.meshes.mesh import Mesh
+from webapp.scene.meshes.mesh_file import stl_of
+from webapp.scene.meshes.mesh_hull import UNITS, MeshHull
 from webapp.session.companions import (
     TABLE_FOLDER,
     Opened,
@@ -138,6 +142,19 @@ def stored_hull(name: str, content: bytes, unit: str) -> Hull:
     chosen(unit, "unit", UNITS)
     short = Path(str(name)).name[-80:] or "upload"
     return Hull(mesh=stored_mesh(short, content, UNITS[unit], cache_folder()), scale=UNITS[unit])
+
+
+def reshaped_hull(hull: Hull, change: Callable[[Mesh], Mesh]) -> Hull:
+    """A hull from a mesh file with another shape, in metres about the middle of its box; kept like an upload.
+
+    Raises:
+        FinlabError: the hull is no mesh, its file is gone, or what comes of it is no hull.
+    """
+    if hull.mesh is None:
+        raise FinlabError("the hull is drawn from a shape; import a mesh first")
+    drawn = MeshHull.load(hull.mesh, hull.scale, (0.0, 0.0, 0.0))
+    content = stl_of(change(drawn.mesh()))
+    return replace(hull, mesh=stored_mesh("hull.stl", content, 1.0, cache_folder()), scale=1.0)
 
 
 def read_path(name: str, content: bytes) -> Trajectory:

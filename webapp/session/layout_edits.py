@@ -11,14 +11,21 @@ from finlab.errors import FinlabError
 from finlab.layout import Body, Fin, FinModelSpec, Layout
 from finlab.layout.angles import wrapped
 from finlab.layout.body import HULL_SHAPES, Hull
+from finlab.layout.layout import MAX_FINS
 from webapp.scene.meshes.hull import hull_of
 from webapp.session.links import existing_image, image
-from webapp.session.state import MAX_FINS, chosen, number
+from webapp.session.state import chosen, number
 
+UNTOUCHED = 1e-6
+"""Change [m], [rad] up to which a coordinate or an angle counts as left alone: a page's own rounding."""
 MAX_COORDINATE = 2.0
 """How far out a fin may be placed in the browser [m]."""
 AXES = ("x", "y", "z")
 """Body axes that copies can stand around: forward, left, up."""
+CLEAR, STEP_UP = 0.12, 0.05
+"""How far a new fin, and a copy, stands from all others if there is room [m]."""
+ROUND = (180, 150, -150, 120, -120, 90, -90, 60, -60, 30, -30, 0)
+"""Directions [deg] in which a new fin is put, the stern first."""
 STAND_OFF = 0.02
 """Distance of a fin that sticks to the hull from its surface: room for the servo [m]."""
 
@@ -30,19 +37,42 @@ def snapped(value: float, step: float) -> float:
     return round(value / step) * step if step > 0 else value
 
 
-def moved(layout: Layout, name: str, position: tuple[float, float, float], step: float = 0.0) -> Layout:
-    """A fin at another place [m], snapped to multiples of `step` [m]."""
-    checked = tuple(
-        snapped(number(v, f"{axis} of {name} [m]", -MAX_COORDINATE, MAX_COORDINATE), step)
-        for v, axis in zip(position, "xyz", strict=True)
-    )
-    return layout.replace_fin(name, position=checked)
+def moved(
+    layout: Layout, name: str, position: Vector, step: float = 0.0, before: Fin | None = None
+) -> Layout:
+    """A fin at another place [m], snapped to multiples of `step` [m] along the axes along which it moved.
+
+    `before` is the fin before it was touched, by default as it is now.
+    """
+    start = (before or layout.fins[layout.index(name)]).position
+    checked = []
+    for value, now, axis in zip(position, start, "xyz", strict=True):
+        place = number(value, f"{axis} of {name} [m]", -MAX_COORDINATE, MAX_COORDINATE)
+        checked.append(snapped(place, step) if abs(place - now) > UNTOUCHED else now)
+    return layout.replace_fin(name, position=tuple(checked))
 
 
-def turned(layout: Layout, name: str, angle: float, step: float = 0.0) -> Layout:
-    """A fin with another mounting angle [rad], snapped to multiples of `step` [rad]."""
+def turned(layout: Layout, name: str, angle: float, step: float = 0.0, before: Fin | None = None) -> Layout:
+    """A fin with another mounting angle [rad], snapped to multiples of `step` [rad] if it was turned."""
+    now = (before or layout.fins[layout.index(name)]).mounting_angle
     checked = number(angle, f"mounting angle of {name} [rad]", -100.0, 100.0)
+    if abs(math.remainder(checked - now, math.tau)) <= UNTOUCHED:
+        return layout.replace_fin(name, mounting_angle=now)
     return layout.replace_fin(name, mounting_angle=float(wrapped(snapped(checked, step))))
+
+
+def keeping_hull(before: Layout, after: Layout) -> Layout:
+    """A layout after an edit, with the hull that was drawn before where none is described.
+
+    One that is made to fit the fins would stretch with each of them.
+    """
+    if after.body is not None and after.body.hull is not None:
+        return after
+    if before.body is not None and before.body.hull is not None:
+        return after
+    drawn = hull_of(before)
+    x, y, z = drawn.half
+    return with_hull(after, Hull(shape=drawn.shape, size_m=(2 * x, 2 * y, 2 * z), center_m=drawn.center))
 
 
 def mirrored(layout: Layout, name: str) -> tuple[Layout, str]:
@@ -93,16 +123,37 @@ def stuck(layout: Layout, name: str) -> Layout:
 
 
 def duplicated(layout: Layout, name: str) -> tuple[Layout, str]:
-    """The layout with a copy of a fin 5 cm above it, and the copy's name."""
+    """The layout with a copy of a fin above it, 5 cm or the first place that is free, and the copy's name."""
     fin = layout.fins[layout.index(name)]
     x, y, z = fin.position
-    return _added(layout, replace(fin, position=(x, y, z + 0.05)), name)
+    places = ((x, y, round(z + STEP_UP * k, 9)) for k in range(1, MAX_FINS + 1))
+    return _added(
+        layout, replace(fin, position=next(p for p in places if _is_free(layout, p, STEP_UP))), name
+    )
 
 
 def added(layout: Layout) -> tuple[Layout, str]:
-    """The layout with one more fin at the stern, and its name."""
-    reach = max(abs(fin.position[0]) for fin in layout.fins)
-    return _added(layout, Fin("fin", (-max(reach, 0.1), 0.0, 0.0), math.pi), "fin")
+    """The layout with one more fin on the hull, and its name: at the stern, or where there is room."""
+    hull = hull_of(layout)
+    far = 4.0 * max(hull.half)
+    for clear in (CLEAR, STEP_UP, 0.0):
+        for degrees in ROUND:
+            way = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees)), 0.0])
+            point, normal = hull.nearest(np.array(hull.center) + far * way)
+            x, y, z = (round(float(v), 4) + 0.0 for v in point + STAND_OFF * normal)
+            if _is_free(layout, (x, y, z), clear):
+                azimuth = (
+                    math.atan2(normal[1], normal[0])
+                    if math.hypot(*normal[:2]) > 0.2
+                    else math.radians(degrees)
+                )
+                return _added(layout, Fin("fin", (x, y, z), float(wrapped(azimuth))), "fin")
+    raise AssertionError("any place is free of none")
+
+
+def _is_free(layout: Layout, position: Vector, clear: float) -> bool:
+    """Whether all fins are at least so far [m] from a place."""
+    return all(math.dist(fin.position, position) >= clear - 1e-9 for fin in layout.fins)
 
 
 def deleted(layout: Layout, name: str) -> Layout:
@@ -115,7 +166,7 @@ def deleted(layout: Layout, name: str) -> Layout:
 
 def _added(layout: Layout, fin: Fin, wanted: str) -> tuple[Layout, str]:
     if layout.n_fins >= MAX_FINS:
-        raise FinlabError(f"the layout has {layout.n_fins} fins already; the app places at most {MAX_FINS}")
+        raise FinlabError(f"the layout has {layout.n_fins} fins already; expected at most {MAX_FINS}")
     name = _free_name(layout, wanted)
     return replace(layout, fins=(*layout.fins, replace(fin, name=name))), name
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from finlab.analysis import Bounds
+from finlab.analysis.moves import is_mirrored
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.session.state import MAX_TARGET, chosen, number
@@ -42,6 +43,10 @@ class SearchRequest:
     """How far fins may go along x, y, z [m] and turn [deg], by name or `ALL`."""
     mission: str = ""
     """The mission as text, see `parsed_mission`."""
+    apart_m: float = 0.02
+    """Least distance between what two fins sweep [m]."""
+    symmetric: bool = True
+    """Whether mirror pairs stay pairs, and fins in the mirror plane stay there."""
 
     def with_goal(self, goal: Any) -> "SearchRequest":
         """Another goal.
@@ -69,6 +74,18 @@ class SearchRequest:
         others = tuple(pair for pair in self.ways if pair[0] != name)
         return replace(self, ways=(*others, (name, checked)))
 
+    def with_apart(self, apart: Any) -> "SearchRequest":
+        """Another least distance between what fins sweep [m].
+
+        Raises:
+            FinlabError: it is none.
+        """
+        return replace(self, apart_m=number(apart, "distance of swept fins [m]", 0.0, 1.0))
+
+    def with_symmetry(self, symmetric: Any) -> "SearchRequest":
+        """Symmetric, or not."""
+        return replace(self, symmetric=bool(symmetric))
+
     def with_mission(self, text: Any) -> "SearchRequest":
         """Another mission; it is read when the search begins, so that half a line may be typed."""
         return replace(self, mission=str(text)[:MAX_TEXT])
@@ -88,7 +105,11 @@ class SearchRequest:
         for fin in layout.fins:
             if fin.name not in self.held:
                 *reach, turn = self.way(fin.name)
-                bounds[fin.name] = Bounds.around(fin, reach, math.radians(turn))
+                around = Bounds.around(fin, reach, math.radians(turn))
+                if self.symmetric and is_mirrored(fin, fin):
+                    y, angle = fin.position[1], fin.mounting_angle
+                    around = replace(around, y=(y, y), mounting_angle=(angle, angle))
+                bounds[fin.name] = around
         if not bounds:
             raise FinlabError("no fin may move; press the numbers of those that may")
         return bounds
@@ -101,6 +122,7 @@ def restored_request(values: Mapping[str, Any]) -> SearchRequest:
         FinlabError: a value is not allowed. So may KeyError, TypeError and ValueError tell.
     """
     request = SearchRequest().with_goal(values["goal"]).with_mission(values["mission"])
+    request = request.with_apart(values["apart_m"]).with_symmetry(values["symmetric"])
     for name in values["held"]:
         request = request.with_held_toggled(str(name))
     for name, way in values["ways"]:

@@ -13,7 +13,7 @@ from webapp.session import Session
 from webapp.session.search_request import restored_request
 from webapp.session.state import SETTINGS, State
 
-VERSION = 4
+VERSION = 5
 """Of what stands in the files; others are not read."""
 MAX_FILES = 64
 """Sessions that are kept; the oldest go first."""

@@ -23,8 +23,6 @@ AXIS_UNITS = ("N", "N", "N", "N m", "N m", "N m")
 
 MAX_TARGET = 1000.0
 """Largest target component that the page may ask for [N, N m]."""
-MAX_FINS = 8
-"""Most fins that can be placed in the browser; files may hold more."""
 CANDIDATE_RANGE = (4, 256)
 """How many candidates K the mixture may be asked for."""
 TEMPERATURE_RANGE = (0.0, 2.0)

@@ -1,5 +1,6 @@
 """A search for a better layout that can be watched, stopped, and taken or left."""
 
+import math
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,9 +10,13 @@ from finlab.analysis import Bounds, Improvement, Progress, optimize_layout
 from finlab.analysis.goals import MISSION
 from finlab.errors import FinlabError
 from finlab.layout import Layout
+from webapp.session.room import Room
 from webapp.session.search_request import GOAL_WORDS, SearchRequest, parsed_mission
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
+
+GRID = 0.001, math.radians(1.0)
+"""What is proposed is round: steps of places [m] and shafts [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +31,10 @@ class Search:
     """Where each fin that may move may go."""
     mission: Sequence[Sequence[float]]
     """Wrenches (N, 6) of the mission [N, N m]."""
+    room: Room
+    """Where fins may stand."""
+    symmetric: bool
+    """Whether mirror pairs stay pairs."""
     stop: threading.Event = field(default_factory=threading.Event)
     """Ends it after the present round."""
 
@@ -48,7 +57,8 @@ class Improver(Newest[Search, Improvement]):
         if self.busy:
             raise FinlabError("a search is running already; cancel it first")
         mission = parsed_mission(request.mission) or MISSION
-        search = Search(layout, GOAL_WORDS[request.goal], request.bounds(layout), mission)
+        room, goal = Room(layout, request.apart_m), GOAL_WORDS[request.goal]
+        search = Search(layout, goal, request.bounds(layout), mission, room, request.symmetric)
         self.forget()
         self.ask(search)
 
@@ -70,7 +80,10 @@ class Improver(Newest[Search, Improvement]):
             tuple(search.bounds),
             search.bounds,
             search.goal,
+            None if search.symmetric else (),
             mission=search.mission,
+            rule=search.room.broken,
+            grid=GRID,
             progress=lambda progress: self._loop.post(partial(self._note, search, progress)),
             cancelled=search.stop.is_set,
         )

@@ -18,7 +18,7 @@ STEP_S = 1 / 15
 
 
 class Sweep:
-    """Goes to and fro through a range until it is stopped; the target stays where it then is."""
+    """Goes to and fro through a range until it is stopped; then what was asked before comes back."""
 
     def __init__(self, context: Context) -> None:
         """Move the target of the page's session; everything here runs on the loop."""
@@ -63,10 +63,10 @@ class Sweep:
         self._timer = self._loop.later(0.0, self._go)
 
     def stop(self) -> None:
-        """Leave the target where it is."""
+        """Bring back what was asked before; whoever has asked for something else meanwhile keeps that."""
         if self._timer is not None:
             self._timer.cancel()
-            self._session.history.end_merge()
+            self._session.end_sweep()
         self._timer = None
 
     def _go(self) -> None:

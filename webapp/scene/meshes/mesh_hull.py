@@ -1,26 +1,20 @@
-"""A hull from a mesh file (STL, OBJ, GLB, PLY), brought to metres, that can be asked where its surface is."""
+"""A hull from a mesh file that can be asked where its surface is."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from io import BytesIO
 from pathlib import Path
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 from trimesh.triangles import closest_point
 
 from finlab.arrays import Array
 from finlab.errors import FinlabError
-from finlab.layout.body import MESH_SUFFIXES
 from webapp.scene.meshes.mesh import NOTHING, Mesh
+from webapp.scene.meshes.mesh_file import MAX_BYTES, MeshReport, read_mesh, simplified
 
-MAX_BYTES = 20_000_000
-"""Largest mesh file that is read."""
-MAX_FACES = 60_000
-"""Most triangles of a hull; more would make the page slow and show nothing new."""
-SMALLEST, LARGEST = 0.02, 10.0
-"""Lengths [m] that a hull may have; anything else is a mistaken unit."""
+COARSE_FACES = 400
+"""Triangles of a coarse hull."""
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
 """Metres per unit of a mesh file."""
 
@@ -75,6 +69,8 @@ class MeshHull:
     """Half length, width and height of the box around it [m]."""
     center: tuple[float, float, float]
     """Where the middle of that box lies in the body frame [m]."""
+    report: MeshReport
+    """What was found in the file, and mended."""
     shape: str = "mesh"
     """Tells it from the parametric hulls."""
 
@@ -99,11 +95,17 @@ class MeshHull:
             content = file.read_bytes()
         except OSError as error:
             raise FinlabError(f"{file.name}: cannot be read: {error.strerror}") from None
-        mesh = read_mesh(file.name, content, scale)
+        mesh, report = read_mesh(file.name, content, scale)
         corners = mesh.vertices + np.array(center)
         half = np.ptp(mesh.vertices, axis=0) / 2
         x, y, z = (float(v) for v in half)
-        return MeshHull((path, scale, center), Triangles(Mesh(corners, mesh.faces)), (x, y, z), center)
+        surface = Triangles(Mesh(corners, mesh.faces))
+        return MeshHull((path, scale, center), surface, (x, y, z), center, report)
+
+    def coarse(self) -> "MeshHull":
+        """About the same hull with few triangles, for questions that are asked thousands of times."""
+        mesh = simplified(self.mesh(), COARSE_FACES)
+        return replace(self, surface=Triangles(mesh))
 
     def mesh(self) -> Mesh:
         """The hull's surface."""
@@ -127,48 +129,3 @@ class MeshHull:
     def nearest(self, point: Array) -> tuple[Array, Array]:
         """The point (3,) of the surface nearest to `point`, and the outward normal (3,) there."""
         return self.surface.nearest(point)
-
-
-def read_mesh(name: str, content: bytes, scale: float) -> Mesh:
-    """The mesh in a file: whole scene, in metres, repaired, the middle of its box at the origin.
-
-    Args:
-        name: the file's name; its ending tells the format.
-        content: what is in it.
-        scale: metres per unit.
-
-    Raises:
-        FinlabError: too large, no mesh, or of a size that no hull has; the message names the file.
-    """
-    kind = Path(name).suffix.lower()
-    if kind not in MESH_SUFFIXES:
-        raise FinlabError(f"{name}: expected a file ending in {', '.join(MESH_SUFFIXES)}")
-    if len(content) > MAX_BYTES:
-        raise FinlabError(f"{name}: is {len(content):,} bytes long, expected at most {MAX_BYTES:,}")
-    try:
-        # Without a resolver nothing beside this file is read: no textures, no materials.
-        mesh = trimesh.load_mesh(BytesIO(content), file_type=kind[1:])
-        if isinstance(mesh, trimesh.Scene):
-            mesh = mesh.to_mesh()
-        faces = len(mesh.faces)
-    except Exception as error:  # trimesh's readers raise whatever went wrong inside them
-        raise FinlabError(f"{name}: is not a {kind[1:].upper()} mesh that can be read ({error})") from None
-    if faces == 0 or not np.isfinite(mesh.vertices).all():
-        raise FinlabError(f"{name}: holds no triangles with finite corners")
-    if faces > MAX_FACES:
-        raise FinlabError(f"{name}: has {faces:,} triangles, expected at most {MAX_FACES:,}; simplify it")
-    mesh.merge_vertices()
-    mesh.update_faces(mesh.nondegenerate_faces())
-    trimesh.repair.fill_holes(mesh)
-    trimesh.repair.fix_normals(mesh)
-    vertices = np.asarray(mesh.vertices, dtype=float) * scale
-    if len(mesh.faces) == 0:
-        raise FinlabError(f"{name}: holds no triangles with an area")
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    length = float((high - low).max())
-    if not SMALLEST <= length <= LARGEST:
-        raise FinlabError(
-            f"{name}: would be {length:.3g} m long, expected {SMALLEST:g} to {LARGEST:g} m; "
-            "choose another unit"
-        )
-    return Mesh(vertices - (low + high) / 2, np.asarray(mesh.faces, dtype=np.int32))

@@ -1,0 +1,164 @@
+"""The hull: a shape with a size, or a mesh file that is looked at, turned, scaled and simplified."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import viser
+from scipy.spatial.transform import Rotation
+
+from finlab.errors import FinlabError
+from finlab.layout.body import HULL_SHAPES, Hull
+from webapp.handles import put
+from webapp.page import Page
+from webapp.scene.meshes.hull import hull_of
+from webapp.scene.meshes.mesh import Mesh
+from webapp.scene.meshes.mesh_file import (
+    LARGEST,
+    LEAST_FACES,
+    MAX_BYTES,
+    MAX_FACES,
+    SMALLEST,
+    simplified,
+    turned,
+)
+from webapp.scene.meshes.mesh_hull import UNITS, MeshHull
+from webapp.session.files import reshaped_hull, stored_hull
+from webapp.session.layout_edits import center_of_gravity
+from webapp.session.state import chosen, number
+
+MESH = "mesh file"
+"""Entry of the list of shapes while the hull comes from a file."""
+TURNS = ("x", "y", "z")
+"""Axes that a hull from a file can be turned about."""
+
+
+class HullPanel:
+    """Widgets of one folder."""
+
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
+        """Build the widgets."""
+        self._page, self._chosen = page, "m"
+        with gui.add_folder("Hull", expand_by_default=False):
+            shapes = gui.add_dropdown("Shape", (*HULL_SHAPES, MESH), hint="For looks and for sticking.")
+            page.bind(shapes, self._choose_shape, lambda: self._shape or MESH)
+            ends: dict[str, Any] = {"min": (0.02,) * 3, "max": (5.0,) * 3, "step": 0.01}
+            sides = "Length, width and height of a shape."
+            self._size = page.bind_number(
+                gui.add_vector3("Size [m]", (0.5, 0.3, 0.2), **ends, hint=sides),
+                self._resize,
+                lambda: tuple(2 * v for v in hull_of(page.session.state.layout).half),
+            )
+            about = "Centre of gravity as seen from the hull's middle. Torques are about it."
+            page.bind_number(
+                gui.add_vector3("Centre of gravity [m]", (0.0, 0.0, 0.0), step=0.005, hint=about),
+                page.session.set_center_of_gravity,
+                lambda: center_of_gravity(page.session.state.layout),
+            )
+            hint = "What 1 means in the mesh file; of one that is here, too."
+            self._unit = page.bind(
+                gui.add_dropdown("Unit of file", tuple(UNITS), hint=hint),
+                self._choose_unit,
+                self._unit_now,
+            )
+            page.add_upload(
+                "Import a hull (STL, OBJ, GLB)",
+                self._import,
+                icon=viser.Icon.UPLOAD,
+                mime_type=".stl,.obj,.glb,.ply",
+                hint=f"Up to {MAX_BYTES // 1_000_000} MB; more than {MAX_FACES:,} triangles are simplified.",
+            )
+            self._report = gui.add_html("")
+            turns = {axis: partial(self._turn, axis) for axis in TURNS}
+            hint = "A quarter turn about the body's axis, by the right-hand rule."
+            self._turns = page.add_buttons("Turn by 90°", turns, hint=hint)
+            self._length = page.bind_number(
+                gui.add_number("Length [m]", 1.0, step=0.01, hint="Along x; width and height follow."),
+                self._scale,
+                lambda: 2.0 * hull_of(page.session.state.layout).half[0],
+            )
+            hint = "At most so many; fewer make the page quicker."
+            self._faces = page.bind_number(
+                gui.add_number("Triangles", 1.0, step=1000, hint=hint), self._simplify, self._count, digits=0
+            )
+
+    def _import(self, name: str, content: bytes) -> None:
+        self._page.session.import_hull(stored_hull(name, content, self._chosen))
+
+    def _choose_unit(self, unit: str) -> None:
+        """Another unit, for the next file and for the one that is here; a reshaped one is in metres."""
+        self._chosen = chosen(unit, "unit", UNITS)
+        hull = self._hull
+        if hull is not None and hull.mesh is not None:
+            self._page.session.import_hull(replace(hull, scale=UNITS[self._chosen]), "Unit of the hull")
+
+    def _unit_now(self) -> str:
+        """The unit of the mesh that is here, else the one for the next."""
+        hull = self._hull
+        scale = None if hull is None or hull.mesh is None else hull.scale
+        return next((unit for unit, factor in UNITS.items() if factor == scale), self._chosen)
+
+    @property
+    def _hull(self) -> Hull | None:
+        """The hull as the layout describes it."""
+        body = self._page.session.state.layout.body
+        return None if body is None else body.hull
+
+    def _count(self) -> float:
+        drawn = hull_of(self._page.session.state.layout)
+        return float(drawn.report.triangles) if isinstance(drawn, MeshHull) else 0.0
+
+    def _reshape(self, name: str, change: Callable[[Mesh], Mesh]) -> None:
+        hull = self._hull
+        if hull is None:
+            raise FinlabError("the hull is drawn from a shape; import a mesh first")
+        self._page.session.import_hull(reshaped_hull(hull, change), name)
+        self._chosen = "m"
+
+    def _turn(self, axis: str) -> None:
+        rotation = Rotation.from_euler(axis, 90.0, degrees=True).as_matrix()
+        self._reshape(f"Turn the hull about {axis}", lambda mesh: turned(mesh, rotation))
+
+    def _scale(self, length: float) -> None:
+        now = 2.0 * hull_of(self._page.session.state.layout).half[0]
+        share = number(length, "length of the hull [m]", SMALLEST, LARGEST) / now
+        self._reshape("Scale the hull", lambda mesh: mesh._replace(vertices=mesh.vertices * share))
+
+    def _simplify(self, faces: float) -> None:
+        most = round(number(faces, "triangles of the hull", LEAST_FACES, MAX_FACES))
+        self._reshape("Simplify the hull", lambda mesh: simplified(mesh, most))
+
+    @property
+    def _shape(self) -> str | None:
+        """The hull's parametric shape; None where it comes from a file."""
+        shape = hull_of(self._page.session.state.layout).shape
+        return shape if shape in HULL_SHAPES else None
+
+    def _choose_shape(self, shape: str) -> None:
+        if shape != MESH:
+            x, y, z = hull_of(self._page.session.state.layout).half
+            self._page.session.set_hull(shape, (2 * x, 2 * y, 2 * z))
+
+    def _resize(self, size: tuple[float, float, float]) -> None:
+        if self._shape is not None:
+            self._page.session.set_hull(self._shape, size)
+
+    def refresh(self) -> None:
+        """Write the hull."""
+        is_mesh = self._shape is None
+        put(self._size, disabled=is_mesh)
+        for widget in (self._turns, self._length, self._faces):
+            put(widget, visible=is_mesh)
+        drawn = hull_of(self._page.session.state.layout)
+        text = _report(drawn) if isinstance(drawn, MeshHull) else ""
+        put(self._report, content=text, visible=bool(text))
+
+
+def _report(hull: MeshHull) -> str:
+    """What was found in the hull's file, and mended."""
+    report = hull.report
+    size = " × ".join(f"{2.0 * half:.3g}" for half in hull.half)
+    closed = "watertight" if report.is_watertight else "<span class='missing'>not quite closed</span>"
+    mended = f" Mended: {'; '.join(report.mended)}." if report.mended else " Nothing had to be mended."
+    return f"<div class='fl'>{size} m, {report.triangles:,} triangles, {closed}.{mended}</div>"

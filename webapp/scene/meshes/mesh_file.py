@@ -1,0 +1,141 @@
+"""Mesh files (STL, OBJ, GLB, PLY) as hulls: what is read of one, what is mended, what is refused, and why."""
+
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from finlab.arrays import Array
+from finlab.errors import FinlabError
+from finlab.layout.body import MESH_SUFFIXES
+from webapp.scene.meshes.mesh import Mesh
+
+MAX_BYTES = 20_000_000
+"""Largest mesh file that is read."""
+MAX_FACES = 60_000
+"""Most triangles of a hull; more would make the page slow and show nothing new, so they are simplified."""
+LEAST_FACES = 50
+"""Least number of triangles that a hull may be simplified to."""
+SMALLEST, LARGEST = 0.02, 10.0
+"""Lengths [m] that a hull may have; anything else is a mistaken unit."""
+OPEN = 0.02
+"""Share of edges with one triangle only from which a mesh is a sheet and not a body."""
+
+
+@dataclass(frozen=True)
+class MeshReport:
+    """What there is to know of a mesh file."""
+
+    triangles: int
+    """How many it holds, mended."""
+    is_watertight: bool
+    """Whether it is closed everywhere."""
+    mended: tuple[str, ...]
+    """What was done to it, a clause each."""
+
+
+def read_mesh(name: str, content: bytes, scale: float) -> tuple[Mesh, MeshReport]:
+    """The mesh in a file: whole scene, in metres, mended, the middle of its box at the origin.
+
+    Args:
+        name: the file's name; its ending tells the format.
+        content: what is in it.
+        scale: metres per unit.
+
+    Raises:
+        FinlabError: too large, no closed mesh, or of a size that no hull has; the message names the file.
+    """
+    mesh = _loaded(name, content)
+    mended = _mended(mesh)
+    vertices = np.asarray(mesh.vertices, dtype=float) * scale
+    edges = np.unique(mesh.edges_sorted, axis=0, return_counts=True)[1]
+    loose = int((edges == 1).sum())
+    if len(mesh.faces) == 0 or loose > OPEN * len(edges):
+        raise FinlabError(
+            f"{name}: is an open sheet, {loose} of its {len(edges)} edges belong to one triangle only; "
+            "give it a thickness, or close it"
+        )
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    length = float((high - low).max())
+    if not SMALLEST <= length <= LARGEST:
+        raise FinlabError(
+            f"{name}: would be {length:.3g} m long, expected {SMALLEST:g} to {LARGEST:g} m; "
+            "choose another unit"
+        )
+    report = MeshReport(len(mesh.faces), bool(mesh.is_watertight), mended)
+    return Mesh(vertices - (low + high) / 2, np.asarray(mesh.faces, dtype=np.int32)), report
+
+
+def _loaded(name: str, content: bytes) -> trimesh.Trimesh:
+    """The triangles of a file, as they stand in it."""
+    kind = Path(name).suffix.lower()
+    if kind not in MESH_SUFFIXES:
+        raise FinlabError(f"{name}: expected a file ending in {', '.join(MESH_SUFFIXES)}")
+    if len(content) > MAX_BYTES:
+        raise FinlabError(f"{name}: is {len(content):,} bytes long, expected at most {MAX_BYTES:,}")
+    try:
+        # Without a resolver nothing beside this file is read: no textures, no materials. Without processing,
+        # corners that are no numbers are not quietly left out.
+        mesh = trimesh.load_mesh(BytesIO(content), file_type=kind[1:], process=False)
+        if isinstance(mesh, trimesh.Scene):
+            mesh = mesh.to_mesh()
+        faces, corners = len(mesh.faces), np.asarray(mesh.vertices, dtype=float)
+    except Exception as error:  # trimesh's readers raise whatever went wrong inside them
+        raise FinlabError(f"{name}: is not a {kind[1:].upper()} mesh that can be read ({error})") from None
+    if faces == 0:
+        raise FinlabError(f"{name}: holds no triangles")
+    wrong = int((~np.isfinite(corners).all(axis=1)).sum())
+    if wrong:
+        raise FinlabError(
+            f"{name}: {wrong} of its {len(corners)} corners are not finite numbers; export it again"
+        )
+    return mesh
+
+
+def _mended(mesh: trimesh.Trimesh) -> tuple[str, ...]:
+    """Close small holes, drop what has no area, turn triangles outwards: in place, and in words."""
+    told = []
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    flat = int((~mesh.nondegenerate_faces()).sum())
+    if flat:
+        mesh.update_faces(mesh.nondegenerate_faces())
+        told.append(f"{flat} triangles without an area left out")
+    twice = len(mesh.faces) - int(mesh.unique_faces().sum())
+    if twice:
+        mesh.update_faces(mesh.unique_faces())
+        told.append(f"{twice} triangles that stood there twice left out")
+    before = len(mesh.faces)
+    if not mesh.is_watertight:
+        trimesh.repair.fill_holes(mesh)
+        if len(mesh.faces) > before:
+            told.append(f"holes closed with {len(mesh.faces) - before} triangles")
+    normals = np.array(mesh.face_normals)
+    trimesh.repair.fix_normals(mesh)
+    turned = int((np.einsum("ij,ij->i", normals, mesh.face_normals) < 0.0).sum()) if len(normals) else 0
+    if turned:
+        told.append(f"{turned} triangles turned outwards")
+    return tuple(told)
+
+
+def simplified(mesh: Mesh, faces: int) -> Mesh:
+    """About the same shape with at most so many triangles, by quadric error metrics."""
+    if len(mesh.faces) <= faces:
+        return mesh
+    whole = trimesh.Trimesh(mesh.vertices, mesh.faces, process=True)
+    found = whole.simplify_quadric_decimation(face_count=faces)
+    return Mesh(np.asarray(found.vertices, dtype=float), np.asarray(found.faces, dtype=np.int32))
+
+
+def turned(mesh: Mesh, rotation: Array) -> Mesh:
+    """A mesh turned by a matrix (3, 3) about the middle of its box, which stays at the origin."""
+    vertices = mesh.vertices @ np.asarray(rotation).T
+    return Mesh(vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2, mesh.faces)
+
+
+def stl_of(mesh: Mesh) -> bytes:
+    """A mesh as the content of a binary STL file."""
+    content = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(file_type="stl")
+    assert isinstance(content, bytes)
+    return content
