@@ -157,7 +157,7 @@ class Moves:
         position, angle = self.geometry(vector[None])
         result = self.layout
         for i in self.layout.indices(self.names):
-            x, y, z = (float(value) for value in position[0, i])
+            x, y, z = (round(float(value), 12) for value in position[0, i])
             turned = math.remainder(float(angle[0, i]), math.tau)
             result = result.replace_fin(self.layout.names[i], position=(x, y, z), mounting_angle=turned)
         return result
