@@ -101,22 +101,26 @@ def _mended(mesh: trimesh.Trimesh) -> tuple[str, ...]:
     flat = int((~mesh.nondegenerate_faces()).sum())
     if flat:
         mesh.update_faces(mesh.nondegenerate_faces())
-        told.append(f"{flat} triangles without an area left out")
+        told.append(f"{_triangles(flat)} without an area left out")
     twice = len(mesh.faces) - int(mesh.unique_faces().sum())
     if twice:
         mesh.update_faces(mesh.unique_faces())
-        told.append(f"{twice} triangles that stood there twice left out")
+        told.append(f"{_triangles(twice)} that stood there twice left out")
     before = len(mesh.faces)
     if not mesh.is_watertight:
         trimesh.repair.fill_holes(mesh)
         if len(mesh.faces) > before:
-            told.append(f"holes closed with {len(mesh.faces) - before} triangles")
+            told.append(f"holes closed with {_triangles(len(mesh.faces) - before)}")
     normals = np.array(mesh.face_normals)
     trimesh.repair.fix_normals(mesh)
     turned = int((np.einsum("ij,ij->i", normals, mesh.face_normals) < 0.0).sum()) if len(normals) else 0
     if turned:
-        told.append(f"{turned} triangles turned outwards")
+        told.append(f"{_triangles(turned)} turned outwards")
     return tuple(told)
+
+
+def _triangles(count: int) -> str:
+    return f"{count} triangle{'s' * (count != 1)}"
 
 
 def simplified(mesh: Mesh, faces: int) -> Mesh:
