@@ -1,9 +1,15 @@
 """Place a fin by gizmo and by numbers, mirror it, undo; open and save files."""
 
+import zipfile
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from finlab.layout import FinModelSpec, layout_to_dict, load_layout
+from finlab.layout.yaml_file import yaml_text
+from finlab.physics import make_law
+from finlab.physics.table_file import write_table
 
 
 def test_gizmo_moves_a_fin(page: Any) -> None:
@@ -130,3 +136,49 @@ def test_save_open_and_a_bad_file(page: Any, tmp_path: Path) -> None:
     chooser.value.set_files(broken)
     page.until(lambda: any("broken.yaml" in note and "version" in note for note in page.notes()))
     assert page.session.state.layout.names[0] == "bow", "nothing is lost"
+
+
+EVIL = "<img src=x onerror=window.pwned=1><script>window.pwned=2"
+
+
+def test_a_strangers_layout_opens_no_file_and_runs_nothing(page: Any, tmp_path: Path) -> None:
+    before = page.session.state
+    values = layout_to_dict(load_layout("ucat")) | {"name": EVIL, "description": EVIL}
+    values["fins"][0] |= {"name": EVIL[:60], "model": {"type": "table", "path": "/etc/passwd"}}
+    (tmp_path / "robot.yaml").write_text(yaml_text(values))
+    page.tab("Files")
+    page.upload("Open a layout file", tmp_path / "robot.yaml")
+    page.until(lambda: any("'passwd', which did not come along" in note for note in page.notes()))
+    assert page.session.state == before and "root:" not in "".join(page.notes())
+    values["fins"][0]["model"] = {"type": "drag"}
+    (tmp_path / "robot.yaml").write_text(yaml_text(values))
+    page.upload("Open a layout file", tmp_path / "robot.yaml")
+    page.until(lambda: page.session.state.layout.name == EVIL and not page.view.busy)
+    page.until(lambda: EVIL[:20] in page.text(".fl-status"))
+    page.key("n")
+    for tab in ("Layout", "Limits", "Swim", "Wrench"):
+        page.tab(tab)
+    page.catch_up()
+    assert page.page.evaluate("window.pwned") is None and page.page.locator("img[src=x]").count() == 0
+
+
+def test_a_layout_brings_its_table_along_and_takes_it_home(
+    page: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    grid = [[0.05, 0.3, 0.6], [0.1, 1.0, 2.1], [-3.0, -1.5, 0.0, 1.5]]
+    write_table(tmp_path / "soft.csv", make_law(FinModelSpec("soft")), *grid)  # type: ignore[arg-type]
+    values = layout_to_dict(load_layout("ucat")) | {"name": "measured"}
+    values["fins"][0]["model"] = {"type": "table", "path": "tables/soft.csv"}
+    with zipfile.ZipFile(tmp_path / "robot.zip", "w") as archive:
+        archive.writestr("robot.yaml", yaml_text(values))
+        archive.write(tmp_path / "soft.csv", "tables/soft.csv")
+    page.tab("Files")
+    page.upload("Open a layout file", tmp_path / "robot.zip")
+    page.until(lambda: page.session.state.layout.name == "measured" and not page.view.busy)
+    page.until(lambda: "measured" in page.text(".fl-status") and "Exact" in page.text(".fl-status"))
+    with page.page.expect_download() as download:
+        page.press("Layout (YAML)")
+    download.value.save_as(tmp_path / "home.zip")
+    names = zipfile.ZipFile(tmp_path / "home.zip").namelist()
+    assert names[0] == "measured.yaml" and names[1].startswith("tables/") and len(names) == 2
