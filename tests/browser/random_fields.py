@@ -271,11 +271,17 @@ class Walk:
 
     def _settles(self, box: Box, field: Any) -> None:
         """Wait until the box shows what the model expects of it."""
-        wanted = box.text(self._model[box])
+        wanted = self._model[box]
+
+        def agrees() -> bool:
+            now = box.value(self._session)
+            # What lies between two digits may be rounded either way, so the text is that of what is in force.
+            return abs(now - wanted) <= 1e-9 * max(1.0, abs(wanted)) and field.input_value() == box.text(now)
+
         try:
-            self._page.until(lambda: field.input_value() == wanted, 15)
+            self._page.until(agrees, 15)
         except AssertionError:
-            raise AssertionError(f"shows {field.input_value()!r}, expected {wanted!r}") from None
+            raise AssertionError(f"shows {field.input_value()!r}, expected {box.text(wanted)!r}") from None
 
     def _compare(self) -> None:
         """The session against the model, and every box of the tab against both."""

@@ -113,7 +113,7 @@ def test_every_widget_survives_a_fault_in_what_it_does(
         "webapp.panels.limits_tab.ImprovePanel.refresh",
         "webapp.panels.pilot.pad",
         "webapp.panels.damage.button_colors",
-        "webapp.panels.layout_tab.hull_of",
+        "webapp.panels.hull_panel.hull_of",
         "webapp.panels.files_tab.python_lines",
         "webapp.panels.swim_tab.swim_card",
         "webapp.panels.swim_tab.scenario_card",
