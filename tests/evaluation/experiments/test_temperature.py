@@ -31,13 +31,12 @@ def test_diversity_by_hand() -> None:
     assert diversity(command[:1], robot) == 0.0
 
 
-def test_more_temperature_more_diversity(untrained_checkpoint: Path) -> None:
+def test_more_temperature_more_diversity() -> None:
+    """With the shipped network, whose components stand for different commands."""
     cases = make_split("id", 2, 2, 0)
-    cold, hot = (
-        temperature_columns(cases, t, checkpoint=untrained_checkpoint, n_candidates=16) for t in (1e-3, 1.0)
-    )
+    cold, hot = (temperature_columns(cases, t, n_candidates=16) for t in (1e-3, 1.0))
     assert cold["layout"].tolist() == [0, 0, 1, 1] and cold["target"].tolist() == [0, 1, 0, 1]
-    assert (hot["diversity"] > 2 * cold["diversity"]).all()
+    assert (hot["diversity"] > 1.5 * cold["diversity"]).all()
     assert (cold["best_j"] <= cold["mean_j"]).all()
 
 
