@@ -133,6 +133,11 @@ class Page:
         if name in TABS:
             self.until(lambda: self.view.tab == name)
 
+    def unfold(self, folder: str, label: str) -> None:
+        """Open a folder that holds this label, unless an earlier flow has left it open."""
+        if self.page.locator("label:visible", has_text=label).count() == 0:
+            self.tab(folder)
+
     def press(self, name: str) -> None:
         """Press a button that is shown."""
         self.page.get_by_role("button", name=name, exact=True).first.click()
