@@ -11,9 +11,15 @@ import torch
 
 from finlab.errors import DataError
 from finlab.layout.arrays import LayoutArrays
-from finlab.physics import FinLaw, assemble_wrench
+from finlab.physics import FinLaw
 from finlab.training.presets import SampledTraining
-from finlab.training.sampling import Batch, seeded_generator, training_layouts
+from finlab.training.sampling import (
+    Batch,
+    random_commands,
+    seeded_generator,
+    to_tensor,
+    training_layouts,
+)
 
 CHUNK = 200_000
 """Samples that are drawn together, in double precision."""
@@ -60,11 +66,10 @@ class RecordedSamples:
         for first in range(0, self.layouts, together):
             some = LayoutArrays._make(part[first : first + together] for part in robots)
             rows = slice(first * self.commands, (first + len(some.mask)) * self.commands)
-            self._samples[rows] = torch.from_numpy(_recorded(rng, self.law, some, self.commands))
-        self._robots = [
-            torch.from_numpy(part if part.dtype == bool else part.astype(np.float32)).to(self.device)
-            for part in robots
-        ]
+            command, wrench = random_commands(rng, self.law, some, self.commands)
+            self._samples[rows, :-6] = to_tensor(command.reshape(-1, 3 * n)).to(self.device)
+            self._samples[rows, -6:] = to_tensor(wrench.reshape(-1, 6)).to(self.device)
+        self._robots = [to_tensor(part).to(self.device) for part in robots]
         self._epoch, self._order = -1, torch.empty(0)
 
     def batch(self, step: int, rows: slice = slice(None)) -> Batch:
@@ -87,14 +92,3 @@ def recorded_samples(
     """The data set of a training."""
     size = training.layouts, training.commands
     return RecordedSamples(seed, law, *size, training.varied_limits, training.batch_size, device)
-
-
-def _recorded(rng: np.random.Generator, law: FinLaw, robots: LayoutArrays, commands: int) -> np.ndarray:
-    """Commands uniform within the limits, and their wrenches: (layouts x commands, 3 n + 6), float32."""
-    lower, upper, mask = robots.lower[:, None], robots.upper[:, None], robots.mask[:, None]
-    share = rng.random((len(mask), commands, *lower.shape[2:]))
-    command = (lower + share * (upper - lower)) * mask[..., None]
-    place = robots.position[:, None], robots.mounting_angle[:, None], mask
-    wrench = assemble_wrench(law, command, *place)
-    flat = command.reshape(*command.shape[:2], -1)
-    return np.concatenate([flat, wrench], axis=-1).reshape(-1, flat.shape[-1] + 6).astype(np.float32)

@@ -68,12 +68,9 @@ class ForwardSampler:
         """Returns batch number `step`."""
         rng = np.random.default_rng([self.seed, step])
         layouts = training_layouts(rng, self.batch_size, self.n_fins, self.varied_limits)
-        share = rng.random(layouts.lower.shape)
-        command = (layouts.lower + share * (layouts.upper - layouts.lower)) * layouts.mask[..., None]
-        place = layouts.position, layouts.mounting_angle, layouts.mask
-        wrench = assemble_wrench(self.fin_model, command, *place)
-        arrays = (*layouts, command, wrench)
-        return Batch._make(_tensor(part) for part in arrays)
+        command, wrench = random_commands(rng, self.fin_model, layouts, 1)
+        arrays = (*layouts, command[:, 0], wrench[:, 0])
+        return Batch._make(to_tensor(part) for part in arrays)
 
 
 def training_layouts(
@@ -86,13 +83,25 @@ def training_layouts(
     return layouts
 
 
+def random_commands(
+    rng: np.random.Generator, law: FinLaw, layouts: LayoutArrays, n: int
+) -> tuple[AnyArray, AnyArray]:
+    """Returns n commands (B, n, fins, 3) uniform within the limits of each layout, and their wrenches
+    (B, n, 6)."""
+    lower, upper, mask = (part[:, None] for part in (layouts.lower, layouts.upper, layouts.mask))
+    share = rng.random((len(mask), n, *lower.shape[2:]))
+    command = (lower + share * (upper - lower)) * mask[..., None]
+    place = layouts.position[:, None], layouts.mounting_angle[:, None], mask
+    return command, assemble_wrench(law, command, *place)
+
+
 def seeded_generator(seed: int, stream: int, device: torch.device | str = "cpu") -> torch.Generator:
     """Returns a generator whose numbers depend on (seed, stream) alone, unrelated between streams."""
     state = np.random.SeedSequence([seed, stream]).generate_state(1, np.uint64)[0]
     return torch.Generator(device=device).manual_seed(int(state >> np.uint64(1)))
 
 
-def _tensor(values: AnyArray) -> Tensor:
+def to_tensor(values: AnyArray) -> Tensor:
     """The same values in single precision; truth values as they are."""
     return torch.from_numpy(values if values.dtype == bool else values.astype(np.float32))
 
