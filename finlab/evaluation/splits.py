@@ -9,6 +9,18 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import DataError
+from finlab.evaluation.hard_geometry import (
+    BIG,
+    TINY,
+    DrawLayout,
+    clustered,
+    coincident,
+    collinear,
+    parallel,
+    perturbed,
+    scaled,
+    stacked,
+)
 from finlab.evaluation.noisy_tables import noisy_table
 from finlab.layout import Layout, random_layout
 from finlab.layout.angles import wrapped
@@ -28,9 +40,9 @@ NEAR_POSITION = 0.005
 """Nearly coincident fins of split `near-singular` lie within this of each other along each axis [m]."""
 DOMAIN = 0x7E57
 """Leads the seed of every test case; training seeds begin otherwise."""
-OWN_SIGMA = ("fins", "fins-mixed", "tables")
-"""Splits whose robots are each measured by their own wrenches: their fins are weaker or stronger than those
-that the wrenches of training come from."""
+OWN_SIGMA = ("fins", "fins-mixed", "tables", "big", "tiny")
+"""Splits whose robots are each measured by their own wrenches, which are smaller or larger than those of
+training: errors there are relative to what the robot can do."""
 N_SIGMA = 4096
 """Uniform commands from which such a robot's yardstick is computed."""
 LEAST_SIGMA = 0.05
@@ -101,7 +113,12 @@ Draw = Callable[[np.random.Generator, str], tuple[Layout, tuple[str, ...]]]
 
 def _whole(**options: Any) -> Draw:
     """Layouts of which no fin has failed; options of `random_layout`."""
-    return lambda rng, name: (random_layout(rng, name, **options), ())
+    return _healthy(lambda rng, name: random_layout(rng, name, **options))
+
+
+def _healthy(draw: DrawLayout) -> Draw:
+    """The same for layouts drawn in another way."""
+    return lambda rng, name: (draw(rng, name), ())
 
 
 def _failure(rng: np.random.Generator, name: str) -> tuple[Layout, tuple[str, ...]]:
@@ -160,5 +177,13 @@ SPLITS: dict[str, Draw] = {
     "fins-mixed": _fins_mixed,
     "tables": _tables,
     "many-fins": _whole(n_fins=MANY_FINS),
+    "perturbed": _healthy(perturbed),
+    "parallel": _healthy(parallel),
+    "collinear": _healthy(collinear),
+    "clustered": _healthy(clustered),
+    "coincident": _healthy(coincident),
+    "stacked": _healthy(stacked),
+    "big": _healthy(scaled(BIG)),
+    "tiny": _healthy(scaled(TINY)),
 }
 """Name -> how a layout and its failed fins are drawn. The order is part of the seed: append only."""

@@ -1,11 +1,8 @@
 """Cases in which fins are equals, so that a method must choose which of them works, as robots mostly ask.
 
-`axes`: pure axes on the symmetric shipped layouts; `axes-mixed`: two or three axes together. `coincident`:
-two fins at one place with parallel shafts; `stacked`: pairs of fins one above the other.
+`axes`: pure axes on the symmetric shipped layouts; `axes-mixed`: two or three axes together.
 """
 
-import math
-from dataclasses import replace
 from functools import cache
 from itertools import combinations
 
@@ -14,9 +11,7 @@ import numpy as np
 from finlab.analysis import AXES, authority
 from finlab.arrays import Array
 from finlab.evaluation.splits import Case
-from finlab.layout import Fin, Layout, load_layout, random_layout
-from finlab.layout.random import TRAINING_BOX
-from finlab.physics import plant_of
+from finlab.layout import Layout, load_layout
 
 DOMAIN = 0x5E11
 """Leads the seed of every case."""
@@ -24,12 +19,12 @@ LAYOUTS = ("A", "B", "penta", "hexa", "octo")
 """The symmetric shipped layouts."""
 SHARES = (0.2, 0.5, 0.8)
 """Of the largest wrench along an axis alone: what is asked for."""
-SETS = ("axes", "axes-mixed", "coincident", "stacked")
+SETS = ("axes", "axes-mixed")
 """Names of the sets; the order is part of the seed: append only."""
 
 
 def symmetric_cases(name: str, n_layouts: int, n_targets: int, seed: int) -> list[Case]:
-    """The cases of a set, the first ones of the shipped layouts, or random ones.
+    """The cases of a set, on the first of the shipped layouts.
 
     Args:
         name: one of `SETS`.
@@ -38,15 +33,10 @@ def symmetric_cases(name: str, n_layouts: int, n_targets: int, seed: int) -> lis
         seed: of all draws.
     """
     cases = []
-    for k in range(min(n_layouts, len(LAYOUTS)) if name.startswith("axes") else n_layouts):
+    for k, robot in enumerate(LAYOUTS[:n_layouts]):
         rng = np.random.default_rng((DOMAIN, SETS.index(name), seed, k))
-        if name.startswith("axes"):
-            layout = load_layout(LAYOUTS[k])
-            targets = rng.permutation(_mixed_axes(rng, layout) if name == "axes-mixed" else _axes(layout))
-        else:
-            layout = (_coincident if name == "coincident" else _stacked)(rng, f"{name}-{seed}-{k}")
-            plant = plant_of(layout)
-            targets = plant.wrench(plant.sample(rng, (n_targets,)))
+        layout = load_layout(robot)
+        targets = rng.permutation(_mixed_axes(rng, layout) if name == "axes-mixed" else _axes(layout))
         cases.append(Case(layout, targets[:n_targets], ()))
     return cases
 
@@ -74,26 +64,3 @@ def _mixed_axes(rng: np.random.Generator, layout: Layout) -> Array:
         part = rng.dirichlet(np.ones(len(chosen))) * rng.choice([-1.0, 1.0], len(chosen))
         targets.append(rng.choice(SHARES) * part @ largest[list(chosen)])
     return np.array(targets).reshape(-1, 6)
-
-
-def _coincident(rng: np.random.Generator, name: str) -> Layout:
-    """Two of three to six fins share their place, with shafts along or against each other."""
-    layout = random_layout(rng, name, n_fins=(3, 6))
-    first, second, *others = layout.fins
-    turned = first.mounting_angle + (math.pi if rng.random() < 0.5 else 0.0)
-    twin = replace(second, position=first.position, mounting_angle=math.remainder(turned, 2.0 * math.pi))
-    return replace(layout, fins=(first, twin, *others))
-
-
-def _stacked(rng: np.random.Generator, name: str) -> Layout:
-    """Two to four pairs of fins, one above the other, at the same height above and below the centre."""
-    fins: list[Fin] = []
-    for low in random_layout(rng, name, n_fins=(2, 4)).fins:
-        x, y, _ = low.position
-        height = float(rng.uniform(0.02, TRAINING_BOX[2]))
-        fins += [replace(low, name=f"{low.name}_{w}", position=(x, y, z)) for w, z in _ends(height)]
-    return Layout(name, tuple(fins))
-
-
-def _ends(height: float) -> tuple[tuple[str, float], tuple[str, float]]:
-    return ("up", height), ("down", -height)

@@ -32,22 +32,3 @@ def test_axes_are_pure_and_of_known_sizes() -> None:
 def test_mixes_ask_for_two_or_three_axes() -> None:
     for case in symmetric_cases("axes-mixed", 5, 99, 0):
         assert set((case.targets != 0.0).sum(axis=1)) == {2, 3}
-
-
-def test_coincident_fins_share_their_place_and_their_shafts_line() -> None:
-    turns = set()
-    for case in symmetric_cases("coincident", 12, 1, 0):
-        first, second, *_ = case.layout.fins
-        turn = np.mod(second.mounting_angle - first.mounting_angle, 2 * np.pi)
-        assert first.position == second.position
-        turns.add(round(float(min(turn, 2 * np.pi - turn)), 6))
-    assert turns == {0.0, round(np.pi, 6)}
-
-
-def test_stacked_pairs_are_one_above_the_other() -> None:
-    for case in symmetric_cases("stacked", 6, 1, 0):
-        fins = case.layout.fins
-        assert len(fins) in (4, 6, 8)
-        for up, down in zip(fins[::2], fins[1::2], strict=True):
-            assert up.position[:2] == down.position[:2] and up.position[2] == -down.position[2] > 0.0
-            assert up.mounting_angle == down.mounting_angle

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from finlab.allocation import load_allocator
 from finlab.assets import shipped_layouts
+from finlab.evaluation.hard_geometry import coincident
 from finlab.evaluation.splits import make_split
-from finlab.evaluation.symmetric_cases import symmetric_cases
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout
 from finlab.physics import Plant
 from finlab.physics.objective import Name, Objective
@@ -133,12 +133,15 @@ def test_coincident_fins_share_or_rest(objective: Name) -> None:
 @pytest.mark.parametrize(("case", "target"), [(5, 1), (7, 2)])
 def test_fins_at_rest_point_where_that_costs_least(case: int, target: int) -> None:
     """Beside a twin that works; the fins around it must mend what a turned one no longer gives."""
-    robot = symmetric_cases("coincident", 10, 4, 77)[case]
-    answer = load_allocator(objective="effort").allocate(robot.layout, robot.targets[target])
-    rests = (answer.command[:, :2] < Plant(robot.layout).lower[:, :2] + 1e-3).all(axis=1)
+    rng = np.random.default_rng((0x5E11, 2, 77, case))
+    robot = coincident(rng, "twins")
+    plant = Plant(robot)
+    targets = plant.wrench(plant.sample(rng, (4,)))
+    answer = load_allocator(objective="effort").allocate(robot, targets[target])
+    rests = (answer.command[:, :2] < plant.lower[:, :2] + 1e-3).all(axis=1)
     assert rests.any() and np.abs(answer.command[rests, 2]).max() < 0.03
     goal = Objective("effort")
-    least = least_cost(robot.layout, answer.target, answer.sigma, goal, n_starts=8, also=answer.command)
+    least = least_cost(robot, answer.target, answer.sigma, goal, n_starts=8, also=answer.command)
     assert answer.err_norm < 1e-5 and answer.energy < 1.005 * least
 
 
