@@ -13,6 +13,7 @@ from tyro.extras import SubcommandApp
 from finlab.cli import eval_allocation, eval_closed_loop, eval_fit, eval_robots, eval_swims
 from finlab.cli.eval_arguments import Checkpoint, Count, Folder, Name, Names, Output, check_folders
 from finlab.cli.inputs import check_positive
+from finlab.evaluation.report.sizes import SEED
 
 OUTPUT = Output()
 
@@ -63,7 +64,7 @@ def training(
 def report(
     out: Annotated[Path, arg(aliases=["-o"], metavar="DIR")],
     quick: bool = False,
-    seed: Count = 0,
+    seed: Count = SEED,
     checkpoint: Checkpoint = None,
     paper_checkpoint: Checkpoint = None,
     records: Folder = None,
@@ -84,8 +85,9 @@ def report(
         paper_checkpoint: trained checkpoint of method paper; the shipped one by default.
         records: folder for the records; DIR/records by default.
         processes: parts that run at once; the number of cores by default.
-        sections: run only some: wrench, cost, network, modes, unreachable, steadiness, latency, closed-loop,
-            hard-days, ablation, temperature, training; the page shows what is there of all.
+        sections: run only some: wrench, cost, network, modes, unreachable, beyond, steadiness, sequences,
+            latency, closed-loop, hard-days, ablation, temperature, training; the
+            page shows what is there of all.
         as_is: do no work; make the page from what is there.
     """
     from finlab.evaluation.method_specs import Checkpoints
@@ -97,7 +99,7 @@ def report(
     chosen = [] if as_is else parse_sections(sections)
     check_folders(out=out, records=records)
     words = ["finlab", "eval", "report", "-o", str(out), *(["--quick"] if quick else [])]
-    words += ["--seed", str(seed)] if seed else []
+    words += ["--seed", str(seed)] if seed != SEED else []
     words += ["--checkpoint", checkpoint] if checkpoint else []
     words += ["--paper-checkpoint", paper_checkpoint] if paper_checkpoint else []
     page = make_report(

@@ -187,3 +187,5 @@ SPLITS: dict[str, Draw] = {
     "tiny": _healthy(scaled(TINY)),
 }
 """Name -> how a layout and its failed fins are drawn. The order is part of the seed: append only."""
+GEOMETRIES = ("perturbed", "parallel", "collinear", "clustered")
+"""Splits of which nothing but the places and shafts of the fins is out of the ordinary."""

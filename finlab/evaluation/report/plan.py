@@ -25,13 +25,15 @@ from finlab.evaluation.method_specs import (
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.report import work
 from finlab.evaluation.report.jobs import Job
-from finlab.evaluation.report.sizes import Settings, Sizes
-from finlab.evaluation.splits import SPLITS
+from finlab.evaluation.report.sizes import RERUN, Settings, Sizes
+from finlab.evaluation.splits import GEOMETRIES, SPLITS
 
 COST_METHODS = ("search", "mdn", "analytic", "sqp", "multistart")
 """Methods whose costs are compared with the best of many starts."""
 N_STARTS = 32
 """Of that yardstick."""
+COST_SETS = tuple(name for name in cost_sets("all") if name not in GEOMETRIES)
+"""Sets of cases on which costs are compared: all but those whose geometry alone is hard."""
 LATENCY_METHODS = ("search", "mdn", "analytic", "qp", "sqp", "multistart", "paper", "trf", "slsqp", "ipopt")
 """Methods that are timed side by side."""
 N_CANDIDATES = 64
@@ -49,7 +51,9 @@ SWIMMERS = {
 DAY_METHODS = "search,analytic,on-board"
 """Methods that swim the hard days."""
 SECTIONS = {
-    **{name: (name,) for name in ("wrench", "cost", "network", "modes", "unreachable", "steadiness")},
+    "wrench": ("wrench", "rerun"),
+    **{name: (name,) for name in ("cost", "network", "modes", "unreachable", "beyond")},
+    **{name: (name,) for name in ("steadiness", "sequences")},
     "latency": ("latency", "first_answers"),
     "closed-loop": ("trajectory", "faults", "velocity"),
     "hard-days": ("swims",),
@@ -78,9 +82,10 @@ class Plan:
     """Jobs of a report."""
 
     tables: dict[str, dict[Any, Job]] = field(default_factory=dict)
-    """Table -> jobs by what tells them apart: `wrench` by (split, method), `cost` by (set of cases,
-    objective), `network` by (fins, objective), `swims` by the day, `ablation` by (variant, refinement),
-    `temperature` and `training` by what is changed; the others are one job each, under the key ()."""
+    """Table -> jobs by what tells them apart: `wrench` and `rerun` by (split, method), `cost` by (set of
+    cases, objective), `network` by (fins, objective), `swims` by the day, `ablation` by (variant,
+    refinement), `temperature` and `training` by what is changed; the others are one job each, under the
+    key ()."""
 
     def only(self, sections: Collection[str]) -> "Plan":
         """The jobs of some sections."""
@@ -116,19 +121,22 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
 
     def add(table: str, key: tuple[Any, ...], who: Sequence[str], **settings: Any) -> None:
         parts = (f"{part:.3g}" if isinstance(part, float) else str(part) for part in key)
-        settings = {**sizes.of_table.get(table, {}), **settings, "seed": seed}
+        settings = {**sizes.of_table.get(table, {}), **settings}
+        settings.setdefault("seed", seed)
         together = "".join(dict.fromkeys(map(prints, who)))
         name, do, context = "-".join([table, *parts]), getattr(work, table), {"checkpoints": checkpoints}
         tables[table][key] = Job(name, do, settings, together, context, alone=table == "latency")
 
-    for split, objective in product(cost_sets("all"), OBJECTIVES):
+    for split, objective in product(COST_SETS, OBJECTIVES):
         about = {"split": split, "objective": objective, "methods": costed, "starts": N_STARTS}
         add("cost", (split, objective), costed, **about)
     for method, split in product(sorted(names, key=lambda name: name != "paper"), SPLITS):
+        share, about = PAPER_SHARE if method == "paper" else 1, {"split": split, "method": method}
         size = sizes.of_split(main=split in paper_figures()["wrench_tracking"], slow=is_slow(method))
-        if method == "paper":
-            size = size | {"targets": max(1, size["targets"] // PAPER_SHARE)}
-        add("wrench", (split, method), [method], split=split, method=method, **size)
+        add("wrench", (split, method), [method], **about, **_fewer(size, share))
+        if not is_slow(method):
+            size = _fewer(sizes.of_table["rerun"], share) | {"seed": seed + RERUN}
+            add("rerun", (split, method), [method], **about, **size)
     for fins, objective in product(sizes.of_table["network"]["fins"], OBJECTIVES):
         add("network", (fins, objective), ["mdn"], fins=fins, objective=objective)
     for by, variant in product(REFINEMENTS, VARIANTS):
@@ -138,6 +146,8 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
         add("temperature", (value,), ["paper"], temperature=value)
     add("scatter", (), ["paper"], fins=SCATTER_FINS, targets=SCATTER_TARGETS)
     add("latency", (), timed, methods=timed)
+    for table in ("sequences", *(["beyond"] if casadi else [])):
+        add(table, (), QUICK, methods=list(QUICK))
     for table in ("modes", "steadiness", "first_answers", *(["unreachable"] if casadi else [])):
         add(table, (), ["search"])
     for table, swimmers in SWIMMERS.items():
@@ -148,6 +158,11 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
     if torch:
         tables["training"] = training_jobs(sizes.of_table["training"] | {"seed": seed}, runs)
     return Plan({table: jobs for table, jobs in tables.items() if jobs})
+
+
+def _fewer(size: Settings, share: int) -> Settings:
+    """One target in so many, at least one."""
+    return size | {"targets": max(1, size["targets"] // share)}
 
 
 def training_jobs(settings: Settings, folder: Path) -> dict[Any, Job]:

@@ -27,6 +27,7 @@ def _wrench_rows(split: str, method: str, columns: Columns) -> list[Row]:
 
 ROWS: dict[str, Callable[..., list[Row]]] = {
     "wrench": _wrench_rows,
+    "rerun": _wrench_rows,
     "ablation": variant_rows,
     "temperature": lambda *made: [temperature_row(*made)],
     "training": lambda *made: [training_row(*made)],

@@ -7,6 +7,7 @@ from typing import Any
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import load_allocator
 from finlab.evaluation.experiments.ablation import ablation_method, run_variant
+from finlab.evaluation.experiments.beyond_reach import beyond_reach_rows
 from finlab.evaluation.experiments.closed_loop_runs import Run, Scenario, run_all
 from finlab.evaluation.experiments.cost import cost_rows
 from finlab.evaluation.experiments.faults import all_faults, fault_rows, fault_scenarios
@@ -15,6 +16,7 @@ from finlab.evaluation.experiments.hard_days import choose_days
 from finlab.evaluation.experiments.latency import latency_cases, latency_rows
 from finlab.evaluation.experiments.mode_coverage import mode_rows
 from finlab.evaluation.experiments.network import network_rows
+from finlab.evaluation.experiments.noisy_sequences import noisy_sequence_rows
 from finlab.evaluation.experiments.steadiness import steadiness_rows
 from finlab.evaluation.experiments.swims import swim_all
 from finlab.evaluation.experiments.temperature import refinement_columns, temperature_columns
@@ -52,6 +54,10 @@ def wrench(
     return columns_of_records(run_method(load_method_spec(method, checkpoints.of(method)), cases))
 
 
+rerun = wrench
+"""The same with another seed."""
+
+
 def cost(
     *, split: str, objective: Name, methods: list[str], starts: int, checkpoints: Checkpoints, **drawn: int
 ) -> Columns:
@@ -77,6 +83,21 @@ def unreachable(*, layouts: int, seed: int, checkpoints: Checkpoints) -> Columns
     """Rows of what is delivered of wrenches out of reach."""
     method = load_method_spec("search", checkpoints.of("search"))
     return columns_of_rows(unreachable_rows(method, n_layouts=layouts, seed=seed))
+
+
+def beyond(*, layouts: int, targets: int, methods: list[str], seed: int, checkpoints: Checkpoints) -> Columns:
+    """Rows of what methods miss on the boundary of what robots can do, and beyond."""
+    allocators = _allocators(methods, checkpoints)
+    return columns_of_rows(beyond_reach_rows(allocators, layouts=layouts, targets=targets, seed=seed))
+
+
+def sequences(
+    *, layouts: list[str], paths: int, ticks: int, methods: list[str], seed: int, checkpoints: Checkpoints
+) -> Columns:
+    """Rows of what commands change by along noisy sequences."""
+    robots = [load_layout(name) for name in layouts]
+    allocators = _allocators(methods, checkpoints)
+    return columns_of_rows(noisy_sequence_rows(allocators, robots, n_paths=paths, ticks=ticks, seed=seed))
 
 
 def steadiness(*, layouts: list[str], paths: int, ticks: int, seed: int, checkpoints: Checkpoints) -> Columns:

@@ -28,6 +28,9 @@ TINY = Sizes(
         "network": cases(1, 2, fins=[4]),
         "modes": cases(2, 1, starts=4),
         "unreachable": {"layouts": 4},
+        "rerun": cases(2, 2),
+        "beyond": cases(1, 1),
+        "sequences": {"layouts": ["D"], "paths": 1, "ticks": 3},
         "steadiness": {"layouts": ["D"], "paths": 1, "ticks": 3},
         "latency": {"calls": 3, "budget_s": 0.5},
         "first_answers": {"robots": 1},
@@ -50,7 +53,7 @@ def few() -> pytest.MonkeyPatch:
         patch.setattr(planning, "SLOW", ("ipopt",))
         patch.setattr(planning, "SPLITS", FEW_SPLITS)
         patch.setattr(planning, "COST_METHODS", ("search", "analytic"))
-        patch.setattr(planning, "cost_sets", lambda _: ["id", "axes", "tables"])
+        patch.setattr(planning, "COST_SETS", ("id", "axes", "tables"))
         patch.setattr(planning, "N_STARTS", 4)
         patch.setattr(planning, "LATENCY_METHODS", ("search", "paper", "analytic", "ipopt"))
         patch.setattr(planning, "TEMPERATURES", (0.01, 1.0))

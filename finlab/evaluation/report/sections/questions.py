@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 
 from finlab.evaluation.experiments.mode_coverage import CHEAP
+from finlab.evaluation.experiments.noisy_sequences import NOISE
 from finlab.evaluation.experiments.steadiness import GOAL, RATE
-from finlab.evaluation.report.document import Block, Column, Row, Table
+from finlab.evaluation.report.document import Block, Column, Row, Table, method_row
 
 
 def mode_blocks(
@@ -56,6 +57,60 @@ def unreachable_blocks(rows: Sequence[Row]) -> list[Block]:
             "beside that share."
         ),
         Table(columns, rows),
+    ]
+
+
+def beyond_blocks(rows: Sequence[Row]) -> list[Block]:
+    """What methods miss on the boundary of what robots can do, and beyond."""
+    columns = (
+        Column("factor", "asked over largest", "three"),
+        Column("method", "method"),
+        Column("n", "targets", "count"),
+        Column("least_mean", "least possible error, mean", "error"),
+        Column("excess_mean", "missed beyond it, mean", "error", "excess_mean_interval"),
+        Column("excess_median", "median", "error"),
+        Column("excess_max", "largest", "error"),
+    )
+    return [
+        "## On the boundary and beyond",
+        (
+            "Every method is asked for the largest wrench of a random direction, as IPOPT finds it in the "
+            "fins' forces, and for 1.2, 2 and 3 times as much, on layouts of split `id`. No method can err "
+            "less than the least possible error, which is IPOPT's too, to about 1e-5; given is what is "
+            "missed beyond that, in standard deviations of the wrenches of training, by the plant. "
+            "`search` stops a target on the boundary when it is missed by less than a hundredth."
+        ),
+        Table(columns, [method_row(row) for row in rows]),
+    ]
+
+
+def sequence_blocks(rows: Sequence[Row]) -> list[Block]:
+    """What commands change by along noisy sequences."""
+    changes = (
+        Column(f"{what}_{figure}", f"{title}, {figure}", "error")
+        for figure in ("mean", "p99")
+        for what, title in (("amplitude", "A [rad]"), ("frequency", "f [Hz]"), ("turn", "phi [rad]"))
+    )
+    columns = (
+        Column("layout", "layout", "code"),
+        Column("method", "method"),
+        Column("ticks", "ticks", "count"),
+        *changes,
+        Column("err_norm_mean", "mean error", "error"),
+        Column("late_mean", "late", "three"),
+        Column("power_mean", "power [W]", "three"),
+    )
+    return [
+        "### Sequences with noise",
+        (
+            f"The same paths with white noise on every axis, {NOISE:.0%} of the path's root mean square, as "
+            "a controller's wrenches carry it. Every method is given its previous command; `qp`, `sqp` and "
+            "`analytic` take no heed of it. Changes of amplitude, frequency and zero direction from tick to "
+            "tick, over all fins: mean and 99th percentile. `search` and `mdn` keep to the rates of the "
+            "servos and miss a few ticks for it; late is the error of what fins give that follow with the "
+            "lags of their servos, which the other methods' jumps do not make smaller."
+        ),
+        Table(columns, [method_row(row) for row in rows]),
     ]
 
 
