@@ -22,6 +22,7 @@ LEVELS = (
     ("control",),
     ("training", "sim", "analysis", "fit"),
     ("evaluation", "deploy"),
+    ("bench",),
     ("cli",),
 )
 """A room may import rooms of earlier levels and itself, never its neighbours or later ones."""

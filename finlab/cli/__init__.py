@@ -73,13 +73,14 @@ _DESCRIPTION = "Control allocation for fin-actuated underwater robots: a target 
 
 def _command_line() -> SubcommandApp:
     """All verbs; a function may return an exit code, None means 0."""
-    from finlab.cli import allocate, app, evaluate, export, fit, layout, simulate, train
+    from finlab.cli import allocate, app, bench, evaluate, export, fit, layout, simulate, train
 
     root = SubcommandApp()
     root.command(allocate.allocate)
     root.command(layout.verbs, name="layout", help="Check, show and optimize layout files.")
     root.command(train.verbs, name="train", help="Train the surrogate and the allocator.")
     root.command(evaluate.verbs, name="eval", help="Measure methods against the analytic fin model.")
+    root.command(bench.bench)
     root.command(fit.verbs, name="fit", help="Fit fins to measurements.")
     root.command(simulate.simulate)
     root.command(export.export)

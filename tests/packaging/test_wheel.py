@@ -54,6 +54,8 @@ def test_carries_library_app_layouts_and_checkpoints(wheel: Path) -> None:
         assert f"finlab/shipped/checkpoints/default/{name}" in names
     for name in ("finlab/py.typed", "finlab/deploy/graph.schema.json", "finlab/layout/layout.schema.json"):
         assert name in names
+    for name in ("problems.npz", "problems.md", "problems.schema.json"):
+        assert f"finlab/bench/{name}" in names
     assert "webapp/app.py" in names
 
 
@@ -154,6 +156,7 @@ def test_without_extras_it_simulates_evaluates_and_exports(bare: Path, tmp_path:
         "simulate A --duration 12",
         "eval wrench --split id --layouts 2 --targets 3 --methods search,paper,sqp",
         "layout check ucat",
+        "bench analytic --quick --sets paper",
         "export mixed -o robot --objective effort",
     ):
         done = bare_run(bare, tmp_path, "-m", "finlab", *line.split())

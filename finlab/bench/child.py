@@ -1,0 +1,131 @@
+"""A method in a process of its own, asked one line at a time: it may hang or die without harm."""
+
+import contextlib
+import os
+import queue
+import signal
+import subprocess
+import tempfile
+import threading
+import time
+from collections.abc import Sequence
+from typing import NamedTuple, Self
+
+from finlab.errors import DataError
+
+MAX_LINE = 50_000_000
+"""Bytes of an answer that are read."""
+ENDING_S = 2.0
+"""How long a process may take to end once its input has ended [s]."""
+
+
+class Reply(NamedTuple):
+    """What came back."""
+
+    line: bytes | None
+    """The answer; empty where the process has ended, None where it is not there in time."""
+    seconds: float
+    """From the first byte of the question to the last of the answer."""
+
+
+class Child:
+    """A process that answers lines with lines, started anew whenever it was lost."""
+
+    def __init__(self, command: Sequence[str], greets: bool = False) -> None:
+        """Prepare; the process starts with the first question.
+
+        Args:
+            command: program and arguments.
+            greets: whether it says a line of its own before the first question.
+        """
+        self.command, self.greets = list(command), greets
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    @property
+    def runs(self) -> bool:
+        """Whether the process is there."""
+        return self._process is not None and self._process.poll() is None
+
+    def start(self, wait_s: float) -> Reply | None:
+        """Start the process, unless it runs; returns its greeting, where it greets.
+
+        Raises:
+            DataError: there is no such program.
+        """
+        self.stop()
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115  # lives as long as the process
+        # One thread each: small products are slower when many threads wait for each other.
+        environment = {
+            "OMP_NUM_THREADS": "1",
+            "OPENBLAS_NUM_THREADS": "1",
+            "MKL_NUM_THREADS": "1",
+        } | os.environ
+        try:
+            self._process = subprocess.Popen(
+                self.command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._errors,
+                env=environment,
+                start_new_session=True,
+            )
+        except OSError as error:
+            raise DataError(f"{self.command[0]}: cannot be started: {error.strerror}") from None
+        self._questions: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        self._replies: queue.SimpleQueue[Reply] = queue.SimpleQueue()
+        talk = (self._process, self._questions, self._replies)
+        threading.Thread(target=_talk, args=talk, daemon=True).start()
+        return self.ask("", wait_s) if self.greets else None
+
+    def ask(self, line: str, wait_s: float) -> Reply:
+        """The answer to a line; a process that is late is ended."""
+        self._questions.put(line.encode())
+        try:
+            return self._replies.get(timeout=wait_s)
+        except queue.Empty:
+            self.stop(at_once=True)
+            return Reply(None, wait_s)
+
+    def last_words(self) -> str:
+        """The last line that the process has written to stderr."""
+        self._errors.seek(0, os.SEEK_END)
+        self._errors.seek(max(0, self._errors.tell() - 4000))
+        lines = self._errors.read().decode(errors="replace").strip().splitlines()
+        return lines[-1][:300] if lines else "no word on stderr"
+
+    def stop(self, at_once: bool = False) -> None:
+        """End the process and all that it has started."""
+        if self._process is None:
+            return
+        process, self._process = self._process, None
+        if not at_once:
+            self._questions.put(None)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(ENDING_S)
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+def _talk(
+    process: "subprocess.Popen[bytes]",
+    questions: "queue.SimpleQueue[bytes | None]",
+    replies: "queue.SimpleQueue[Reply]",
+) -> None:
+    """Write each question and read its answer, until the input or the process ends."""
+    assert process.stdin is not None and process.stdout is not None
+    with process.stdin, process.stdout, contextlib.suppress(OSError, ValueError):
+        while (line := questions.get()) is not None:
+            begin = time.perf_counter()
+            answer = b""
+            with contextlib.suppress(OSError):
+                process.stdin.write(line)
+                process.stdin.flush()
+                answer = process.stdout.readline(MAX_LINE)
+            replies.put(Reply(answer, time.perf_counter() - begin))

@@ -1,0 +1,146 @@
+"""`python -m finlab.bench.worker METHOD`: a Python callable, or one of finlab's methods, speaks the protocol.
+
+A callable is handed what its parameters ask for by name: `targets` (N, 6), `layout` (a `finlab.Layout`),
+`robot` (the same as plain values of a layout file), `sigma` (6,), `previous` (n, 3) or None.
+It returns commands (N, n, 3).
+"""
+
+import inspect
+import json
+import os
+import runpy
+import sys
+import time
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.methods import LEARNED
+from finlab.allocation.policy import Policy
+from finlab.arrays import Array
+from finlab.bench.protocol import GREETING
+from finlab.errors import DataError, FinlabError
+from finlab.evaluation.method_specs import load_method_spec, method_and_starts
+from finlab.inference.normalization import Normalization
+from finlab.layout import Layout
+from finlab.layout.file import parse_layout
+
+KNOWN = ("targets", "layout", "robot", "sigma", "previous")
+"""Parameters that a callable may have."""
+
+
+def load_callable(name: str) -> Callable[..., Any]:
+    """The function `module:function` or `file.py:function`.
+
+    Raises:
+        DataError: there is none, or one of its parameters is none of `KNOWN`.
+    """
+    place, _, attribute = name.rpartition(":")
+    try:
+        if place.endswith(".py"):
+            sys.path.insert(0, str(Path(place).resolve().parent))
+            found = runpy.run_path(place).get(attribute)
+        else:
+            sys.path.insert(0, os.getcwd())
+            found = getattr(import_module(place), attribute, None)
+    except Exception as error:  # a stranger's file may fail in any way
+        raise DataError(f"{place}: cannot be loaded: {type(error).__name__}: {error}") from None
+    if not callable(found):
+        raise DataError(f"{place}: holds no function {attribute!r}")
+    try:
+        parameters = inspect.signature(found).parameters.values()
+    except ValueError:
+        raise DataError(f"{name}: its parameters are not known; wrap it in a function") from None
+    unknown = [p.name for p in parameters if p.default is p.empty and p.name not in KNOWN]
+    if unknown:
+        raise DataError(f"{name}: expected parameters among {', '.join(KNOWN)}, got {unknown[0]!r}")
+    method: Callable[..., Any] = found
+    return method
+
+
+def finlab_method(name: str) -> Callable[..., Array]:
+    """One of finlab's methods as a callable, told what the benchmark divides errors by.
+
+    `paper` and `mdn` keep the yardstick that their networks were trained with; `mdn` is told what
+    the axes of a wrench out of reach weigh.
+    """
+    base, learned = load_method_spec(name), method_and_starts(name.partition("-")[0])[0] in LEARNED
+    made: dict[Layout, Allocator] = {}
+
+    def answer(layout: Layout, targets: Array, sigma: Array, previous: Array | None) -> Array:
+        policy: Policy | str = "closest"
+        allocator = base
+        if not learned:
+            if layout not in made:
+                made[layout] = _with_sigma(base, sigma)
+            allocator = made[layout]
+        elif base.name == "mdn":
+            weights = (base.normalization.std / sigma) ** 2
+            policy = Policy("closest", tuple(weights / weights.max()))
+        if len(targets) == 1:
+            return allocator.allocate(layout, targets[0], previous=previous, policy=policy).command[None]
+        return allocator.allocate_batch(layout, targets, policy=policy).command
+
+    return answer
+
+
+def _with_sigma(method: Allocator, sigma: Array) -> Allocator:
+    """The same method with another yardstick of the error."""
+    make: Any = type(method)
+    made: Allocator = make(Normalization(np.zeros(6), sigma), **method.options)
+    return made
+
+
+def answers(method: Callable[..., Any], asked: dict[str, Any], layouts: dict[str, Layout]) -> dict[str, Any]:
+    """The answer to one question; only the call itself is timed."""
+    key = json.dumps(asked["layout"])
+    if key not in layouts:
+        layouts[key] = parse_layout(asked["layout"])
+    before = asked["previous"]
+    given: dict[str, Any] = {
+        "targets": np.array(asked["targets"]),
+        "layout": layouts[key],
+        "robot": asked["layout"],
+        "sigma": np.array(asked["sigma"]),
+        "previous": None if before is None else np.array(before),
+    }
+    wanted = inspect.signature(method).parameters
+    takes_all = any(p.kind is p.VAR_KEYWORD for p in wanted.values())
+    given = {name: value for name, value in given.items() if takes_all or name in wanted}
+    begin = time.perf_counter()
+    commands = method(**given)
+    seconds = time.perf_counter() - begin
+    return {"id": asked["id"], "commands": np.asarray(commands, np.float64).tolist(), "seconds": seconds}
+
+
+def main(name: str) -> int:
+    """Answer lines on stdin until they end; what the method prints goes to stderr."""
+    with os.fdopen(os.dup(1), "w", encoding="utf-8") as out:
+        os.dup2(2, 1)
+
+        def say(what: dict[str, Any]) -> None:
+            out.write(json.dumps(what) + "\n")
+            out.flush()
+
+        try:
+            method = load_callable(name) if ":" in name else finlab_method(name)
+        except (FinlabError, ModuleNotFoundError) as error:
+            say({"id": GREETING, "error": str(error)})
+            return 2
+        say({"id": GREETING, "commands": []})
+        layouts: dict[str, Layout] = {}
+        for line in sys.stdin:
+            asked = json.loads(line)
+            try:
+                say(answers(method, asked, layouts))
+            except Exception as error:  # whatever a method raises is one failure of it
+                say({"id": asked["id"], "error": f"{type(error).__name__}: {error}"})
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

@@ -1,0 +1,64 @@
+"""`finlab bench` through `main`: table, page, results, and one sentence for what is wrong."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from finlab.bench.results import read_results
+from finlab.cli import main
+from finlab.errors import DataError
+
+METHODS = Path(__file__).with_name("methods.py")
+
+
+def test_a_strangers_function_and_program(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page, file = tmp_path / "p.html", tmp_path / "r.json"
+    program = f"{sys.executable} -c 'import sys; [print(line, flush=True) for line in sys.stdin]'"
+    arguments = [f"{METHODS}:rests", "analytic", "--command", program, "--quick", "--sets", "paper"]
+    assert main(["bench", *arguments, "--page", str(page), "--json", str(file)]) == 0
+    shown = capsys.readouterr().out
+    rows = read_results(file)["methods"]
+    assert [row["method"] for row in rows[:2]] == ["methods.py:rests", "analytic"]
+    for row in rows:
+        assert f"`{row['method']}`" in shown
+    assert rows[1]["summary"]["failed"] == 0.0 and rows[2]["summary"]["failed"] == 1.0
+    html = page.read_text()
+    assert "<svg" in html and "methods.py:rests" in html and 'href="http' not in html and "src=" not in html
+    assert html.count("<table") == 5
+
+
+def test_results_are_plain_and_versioned(tmp_path: Path) -> None:
+    file = tmp_path / "r.json"
+    assert main(["bench", "analytic", "--quick", "--sets", "tiny", "--json", str(file)]) == 0
+    found = read_results(file)
+    assert found["command"] == "finlab bench analytic --sets tiny --quick" and found["seed"] == 8821
+    assert set(found["machine"]) >= {"processor", "cores", "python"}
+    for wrong in ({**found, "version": 2}, {**found, "format": "other"}, [found]):
+        file.write_text(json.dumps(wrong))
+        with pytest.raises(DataError, match="expected finlab-bench-results of version 1"):
+            read_results(file)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("nonsense", "expected one of search, mdn"),
+        ("search search", "expected different names, got search, search"),
+        ("--limit 0", "limit: expected a number of seconds above 0, got 0.0"),
+        ("--sets nowhere", "sets: expected some of paper, shipped"),
+        ("--problems missing.npz", "missing.npz: cannot be read"),
+        ("--problems README.md", "README.md: is no file of problems"),
+        ("--page no/such/folder.html", "expected a file in an existing folder"),
+        ("README.md:f --sets paper", "README.md"),
+        ("--command /no/such/program --sets paper", "/no/such/program: cannot be started"),
+    ],
+)
+def test_bad_input_is_one_sentence(
+    arguments: str, message: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(Path(__file__).resolve().parents[2])
+    assert main(["bench", *arguments.split()]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("finlab: error: ") and message in error and error.count("\n") == 1
