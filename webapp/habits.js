@@ -1,27 +1,54 @@
-// What the page of viser does otherwise: with Ctrl the camera stays where it is, and the server is told which tab
-// is open and how wide the window has become.
+// What the page of viser does otherwise: with Ctrl the camera stays where it is, keys have their usual second names,
+// the drawer is dragged taller, and the first card and the sheet of keys come and go.
 (() => {
-  if (window.finlabHabits) return;
-  window.finlabHabits = true;
+  if (window.finlabFrame) return;
+  const page = document.documentElement;
   const MOVES = /^(Key[WASDQE]|Arrow)/;
+  const TALL = 'finlab-drawer', MET = 'finlab-met';
+  const typing = (target) => target.closest?.('input, textarea, [contenteditable=true]');
+
+  function kept(name) { try { return localStorage.getItem(name); } catch { return null; } }
+  function keep(name, value) { try { localStorage.setItem(name, value); } catch { /* a browser that forbids it */ } }
+
+  window.finlabFrame = {
+    sheet(open = !page.classList.contains('fl-keys')) { page.classList.toggle('fl-keys', open); },
+    met() { page.classList.remove('fl-first'); keep(MET, '1'); },
+    pane(name) { page.dataset.pane = name; },
+  };
+  if (!kept(MET)) page.classList.add('fl-first');
+  if (/^\d+px$/.test(kept(TALL) ?? '')) page.style.setProperty('--fl-drawer', kept(TALL));
+
   window.addEventListener('keydown', (event) => {
-    if ((event.ctrlKey || event.metaKey || event.altKey) && MOVES.test(event.code)) event.stopImmediatePropagation();
+    const held = event.ctrlKey || event.metaKey;
+    if (typing(event.target)) return;
+    if (event.key === '?') { window.finlabFrame.sheet(); event.stopImmediatePropagation(); }
+    else if (event.key === 'Escape' && page.classList.contains('fl-keys')) {
+      window.finlabFrame.sheet(false);
+      event.stopImmediatePropagation();
+    } else if (held && !event.shiftKey && event.key.toLowerCase() === 'y') {
+      event.preventDefault();
+      event.stopImmediatePropagation();
+      page.dispatchEvent(new KeyboardEvent('keydown', { key: 'z', code: 'KeyZ', ctrlKey: true, shiftKey: true, bubbles: true }));
+    }
   }, { capture: true });
 
-  const value = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value');
-  let told = '', timer = 0;
-  function tell() {
-    const box = document.querySelector('div:has(>.fl-habits) + div input');
-    const tab = document.querySelector('[role=tablist] [role=tab][aria-selected=true]')?.innerText.trim();
-    const word = `${tab ?? ''},${window.innerWidth}`;
-    if (!box || word === told) return;
-    told = word;
-    value.set.call(box, word);
-    box.dispatchEvent(new Event('input', { bubbles: true }));
-  }
-  const soon = () => { clearTimeout(timer); timer = setTimeout(tell, 120); };
-  window.addEventListener('resize', soon);
-  window.addEventListener('click', soon, { capture: true });
-  window.addEventListener('keyup', soon, { capture: true });
-  soon();
+  // Commands listen on the root of the document, the camera on the document, which comes after.
+  page.addEventListener('keydown', (event) => {
+    if ((event.ctrlKey || event.metaKey || event.altKey) && MOVES.test(event.code)) event.stopPropagation();
+  });
+
+  window.addEventListener('pointerdown', (event) => {
+    const handle = event.target.closest?.('.fl-handle');
+    if (!handle) return;
+    event.preventDefault();
+    const drawer = handle.parentElement.closest('.mantine-Paper-root');
+    const from = drawer.getBoundingClientRect().height + event.clientY;
+    const move = (to) => page.style.setProperty('--fl-drawer', `${Math.round(from - to.clientY)}px`);
+    const end = () => {
+      window.removeEventListener('pointermove', move);
+      keep(TALL, `${Math.round(drawer.getBoundingClientRect().height)}px`);
+    };
+    window.addEventListener('pointermove', move);
+    window.addEventListener('pointerup', end, { once: true });
+  }, { capture: true });
 })();

@@ -98,8 +98,6 @@ class Page(ABC):
         """What is seen beside the panel."""
         self.bound: list[Callable[[], None]] = []
         """Each writes what the session holds into a widget; the panel that is being built takes them."""
-        self.tab = "Wrench"
-        """The tab that is open in the browser."""
         self.fields = NumberFields(client.gui, self.fault)
         """The boxes for numbers."""
         limit_uploads(client.gui, MAX_UPLOAD, self._refuse_upload)
@@ -241,7 +239,7 @@ class Page(ABC):
             try:
                 self.sweep.note(self.answering)
                 # Before the panels: it settles the scale that the legend tells.
-                self.scenery.robot.editing = self.tab == "Layout"
+                self.scenery.robot.editing = self.session.task == "Design"
                 self.scenery.refresh(self.answering, self.comparison, self.improver, self.analyst.findings)
             except Exception as error:
                 self.scenery.hide()

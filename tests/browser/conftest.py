@@ -109,7 +109,7 @@ def new_page(browser: Any, served: Served) -> Iterator[Callable[[], Any]]:
 
     def open_page(context: Any = None) -> Page:
         if context is None:
-            context = browser.new_context(viewport={"width": 900, "height": 600}, accept_downloads=True)
+            context = browser.new_context(viewport={"width": 1400, "height": 860}, accept_downloads=True)
             contexts.append(context)
         return Page(context.new_page(), served)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from webapp.panels.tabs import TABS
+from webapp.session.looking import DRAWERS, TASKS
 from webapp.session.search_request import SearchRequest
 from webapp.session.swim_plan import SwimSettings
 from webapp.viser_internals import run_script
@@ -47,6 +47,7 @@ class Page:
         page.set_default_timeout(WAIT_MS * patience)
         page.on("console", lambda m: self.problems.append(m.text) if m.type == "error" else None)
         before = set(served.app.views)
+        page.add_init_script("localStorage.setItem('finlab-met', '1')")
         page.goto(served.url)
         self.ready()
         self.until(lambda: bool(set(served.app.views) - before))
@@ -55,7 +56,7 @@ class Page:
 
     def ready(self) -> None:
         """Wait for panel, robot and first answer."""
-        self.page.get_by_role("button", name="Undo").wait_for()
+        self.page.locator(".fl-tasks").wait_for()
         self.node("/robot/fins/0/turn/blade")
         self.page.locator(".fl-status .err").wait_for(state="attached")
         self.close_notes()  # viser's own one on software rendering lies over the view
@@ -73,6 +74,7 @@ class Page:
         def restart() -> None:
             self.session.start_over()
             self.session.display = self._display
+            self.session.show_drawer("Candidates")
             self.session.draft, self.session.swim = SearchRequest(), SwimSettings()
             self.session.compare_with(None)
             self.session.set_overlay(None)
@@ -87,7 +89,7 @@ class Page:
         self._served.server.get_event_loop().call_soon_threadsafe(self.view.do, restart)
         self.until(done.is_set)
         self.close_notes()
-        self.tab("Wrench")
+        self.tab("Allocate")
         self.until(
             lambda: not self.view.busy and self.page.locator(".mantine-Notification-root").count() == 0
         )
@@ -127,11 +129,22 @@ class Page:
         self.page.wait_for_function(script, arg=[name, wanted])
 
     def tab(self, name: str) -> None:
-        """Open a tab of the panel."""
-        self.page.get_by_text(name, exact=True).first.click()
+        """Open a task, something in the drawer, or a folder that is there."""
+        task = next((task for task, names in DRAWERS.items() if name in names), name)
+        if task in TASKS and self.session.task != task:
+            self.page.locator(".fl-tasks button", has_text=task).click()
+            self.until(lambda: self.session.task == task)
+            self.catch_up()
+        if name in TASKS:
+            return
+        if task in TASKS:
+            if self.session.drawer != name:
+                self.page.locator(".fl-strip button", has_text=name).click()
+                self.until(lambda: self.session.drawer == name)
+                self.catch_up()
+            return
+        self.page.get_by_text(name, exact=True).locator("visible=true").first.click()
         self._pause()
-        if name in TABS:
-            self.until(lambda: self.view.tab == name)
 
     def unfold(self, folder: str, label: str) -> None:
         """Open a folder that holds this label, unless an earlier flow has left it open."""
@@ -140,7 +153,8 @@ class Page:
 
     def press(self, name: str) -> None:
         """Press a button that is shown."""
-        self.page.get_by_role("button", name=name, exact=True).first.click()
+        named = re.compile(f"^{name}(:|$)") if name in ("Undo", "Redo") else name
+        self.page.get_by_role("button", name=named, exact=True).first.click()
         self._pause()
 
     def row(self, label: str) -> Any:
@@ -211,8 +225,8 @@ class Page:
         return x, y
 
     def text(self, selector: str) -> str:
-        """The text of the first such element."""
-        return str(self.page.locator(selector).first.inner_text())
+        """The text of the first such element that is shown."""
+        return str(self.page.locator(f"{selector} >> visible=true").first.inner_text())
 
     def notes(self) -> list[str]:
         """Texts of the notes that are shown."""

@@ -38,9 +38,9 @@ def _scroll(page: Page) -> None:
 
 
 def _first(page: Page) -> None:
-    page.tab("View")
+    page.tab("Display")
     page.row("Shadows").first.click()
-    page.tab("Wrench")
+    page.tab("Allocate")
     page.page.wait_for_timeout(6000)  # shadows take their time without a graphics card
 
 
@@ -75,7 +75,7 @@ def _palette(page: Page) -> None:
 
 def _steer(page: Page) -> None:
     page.tab("Steer by hand")
-    page.tab("Sweep an axis")
+    page.tab("Sweep")
     page.choose("Sweep", "heave")
     page.press("Play the sweep")
     page.until(lambda: page.session.state.target[2] > 8.0)
@@ -91,7 +91,7 @@ def _steer(page: Page) -> None:
 
 def _layout(page: Page) -> None:
     page.key("n")
-    page.tab("Layout")
+    page.tab("Design")
 
 
 def _fit(page: Page) -> None:
@@ -118,14 +118,14 @@ def _hull(page: Page) -> None:
 
 
 def _modes(page: Page) -> None:
-    page.tab("Modes")
+    page.tab("Candidates")
     page.until(lambda: not page.view.busy and not page.view.answering.searching)
     page.page.locator("table.modes tr.pick").nth(1).click()
     page.until(lambda: page.session.mode == 1)
 
 
 def _proposals(page: Page) -> None:
-    page.tab("Modes")
+    page.tab("Candidates")
     page.choose("Method", "mdn")
     page.until(lambda: page.session.state.method == "mdn" and not page.view.busy)
     page.tab("What the network proposes")
@@ -134,14 +134,14 @@ def _proposals(page: Page) -> None:
 
 
 def _limits(page: Page) -> None:
-    page.tab("Limits")
+    page.tab("Reach")
     page.press("forces")
-    page.key("f")
+    page.key("x")
     page.until(lambda: page.session.state.failed != () and not page.view.analyst.busy)
 
 
 def _improve(page: Page) -> None:
-    page.tab("Limits")
+    page.tab("Reach")
     page.press("Search")
     page.until(lambda: page.view.improver.progress is not None and page.view.improver.progress.round > 5)
     page.press("Cancel")
@@ -151,14 +151,14 @@ def _improve(page: Page) -> None:
 
 
 def _compare(page: Page) -> None:
-    page.tab("Compare")
+    page.tab("Comparison")
     page.press("Compare the methods")
     page.until(lambda: page.view.comparison.state is not None and not page.view.comparison.running)
     page.press("sqp")
 
 
 def _swim(page: Page) -> None:
-    page.tab("Swim")
+    page.tab("Simulate")
     page.choose("Scenario", "lost-in-current")
     page.type("Speed", "8")
     page.tab("More")
@@ -179,14 +179,14 @@ def _swim(page: Page) -> None:
 
 
 def _view(page: Page) -> None:
-    page.tab("View")
+    page.tab("Display")
     page.row("Fin graph").first.click()
 
 
 def _dark(page: Page) -> None:
-    page.tab("View")
+    page.tab("Display")
     page.row("Dark").first.click()
-    page.tab("Wrench")
+    page.tab("Allocate")
 
 
 SCENES: dict[str, Callable[[Page], object]] = {
@@ -203,7 +203,7 @@ SCENES: dict[str, Callable[[Page], object]] = {
     "app-compare": _compare,
     "app-swim": _swim,
     "app-view": _view,
-    "app-files": lambda page: page.tab("Files"),
+    "app-files": lambda page: page.tab("Export"),
     "app-dark": _dark,
     "app-damage": _damage,
     "app-steer": _steer,

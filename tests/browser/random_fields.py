@@ -16,11 +16,10 @@ from finlab.errors import FinlabError
 from webapp.session.quantities import read_number
 
 HEADINGS = {
-    "Wrench": "Preset",
-    "Layout": "How many",
-    "Limits": "Put aside",
-    "Swim": "Run",
-    "View": "Camera",
+    "Allocate": "Preset",
+    "Design": "How many",
+    "Improve": "May move",
+    "Simulate": "Break a fin",
 }
 """Words in each tab that can be clicked without anything happening."""
 
@@ -76,18 +75,26 @@ def boxes() -> list[Box]:
     """All that the walk types into."""
     wrench = [
         Box(
-            "Wrench", f"{axis} [{unit}]", -1, unit, -1000.0, 1000.0, step, 4, lambda s, k=k: s.state.target[k]
+            "Allocate",
+            f"{axis} [{unit}]",
+            -1,
+            unit,
+            -1000.0,
+            1000.0,
+            step,
+            4,
+            lambda s, k=k: s.state.target[k],
         )
         for k, (axis, unit, step) in enumerate(
             [(a, "N", 0.01) for a in ("Fx", "Fy", "Fz")] + [(a, "N m", 0.001) for a in ("Tx", "Ty", "Tz")]
         )
     ]
     place = [
-        Box("Layout", "Position [m]", k, "m", -2.0, 2.0, 0.005, 4, lambda s, k=k: _fin(s).position[k])
+        Box("Design", "Position [m]", k, "m", -2.0, 2.0, 0.005, 4, lambda s, k=k: _fin(s).position[k])
         for k in range(3)
     ]
     shaft = Box(
-        "Layout",
+        "Design",
         "Shaft [°]",
         -1,
         "°",
@@ -99,13 +106,13 @@ def boxes() -> list[Box]:
         _wrapped,
     )
     reach = [
-        Box("Limits", "Reach ± [m]", k, "m", 0.0, 0.5, 0.01, 4, lambda s, k=k: s.draft.way("all")[k])
+        Box("Improve", "Reach ± [m]", k, "m", 0.0, 0.5, 0.01, 4, lambda s, k=k: s.draft.way("all")[k])
         for k in range(3)
     ]
-    turn = Box("Limits", "Turn ± [°]", -1, "°", 0.0, 180.0, 5.0, 2, lambda s: s.draft.way("all")[3])
-    apart = Box("Limits", "Apart [m]", -1, "m", 0.0, 1.0, 0.01, 4, lambda s: s.draft.apart_m)
+    turn = Box("Improve", "Turn ± [°]", -1, "°", 0.0, 180.0, 5.0, 2, lambda s: s.draft.way("all")[3])
+    apart = Box("Improve", "Apart [m]", -1, "m", 0.0, 1.0, 0.01, 4, lambda s: s.draft.apart_m)
     swim = [
-        Box("Swim", label, -1, unit, low, high, step, 3, lambda s, key=key: getattr(s.swim, key))
+        Box("Simulate", label, -1, unit, low, high, step, 3, lambda s, key=key: getattr(s.swim, key))
         for key, label, unit, low, high, step in (
             ("current_cm_s", "Current [cm/s]", "cm/s", 0.0, 30.0, 0.1),
             ("heading_deg", "flows to [°]", "°", -180.0, 180.0, 1.0),
@@ -113,7 +120,7 @@ def boxes() -> list[Box]:
             ("buoyancy_percent", "Buoyancy [%]", "%", -3.0, 3.0, 0.1),
         )
     ]
-    speed = Box("View", "Motion speed", -1, "", 0.02, 1.0, 0.05, 3, lambda s: s.display.speed)
+    speed = Box("Allocate", "Motion speed", -1, "", 0.02, 1.0, 0.05, 3, lambda s: s.display.speed)
     return [*wrench, *place, shaft, *reach, turn, apart, *swim, speed]
 
 
@@ -124,9 +131,10 @@ class Walk:
         """Take over a page at first sight; all that follows is decided by the seed."""
         self._page, self._random = page, random.Random(seed)
         self._session, self._boxes = page.session, boxes()
-        self._tab = "Wrench"
+        self._tab = "Allocate"
         self.done: Counter[str] = Counter()
         """How often each kind of action was done."""
+        page.unfold("Display", "Motion speed")
         page.key("n")
         page.until(lambda: self._session.selected is not None)
         self._model = {box: box.value(self._session) for box in self._boxes}

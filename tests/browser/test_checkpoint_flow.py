@@ -52,14 +52,14 @@ def test_search_answers_a_slider_and_a_failure(trained: Page) -> None:
 
 def test_power_or_effort_is_kept_least(trained: Page) -> None:
     page = trained
-    page.tab("Modes")
+    page.tab("Candidates")
     watts = page.view.answering.best.power
-    page.press("effort")
+    page.choose("Keep least", "effort")
     page.until(lambda: page.session.state.objective == "effort" and not page.view.busy)
     page.until(lambda: "least effort" in page.text(".fl-status"))
     assert page.view.answering.best.power > watts
     page.until(lambda: "effort" in str(page.page.locator("svg.plot:visible").text_content()))
-    page.press("power")
+    page.choose("Keep least", "power")
     page.until(lambda: page.session.state.objective == "power" and not page.view.busy)
     assert page.view.answering.best.power == watts
 
@@ -93,7 +93,7 @@ def test_modes_tell_their_components_and_proposals_are_drawn(
 
 def test_the_page_gives_the_bundle_that_the_command_writes(trained: Page, tmp_path: Path) -> None:
     page = trained
-    page.tab("Files")
+    page.tab("Export")
     with page.page.expect_download() as download:
         page.press("Bundle (ZIP)")
     download.value.save_as(tmp_path / "page.zip")

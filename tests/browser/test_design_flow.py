@@ -10,10 +10,10 @@ from webapp.session.state import COMPARED
 
 
 def test_linked_pair_follows_the_gizmo(page: Any) -> None:
-    page.tab("Layout")
+    page.tab("Design")
     page.key("n")
     page.until(lambda: page.session.selected == "front_right")
-    page.tab("Layout")
+    page.tab("Design")
     page.press("Mirror")
     page.until(lambda: page.session.state.links == (("front_right", "front_left"),))
     page.until(lambda: page.session.selected == "front_left")
@@ -35,7 +35,7 @@ def test_hull_from_a_file_and_by_numbers(page: Any, tmp_path: Path, monkeypatch:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     path = tmp_path / "hull.stl"
     path.write_bytes(trimesh.creation.capsule(height=400, radius=90).export(file_type="stl"))
-    page.tab("Layout")
+    page.tab("Design")
     page.tab("Hull")  # opens the folder
     page.upload("Import a hull (STL, OBJ, GLB)", path)
     page.until(lambda: any("another unit" in note for note in page.notes()))
@@ -52,18 +52,18 @@ def test_hull_from_a_file_and_by_numbers(page: Any, tmp_path: Path, monkeypatch:
 
 
 def test_failure_changes_graph_and_attainable_set(page: Any) -> None:
-    page.tab("View")
+    page.unfold("Display", "Fin graph")
     page.row("Fin graph").first.click()
     page.visible("/robot/graph")
     graph = page.vertices("/robot/graph")
-    page.tab("Limits")
+    page.tab("Reach")
     page.press("forces")
     page.page.wait_for_function(
         "() => window.__viserMutable.nodeRefFromName['/robot/attainable/now'].visible"
     )
     page.until(lambda: not page.view.analyst.busy)
     whole, card = page.vertices("/robot/attainable/now"), page.text(".score")
-    page.key("f")
+    page.key("x")
     page.until(lambda: page.session.state.failed == ("front_right",))
     page.until(lambda: len(page.vertices("/robot/graph")) < len(graph))
     page.until(lambda: page.vertices("/robot/attainable/now") != whole)
@@ -76,7 +76,7 @@ def test_failure_changes_graph_and_attainable_set(page: Any) -> None:
 
 
 def test_any_layout_stands_beside(page: Any) -> None:
-    page.tab("Limits")
+    page.tab("Reach")
     page.choose("Beside", "pair")
     page.until(lambda: page.session.beside == "pair")
     page.until(lambda: not page.view.analyst.busy and "pair" in page.text(".score"))
@@ -88,7 +88,7 @@ def test_any_layout_stands_beside(page: Any) -> None:
 
 
 def test_search_is_watched_and_accepted(page: Any) -> None:
-    page.tab("Limits")
+    page.tab("Improve")
     before = page.session.state.layout
     page.choose("Goal", "power for a mission")
     page.until(lambda: page.session.draft.goal == "power for a mission")
@@ -113,7 +113,7 @@ def test_search_is_watched_and_accepted(page: Any) -> None:
 
 
 def test_methods_side_by_side(page: Any) -> None:
-    page.tab("Compare")
+    page.tab("Comparison")
     page.press("Compare the methods")
     page.until(lambda: page.view.comparison.state is not None and not page.view.comparison.running)
     page.until(lambda: page.page.locator("table.methods tr").count() == 1 + len(COMPARED))

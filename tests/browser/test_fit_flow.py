@@ -13,7 +13,7 @@ def test_a_noisy_file_becomes_a_fin(page: Any, tmp_path: Path, monkeypatch: pyte
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     command = commands(120)
     cell = write(tmp_path / "cell.csv", columns_of(command, measured(soft(k=4.0, d=0.1), command)))
-    page.tab("Layout")
+    page.tab("Design")
     assert page.page.get_by_role("button", name="Fit from measurements (CSV)").is_disabled()
     page.key("n")
     before = page.session.state
@@ -29,7 +29,7 @@ def test_a_noisy_file_becomes_a_fin(page: Any, tmp_path: Path, monkeypatch: pyte
     page.until(lambda: not page.view.busy and page.view.shown.err_norm < 1e-3)
     page.page.get_by_text("Exact", exact=True).first.wait_for()
 
-    page.tab("Files")
+    page.tab("Export")
     with page.page.expect_download() as download:
         page.press("Layout (YAML)")
     download.value.save_as(tmp_path / "robot.zip")
@@ -43,7 +43,7 @@ def test_a_noisy_file_becomes_a_fin(page: Any, tmp_path: Path, monkeypatch: pyte
 
 def test_a_wrong_file_is_told_where_and_changes_nothing(page: Any, tmp_path: Path) -> None:
     page.key("n")
-    page.tab("Layout")
+    page.tab("Design")
     before = page.session.state
     (tmp_path / "cell.csv").write_text("A,f,phi,Fx,Fy,Fz\n0.3,1.0,0.0,0,oops,0\n")
     page.upload("Fit from measurements (CSV)", tmp_path / "cell.csv")
@@ -57,7 +57,7 @@ def test_a_file_of_gigabytes_is_not_even_begun(
     page: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     page.key("n")
-    page.tab("Layout")
+    page.tab("Design")
     with (tmp_path / "huge.csv").open("wb") as file:
         file.truncate(160_000_000)  # sparse: it takes no room
     page.upload("Fit from measurements (CSV)", tmp_path / "huge.csv")

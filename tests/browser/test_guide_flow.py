@@ -22,7 +22,7 @@ def test_the_tour_sets_each_stop_and_brings_the_work_back(page: Any) -> None:
     page.until(lambda: not page.view.swimming.active)
     page.visible("/robot")
     page.until(lambda: "6 of 6 fins" in page.text(".fl-status"))
-    page.press("End")
+    page.press("Finish")
     page.until(lambda: page.session.state == mine and page.session.stop is None)
     assert page.problems == []
 
@@ -37,7 +37,7 @@ def test_a_command_is_found_by_its_words(page: Any) -> None:
     page.until(lambda: page.session.state.target[2] != 0.0 and page.session.state.target[0] == 0.0)
     box.wait_for(state="hidden")
     page.key("n")
-    page.key("f")
+    page.key("x")
     page.until(lambda: page.session.state.failed == ("front_right",))
     page.key("Control+z")
     page.until(lambda: page.session.state.failed == ())

@@ -13,7 +13,7 @@ from finlab.physics.table_file import write_table
 
 
 def test_gizmo_moves_a_fin(page: Any) -> None:
-    page.tab("Layout")
+    page.tab("Design")
     page.key("n")
     page.until(lambda: page.session.selected == "front_right")
     page.look_from_above()
@@ -34,7 +34,7 @@ def test_gizmo_moves_a_fin(page: Any) -> None:
 
 def test_a_ghost_shows_where_a_held_fin_will_stick(page: Any) -> None:
     page.key("n")
-    page.tab("Layout")
+    page.tab("Design")
     page.row("Stick to hull").first.click()
     page.until(lambda: page.session.display.stick)
     page.look_from_above()
@@ -57,7 +57,7 @@ def test_a_ghost_shows_where_a_held_fin_will_stick(page: Any) -> None:
 def test_click_selects_and_numbers_move(page: Any) -> None:
     page.page.mouse.click(*page.pixel("/robot/fins/2/turn/shaft", (-0.02, 0, 0)))
     page.until(lambda: page.session.selected == "back_left")
-    page.tab("Layout")
+    page.tab("Design")
     page.type("Position [m]", "-0.2", place=0)
     page.until(lambda: page.session.state.layout.fins[2].position[0] == -0.2)
     page.type("Shaft [°]", "90")
@@ -65,7 +65,7 @@ def test_click_selects_and_numbers_move(page: Any) -> None:
 
 
 def test_add_mirror_and_undo(page: Any) -> None:
-    page.tab("Layout")
+    page.tab("Design")
     page.choose("Layout", "B")
     page.until(lambda: page.session.state.layout.name == "B")
     page.press("Add a fin")
@@ -84,7 +84,7 @@ def test_add_mirror_and_undo(page: Any) -> None:
 
 def test_copies_stand_around_another_axis(page: Any) -> None:
     page.key("n")
-    page.tab("Layout")
+    page.tab("Design")
     page.choose("Copies around", "x")
     page.until(lambda: page.row("Copies around").first.input_value().startswith("x"))
     page.press("4")
@@ -95,7 +95,7 @@ def test_copies_stand_around_another_axis(page: Any) -> None:
 
 def test_bad_number_is_refused_below_its_box(page: Any) -> None:
     page.key("n")
-    page.tab("Layout")
+    page.tab("Design")
     before = page.session.state.layout
     page.type("Position [m]", "55", place=2)
     page.until(lambda: "z of front_right" in "".join(page.page.locator(".fl.note:visible").all_inner_texts()))
@@ -103,7 +103,7 @@ def test_bad_number_is_refused_below_its_box(page: Any) -> None:
 
 
 def test_page_picture_and_command_to_take_home(page: Any, tmp_path: Path) -> None:
-    page.tab("Files")
+    page.tab("Export")
     page.until(lambda: "finlab allocate ucat --wrench 1.2 0 0 0 0 0.25" in page.text("pre.command"))
     with page.page.expect_download() as download:
         page.press("3D view (HTML)")
@@ -117,7 +117,7 @@ def test_page_picture_and_command_to_take_home(page: Any, tmp_path: Path) -> Non
 
 
 def test_save_open_and_a_bad_file(page: Any, tmp_path: Path) -> None:
-    page.tab("Files")
+    page.tab("Export")
     with page.page.expect_download() as download:
         page.press("Layout (YAML)")
     saved = tmp_path / "saved.yaml"
@@ -146,7 +146,7 @@ def test_a_strangers_layout_opens_no_file_and_runs_nothing(page: Any, tmp_path: 
     values = layout_to_dict(load_layout("ucat")) | {"name": EVIL, "description": EVIL}
     values["fins"][0] |= {"name": EVIL[:60], "model": {"type": "table", "path": "/etc/passwd"}}
     (tmp_path / "robot.yaml").write_text(yaml_text(values))
-    page.tab("Files")
+    page.tab("Export")
     page.upload("Open a layout file", tmp_path / "robot.yaml")
     page.until(lambda: any("'passwd', which did not come along" in note for note in page.notes()))
     assert page.session.state == before and "root:" not in "".join(page.notes())
@@ -154,9 +154,9 @@ def test_a_strangers_layout_opens_no_file_and_runs_nothing(page: Any, tmp_path: 
     (tmp_path / "robot.yaml").write_text(yaml_text(values))
     page.upload("Open a layout file", tmp_path / "robot.yaml")
     page.until(lambda: page.session.state.layout.name == EVIL and not page.view.busy)
-    page.until(lambda: EVIL[:20] in page.text(".fl-status"))
+    page.until(lambda: EVIL[:20] in page.text(".fl-robot"))
     page.key("n")
-    for tab in ("Layout", "Limits", "Swim", "Wrench"):
+    for tab in ("Design", "Reach", "Simulate", "Allocate"):
         page.tab(tab)
     page.catch_up()
     assert page.page.evaluate("window.pwned") is None and page.page.locator("img[src=x]").count() == 0
@@ -173,10 +173,10 @@ def test_a_layout_brings_its_table_along_and_takes_it_home(
     with zipfile.ZipFile(tmp_path / "robot.zip", "w") as archive:
         archive.writestr("robot.yaml", yaml_text(values))
         archive.write(tmp_path / "soft.csv", "tables/soft.csv")
-    page.tab("Files")
+    page.tab("Export")
     page.upload("Open a layout file", tmp_path / "robot.zip")
     page.until(lambda: page.session.state.layout.name == "measured" and not page.view.busy)
-    page.until(lambda: "measured" in page.text(".fl-status") and "Exact" in page.text(".fl-status"))
+    page.until(lambda: "measured" in page.text(".fl-robot") and "Exact" in page.text(".fl-status"))
     with page.page.expect_download() as download:
         page.press("Layout (YAML)")
     download.value.save_as(tmp_path / "home.zip")

@@ -85,7 +85,7 @@ def test_a_negative_target(page: Any, steps: list[Any], delay: int) -> None:
 def test_half_a_degree(page: Any, steps: list[Any], delay: int) -> None:
     def typed() -> Any:
         page.key("n")
-        page.tab("Layout")
+        page.tab("Design")
         box = begin(page, "Shaft [°]")
         page.page.keyboard.type("45.5", delay=delay)
         return box
@@ -104,7 +104,7 @@ def test_three_coordinates_one_after_the_other(page: Any, steps: list[Any], dela
 
     def typed() -> None:
         page.key("n")
-        page.tab("Layout")
+        page.tab("Design")
         begin(page, "Position [m]", 0)
         for text, key in (("-0.125", "Tab"), ("0.05", "Tab"), ("-.02", "Enter")):
             page.page.keyboard.type(text, delay=delay)
@@ -207,7 +207,7 @@ def test_units_and_arithmetic(page: Any, steps: list[Any], text: str, value: flo
 
 def test_what_is_refused_is_told_in_place(page: Any, steps: list[Any]) -> None:
     page.key("n")
-    page.tab("Layout")
+    page.tab("Design")
     note = page.page.locator(".fl.note:visible")
 
     def typed() -> Any:
@@ -236,7 +236,7 @@ def test_what_is_refused_is_told_in_place(page: Any, steps: list[Any]) -> None:
 
 def test_what_became_of_a_number_is_told(page: Any) -> None:
     page.key("n")
-    page.tab("Layout")
+    page.tab("Design")
     note = page.page.locator(".fl.note:visible")
     begin(page, "Shaft [°]")
     page.page.keyboard.type("270 deg", delay=20)
@@ -265,26 +265,26 @@ def test_every_field_of_every_tab(page: Any, steps: list[Any]) -> None:
     page.unfold("Damage a fin", "Strength [%]")
     commit("Strength [%]", "62.5", -1, lambda: sum(share for _, share in session.state.weak), 0.625)
     page.tab("Damage a fin")
-    page.tab("Layout")
+    page.tab("Design")
     commit("Shaft [°]", "33.25", -1, lambda: math.degrees(session.state.layout.fins[0].mounting_angle), 33.25)
     commit("Position [m]", ".03", 0, lambda: session.state.layout.fins[0].position[0], 0.03)
     page.unfold("Hull", "Size [m]")
     commit("Size [m]", "52 cm", 0, lambda: session.state.layout.body.hull.size_m[0], 0.52)
     commit("Centre of gravity [m]", "-5 mm", 2, lambda: -session.state.layout.body.hull.center_m[2], -0.005)
     page.tab("Hull")
-    page.tab("Limits")
+    page.tab("Improve")
     commit("Reach ± [m]", "2 cm", 1, lambda: session.draft.way("all")[1], 0.02)
     commit("Turn ± [°]", "pi/4 rad", -1, lambda: session.draft.way("all")[3], 45.0)
-    page.tab("Modes")
+    page.tab("Candidates")
     page.choose("Method", "mdn")
     commit("Candidates K", "32", -1, lambda: session.state.n_candidates, 32)
     commit("Temperature T", ".125", -1, lambda: session.state.temperature, 0.125)
-    page.tab("Swim")
+    page.tab("Simulate")
     commit("Current [cm/s]", "0.07 m/s", -1, lambda: session.swim.current_cm_s, 7.0)
     page.unfold("More", "Battery [Wh]")
     commit("Battery [Wh]", "0.05 kWh", -1, lambda: session.swim.pack_wh, 50.0)
     page.tab("More")
-    page.tab("View")
+    page.unfold("Display", "Motion speed")
     commit("Motion speed", "1/8", -1, lambda: session.display.speed, 0.125)
 
 

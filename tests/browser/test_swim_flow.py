@@ -10,8 +10,8 @@ from PIL import Image
 
 
 def test_swims_loses_a_fin_and_goes_on(page: Any) -> None:
-    page.tab("Swim")
-    for label, entry in (("Path", "circle"), ("Method", "analytic"), ("Beside", "qp")):
+    page.tab("Simulate")
+    for label, entry in (("Path", "circle"), ("Swim with", "analytic"), ("Beside", "qp")):
         page.choose(label, entry)
         page.until(lambda entry=entry: entry in vars(page.session.swim).values())
     page.press("Start")
@@ -50,8 +50,8 @@ def test_swims_loses_a_fin_and_goes_on(page: Any) -> None:
 
 
 def test_a_fin_breaks_without_a_word_and_the_robot_finds_out(page: Any) -> None:
-    page.tab("Swim")
-    for label, entry in (("Path", "circle"), ("Method", "analytic")):
+    page.tab("Simulate")
+    for label, entry in (("Path", "circle"), ("Swim with", "analytic")):
         page.choose(label, entry)
         page.until(lambda entry=entry: entry in vars(page.session.swim).values())
     page.row("Announced").first.click()
@@ -82,11 +82,11 @@ def test_a_fin_breaks_without_a_word_and_the_robot_finds_out(page: Any) -> None:
 
 
 def test_a_robot_loses_a_fin_in_a_current_and_carries_on(page: Any, tmp_path: Path) -> None:
-    page.tab("Swim")
+    page.tab("Simulate")
     page.choose("Scenario", "lost-in-current")
     page.until(lambda: page.session.swim.current_cm_s == 7.1 and not page.session.swim.announced)
     page.until(lambda: "current 7.1 cm/s towards −45°; 1 fin lost half-way" in page.page.inner_text("body"))
-    page.choose("Method", "analytic")
+    page.choose("Swim with", "analytic")
     page.until(lambda: page.session.swim.method == "analytic")
     page.type("Speed", "8")
     page.press("Start")

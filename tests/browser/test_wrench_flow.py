@@ -48,7 +48,7 @@ def test_last_fin_cannot_fail(page: Any) -> None:
 
 
 def test_mode_is_picked_in_plot_and_table(page: Any) -> None:
-    page.tab("Modes")
+    page.tab("Candidates")
     page.until(lambda: len(page.view.answering.modes.shown) > 1 and not page.view.answering.searching)
     page.until(lambda: page.page.locator("table.modes tr.pick").count() > 1)
     best = page.view.answering.best
@@ -70,7 +70,7 @@ def test_mode_is_picked_in_plot_and_table(page: Any) -> None:
 
 
 def test_method_that_fails_says_so_and_the_page_goes_on(page: Any) -> None:
-    page.tab("Modes")
+    page.tab("Candidates")
     page.choose("Method", "slsqp")
     page.until(lambda: any("out of order" in note for note in page.notes()))
     page.key("Control+z")
@@ -109,7 +109,7 @@ def test_the_stick_steers_and_springs_back(page: Any) -> None:
 
 
 def test_a_sweep_plays_and_stops(page: Any) -> None:
-    page.tab("Sweep an axis")
+    page.tab("Sweep")
     page.press("Play the sweep")
     page.until(lambda: page.view.sweep.running)
     page.until(lambda: page.session.state.target[0] > -4.0)
@@ -117,4 +117,3 @@ def test_a_sweep_plays_and_stops(page: Any) -> None:
     page.press("Stop the sweep")
     page.until(lambda: not page.view.sweep.running)
     page.until(lambda: page.session.state.target[0] == 1.2 and page.row("Fx [N]").last.input_value() == "1.2")
-    page.tab("Sweep an axis")

@@ -39,7 +39,7 @@ COMPUTED = (
 """Where a fault meets a worker's thread."""
 DRAWN = (
     "webapp.markup.corner.verdict_sentence",
-    "webapp.panels.tabs.corner",
+    "webapp.panels.status.corner",
     "webapp.panels.wrench_tab.axis_reach",
     "webapp.panels.wrench_tab.slider_end",
     "webapp.panels.wrench_tab.wrench_bars",

@@ -16,7 +16,7 @@ from webapp.theme import DEAD, css, fin_color
 
 HEADER = (
     "<tr><th>fin</th><th title='half amplitude'>A [°]</th><th title='frequency'>f [Hz]</th>"
-    "<th title='zero direction'>direction [°]</th><th>force [N]</th>"
+    "<th title='zero direction'>dir. [°]</th><th>force [N]</th>"
     "<th title='share of the full thrust'>load</th></tr>"
 )
 
@@ -53,7 +53,7 @@ def wrench_bars(asked: ArrayLike, given: ArrayLike | None, sentence: str) -> str
 def _header(scales: list[float]) -> str:
     scale = f"±{scales[0]:g} N, ±{scales[1]:g} N m"
     return (
-        f"<span></span><span class='dim' style='text-align:center;white-space:nowrap'>{scale}</span>"
+        f"<span class='dim scale'>{scale}</span>"
         "<b class='right asked'>asked</b><b class='right given'>delivered</b>"
         "<b class='right missing'>missing</b>"
     )

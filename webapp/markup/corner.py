@@ -104,7 +104,7 @@ def corner(
         in_reach: whether any command of the working fins gives what is asked.
     """
     fins = f"{len(state.healthy)} of {state.layout.n_fins} fins"
-    parts = [f"<b>{escape(state.layout.name)}</b>", f"<span>{fins}</span>"]
+    parts = [f"<span>{fins}</span>"]
     if error is not None:
         parts.append(f"<span class='missing'>{escape(error)}</span>")
     elif allocation is not None:
@@ -138,7 +138,7 @@ def _figures(allocation: Allocation, raw: bool, least: bool, in_reach: bool) -> 
 
 
 def swim_corner(swimming: Swimming, newtons: float) -> str:
-    """The same while robots swim, in the upper left corner: below lies the time."""
+    """The same while robots swim."""
     first, shown = swimming.swimmers[0], swimming.seen[0]
     trails = "".join(
         f"<svg width='44' height='10'><path d='M0 5H44' stroke='{css(color)}' stroke-width='3.5'/></svg>"
@@ -155,7 +155,6 @@ def swim_corner(swimming: Swimming, newtons: float) -> str:
     off = f"{100 * float(shown.record[-1, ERROR]):.1f}" if len(shown.record) else "–"
     power = "–" if shown.figures is None else f"{shown.figures.now_w:.1f}"
     parts = [
-        f"<b>{escape(first.layout.name)}</b>",
         f"<span>{alive} of {len(first.fins)} fins</span>",
         f"<span><b>{shown.time:.1f}</b> s of {first.duration_s:.0f} s</span>",
         f"<span><span class='dim'>off the path</span> <b>{off}</b> cm</span>",
@@ -163,11 +162,11 @@ def swim_corner(swimming: Swimming, newtons: float) -> str:
         f"<span>{pace_words(swimming)}</span>",
     ]
     scale = f"<div class='dim scales'>arrow 0.1 m = {newtons:g} N</div>"
-    return _cards(f"<div class='fl-legend'>{trails}</div>{scale}", parts, "fl-corner fl-upper")
+    return _cards(f"<div class='fl-legend'>{trails}</div>{scale}", parts)
 
 
-def _cards(legend: str, status: list[str], where: str = "fl-corner") -> str:
+def _cards(legend: str, status: list[str]) -> str:
     return (
-        f"<div class='{where}'><div class='fl fl-card fl-legend-card'>{legend}</div>"
+        f"<div class='fl-corner'><div class='fl fl-card fl-legend-card'>{legend}</div>"
         f"<div class='fl fl-card fl-status'>{''.join(status)}</div></div>"
     )

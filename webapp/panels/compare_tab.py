@@ -10,7 +10,7 @@ from webapp.session.state import COMPARED
 PICKER = "fl-compare"
 
 
-class CompareTab:
+class ComparePanel:
     """A button, a table, and whose arrows are shown."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:

@@ -49,7 +49,7 @@ class FinButtons:
 
 
 class DamagePanel:
-    """Widgets of one folder."""
+    """What is wrong with the selected fin."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
@@ -57,30 +57,27 @@ class DamagePanel:
         left = "What is left of its largest amplitude and frequency: a worn motor, a torn fin."
         flaps = "It no longer turns: it flaps about one direction only."
         stays = "Zero direction at which it stays."
-        with gui.add_folder("Damage a fin", expand_by_default=False):
-            self._fin = gui.add_dropdown(
-                "Which fin", ("1",), hint="Also the one that is selected in the view."
-            )
-            page.on_change(self._fin, page.session.select)
-            page.bind_number(
-                gui.add_slider("Strength [%]", 100 * STRENGTH_RANGE[0], 100.0, 5.0, 100.0, hint=left),
-                lambda share: page.session.weaken(self._name, share / 100.0),
-                lambda: 100.0 * dict(page.session.state.weak).get(self._name, 1.0),
-                digits=1,
-            )
-            page.bind(
-                gui.add_checkbox("Stuck", False, hint=flaps),
-                lambda stuck: self._jam(stuck, 0.0),
-                lambda: self._stop is not None,
-            )
-            self._angle = page.bind_number(
-                gui.add_slider("Stuck at [°]", -180.0, 180.0, 5.0, 0.0, hint=stays, visible=False),
-                partial(self._jam, True),
-                lambda: math.degrees(self._stop or 0.0),
-                digits=1,
-            )
-            mends = {"This fin": lambda: page.session.mend(self._name), "All fins": page.session.mend_all}
-            page.add_buttons("Repair", mends, hint="Whole again; can be undone like all else.")
+        self._fin = gui.add_dropdown("Which fin", ("1",), hint="Also the one that is selected in the view.")
+        page.on_change(self._fin, page.session.select)
+        page.bind_number(
+            gui.add_slider("Strength [%]", 100 * STRENGTH_RANGE[0], 100.0, 5.0, 100.0, hint=left),
+            lambda share: page.session.weaken(self._name, share / 100.0),
+            lambda: 100.0 * dict(page.session.state.weak).get(self._name, 1.0),
+            digits=1,
+        )
+        page.bind(
+            gui.add_checkbox("Stuck", False, hint=flaps),
+            lambda stuck: self._jam(stuck, 0.0),
+            lambda: self._stop is not None,
+        )
+        self._angle = page.bind_number(
+            gui.add_slider("Stuck at [°]", -180.0, 180.0, 5.0, 0.0, hint=stays, visible=False),
+            partial(self._jam, True),
+            lambda: math.degrees(self._stop or 0.0),
+            digits=1,
+        )
+        mends = {"This fin": lambda: page.session.mend(self._name), "All fins": page.session.mend_all}
+        page.add_buttons("Repair", mends, hint="Whole again; can be undone like all else.")
 
     @property
     def _name(self) -> str:

@@ -23,7 +23,7 @@ SAVED = "saved state"
 """Entry of the list of layouts for the one that was opened or saved last."""
 
 
-class LimitsTab:
+class ReachPanel:
     """Switches and the card."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
@@ -46,7 +46,6 @@ class LimitsTab:
         pins = {"Pin this layout": page.session.pin}
         page.add_buttons("Put aside", pins, hint="As it is now, to compare others with.")
         self._card = gui.add_html("")
-        self._improve = ImprovePanel(gui, page)
         self._changes = Changes()
 
     def _compare(self, name: str) -> None:
@@ -57,7 +56,6 @@ class LimitsTab:
         session = self._page.session
         names = (SAVED, *((PINNED,) if session.pinned is not None else ()), *shipped())
         put(self._beside, options=names, value=session.beside or SAVED)
-        self._improve.refresh()
         analyst, display = self._page.analyst, self._page.session.display
         put(self._alone, visible=display.drawn != "none")
         if self._changes(analyst.findings, analyst.busy, analyst.error, session.beside):
@@ -81,73 +79,68 @@ class LimitsTab:
 
 
 class ImprovePanel:
-    """Widgets of one folder."""
+    """What to look for, and what was found."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
-        with gui.add_folder("Improve this layout"):
-            goals = gui.add_dropdown("Goal", tuple(GOAL_WORDS), hint="What to raise.")
-            page.bind(goals, partial(self._draft, SearchRequest.with_goal), lambda: page.session.draft.goal)
-            self._fins = FinButtons(
-                page,
-                "May move",
-                "Press a number to hold a fin, or to let it move. Pairs stay pairs.",
-                "fl-movers",
-                partial(self._draft, SearchRequest.with_held_toggled),
-            )
-            self._whose = gui.add_dropdown(
-                "Bounds of", (ALL,), hint="All fins, or one that gets bounds of its own."
-            )
-            page.on_change(self._whose, lambda _: None)
-            page.bind_number(
-                gui.add_vector3("Reach ± [m]", WAY[:3], step=0.01, hint="Along x, y and z."),
-                lambda reach: self._bound((*reach, self._way[3])),
-                lambda: self._way[:3],
-            )
-            hint = "How far its shaft may turn either way."
-            page.bind_number(
-                gui.add_slider("Turn ± [°]", 0.0, 180.0, 5.0, WAY[3], hint=hint),
-                lambda turn: self._bound((*self._way[:3], turn)),
-                lambda: self._way[3],
-                digits=2,
-            )
-            page.bind_number(
-                gui.add_number(
-                    "Apart [m]", 0.02, step=0.01, hint="Least distance between what two fins sweep."
-                ),
-                partial(self._draft, SearchRequest.with_apart),
-                lambda: page.session.draft.apart_m,
-            )
-            hint = "Mirror pairs stay pairs, fins in the mirror plane stay in it."
-            page.bind(
-                gui.add_checkbox("Symmetric", True, hint=hint),
-                partial(self._draft, SearchRequest.with_symmetry),
-                lambda: page.session.draft.symmetric,
-            )
-            lines = "Wrenches, one line each: Fx Fy Fz Tx Ty Tz [N, N m]. Empty: the common ones."
-            self._mission = page.bind(
-                gui.add_text("Mission", "", multiline=True, hint=lines, visible=False),
-                partial(self._draft, SearchRequest.with_mission),
-                lambda: page.session.draft.mission,
-            )
-            takes = {"Add the present wrench": self._add_wrench}
-            self._take = page.add_buttons(" ", takes, hint="To the mission.", visible=False)
-            stops = "Takes up to a minute; it can be stopped any time."
-            offered = "What was found so far is offered."
-            self._start = page.add_button("Search", self._search, icon=viser.Icon.SPARKLES, hint=stops)
-            self._bar = gui.add_progress_bar(0.0, visible=False)
-            self._cancel = page.add_button(
-                "Cancel", page.improver.cancel, icon=viser.Icon.X, visible=False, hint=offered
-            )
-            self._card = gui.add_html("")
-            gui.add_html(chosen_button("fl-verdict", 0))
-            hint = "Where the fins would stand, in green; off: as they stand now."
-            self._proposed = page.bind_display(gui.add_checkbox("Show after", True, hint=hint), "proposed")
-            verdicts = {"Accept": self._accept, "Leave": page.improver.forget}
-            self._verdict = page.add_buttons(
-                "Result", verdicts, visible=False, hint="Accepting can be undone."
-            )
+        goals = gui.add_dropdown("Goal", tuple(GOAL_WORDS), hint="What to raise.")
+        page.bind(goals, partial(self._draft, SearchRequest.with_goal), lambda: page.session.draft.goal)
+        self._fins = FinButtons(
+            page,
+            "May move",
+            "Press a number to hold a fin, or to let it move. Pairs stay pairs.",
+            "fl-movers",
+            partial(self._draft, SearchRequest.with_held_toggled),
+        )
+        self._whose = gui.add_dropdown(
+            "Bounds of", (ALL,), hint="All fins, or one that gets bounds of its own."
+        )
+        page.on_change(self._whose, lambda _: None)
+        page.bind_number(
+            gui.add_vector3("Reach ± [m]", WAY[:3], step=0.01, hint="Along x, y and z."),
+            lambda reach: self._bound((*reach, self._way[3])),
+            lambda: self._way[:3],
+        )
+        hint = "How far its shaft may turn either way."
+        page.bind_number(
+            gui.add_slider("Turn ± [°]", 0.0, 180.0, 5.0, WAY[3], hint=hint),
+            lambda turn: self._bound((*self._way[:3], turn)),
+            lambda: self._way[3],
+            digits=2,
+        )
+        page.bind_number(
+            gui.add_number("Apart [m]", 0.02, step=0.01, hint="Least distance between what two fins sweep."),
+            partial(self._draft, SearchRequest.with_apart),
+            lambda: page.session.draft.apart_m,
+        )
+        hint = "Mirror pairs stay pairs, fins in the mirror plane stay in it."
+        page.bind(
+            gui.add_checkbox("Symmetric", True, hint=hint),
+            partial(self._draft, SearchRequest.with_symmetry),
+            lambda: page.session.draft.symmetric,
+        )
+        lines = "Wrenches, one line each: Fx Fy Fz Tx Ty Tz [N, N m]. Empty: the common ones."
+        self._mission = page.bind(
+            gui.add_text("Mission", "", multiline=True, hint=lines, visible=False),
+            partial(self._draft, SearchRequest.with_mission),
+            lambda: page.session.draft.mission,
+        )
+        takes = {"Add the present wrench": self._add_wrench}
+        self._take = page.add_buttons(" ", takes, hint="To the mission.", visible=False)
+        stops = "Takes up to a minute; it can be stopped any time."
+        offered = "What was found so far is offered."
+        self._start = page.add_button("Search", self._search, icon=viser.Icon.SPARKLES, hint=stops)
+        self._bar = gui.add_progress_bar(0.0, visible=False)
+        self._cancel = page.add_button(
+            "Cancel", page.improver.cancel, icon=viser.Icon.X, visible=False, hint=offered
+        )
+        self._card = gui.add_html("")
+        gui.add_html(chosen_button("fl-verdict", 0))
+        hint = "Where the fins would stand, in green; off: as they stand now."
+        self._proposed = page.bind_display(gui.add_checkbox("Show after", True, hint=hint), "proposed")
+        verdicts = {"Accept": self._accept, "Leave": page.improver.forget}
+        self._verdict = page.add_buttons("Result", verdicts, visible=False, hint="Accepting can be undone.")
 
     @property
     def _way(self) -> tuple[float, ...]:

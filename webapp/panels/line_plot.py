@@ -12,7 +12,7 @@ from webapp.handles import put
 from webapp.session.targets import nice_limit
 from webapp.theme import css, fin_color
 
-FONT = "11px sans-serif"
+FONT = "13px sans-serif"
 FIN_LINES = tuple(css(fin_color(i)) for i in range(MAX_FINS))
 """Colours of lines that belong to a fin each."""
 ROOM = 1.14

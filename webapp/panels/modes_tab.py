@@ -1,10 +1,9 @@
-"""Why one wrench has many answers: who answers, what is kept least, the modes, and where they come from."""
+"""Why one wrench has many answers: the modes, and where they come from."""
 
 from functools import partial
 
 import viser
 
-from finlab.allocation.methods import METHODS
 from webapp.handles import Changes, numbered, on_user_change, put
 from webapp.markup.mode_plot import SAMPLES, mode_plot
 from webapp.markup.modes import mode_table
@@ -12,7 +11,7 @@ from webapp.markup.picking import add_channel, chosen_button, marker
 from webapp.markup.proposals import proposal_discs
 from webapp.markup.words import small, three_digits
 from webapp.page import Page
-from webapp.session.state import CANDIDATE_RANGE, GAMMA_RANGE, OBJECTIVES, TEMPERATURE_RANGE, knows_objective
+from webapp.session.state import CANDIDATE_RANGE, GAMMA_RANGE, TEMPERATURE_RANGE, knows_objective
 from webapp.tasks.solver import STEPS
 
 ORIGINS = {
@@ -29,8 +28,8 @@ DRAWN = {"n_candidates": 64.0, "temperature": 0.02, "gamma": 0.01}
 """What the widgets of drawing show at first."""
 
 
-class ModesTab:
-    """Method and objective, plot and table, and what is drawn from a mixture."""
+class CandidatesPanel:
+    """Plot and table, and what is drawn from a mixture."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
@@ -38,17 +37,8 @@ class ModesTab:
         stray, count = "How far draws stray from the mixture's means.", "Draws from the mixture."
         weight = "How much effort counts in the ranking."
         session = page.session
-        methods = gui.add_dropdown("Method", tuple(METHODS), hint="Who answers.")
-        page.bind(methods, partial(session.set_setting, "method"), lambda: session.state.method)
-        page.add_choice(
-            "Keep least",
-            "fl-objective",
-            OBJECTIVES,
-            partial(session.set_setting, "objective"),
-            lambda: session.state.objective,
-            hint="Power in watts, or the paper's effort: for all answers, comparisons, sweeps and swims.",
-        )
-        self._origin = gui.add_html("")
+        self._picker = ModePicker(gui, page, 176, "fl-modes")
+        self._table = gui.add_html("")
         self._settings = {
             key: page.bind_number(
                 gui.add_slider(label, ends[0], ends[1], step, DRAWN[key], hint=hint),
@@ -62,8 +52,6 @@ class ModesTab:
                 ("gamma", "Effort weight γ", GAMMA_RANGE, 0.005, 4, weight),
             )
         }
-        self._picker = ModePicker(gui, page, 250, "fl-modes")
-        self._table = gui.add_html("")
         self._play = page.add_button(
             "Play the refinement",
             page.answering.play,
@@ -71,6 +59,7 @@ class ModesTab:
             hint="Levenberg-Marquardt from the best raw candidate, step by step; then the answer.",
         )
         self._step = gui.add_html("")
+        self._origin = gui.add_html("")
         self._proposals = ProposalPanel(gui, page)
 
     def _setting(self, key: str) -> float:

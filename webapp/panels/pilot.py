@@ -82,28 +82,27 @@ def _side(axes: Pad, left: float) -> str:
 
 
 class PilotPanel:
-    """Widgets of one folder."""
+    """The stick and its settings."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
         policies = "Come closest, keep the direction, or serve axes by priority, heave first."
-        with gui.add_folder("Steer by hand", expand_by_default=False):
-            self._axes = gui.add_dropdown("Stick for", tuple(PADS), hint="What up and sideways mean.")
-            page.on_change(self._axes, lambda _: None)
-            self._spring = gui.add_checkbox(
-                "Spring back", True, hint="Let go, and what was asked before comes back."
-            )
-            page.on_change(self._spring, lambda _: None)
-            self._pad = gui.add_html("")
-            add_channel(gui, CHANNEL, self._steer)
-            grips = "Handles on the blue arrows in the view, for the force and the torque."
-            page.bind_display(gui.add_checkbox("Drag in 3D (G)", False, hint=grips), "grips")
-            page.bind(
-                gui.add_dropdown("Out of reach", KINDS, hint=policies),
-                partial(page.session.set_setting, "policy"),
-                lambda: page.session.state.policy,
-            )
+        self._axes = gui.add_dropdown("Stick for", tuple(PADS), hint="What up and sideways mean.")
+        page.on_change(self._axes, lambda _: None)
+        self._spring = gui.add_checkbox(
+            "Spring back", True, hint="Let go, and what was asked before comes back."
+        )
+        page.on_change(self._spring, lambda _: None)
+        self._pad = gui.add_html("")
+        add_channel(gui, CHANNEL, self._steer)
+        grips = "Handles on the blue arrows in the view, for the force and the torque."
+        page.bind_display(gui.add_checkbox("Drag in 3D (G)", False, hint=grips), "grips")
+        page.bind(
+            gui.add_dropdown("Out of reach", KINDS, hint=policies),
+            partial(page.session.set_setting, "policy"),
+            lambda: page.session.state.policy,
+        )
 
     def _steer(self, word: list[str]) -> None:
         """`left,up` as shares of the stick's way, or `off`."""

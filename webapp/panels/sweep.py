@@ -19,26 +19,25 @@ EVERY_S = 0.25
 
 
 class SweepPanel:
-    """Widgets of one folder."""
+    """Which axis, how far, and the plot."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
         self._drawn = 0.0
         self._ends = (-5.0, 5.0)
-        with gui.add_folder("Sweep an axis", expand_by_default=False):
-            self._axis = gui.add_dropdown(
-                "Sweep", AXIS_WORDS, hint="Which component of the target goes through the range."
-            )
-            page.on_change(self._axis, lambda _: self._fit_range())
-            page.bind_number(
-                gui.add_vector2("From, to", self._ends, step=0.05, hint="Ends of the range [N or N m]."),
-                self._set_ends,
-                lambda: self._ends,
-            )
-            self._play = page.add_button("Play the sweep", self._toggle, hint="To and fro until you stop it.")
-            self._plot = LinePlot(gui, FIN_LINES, "force of each fin [N]", height=170, widths=(2.0,))
-            self._said = gui.add_html("")
+        self._axis = gui.add_dropdown(
+            "Sweep", AXIS_WORDS, hint="Which component of the target goes through the range."
+        )
+        page.on_change(self._axis, lambda _: self._fit_range())
+        page.bind_number(
+            gui.add_vector2("From, to", self._ends, step=0.05, hint="Ends of the range [N or N m]."),
+            self._set_ends,
+            lambda: self._ends,
+        )
+        self._play = page.add_button("Play the sweep", self._toggle, hint="To and fro until you stop it.")
+        self._plot = LinePlot(gui, FIN_LINES, "force of each fin [N]", height=170, widths=(2.0,))
+        self._said = gui.add_html("")
 
     def _toggle(self) -> None:
         sweep = self._page.sweep

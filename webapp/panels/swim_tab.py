@@ -5,55 +5,117 @@ from typing import Any
 
 import viser
 
-from finlab.sim import PLANTS, SHIPPED, Trajectory
-from webapp.handles import hold_kind, option_index, put
+from finlab.sim import PLANTS, SHIPPED
+from webapp.handles import put
+from webapp.markup.picking import marker
 from webapp.markup.scenario import scenario_card
 from webapp.markup.swim_card import swim_card
 from webapp.page import Page
 from webapp.panels.damage import FinButtons
-from webapp.panels.timeline import Timeline
 from webapp.session.files import read_path
 from webapp.session.scenarios import SCENARIOS
-from webapp.session.state import AXIS_WORDS, COMPARED
+from webapp.session.state import COMPARED
 from webapp.session.swim_plan import ALONE, CONTROLLERS, NUMBERS, OWN, SPEEDS
 
 
-class SwimTab:
-    """Widgets of one tab, and the window with the plots."""
+class SwimPanel:
+    """A panel with settings of swims."""
+
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
+        """Nothing is built yet."""
+        self._page, self._gui = page, gui
+
+    def _bind(self, key: str, widget: Any, live: bool = False, digits: int | None = None) -> None:
+        """A widget for a setting of swims; what is `live` acts on the robots that swim, too. Numbers show
+        so many digits behind the point."""
+        session = self._page.session
+        act = partial(self._meet, key) if live else partial(session.set_swim, key)
+
+        def value() -> Any:
+            return getattr(session.swim, key)
+
+        if digits is None:
+            self._page.bind(widget, act, value)
+        else:
+            self._page.bind_number(widget, act, value, digits)
+
+    def _meet(self, key: str, value: Any) -> None:
+        """Another water or buoyancy, at once."""
+        session = self._page.session
+        session.set_swim(key, value)
+        self._page.swimming.meet(session.swim.water, session.swim.truth["buoyancy"])
+
+
+class ScenarioPanel(SwimPanel):
+    """What is swum, in which water, by whom."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
-        self._page, self._gui = page, gui
-        self._own: Trajectory | None = None
+        super().__init__(gui, page)
         day = "A day that is not as the designer assumed; it sets path, water, body, sensors and fins."
         self._bind("scenario", gui.add_dropdown("Scenario", tuple(SCENARIOS), hint=day), live=True)
         self._about = gui.add_html("")
         self._path = gui.add_dropdown("Path", tuple(SHIPPED), hint="Where to swim.")
         self._bind("path", self._path)
         rival = "A second robot on the same path, with another method."
-        self._bind("method", gui.add_dropdown("Method", COMPARED, hint="Who allocates, ten times a second."))
+        who = "Who allocates, ten times a second."
+        self._bind("method", gui.add_dropdown("Swim with", COMPARED, hint=who))
         self._bind("rival", gui.add_dropdown("Beside", (ALONE, *COMPARED), hint=rival))
+        self._add_more()
+
+    def _add_more(self) -> None:
+        gui, page = self._gui, self._page
+        with gui.add_folder("More", expand_by_default=False):
+            steers = "Tracking learns the current and other forces; waypoint is the paper's way."
+            self._bind("controller", gui.add_dropdown("Controller", CONTROLLERS, hint=steers))
+            forces = "The fin law, its ripple, or what no layout says: soft fins, jets, inflow, offsets."
+            self._bind("plant", gui.add_dropdown("Fin forces", tuple(PLANTS), hint=forces))
+            for key, label, step, hint in (
+                ("pack_wh", "Battery [Wh]", 1.0, "What is in it, for how long and how far it lasts."),
+                (
+                    "electronics_w",
+                    "Other load [W]",
+                    0.5,
+                    "Computer, sensors, lights: what takes power besides the fins.",
+                ),
+            ):
+                first = getattr(page.session.swim, key)
+                self._bind(key, gui.add_number(label, first, step=step, hint=hint), digits=3)
+            follow = gui.add_checkbox("Follow", False, hint="The camera goes along with the first robot.")
+            page.on_change(follow, page.scenery.swim.look)
+            page.add_upload(
+                "Open a path (CSV)",
+                self._take_path,
+                icon=viser.Icon.ROUTE,
+                mime_type=".csv",
+                hint="A table with the columns t [s], x, y, z [m].",
+            )
+
+    def _take_path(self, name: str, content: bytes) -> None:
+        self._page.swimming.own_path = read_path(name, content)
+        put(self._path, options=(*SHIPPED, OWN))
+        self._page.session.set_swim("path", OWN)
+
+    def refresh(self) -> None:
+        """Say what is true and what the robot believes."""
+        put(self._about, content=scenario_card(self._page.session.swim))
+
+
+class RunPanel(SwimPanel):
+    """Start, stop, and what can go wrong at any moment."""
+
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
+        """Build the widgets."""
+        super().__init__(gui, page)
         self._add_run()
         self._add_disturbances()
-        self._card = gui.add_html("")
-        keeps = {"Keep this swim": page.swimming.keep, "Forget it": page.swimming.forget_kept}
-        page.add_buttons("Compare", keeps, hint="Keep it in orange, and swim again with something changed.")
-        files = {
-            "Table (CSV)": page.swim_files.table,
-            "Plots (PNG)": page.swim_files.pictures,
-            "Film (GIF)": page.swim_files.animation,
-        }
-        page.add_buttons(
-            "Save", files, hint="The log with units, pictures, an animation; made on the server."
-        )
-        self._making = gui.add_progress_bar(0.0, visible=False)
-        self._add_more()
-        self._timeline = Timeline(gui, page)
 
     def _add_run(self) -> None:
         page = self._page
+        gui = self._gui
+        gui.add_html(marker("fl-primary"))
+        page.add_button("Start", self._start, icon=viser.Icon.PLAYER_PLAY, hint="From the beginning.")
         runs = {
-            "Start": self._start,
             "Pause": self._hold,
             "Go on": self._hold,
             "Step": page.swimming.step,
@@ -85,68 +147,12 @@ class SwimTab:
             slider = self._gui.add_slider(label, *NUMBERS[key], step, 0.0, hint=hint)
             self._bind(key, slider, live=True, digits=3)
 
-    def _add_more(self) -> None:
-        gui, page = self._gui, self._page
-        with gui.add_folder("More", expand_by_default=False):
-            steers = "Tracking learns the current and other forces; waypoint is the paper's way."
-            self._bind("controller", gui.add_dropdown("Controller", CONTROLLERS, hint=steers))
-            forces = "The fin law, its ripple, or what no layout says: soft fins, jets, inflow, offsets."
-            self._bind("plant", gui.add_dropdown("Fin forces", tuple(PLANTS), hint=forces))
-            for key, label, step, hint in (
-                ("pack_wh", "Battery [Wh]", 1.0, "What is in it, for how long and how far it lasts."),
-                (
-                    "electronics_w",
-                    "Other load [W]",
-                    0.5,
-                    "Computer, sensors, lights: what takes power besides the fins.",
-                ),
-            ):
-                first = getattr(page.session.swim, key)
-                self._bind(key, gui.add_number(label, first, step=step, hint=hint), digits=3)
-            wrench = "Asked in blue, delivered in green, of the first robot."
-            self._axis = gui.add_dropdown("Plot the wrench of", AXIS_WORDS, hint=wrench)
-            hold_kind(self._axis)
-            follow = gui.add_checkbox("Follow", False, hint="The camera goes along with the first robot.")
-            page.on_change(follow, page.scenery.swim.look)
-            page.add_upload(
-                "Open a path (CSV)",
-                self._take_path,
-                icon=viser.Icon.ROUTE,
-                mime_type=".csv",
-                hint="A table with the columns t [s], x, y, z [m].",
-            )
-
-    def _bind(self, key: str, widget: Any, live: bool = False, digits: int | None = None) -> None:
-        """A widget for a setting of swims; what is `live` acts on the robots that swim, too. Numbers show
-        so many digits behind the point."""
-        session = self._page.session
-        act = partial(self._meet, key) if live else partial(session.set_swim, key)
-
-        def value() -> Any:
-            return getattr(session.swim, key)
-
-        if digits is None:
-            self._page.bind(widget, act, value)
-        else:
-            self._page.bind_number(widget, act, value, digits)
-
-    def _meet(self, key: str, value: Any) -> None:
-        """Another water or buoyancy, at once."""
-        session = self._page.session
-        session.set_swim(key, value)
-        self._page.swimming.meet(session.swim.water, session.swim.truth["buoyancy"])
-
-    def _take_path(self, name: str, content: bytes) -> None:
-        self._own = read_path(name, content)
-        put(self._path, options=(*SHIPPED, OWN))
-        self._page.session.set_swim("path", OWN)
-
     def _hold(self) -> None:
         self._page.swimming.set_running(not self._page.swimming.running)
 
     def _start(self) -> None:
         session = self._page.session
-        self._page.swimming.start(session.swim.plan(session.state, self._own))
+        self._page.swimming.start(session.swim.plan(session.state, self._page.swimming.own_path))
 
     def refresh(self) -> None:
         """Write how the swim goes."""
@@ -157,11 +163,31 @@ class SwimTab:
         names = swimmers[0].fins if swimmers else self._page.session.state.layout.names
         lost = swimmers[0].shown.lost if swimmers else self._page.session.state.failed
         paused = swimming.active and not swimming.running and not swimming.done
-        put(self._about, content=scenario_card(settings))
-        put(self._run, options=("Start", "Go on" if paused else "Pause", "Step", "End"))
+        put(self._run, options=("Go on" if paused else "Pause", "Step", "End"))
         self._fins.refresh(names, lost)
-        put(self._card, content=swim_card(swimming, settings))
+
+
+class SwimCardPanel:
+    """What the swim took, and what can be taken home of it."""
+
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
+        """Build the widgets."""
+        self._page = page
+        self._card = gui.add_html("")
+        keeps = {"Keep this swim": page.swimming.keep, "Forget it": page.swimming.forget_kept}
+        page.add_buttons("Compare", keeps, hint="Keep it in orange, and swim again with something changed.")
+        files = {
+            "Table (CSV)": page.swim_files.table,
+            "Plots (PNG)": page.swim_files.pictures,
+            "Film (GIF)": page.swim_files.animation,
+        }
+        page.add_buttons(
+            "Save", files, hint="The log with units, pictures, an animation; made on the server."
+        )
+        self._making = gui.add_progress_bar(0.0, visible=False)
+
+    def refresh(self) -> None:
+        """Write the figures."""
+        put(self._card, content=swim_card(self._page.swimming, self._page.session.swim))
         making = self._page.swim_files
         put(self._making, visible=bool(making.making), value=round(100.0 * making.share, 1))
-        self._timeline.axis = option_index(self._axis)
-        self._timeline.refresh()

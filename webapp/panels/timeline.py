@@ -1,4 +1,4 @@
-"""A window over the view while robots swim: a slider of time, and plots of what happens."""
+"""What happens while robots swim: a slider of time, and plots."""
 
 import time
 
@@ -6,7 +6,8 @@ import numpy as np
 import viser
 
 from finlab.arrays import Array
-from webapp.handles import Changes, put
+from webapp.handles import Changes, hold_kind, option_index, put
+from webapp.markup.picking import marker
 from webapp.page import Page
 from webapp.panels.line_plot import FIN_LINES, LinePlot, top_of, with_cursor
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS
@@ -22,10 +23,6 @@ SMALL = 0.01
 """What the vertical axes show at least."""
 PLOT_PX = 78
 """Height of a plot [px]."""
-SIZE_PX = (960, 304)
-"""Width and height of the window [px]."""
-EDGE_PX = 12
-"""Between the window and the edges of the view [px]."""
 STEPS = (5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 90.0, 120.0, 180.0, 240.0)
 """Where the axes of time may end [s]."""
 CERTAIN = 114.0
@@ -37,35 +34,36 @@ SMOOTH = 1.0
 
 
 class Timeline:
-    """Widgets of the window, and the plots."""
+    """The slider and the plots."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build it, hidden."""
-        self._page = page
-        self.axis = 0
-        """Which axis of the wrench is plotted."""
-        self._window = gui.add_panel(visible=False)
-        with self._window.add_tab("Swim over time", viser.Icon.CHART_LINE):
-            gui.add_html("<div class='fl-timeline'></div>")
-            hint, swimming = "Hold the swim, and look at any moment of it again.", page.swimming
-            self._slider = page.bind_number(
-                gui.add_slider("At [s]", 0.0, 90.0, 0.1, 0.0, hint=hint),
-                swimming.look_at,
-                lambda: swimming.seen_time if swimming.swimmers else 0.0,
-                digits=1,
-            )
-            self._plots = SwimPlots(gui)
-        width, height = SIZE_PX
-        self._window.float(x=EDGE_PX, y=-EDGE_PX, width=width, height=height)
+        """Build the widgets."""
+        self._page, swimming = page, page.swimming
+        gui.add_html(marker("fl-timeline"))
+        self._none = gui.add_html("<div class='fl dim'>Start a swim, and its plots stand here.</div>")
+        hint = "Hold the swim, and look at any moment of it again."
+        self._slider = page.bind_number(
+            gui.add_slider("At [s]", 0.0, 90.0, 0.1, 0.0, hint=hint),
+            swimming.look_at,
+            lambda: swimming.seen_time if swimming.swimmers else 0.0,
+            digits=1,
+        )
+        wrench = "Asked in blue, delivered in green, of the first robot."
+        self._axis = gui.add_dropdown("Plot the wrench of", AXIS_WORDS, hint=wrench)
+        hold_kind(self._axis)
+        self._plots = SwimPlots(gui)
 
     def refresh(self) -> None:
         """Write the time, and draw."""
         swimming = self._page.swimming
-        put(self._window, visible=bool(swimming.swimmers))
-        if not swimming.swimmers:
-            return
-        put(self._slider, max=round(swimming.swimmers[0].duration_s, 1))
-        self._plots.refresh(swimming, self.axis)
+        there = bool(swimming.swimmers)
+        put(self._none, visible=not there)
+        put(self._slider, visible=there)
+        put(self._axis, visible=there)
+        self._plots.show(there)
+        if there:
+            put(self._slider, max=round(swimming.swimmers[0].duration_s, 1))
+            self._plots.refresh(swimming, option_index(self._axis))
 
 
 class SwimPlots:
@@ -79,9 +77,7 @@ class SwimPlots:
 
         def plot(colors: tuple[str, ...], title: str, below: str = "") -> LinePlot:
             height = PLOT_PX + (24 if below else 0)
-            return LinePlot(
-                gui, (CURSOR, *colors), title, below, height=height, widths=(1.0, 1.5), visible=True
-            )
+            return LinePlot(gui, (CURSOR, *colors), title, below, height=height, widths=(1.0, 1.5))
 
         self._error = plot(robots, "off [cm]")
         self._depth = plot(robots, "z off [cm]")
@@ -89,6 +85,11 @@ class SwimPlots:
         self._wrench = plot(wrench, "surge [N]", "time [s]")
         self._force = plot(FIN_LINES, "fins [N]", "time [s]")
         self._broken = plot(FIN_LINES, "broken %", "time [s]")
+
+    def show(self, visible: bool) -> None:
+        """Show all plots, or none."""
+        for plot in (self._error, self._depth, self._power, self._wrench, self._force, self._broken):
+            plot.show(visible)
 
     def refresh(self, swimming: Swimming, axis: int) -> None:
         """Draw errors, power, one axis of the wrench, forces and the monitor's doubts, but no more often than

@@ -35,14 +35,14 @@ SCALES = {_scale_entry(newtons): newtons for newtons in (0.0, *NEWTONS)}
 """Entries of the arrow scale and their forces [N]."""
 
 
-class ViewTab:
+class ViewPanel:
     """Switches and camera."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
         looks = {view: partial(page.scenery.robot.look_from, view) for view in CAMERAS}
-        page.add_buttons("Camera", looks, hint="Keys 1, 2, 3, 4.")
+        page.add_buttons("Camera", looks, hint="Keys 1, 2, 3, 4; F frames what is selected.")
         speed = gui.add_slider("Motion speed", 0.05, 1.0, 0.05, 0.5, hint="1 is real time.")
         page.bind_number(
             speed, partial(page.session.set_display, "speed"), lambda: page.session.display.speed, digits=3

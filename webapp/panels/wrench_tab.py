@@ -1,4 +1,4 @@
-"""The question and its answer: target wrench, failures, bars, and the table of commands."""
+"""The question and its answer: the target wrench, bars, failures, and the table of commands."""
 
 from functools import partial
 from html import escape
@@ -7,56 +7,53 @@ import numpy as np
 import viser
 
 from finlab.allocation.policy import AXES
-from finlab.arrays import Array
 from webapp.handles import Changes, put
 from webapp.markup.answer import fin_table, wrench_bars
 from webapp.markup.picking import marker
 from webapp.markup.words import authority_sentence, rest_sentence, three_digits
 from webapp.page import Page
-from webapp.panels.damage import DamagePanel, FinButtons
-from webapp.panels.modes_tab import ModePicker
-from webapp.panels.pilot import PilotPanel
-from webapp.panels.sweep import SweepPanel
+from webapp.panels.damage import FinButtons
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS
 from webapp.session.targets import PRESETS, axis_reach, full_thrust, slider_end
 from webapp.viser_internals import put_marks
 
 
-class WrenchTab:
-    """Target sliders with what comes of them below."""
+class FinsPanel:
+    """What each fin does, and which have failed."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
-        self._target = TargetPanel(gui, page)
         self._failures = FinButtons(
             page,
             "Fail a fin",
-            "Press a number to fail or repair a fin; F does it to the selected one.",
+            "Press a number to fail or repair a fin; X does it to the selected one.",
             "fl-fails",
             page.session.toggle_failure,
         )
-        self._bars = gui.add_html("")
         self._table = gui.add_html("")
-        self._picker = ModePicker(gui, page, 150, "fl-wrench-modes")
-        self._damage = DamagePanel(gui, page)
-        self._pilot = PilotPanel(gui, page)
-        self._sweep = SweepPanel(gui, page)
 
     def refresh(self) -> None:
-        """Write target, failures and answer."""
-        page, state = self._page, self._page.session.state
-        self._target.refresh()
+        """Write failures and commands."""
+        state, answer = self._page.session.state, self._page.shown
         self._failures.refresh(state.layout.names, state.failed)
-        self._picker.refresh()
-        self._damage.refresh()
-        self._pilot.refresh()
-        self._sweep.refresh()
-        answer = page.shown
-        given = None if answer is None else answer.wrench
-        put(self._bars, content=wrench_bars(state.target, given, self._sentence()))
         fitting = answer if answer is not None and answer.layout.names == state.layout.names else None
-        put(self._table, content=fin_table(state, fitting, full_thrust(state.able), page.session.selected))
+        table = fin_table(state, fitting, full_thrust(state.able), self._page.session.selected)
+        put(self._table, content=table)
+
+
+class AnswerPanel:
+    """What is asked, what the fins give, and what is left undone."""
+
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
+        """Build it, empty."""
+        self._page, self._bars = page, gui.add_html("")
+
+    def refresh(self) -> None:
+        """Write the answer."""
+        answer = self._page.shown
+        given = None if answer is None else answer.wrench
+        put(self._bars, content=wrench_bars(self._page.session.state.target, given, self._sentence()))
 
     def _sentence(self) -> str:
         """What is left undone, and why."""
@@ -69,7 +66,7 @@ class WrenchTab:
                 "; ".join((f"{100 * answer.scale:.0f} % of what is asked", *answer.binding, *answer.notes))
             )
             sentence = f"{sentence} {told}."
-        blind = authority_sentence(state.layout, state.failed, self._target.reach)
+        blind = authority_sentence(state.layout, state.failed, axis_reach(state.able, state.failed))
         return sentence if blind is None else f"<span class='missing'>{blind}</span> {sentence}"
 
 
@@ -100,16 +97,11 @@ class TargetPanel:
             lambda: session.state.target[axis],
         )
 
-    @property
-    def reach(self) -> Array:
-        """Largest size of each component with the others free (6,) [N, N m]."""
-        state = self._page.session.state
-        return axis_reach(state.able, state.failed)
-
     def refresh(self) -> None:
         """Write the target, the sliders' ends and the marks on them."""
         state = self._page.session.state
-        for slider, value, reach in zip(self._sliders, state.target, self.reach, strict=True):
+        most = axis_reach(state.able, state.failed)  # with the others free
+        for slider, value, reach in zip(self._sliders, state.target, most, strict=True):
             end = slider_end(float(reach))
             put(slider, min=min(-end, value), max=max(end, value))
         ranges, error = self._page.ranging.findings, self._page.ranging.error
@@ -124,7 +116,7 @@ class TargetPanel:
                 continue
             low, high = float(ranges.low[k]), float(ranges.high[k])
             put_marks(slider, _marks(low, high))
-            put(slider, hint=_hint(k, low, high, float(self.reach[k])))
+            put(slider, hint=_hint(k, low, high, float(most[k])))
 
 
 def _marks(low: float, high: float) -> tuple[tuple[float, str], ...]:

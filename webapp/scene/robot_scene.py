@@ -80,6 +80,17 @@ class RobotScene:
         """Move the camera to one of `CAMERAS`."""
         aim_camera(self._client, np.array(CAMERAS[view]), np.array([0.0, 0.0, 0.03]))
 
+    def frame(self) -> None:
+        """Bring the selected fin, or the whole robot, into the middle of the view, seen from where it is."""
+        session, camera = self._session, self._client.camera
+        layout = session.state.layout
+        hull = hull_of(layout)
+        center, size = np.array(hull.center), 2.6 * float(np.linalg.norm(hull.half))
+        if session.selected is not None:
+            center, size = np.array(layout.fins[layout.index(session.selected)].position), 0.55
+        way = np.asarray(camera.position) - np.asarray(camera.look_at)
+        aim_camera(self._client, center + way / max(float(np.linalg.norm(way)), 1e-6) * size, center)
+
     def refresh(
         self,
         allocation: Allocation | None,

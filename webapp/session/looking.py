@@ -7,13 +7,54 @@ from finlab.layout import Layout
 from webapp.session.core import Core
 from webapp.session.files import shipped
 from webapp.session.search_request import SearchRequest
+from webapp.session.state import chosen
 
+TASKS = ("Design", "Allocate", "Simulate", "Export")
+"""What a page can be used for."""
+DRAWERS: dict[str, tuple[str, ...]] = {
+    "Design": ("Reach", "Improve"),
+    "Allocate": ("Candidates", "Comparison", "Sweep"),
+    "Simulate": ("Swim over time",),
+    "Export": (),
+}
+"""What lies in the drawer of each task."""
 PINNED = "pinned"
 """Name of the layout that was put aside, among those to compare with."""
 
 
 class Looking(Core):
-    """Modes, samples, overlays, switches, and the layout to compare with."""
+    """Tasks, modes, samples, overlays, switches, and the layout to compare with."""
+
+    task = "Allocate"
+    """Which of `TASKS` is open."""
+    folded = False
+    """Whether of the drawer only its tabs are seen."""
+    _drawers: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def opened(self) -> dict[str, str]:
+        """What lies uppermost in the drawer of each task; nothing where a task has none."""
+        return {task: names[0] if names else "" for task, names in DRAWERS.items()} | dict(self._drawers)
+
+    @property
+    def drawer(self) -> str | None:
+        """What of the drawer is seen; None where it is folded, or the task has none."""
+        return None if self.folded else self.opened[self.task] or None
+
+    def show_task(self, name: str) -> None:
+        """Open a task."""
+        self.task = chosen(name, "task", TASKS)
+
+    def show_drawer(self, name: str) -> None:
+        """Open the drawer at one of its tabs, and the task to which it belongs."""
+        self.task = next((task for task, names in DRAWERS.items() if name in names), self.task)
+        chosen(name, "drawer", DRAWERS[self.task])
+        self._drawers = (*(pair for pair in self._drawers if pair[0] != self.task), (self.task, name))
+        self.folded = False
+
+    def fold_drawer(self) -> None:
+        """Leave only the tabs of the drawer, or open it again."""
+        self.folded = not self.folded
 
     def show_mode(self, index: int) -> None:
         """Show one of the answer's modes on the robot."""

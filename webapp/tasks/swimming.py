@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from finlab.allocation.allocator import Allocator
 from finlab.errors import FinlabError
-from finlab.sim import Water
+from finlab.sim import Trajectory, Water
 from webapp.session.state import State
 from webapp.session.swim_plan import Plan
 from webapp.tasks.background import Newest
@@ -51,6 +51,8 @@ class Swimming:
         """The moment that is looked at again [s]; None for the newest one."""
         self.kept: Recorded | None = None
         """A swim that was put aside to compare others with."""
+        self.own_path: Trajectory | None = None
+        """A path that was uploaded."""
         self._acts: deque[Callable[[Swimmer], None]] = deque()
 
     @property

@@ -1,0 +1,119 @@
+"""Everything that can be done by a key or from the list of commands (Ctrl+K): one table of both."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import viser
+
+from webapp.page import Page
+from webapp.session.looking import TASKS
+from webapp.session.state import AXIS_WORDS, OBJECTIVES
+from webapp.session.targets import PRESETS
+from webapp.viser_internals import run_script
+
+CTRL, CTRL_SHIFT, ALT = "cmd/ctrl", "cmd/ctrl+shift", "alt"
+WRITTEN = {CTRL: "Ctrl+", CTRL_SHIFT: "Ctrl+Shift+", ALT: "Alt+", "delete": "Del", "escape": "Esc"}
+"""How keys are written for people."""
+
+
+class Command(NamedTuple):
+    """One thing to do."""
+
+    group: str
+    """What it is about."""
+    label: str
+    """In words."""
+    act: Callable[[], object]
+    """Does it."""
+    key: str = ""
+    """As viser calls it; none where it is done from the list alone."""
+    modifier: str = ""
+    """What is held with it."""
+
+    @property
+    def keys(self) -> str:
+        """The keys for people."""
+        return WRITTEN.get(self.modifier, "") + WRITTEN.get(self.key, self.key) if self.key else ""
+
+
+def commands(page: Page) -> list[Command]:
+    """All commands of one page. The camera owns W A S D Q E and the arrow keys."""
+    session, robot = page.session, page.scenery.robot
+
+    def fail_selected() -> None:
+        session.toggle_failure(session.selected or session.state.layout.names[0])
+
+    def toggle(key: str) -> None:
+        session.set_display(key, not getattr(session.display, key))
+
+    def compare() -> None:
+        session.show_drawer("Comparison")
+        page.comparison.start(session.state)
+
+    def swim_on() -> None:
+        page.swimming.set_running(not page.swimming.running)
+
+    def keys() -> None:
+        run_script(page.client.gui, "finlabFrame.sheet();")
+
+    return [
+        *(
+            Command("Tasks", task, partial(session.show_task, task), str(k + 1), ALT)
+            for k, task in enumerate(TASKS)
+        ),
+        Command("Tasks", "Fold or open the drawer", session.fold_drawer, "J", CTRL),
+        Command("Design", "Undo", session.undo, "Z", CTRL),
+        Command("Design", "Redo", session.redo, "Z", CTRL_SHIFT),
+        Command("Design", "Select the next fin", session.select_next, "N"),
+        Command("Design", "Select nothing", partial(session.select, None), "escape"),
+        Command("Design", "Duplicate the selected fin", session.duplicate_fin, "D", CTRL),
+        Command("Design", "Mirror the selected fin", session.mirror_fin, "M"),
+        Command("Design", "Delete the selected fin", session.delete_fin, "delete"),
+        Command("Design", "Add a fin", session.add_fin, "I"),
+        Command("Design", "Unlink the selected fin from its mirror image", session.unlink_fin),
+        Command("Design", "Stick the selected fin to the hull", session.stick_fin),
+        Command("Design", "Pin this layout to compare with", session.pin),
+        Command("Design", "Start over", session.start_over),
+        Command("Wrench", "Fail or repair the selected fin", fail_selected, "X"),
+        Command("Wrench", "Drag the wrench in 3D, or stop it", partial(toggle, "grips"), "G"),
+        *(Command("Wrench", f"Ask for: {name}", partial(session.set_preset, name)) for name in PRESETS),
+        *(
+            Command("Wrench", f"Ask for {word} alone", partial(session.set_only_axis, axis))
+            for axis, word in enumerate(AXIS_WORDS)
+        ),
+        *(
+            Command("Wrench", f"Keep least: {word}", partial(session.set_setting, "objective", word))
+            for word in OBJECTIVES
+        ),
+        Command("Wrench", "Compare the methods", compare),
+        Command("Wrench", "Play the refinement", page.answering.play),
+        Command("Wrench", "Stop the sweep", page.sweep.stop),
+        Command("Swim", "Swim: pause or go on", swim_on, "B"),
+        Command("Swim", "Swim: keep it to compare others with", page.swimming.keep),
+        Command("Swim", "Swim: back to the design", page.scenery.end_swim),
+        Command("View", "Frame what is selected", robot.frame, "F"),
+        *(
+            Command("View", f"Camera: {view}", partial(robot.look_from, view), key)
+            for view, key in (("3D", "1"), ("Top", "2"), ("Side", "3"), ("Front", "4"))
+        ),
+        Command("View", "Freeze or move the fins", partial(toggle, "frozen"), "P"),
+        Command("View", "Show or hide the fin graph", partial(toggle, "graph")),
+        Command("View", "Show or hide the centre of gravity", partial(toggle, "center")),
+        Command("View", "Dark or light theme", partial(toggle, "dark")),
+        Command("Help", "Tour: start, or next stop", session.next_stop, "T"),
+        Command("Help", "Show all keys", keys),
+        Command("Files", "Export the bundle for the robot", page.exports.bundle),
+    ]
+
+
+def register(gui: viser.GuiApi, page: Page, table: list[Command]) -> None:
+    """Let a browser have the commands."""
+    for command in table:
+        key: Any = command.key or None
+        modifier: Any = command.modifier or None
+        handle = gui.add_command(command.label, hotkey=key, modifier=modifier)
+
+        @handle.on_trigger
+        async def _triggered(_event: Any, act: Callable[[], object] = command.act) -> None:
+            page.do(act)

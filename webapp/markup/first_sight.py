@@ -1,0 +1,55 @@
+"""What lies over the page for a while: the card of the first visit, and the sheet of all keys."""
+
+from collections.abc import Sequence
+from html import escape
+
+from webapp.markup.picking import send
+
+FRAME = "fl-frame"
+"""Channel on which the frame is told what was pressed in it."""
+TRIES = (
+    ("Ask for a wrench", "Drag Fx: the fins change, and green follows blue.", "task,Allocate"),
+    ("Move a fin", "Select one and pull its arrows; what the robot can do changes with it.", "task,Design"),
+    ("Break a fin while it swims", "Start, press its number, and see the others take over.", "task,Simulate"),
+)
+"""Three things to try: in a word, in a sentence, and where."""
+
+
+def tell(word: str) -> str:
+    """A line of script that tells the frame a word; a number behind it makes each one new."""
+    return send(FRAME, f"`{word},${{Date.now()}}`")
+
+
+def welcome() -> str:
+    """The card of the first visit; `habits.js` shows it once."""
+    tries = "".join(
+        f'<li><button onclick="{tell(word)} finlabFrame.met()">{escape(title)}</button>'
+        f"<span>{escape(text)}</span></li>"
+        for title, text, word in TRIES
+    )
+    return (
+        "<section class='fl fl-welcome' aria-label='Welcome'><h2>finlab</h2>"
+        "<p>A bench for robots that swim with fins. Say which force and torque the body shall feel; "
+        "every fin is told how far, how fast and in which direction to flap, and the figures say what is "
+        f"left undone.</p><ol>{tries}</ol><div class='row'>"
+        f'<button class="primary" onclick="{tell("tour,")} finlabFrame.met()">Take the tour</button>'
+        "<button onclick='finlabFrame.met()'>Close</button></div></section>"
+    )
+
+
+def key_sheet(rows: Sequence[tuple[str, str, str]]) -> str:
+    """The sheet of keys, from groups, labels and keys; rows without a key are left out."""
+    groups: dict[str, list[str]] = {}
+    camera = [("View", "Move the camera", "W A S D Q E, arrows")]
+    about = [("Help", "All commands", "Ctrl+K"), ("Help", "This sheet", "?")]
+    for group, label, keys in (*rows, *camera, *about):
+        if keys:
+            keys = "Ctrl+Y, Ctrl+Shift+Z" if label == "Redo" else keys
+            groups.setdefault(group, []).append(f"<dt><kbd>{escape(keys)}</kbd></dt><dd>{escape(label)}</dd>")
+    lists = "".join(
+        f"<div><h3>{escape(group)}</h3><dl>{''.join(found)}</dl></div>" for group, found in groups.items()
+    )
+    return (
+        "<div class='fl fl-sheet' role='dialog' aria-label='Keys' onclick='finlabFrame.sheet(false)'>"
+        f"<div class='sheet'><h2>Keys</h2><div class='groups'>{lists}</div></div></div>"
+    )

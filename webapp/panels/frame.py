@@ -1,0 +1,162 @@
+"""The frame: a bar above, a list at the left, an inspector at the right, a drawer below, by task.
+
+Every region is a folder of viser's that a style takes out of its panel and puts into its place
+(`markup/frame.css`); which of them are there, and which sections in them, is one more style element, written
+here. So all widgets stay mounted, and a change of task is one message.
+"""
+
+from collections.abc import Callable
+from html import escape
+from importlib.resources import files
+
+import viser
+
+from webapp.handles import put
+from webapp.markup.first_sight import FRAME, tell
+from webapp.markup.picking import add_channel, marker
+from webapp.page import Page, Panel
+from webapp.panels.places import DRAWER, LEFT, PLACES, REGIONS, RIGHT, Place
+from webapp.panels.status import Corner
+from webapp.session.looking import DRAWERS
+from webapp.theme import ASKED, DELIVERED, MISSING, css
+from webapp.viser_internals import run_script
+
+HABITS = files("webapp").joinpath("habits.js").read_text("utf-8")
+"""Script that mends what viser's page does otherwise."""
+_VARIABLES = (
+    f":root {{ --fl-asked: {css(ASKED)}; --fl-delivered: {css(DELIVERED)}; --fl-missing: {css(MISSING)}; }}"
+)
+_SHEETS = "".join(
+    files("webapp.markup").joinpath(name).read_text("utf-8") for name in ("style.css", "frame.css")
+)
+STYLE = f"<style>{_VARIABLES}{_SHEETS}</style>"
+"""A style element, to be put into the page once."""
+PANES = "".join(
+    f"<button class='to-{region}' onclick='finlabFrame.pane(\"{region}\")'>{word}</button>"
+    for region, word in ((LEFT, "Fins"), (RIGHT, "Settings"), (DRAWER, "Plots"))
+)
+PANES = f"<nav class='fl-panes' aria-label='Regions'>{PANES}</nav>"
+"""On a narrow page one region is seen at a time; these choose it."""
+FOLDER = ".mantine-Paper-root:has(> div > div > div > div > .{})"
+"""Selector of the folder whose first element is a marker."""
+
+
+class Section:
+    """A panel in its place; it gives way to a sentence when it cannot be shown: no old figure stands under a
+    new name."""
+
+    def __init__(self, gui: viser.GuiApi, page: Page, place: Place, index: int) -> None:
+        """Build the panel, and take over the widgets that it binds to the session."""
+        self.place, self.marker, self._page = place, f"fl-at-{index}", page
+        with gui.add_folder(place.title, expand_by_default=not place.folded):
+            gui.add_html(marker(f"fl-section {self.marker}"))
+            self._sentence = gui.add_html("", visible=False)
+            with gui.add_folder(None) as self._folder:
+                self._panel = place.make(gui, page)
+        self._bound, page.bound = page.bound, []
+
+    def refresh(self) -> None:
+        """Write the session and the answer into it."""
+        try:
+            for write in self._bound:
+                write()
+            self._panel.refresh()
+        except Exception as error:
+            name = escape(self._page.session.state.layout.name)
+            text = f"<div class='fl missing'>This cannot be shown of {name}: {escape(str(error))}</div>"
+            put(self._sentence, content=text, visible=True)
+            put(self._folder, visible=False)
+            self._page.fault(error)
+        else:
+            put(self._folder, visible=True)
+            put(self._sentence, visible=False)
+
+
+class Frame:
+    """All regions of one page with their sections."""
+
+    def __init__(self, gui: viser.GuiApi, page: Page, over: str) -> None:
+        """Build everything; `over` is markup that may lie over the page for a while."""
+        self._page = page
+        gui.add_html(f"{STYLE}{marker('fl-chrome')}{over}{PANES}")
+        self._shown = gui.add_html("")
+        add_channel(gui, FRAME, self._hear)
+        self._corner = Corner(gui, page)
+        self._strip: viser.GuiHtmlHandle | None = None
+        self._sections: list[Section] = []
+        for region in REGIONS:
+            with gui.add_folder(region):
+                gui.add_html(marker(f"fl-region fl-{region}"))
+                if region == DRAWER:
+                    self._strip = gui.add_html("")
+                self._sections += [
+                    Section(gui, page, place, index)
+                    for index, place in enumerate(PLACES)
+                    if place.region == region
+                ]
+        run_script(gui, HABITS)
+
+    @property
+    def panels(self) -> tuple[list[Panel], list[Panel]]:
+        """All panels, and of these the ones that follow a swim."""
+        follow = [section for section in self._sections if section.place.swims]
+        return [self, self._corner, *self._sections], [self._corner, *follow]
+
+    def refresh(self) -> None:
+        """Show what belongs to the task."""
+        session = self._page.session
+        put(self._shown, content=_style(self._sections, session.task, session.drawer))
+        assert self._strip is not None
+        put(self._strip, content=_strip(session.task, session.opened[session.task], session.folded))
+
+    def _hear(self, word: list[str]) -> None:
+        """`task,name`, `drawer,name`, or one of the rest; a number behind it makes each word new."""
+        session = self._page.session
+        acts: dict[str, Callable[[str], object]] = {
+            "task": session.show_task,
+            "drawer": session.show_drawer,
+            "fold": lambda _: session.fold_drawer(),
+            "tour": lambda _: session.next_stop(),
+            "back": lambda _: session.previous_stop(),
+            "end": lambda _: session.end_tour(),
+        }
+        if word[0] in acts and len(word) > 1:
+            self._page.do(lambda: acts[word[0]](word[1]))
+
+
+def _style(sections: list[Section], task: str, drawer: str | None) -> str:
+    """Which regions are there, and which sections in them."""
+    there = {
+        section.marker
+        for section in sections
+        if task in section.place.tasks and (section.place.region != DRAWER or section.place.title == drawer)
+    }
+    regions = {section.place.region for section in sections if section.marker in there}
+    gone = [FOLDER.format(section.marker) for section in sections if section.marker not in there]
+    gone += [FOLDER.format(f"fl-{region}") for region in (LEFT, RIGHT) if region not in regions]
+    if not DRAWERS[task]:
+        gone.append(FOLDER.format(f"fl-{DRAWER}"))
+    counts = {
+        "left": LEFT in regions,
+        "right": RIGHT in regions,
+        "drawer": bool(DRAWERS[task]),
+        "open": drawer is not None,
+    }
+    variables = "".join(f"--has-{name}: {int(there)};" for name, there in counts.items())
+    return f"<style>:root {{ {variables} }} {', '.join(gone)} {{ display: none !important; }}</style>"
+
+
+def _strip(task: str, opened: str, folded: bool) -> str:
+    """The upper edge of the drawer: its handle, its tabs, and the button that folds it."""
+    tabs = "".join(
+        f"<button aria-pressed='{str(name == opened and not folded).lower()}' "
+        f'onclick="{tell(f"drawer,{name}")}">{escape(name)}</button>'
+        for name in DRAWERS[task]
+    )
+    word = "Open the drawer" if folded else "Fold the drawer"
+    fold = (
+        f"<button class='fold' aria-label='{word}' title='{word}' "
+        f'onclick="{tell("fold,")}">{"▴" if folded else "▾"}</button>'
+    )
+    handle = "" if folded else "<div class='fl-handle' title='drag to make the drawer taller'></div>"
+    return f"{handle}<nav class='fl-strip' aria-label='Drawer'>{tabs}{fold}</nav>"

@@ -1,0 +1,69 @@
+"""Which panel stands where: the one table of the frame. A panel is a class that takes `gui` and `page`."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import viser
+
+from webapp.page import Page, Panel
+from webapp.panels.compare_tab import ComparePanel
+from webapp.panels.damage import DamagePanel
+from webapp.panels.files_tab import FilesTab
+from webapp.panels.layout_tab import LayoutTab
+from webapp.panels.limits_tab import ImprovePanel, ReachPanel
+from webapp.panels.modes_tab import CandidatesPanel
+from webapp.panels.pilot import PilotPanel
+from webapp.panels.sweep import SweepPanel
+from webapp.panels.swim_tab import RunPanel, ScenarioPanel, SwimCardPanel
+from webapp.panels.timeline import Timeline
+from webapp.panels.top_bar import AnsweringBar, HistoryBar, RobotBar, TaskBar
+from webapp.panels.view_tab import ViewPanel
+from webapp.panels.wrench_tab import AnswerPanel, FinsPanel, TargetPanel
+from webapp.session.looking import TASKS
+
+TOP, LEFT, RIGHT, DRAWER, VIEW = REGIONS = ("top", "left", "right", "drawer", "view")
+"""The bar above all; the list at the left; the inspector at the right; the drawer below; over the view."""
+DESIGN, ALLOCATE, SIMULATE, EXPORT = TASKS
+
+
+class Place(NamedTuple):
+    """Where a panel stands."""
+
+    region: str
+    """One of `REGIONS`."""
+    tasks: tuple[str, ...]
+    """In which tasks it is there."""
+    title: str
+    """Its heading; in the drawer the name of its tab, which `DRAWERS` knows; nothing in the bar."""
+    make: Callable[[viser.GuiApi, Page], Panel]
+    """Builds it."""
+    swims: bool = False
+    """Whether it shows a swim, and is to follow it."""
+    folded: bool = False
+    """Whether only its heading is seen at first."""
+
+
+PLACES = (
+    Place(TOP, TASKS, "Robot", RobotBar),
+    Place(TOP, TASKS, "History", HistoryBar),
+    Place(TOP, TASKS, "Tasks", TaskBar),
+    Place(TOP, TASKS, "Answers", AnsweringBar),
+    Place(RIGHT, (DESIGN,), "Layout", LayoutTab),
+    Place(DRAWER, (DESIGN,), "Reach", ReachPanel),
+    Place(DRAWER, (DESIGN,), "Improve", ImprovePanel),
+    Place(LEFT, (ALLOCATE,), "Fins", FinsPanel),
+    Place(LEFT, (ALLOCATE,), "Damage a fin", DamagePanel, folded=True),
+    Place(RIGHT, (ALLOCATE,), "Wrench", TargetPanel),
+    Place(RIGHT, (ALLOCATE,), "Asked and delivered", AnswerPanel),
+    Place(RIGHT, (ALLOCATE,), "Steer by hand", PilotPanel, folded=True),
+    Place(DRAWER, (ALLOCATE,), "Candidates", CandidatesPanel),
+    Place(DRAWER, (ALLOCATE,), "Comparison", ComparePanel),
+    Place(DRAWER, (ALLOCATE,), "Sweep", SweepPanel),
+    Place(LEFT, (SIMULATE,), "Scenario", ScenarioPanel),
+    Place(RIGHT, (SIMULATE,), "Run", RunPanel, swims=True),
+    Place(RIGHT, (SIMULATE,), "Figures", SwimCardPanel, swims=True),
+    Place(DRAWER, (SIMULATE,), "Swim over time", Timeline, swims=True),
+    Place(RIGHT, (EXPORT,), "Files", FilesTab),
+    Place(VIEW, TASKS, "Display", ViewPanel, folded=True),
+)
+"""All panels, in the order in which they stand in their regions."""

@@ -1,0 +1,116 @@
+"""The bar above all: whose design it is, what can be undone, the tasks, who answers, and help."""
+
+from functools import partial
+from html import escape
+
+import viser
+
+from finlab.allocation.methods import METHODS
+from webapp.handles import put
+from webapp.markup.first_sight import tell
+from webapp.page import Page
+from webapp.session.looking import TASKS
+from webapp.session.state import OBJECTIVES
+from webapp.session.tour import STEPS
+
+PALETTE = (
+    "document.documentElement.dispatchEvent(new KeyboardEvent('keydown', "
+    "{ key: 'k', code: 'KeyK', ctrlKey: true, bubbles: true }))"
+)
+"""A line of script that opens the list of commands, as Ctrl+K does."""
+
+
+class RobotBar:
+    """The robot's name."""
+
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
+        """Build it."""
+        self._page, self._name = page, gui.add_html("")
+
+    def refresh(self) -> None:
+        """Write the name, and whether it has been changed since it was opened or saved."""
+        session = self._page.session
+        layout = session.state.layout
+        changed = "" if layout == session.saved else "<span class='dim'>edited</span>"
+        name = escape(layout.name)
+        put(self._name, content=f"<div class='fl-robot' title='{name}'><b>{name}</b>{changed}</div>")
+
+
+class HistoryBar:
+    """Undo and redo, by name; and the card of the tour."""
+
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
+        """Build the widgets."""
+        self._page, session = page, page.session
+        back, forth = viser.Icon.ARROW_BACK_UP, viser.Icon.ARROW_FORWARD_UP
+        self._undo = page.add_button("Undo", session.undo, icon=back, hint="Ctrl+Z")
+        self._redo = page.add_button("Redo", session.redo, icon=forth, hint="Ctrl+Y or Ctrl+Shift+Z")
+        self._card = gui.add_html("", visible=False)
+
+    def refresh(self) -> None:
+        """Write what can be undone, and where the tour is."""
+        history, stop = self._page.session.history, self._page.session.stop
+        for button, word, name in (
+            (self._undo, "Undo", history.undo_name),
+            (self._redo, "Redo", history.redo_name),
+        ):
+            put(button, label=f"{word}: {name}" if name else word, disabled=name is None)
+        put(self._card, visible=stop is not None, content="" if stop is None else tour_card(stop))
+
+
+class TaskBar:
+    """What is being done: one of four tasks."""
+
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
+        """Build it."""
+        self._page, self._tasks = page, gui.add_html("")
+
+    def refresh(self) -> None:
+        """Mark the task that is open."""
+        here = self._page.session.task
+        buttons = "".join(
+            f"<button {'aria-current=page ' if task == here else ''}"
+            f'onclick="{tell(f"task,{task}")}">{task}</button>'
+            for task in TASKS
+        )
+        put(self._tasks, content=f"<nav class='fl-tasks' aria-label='Tasks'>{buttons}</nav>")
+
+
+class AnsweringBar:
+    """Who answers, what is kept least, and where help is found."""
+
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
+        """Build the widgets."""
+        session = page.session
+        methods = gui.add_dropdown("Method", tuple(METHODS), hint="Who answers.")
+        page.bind(methods, partial(session.set_setting, "method"), lambda: session.state.method)
+        about = "Power in watts, or the paper's effort: for all answers, comparisons, sweeps and swims."
+        least = gui.add_dropdown("Keep least", OBJECTIVES, hint=about)
+        page.bind(least, partial(session.set_setting, "objective"), lambda: session.state.objective)
+        gui.add_html(
+            "<div class='fl-help'>"
+            f'<button title="all commands (Ctrl+K)" onclick="{PALETTE}">Commands</button>'
+            f'<button title="a tour in {len(STEPS)} stops (T)" '
+            f'onclick="{tell("tour,")}">Tour</button>'
+            '<button aria-label="Keys" title="all keys (?)" onclick="finlabFrame.sheet()">?</button></div>'
+        )
+
+    def refresh(self) -> None:
+        """Nothing but what is bound."""
+
+
+def tour_card(index: int) -> str:
+    """Title and text of a stop, and the way on."""
+    step = STEPS[index]
+    last = index + 1 == len(STEPS)
+    words = {"back": "Back", "tour": "Finish" if last else "Next", "end": "End the tour"}
+    buttons = "".join(
+        f"<button {'class=primary' * (word == 'tour')} {'disabled' * (word == 'back' and not index)} "
+        f'onclick="{tell(f"{word},")}">{label}</button>'
+        for word, label in words.items()
+        if not (last and word == "end")
+    )
+    return (
+        f"<div class='fl fl-tour tour'><b>{index + 1} of {len(STEPS)} · {escape(step.title)}</b>"
+        f"<p>{escape(step.text)}</p><div class='row'>{buttons}</div></div>"
+    )
