@@ -15,7 +15,6 @@ from finlab.cli.eval_arguments import (
     Names,
     Run,
     check_folders,
-    open_layouts,
     parse_counts,
 )
 from finlab.cli.inputs import check_positive
@@ -88,8 +87,7 @@ def cost(
 ) -> None:
     """Cost under exact tracking over the best of many random starts, by split and number of fins.
 
-    Splits may also be axes (pure axes and their mixes on the symmetric shipped layouts), coincident or
-    stacked (pairs of fins at one place, or one above the other).
+    Splits may also be axes or axes-mixed: pure axes and their mixes on the symmetric shipped layouts.
 
     Args:
         methods: names with commas between, as in `eval wrench`.
@@ -217,30 +215,6 @@ def latency(
     run.show(*blocks, rows=rows, first_answers=first, machine=described)
 
 
-def steadiness(
-    layouts: Names = "A,B,C,D,ucat,asymmetric,penta,hexa,octo,restricted,pair",
-    paths: Count = 3,
-    ticks: Count = 600,
-    seed: Count = 0,
-    run: Annotated[MethodRun, arg(name="")] = METHODS,
-) -> None:
-    """Follow smooth paths of wrenches at 10 Hz with and without the previous command; turns and energy.
-
-    Args:
-        layouts: files or names of shipped layouts, with commas between.
-        paths: random paths of each layout.
-        ticks: length of a path; 600 are a minute.
-        seed: draws the paths; same numbers, same paths.
-    """
-    from finlab.evaluation.experiments.steadiness import steadiness_rows
-    from finlab.evaluation.report.sections.questions import steadiness_blocks
-
-    check_positive(paths=paths, ticks=ticks - 1)
-    robots = open_layouts(layouts)
-    rows = steadiness_rows(run.method("search"), robots, n_paths=paths, ticks=ticks, seed=seed)
-    run.show(*steadiness_blocks(rows, run.objective), rows=rows)
-
-
 def modes(
     cases: Annotated[Cases, arg(name="")] = FEW,
     method: Name = "search",
@@ -260,23 +234,6 @@ def modes(
     rows = mode_rows(run.method(method), cases.draw(), n_starts=starts, seed=cases.seed)
     about = {"method": method, "objective": run.objective, "split": cases.split}
     run.show(*mode_blocks(rows, starts, **about), rows=rows)
-
-
-def unreachable(
-    layouts: Count = 50, seed: Count = 0, run: Annotated[MethodRun, arg(name="")] = METHODS
-) -> None:
-    """Ask for wrenches out of reach; what each policy delivers against the best possible.
-
-    Args:
-        layouts: random layouts of 2 to 8 fins per kind of limits, with one target each.
-        seed: draws layouts and targets.
-    """
-    from finlab.evaluation.experiments.unreachable import unreachable_rows
-    from finlab.evaluation.report.sections.questions import unreachable_blocks
-
-    check_positive(layouts=layouts)
-    rows = unreachable_rows(run.method("search"), n_layouts=layouts, seed=seed)
-    run.show(*unreachable_blocks(rows), rows=rows)
 
 
 def fuzz(

@@ -36,8 +36,9 @@ class Cases:
     """Held-out layouts with reachable targets."""
 
     split: Name = "id"
-    """One of id, ood, ood-fins, limits, failure, near-singular, fins, fins-mixed, tables, many-fins; `eval
-    wrench` and `eval cost` take all, too."""
+    """One of id, ood, ood-fins, limits, failure, near-singular, fins, fins-mixed, tables, many-fins,
+    perturbed, parallel, collinear, clustered, coincident, stacked, big, tiny; `eval wrench` and `eval cost`
+    take all, too."""
     layouts: Count = 100
     """Layouts of the split."""
     targets: Count = 1000

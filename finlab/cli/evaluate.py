@@ -10,7 +10,15 @@ from typing import Annotated
 from tyro.conf import arg
 from tyro.extras import SubcommandApp
 
-from finlab.cli import eval_allocation, eval_closed_loop, eval_fit, eval_robots, eval_swims
+from finlab.cli import (
+    eval_allocation,
+    eval_closed_loop,
+    eval_fit,
+    eval_reach,
+    eval_robots,
+    eval_sequences,
+    eval_swims,
+)
 from finlab.cli.eval_arguments import Checkpoint, Count, Folder, Name, Names, Output, check_folders
 from finlab.cli.inputs import check_positive
 from finlab.evaluation.report.sizes import SEED
@@ -124,9 +132,11 @@ for verb in (
     eval_allocation.ablation,
     eval_allocation.temperature,
     eval_allocation.latency,
-    eval_allocation.steadiness,
     eval_allocation.modes,
-    eval_allocation.unreachable,
+    eval_reach.unreachable,
+    eval_reach.beyond,
+    eval_sequences.steadiness,
+    eval_sequences.sequences,
     eval_allocation.fuzz,
     eval_closed_loop.trajectory,
     eval_closed_loop.faults,

@@ -12,6 +12,7 @@ import numpy as np
 
 from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
+from finlab.errors import DataError
 from finlab.evaluation.experiments.unreachable import Judge
 from finlab.evaluation.progress import progress
 from finlab.evaluation.splits import make_split
@@ -53,14 +54,19 @@ def beyond_reach_rows(
         layouts: of the split, whose fins follow the law `drag`, which is the judge's.
         targets: directions on each layout.
         seed: of the split.
-        split: `id`, `ood`, `ood-fins`, `limits` or another one with that law.
+        split: any with that law, such as `id`, `ood`, `ood-fins` or `limits`.
         factors: targets over the largest wrench of their direction.
 
     Returns:
         Rows of `factor`, `method`, `n`, `least_mean`, and of the normalized error beyond the least possible
         `excess_mean` with `excess_mean_interval`, `excess_median` and `excess_max`.
+
+    Raises:
+        DataError: a split with fins of another law.
     """
     cases = make_split(split, layouts, targets, seed)
+    if any(fin.model.type != "drag" for case in cases for fin in case.layout.fins):
+        raise DataError(f"split: expected one whose fins follow the judge's law, drag, got {split!r}")
     sigma = next(iter(allocators.values())).normalization.std
     bounds = []
     for number, case in enumerate(progress(cases, "layout", "boundary")):

@@ -19,6 +19,7 @@ from finlab.evaluation.report.sections import (
     methods,
     network,
     questions,
+    scope,
     studies,
     summary,
     swims,
@@ -73,7 +74,8 @@ def make_report(
 
 def make_document(results: Results, provenance: Provenance, sizes: Sizes, missing: int = 0) -> Document:
     """The page's blocks, from results; so many jobs have none yet."""
-    blocks: list[Block] = [*summary.summary_blocks(results.tables), *methods.method_blocks()]
+    cards, *standings = summary.summary_blocks(results.tables)
+    blocks: list[Block] = [cards, *scope.scope_blocks(provenance.seed), *standings, *methods.method_blocks()]
     blocks += result_blocks(results, sizes)
     blocks += how_made_blocks(results, provenance, sizes)
     note = "" if sizes.name == "full" else f" A {sizes.name} look on few cases; intervals are wide."

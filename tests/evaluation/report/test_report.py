@@ -92,7 +92,11 @@ def test_page_twin_pictures_and_rows_say_the_same(folder: Path, untrained_checkp
     page, twin = (folder / PAGE).read_text("utf-8"), (folder / TWIN).read_text("utf-8")
     tables = json.loads((folder / TABLES).read_text("utf-8"))
     for words in (
+        "What is not shown",
+        "Who was tuned on what",
         "Who leads",
+        "asked over largest",
+        "Sequences with noise",
         "the other leads",
         "Every comparison",
         "0.0857",
@@ -113,6 +117,12 @@ def test_page_twin_pictures_and_rows_say_the_same(folder: Path, untrained_checkp
         for objective in ("power", "effort")
         for method in ("search", "analytic")
     }
+    again = {(row["split"], row["method"]): row["err_norm_mean"] for row in tables["rerun"]}
+    assert set(again) == {
+        (split, method) for split in FEW_SPLITS for method in ("search", "paper", "analytic")
+    }
+    for row in tables["wrench"]:  # drawn anew
+        assert row["method"] == "ipopt" or row["err_norm_mean"] != again[row["split"], row["method"]]
     assert [row["temperature"] for row in tables["temperature"]] == [0.01, 1.0]
     assert {(row["fins"], row["objective"]) for row in tables["network"]} == {(4, "power"), (4, "effort")}
     assert [row["fins"] for row in tables["first_answers"]] == ["drag", "drag", "table", "table"]
@@ -159,9 +169,9 @@ def test_a_report_can_be_made_section_by_section(few: pytest.MonkeyPatch, tmp_pa
         lines = (tmp_path / TWIN).read_text("utf-8").splitlines()
         return [line.removeprefix("## ") for line in lines if line.startswith("## ")]
 
-    always = ["Who leads", "Who knows what", "How this was made"]
-    assert headings(["unreachable"]) == [*always[:2], "Out of reach", always[2]]
-    assert headings(["steadiness"]) == [*always[:2], "Out of reach", "From tick to tick", always[2]]
+    first, last = ["What is shown", "Who leads", "Who knows what"], ["How this was made"]
+    assert headings(["unreachable"]) == [*first, "Out of reach", *last]
+    assert headings(["steadiness"]) == [*first, "Out of reach", "From tick to tick", *last]
     assert "Not run yet when this page was made: " in (tmp_path / TWIN).read_text("utf-8")
 
 
@@ -181,7 +191,7 @@ def test_without_casadi_and_torch_the_rest_is_planned(
     whole = make_plan(TINY, seed=0, checkpoints=Checkpoints(), runs=tmp_path).tables
     monkeypatch.setattr(planning, "find_spec", lambda _: None)
     bare = make_plan(TINY, seed=0, checkpoints=Checkpoints(), runs=tmp_path).tables
-    assert set(whole) - set(bare) == {"training", "unreachable"}
+    assert set(whole) - set(bare) == {"training", "unreachable", "beyond"}
     assert {method for _, method in set(whole["wrench"]) - set(bare["wrench"])} == {"ipopt"}
     assert bare["cost"] == whole["cost"]  # SLSQP stands in for IPOPT
     assert bare["ablation"] == whole["ablation"]

@@ -120,7 +120,12 @@ def test_the_summary_compares_every_table_it_has() -> None:
             | {"cost_ratio_interval": None if ratio is None else [0.99 * ratio, 1.01 * ratio]}
             for objective in ("power", "effort")
             for fins in (4, "all")
-            for m, ratio in (("search", 1.0), ("qp", 1.5 if objective == "power" else 0.9), ("sqp", None))
+            for m, ratio in (
+                ("search", 1.0),
+                ("multistart", 1.5 if objective == "power" else 0.9),
+                ("analytic", 2.0),  # does not keep the cost least: neither leads nor trails
+                ("sqp", None),
+            )
         ],
         "ablation": [
             {
@@ -148,10 +153,9 @@ def test_the_summary_compares_every_table_it_has() -> None:
         ("mean error", "id", "qp", LEADS),
         ("mean error", "id", "paper (printed)", LEADS),
         ("J_norm", "ablation by the surrogate", "paper (printed)", TRAILS),
-        ("power", "split id", "qp", LEADS),
-        ("effort", "split id", "qp", TRAILS),
+        ("power", "split id", "multistart", LEADS),
+        ("effort", "split id", "multistart", TRAILS),
         ("time per call", "4 fins", "qp", TRAILS),
         ("ATE", "layouts A", "on-board", LEADS),
-        ("inertial power", "0.10 m/s", "analytic", LEADS),
         ("speed error", "0.10 m/s", "analytic", LEADS),
     ]

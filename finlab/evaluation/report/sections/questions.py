@@ -84,7 +84,7 @@ def beyond_blocks(rows: Sequence[Row]) -> list[Block]:
     ]
 
 
-def sequence_blocks(rows: Sequence[Row]) -> list[Block]:
+def sequence_blocks(rows: Sequence[Row], noise: float = NOISE) -> list[Block]:
     """What commands change by along noisy sequences."""
     changes = (
         Column(f"{what}_{figure}", f"{title}, {figure}", "error")
@@ -103,12 +103,12 @@ def sequence_blocks(rows: Sequence[Row]) -> list[Block]:
     return [
         "### Sequences with noise",
         (
-            f"The same paths with white noise on every axis, {NOISE:.0%} of the path's root mean square, as "
-            "a controller's wrenches carry it. Every method is given its previous command; `qp`, `sqp` and "
-            "`analytic` take no heed of it. Changes of amplitude, frequency and zero direction from tick to "
-            "tick, over all fins: mean and 99th percentile. `search` and `mdn` keep to the rates of the "
-            "servos and miss a few ticks for it; late is the error of what fins give that follow with the "
-            "lags of their servos, which the other methods' jumps do not make smaller."
+            f"The same paths with white noise on every axis, {100 * noise:g} % of the path's root mean "
+            "square, as a controller's wrenches carry it. Every method is given its previous command; `qp`, "
+            "`sqp` and `analytic` take no heed of it. Changes of amplitude, frequency and zero direction "
+            "from tick to tick, over all fins: mean and 99th percentile. `search` and `mdn` keep to the "
+            "rates of the servos and miss a few ticks for it. Late: mean error of what fins give that follow "
+            "with the lags of their servos, which jumps do not make smaller."
         ),
         Table(columns, [method_row(row) for row in rows]),
     ]
