@@ -175,6 +175,22 @@ def test_a_report_can_be_made_section_by_section(few: pytest.MonkeyPatch, tmp_pa
     assert "Not run yet when this page was made: " in (tmp_path / TWIN).read_text("utf-8")
 
 
+def test_two_runs_with_one_seed_print_the_same(few: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """All but times, digit for digit."""
+
+    def printed(folder: str) -> dict[str, Any]:
+        _make(tmp_path / folder, Checkpoints(), sections=["wrench", "beyond", "sequences"])
+        tables = json.loads((tmp_path / folder / TABLES).read_text("utf-8"))
+        names = "wrench", "rerun", "beyond", "sequences"
+        return {name: list(map(_timeless, tables[name])) for name in names}
+
+    assert printed("first") == printed("second")
+
+
+def _timeless(row: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in row.items() if "ms" not in key.split("_")}
+
+
 def test_a_study_without_one_of_its_parts_is_left_out(few: pytest.MonkeyPatch, tmp_path: Path) -> None:
     plan = make_plan(TINY, seed=0, checkpoints=Checkpoints(), runs=tmp_path).only(["temperature"])
     *parts, last = plan
