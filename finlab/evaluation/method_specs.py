@@ -3,6 +3,7 @@
 import hashlib
 import re
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,11 @@ class Checkpoints:
 def is_slow(name: str) -> bool:
     """Whether a method runs on a subsample only."""
     return method_and_starts(name)[0] in SLOW
+
+
+def installed_methods() -> list[str]:
+    """All methods of the library that can run here."""
+    return [name for name in (*QUICK, *SLOW) if name != "ipopt" or find_spec("casadi") is not None]
 
 
 def load_method_specs(
