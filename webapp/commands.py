@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import viser
 
 from webapp.page import Page
+from webapp.session.lessons import LESSONS
 from webapp.session.looking import TASKS
 from webapp.session.state import AXIS_WORDS, OBJECTIVES
 from webapp.session.targets import PRESETS
@@ -102,6 +103,10 @@ def commands(page: Page) -> list[Command]:
         Command("View", "Show or hide the centre of gravity", partial(toggle, "center")),
         Command("View", "Dark or light theme", partial(toggle, "dark")),
         Command("Help", "Tour: start, or next stop", session.next_stop, "T"),
+        *(
+            Command("Help", f"Lesson: {lesson.title}", partial(session.open_lesson, lesson.name))
+            for lesson in LESSONS
+        ),
         Command("Help", "Show all keys", keys),
         Command("Files", "Export the bundle for the robot", page.exports.bundle),
     ]

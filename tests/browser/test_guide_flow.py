@@ -60,3 +60,22 @@ def test_a_weak_and_stuck_fin_is_told_and_mended(page: Any) -> None:
     page.press("All fins")
     page.until(lambda: page.session.state.health is None)
     page.page.locator(".damage").wait_for(state="detached")
+
+
+def test_a_link_opens_a_lesson_that_sees_when_its_task_is_done(page: Any) -> None:
+    mine = page.session.state
+    page.page.goto(f"{page.page.url.split('?')[0]}?lesson=two-ways")
+    page.ready()
+    page.until(lambda: "One wrench, several ways" in page.text(".fl-lesson"))
+    page.until(lambda: not page.view.busy and len(page.view.answering.modes.shown) > 1)
+    assert "○" in page.text(".fl-lesson") and page.session.state.objective == "effort"
+    page.page.locator("table.modes tr.pick").nth(1).click()
+    page.until(lambda: "✓" in page.text(".fl-lesson"))
+    assert "the green arrows did not" in page.text(".fl-lesson")
+    page.press("Next lesson")
+    page.until(lambda: "Watts are not effort" in page.text(".fl-lesson"))
+    page.choose("Keep least", "power")
+    page.until(lambda: "✓" in page.text(".fl-lesson"))
+    page.press("Close")
+    page.until(lambda: page.session.lesson is None and page.session.state == mine)
+    assert page.problems == []

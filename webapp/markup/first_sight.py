@@ -20,6 +20,21 @@ def tell(word: str) -> str:
     return send(FRAME, f"`{word},${{Date.now()}}`")
 
 
+def open_linked(key: str) -> str:
+    """A script that tells the frame what the page's address asks for: `?key=value` as `key,value`, once.
+
+    The channel may be there later than the script.
+    """
+    box = f"document.querySelector('div:has(>.{FRAME}) + div input')"
+    return (
+        f"(() => {{ const asked = new URLSearchParams(location.search).get('{key}');"
+        f" if (!asked || !/^[a-z-]{{1,40}}$/.test(asked) || window.finlabLinked === asked) return;"
+        f" const tellIt = () => {{ if (!{box}) return setTimeout(tellIt, 100);"
+        f" window.finlabLinked = asked; {tell(f'{key},${{asked}}')} }};"
+        " tellIt(); })();"
+    )
+
+
 def welcome() -> str:
     """The card of the first visit; `habits.js` shows it once."""
     tries = "".join(

@@ -12,7 +12,7 @@ from importlib.resources import files
 import viser
 
 from webapp.handles import put
-from webapp.markup.first_sight import FRAME, tell
+from webapp.markup.first_sight import FRAME, open_linked, tell
 from webapp.markup.picking import add_channel, marker
 from webapp.page import Page, Panel
 from webapp.panels.places import DRAWER, LEFT, PLACES, REGIONS, RIGHT, Place
@@ -94,7 +94,7 @@ class Frame:
                     for index, place in enumerate(PLACES)
                     if place.region == region
                 ]
-        run_script(gui, HABITS)
+        run_script(gui, HABITS + open_linked("lesson"))
 
     @property
     def panels(self) -> tuple[list[Panel], list[Panel]]:
@@ -119,6 +119,9 @@ class Frame:
             "tour": lambda _: session.next_stop(),
             "back": lambda _: session.previous_stop(),
             "end": lambda _: session.end_tour(),
+            "lesson": session.open_lesson,
+            "lesson-next": lambda _: session.next_lesson(),
+            "lesson-close": lambda _: session.close_lesson(),
         }
         if word[0] in acts and len(word) > 1:
             self._page.do(lambda: acts[word[0]](word[1]))

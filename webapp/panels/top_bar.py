@@ -8,7 +8,9 @@ import viser
 from finlab.allocation.methods import METHODS
 from webapp.handles import put
 from webapp.markup.first_sight import tell
+from webapp.markup.lesson_card import lesson_card
 from webapp.page import Page
+from webapp.session.lessons import LESSONS
 from webapp.session.looking import TASKS
 from webapp.session.state import OBJECTIVES
 from webapp.session.tour import STEPS
@@ -49,13 +51,21 @@ class HistoryBar:
 
     def refresh(self) -> None:
         """Write what can be undone, and where the tour is."""
-        history, stop = self._page.session.history, self._page.session.stop
+        history = self._page.session.history
         for button, word, name in (
             (self._undo, "Undo", history.undo_name),
             (self._redo, "Redo", history.redo_name),
         ):
             put(button, label=f"{word}: {name}" if name else word, disabled=name is None)
-        put(self._card, visible=stop is not None, content="" if stop is None else tour_card(stop))
+        guide = self._guide()
+        put(self._card, content=guide, visible=bool(guide))
+
+    def _guide(self) -> str:
+        """The card of the lesson, or of the tour."""
+        page, session = self._page, self._page.session
+        if session.lesson is not None:
+            return lesson_card(session.lesson, session.check_lesson(None if page.busy else page.shown))
+        return "" if session.stop is None else tour_card(session.stop)
 
 
 class TaskBar:
@@ -92,6 +102,8 @@ class AnsweringBar:
             f'<button title="all commands (Ctrl+K)" onclick="{PALETTE}">Commands</button>'
             f'<button title="a tour in {len(STEPS)} stops (T)" '
             f'onclick="{tell("tour,")}">Tour</button>'
+            f'<button title="{len(LESSONS)} lessons with a task each" '
+            f'onclick="{tell(f"lesson,{LESSONS[0].name}")}">Lessons</button>'
             '<button aria-label="Keys" title="all keys (?)" onclick="finlabFrame.sheet()">?</button></div>'
         )
 

@@ -6,12 +6,11 @@ with a sentence for the user and changes nothing. One file per kind of intent.
 
 from webapp.session.display import ANGLE_STEPS, POSITION_STEPS, Display
 from webapp.session.editing import Editing
-from webapp.session.looking import Looking
+from webapp.session.lessons import Learning
 from webapp.session.questions import Questions
-from webapp.session.tour import Guiding
 
 
-class Session(Questions, Editing, Looking, Guiding):
+class Session(Questions, Editing, Learning):
     """What one browser has made so far."""
 
     def twin(self) -> "Session":

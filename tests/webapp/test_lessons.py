@@ -1,0 +1,105 @@
+"""Lessons: each opens unsolved, can be solved as it says, and gives back what was there before."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from html import unescape
+
+import pytest
+
+from finlab.allocation import Allocation, load_allocator
+from finlab.errors import FinlabError
+from finlab.layout import load_layout
+from webapp.markup.first_sight import open_linked
+from webapp.markup.lesson_card import lesson_card
+from webapp.session import Session
+from webapp.session.lessons import BY_NAME, LESSONS
+from webapp.session.state import State
+
+
+def _answer(state: State) -> Allocation:
+    allocator = load_allocator(state.method)
+    if "objective" in allocator.option_names():
+        allocator = allocator.with_settings(objective=state.objective)
+    return allocator.allocate(state.layout, state.target, failed=state.failed, policy=state.policy)
+
+
+def _turn_a_shaft(session: Session) -> None:
+    name = session.state.layout.names[0]
+    session.turn_fin(name, session.state.layout.fins[0].mounting_angle + 1.2)
+
+
+SOLVED: dict[str, Callable[[Session], object]] = {
+    "two-ways": lambda session: session.show_mode(1),
+    "watts-or-effort": lambda session: session.set_setting("objective", "power"),
+    "lost-fin": lambda session: session.toggle_failure("front_left"),
+    "no-yaw": _turn_a_shaft,
+    "out-of-reach": lambda session: session.set_setting("policy", "direction"),
+    "learned-physics": lambda session: session.set_setting("method", "paper"),
+}
+"""What a student does."""
+
+
+@pytest.mark.parametrize("name", BY_NAME)
+def test_a_lesson_is_unsolved_until_its_exercise_is_done(name: str) -> None:
+    session = Session(load_layout("penta"))
+    session.open_lesson(name)
+    assert session.lesson is BY_NAME[name] and session.task == BY_NAME[name].task
+    assert not session.check_lesson(_answer(session.state))
+    SOLVED[name](session)
+    assert session.check_lesson(_answer(session.state))
+    session.show_mode(0)
+    assert session.check_lesson(None)  # once done, done
+
+
+def test_wrong_ways_do_not_count() -> None:
+    session = Session(load_layout("penta"))
+    session.open_lesson("lost-fin")
+    for fin in ("front_left", "back_right", "front_right"):  # one fin alone turns nothing
+        session.toggle_failure(fin)
+    assert not session.check_lesson(_answer(session.state))
+    session.open_lesson("out-of-reach")
+    session.set_setting("policy", "direction")
+    easy = replace(session.state, target=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    assert not session.check_lesson(_answer(easy))
+
+
+def test_closing_gives_back_what_was_there_and_next_goes_on_to_the_end() -> None:
+    session = Session(load_layout("penta"))
+    before = session.state
+    session.next_lesson()
+    names = [session.lesson.name if session.lesson else None]
+    while session.lesson is not None:
+        session.next_lesson()
+        names.append(session.lesson.name if session.lesson else None)
+    assert names == [*BY_NAME, None] and session.state == before
+    assert session.history.undo_name == "Close the lesson"
+
+
+def test_tour_and_lesson_end_each_other() -> None:
+    session = Session(load_layout("penta"))
+    before = session.state
+    session.next_stop()
+    session.open_lesson("two-ways")
+    assert session.stop is None and session.lesson is not None
+    session.next_stop()
+    assert session.stop == 0 and session.lesson is None
+    session.end_tour()
+    assert session.state == before
+
+
+def test_unknown_lessons_are_refused() -> None:
+    with pytest.raises(FinlabError, match="lesson: expected one of two-ways, .*got 'sailing'"):
+        Session(load_layout("A")).open_lesson("sailing")
+
+
+def test_the_card_says_what_to_do_and_praises_what_is_done() -> None:
+    for lesson in LESSONS:
+        cards = [unescape(lesson_card(lesson, solved)) for solved in (False, True)]
+        assert all(lesson.exercise in card for card in cards)
+        assert [lesson.praise in card for card in cards] == [False, True]
+    assert "Finish" in lesson_card(LESSONS[-1], True)
+
+
+def test_links_open_lessons_by_plain_names_alone() -> None:
+    assert all(len(f"lesson,{name},{10**13}") <= 60 for name in BY_NAME)
+    assert "/^[a-z-]{1,40}$/" in open_linked("lesson")
