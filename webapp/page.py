@@ -15,6 +15,7 @@ import viser
 from finlab.allocation.allocation import Allocation
 from finlab.bundle_files import LARGEST_BUNDLE
 from finlab.errors import FinlabError
+from webapp.editables import Editables
 from webapp.handles import Changes, on_user_change, put
 from webapp.markup.picking import chosen_button
 from webapp.number_fields import NumberField, NumberFields
@@ -100,10 +101,13 @@ class Page(ABC):
         """Each writes what the session holds into a widget; the panel that is being built takes them."""
         self.fields = NumberFields(client.gui, self.fault)
         """The boxes for numbers."""
+        self.editables = Editables(client.gui, self.attempt)
+        """Names and cells that are edited where they stand."""
         limit_uploads(client.gui, MAX_UPLOAD, self._refuse_upload)
         self._panels: list[Panel] = []
         self._panels, self._swim_panels = self._build()
         self.fields.start()
+        self.editables.start()
         self._refresh()
         self._ask()
 

@@ -4,7 +4,7 @@ import math
 from html import escape
 
 from finlab.errors import DataError
-from finlab.layout.fin import FIN_MODELS, Fin, FinModelSpec
+from finlab.layout.fin import Fin, FinModelSpec
 from finlab.physics import make_law
 from finlab.physics.table import TableLaw
 from finlab.physics.table_file import DOUBT
@@ -26,13 +26,8 @@ def model_card(fin: Fin, doubts: bool = True) -> str:
 
 
 def _law_words(model: FinModelSpec) -> str:
-    values, rules = model.values(), FIN_MODELS[model.type]
-    given = ", ".join(
-        f"{escape(rule.meaning)} {float(values[name]):.4g}{f' {rule.unit}' if rule.unit else ''}"
-        for name, rule in rules.items()
-    )
-    given = given.replace("^2", "²").replace("^3", "³")
-    return f"<b>{model.type}</b>: {LAWS[model.type]}.<div class='dim'>{given[0].upper()}{given[1:]}.</div>"
+    said = LAWS[model.type]
+    return f"<div class='dim'>{said[0].upper()}{said[1:]}.</div>"
 
 
 def _table_words(fin: Fin, doubts: bool) -> str:

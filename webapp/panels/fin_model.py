@@ -1,14 +1,18 @@
-"""What the selected fin is known by, and a new model for it from a file of measurements."""
+"""What the selected fins are known by: a formula with its numbers, or a table fitted to measurements."""
 
+from functools import partial
 from html import escape
 
 import viser
 
 from finlab.errors import FinlabError
+from finlab.layout.fin import FIN_MODELS
 from webapp.handles import Changes, put
 from webapp.markup.fin_model import model_card
+from webapp.markup.thrust_curves import thrust_curves
 from webapp.page import Page
 from webapp.session.files import file_stem
+from webapp.session.fin_edits import FORMULAS, words
 from webapp.tasks.fitting import MAX_BYTES, Fitted
 
 
@@ -18,8 +22,15 @@ class FinModelPanel:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
+        self._numbers: dict[tuple[str, str], viser.GuiInputHandle[float]] = {}
         with gui.add_folder("Fin model"):
+            about = "The formula that gives the fin's force; a table comes from a file, below."
+            self._kind = gui.add_dropdown("Model", FORMULAS, hint=about)
+            page.on_change(self._kind, page.session.choose_model)
             self._words = gui.add_html("")
+            for kind in FORMULAS:
+                self._add_numbers(gui, kind)
+            self._curves = gui.add_html("")
             self._upload_button = page.add_upload(
                 "Fit from measurements (CSV)",
                 self._upload,
@@ -50,6 +61,30 @@ class FinModelPanel:
                 "Fit", results, visible=False, hint="All fins that had the same model. Undo takes a fit back."
             )
         self._changes = Changes()
+
+    def _add_numbers(self, gui: viser.GuiApi, kind: str) -> None:
+        """A box for each number of a model, shown while the fin has that model."""
+        for key, rule in FIN_MODELS[kind].items():
+            unit = f" [{rule.unit}]".replace("^2", "²").replace("^3", "³") if rule.unit else ""
+            hint = f"{rule.meaning[0].upper()}{rule.meaning[1:]}. Usual: {rule.default:g}."
+            label, step = f"{words(key)}{unit}", (abs(rule.default) or 1.0) / 20
+            handle = gui.add_number(label, rule.default, step=step, hint=hint, visible=False)
+            self._page.bind_number(
+                handle,
+                partial(self._page.session.set_parameter, key),
+                partial(self._value, kind, key),
+            )
+            self._numbers[kind, key] = handle
+
+    def _value(self, kind: str, key: str) -> float:
+        """A number of the selected fin's model; the usual one while it has another model."""
+        session = self._page.session
+        layout = session.state.layout
+        if session.selected is not None:
+            model = layout.fins[layout.index(session.selected)].model
+            if model.type == kind:
+                return float(model.values()[key])
+        return FIN_MODELS[kind][key].default
 
     def _upload(self, name: str, content: bytes) -> None:
         session = self._page.session
@@ -88,13 +123,14 @@ class FinModelPanel:
         """Write the model of the selected fin, and how far a fit is."""
         session, fitting = self._page.session, self._page.fitting
         layout = session.state.layout
-        if session.selected is None:
-            words = "<div class='fl dim'>Select the fin that was measured.</div>"
-        else:
-            fin = layout.fins[layout.index(session.selected)]
-            found = fitting.findings
-            words = model_card(fin, doubts=found is None or found.model != fin.model)
-        put(self._words, content=words)
+        fin = None if session.selected is None else layout.fins[layout.index(session.selected)]
+        if fin is not None:
+            found, kind = fitting.findings, fin.model.type
+            put(self._words, content=model_card(fin, doubts=found is None or found.model != fin.model))
+            put(self._kind, options=(*FORMULAS, kind) if kind not in FORMULAS else FORMULAS, value=kind)
+            put(self._curves, content=thrust_curves(fin))
+        for (kind, _), handle in self._numbers.items():
+            put(handle, visible=fin is not None and fin.model.type == kind)
         put(self._upload_button, disabled=session.selected is None or fitting.busy)
         put(self._bar, visible=fitting.busy)
         put(self._cancel, visible=fitting.busy)

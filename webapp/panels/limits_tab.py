@@ -1,6 +1,7 @@
 """What this layout can do (attainable sets, the score card), and a search for a better one."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from html import escape
 from typing import Any
@@ -162,7 +163,8 @@ class ImprovePanel:
 
     def _search(self) -> None:
         session = self._page.session
-        self._page.improver.start(session.state.layout, session.draft)
+        held = (*session.draft.held, *session.state.locked)
+        self._page.improver.start(session.state.layout, replace(session.draft, held=held))
 
     def _accept(self) -> None:
         found = self._page.improver.findings

@@ -25,6 +25,8 @@ LIMP = math.pi / 2
 """Where the blade of a failed fin hangs [rad]: down."""
 GIZMO_SIZE = 0.24
 RING_SIZE = 0.20
+HELD: tuple[Any, ...] = (None, "cmd/ctrl", "shift")
+"""Keys that may be held while a fin is clicked; viser hears each by itself."""
 
 
 class Flapping:
@@ -96,7 +98,7 @@ class FinNode:
         self,
         scene: viser.SceneApi,
         index: int,
-        on_click: Callable[[int], None],
+        on_click: Callable[[int, bool], None],
         on_drag: Callable[[int, str, tuple[float, float, float], float], None],
     ) -> None:
         """Build the nodes.
@@ -104,7 +106,7 @@ class FinNode:
         Args:
             scene: the client's scene.
             index: place of the fin in the layout.
-            on_click: called with the index when the fin is clicked.
+            on_click: called with the index when the fin is clicked, and whether Ctrl or Shift was held.
             on_drag: called with index, phase (`start`, `update`, `end`), position [m] and angle [rad].
         """
         name = f"/robot/fins/{index}"
@@ -127,10 +129,11 @@ class FinNode:
         self._strut = Shape(scene, f"/robot/struts/{index}", LIGHT.metal)
 
         for node in (fin.blade, fin.shaft):
+            for held in HELD:
 
-            @node.on_click
-            async def _clicked(event: Any) -> None:
-                on_click(index)
+                @node.on_click(modifier=held)
+                async def _clicked(event: Any) -> None:
+                    on_click(index, event.modifier is not None)
 
     def pose(self) -> tuple[tuple[float, float, float], float]:
         """Position [m] and mounting angle [rad] as they stand in the scene."""

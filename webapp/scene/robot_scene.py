@@ -124,8 +124,11 @@ class RobotScene:
         fits = allocation is not None and allocation.layout.names == state.layout.names
         for i, fin in enumerate(state.layout.fins):
             selected = fin.name == self._session.selected
-            label = _label(state, i, selected) if display.labels else None
-            gizmos = selected and self.editing and not display.grips
+            label = _label(state, i, fin.name in self._session.selection) if display.labels else None
+            if fin.name in state.hidden:
+                self._fins[i].hide()
+                continue
+            gizmos = selected and self.editing and not display.grips and fin.name not in state.locked
             self._fins[i].place(fin, hull, gizmos, label, i == self.dragged)
             if fin.name in state.failed or allocation is None:
                 self._fins[i].command(None, np.zeros(3), 0.0, False)
@@ -171,8 +174,9 @@ class RobotScene:
         for node, angle in zip(self._fins, angles, strict=False):  # a fin may be newer than the answer
             node.shapes.pose(angle)
 
-    def _clicked(self, index: int) -> None:
-        self._do(partial(self._session.select, self._session.state.layout.names[index]))
+    def _clicked(self, index: int, also: bool) -> None:
+        select = self._session.select_also if also else self._session.select
+        self._do(partial(select, self._session.state.layout.names[index]))
 
     def _drag(self, index: int, phase: str, position: tuple[float, float, float], angle: float) -> None:
         session = self._session

@@ -5,12 +5,12 @@ with a sentence for the user and changes nothing. One file per kind of intent.
 """
 
 from webapp.session.display import ANGLE_STEPS, POSITION_STEPS, Display
-from webapp.session.editing import Editing
+from webapp.session.inspecting import Inspecting
 from webapp.session.lessons import Learning
 from webapp.session.questions import Questions
 
 
-class Session(Questions, Editing, Learning):
+class Session(Questions, Inspecting, Learning):
     """What one browser has made so far."""
 
     def twin(self) -> "Session":

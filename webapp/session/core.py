@@ -103,8 +103,9 @@ class Core:
         self._first = State(layout, target=FIRST)
         self.history: History[State] = History(self._first)
         self.display = display or Display()
-        self.selected: str | None = None
-        """The selected fin."""
+        self._chosen: tuple[str, ...] = ()
+        """The selected fins, in the order in which they were chosen."""
+        self._names = layout.names
         self.saved = layout
         """The layout as it was opened or saved last."""
         self.pinned: Layout | None = None
@@ -128,11 +129,26 @@ class Core:
         """Go on from a state that was kept; what led there is not known any more."""
         self.history = History(state)
         self.saved = state.layout
+        self._names = state.layout.names
 
     @property
     def state(self) -> State:
         """The present state."""
         return self.history.state
+
+    @property
+    def selected(self) -> str | None:
+        """The selected fin; of several the one that was chosen last."""
+        return self._chosen[-1] if self._chosen else None
+
+    @selected.setter
+    def selected(self, name: str | None) -> None:
+        self._chosen = () if name is None else (name,)
+
+    @property
+    def selection(self) -> tuple[str, ...]:
+        """All selected fins, in the order of the layout."""
+        return tuple(name for name in self.state.layout.names if name in self._chosen)
 
     def _commit(self, name: str, state: State, merge_key: str | None = None, timed: bool = True) -> None:
         if state != self.state:
@@ -143,14 +159,38 @@ class Core:
         """After any change of the state: a choice of mode is void, a lost fin is not selected."""
         self.revision += 1
         self.mode, self.sample = 0, None
-        if self.selected not in self.state.layout.names:
-            self.selected = None
+        names, before = self.state.layout.names, self._names
+        self._names = names
+        if len(names) == len(before):  # a fin that is called otherwise now stays selected
+            called = {old: new for old, new in zip(before, names, strict=True) if old not in names}
+            self._chosen = tuple(called.get(name, name) for name in self._chosen)
+        self._chosen = tuple(name for name in self._chosen if name in names)
 
     def select(self, name: str | None) -> None:
         """Select a fin, or none."""
         if name is not None:
             self.state.layout.index(name)
         self.selected = name
+        self.history.end_merge()
+
+    def select_also(self, name: str) -> None:
+        """One more fin beside those that are selected; one of them is let go."""
+        self.state.layout.index(name)
+        others = tuple(other for other in self._chosen if other != name)
+        self._chosen = others if name in self._chosen else (*others, name)
+        self.history.end_merge()
+
+    def select_to(self, name: str) -> None:
+        """All fins from the selected one to this one, in the order of the layout."""
+        names = self.state.layout.names
+        start, end = self.state.layout.index(self.selected or name), self.state.layout.index(name)
+        span = names[start : end + 1] if start <= end else names[end : start + 1][::-1]
+        self._chosen = (*(other for other in self._chosen if other not in span), *span)
+        self.history.end_merge()
+
+    def select_all(self) -> None:
+        """All fins."""
+        self._chosen = self.state.layout.names
         self.history.end_merge()
 
     def select_next(self) -> None:

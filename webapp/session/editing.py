@@ -34,6 +34,7 @@ class Editing(Core):
 
     def move_fin(self, name: str, position: Vector) -> None:
         """A fin at another place [m], snapped."""
+        self.state.check_free([name])
         layout = layout_edits.moved(self.state.layout, name, position, self._step_m)
         if self.display.stick:
             layout = layout_edits.stuck(layout, name)
@@ -41,6 +42,7 @@ class Editing(Core):
 
     def turn_fin(self, name: str, angle: float) -> None:
         """A fin with another mounting angle [rad], snapped."""
+        self.state.check_free([name])
         layout = layout_edits.turned(self.state.layout, name, angle, self._step_rad)
         self._edit(f"Turn {name}", followed(layout, self.state.links, name), f"turn {name}")
 
@@ -76,6 +78,7 @@ class Editing(Core):
         return layout.fins[layout.index(name)]
 
     def _drag(self, name: str, layout: Layout) -> None:
+        self.state.check_free([name])
         whole = layout_edits.keeping_hull(self.state.layout, followed(layout, self.state.links, name))
         state = self.state.with_layout(whole)
         self._commit(f"Move {name}", state, f"drag {name}", timed=False)
@@ -124,16 +127,21 @@ class Editing(Core):
     def stick_fin(self) -> None:
         """The selected fin onto the hull."""
         name = self._selected_name()
+        self.state.check_free([name])
         layout = layout_edits.stuck(self.state.layout, name)
         self._edit(f"Stick {name} to the hull", followed(layout, self.state.links, name))
 
     def delete_fin(self) -> None:
-        """The selected fin goes."""
-        name = self._selected_name()
-        self._edit(f"Delete {name}", layout_edits.deleted(self.state.layout, name))
+        """The selected fins go."""
+        self._selected_name()
+        names = self.selection
+        self.state.check_free(names)
+        which = names[0] if len(names) == 1 else f"{len(names)} fins"
+        self._edit(f"Delete {which}", layout_edits.deleted(self.state.layout, names))
 
     def set_model(self, names: Sequence[str], model: FinModelSpec) -> None:
         """Another model for some fins."""
+        self.state.check_free(names)
         which = names[0] if len(names) == 1 else f"{len(names)} fins"
         self._edit(f"Fit {which}", layout_edits.with_model(self.state.layout, names, model))
 

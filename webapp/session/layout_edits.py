@@ -156,12 +156,13 @@ def _is_free(layout: Layout, position: Vector, clear: float) -> bool:
     return all(math.dist(fin.position, position) >= clear - 1e-9 for fin in layout.fins)
 
 
-def deleted(layout: Layout, name: str) -> Layout:
-    """The layout without a fin; the last one stays."""
-    layout.index(name)
-    if layout.n_fins == 1:
-        raise FinlabError(f"{name} is the only fin; a layout needs at least one")
-    return layout.without([name])
+def deleted(layout: Layout, names: Sequence[str]) -> Layout:
+    """The layout without some fins; one at least stays."""
+    layout.indices(names)
+    if layout.n_fins == len(set(names)):
+        only = f"{names[0]} is the only fin" if layout.n_fins == 1 else "these are all fins"
+        raise FinlabError(f"{only}; a layout needs at least one")
+    return layout.without(names)
 
 
 def _added(layout: Layout, fin: Fin, wanted: str) -> tuple[Layout, str]:

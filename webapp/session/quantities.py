@@ -63,7 +63,9 @@ EXAMPLES = {
 
 _NUMBER = r"\d+\.?\d*(?:e[+-]?\d+)?|\.\d+(?:e[+-]?\d+)?"
 _TOKEN = re.compile(rf"\s*(?:({_NUMBER})|([a-zπ]+|[°%])|(\*\*|[-+*/^()]))", re.ASCII | re.IGNORECASE)
-_SIGNS = str.maketrans({"−": "-", "–": "-", "×": "*", "·": "*", "⋅": "*", "÷": "/", ",": ".", "º": "°"})
+_SIGNS = str.maketrans(
+    {"−": "-", "–": "-", "×": "*", "·": "*", "⋅": "*", "÷": "/", ",": "."} | {"º": "°", "²": "^2", "³": "^3"}
+)
 
 
 def read_number(text: str, unit: str = "") -> float:

@@ -1,0 +1,198 @@
+"""Several fins selected and changed in one step, names, limits, models, order, locks."""
+
+import json
+import math
+
+import pytest
+
+from finlab.assets import shipped_layouts
+from finlab.errors import FinlabError
+from finlab.layout import FinModelSpec, Layout, load_layout
+from webapp.markup.fin_list import fin_list
+from webapp.markup.thrust_curves import thrust_within
+from webapp.panels.fin_inspector import differences
+from webapp.session import Session
+from webapp.session.fin_edits import modelled, reordered
+from webapp.session.session_files import restore, to_dict
+
+FRONT = ("front_right", "front_left")
+
+
+@pytest.fixture
+def session() -> Session:
+    return Session(load_layout(shipped_layouts()["ucat"]))
+
+
+def fin(session: Session, name: str):  # type: ignore[no-untyped-def]
+    layout = session.state.layout
+    return layout.fins[layout.index(name)]
+
+
+def choose(session: Session, *names: str) -> None:
+    session.select(names[0])
+    for name in names[1:]:
+        session.select_also(name)
+
+
+def test_selection_grows_shrinks_and_spans(session: Session) -> None:
+    choose(session, "back_left", "front_right")
+    assert session.selection == ("front_right", "back_left") and session.selected == "front_right"
+    session.select_to("front_left")
+    assert session.selected == "front_left" and set(session.selection) == {*FRONT, "back_left"}
+    session.select_also("back_left")
+    assert session.selection == FRONT
+    session.select_all()
+    with pytest.raises(FinlabError, match="these are all fins"):
+        session.delete_fin()
+    session.select(None)
+    assert session.selection == () and session.selected is None
+
+
+def test_what_changes_counts_for_all_selected_in_one_step(session: Session) -> None:
+    choose(session, *FRONT)
+    session.place_selected((0.2, *fin(session, "front_left").position[1:]))
+    assert [fin(session, name).position for name in FRONT] == [(0.2, -0.1502, 0.0), (0.2, 0.1502, 0.0)]
+    session.history.end_merge()
+    session.limit_selected("amplitude", (0.1, 0.5))
+    session.choose_model("lighthill")
+    session.set_parameter("width", 0.12)
+    session.set_servo("speed_limit", 9.0)
+    session.turn_selected(math.radians(45))
+    for name in FRONT:
+        changed = fin(session, name)
+        assert changed.limits.amplitude == (0.1, 0.5) and changed.limits.frequency == (0.1, 2.1)
+        assert changed.model == FinModelSpec("lighthill", (("width", 0.12),))
+        assert changed.servo.speed_limit == 9.0 and changed.mounting_angle == pytest.approx(math.pi / 4)
+    assert fin(session, "back_left") == load_layout("ucat").fins[2]
+    assert len(session.history.past) == 6
+    assert session.history.past[1][0] == "Limit 2 fins" and session.history.past[3][0] == "Width of 2 fins"
+    for _ in range(6):
+        session.undo()
+    assert session.state.layout == load_layout("ucat")
+
+
+def test_usual_values_are_not_written_and_shared_ones_stay(session: Session) -> None:
+    session.select("front_right")
+    session.set_parameter("density", 1025.0)
+    session.set_parameter("area", 0.03)
+    session.choose_model("lighthill")
+    assert fin(session, "front_right").model == FinModelSpec("lighthill", (("density", 1025.0),))
+    session.set_parameter("density", 1000.0)
+    assert fin(session, "front_right").model == FinModelSpec("lighthill")
+    with pytest.raises(FinlabError, match="comes from a file"):
+        modelled(fin(session, "front_right"), "table")
+
+
+@pytest.mark.parametrize(
+    ("act", "says"),
+    [
+        (lambda s: s.limit_selected("amplitude", (0.5, 0.2)), "minimum 0.5 is above maximum 0.2"),
+        (lambda s: s.limit_selected("frequency", (0.0, 0.0)), "maximum must be above 0"),
+        (lambda s: s.limit_selected("zero_direction", (-4.0, 4.0)), "one turn"),
+        (lambda s: s.limit_selected("nothing", (0.0, 1.0)), "expected one of"),
+        (lambda s: s.set_parameter("area", -0.1), "must be above 0"),
+        (lambda s: s.set_parameter("area", float("nan")), "finite"),
+        (lambda s: s.set_servo("amplitude_pole", 0.0), "must be above 0"),
+        (lambda s: s.set_servo("__class__", 1.0), "expected one of"),
+        (lambda s: s.place_one("front_right", "x", 55.0), "x of front_right"),
+        (lambda s: s.rename_fin("front_right", "front_left"), "there is a fin 'front_left' already"),
+        (lambda s: s.rename_fin("front_right", "  "), "name"),
+        (lambda s: s.rename_fin("front_right", "x" * 65), "name"),
+        (lambda s: s.rename_fin("nobody", "x"), "has no fin"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_and_changes_nothing(session: Session, act, says: str) -> None:  # type: ignore[no-untyped-def]
+    session.select("front_right")
+    before = session.state
+    with pytest.raises(FinlabError, match=says):
+        act(session)
+    assert session.state == before
+
+
+def test_a_renamed_fin_keeps_its_damage_link_lock_and_selection(session: Session) -> None:
+    session.select("front_left")
+    session.mirror_fin()
+    session.select("front_left")
+    session.toggle_failure("front_left")
+    session.toggle_mark("hidden", ["front_left"])
+    session.rename_fin("front_left", " bow <b> ")
+    state = session.state
+    assert state.failed == ("bow <b>",) and ("bow <b>", "front_right") in state.links
+    assert state.hidden == ("bow <b>",) and session.selected == "bow <b>"
+    assert "<b>" not in fin_list(state, session.selection).split("<table>")[1].split("bow")[1][:12]
+    session.undo()
+    assert session.selected == "front_left" and session.state.failed == ("front_left",)
+
+
+def test_a_locked_fin_stays_until_it_is_unlocked(session: Session) -> None:
+    choose(session, *FRONT)
+    session.toggle_mark("locked", ["front_left", "front_right"])
+    assert session.history.undo_name == "Lock 2 fins"
+    for act in (
+        lambda: session.move_fin("front_left", (0.0, 0.1, 0.0)),
+        lambda: session.drag_fin("front_left", (0.0, 0.1, 0.0), 0.0),
+        lambda: session.turn_selected(0.1),
+        lambda: session.set_parameter("area", 0.05),
+        lambda: session.rename_fin("front_left", "x"),
+        session.stick_fin,
+        session.delete_fin,
+    ):
+        with pytest.raises(FinlabError, match="is locked; unlock it"):
+            act()
+    session.toggle_mark("locked", ["front_left"])
+    assert session.state.locked == ("front_right",)
+    session.select("front_left")
+    session.delete_fin()
+    assert session.state.locked == ("front_right",)
+
+
+def test_a_linked_twin_that_is_locked_holds_its_pair(session: Session) -> None:
+    session.select("front_left")
+    session.mirror_fin()
+    session.toggle_mark("locked", ["front_right"])
+    session.select("front_left")
+    with pytest.raises(FinlabError, match="front_right, the mirror image of front_left, is locked"):
+        session.place_selected((0.1, 0.15, 0.0))
+
+
+def test_linked_fins_that_are_both_selected_move_once(session: Session) -> None:
+    session.select("front_left")
+    session.mirror_fin()
+    choose(session, *FRONT)
+    session.place_selected((0.2, 0.2, 0.0))
+    assert fin(session, "front_left").position == (0.2, 0.2, 0.0)
+    assert fin(session, "front_right").position == (0.2, -0.2, 0.0)
+
+
+def test_order_moves_blocks_and_stops_at_the_ends(session: Session) -> None:
+    layout: Layout = session.state.layout
+    names = layout.names
+    assert reordered(layout, names[:2], 1).names == (names[2], *names[:2], names[3])
+    assert reordered(layout, names[:2], -1) == layout
+    assert reordered(layout, (names[3], names[1]), -1).names == (names[1], names[0], names[3], names[2])
+    session.select(names[0])
+    session.reorder(1)
+    assert session.state.layout.names[1] == session.selected == names[0]
+
+
+def test_marks_are_kept_with_the_session(session: Session) -> None:
+    session.toggle_mark("locked", ["back_left"])
+    session.toggle_mark("hidden", ["front_right", "back_left"])
+    again = Session(load_layout(shipped_layouts()["pair"]))
+    restore(again, json.loads(json.dumps(to_dict(session))))
+    assert again.state == session.state
+
+
+def test_curves_show_the_fins_own_law_within_its_limits(session: Session) -> None:
+    one = fin(session, "front_right")
+    amplitude, frequency, thrust = thrust_within(one.model, one.limits)
+    assert amplitude[0] == 0.6 and (frequency[0], frequency[-1]) == (0.1, 2.1)
+    assert thrust[0, -1] == pytest.approx(4.737 * 2.1**2 * math.sin(0.6) ** 2, rel=1e-3)
+
+
+def test_differences_are_told_in_words(session: Session) -> None:
+    fins = list(session.state.layout.fins)
+    assert differences(fins) == "shaft"
+    session.select("back_left")
+    session.limit_selected("frequency", (0.1, 1.0))
+    assert differences(list(session.state.layout.fins)) == "shaft and limits"

@@ -1,0 +1,137 @@
+"""Intents about what a layout says of its fins: for one of them, or for all that are selected at once."""
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from finlab.errors import FinlabError
+from finlab.layout import Fin, Layout
+from webapp.session import fin_edits, layout_edits
+from webapp.session.editing import Editing, Vector
+from webapp.session.links import followed, partner
+from webapp.session.state import number
+
+
+class Inspecting(Editing):
+    """Names, limits, models and drives of fins; several fins in one step."""
+
+    def rename_fin(self, name: str, wanted: str) -> None:
+        """A fin with another name; whatever is known of it goes on under that."""
+        if wanted.strip() != name:
+            self.state.check_free([name])
+            renamed = fin_edits.checked_name(self.state.layout, name, wanted)
+            self._commit(f"Rename {name} to {renamed}", self.state.with_renamed(name, renamed))
+
+    def place_selected(self, position: Vector) -> None:
+        """The selected fin at another place [m]; others that are selected take what of it has changed."""
+        names = self._selected_names()
+        before = self.state.layout.fins[self.state.layout.index(names[-1])].position
+        changed = [abs(new - old) > layout_edits.UNTOUCHED for new, old in zip(position, before, strict=True)]
+
+        def placed(layout: Layout, name: str) -> Layout:
+            own = layout.fins[layout.index(name)].position
+            x, y, z = (new if c else old for new, old, c in zip(position, own, changed, strict=True))
+            layout = layout_edits.moved(layout, name, (x, y, z), self._step_m)
+            return layout_edits.stuck(layout, name) if self.display.stick else layout
+
+        self._for_each("Move", names, placed, f"move {names}")
+
+    def turn_selected(self, angle: float) -> None:
+        """All selected fins with one mounting angle [rad]."""
+        names = self._selected_names()
+
+        def turned(layout: Layout, name: str) -> Layout:
+            return layout_edits.turned(layout, name, angle, self._step_rad)
+
+        self._for_each("Turn", names, turned, f"turn {names}")
+
+    def place_one(self, name: str, axis: str, value: Any) -> None:
+        """One coordinate of a fin [m], as it is typed into the list: never snapped."""
+        self.state.check_free([name])
+        position = list(self.state.layout.fins[self.state.layout.index(name)].position)
+        position["xyz".index(axis)] = value
+        x, y, z = position
+        layout = layout_edits.moved(self.state.layout, name, (x, y, z))
+        self._edit(f"Move {name}", followed(layout, self.state.links, name))
+
+    def limit_selected(self, quantity: str, ends: tuple[float, float]) -> None:
+        """Other limits of all selected fins; `quantity` is a field of `Limits`, in radians or hertz."""
+        self._change("Limit", self._selected_names(), lambda fin: fin_edits.limited(fin, quantity, ends))
+
+    def choose_model(self, kind: str) -> None:
+        """Another kind of model for all selected fins."""
+        self._change(f"Model {kind} for", self._selected_names(), lambda fin: fin_edits.modelled(fin, kind))
+
+    def set_parameter(self, key: str, value: Any) -> None:
+        """A number of the model of all selected fins whose model has it."""
+        self._change(
+            f"{fin_edits.words(key)} of",
+            self._selected_names(),
+            lambda fin: fin_edits.with_parameter(fin, key, value),
+        )
+
+    def set_servo(self, key: str, value: Any) -> None:
+        """A number of the drive of all selected fins, a field of `Servo`."""
+        self._change(
+            f"{fin_edits.words(key)} of",
+            self._selected_names(),
+            lambda fin: fin_edits.with_servo(fin, key, value),
+        )
+
+    def turn_one(self, name: str, degrees: Any) -> None:
+        """The shaft of a fin [deg], as it is typed into the list: never snapped."""
+        self.state.check_free([name])
+        angle = math.radians(number(degrees, f"shaft of {name} [°]", -3600.0, 3600.0))
+        layout = layout_edits.turned(self.state.layout, name, angle)
+        self._edit(f"Turn {name}", followed(layout, self.state.links, name))
+
+    def reorder(self, step: int) -> None:
+        """The selected fins one place up (-1) or down (1) in the list, hence in commands."""
+        names = self._selected_names()
+        layout = fin_edits.reordered(self.state.layout, names, step)
+        self._edit(f"{_which(names)} {'up' if step < 0 else 'down'}", layout)
+
+    def toggle_mark(self, mark: str, names: Iterable[str]) -> None:
+        """Fins locked or free again, hidden or shown again: `mark` is one of `MARKS`."""
+        given = tuple(names)
+        state = self.state.with_mark_toggled(mark, given)
+        done = set(getattr(state, mark)) > set(getattr(self.state, mark))
+        word = {"locked": ("Unlock", "Lock"), "hidden": ("Show", "Hide")}[mark][done]
+        self._commit(f"{word} {_which(given)}", state)
+
+    def _selected_names(self) -> tuple[str, ...]:
+        """The selected fins, in the order in which they were chosen; none of them is locked."""
+        self._selected_name()
+        self.state.check_free(self._chosen)
+        return self._chosen
+
+    def _change(self, what: str, names: tuple[str, ...], change: Callable[[Fin], Fin]) -> None:
+        def changed(layout: Layout, name: str) -> Layout:
+            return fin_edits.with_fin(layout, name, change(layout.fins[layout.index(name)]))
+
+        self._for_each(what, names, changed, None)
+
+    def _for_each(
+        self,
+        what: str,
+        names: tuple[str, ...],
+        change: Callable[[Layout, str], Layout],
+        merge_key: str | None,
+    ) -> None:
+        """One step for several fins; twins follow unless they are among them already."""
+        layout, links = self.state.layout, self.state.links
+        done: set[str] = set()
+        for name in reversed(names):  # the one that was chosen last leads its twin
+            twin = partner(links, name)
+            if twin in done:
+                continue
+            layout = change(layout, name)
+            done.add(name)
+            if twin is not None and twin in self.state.locked:
+                raise FinlabError(f"{twin}, the mirror image of {name}, is locked; unlock or unlink it first")
+            layout = followed(layout, links, name)
+        self._edit(f"{what} {_which(names)}", layout, merge_key)
+
+
+def _which(names: tuple[str, ...]) -> str:
+    return names[0] if len(names) == 1 else f"{len(names)} fins"
