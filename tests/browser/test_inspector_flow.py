@@ -6,7 +6,7 @@ import pytest
 
 
 def test_a_name_and_a_place_are_edited_in_the_list(page: Any) -> None:
-    page.tab("Layout")
+    page.tab("Design")
     keys = page.page.keyboard
     row = page.page.locator(".fin-list tr[data-fin=back_left]")
     row.locator("td").last.wait_for()
@@ -36,7 +36,7 @@ def test_a_name_and_a_place_are_edited_in_the_list(page: Any) -> None:
 
 
 def test_escape_leaves_a_cell_as_it_was(page: Any) -> None:
-    page.tab("Layout")
+    page.tab("Design")
     before = page.session.state
     page.page.locator(".fin-list [data-edit=fin-shaft]").first.dblclick()
     page.page.keyboard.type("77", delay=15)
@@ -61,7 +61,7 @@ def fins(page: Any) -> tuple[Any, ...]:
 
 
 def test_limits_and_model_count_for_all_selected_fins(page: Any) -> None:
-    page.tab("Layout")
+    page.tab("Design")
     page.page.locator(".fin-list tr[data-fin=front_right] .swatch").click()
     page.page.locator(".fin-list tr[data-fin=back_left] .swatch").click(modifiers=["Shift"])
     page.until(lambda: len(page.session.selection) == 3)
@@ -83,7 +83,7 @@ def test_limits_and_model_count_for_all_selected_fins(page: Any) -> None:
 
 
 def test_a_locked_and_hidden_fin(page: Any) -> None:
-    page.tab("Layout")
+    page.tab("Design")
     page.page.locator("tr[data-fin=front_right] [data-press=hidden]").click()
     page.visible("/robot/fins/0", False)
     page.page.locator("tr[data-fin=front_left] [data-press=locked]").click()

@@ -268,6 +268,7 @@ def test_every_field_of_every_tab(page: Any, steps: list[Any]) -> None:
     page.tab("Design")
     commit("Shaft [°]", "33.25", -1, lambda: math.degrees(session.state.layout.fins[0].mounting_angle), 33.25)
     commit("Position [m]", ".03", 0, lambda: session.state.layout.fins[0].position[0], 0.03)
+    page.key("Escape")  # the hull is the robot's: nothing else is selected
     page.unfold("Hull", "Size [m]")
     commit("Size [m]", "52 cm", 0, lambda: session.state.layout.body.hull.size_m[0], 0.52)
     commit("Centre of gravity [m]", "-5 mm", 2, lambda: -session.state.layout.body.hull.center_m[2], -0.005)

@@ -8,11 +8,17 @@ from html import escape
 
 from webapp.editables import edit, press
 from webapp.markup.answer import swatch
+from webapp.session.links import partner
 from webapp.session.state import MARKS, State
 
 AXES = ("x", "y", "z")
 LOCK = "<rect x='2.5' y='6.5' width='9' height='6' rx='1.2'/><path d='M4.5 6.5V4.5a2.5 2.5 0 0 1 5 0v{}'/>"
 EYE = "<path d='M1 7c2.4-4.6 9.6-4.6 12 0c-2.4 4.6-9.6 4.6-12 0z'/><circle cx='7' cy='7' r='1.9'/>{}"
+HULL = (
+    "<svg class='hull' width='18' height='18' viewBox='0 0 18 18'>"
+    "<ellipse cx='9' cy='9' rx='7.5' ry='4.5'/></svg>"
+)
+"""A small picture of a hull."""
 SHAPES = {
     ("locked", True): LOCK.format(2),
     ("locked", False): LOCK.format("0.4"),
@@ -38,11 +44,16 @@ def fin_list(state: State, selection: tuple[str, ...]) -> str:
     heads = "".join(f"<th class='place'>{axis}</th>" for axis in AXES)
     names = state.layout.names
     rows = [_row(state, index, name in selection) for index, name in enumerate(names)]
+    chosen = "" if selection else "chosen"
+    robot = (
+        f"<tr class='{chosen}' {press('robot', '')}><td colspan='6'>{HULL}<span class='name whole'>"
+        f"{escape(state.layout.name)}</span></td></tr>"
+    )
+    heads += "<th class='place' title='Azimuth of the shaft'>shaft</th><th></th>"
     return (
-        "<div class='fl fin-list'><table><tr><th>Fin</th>"
-        f"{heads}<th class='place' title='Azimuth of the shaft'>shaft</th><th></th></tr>{''.join(rows)}"
-        "</table><div class='dim units'>x, y, z in m, shaft in °. Press to select, with Ctrl or Shift "
-        "several; press twice to edit.</div></div>"
+        f"<div class='fl fin-list'><table><tr><th></th>{heads}</tr>{robot}{''.join(rows)}</table>"
+        "<div class='dim units'>Press to select, with Ctrl or Shift several; press twice to edit. "
+        "<span class='place'>x, y, z in m, shaft in °.</span></div></div>"
     )
 
 
@@ -57,11 +68,13 @@ def _row(state: State, index: int, chosen: bool) -> str:
     degrees = math.degrees(fin.mounting_angle)
     shaft = _cell(edit("fin-shaft", key, _exact(degrees, 2), f"shaft of {fin.name} [°]"), f"{degrees:.0f}")
     called = edit("fin-name", key, fin.name, f"name of {fin.name}")
+    twin = partner(state.links, fin.name)
+    paired = "" if twin is None else f"<span class='dim' title='moves with {escape(twin)}'>⇄</span>"
     words = f"<span class='name edit' title='{name}' {called}>{name}</span>"
     marks = "".join(_mark(mark, key, name, fin.name in getattr(state, mark)) for mark in MARKS)
     return (
         f"<tr class='{' '.join(kinds)}' data-fin='{name}' {press('fin', key)}>"
-        f"<td>{swatch(index, fin.name in state.failed)}{words}</td>{places}{shaft}"
+        f"<td>{swatch(index, fin.name in state.failed)}{words}{paired}</td>{places}{shaft}"
         f"<td class='marks'>{marks}</td></tr>"
     )
 

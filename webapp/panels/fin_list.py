@@ -28,6 +28,7 @@ class FinList:
         self._table = gui.add_html("")
         acts: dict[str, Callable[[str, str], object]] = {
             "fin": self._select,
+            "robot": lambda _key, _held: session.select(None),
             "fin-name": self._rename,
             "fin-called": self._rename,
             "fin-shaft": self._turn,

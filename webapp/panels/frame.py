@@ -17,6 +17,7 @@ from webapp.markup.picking import add_channel, marker
 from webapp.page import Page, Panel
 from webapp.panels.places import DRAWER, LEFT, PLACES, REGIONS, RIGHT, Place
 from webapp.panels.status import Corner
+from webapp.session import Session
 from webapp.session.looking import DRAWERS
 from webapp.theme import ASKED, DELIVERED, MISSING, css
 from webapp.viser_internals import run_script
@@ -105,7 +106,7 @@ class Frame:
     def refresh(self) -> None:
         """Show what belongs to the task."""
         session = self._page.session
-        put(self._shown, content=_style(self._sections, session.task, session.drawer))
+        put(self._shown, content=_style(self._sections, session))
         assert self._strip is not None
         put(self._strip, content=_strip(session.task, session.opened[session.task], session.folded))
 
@@ -127,12 +128,16 @@ class Frame:
             self._page.do(lambda: acts[word[0]](word[1]))
 
 
-def _style(sections: list[Section], task: str, drawer: str | None) -> str:
+def _style(sections: list[Section], session: Session) -> str:
     """Which regions are there, and which sections in them."""
+    task, drawer = session.task, session.drawer
+    about = ("", "robot" if session.selected is None else "fins")
     there = {
         section.marker
         for section in sections
-        if task in section.place.tasks and (section.place.region != DRAWER or section.place.title == drawer)
+        if task in section.place.tasks
+        and section.place.about in about
+        and (section.place.region != DRAWER or section.place.title == drawer)
     }
     regions = {section.place.region for section in sections if section.marker in there}
     gone = [FOLDER.format(section.marker) for section in sections if section.marker not in there]

@@ -35,53 +35,52 @@ TURNS = ("x", "y", "z")
 
 
 class HullPanel:
-    """Widgets of one folder."""
+    """Widgets about the hull."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page, self._chosen = page, "m"
-        with gui.add_folder("Hull", expand_by_default=False):
-            shapes = gui.add_dropdown("Shape", (*HULL_SHAPES, MESH), hint="For looks and for sticking.")
-            page.bind(shapes, self._choose_shape, lambda: self._shape or MESH)
-            ends: dict[str, Any] = {"min": (0.02,) * 3, "max": (5.0,) * 3, "step": 0.01}
-            sides = "Length, width and height of a shape."
-            self._size = page.bind_number(
-                gui.add_vector3("Size [m]", (0.5, 0.3, 0.2), **ends, hint=sides),
-                self._resize,
-                lambda: tuple(2 * v for v in hull_of(page.session.state.layout).half),
-            )
-            about = "Centre of gravity as seen from the hull's middle. Torques are about it."
-            page.bind_number(
-                gui.add_vector3("Centre of gravity [m]", (0.0, 0.0, 0.0), step=0.005, hint=about),
-                page.session.set_center_of_gravity,
-                lambda: center_of_gravity(page.session.state.layout),
-            )
-            hint = "What 1 means in the mesh file; of one that is here, too."
-            self._unit = page.bind(
-                gui.add_dropdown("Unit of file", tuple(UNITS), hint=hint),
-                self._choose_unit,
-                self._unit_now,
-            )
-            page.add_upload(
-                "Import a hull (STL, OBJ, GLB)",
-                self._import,
-                icon=viser.Icon.UPLOAD,
-                mime_type=".stl,.obj,.glb,.ply",
-                hint=f"Up to {MAX_BYTES // 1_000_000} MB; more than {MAX_FACES:,} triangles are simplified.",
-            )
-            self._report = gui.add_html("")
-            turns = {axis: partial(self._turn, axis) for axis in TURNS}
-            hint = "A quarter turn about the body's axis, by the right-hand rule."
-            self._turns = page.add_buttons("Turn by 90°", turns, hint=hint)
-            self._length = page.bind_number(
-                gui.add_number("Length [m]", 1.0, step=0.01, hint="Along x; width and height follow."),
-                self._scale,
-                lambda: 2.0 * hull_of(page.session.state.layout).half[0],
-            )
-            hint = "At most so many; fewer make the page quicker."
-            self._faces = page.bind_number(
-                gui.add_number("Triangles", 1.0, step=1000, hint=hint), self._simplify, self._count, digits=0
-            )
+        shapes = gui.add_dropdown("Shape", (*HULL_SHAPES, MESH), hint="For looks and for sticking.")
+        page.bind(shapes, self._choose_shape, lambda: self._shape or MESH)
+        ends: dict[str, Any] = {"min": (0.02,) * 3, "max": (5.0,) * 3, "step": 0.01}
+        sides = "Length, width and height of a shape."
+        self._size = page.bind_number(
+            gui.add_vector3("Size [m]", (0.5, 0.3, 0.2), **ends, hint=sides),
+            self._resize,
+            lambda: tuple(2 * v for v in hull_of(page.session.state.layout).half),
+        )
+        about = "Centre of gravity as seen from the hull's middle. Torques are about it."
+        page.bind_number(
+            gui.add_vector3("Centre of gravity [m]", (0.0, 0.0, 0.0), step=0.005, hint=about),
+            page.session.set_center_of_gravity,
+            lambda: center_of_gravity(page.session.state.layout),
+        )
+        hint = "What 1 means in the mesh file; of one that is here, too."
+        self._unit = page.bind(
+            gui.add_dropdown("Unit of file", tuple(UNITS), hint=hint),
+            self._choose_unit,
+            self._unit_now,
+        )
+        page.add_upload(
+            "Import a hull (STL, OBJ, GLB)",
+            self._import,
+            icon=viser.Icon.UPLOAD,
+            mime_type=".stl,.obj,.glb,.ply",
+            hint=f"Up to {MAX_BYTES // 1_000_000} MB; more than {MAX_FACES:,} triangles are simplified.",
+        )
+        self._report = gui.add_html("")
+        turns = {axis: partial(self._turn, axis) for axis in TURNS}
+        hint = "A quarter turn about the body's axis, by the right-hand rule."
+        self._turns = page.add_buttons("Turn by 90°", turns, hint=hint)
+        self._length = page.bind_number(
+            gui.add_number("Length [m]", 1.0, step=0.01, hint="Along x; width and height follow."),
+            self._scale,
+            lambda: 2.0 * hull_of(page.session.state.layout).half[0],
+        )
+        hint = "At most so many; fewer make the page quicker."
+        self._faces = page.bind_number(
+            gui.add_number("Triangles", 1.0, step=1000, hint=hint), self._simplify, self._count, digits=0
+        )
 
     def _import(self, name: str, content: bytes) -> None:
         self._page.session.import_hull(stored_hull(name, content, self._chosen))

@@ -6,10 +6,14 @@ from typing import NamedTuple
 import viser
 
 from webapp.page import Page, Panel
+from webapp.panels.check_panel import CheckPanel
 from webapp.panels.compare_tab import ComparePanel
 from webapp.panels.damage import DamagePanel
+from webapp.panels.design_panel import DesignPanel
 from webapp.panels.files_tab import FilesTab
-from webapp.panels.layout_tab import LayoutTab
+from webapp.panels.fin_inspector import FinInspector
+from webapp.panels.fin_list import FinList
+from webapp.panels.hull_panel import HullPanel
 from webapp.panels.limits_tab import ImprovePanel, ReachPanel
 from webapp.panels.modes_tab import CandidatesPanel
 from webapp.panels.pilot import PilotPanel
@@ -41,6 +45,8 @@ class Place(NamedTuple):
     """Whether it shows a swim, and is to follow it."""
     folded: bool = False
     """Whether only its heading is seen at first."""
+    about: str = ""
+    """What must be selected for it to be there: `fins`, or none of them (`robot`); nothing where any may."""
 
 
 PLACES = (
@@ -48,7 +54,11 @@ PLACES = (
     Place(TOP, TASKS, "History", HistoryBar),
     Place(TOP, TASKS, "Tasks", TaskBar),
     Place(TOP, TASKS, "Answers", AnsweringBar),
-    Place(RIGHT, (DESIGN,), "Layout", LayoutTab),
+    Place(LEFT, (DESIGN,), "Fins", FinList),
+    Place(LEFT, (DESIGN,), "Design", DesignPanel),
+    Place(RIGHT, (DESIGN,), "Fin", FinInspector, about="fins"),
+    Place(RIGHT, (DESIGN,), "Hull", HullPanel, folded=True, about="robot"),
+    Place(RIGHT, (DESIGN,), "Check", CheckPanel),
     Place(DRAWER, (DESIGN,), "Reach", ReachPanel),
     Place(DRAWER, (DESIGN,), "Improve", ImprovePanel),
     Place(LEFT, (ALLOCATE,), "Fins", FinsPanel),
