@@ -6,6 +6,7 @@ from typing import NamedTuple
 import viser
 
 from webapp.page import Page, Panel
+from webapp.panels.body_inspector import BodyInspector
 from webapp.panels.check_panel import CheckPanel
 from webapp.panels.compare_tab import ComparePanel
 from webapp.panels.damage import DamagePanel
@@ -57,6 +58,7 @@ PLACES = (
     Place(LEFT, (DESIGN,), "Fins", FinList),
     Place(LEFT, (DESIGN,), "Design", DesignPanel),
     Place(RIGHT, (DESIGN,), "Fin", FinInspector, about="fins"),
+    Place(RIGHT, (DESIGN,), "Body", BodyInspector, about="robot"),
     Place(RIGHT, (DESIGN,), "Hull", HullPanel, folded=True, about="robot"),
     Place(RIGHT, (DESIGN,), "Check", CheckPanel),
     Place(DRAWER, (DESIGN,), "Reach", ReachPanel),

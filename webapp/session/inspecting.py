@@ -6,10 +6,13 @@ from typing import Any
 
 from finlab.errors import FinlabError
 from finlab.layout import Fin, Layout
-from webapp.session import fin_edits, layout_edits
+from webapp.session import body_edits, fin_edits, layout_edits
 from webapp.session.editing import Editing, Vector
 from webapp.session.links import followed, partner
 from webapp.session.state import number
+
+UNITS = ("kg", "kgm2", "m", "n")
+"""How keys of a body end."""
 
 
 class Inspecting(Editing):
@@ -98,6 +101,33 @@ class Inspecting(Editing):
         done = set(getattr(state, mark)) > set(getattr(self.state, mark))
         word = {"locked": ("Unlock", "Lock"), "hidden": ("Show", "Hide")}[mark][done]
         self._commit(f"{word} {_which(given)}", state)
+
+    def rename_robot(self, wanted: str) -> None:
+        """Another name of the robot."""
+        layout = self.state.layout
+        named = body_edits.described(layout, wanted, layout.description)
+        self._edit(f"Rename the robot to {named.name}", named)
+
+    def describe_robot(self, text: str) -> None:
+        """Another description of the robot."""
+        layout = self.state.layout
+        self._edit("Describe the robot", body_edits.described(layout, layout.name, text))
+
+    def set_dynamics(self, key: str, value: Any) -> None:
+        """Another field of the body, one of `DYNAMICS`; None forgets it."""
+        changed = body_edits.with_dynamics(self.state.layout, **{key: value})
+        word = fin_edits.words(key.rsplit("_", 1)[0] if key.rsplit("_", 1)[-1] in UNITS else key)
+        self._edit(f"{word} of the robot", changed)
+
+    def forget_dynamics(self) -> None:
+        """Nothing is said of mass, damping and buoyancy."""
+        nothing: dict[str, Any] = dict.fromkeys(body_edits.DYNAMICS)
+        self._edit("Forget mass and damping", body_edits.with_dynamics(self.state.layout, **nothing))
+
+    def estimate(self, what: str) -> None:
+        """What the hull says of the body, by a key of `ESTIMATES`."""
+        word = "mass and damping" if what == "all" else what
+        self._edit(f"Estimate {word} from the hull", body_edits.estimated(self.state.layout, what))
 
     def _selected_names(self) -> tuple[str, ...]:
         """The selected fins, in the order in which they were chosen; none of them is locked."""
