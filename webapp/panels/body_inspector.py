@@ -26,8 +26,8 @@ KNOWN = {
 """What a swim wants to know, and what it is called."""
 FORMULAS = (
     "Mass: of the water that the hull displaces. Inertia: one density. Added mass: the ellipsoid of its "
-    "volume and proportions, after Lamb (1932). Damping: pressure after Hoerner (1965), about axes by strips; "
-    "friction after Blasius at 0.2 m/s. All of the bare hull: fins, wires and ports come on top."
+    "volume and proportions, after Lamb (1932). Damping: pressure after Hoerner (1965), about axes by "
+    "strips; friction after Blasius at 0.2 m/s. All of the bare hull: fins, wires and ports come on top."
 )
 PARTS: dict[str, tuple[tuple[str, int, str], ...]] = {
     "inertia_kgm2": (("Inertia [kg m²]", 0, "About x, y, z. From the hull: a solid of one density."),),
