@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from finlab.allocation.command_cost import Bowl, CommandCost
 from finlab.arrays import Array
+from finlab.forces.small_systems import solve_symmetric
 
 Mask = NDArray[np.bool_]
 
@@ -230,5 +231,5 @@ def _damped_step(residual: Array, slope: Array, pull: Array, damping: Array, hel
     matrix = weighted @ slope.transpose(0, 2, 1)
     matrix[:, np.arange(6), np.arange(6)] += 1.0
     missing = residual + np.einsum("bij,bj->bi", slope, rest.reshape(n_rows, -1))
-    multiplier = np.linalg.solve(matrix, missing[..., None])[..., 0]
+    multiplier = solve_symmetric(matrix, missing[..., None])[..., 0]
     return np.asarray(rest - np.einsum("bij,bi->bj", weighted, multiplier).reshape(pull.shape))

@@ -79,7 +79,7 @@ def finlab_method(name: str) -> Callable[..., Array]:
                 made[layout] = _with_sigma(base, sigma)
             allocator = made[layout]
         elif base.name == "mdn":
-            weights = (base.normalization.std / sigma) ** 2
+            weights = base.normalization.std / sigma
             policy = Policy("closest", tuple(weights / weights.max()))
         if len(targets) == 1:
             return allocator.allocate(layout, targets[0], previous=previous, policy=policy).command[None]

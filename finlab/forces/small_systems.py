@@ -16,6 +16,22 @@ except ImportError:
     _lapack = np.linalg  # type: ignore[misc]
 
 
+RANK = 1e-13
+"""Eigenvalues of a matrix below this share of the largest one are rounding."""
+
+
+def solve_symmetric(matrix: Array, right: Array) -> Array:
+    """Solutions (..., m, k) of symmetric systems (..., m, m), singular ones among them.
+
+    A regularization that is smaller than what rounding has lost of a matrix leaves it singular, as large fins
+    far out in one line may do. The shortest of the best solutions is then taken, of all systems at once.
+    """
+    try:
+        return np.linalg.solve(matrix, right)
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.pinv(matrix, rcond=RANK, hermitian=True) @ right)
+
+
 def solve(matrix: Array, right: Array) -> AnyArray:
     """Solutions (..., m, k) of systems (..., m, m) with right sides (..., m, k), broadcast."""
     solution: AnyArray = _lapack.solve(matrix, right)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.forces.small_systems import solve_symmetric
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ def solve_box_quadratics(
     """Minimize `0.5 x' H x + g' x` subject to `lower <= x <= upper`, for B problems of m variables.
 
     Args:
-        hessian: symmetric positive definite H (B, m, m).
+        hessian: symmetric H (B, m, m), positive definite but for rounding.
         gradient: g (B, m).
         lower: (B, m), not above `upper`.
         upper: (B, m).
@@ -69,7 +70,7 @@ def solve_box_quadratics(
         pair_free = ~(held[:, :, None] | held[:, None, :])
         free_slope = np.where(held, 0.0, slope)
         reduced = np.where(pair_free, h, identity)
-        step = -np.linalg.solve(reduced, free_slope[..., None])[..., 0]
+        step = -solve_symmetric(reduced, free_slope[..., None])[..., 0]
         x[busy] = _search(h, slope, at, step, low, high, settings)
     return x
 

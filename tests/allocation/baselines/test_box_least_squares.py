@@ -35,6 +35,15 @@ def test_solutions_are_those_of_an_active_set_solver(spread: float) -> None:
     assert 0.1 < ((found == lower) | (found == upper)).mean() < 0.95
 
 
+def test_a_hessian_that_rounding_has_left_singular_has_a_solution() -> None:
+    """One of two problems has two variables that are one; with the other it is solved at once."""
+    twins = 1e12 * np.ones((2, 2))
+    hessian = np.stack([twins, np.diag([2.0, 1.0])])
+    gradient = np.array([[-1e12, -1e12], [-2.0, 3.0]])
+    found = solve_box_quadratics(hessian, gradient, np.full((2, 2), -1.0), np.ones((2, 2)))
+    np.testing.assert_allclose(found, [[0.5, 0.5], [1.0, -1.0]], rtol=1e-9)
+
+
 def test_it_takes_no_more_steps_than_it_may() -> None:
     hessian, gradient, lower, upper, *_ = problems(2, 1.0)
     start = np.clip(0.0, lower, upper)
