@@ -27,7 +27,7 @@ def solve_symmetric(matrix: Array, right: Array) -> Array:
     far out in one line may do. The shortest of the best solutions is then taken, of all systems at once.
     """
     try:
-        return np.linalg.solve(matrix, right)
+        return np.asarray(np.linalg.solve(matrix, right), np.float64)
     except np.linalg.LinAlgError:
         return np.asarray(np.linalg.pinv(matrix, rcond=RANK, hermitian=True) @ right)
 
