@@ -93,7 +93,9 @@ class Child:
             return Reply(None, wait_s)
 
     def last_words(self) -> str:
-        """The last line that the process has written to stderr."""
+        """The last line that the process has written to stderr, while it was asked."""
+        if self._errors.closed:
+            return "it did not answer in time"
         self._errors.seek(0, os.SEEK_END)
         self._errors.seek(max(0, self._errors.tell() - 4000))
         lines = self._errors.read().decode(errors="replace").strip().splitlines()
@@ -111,6 +113,7 @@ class Child:
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
+        self._errors.close()
 
 
 def _talk(

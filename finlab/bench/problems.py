@@ -180,16 +180,19 @@ def open_problems(path: str | os.PathLike[str] = FILE) -> Problems:
         raise DataError(f"{path}: this finlab reads version {VERSION}, got {index.get('version')!r:.60}")
     if index.get("checksum") != checksum_of(index, arrays):
         raise DataError(f"{path}: the checksum does not fit the contents; the file was changed, get it again")
-    robots = [Robot(r["set"], r["layout"], tuple(r["sigma"]), r["tables"]) for r in index["robots"]]
+    try:
+        robots = [Robot(r["set"], r["layout"], tuple(r["sigma"]), r["tables"]) for r in index["robots"]]
+        targets = Targets(*(arrays[f"target_{name}"] for name in Targets._fields))
+        paths = Sequences(*(arrays[f"sequence_{name}"] for name in Sequences._fields))
+        files = [name for robot in robots for name in robot.tables]
+    except (KeyError, TypeError) as error:
+        raise DataError(f"{path}: is incomplete or of another form: {error}") from None
+    if foreign := [name for name in files if Path(name).name != name]:
+        raise DataError(f"{path}: a force table would be written outside of its folder: {foreign[0]!r:.80}")
     named = ("format", "version", "checksum", "kinds", "robots")
-    return Problems(
-        {key: value for key, value in index.items() if key not in named},
-        tuple(robots),
-        Targets(*(arrays[f"target_{name}"] for name in Targets._fields)),
-        Sequences(*(arrays[f"sequence_{name}"] for name in Sequences._fields)),
-        {name: values for name, values in arrays.items() if name.startswith("table_")},
-        index["checksum"],
-    )
+    about = {key: value for key, value in index.items() if key not in named}
+    forces = {name: values for name, values in arrays.items() if name.startswith("table_")}
+    return Problems(about, tuple(robots), targets, paths, forces, index["checksum"])
 
 
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, AnyArray]]:

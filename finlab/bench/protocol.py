@@ -27,6 +27,9 @@ infinity; a command leaves the fin's limits; it came too late; or the process en
 GREETING = 0
 """Number of the answer with which finlab's own worker says that it is ready."""
 
+CPU = "--cpu"
+"""Tells the worker to time calls by the processor's time."""
+
 
 class Failure(NamedTuple):
     """Why there is no answer."""

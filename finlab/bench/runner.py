@@ -11,7 +11,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.bench.child import Child, Reply
 from finlab.bench.problems import Problems
-from finlab.bench.protocol import GREETING, Failure, checked_commands, parse_answer, question
+from finlab.bench.protocol import CPU, GREETING, Failure, checked_commands, parse_answer, question
 from finlab.errors import AllocationError
 from finlab.evaluation.progress import progress
 from finlab.layout.file import layout_to_dict
@@ -22,7 +22,9 @@ LIMIT_S = 1.0
 PATIENCE = 4.0
 """How many times the limit is waited for an answer before the process is ended."""
 START_S = 60.0
-"""Longest time for a process to start, and for its first answer about a robot [s]."""
+"""Longest time for a process to start [s]."""
+FIRST_S = 60.0
+"""Longest time for the first answer about a robot [s]."""
 GIVE_UP = 3
 """Processes that end or hang one after the other before no further question is asked."""
 
@@ -50,10 +52,12 @@ class Method:
     """Whether it says that it is ready, and tells how long each call took: finlab's own worker."""
 
     @classmethod
-    def of(cls, name: str) -> "Method":
-        """One of finlab's methods, `module:function` or `file.py:function`."""
+    def of(cls, name: str, cpu: bool = False) -> "Method":
+        """One of finlab's methods, `module:function` or `file.py:function`; timed by the processor's time,
+        which other work on the machine does not prolong, or by the wall clock."""
         shown = name.rpartition("/")[2] if ":" in name else name
-        return cls(shown, (sys.executable, "-m", "finlab.bench.worker", name), greets=True)
+        worker = (sys.executable, "-m", "finlab.bench.worker", name)
+        return cls(shown, (*worker, CPU) if cpu else worker, greets=True)
 
 
 @dataclass
@@ -126,7 +130,7 @@ class Asker:
         """Make the robot at a place the one that is asked about; its first call is not counted."""
         layout = problems.layout(place)
         self.plant, self.layout, self.sigma = plant_of(layout), layout_to_dict(layout), problems.sigma(place)
-        self.ask(problems.targets.wrench[problems.targets.robot == place][:1], wait_s=START_S)
+        self.ask(problems.targets.wrench[problems.targets.robot == place][:1], wait_s=FIRST_S)
 
     def ask(self, targets: Array, previous: Array | None = None, wait_s: float = 0.0) -> list[Answer]:
         """Answers to targets (N, 6) in one call."""
@@ -135,7 +139,7 @@ class Asker:
             return [Answer(None, math.nan, Failure("died", "not asked any more"))] * count
         if not self.child.runs:
             self._start()
-            wait_s = max(wait_s, START_S)
+            wait_s = max(wait_s, FIRST_S)
         self.number += 1
         line = question(self.number, self.layout, self.sigma, targets, previous)
         reply = self.child.ask(line, max(PATIENCE * limit, wait_s))

@@ -1,4 +1,4 @@
-"""`python -m finlab.bench.worker METHOD`: a Python callable, or one of finlab's methods, speaks the protocol.
+"""`python -m finlab.bench.worker METHOD [--cpu]`: a Python function, or a method of finlab, answers in lines.
 
 A callable is handed what its parameters ask for by name: `targets` (N, 6), `layout` (a `finlab.Layout`),
 `robot` (the same as plain values of a layout file), `sigma` (6,), `previous` (n, 3) or None.
@@ -12,6 +12,7 @@ import runpy
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -19,12 +20,10 @@ from typing import Any
 import numpy as np
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.methods import LEARNED
-from finlab.allocation.policy import Policy
 from finlab.arrays import Array
-from finlab.bench.protocol import GREETING
+from finlab.bench.protocol import CPU, GREETING
 from finlab.errors import DataError, FinlabError
-from finlab.evaluation.method_specs import load_method_spec, method_and_starts
+from finlab.evaluation.method_specs import load_method_spec
 from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
 from finlab.layout.file import parse_layout
@@ -65,38 +64,37 @@ def load_callable(name: str) -> Callable[..., Any]:
 def finlab_method(name: str) -> Callable[..., Array]:
     """One of finlab's methods as a callable, told what the benchmark divides errors by.
 
-    `paper` and `mdn` keep the yardstick that their networks were trained with; `mdn` is told what
-    the axes of a wrench out of reach weigh.
+    Method `paper` keeps what its network was trained with.
     """
-    base, learned = load_method_spec(name), method_and_starts(name.partition("-")[0])[0] in LEARNED
+    base = load_method_spec(name)
     made: dict[Layout, Allocator] = {}
 
     def answer(layout: Layout, targets: Array, sigma: Array, previous: Array | None) -> Array:
-        policy: Policy | str = "closest"
-        allocator = base
-        if not learned:
-            if layout not in made:
-                made[layout] = _with_sigma(base, sigma)
-            allocator = made[layout]
-        elif base.name == "mdn":
-            weights = base.normalization.std / sigma
-            policy = Policy("closest", tuple(weights / weights.max()))
+        if layout not in made:
+            made[layout] = base if base.name == "paper" else _with_sigma(base, sigma)
         if len(targets) == 1:
-            return allocator.allocate(layout, targets[0], previous=previous, policy=policy).command[None]
-        return allocator.allocate_batch(layout, targets, policy=policy).command
+            return made[layout].allocate(layout, targets[0], previous=previous).command[None]
+        return made[layout].allocate_batch(layout, targets).command
 
     return answer
 
 
 def _with_sigma(method: Allocator, sigma: Array) -> Allocator:
-    """The same method with another yardstick of the error."""
+    """The same method with another yardstick of the error; what the network of `mdn` sees has none."""
     make: Any = type(method)
-    made: Allocator = make(Normalization(np.zeros(6), sigma), **method.options)
+    own = Normalization(np.zeros(6), sigma)
+    known = own if method.weights is None else replace(method.weights, normalization=own)
+    made: Allocator = make(known, **method.options)
     return made
 
 
-def answers(method: Callable[..., Any], asked: dict[str, Any], layouts: dict[str, Layout]) -> dict[str, Any]:
-    """The answer to one question; only the call itself is timed."""
+def answers(
+    method: Callable[..., Any],
+    asked: dict[str, Any],
+    layouts: dict[str, Layout],
+    clock: Callable[[], float] = time.perf_counter,
+) -> dict[str, Any]:
+    """The answer to one question; only the call itself is timed, by a clock [s]."""
     key = json.dumps(asked["layout"])
     if key not in layouts:
         layouts[key] = parse_layout(asked["layout"])
@@ -111,13 +109,13 @@ def answers(method: Callable[..., Any], asked: dict[str, Any], layouts: dict[str
     wanted = inspect.signature(method).parameters
     takes_all = any(p.kind is p.VAR_KEYWORD for p in wanted.values())
     given = {name: value for name, value in given.items() if takes_all or name in wanted}
-    begin = time.perf_counter()
+    begin = clock()
     commands = method(**given)
-    seconds = time.perf_counter() - begin
+    seconds = clock() - begin
     return {"id": asked["id"], "commands": np.asarray(commands, np.float64).tolist(), "seconds": seconds}
 
 
-def main(name: str) -> int:
+def main(name: str, *options: str) -> int:
     """Answer lines on stdin until they end; what the method prints goes to stderr."""
     with os.fdopen(os.dup(1), "w", encoding="utf-8") as out:
         os.dup2(2, 1)
@@ -133,14 +131,15 @@ def main(name: str) -> int:
             return 2
         say({"id": GREETING, "commands": []})
         layouts: dict[str, Layout] = {}
+        clock = time.process_time if CPU in options else time.perf_counter
         for line in sys.stdin:
             asked = json.loads(line)
             try:
-                say(answers(method, asked, layouts))
+                say(answers(method, asked, layouts, clock))
             except Exception as error:  # whatever a method raises is one failure of it
                 say({"id": asked["id"], "error": f"{type(error).__name__}: {error}"})
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
+    sys.exit(main(*sys.argv[1:]))

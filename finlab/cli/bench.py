@@ -21,6 +21,7 @@ def bench(
     quick: bool = False,
     sets: Names = "all",
     limit: Annotated[float, arg(metavar="SECONDS")] = 1.0,
+    cpu: bool = False,
     together: bool = False,
     problems: Annotated[Path | None, arg(metavar="FILE")] = None,
     page: Annotated[Path | None, arg(metavar="FILE")] = None,
@@ -35,6 +36,7 @@ def bench(
         quick: the first robot of each set and the first paths, within a minute.
         sets: sets of robots with commas between, such as paper,tiny.
         limit: longest time for one target; a later answer is a failure.
+        cpu: time Python functions by the processor's time, which other work on the machine does not prolong.
         together: ask for all targets of a robot in one call.
         problems: file of problems; the shipped one by default.
         page: file for a page that needs nothing else.
@@ -56,11 +58,11 @@ def bench(
     asked = open_problems(problems or FILE)
     part = asked if sets == "all" else asked.of_sets([name.strip() for name in sets.split(",")])
     chosen = part.quick() if quick else part
-    tested = _tested(methods, command)
+    tested = _tested(methods, command, cpu)
     found = [figures(chosen, run_method(method, chosen, limit, together)) for method in tested]
     words = ["finlab", "bench", *methods, *(word for each in command for word in ("--command", each))]
     words += ["--sets", sets] * (part is not asked) + ["--quick"] * quick + ["--together"] * together
-    words += ["--limit", f"{limit:g}"] * (limit != LIMIT_S)
+    words += ["--cpu"] * cpu + ["--limit", f"{limit:g}"] * (limit != LIMIT_S)
     run = results(found, asked, quick=quick, together=together, limit_s=limit, command=shlex.join(words))
     stored = comparable(asked, quick=quick, together=together) if part is asked else None
     if json is not None:
@@ -70,14 +72,14 @@ def bench(
     print(to_text(*summary_blocks(rows_of(run, stored))))
 
 
-def _tested(methods: tuple[str, ...], commands: tuple[str, ...]) -> list[Method]:
+def _tested(methods: tuple[str, ...], commands: tuple[str, ...], cpu: bool) -> list[Method]:
     """The methods that were named, each of another name."""
     from finlab.bench.runner import Method
     from finlab.evaluation.method_specs import load_method_specs
 
     if own := [name for name in methods if ":" not in name]:
         load_method_specs(",".join(own))  # a wrong name costs no time
-    tested = [Method.of(name) for name in methods or (() if commands else ("search",))]
+    tested = [Method.of(name, cpu) for name in methods or (() if commands else ("search",))]
     for text in commands:
         words = shlex.split(text)
         if not words:

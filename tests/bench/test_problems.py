@@ -124,6 +124,19 @@ def test_later_version_is_refused(tmp_path: Path, few: Problems, monkeypatch: py
         open_problems(tmp_path / "p.npz")
 
 
+def test_tables_stay_in_their_folder_and_arrays_are_complete(tmp_path: Path, shipped: Problems) -> None:
+    place = next(k for k, robot in enumerate(shipped.robots) if robot.tables)
+    robot = shipped.robots[place]
+    away = replace(robot, tables={f"../{name}": table for name, table in robot.tables.items()})
+    save_problems(replace(shipped, robots=(away,)), tmp_path / "p.npz")
+    with pytest.raises(DataError, match="outside of its folder"):
+        open_problems(tmp_path / "p.npz")
+    broken = replace(robot, tables=None)  # type: ignore[arg-type]
+    save_problems(replace(shipped, robots=(broken,)), tmp_path / "q.npz")
+    with pytest.raises(DataError, match="q.npz: is incomplete or of another form"):
+        open_problems(tmp_path / "q.npz")
+
+
 def test_quick_is_a_part_and_sets_are_named(shipped: Problems) -> None:
     quick = shipped.quick()
     assert len(quick.targets.robot) == 11 * len(SETS) and len(quick.sequences.robot) == 2

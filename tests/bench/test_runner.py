@@ -43,8 +43,14 @@ def test_late_answers_are_failures(few: Problems) -> None:
     assert 60.0 <= found["summary"]["p50_ms"] < 500.0
 
 
+def test_the_processors_time_leaves_waiting_out(few: Problems) -> None:
+    method = Method.of(f"{METHODS}:is_slow", cpu=True)
+    found = figures(few, run_method(method, few, 0.05))
+    assert found["summary"]["failed"] == 0.0 and found["summary"]["p50_ms"] < 20.0
+
+
 def test_a_method_that_hangs_is_ended(few: Problems, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("finlab.bench.runner.START_S", 3.0)
+    monkeypatch.setattr("finlab.bench.runner.FIRST_S", 1.0)
     found = figures(few, run("sleeps", few, limit_s=0.1))
     assert found["summary"]["failed"] == 1.0 and found["failures"]["died"] > 100
 
