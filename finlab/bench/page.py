@@ -118,8 +118,8 @@ def document(found: dict[str, Any], stored: dict[str, Any] | None, problems: Pro
 
 
 _CAPTION = (
-    "Left: share of all targets whose relative error is at most so large; dashes at 1 %. Right: median and "
-    "99th percentile of single calls."
+    "Left: share of all targets whose relative error is at most so large; dashes at 1 %. Right: median "
+    "(dot) to 99th percentile of single calls."
 )
 
 
@@ -149,7 +149,8 @@ def _cards(row: Row) -> tuple[Card, ...]:
 def _by(key: str, title: str, names: dict[str, str], rows: Sequence[Row]) -> Table:
     """Shares solved: a line for each name, a column for each method."""
     columns = [Column("name", title, "code"), Column("what", "")]
-    columns += [Column(row["method"], f"`{row['method']}`", "share") for row in rows]
+    for row in rows:  # a space where a long name may be broken
+        columns.append(Column(row["method"], f"`{row['method'].replace(':', ': ')}`", "share"))
     lines = []
     for name, what in names.items():
         known = {row["method"]: row[key][name]["solved"] for row in rows if name in row[key]}
@@ -187,7 +188,7 @@ def _stored_remark(stored: dict[str, Any] | None) -> list[Block]:
         return []
     machine = stored["machine"]
     where = f"{machine['processor']}, {machine['cores']} cores"
-    return [f"*In italics: stored results, whose times are those of {where}.*"]
+    return [f"*In italics: stored results, made by `{stored['command']}` on {where}.*"]
 
 
 def _how(found: dict[str, Any], stored: dict[str, Any] | None, problems: Problems) -> list[Block]:

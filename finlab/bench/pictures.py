@@ -8,8 +8,10 @@ from finlab.bench.metrics import LEVELS, SOLVED
 from finlab.evaluation.plots import style
 from finlab.evaluation.plots.style import Picture, picture
 
-OTHERS = (style.VERMILION, style.PURPLE, style.YELLOW, style.SKY, style.GREEN)
-"""Colours of methods that have none of their own, in turn."""
+OTHERS = ("#C2185B", "#6D4C41", "#7CB342", "#5E35B1")
+"""Colours of methods that have none of their own, in turn; no other method has them."""
+OWN = 3.0
+"""Width of the lines of methods that stand out among stored ones."""
 
 
 def profile_and_times(rows: Sequence[dict[str, Any]]) -> Picture:
@@ -17,11 +19,14 @@ def profile_and_times(rows: Sequence[dict[str, Any]]) -> Picture:
     spare = cycle(OTHERS)
     colours = {row["method"]: style.COLOURS.get(row["method"]) or next(spare) for row in rows}
     timed = sorted((row for row in rows if row["summary"]["p50_ms"]), key=lambda r: -r["summary"]["p50_ms"])
-    with picture(1, 2, height=3.6, legend=9, width_ratios=(1.5, 1)) as view:
+    with picture(1, 2, height=3.8, legend=6, width_ratios=(1.5, 1)) as view:
         left, right = view.axes
         for row in rows:
             share = [100.0 * value for value in row["profile"]]
-            left.plot(LEVELS, share, color=colours[row["method"]], label=row["method"])
+            look: dict[str, Any] = {"color": colours[row["method"]], "label": row["method"]}
+            if row.get("_kind") == "ours":
+                look |= {"linewidth": OWN, "zorder": 3}
+            left.plot(LEVELS, share, **look)
         left.axvline(SOLVED, **style.DASHES)
         left.set(xscale="log", xlabel="relative error, up to", ylabel="targets [%]", ylim=(-2, 102))
         left.set_xlim(LEVELS[0], LEVELS[-1])
@@ -29,6 +34,6 @@ def profile_and_times(rows: Sequence[dict[str, Any]]) -> Picture:
             colour, summary = colours[row["method"]], row["summary"]
             right.plot([summary["p50_ms"], summary["p99_ms"]], [k, k], color=colour, linewidth=4, alpha=0.45)
             right.plot(summary["p50_ms"], k, "o", color=colour, markersize=7)
-        right.set(xscale="log", xlabel="one call [ms]: median (dot) to 99th percentile")
+        right.set(xscale="log", xlabel="one call [ms]")
         right.set_yticks(range(len(timed)), [row["method"] for row in timed])
         return view

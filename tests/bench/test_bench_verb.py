@@ -6,9 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from finlab.bench.results import read_results
+from finlab.bench.problems import Problems
+from finlab.bench.results import comparable, read_results, stored_results
 from finlab.cli import main
 from finlab.errors import DataError
+from finlab.evaluation.report.numbers import error
 
 METHODS = Path(__file__).with_name("methods.py")
 
@@ -39,6 +41,30 @@ def test_results_are_plain_and_versioned(tmp_path: Path) -> None:
         file.write_text(json.dumps(wrong))
         with pytest.raises(DataError, match="expected finlab-bench-results of version 1"):
             read_results(file)
+
+
+@pytest.mark.parametrize("quick", [True, False])
+def test_stored_results_belong_to_the_shipped_problems(quick: bool, shipped: Problems) -> None:
+    stored = comparable(shipped, quick=quick, together=False)
+    assert stored is not None and stored == read_results(stored_results(quick))
+    assert comparable(shipped, quick=quick, together=True) is None
+    asked = shipped.quick() if quick else shipped
+    calls = len(asked.targets.robot) + asked.sequences.best_error.size
+    assert {row["summary"]["calls"] for row in stored["methods"]} == {calls}
+    search = next(row["summary"] for row in stored["methods"] if row["method"] == "search")
+    assert search["failed"] == 0.0 and search["solved"] > 0.99
+    assert stored["seed"] == shipped.about["seed"] and stored["command"].startswith("finlab bench ")
+
+
+def test_documented_figures_are_the_stored_ones() -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "bench.md").read_text()
+    for row in read_results(stored_results(quick=False))["methods"]:
+        summary = row["summary"]
+        solved, turn = f"{100 * summary['solved']:.1f}".removesuffix(".0"), f"{summary['turn']:.3f}"
+        line = next(line for line in page.splitlines() if line.startswith(f"| `{row['method']}` | 0 %"))
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        assert cells[2].removesuffix(" %").removesuffix(".0") == solved and cells[8] == turn
+        assert cells[3] == error(summary["error"]) and cells[5] == error(summary["beyond"])
 
 
 @pytest.mark.parametrize(

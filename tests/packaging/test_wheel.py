@@ -54,7 +54,7 @@ def test_carries_library_app_layouts_and_checkpoints(wheel: Path) -> None:
         assert f"finlab/shipped/checkpoints/default/{name}" in names
     for name in ("finlab/py.typed", "finlab/deploy/graph.schema.json", "finlab/layout/layout.schema.json"):
         assert name in names
-    for name in ("problems.npz", "problems.md", "problems.schema.json"):
+    for name in ("problems.npz", "problems.md", "problems.schema.json", "results.json"):
         assert f"finlab/bench/{name}" in names
     assert "webapp/app.py" in names
 
