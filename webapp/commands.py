@@ -45,9 +45,6 @@ def commands(page: Page) -> list[Command]:
     def fail_selected() -> None:
         session.toggle_failure(session.selected or session.state.layout.names[0])
 
-    def toggle(key: str) -> None:
-        session.set_display(key, not getattr(session.display, key))
-
     def compare() -> None:
         session.show_drawer("Comparison")
         page.comparison.start(session.state)
@@ -77,7 +74,7 @@ def commands(page: Page) -> list[Command]:
         Command("Design", "Pin this layout to compare with", session.pin),
         Command("Design", "Start over", session.start_over),
         Command("Wrench", "Fail or repair the selected fin", fail_selected, "X"),
-        Command("Wrench", "Drag the wrench in 3D, or stop it", partial(toggle, "grips"), "G"),
+        Command("Wrench", "Drag the wrench in 3D, or stop it", partial(session.toggle, "grips"), "G"),
         *(Command("Wrench", f"Ask for: {name}", partial(session.set_preset, name)) for name in PRESETS),
         *(
             Command("Wrench", f"Ask for {word} alone", partial(session.set_only_axis, axis))
@@ -98,10 +95,12 @@ def commands(page: Page) -> list[Command]:
             Command("View", f"Camera: {view}", partial(robot.look_from, view), key)
             for view, key in (("3D", "1"), ("Top", "2"), ("Side", "3"), ("Front", "4"))
         ),
-        Command("View", "Freeze or move the fins", partial(toggle, "frozen"), "P"),
-        Command("View", "Show or hide the fin graph", partial(toggle, "graph")),
-        Command("View", "Show or hide the centre of gravity", partial(toggle, "center")),
-        Command("View", "Dark or light theme", partial(toggle, "dark")),
+        Command("View", "Parallel lines, or perspective", partial(session.toggle, "parallel"), "5"),
+        Command("View", "Measure a distance, or stop it", partial(session.toggle, "measure"), "L"),
+        Command("View", "Freeze or move the fins", partial(session.toggle, "frozen"), "P"),
+        Command("View", "Show or hide the fin graph", partial(session.toggle, "graph")),
+        Command("View", "Show or hide the centre of gravity", partial(session.toggle, "center")),
+        Command("View", "Dark or light theme", partial(session.toggle, "dark")),
         Command("Help", "Tour: start, or next stop", session.next_stop, "T"),
         *(
             Command("Help", f"Lesson: {lesson.title}", partial(session.open_lesson, lesson.name))

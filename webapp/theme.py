@@ -10,7 +10,6 @@ GREEN: Rgb = (0, 158, 115)
 VERMILLION: Rgb = (213, 94, 0)
 ORANGE: Rgb = (230, 159, 0)
 SKY: Rgb = (86, 180, 233)
-PURPLE: Rgb = (204, 121, 167)
 YELLOW: Rgb = (240, 228, 66)
 
 BRAND: Rgb = (0, 92, 144)
@@ -35,16 +34,17 @@ DEAD: Rgb = (150, 154, 158)
 """A failed fin."""
 
 FIN_COLORS: tuple[Rgb, ...] = (
-    ORANGE,
-    SKY,
-    PURPLE,
     YELLOW,
-    (153, 97, 0),  # darker relatives of the first four, for robots with many fins
-    (35, 112, 160),
-    (140, 66, 105),
-    (150, 140, 20),
+    (148, 118, 224),  # violet
+    (236, 138, 184),  # pink
+    (134, 128, 34),  # olive
+    (200, 178, 246),  # lavender
+    (160, 52, 104),  # wine
+    (186, 206, 70),  # lime
+    (122, 62, 140),  # plum
 )
-"""One colour per fin, in order; asked, delivered and missing keep their three colours to themselves."""
+"""One colour per fin, in order. None is near blue, green or vermillion: those hues are reserved for what is
+asked, delivered and missing."""
 
 MODE_COLORS: tuple[Rgb, ...] = (
     (92, 92, 196),  # indigo, teal, wine, olive, ...: after Paul Tol's "muted" set, told apart by every eye,
@@ -113,6 +113,12 @@ DARK = Look(
 def look(dark: bool) -> Look:
     """The look of the dark or the light theme."""
     return DARK if dark else LIGHT
+
+
+def ink(color: Rgb) -> str:
+    """Colour of a number on a colour, as CSS: dark or light, whichever stands out."""
+    red, green, blue = color
+    return "#111" if 0.299 * red + 0.587 * green + 0.114 * blue > 118 else "#fff"
 
 
 def fin_color(index: int) -> Rgb:

@@ -107,11 +107,11 @@ def new_page(browser: Any, served: Served) -> Iterator[Callable[[], Any]]:
 
     contexts = []
 
-    def open_page(context: Any = None) -> Page:
+    def open_page(context: Any = None, first: bool = False) -> Page:
         if context is None:
             context = browser.new_context(viewport={"width": 1400, "height": 860}, accept_downloads=True)
             contexts.append(context)
-        return Page(context.new_page(), served)
+        return Page(context.new_page(), served, first=first)
 
     yield open_page
     for context in contexts:

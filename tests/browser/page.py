@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from webapp.session.looking import DRAWERS, TASKS
+from webapp.session.looking import DRAWERS, TASKS, Desk
 from webapp.session.search_request import SearchRequest
 from webapp.session.swim_plan import SwimSettings
 from webapp.viser_internals import run_script
@@ -37,8 +37,9 @@ PROJECT = """([name, point]) => {
 class Page:
     """One tab."""
 
-    def __init__(self, page: Any, served: Any, patience: float = 1.0) -> None:
-        """Open the app and wait until the robot stands; `patience` makes all waits longer."""
+    def __init__(self, page: Any, served: Any, patience: float = 1.0, first: bool = False) -> None:
+        """Open the app and wait until the robot stands; `patience` makes all waits longer, `first` is a first
+        visit."""
         self.patience = patience
         self.page = page
         self._served = served
@@ -47,7 +48,8 @@ class Page:
         page.set_default_timeout(WAIT_MS * patience)
         page.on("console", lambda m: self.problems.append(m.text) if m.type == "error" else None)
         before = set(served.app.views)
-        page.add_init_script("localStorage.setItem('finlab-met', '1')")
+        if not first:
+            page.add_init_script("localStorage.setItem('finlab-met', '1')")
         page.goto(served.url)
         self.ready()
         self.until(lambda: bool(set(served.app.views) - before))
@@ -74,7 +76,7 @@ class Page:
         def restart() -> None:
             self.session.start_over()
             self.session.display = self._display
-            self.session.show_drawer("Candidates")
+            self.session.desk = Desk()
             self.session.draft, self.session.swim = SearchRequest(), SwimSettings()
             self.session.compare_with(None)
             self.session.set_overlay(None)

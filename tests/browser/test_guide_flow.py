@@ -2,11 +2,15 @@
 
 from typing import Any
 
+import numpy as np
+
 
 def test_the_tour_sets_each_stop_and_brings_the_work_back(page: Any) -> None:
     page.type("Fy [N]", "0.5")
     page.until(lambda: page.session.state.target[1] == 0.5)
-    mine = page.session.state
+    page.tab("Improve")
+    page.key("2")
+    mine, camera = page.session.state, page.view.scenery.robot.camera
     page.press("Tour")
     page.until(lambda: "1 of 6" in page.text(".tour"))
     assert page.session.state.target[1] == 0.0
@@ -24,6 +28,9 @@ def test_the_tour_sets_each_stop_and_brings_the_work_back(page: Any) -> None:
     page.until(lambda: "6 of 6 fins" in page.text(".fl-status"))
     page.press("Finish")
     page.until(lambda: page.session.state == mine and page.session.stop is None)
+    assert page.session.drawer == "Improve" and page.session.history.undo_name == "Set Fy"
+    back = page.view.scenery.robot.camera
+    page.until(lambda: np.allclose(back, camera, atol=1e-3))
     assert page.problems == []
 
 

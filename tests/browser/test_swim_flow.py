@@ -92,7 +92,7 @@ def test_a_robot_loses_a_fin_in_a_current_and_carries_on(page: Any, tmp_path: Pa
     page.press("Start")
     swimming = page.view.swimming
     page.until(lambda: len(swimming.swimmers) == 1)
-    page.until(lambda: page.page.get_by_text("Swim over time").is_visible())
+    page.until(lambda: page.page.locator(".uplot:visible").count() == 6)
     page.until(lambda: swimming.swimmers[0].shown.lost == ("front_right",))
     page.until(lambda: swimming.swimmers[0].shown.failed == ("front_right",))
     page.until(lambda: "The monitor found front_right lost" in page.page.inner_text("body"))

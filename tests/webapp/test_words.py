@@ -150,14 +150,23 @@ def test_every_stop_of_the_tour_stands() -> None:
         state = step.state(State(load_layout(shipped_layouts()["A"])))
         assert set(step.failed) <= set(state.layout.names)
     session = Session(load_layout(shipped_layouts()["A"]))
-    before = session.state
-    for _ in STEPS:
+    session.set_target(1, 0.5)
+    session.select(session.state.layout.names[1])
+    session.set_display("drawn", "forces")
+    session.show_drawer("Improve")
+
+    def all_there_is() -> tuple[object, ...]:
+        return session.state, session.display, session.desk, session.selected, session.history.undo_name
+
+    before = all_there_is()
+    for step in STEPS:
         session.next_stop()
+        assert session.drawer == step.drawer and session.selected is None
     session.previous_stop()
     assert session.stop == len(STEPS) - 2
     session.next_stop()
     session.next_stop()
-    assert session.stop is None and session.state == before
+    assert session.stop is None and all_there_is() == before
 
 
 def test_the_best_mode_is_shown_again_after_a_tour() -> None:

@@ -12,7 +12,7 @@ from finlab.arrays import Array
 from webapp.markup.words import damage_words, saturated
 from webapp.session.state import AXIS_WORDS, State
 from webapp.session.targets import nice_limit
-from webapp.theme import DEAD, css, fin_color
+from webapp.theme import DEAD, css, fin_color, ink
 
 HEADER = (
     "<tr><th>fin</th><th title='half amplitude'>A [°]</th><th title='frequency'>f [Hz]</th>"
@@ -85,8 +85,8 @@ def _bar(start: float, end: float, top: int, height: int, color: str) -> str:
 
 def swatch(index: int, failed: bool = False) -> str:
     """The fin's number on its colour."""
-    color = css(DEAD if failed else fin_color(index))
-    return f"<span class='swatch' style='background:{color}'>{index + 1}</span>"
+    color = DEAD if failed else fin_color(index)
+    return f"<span class='swatch' style='background:{css(color)};color:{ink(color)}'>{index + 1}</span>"
 
 
 def fin_table(state: State, allocation: Allocation | None, full: Array, selected: str | None) -> str:

@@ -44,9 +44,8 @@ def welcome() -> str:
     )
     return (
         "<section class='fl fl-welcome' aria-label='Welcome'><h2>finlab</h2>"
-        "<p>A bench for robots that swim with fins. Say which force and torque the body shall feel; "
-        "every fin is told how far, how fast and in which direction to flap, and the figures say what is "
-        f"left undone.</p><ol>{tries}</ol><div class='row'>"
+        "<p>For robots that swim with fins: say which force and torque the body shall feel, and every fin "
+        f"is told how to flap.</p><ol>{tries}</ol><div class='row'>"
         f'<button class="primary" onclick="{tell("tour,")} finlabFrame.met()">Take the tour</button>'
         "<button onclick='finlabFrame.met()'>Close</button></div></section>"
     )
@@ -55,11 +54,11 @@ def welcome() -> str:
 def key_sheet(rows: Sequence[tuple[str, str, str]]) -> str:
     """The sheet of keys, from groups, labels and keys; rows without a key are left out."""
     groups: dict[str, list[str]] = {}
-    camera = [("View", "Move the camera", "W A S D Q E, arrows")]
+    camera = [("View", "Move the camera", "W A S D Q E")]
     about = [("Help", "All commands", "Ctrl+K"), ("Help", "This sheet", "?")]
     for group, label, keys in (*rows, *camera, *about):
         if keys:
-            keys = "Ctrl+Y, Ctrl+Shift+Z" if label == "Redo" else keys
+            keys = "Ctrl+Y" if label == "Redo" else keys
             groups.setdefault(group, []).append(f"<dt><kbd>{escape(keys)}</kbd></dt><dd>{escape(label)}</dd>")
     lists = "".join(
         f"<div><h3>{escape(group)}</h3><dl>{''.join(found)}</dl></div>" for group, found in groups.items()

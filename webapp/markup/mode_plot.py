@@ -125,7 +125,7 @@ def mode_plot(
             parts.append(f"<circle cx='{u:.1f}' cy='{v:.1f}' r='3.5' fill='{color}'/>")
         parts.append(
             f"<g class='pick' {pick(picker, k)}>"
-            f"<circle cx='{x:.1f}' cy='{y:.1f}' r='8.5' fill='{css(mode_color(k))}'/>"
+            f"<circle cx='{x:.1f}' cy='{y:.1f}' r='8' class='disc' stroke='{css(mode_color(k))}'/>"
             f"<text x='{x:.1f}' y='{y + 3.8:.1f}' class='digit'>{k + 1}</text></g>"
         )
         if k == shown:

@@ -40,4 +40,4 @@ def mode_table(modes: Modes, searching: bool, shown: int | None, picker: str) ->
 
 
 def _swatch(k: int) -> str:
-    return f"<span class='swatch mode' style='background:{css(mode_color(k))}'>{k + 1}</span>"
+    return f"<span class='swatch mode' style='border-color:{css(mode_color(k))}'>{k + 1}</span>"

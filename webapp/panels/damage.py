@@ -10,7 +10,7 @@ from webapp.handles import numbered, on_user_change, put
 from webapp.markup.picking import button_colors
 from webapp.page import Page
 from webapp.session.state import STRENGTH_RANGE
-from webapp.theme import DEAD, css, fin_color
+from webapp.theme import DEAD, css, fin_color, ink
 
 
 class FinButtons:
@@ -42,7 +42,7 @@ class FinButtons:
             if n in failed
             else ("transparent", "inherit")
             if n in held
-            else (css(fin_color(i)), "#111")
+            else (css(fin_color(i)), ink(fin_color(i)))
             for i, n in enumerate(names)
         ]
         put(self._paint, content=button_colors(self._marker, colors))

@@ -24,6 +24,8 @@ from webapp.viser_internals import run_script
 
 HABITS = files("webapp").joinpath("habits.js").read_text("utf-8")
 """Script that mends what viser's page does otherwise."""
+TRIAD = files("webapp").joinpath("triad.js").read_text("utf-8")
+"""Script that turns the axes in the corner of the view."""
 _VARIABLES = (
     f":root {{ --fl-asked: {css(ASKED)}; --fl-delivered: {css(DELIVERED)}; --fl-missing: {css(MISSING)}; }}"
 )
@@ -95,7 +97,7 @@ class Frame:
                     for index, place in enumerate(PLACES)
                     if place.region == region
                 ]
-        run_script(gui, HABITS + open_linked("lesson"))
+        run_script(gui, HABITS + TRIAD + open_linked("lesson"))
 
     @property
     def panels(self) -> tuple[list[Panel], list[Panel]]:
@@ -108,11 +110,14 @@ class Frame:
         session = self._page.session
         put(self._shown, content=_style(self._sections, session))
         assert self._strip is not None
-        put(self._strip, content=_strip(session.task, session.opened[session.task], session.folded))
+        put(
+            self._strip,
+            content=_strip(session.task, session.desk.opened[session.task], session.desk.folded),
+        )
 
     def _hear(self, word: list[str]) -> None:
         """`task,name`, `drawer,name`, or one of the rest; a number behind it makes each word new."""
-        session = self._page.session
+        session, robot = self._page.session, self._page.scenery.robot
         acts: dict[str, Callable[[str], object]] = {
             "task": session.show_task,
             "drawer": session.show_drawer,
@@ -123,6 +128,10 @@ class Frame:
             "lesson": session.open_lesson,
             "lesson-next": lambda _: session.next_lesson(),
             "lesson-close": lambda _: session.close_lesson(),
+            "look": robot.look_from,
+            "frame": lambda _: robot.frame(),
+            "parallel": lambda _: session.toggle("parallel"),
+            "measure": lambda _: session.toggle("measure"),
         }
         if word[0] in acts and len(word) > 1:
             self._page.do(lambda: acts[word[0]](word[1]))

@@ -7,6 +7,7 @@ import viser
 
 from webapp.page import Page, Panel
 from webapp.panels.body_inspector import BodyInspector
+from webapp.panels.camera_bar import CameraBar
 from webapp.panels.check_panel import CheckPanel
 from webapp.panels.compare_tab import ComparePanel
 from webapp.panels.damage import DamagePanel
@@ -76,6 +77,7 @@ PLACES = (
     Place(RIGHT, (SIMULATE,), "Figures", SwimCardPanel, swims=True),
     Place(DRAWER, (SIMULATE,), "Swim over time", Timeline, swims=True),
     Place(RIGHT, (EXPORT,), "Files", FilesTab),
+    Place(VIEW, TASKS, "Camera", CameraBar),
     Place(VIEW, TASKS, "Display", ViewPanel, folded=True),
 )
 """All panels, in the order in which they stand in their regions."""

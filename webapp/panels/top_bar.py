@@ -56,7 +56,7 @@ class HistoryBar:
             (self._undo, "Undo", history.undo_name),
             (self._redo, "Redo", history.redo_name),
         ):
-            put(button, label=f"{word}: {name}" if name else word, disabled=name is None)
+            put(button, label=f"{word}: {name}" if name else word)
         guide = self._guide()
         put(self._card, content=guide, visible=bool(guide))
 

@@ -1,4 +1,4 @@
-"""How the robot is shown: motion, what is drawn, theme and camera."""
+"""How the robot is shown: motion, what is drawn, and theme."""
 
 from functools import partial
 from html import escape
@@ -7,7 +7,6 @@ import viser
 
 from webapp.handles import put
 from webapp.page import Page
-from webapp.scene.robot_scene import CAMERAS
 from webapp.session.display import NEWTONS
 
 SWITCHES = {
@@ -36,13 +35,11 @@ SCALES = {_scale_entry(newtons): newtons for newtons in (0.0, *NEWTONS)}
 
 
 class ViewPanel:
-    """Switches and camera."""
+    """Switches."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
-        looks = {view: partial(page.scenery.robot.look_from, view) for view in CAMERAS}
-        page.add_buttons("Camera", looks, hint="Keys 1, 2, 3, 4; F frames what is selected.")
         speed = gui.add_slider("Motion speed", 0.05, 1.0, 0.05, 0.5, hint="1 is real time.")
         page.bind_number(
             speed, partial(page.session.set_display, "speed"), lambda: page.session.display.speed, digits=3

@@ -5,15 +5,17 @@ from functools import partial
 import numpy as np
 
 from finlab.allocation.allocation import Allocation
+from finlab.arrays import Array
 from finlab.layout import Fin, Layout
 from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
 from webapp.scene.fin_node import FinNode, Flapping
 from webapp.scene.gizmos import Grips
+from webapp.scene.measure import Measure
 from webapp.scene.meshes.hull import hull_of
 from webapp.scene.meshes.mesh import LONGEST_TURN
 from webapp.scene.overlays import Ghost, Lines, Overlay, moved_fins
-from webapp.scene.stage import Stage, aim_camera
+from webapp.scene.stage import AWAY, Stage, aim_camera
 from webapp.scene.wrench_nodes import (
     LENGTH,
     AttainableNodes,
@@ -68,6 +70,8 @@ class RobotScene:
         """Torque [N m] that half a turn of a ring stands for at the moment."""
         self.cut = False
         """Whether a ring is cut off."""
+        self._measure = Measure(scene, session)
+        self._parallel = False
         self.look_from("3D")
 
     def show(self, visible: bool) -> None:
@@ -78,18 +82,29 @@ class RobotScene:
 
     def look_from(self, view: str) -> None:
         """Move the camera to one of `CAMERAS`."""
-        aim_camera(self._client, np.array(CAMERAS[view]), np.array([0.0, 0.0, 0.03]))
+        self.aim(np.array(CAMERAS[view]), np.array([0.0, 0.0, 0.03]))
+
+    def aim(self, place: Array, target: Array) -> None:
+        """Let the camera see from a place (3,) to another one (3,) [m], with the lens that is wanted."""
+        self._parallel = self._session.display.parallel
+        aim_camera(self._client, place, target, self._parallel)
+
+    @property
+    def camera(self) -> tuple[Array, Array]:
+        """Where the camera stands (3,), or would with the usual lens, and what it looks at (3,) [m]."""
+        place, target = np.array(self._client.camera.position), np.array(self._client.camera.look_at)
+        return (target + (place - target) / AWAY if self._parallel else place), target
 
     def frame(self) -> None:
         """Bring the selected fin, or the whole robot, into the middle of the view, seen from where it is."""
-        session, camera = self._session, self._client.camera
+        session, (place, target) = self._session, self.camera
         layout = session.state.layout
         hull = hull_of(layout)
         center, size = np.array(hull.center), 2.6 * float(np.linalg.norm(hull.half))
         if session.selected is not None:
             center, size = np.array(layout.fins[layout.index(session.selected)].position), 0.55
-        way = np.asarray(camera.position) - np.asarray(camera.look_at)
-        aim_camera(self._client, center + way / max(float(np.linalg.norm(way)), 1e-6) * size, center)
+        way = place - target
+        self.aim(center + way / max(float(np.linalg.norm(way)), 1e-6) * size, center)
 
     def refresh(
         self,
@@ -110,6 +125,9 @@ class RobotScene:
         """
         state, display = self._session.state, self._session.display
         hull = hull_of(state.layout)
+        if display.parallel != self._parallel:
+            self.aim(*self.camera)
+        self._measure.refresh(display.measure and self.shown, display.dark)
         if self.dragged is None:  # a hull that breathes with the fin one drags is hard to aim at
             # Glass within glass is not drawn; inside an attainable set the hull is a net.
             net, glass = display.drawn != "none", display.graph or display.center

@@ -1,5 +1,7 @@
 """What is seen beside the panel: the robot that is designed, or those that swim."""
 
+import numpy as np
+
 from finlab.allocation.allocation import Allocation
 from webapp.markup.corner import graph_row, legend, overlay_row, set_rows
 from webapp.scene.robot_scene import RobotScene
@@ -23,6 +25,8 @@ class Scenery:
         self._client, self._session, self._swimming = context.client, context.session, swimming
         self._dark: bool | None = None
         self._stop: int | None = None
+        self._camera = (np.zeros(3), np.zeros(3))
+        """Where the camera stood before the tour, and looked at."""
         self.robot = RobotScene(context)
         self.swim = SwimScene(self._client, swimming)
         self.swims = False
@@ -79,11 +83,19 @@ class Scenery:
             self.robot.look_from("3D")
 
     def _follow_tour(self) -> None:
-        """At some stops of the tour the robot swims; to come to a stop, or to leave the tour, ends a swim."""
-        stop = self._session.stop
-        if stop != self._stop:
+        """The robot fills the view at each stop of the tour, and swims at some; to come to a stop, or to
+        leave the tour, ends a swim. At its end the camera stands where it stood before."""
+        stop, before = self._session.stop, self._stop
+        if stop != before:
             self._stop = stop
             self.end_swim()
+            if before is None:
+                self._camera = self.robot.camera
+            if stop is None:
+                self.robot.aim(*self._camera)
+            else:
+                self.robot.look_from("3D")
+                self.robot.frame()
             if stop is not None and STEPS[stop].swims:
                 self._swimming.start(SwimSettings().plan(self._session.state, None))
 

@@ -1,5 +1,6 @@
 """The water, the floor, the hull and its axes."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -15,11 +16,19 @@ BELOW = 0.22
 """How far the floor is below the keel [m]."""
 
 
-def aim_camera(client: viser.ClientHandle, place: Array, target: Array) -> None:
-    """Let the camera stand at a place (3,) and look at another one (3,) [m]."""
+WIDE, LONG = math.radians(75.0), math.radians(5.0)
+"""Angle of the view [rad]: as usual, and so small that parallel lines stay parallel."""
+AWAY = math.tan(WIDE / 2) / math.tan(LONG / 2)
+"""How much further away a camera with the small angle stands to see as much."""
+
+
+def aim_camera(client: viser.ClientHandle, place: Array, target: Array, parallel: bool = False) -> None:
+    """Let the camera stand at a place (3,) and look at another one (3,) [m]; with `parallel` it sees as much
+    from far away."""
     with client.atomic():
+        client.camera.fov = LONG if parallel else WIDE
         client.camera.up_direction = (0.0, 0.0, 1.0)
-        client.camera.position = place
+        client.camera.position = target + AWAY * (place - target) if parallel else place
         client.camera.look_at = target
 
 

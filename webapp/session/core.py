@@ -1,7 +1,7 @@
 """What all intents of a session share: its state with undo, and what is selected and shown."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Generic, TypeVar
 
 from finlab.errors import FinlabError
@@ -54,6 +54,13 @@ class History(Generic[Snapshot]):
         self.merge_key, self._merge_time = merge_key, now
         self.future.clear()
         self.state = state
+
+    def resume(
+        self, state: Snapshot, past: Sequence[tuple[str, Snapshot]], future: Sequence[tuple[str, Snapshot]]
+    ) -> None:
+        """Be again as at an earlier moment, with what could be undone and redone then."""
+        self.state, self.past, self.future = state, list(past), list(future)
+        self.merge_key = None
 
     def end_merge(self) -> None:
         """The next change starts a step of its own."""

@@ -57,6 +57,10 @@ class Display:
     """Attainable forces without torques, torques without forces."""
     center: bool = False
     """Mark the centre of gravity."""
+    parallel: bool = False
+    """Parallel lines stay parallel in the view."""
+    measure: bool = False
+    """Clicks in the view measure distances."""
 
     def with_value(self, key: str, value: Any) -> "Display":
         """One field changed; the page may send anything.

@@ -9,7 +9,6 @@ import numpy as np
 from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
 from webapp.session.files import shipped
-from webapp.session.looking import Looking
 from webapp.session.state import State
 from webapp.session.targets import PRESETS
 from webapp.session.tour import Guiding
@@ -154,7 +153,7 @@ LESSONS = (
 BY_NAME = {lesson.name: lesson for lesson in LESSONS}
 
 
-class Learning(Guiding, Looking):
+class Learning(Guiding):
     """A lesson that is open."""
 
     lesson: Lesson | None = None

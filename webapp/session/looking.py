@@ -1,5 +1,6 @@
 """Intents about what is looked at; none of them is part of undo."""
 
+from dataclasses import dataclass, replace
 from typing import Any
 
 from finlab.errors import FinlabError
@@ -22,39 +23,53 @@ PINNED = "pinned"
 """Name of the layout that was put aside, among those to compare with."""
 
 
-class Looking(Core):
-    """Tasks, modes, samples, overlays, switches, and the layout to compare with."""
+@dataclass(frozen=True)
+class Desk:
+    """Which task is open, and what lies in the drawers."""
 
-    task = "Allocate"
-    """Which of `TASKS` is open."""
-    folded = False
+    task: str = "Allocate"
+    """One of `TASKS`."""
+    drawers: tuple[tuple[str, str], ...] = ()
+    """Tasks, and what was chosen to lie uppermost in their drawers."""
+    folded: bool = False
     """Whether of the drawer only its tabs are seen."""
-    _drawers: tuple[tuple[str, str], ...] = ()
 
     @property
     def opened(self) -> dict[str, str]:
         """What lies uppermost in the drawer of each task; nothing where a task has none."""
-        return {task: names[0] if names else "" for task, names in DRAWERS.items()} | dict(self._drawers)
+        return {task: names[0] if names else "" for task, names in DRAWERS.items()} | dict(self.drawers)
+
+
+class Looking(Core):
+    """Tasks, modes, samples, overlays, switches, and the layout to compare with."""
+
+    desk = Desk()
+    """Which task is open, and what lies in the drawers."""
+
+    @property
+    def task(self) -> str:
+        """Which of `TASKS` is open."""
+        return self.desk.task
 
     @property
     def drawer(self) -> str | None:
         """What of the drawer is seen; None where it is folded, or the task has none."""
-        return None if self.folded else self.opened[self.task] or None
+        return None if self.desk.folded else self.desk.opened[self.task] or None
 
     def show_task(self, name: str) -> None:
         """Open a task."""
-        self.task = chosen(name, "task", TASKS)
+        self.desk = replace(self.desk, task=chosen(name, "task", TASKS))
 
     def show_drawer(self, name: str) -> None:
         """Open the drawer at one of its tabs, and the task to which it belongs."""
-        self.task = next((task for task, names in DRAWERS.items() if name in names), self.task)
-        chosen(name, "drawer", DRAWERS[self.task])
-        self._drawers = (*(pair for pair in self._drawers if pair[0] != self.task), (self.task, name))
-        self.folded = False
+        task = next((task for task, names in DRAWERS.items() if name in names), self.task)
+        chosen(name, "drawer", DRAWERS[task])
+        others = tuple(pair for pair in self.desk.drawers if pair[0] != task)
+        self.desk = Desk(task, (*others, (task, name)))
 
     def fold_drawer(self) -> None:
         """Leave only the tabs of the drawer, or open it again."""
-        self.folded = not self.folded
+        self.desk = replace(self.desk, folded=not self.desk.folded)
 
     def show_mode(self, index: int) -> None:
         """Show one of the answer's modes on the robot."""
@@ -71,6 +86,10 @@ class Looking(Core):
     def set_display(self, key: str, value: Any) -> None:
         """One field of `Display`."""
         self.display = self.display.with_value(key, value)
+
+    def toggle(self, key: str) -> None:
+        """Turn one switch of `Display` on or off."""
+        self.set_display(key, not getattr(self.display, key))
 
     def set_swim(self, key: str, value: Any) -> None:
         """One field of `SwimSettings`."""

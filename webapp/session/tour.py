@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass, replace
 
-from webapp.session.core import Core
+from webapp.session.display import Display
 from webapp.session.files import shipped
+from webapp.session.looking import Desk, Looking
 from webapp.session.state import State
 from webapp.session.targets import PRESETS
 
@@ -30,6 +31,8 @@ class Step:
     """Whether the fin graph is shown."""
     swims: bool = False
     """Whether the robot swims."""
+    drawer: str = "Candidates"
+    """What lies uppermost in the drawer; its task is open."""
 
     def state(self, now: State) -> State:
         """The state of this stop, with the objective and the settings of the present one."""
@@ -56,9 +59,9 @@ STEPS = (
     ),
     Step(
         "One wrench has many answers",
-        "Four fins have twelve numbers, the wrench only six. This is another answer than before. Open Modes: "
-        "each numbered dot is one, with the power that it takes. Click some: the fins change, the green sum "
-        "stays.",
+        "Four fins have twelve numbers, the wrench only six. This is another answer than before. In the "
+        "drawer below each numbered dot is one, with the power that it takes. Click some: the fins change, "
+        "the green sum stays.",
         "ucat",
         PRESETS["Turn"],
         mode=1,
@@ -66,7 +69,7 @@ STEPS = (
     Step(
         "A fin fails",
         "Fin 2 hangs limp. The search leaves it out and answers at once with the other three. Fail another "
-        "one under Wrench, and read below the bars what is left undone.",
+        "one in the list, and read below the bars what is left undone.",
         "ucat",
         PRESETS["Turn"],
         failed=("front_left",),
@@ -74,23 +77,24 @@ STEPS = (
     Step(
         "What a layout cannot do",
         "This robot has no way to turn left or right, however its fins flap: the yaw that is asked stays "
-        "missing. Open Layout, turn a shaft, and watch yaw come alive.",
+        "missing. Select a fin, turn its shaft by the ring, and watch yaw come alive.",
         "no_yaw",
         (1.0, 0.0, 0.0, 0.0, 0.0, 0.2),
+        drawer="Reach",
     ),
     Step(
         "It swims",
         "Ten times a second the controller asks for a wrench and the search answers. The blue ball is where "
-        "the robot should be. Open Swim, break a fin by its number, and watch the others take over.",
+        "the robot should be. Break a fin by its number, and watch the others take over.",
         "ucat",
         PRESETS["Turn"],
         swims=True,
+        drawer="Swim over time",
     ),
     Step(
         "Another robot, and a network",
         "Six fins now, and the method is mdn: a network that reads the robot as a graph proposes, and the "
-        "search makes each proposal exact. Modes shows both. Drag a fin, mirror it, save the file: the robot "
-        "is yours.",
+        "search makes each proposal exact; the drawer shows both. Finish brings your work back.",
         "hexa",
         (1.5, 0.5, -1.0, 0.0, 0.0, 0.15),
         method="mdn",
@@ -100,17 +104,32 @@ STEPS = (
 """The stops in order."""
 
 
-class Guiding(Core):
+@dataclass(frozen=True)
+class Left:
+    """What is left behind when the tour begins."""
+
+    state: State
+    past: tuple[tuple[str, State], ...]
+    future: tuple[tuple[str, State], ...]
+    display: Display
+    chosen: tuple[str, ...]
+    shown: tuple[int, int | None]
+    desk: Desk
+
+
+class Guiding(Looking):
     """The tour."""
 
     stop: int | None = None
     """Where the tour is, None while there is none."""
-    _before_tour: State | None = None
+    _left: Left | None = None
 
     def next_stop(self) -> None:
         """The tour's first stop, or the one after this; after the last one the tour is over."""
         if self.stop is None:
-            self._before_tour = self.state
+            history, shown = self.history, (self.mode, self.sample)
+            past, future = tuple(history.past), tuple(history.future)
+            self._left = Left(self.state, past, future, self.display, self._chosen, shown, self.desk)
         stop = 0 if self.stop is None else self.stop + 1
         if stop == len(STEPS):
             self.end_tour()
@@ -122,19 +141,23 @@ class Guiding(Core):
         self._go(max((self.stop or 0) - 1, 0))
 
     def end_tour(self) -> None:
-        """Back to what was there before the tour."""
-        if self._before_tour is not None:
-            self._commit("End the tour", self._before_tour)
-            self.mode, self.sample = 0, None
-        self.stop, self._before_tour = None, None
+        """All is as it was before the tour, and what could be undone then can be undone now."""
+        left, self.stop, self._left = self._left, None, None
+        if left is None:
+            return
+        self.history.resume(left.state, left.past, left.future)
+        self._settled()
+        self.display, self.desk, self._chosen = left.display, left.desk, left.chosen
+        self.mode, self.sample = left.shown
 
     def start_over(self) -> None:
         """Everything as at first sight, outside the tour."""
-        self.stop, self._before_tour = None, None
+        self.stop, self._left = None, None
         super().start_over()
 
     def _go(self, stop: int) -> None:
         step = STEPS[stop]
         self._commit(f"Tour: {step.title}", step.state(self.state))
         self.stop, self.mode, self.selected = stop, step.mode, None
-        self.display = replace(self.display, graph=step.graph)
+        self.show_drawer(step.drawer)
+        self.display = replace(self.display, graph=step.graph, drawn="none", grips=False)

@@ -1,0 +1,51 @@
+"""How the view is looked at: the axes as they stand, sides to look from, framing, parallel lines, a rule."""
+
+import viser
+
+from webapp.handles import put
+from webapp.markup.first_sight import tell
+from webapp.page import Page
+from webapp.scene.robot_scene import CAMERAS
+
+AXES = (("x", "Front"), ("y", "Side"), ("z", "Top"))
+"""The axes, and from where their tips let one look."""
+
+
+class CameraBar:
+    """The triad and the buttons beside it."""
+
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
+        """Build it."""
+        self._page, self._content = page, gui.add_html("")
+
+    def refresh(self) -> None:
+        """Mark what is on."""
+        display = self._page.session.display
+        looks = "".join(
+            f"<button onclick=\"{tell(f'look,{name}')}\" title='{key}'>{name}</button>"
+            for key, name in enumerate(CAMERAS, 1)
+        )
+        switches = "".join(
+            f"<button onclick=\"{tell(f'{word},')}\" title='{hint}'{pressed}>{label}</button>"
+            for word, label, hint, pressed in (
+                ("frame", "Frame", "what is selected fills the view (F)", ""),
+                ("parallel", "Parallel", "no perspective (5)", _pressed(display.parallel)),
+                ("measure", "Measure", "click two points of hull or fins (L)", _pressed(display.measure)),
+            )
+        )
+        rows = f"<div><div>{looks}</div><div>{switches}</div></div>"
+        put(self._content, content=f"<div class='fl fl-camera'>{triad()}{rows}</div>")
+
+
+def _pressed(on: bool) -> str:
+    return f" aria-pressed='{str(on).lower()}'"
+
+
+def triad() -> str:
+    """The axes of the body, which a script turns with the camera; a click on a tip looks from it."""
+    arms = "".join(
+        f"<g class='axis {axis}' onclick=\"{tell(f'look,{view}')}\"><title>{view}</title>"
+        f"<line/><circle r='9'/><text>{axis}</text></g>"
+        for axis, view in AXES
+    )
+    return f"<svg class='triad' viewBox='-36 -36 72 72' role='img' aria-label='Axes'>{arms}</svg>"
