@@ -22,7 +22,7 @@ SIZE = {"width": 1400, "height": 860}
 def save(page: Page, path: Path) -> None:
     """A screenshot without the notes; one bit less per colour is not seen and makes it a third smaller."""
     page.close_notes()
-    page.page.mouse.move(200, 60)  # off the buttons, so that no hint covers anything
+    page.page.mouse.move(700, 320)  # over the view, so that no hint covers anything
     page.page.wait_for_timeout(1500)
     page.until(lambda: page.page.locator("[role=tooltip]:visible").count() == 0)
     picture = Image.open(io.BytesIO(page.page.screenshot(timeout=0))).convert("RGB")
@@ -30,9 +30,9 @@ def save(page: Page, path: Path) -> None:
     print(path, path.stat().st_size // 1000, "kB", flush=True)
 
 
-def _scroll(page: Page) -> None:
-    """To the end of the panel."""
-    page.page.mouse.move(SIZE["width"] - 200, 500)
+def _scroll(page: Page, drawer: bool = False) -> None:
+    """To the end of what stands at the right, or lies in the drawer."""
+    page.page.mouse.move(*((500, SIZE["height"] - 100) if drawer else (SIZE["width"] - 200, 500)))
     page.page.mouse.wheel(0, 5000)
     page.page.wait_for_timeout(500)
 
@@ -40,7 +40,7 @@ def _scroll(page: Page) -> None:
 def _first(page: Page) -> None:
     page.tab("Display")
     page.row("Shadows").first.click()
-    page.tab("Allocate")
+    page.tab("Display")
     page.page.wait_for_timeout(6000)  # shadows take their time without a graphics card
 
 
@@ -74,7 +74,7 @@ def _palette(page: Page) -> None:
 
 
 def _steer(page: Page) -> None:
-    page.tab("Steer by hand")
+    page.unfold("Steer by hand", "Stick for")
     page.tab("Sweep")
     page.choose("Sweep", "heave")
     page.press("Play the sweep")
@@ -106,7 +106,6 @@ def _fit(page: Page) -> None:
         page.until(lambda: page.view.fitting.findings is not None and not page.view.busy)
     page.press("On all like it")
     page.until(lambda: not page.view.busy)
-    page.tab("Place")  # closes the folder
     page.page.mouse.move(SIZE["width"] - 200, 500)
     page.page.mouse.wheel(0, 130)
 
@@ -130,7 +129,7 @@ def _proposals(page: Page) -> None:
     page.until(lambda: page.session.state.method == "mdn" and not page.view.busy)
     page.tab("What the network proposes")
     page.until(lambda: not page.view.answering.searching)
-    _scroll(page)
+    _scroll(page, drawer=True)
 
 
 def _limits(page: Page) -> None:
@@ -141,13 +140,12 @@ def _limits(page: Page) -> None:
 
 
 def _improve(page: Page) -> None:
-    page.tab("Reach")
+    page.tab("Improve")
     page.press("Search")
     page.until(lambda: page.view.improver.progress is not None and page.view.improver.progress.round > 5)
     page.press("Cancel")
     page.until(lambda: page.view.improver.findings is not None)
     page.page.wait_for_timeout(500)
-    _scroll(page)
 
 
 def _compare(page: Page) -> None:
@@ -179,14 +177,14 @@ def _swim(page: Page) -> None:
 
 
 def _view(page: Page) -> None:
-    page.tab("Display")
+    page.unfold("Display", "Fin graph")
     page.row("Fin graph").first.click()
 
 
 def _dark(page: Page) -> None:
-    page.tab("Display")
+    page.unfold("Display", "Dark")
     page.row("Dark").first.click()
-    page.tab("Allocate")
+    page.tab("Display")
 
 
 SCENES: dict[str, Callable[[Page], object]] = {
