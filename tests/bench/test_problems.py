@@ -97,6 +97,17 @@ def test_same_seed_same_file(tmp_path: Path) -> None:
     assert save_problems(make_problems(7, 1, costs=False), tmp_path / "c.npz") != first
 
 
+def test_shipped_file_is_what_its_seed_makes(shipped: Problems) -> None:
+    """Robots and what is asked of them; the yardsticks of cost take ten minutes."""
+    made = make_problems(SEED, costs=False)
+    for ours, theirs in zip(made.robots, shipped.robots, strict=True):
+        assert (ours.set, ours.description["name"]) == (theirs.set, theirs.description["name"])
+        np.testing.assert_allclose(ours.sigma, theirs.sigma, rtol=1e-6)
+    assert np.array_equal(made.targets.robot, shipped.targets.robot)
+    np.testing.assert_allclose(made.targets.wrench, shipped.targets.wrench, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(made.sequences.wrench, shipped.sequences.wrench, rtol=1e-9, atol=1e-12)
+
+
 def test_changed_file_is_refused(tmp_path: Path, few: Problems) -> None:
     path = tmp_path / "p.npz"
     save_problems(few, path)
