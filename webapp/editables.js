@@ -3,12 +3,21 @@
 // which one types lies over the cell and belongs to nobody else: however often the panel is written anew, it stays.
 (() => {
   if (window.finlabEditables) return;
-  let channel = null, last = 0, unheard = [], editor = null;
+  const AGAIN_MS = 700, TRIES = 40; // a page that is just connecting may lose what it is told to send
+  let channel = null, last = 0, unheard = [], editor = null, timer = 0, tries = 0;
+
+  function post() {
+    clearTimeout(timer);
+    if (!unheard.length || ++tries > TRIES) return;
+    window.__viserMutable?.sendMessage?.(
+      { type: 'GuiUpdateMessage', uuid: channel, updates: { value: JSON.stringify(unheard) } });
+    timer = setTimeout(post, AGAIN_MS);
+  }
 
   function tell(kind, key, text) {
     unheard.push([++last, kind, key, text]);
-    window.__viserMutable?.sendMessage?.(
-      { type: 'GuiUpdateMessage', uuid: channel, updates: { value: JSON.stringify(unheard) } });
+    tries = 0;
+    post();
     return last;
   }
 
@@ -78,8 +87,9 @@
   }
 
   window.finlabEditables = {
-    start(uuid) { channel = uuid; last = 0; unheard = []; close(); },
+    start(uuid) { channel = uuid; last = 0; unheard = []; clearTimeout(timer); close(); },
     tell,
+    ready: () => channel !== null,
     answer(answers) {
       for (const [number, refusal] of answers) {
         if (!editor || editor.sent !== number) continue;
@@ -123,6 +133,8 @@
       event.preventDefault();
       event.stopImmediatePropagation();
       open(target);
+    } else if (target instanceof Element && target.matches('[data-press][tabindex]') && event.key === 'Enter') {
+      tell(target.dataset.press, target.dataset.key, '');
     }
   });
   listen('focusout', (event, target) => {

@@ -27,6 +27,7 @@ from webapp.tasks.answering import Answering
 from webapp.tasks.background import EventLoop, Newest, Workers
 from webapp.tasks.comparison import Comparison
 from webapp.tasks.context import Context
+from webapp.tasks.designs import Designs
 from webapp.tasks.exports import Exports
 from webapp.tasks.fitting import Fitting
 from webapp.tasks.improving import Improver
@@ -103,6 +104,8 @@ class Page(ABC):
         """The boxes for numbers."""
         self.editables = Editables(client.gui, self.attempt)
         """Names and cells that are edited where they stand."""
+        self.designs = Designs(context, self.exports, self.editables)
+        """Designs as a whole."""
         limit_uploads(client.gui, MAX_UPLOAD, self._refuse_upload)
         self._panels: list[Panel] = []
         self._panels, self._swim_panels = self._build()

@@ -18,14 +18,14 @@ class FilesTab:
         self._page = page
         page.add_upload(
             "Open a layout file",
-            self._open,
+            page.designs.open,
             icon=viser.Icon.FOLDER_OPEN,
             mime_type=".yaml,.yml,.json,.zip",
             hint="A layout file (YAML, JSON), a graph file, a bundle, or a layout zipped with its tables.",
         )
         hint = "Measured fins come along in a ZIP. The HTML page moves by itself and needs no server."
         saves = {
-            "Layout (YAML)": self._send_layout,
+            "Layout (YAML)": page.designs.save,
             "Candidates (CSV)": self._send_candidates,
             "Picture (PNG)": page.exports.picture,
             "3D view (HTML)": lambda: page.exports.html(page.shown),
@@ -37,17 +37,6 @@ class FilesTab:
             hint="The layout graph alone, or with the fins' physics and checksums: what finlab export makes.",
         )
         self._command = gui.add_html("")
-
-    def _open(self, name: str, content: bytes) -> None:
-        opened = files.read_layout(name, content)
-        self._page.session.open_layout(opened.layout)
-        for file in opened.missing:
-            text = f"{file} did not come along, so a hull that fits is drawn; put both into one ZIP archive"
-            self._page.notify("Without its hull", text)
-
-    def _send_layout(self) -> None:
-        self._page.exports.download(*files.layout_file(self._page.session.state.layout))
-        self._page.session.note_saved()
 
     def _send_candidates(self) -> None:
         page = self._page

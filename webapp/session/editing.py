@@ -24,6 +24,16 @@ class Editing(Core):
         self._commit(f"Open {layout.name}", whole)
         self.saved = layout
 
+    def new_layout(self) -> None:
+        """A robot to begin with: one hull and one fin."""
+        self.open_layout(layout_edits.blank())
+        self.selected = self.state.layout.names[0]
+
+    def duplicate_layout(self) -> None:
+        """A copy under another name; the next changes are the copy's."""
+        layout = self.state.layout
+        self.open_layout(replace(layout, name=f"{layout.name[:56]} copy"))
+
     def accept_layout(self, layout: Layout) -> None:
         """A better layout that was found for this one."""
         self._edit("Improve the layout", layout)

@@ -151,6 +151,13 @@ def added(layout: Layout) -> tuple[Layout, str]:
     raise AssertionError("any place is free of none")
 
 
+def blank() -> Layout:
+    """A robot to begin with: a round hull, and a fin on its left that pushes ahead, back, up and down."""
+    hull = Hull(shape="ellipsoid", size_m=(0.5, 0.3, 0.2))
+    fin = Fin("left", (0.0, 0.15 + STAND_OFF, 0.0), math.pi / 2)
+    return Layout("New robot", (fin,), body=Body(hull=hull))
+
+
 def _is_free(layout: Layout, position: Vector, clear: float) -> bool:
     """Whether all fins are at least so far [m] from a place."""
     return all(math.dist(fin.position, position) >= clear - 1e-9 for fin in layout.fins)

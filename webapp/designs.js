@@ -1,0 +1,56 @@
+// Designs of this browser: the one in the address it was opened with, those it had lately, and the link that shares one.
+(() => {
+  const KEPT = 'finlab-designs';
+  const tell = (kind, text) => window.finlabEditables.tell(kind, '', text);
+
+  function openLinked(hash) {
+    if (!hash.startsWith('#design=')) return;
+    tell('design-link', hash.slice(1));
+    history.replaceState(null, '', location.pathname + location.search); // a reload goes on with what was made of it
+  }
+
+  // viser writes the address anew before anything of ours runs; how the page was entered is remembered elsewhere.
+  function enteredWith() {
+    const [entry] = performance.getEntriesByType('navigation');
+    return location.hash || new URL(entry?.name ?? location.href).hash;
+  }
+
+  function copy(box) {
+    box.select();
+    if (navigator.clipboard) return navigator.clipboard.writeText(box.value).then(() => true, () => document.execCommand('copy'));
+    return Promise.resolve(document.execCommand('copy'));
+  }
+
+  function share(fragment, name) {
+    document.querySelector('.fl-share')?.remove();
+    const card = document.createElement('div');
+    card.className = 'fl-share';
+    card.setAttribute('role', 'dialog');
+    card.setAttribute('aria-label', 'Share the design');
+    card.innerHTML = '<b></b><p></p><input readonly aria-label="link"><div class="row"><button class="primary">Copy the link</button>'
+      + '<button>Close</button></div>';
+    card.querySelector('b').textContent = `Share ${name}`;
+    card.querySelector('p').textContent = 'The link carries the whole design. Whoever opens it on a finlab of his own has a copy.';
+    const box = card.querySelector('input'), [take, close] = card.querySelectorAll('button');
+    box.value = `${location.origin}${location.pathname}#${fragment}`;
+    take.onclick = () => copy(box).then((done) => { take.textContent = done ? 'Copied' : 'Press Ctrl+C'; });
+    close.onclick = () => card.remove();
+    card.onkeydown = (event) => {
+      event.stopPropagation();
+      if (event.key === 'Escape') card.remove();
+    };
+    document.body.append(card);
+    take.focus();
+  }
+
+  const isFirst = !window.finlabDesigns; // else the connection was lost, and the page is the same
+  if (isFirst) window.addEventListener('hashchange', () => openLinked(location.hash));
+  window.finlabDesigns = { share };
+  const begin = () => {
+    if (!window.finlabEditables?.ready()) return setTimeout(begin, 50);
+    const kept = localStorage.getItem(KEPT);
+    if (kept) tell('designs-kept', kept);
+    if (isFirst) openLinked(enteredWith());
+  };
+  begin();
+})();

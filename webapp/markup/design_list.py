@@ -1,0 +1,32 @@
+"""The designs that a browser had lately, as a list to press on."""
+
+import time
+from collections.abc import Sequence
+from html import escape
+
+from webapp.editables import edit, press
+from webapp.tasks.designs import Recent
+
+
+def design_card(name: str, about: str, recent: Sequence[Recent]) -> str:
+    """The name to save under, what is said of the design, and the recent ones."""
+    box = edit("save-as", "", name, "save under this name", at_once=True)
+    rows = "".join(
+        f"<div class='pick recent' role='button' tabindex='0' {press('design-recent', str(k))}>"
+        f"<b>{escape(one.name)}</b><span class='dim'>{one.fins} fins, {_ago(one.when)}</span></div>"
+        for k, one in enumerate(recent)
+    )
+    lately = f"<div class='dim said'>Lately in this browser</div>{rows}" if rows else ""
+    return (
+        f"<div class='fl'><div class='save-as'><span class='dim'>Save as</span>"
+        f"<span class='edit box' {box}>{escape(name)}</span></div>"
+        f"<div class='dim said'>{escape(about)}</div>{lately}</div>"
+    )
+
+
+def _ago(when: float) -> str:
+    """How long ago something was, in words that stay true for a while."""
+    minutes = max(0.0, time.time() - when) / 60.0
+    if minutes < 60.0:
+        return "within the hour"
+    return f"{minutes / 60.0:.0f} h ago" if minutes < 2880.0 else f"{minutes / 1440.0:.0f} days ago"
