@@ -79,11 +79,11 @@ def rows_of(found: dict[str, Any], stored: dict[str, Any] | None) -> list[Row]:
     return [{**row, **own} for row in found["methods"]] + [{**row, "_kind": "printed"} for row in kept]
 
 
-def summary_blocks(rows: Sequence[Row]) -> list[Block]:
+def summary_blocks(rows: Sequence[Row], stored: dict[str, Any] | None) -> list[Block]:
     """What a terminal shows."""
     flat = [{**_head(row), **row["summary"]} for row in rows]
     blocks: list[Block] = [Table(MAIN, flat), LEGEND]
-    return blocks + _failures(rows)
+    return blocks + _stored_remark(rows, stored) + _failures(rows)
 
 
 def document(found: dict[str, Any], stored: dict[str, Any] | None, problems: Problems) -> Document:
@@ -98,8 +98,7 @@ def document(found: dict[str, Any], stored: dict[str, Any] | None, problems: Pro
         (
             _cards(rows[0]),
             "## Methods",
-            *summary_blocks(rows),
-            *_stored_remark(stored),
+            *summary_blocks(rows, stored),
             Figure("bench", lambda: profile_and_times(rows), _CAPTION),
             "## By set of robots",
             "Share of targets solved, within reach and beyond.",
@@ -183,12 +182,14 @@ def _example(row: Row, kind: str) -> str:
     return seen[0] if seen else ""
 
 
-def _stored_remark(stored: dict[str, Any] | None) -> list[Block]:
-    if stored is None:
+def _stored_remark(rows: Sequence[Row], stored: dict[str, Any] | None) -> list[Block]:
+    """Which rows are not of this run."""
+    kept = ", ".join(f"`{row['method']}`" for row in rows if row.get("_kind") == "printed")
+    if stored is None or not kept:
         return []
     machine = stored["machine"]
     where = f"{machine['processor']}, {machine['cores']} cores"
-    return [f"*In italics: stored results, made by `{stored['command']}` on {where}.*"]
+    return [f"*Not of this run but stored: {kept}, by `{stored['command']}` on {where}.*"]
 
 
 def _how(found: dict[str, Any], stored: dict[str, Any] | None, problems: Problems) -> list[Block]:

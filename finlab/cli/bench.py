@@ -69,7 +69,7 @@ def bench(
         save_results(run, json)
     if page is not None:
         page.write_text(to_html(document(run, stored, asked)), "utf-8")
-    print(to_text(*summary_blocks(rows_of(run, stored))))
+    print(to_text(*summary_blocks(rows_of(run, stored), stored)))
 
 
 def _tested(methods: tuple[str, ...], commands: tuple[str, ...], cpu: bool) -> list[Method]:

@@ -6,11 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from finlab.bench.page import rows_of, summary_blocks
 from finlab.bench.problems import Problems
 from finlab.bench.results import comparable, read_results, stored_results
 from finlab.cli import main
 from finlab.errors import DataError
 from finlab.evaluation.report.numbers import error
+from finlab.evaluation.report.text import to_text
 
 METHODS = Path(__file__).with_name("methods.py")
 
@@ -53,6 +55,9 @@ def test_stored_results_belong_to_the_shipped_problems(quick: bool, shipped: Pro
     assert {row["summary"]["calls"] for row in stored["methods"]} == {calls}
     search = next(row["summary"] for row in stored["methods"] if row["method"] == "search")
     assert search["failed"] == 0.0 and search["solved"] > 0.99
+    shown = to_text(*summary_blocks(rows_of({"methods": stored["methods"][:1]}, stored), stored))
+    assert "Not of this run but stored: `search-effort`, `analytic`" in shown.replace("\n", " ")
+    assert "stored" not in to_text(*summary_blocks(rows_of(stored, stored), stored))
     assert stored["seed"] == shipped.about["seed"] and stored["command"].startswith("finlab bench ")
 
 
