@@ -9,6 +9,7 @@ from finlab.errors import FinlabError
 from finlab.layout.layout import MAX_FINS
 from webapp.handles import hold_kind, put
 from webapp.markup.fin_list import AXES, fin_list
+from webapp.markup.picking import marker
 from webapp.page import Page
 from webapp.session.quantities import read_number
 from webapp.session.state import MARKS
@@ -37,6 +38,7 @@ class FinList:
         }
         for kind, act in acts.items():
             page.editables.on(kind, act)
+        gui.add_html(marker("fl-primary"))
         page.add_button("Add a fin", session.add_fin, icon=viser.Icon.PLUS, hint=f"Up to {MAX_FINS} fins.")
         edits: dict[str, Callable[[], object]] = {
             "Mirror": session.mirror_fin,
