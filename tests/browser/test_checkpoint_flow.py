@@ -79,7 +79,7 @@ def test_modes_tell_their_components_and_proposals_are_drawn(
     )
     names = [mode.name for mode in page.view.answering.modes.shown]
     assert len(set(names)) == len(names)
-    assert page.view.answering.reply.attention is not None
+    assert page.view.answering.reply.proposal is not None
     page.press("Play the refinement")
     page.page.locator(".step", has_text="Best raw candidate").wait_for()
     page.page.locator(".step", has_text="Answer").wait_for()

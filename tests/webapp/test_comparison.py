@@ -77,7 +77,9 @@ def test_each_mode_of_mdn_tells_its_components_and_search_has_no_samples() -> No
     assert modes.shown[0].mode.sources[0].startswith("component "), "the answer comes from the network"
     led = {samples.source[k] for k in np.flatnonzero(modes.of_samples == 0)}
     assert led and led <= set(modes.shown[0].mode.sources)
-    assert reply.attention is not None and reply.attention.weight.sum(axis=1) == pytest.approx(np.ones(4))
+    assert reply.proposal is not None and reply.proposal.seen.attention.sum(axis=1) == pytest.approx(
+        np.ones(4)
+    )
     discs = proposal_discs(reply.answer, reply.modes)
     assert discs.count("<svg") == 4 and discs.count("r='2'") == 4 * len(samples)
     dear = replace(samples, power=np.full(len(samples), 1e4))
@@ -85,7 +87,7 @@ def test_each_mode_of_mdn_tells_its_components_and_search_has_no_samples() -> No
     assert "1e+04" not in far and "e+" not in far, "samples that are far too dear stand at the edge"
     searched = solver.reply(replace(state, method="search"))
     found = solver.modes(searched)
-    assert searched.answer.samples is None and searched.attention is None and found.of_samples is None
+    assert searched.answer.samples is None and searched.proposal is None and found.of_samples is None
     assert not any(s.startswith("component") for mode, _ in found.shown for s in mode.sources)
     assert {source_words(mode.sources).split(" ")[0] for mode, _ in found.shown} <= {"found", "from"}
     assert proposal_discs(searched.answer, found) == ""

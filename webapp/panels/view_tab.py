@@ -17,6 +17,11 @@ SWITCHES = {
         "Fin graph",
         "Edges between working fins; with the method mdn, thick where its network lets one look at another.",
     ),
+    "mixture": (
+        "Mixture",
+        "Around each fin, in its plane of force: how dense the network's mixture is, and the samples "
+        "drawn from it (methods mdn and paper).",
+    ),
     "dimensions": ("Dimensions", "Coordinates of the selected fin."),
     "ghost": ("Ghost", "Where moved fins stood when the layout was opened or saved."),
     "center": ("Centre of gravity", "Mark it, and look through the hull."),
@@ -56,7 +61,7 @@ class ViewPanel:
     def refresh(self) -> None:
         """Say what the graph shows."""
         reply = self._page.answering.reply
-        plain = self._page.session.display.graph and reply is not None and reply.attention is None
+        plain = self._page.session.display.graph and reply is not None and reply.proposal is None
         method = "" if reply is None else reply.answer.method
         put(self._graph, content=f"<div class='fl dim'>{_graph_words(method)}</div>", visible=plain)
 

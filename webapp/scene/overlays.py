@@ -12,7 +12,7 @@ from webapp.handles import put
 from webapp.scene.meshes import fin as fin_mesh
 from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, joined, tube
 from webapp.scene.shape import UNLIT, Shape
-from webapp.tasks.solver import Attention
+from webapp.tasks.solver import Proposal
 from webapp.theme import DEAD, LIGHT, Rgb, look
 
 LIFT = np.array([0.0, 0.0, 0.025])
@@ -94,7 +94,7 @@ class Lines:
         healthy: tuple[str, ...],
         selected: str | None,
         graph: bool,
-        attention: Attention | None = None,
+        proposal: Proposal | None = None,
     ) -> None:
         """Show the edges between healthy fins, and the coordinates of the selected one.
 
@@ -103,14 +103,14 @@ class Lines:
             healthy: fins that are in the graph.
             selected: fin whose coordinates are shown.
             graph: whether the graph is.
-            attention: weights of the edges, where a network has answered for these very fins.
+            proposal: whose attention makes the edges thick, where a network has answered for these very fins.
         """
         places = np.array([fin.position for fin in layout.fins if fin.name in healthy])
         wanted = graph and len(places) > 1
         put(self.graph.node, visible=wanted)
         if wanted:
-            fits = attention is not None and attention.fins == healthy
-            weight = attention.weight if fits and attention is not None else np.ones((len(places),) * 2)
+            fits = proposal is not None and proposal.fins == healthy
+            weight = proposal.seen.attention if fits and proposal is not None else np.ones((len(places),) * 2)
             self.graph.show(_edges, places, weight)
         put(self._steps, visible=selected is not None)
         put(self._text, visible=selected is not None)

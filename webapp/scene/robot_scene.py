@@ -10,6 +10,7 @@ from finlab.layout import Fin, Layout
 from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
 from webapp.scene.fin_node import FinNode, Flapping
+from webapp.scene.force_planes import ForcePlanes
 from webapp.scene.gizmos import Grips
 from webapp.scene.measure import Measure
 from webapp.scene.meshes.hull import hull_of
@@ -26,7 +27,7 @@ from webapp.scene.wrench_nodes import (
 from webapp.session.state import State
 from webapp.tasks.analyst import Findings
 from webapp.tasks.context import Context
-from webapp.tasks.solver import Attention
+from webapp.tasks.solver import Proposal
 from webapp.theme import ASKED, DELIVERED, HALF_TURN
 
 CAMERAS = {
@@ -55,6 +56,8 @@ class RobotScene:
         self._proposed = Ghost(scene, "/robot/proposed", DELIVERED, None)
         self._landing = Ghost(scene, "/robot/landing", ASKED, 0.45)
         self._overlay = Overlay(scene)
+        self.planes = ForcePlanes(scene)
+        """What a network proposes, around the fins."""
         self._attainable = AttainableNodes(scene)
         self.grips = Grips(scene, session, self._do)
         """Handles of the asked wrench."""
@@ -112,7 +115,7 @@ class RobotScene:
         other: Allocation | None = None,
         findings: Findings | None = None,
         offered: Layout | None = None,
-        attention: Attention | None = None,
+        proposal: Proposal | None = None,
     ) -> None:
         """Show the session's layout, and the answer to it if there is one for this very layout.
 
@@ -121,7 +124,7 @@ class RobotScene:
             other: another method's answer, whose forces are shown beside it.
             findings: what the layout can attain, where that is to be shown.
             offered: a better layout, whose fins are shown beside the present ones.
-            attention: how much the fins look at each other.
+            proposal: what a network made of the target.
         """
         state, display = self._session.state, self._session.display
         hull = hull_of(state.layout)
@@ -175,7 +178,7 @@ class RobotScene:
         self._wrench.refresh(target, given, missing, top, scale, HALF_TURN / self.torque)
         self.grips.refresh(display.grips, target, self._wrench.hub(top), scale)
         shown = self._session.selected if display.dimensions else None
-        self._lines.refresh(state.layout, state.healthy, shown, display.graph, attention)
+        self._lines.refresh(state.layout, state.healthy, shown, display.graph, proposal)
 
     def _landings(self) -> tuple[Fin, ...]:
         """Where the fin in the user's hand would come to stand: its gizmo must not be moved meanwhile."""

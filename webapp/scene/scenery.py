@@ -6,6 +6,7 @@ from finlab.allocation.allocation import Allocation
 from webapp.markup.corner import graph_row, legend, overlay_row, set_rows
 from webapp.scene.robot_scene import RobotScene
 from webapp.scene.swim_scene import SwimScene
+from webapp.scene.wrench_nodes import LENGTH
 from webapp.session.swim_plan import SwimSettings
 from webapp.session.tour import STEPS
 from webapp.tasks.analyst import Findings
@@ -42,9 +43,11 @@ class Scenery:
         self._apply_theme()
         found, reply = improver.findings, answering.reply
         offered = found.layout if found is not None and found.improved else None
-        attention = None if reply is None else reply.attention
+        proposal = None if reply is None else reply.proposal
         other, display = self._overlaid(comparison), self._session.display
-        self.robot.refresh(answering.shown, other, findings, offered, attention)
+        self.robot.refresh(answering.shown, other, findings, offered, proposal)
+        drawn = answering.best if display.mixture else None
+        self.robot.planes.refresh(drawn, answering.modes, proposal, LENGTH / self.robot.newtons)
         self.swims = bool(self._swimming.swimmers)
         self.robot.show(not self.swims)
         self.legend = legend(
@@ -53,7 +56,7 @@ class Scenery:
             self.robot.cut,
             (
                 overlay_row(other, display.dark),
-                graph_row(display.graph, attention is not None, display.dark),
+                graph_row(display.graph, proposal is not None, display.dark),
                 set_rows(findings if display.drawn != "none" else None),
             ),
         )

@@ -55,6 +55,8 @@ class Display:
     """Key of `DRAWN`: the attainable set that is shown."""
     alone: bool = True
     """Attainable forces without torques, torques without forces."""
+    mixture: bool = False
+    """Show what a network proposes, around the fins."""
     center: bool = False
     """Mark the centre of gravity."""
     parallel: bool = False

@@ -13,8 +13,7 @@ from finlab.allocation.allocator import Allocator
 from finlab.allocation.judging import judge
 from finlab.allocation.methods import load_allocator
 from finlab.allocation.modes import Mode
-from finlab.allocation.solution import Candidates
-from finlab.arrays import Array
+from finlab.allocation.solution import Candidates, Insight
 from finlab.errors import AllocationError
 from finlab.forces.reach import axis_ranges
 from finlab.layout import Layout
@@ -28,13 +27,13 @@ STEPS = 6
 Load = Callable[..., Allocator]
 
 
-class Attention(NamedTuple):
-    """How much the fins look at each other in the network: the graph that it sees."""
+class Proposal(NamedTuple):
+    """What a network makes of a target on the fins that work."""
 
     fins: tuple[str, ...]
-    """The fins in the graph, n of them: those that work."""
-    weight: Array
-    """How much each fin (rows) looks at each (columns), (n, n); rows sum to 1, itself included."""
+    """Those fins, n of them."""
+    seen: Insight
+    """Mixture over their forces, and how much they look at each other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +44,8 @@ class Reply:
     """The question."""
     answer: Allocation
     """The answer itself."""
-    attention: Attention | None
-    """How much its fins look at each other, for methods with a network."""
+    proposal: Proposal | None
+    """What the network made of the target, for methods with one that tells."""
     modes: Modes
     """Those of its modes that are known anyway: a few."""
     in_reach: bool
@@ -104,9 +103,9 @@ class Solver:
         healthy = answer.layout.without(failed) if failed else answer.layout
         insight = self.allocator(state).insight(healthy, state.target)
         modes = listed_modes(known_modes(answer), answer.samples)
-        attention = None if insight is None else Attention(healthy.names, insight.attention)
+        proposal = None if insight is None else Proposal(healthy.names, insight)
         in_reach = answer.reachable or is_within(answer.layout, state.target, failed)
-        return Reply(state, answer, attention, modes, in_reach)
+        return Reply(state, answer, proposal, modes, in_reach)
 
     def modes(self, reply: Reply) -> Modes:
         """All distinct ways to do what an answer does: a search of its own, tens of milliseconds."""
