@@ -34,7 +34,7 @@ def steps(page: Any) -> Iterator[list[tuple[str, Any]]]:
 
         return hear
 
-    names = ("set_target", "move_fin", "turn_fin")
+    names = ("set_target", "place_selected", "turn_selected")
     for name in names:
         setattr(session, name, recorded(name, getattr(session, name)))
     yield heard
