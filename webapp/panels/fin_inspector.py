@@ -46,7 +46,7 @@ class FinInspector:
                 about = "x forward, y left, z up, from the centre of gravity."
                 page.bind_number(
                     gui.add_vector3("Position [m]", (0.0, 0.0, 0.0), step=0.005, hint=about),
-                    session.place_selected,
+                    self._place,
                     lambda: self._fin.position,
                 )
                 about = "Azimuth of the shaft, 0 is ahead, 90 to the left."
@@ -106,6 +106,9 @@ class FinInspector:
 
     def _drive(self, key: str) -> float:
         return float(getattr(self._fin.servo, key))
+
+    def _place(self, position: tuple[float, float, float]) -> None:
+        self._page.session.place_selected(position)
 
     def _turn(self, degrees: Any) -> None:
         checked = number(degrees, "shaft [°]", -3600.0, 3600.0)
