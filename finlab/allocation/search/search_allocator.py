@@ -188,7 +188,8 @@ class SearchAllocator(Allocator):
         """A lower bound on the cost of any answer to the question of a result: on power [W], or effort.
 
         Power takes milliseconds, by the convex dual; effort seconds, by branch and bound, and from seven fins
-        on little is proven. Both hold as far as the compiled fins do, to about one part in a thousand.
+        on little is proven. Both hold as far as the compiled fins do: to about one part in a thousand, and in
+        a hundred where weak forces are asked of soft fins.
 
         Raises:
             AllocationError: the wrench is out of reach, so that there is no exact answer.
