@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,8 @@ class SilentClient:
     def __init__(self, server: viser.ViserServer) -> None:
         self.scene, self.gui, self.atomic = server.scene, server.gui, server.atomic
         self.camera = type("Camera", (), {})()
+        self.kept: dict[str, str] = {}
+        self.local_storage = SimpleNamespace(set_item=self.kept.__setitem__, get_item=self.kept.get)
         self.notes: list[str] = []
         self.files: dict[str, bytes] = {}
 

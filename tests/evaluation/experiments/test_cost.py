@@ -67,7 +67,7 @@ def test_answers_that_miss_or_leave_their_limits_do_not_count() -> None:
 def test_names() -> None:
     assert cost_sets("all") == [*SPLITS, *SETS] and cost_sets("axes") == ["axes"]
     assert parse_objectives("effort, power") == ["power", "effort"]
-    with pytest.raises(DataError, match="split: expected all or one of id, .*stacked, got 'nowhere'"):
+    with pytest.raises(DataError, match="split: expected all or one of id, .*axes-mixed, got 'nowhere'"):
         cost_sets("nowhere")
     for wrong in ("money", "power,money", ","):
         with pytest.raises(DataError, match="objectives: expected power, effort or both"):
