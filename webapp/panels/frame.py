@@ -26,6 +26,8 @@ HABITS = files("webapp").joinpath("habits.js").read_text("utf-8")
 """Script that mends what viser's page does otherwise."""
 TRIAD = files("webapp").joinpath("triad.js").read_text("utf-8")
 """Script that turns the axes in the corner of the view."""
+NAMES = files("webapp").joinpath("names.js").read_text("utf-8")
+"""Script that gives each box a name for readers of the screen."""
 _VARIABLES = (
     f":root {{ --fl-asked: {css(ASKED)}; --fl-delivered: {css(DELIVERED)}; --fl-missing: {css(MISSING)}; }}"
 )
@@ -97,7 +99,7 @@ class Frame:
                     for index, place in enumerate(PLACES)
                     if place.region == region
                 ]
-        run_script(gui, HABITS + TRIAD + open_linked("lesson"))
+        run_script(gui, HABITS + TRIAD + NAMES + open_linked("lesson"))
 
     @property
     def panels(self) -> tuple[list[Panel], list[Panel]]:
