@@ -4,6 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from finlab.physics import Plant
+from webapp.markup.words import small
+
 
 def test_the_tour_sets_each_stop_and_brings_the_work_back(page: Any) -> None:
     page.type("Fy [N]", "0.5")
@@ -31,6 +34,25 @@ def test_the_tour_sets_each_stop_and_brings_the_work_back(page: Any) -> None:
     assert page.session.drawer == "Improve" and page.session.history.undo_name == "Set Fy"
     back = page.view.scenery.robot.camera
     page.until(lambda: np.allclose(back, camera, atol=1e-3))
+    assert page.problems == []
+
+
+def test_the_refinement_is_played_and_any_step_is_seen_again(page: Any) -> None:
+    page.until(lambda: not page.view.busy and len(page.view.answering.modes.shown) > 1)
+    page.page.locator("table.modes tr.pick").nth(1).click()
+    page.until(lambda: page.session.mode == 1)
+    page.press("Play the refinement")
+    rows = page.page.locator("table.way tr.pick")
+    page.until(lambda: rows.count() == 4 and "chosen" in rows.nth(3).get_attribute("class"))
+    assert "Mode 2" in rows.nth(3).inner_text()
+    rows.nth(1).click()
+    page.until(lambda: "Search, step 1" in page.text(".fl-status .pill"))
+    step = page.view.shown
+    missing = (step.target - Plant(step.layout).wrench(step.command)) / step.sigma
+    assert small(float(np.linalg.norm(missing))) in rows.nth(1).inner_text()
+    page.until(lambda: page.text(".fl-status .err") == rows.nth(1).locator("td").nth(2).inner_text())
+    page.page.locator("table.modes tr.pick").nth(0).click()
+    rows.first.wait_for(state="hidden")
     assert page.problems == []
 
 

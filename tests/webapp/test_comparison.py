@@ -11,7 +11,6 @@ import pytest
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.methods import load_allocator
 from finlab.assets import shipped_checkpoints, shipped_layouts
-from finlab.errors import AllocationError
 from finlab.layout import load_layout
 from tests.webapp.loops import page_of
 from tests.webapp.stand_in import load_stand_in
@@ -27,7 +26,7 @@ from webapp.session.targets import PRESETS
 from webapp.tasks.background import Worker
 from webapp.tasks.comparison import Comparison
 from webapp.tasks.mode_names import known_modes, listed_modes
-from webapp.tasks.solver import STEPS, Solver
+from webapp.tasks.solver import Solver
 
 UCAT = load_layout(shipped_layouts()["ucat"])
 
@@ -91,20 +90,6 @@ def test_each_mode_of_mdn_tells_its_components_and_search_has_no_samples() -> No
     assert not any(s.startswith("component") for mode, _ in found.shown for s in mode.sources)
     assert {source_words(mode.sources).split(" ")[0] for mode, _ in found.shown} <= {"found", "from"}
     assert proposal_discs(searched.answer, found) == ""
-
-
-@pytest.mark.skipif("default" not in shipped_checkpoints(), reason="no trained checkpoint in the tree")
-def test_refinement_makes_a_raw_candidate_exact() -> None:
-    solver = Solver()
-    state = State(UCAT, failed=("back_left",), target=PRESETS["Turn"], method="mdn")
-    reply = solver.reply(state)
-    frames = solver.refinement(reply)
-    errors = [frame.err_norm for frame in frames]
-    assert len(frames) == STEPS + 2 and frames[-1] is reply.answer
-    assert errors[0] > 10 * errors[STEPS] and np.isnan(frames[0].command[2]).all()
-    for method in ("search", "qp"):
-        with pytest.raises(AllocationError, match="'mdn'"):
-            solver.refinement(solver.reply(replace(state, method=method)))
 
 
 def test_what_a_page_tries_out_stays_with_its_own_answers() -> None:

@@ -121,7 +121,8 @@ def test_another_sample_of_another_answer_is_shown() -> None:
     layout = load_layout(shipped_layouts()["ucat"])
     session = Session(layout)
     jobs: list[Any] = []
-    worker: Any = type("Ready", (), {"submit": lambda _, key, job, failed: jobs.append(job)})()
+    submit = {"submit": lambda _, key, job, failed: jobs.append(job)}
+    worker: Any = type("Ready", (), {**submit, "forget": lambda *_: None})()
     loop = AtOnce()
     answering = Answering(page_of(worker, session, loop=loop))
     shown = []

@@ -87,7 +87,7 @@ def corner(
     allocation: Allocation | None,
     busy: bool,
     error: str | None,
-    raw: bool = False,
+    instead: str = "",
     least: bool = True,
     in_reach: bool = False,
 ) -> str:
@@ -99,7 +99,7 @@ def corner(
         allocation: what is on the robot.
         busy: whether a newer answer is on its way.
         error: why there is no answer.
-        raw: whether it is a raw command on show, of which nobody expects that it is exact.
+        instead: what is on show instead of an answer, of which nobody expects that it is exact.
         least: whether it is the answer itself, not another way to do the same.
         in_reach: whether any command of the working fins gives what is asked.
     """
@@ -108,16 +108,16 @@ def corner(
     if error is not None:
         parts.append(f"<span class='missing'>{escape(error)}</span>")
     elif allocation is not None:
-        parts += _figures(allocation, raw, least, in_reach)
+        parts += _figures(allocation, instead, least, in_reach)
     if error is None and (busy or allocation is None):
         parts.append("<span class='dim'>computing …</span>")
     return _cards(legend, parts)
 
 
-def _figures(allocation: Allocation, raw: bool, least: bool, in_reach: bool) -> list[str]:
+def _figures(allocation: Allocation, instead: str, least: bool, in_reach: bool) -> list[str]:
     """Error, costs, time and verdict of what is on the robot."""
-    color = DEAD if raw else verdict_of(allocation, in_reach).color
-    verdict = "Raw, not refined" if raw else verdict_sentence(allocation, in_reach)
+    color = DEAD if instead else verdict_of(allocation, in_reach).color
+    verdict = instead or verdict_sentence(allocation, in_reach)
     rest = ", ".join(
         f"{axis} {value:+.2g} {unit}"
         for axis, value, unit in zip(AXES, allocation.unallocated, AXIS_UNITS, strict=True)

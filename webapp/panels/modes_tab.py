@@ -9,10 +9,10 @@ from webapp.markup.mode_plot import SAMPLES, mode_plot
 from webapp.markup.modes import mode_table
 from webapp.markup.picking import add_channel, chosen_button, marker
 from webapp.markup.proposals import proposal_discs
+from webapp.markup.refinement import STEPS, way_table
 from webapp.markup.words import small, three_digits
 from webapp.page import Page
 from webapp.session.state import CANDIDATE_RANGE, GAMMA_RANGE, TEMPERATURE_RANGE, knows_objective
-from webapp.tasks.solver import STEPS
 
 ORIGINS = {
     "search": "The search knows each fin's own law and draws nothing. It begins with all fins at work and, "
@@ -52,19 +52,23 @@ class CandidatesPanel:
                 ("gamma", "Effort weight γ", GAMMA_RANGE, 0.005, 4, weight),
             )
         }
+        hint = "From where it began to the mode that is shown, step by step."
         self._play = page.add_button(
-            "Play the refinement",
-            page.answering.play,
-            icon=viser.Icon.PLAYER_PLAY,
-            hint="Levenberg-Marquardt from the best raw candidate, step by step; then the answer.",
+            "Play the refinement", page.answering.play, icon=viser.Icon.PLAYER_PLAY, hint=hint
         )
-        self._step = gui.add_html("")
+        add_channel(gui, STEPS, self._show_step)
+        self._steps = gui.add_html("")
+        self._sample = gui.add_html("")
         self._origin = gui.add_html("")
         self._proposals = ProposalPanel(gui, page)
 
     def _setting(self, key: str) -> float:
         """A setting in force; what the widget shows at first while the method has none of the kind."""
         return float(self._page.session.state.drawing.get(key, DRAWN[key]))
+
+    def _show_step(self, word: list[str]) -> None:
+        if word[0].isdecimal():
+            self._page.do(partial(self._page.answering.refinement.show, int(word[0])))
 
     def refresh(self) -> None:
         """Write settings and candidates."""
@@ -73,12 +77,15 @@ class CandidatesPanel:
         drawing = state.drawing
         for key, widget in self._settings.items():
             put(widget, visible=key in drawing)
-        put(self._play, visible=state.method == "mdn")
+        put(self._play, visible=bool(page.answering.modes.shown))
         self._picker.refresh()
         answering, picker = page.answering, self._picker
         table = mode_table(answering.modes, answering.searching, picker.shown, picker.name)
         put(self._table, content=table)
-        put(self._step, content=_step_words(page))
+        refined = answering.refinement
+        way = refined.way if answering.is_refined else None
+        put(self._steps, content=way_table(way, refined.at), visible=way is not None)
+        put(self._sample, content=_sample_words(page))
         self._proposals.refresh()
 
 
@@ -88,21 +95,19 @@ def _origin_words(method: str) -> str:
     return words if knows_objective(method) else f"{words} It keeps effort least whatever is chosen."
 
 
-def _step_words(page: Page) -> str:
-    """What is on the robot while it is neither the answer nor one of its modes."""
-    frame, sample, shown = page.answering.frame, page.session.sample, page.shown
-    if shown is None or (frame is None and sample is None):
+def _sample_words(page: Page) -> str:
+    """Which raw sample is on the robot, and what the fins make of it."""
+    sample, shown = page.session.sample, page.shown
+    if sample is None or shown is None:
         return ""
-    if frame is not None:
-        words = {0: "Best raw candidate", STEPS + 1: "Answer, the cheapest that the search found"}
-        text = words.get(frame, f"Step {frame} of {STEPS}")
-    else:
-        text = f"Raw sample {sample}{_sample_words(page, sample or 0)}"
     error, power, effort = small(shown.err_norm), three_digits(shown.power), three_digits(shown.energy)
-    return f"<div class='fl step'><b>{text}</b>: error {error} σ, power {power} W, effort {effort}</div>"
+    return (
+        f"<div class='fl step'><b>Raw sample {sample}{_component_words(page, sample)}</b>: "
+        f"error {error} σ, power {power} W, effort {effort}</div>"
+    )
 
 
-def _sample_words(page: Page, sample: int) -> str:
+def _component_words(page: Page, sample: int) -> str:
     """Of which component a raw sample is, and to which mode that led."""
     answer, led = page.answering.best, page.answering.modes.of_samples
     if answer is None or answer.samples is None or led is None or not sample < len(led):

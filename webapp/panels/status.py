@@ -4,6 +4,7 @@ import viser
 
 from webapp.handles import put
 from webapp.markup.corner import corner, swim_corner
+from webapp.markup.refinement import step_name
 from webapp.page import Page
 from webapp.scene.swim_scene import ARROWS_N
 
@@ -29,7 +30,10 @@ class Corner:
         page, answering = self._page, self._page.answering
         if page.swimming.swimmers:
             return swim_corner(page.swimming, ARROWS_N)
-        raw = page.session.sample is not None or answering.frame is not None
+        step, sample = answering.step, page.session.sample
+        instead = "" if sample is None else "Raw, not refined"
+        if step is not None:
+            instead = step_name(step.name)
         reply = answering.reply
         return corner(
             page.session.state,
@@ -37,7 +41,7 @@ class Corner:
             page.shown,
             page.busy,
             answering.error,
-            raw,
+            instead,
             page.shown is answering.best,
             reply is not None and reply.in_reach,
         )

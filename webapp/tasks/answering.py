@@ -1,7 +1,5 @@
 """Keeps one page's answer up to date: asks for the newest state, and knows what of the answer is shown."""
 
-from functools import partial
-
 import numpy as np
 
 from finlab.allocation.allocation import Allocation
@@ -10,12 +8,11 @@ from finlab.errors import FinlabError
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
 from webapp.tasks.mode_names import NO_MODES, Modes, same_mode
-from webapp.tasks.solver import STEPS, Reply
+from webapp.tasks.refinement import Refinement, Shown, Step
+from webapp.tasks.solver import Reply
 
 SEARCH_REST_S = 0.2
 """How long there must be no newer answer before all its modes are searched for [s]: that takes a while."""
-FRAME_S = 0.9
-"""How long each step of a refinement is shown [s]."""
 
 
 class Answering:
@@ -23,16 +20,15 @@ class Answering:
 
     def __init__(self, context: Context) -> None:
         """Answer what the page's session asks."""
-        self._session, self._loop = context.session, context.loop
+        self._session = context.session
         self._changed, self._notify = context.changed, context.notify
         self._told: str | None = None
         self._shown: tuple[Allocation, Array, Allocation] | None = None
         loop, worker, solver = context.loop, context.workers.answers, context.solver
         self._answer = Newest(loop, worker, solver.reply, self._take)
         self._search = Newest(loop, worker, solver.modes, self._take_modes, SEARCH_REST_S)
-        self._steps = Newest(loop, worker, solver.refinement, self._take_steps)
-        self._frames: tuple[Allocation, ...] = ()
-        """Steps of a refinement that are still to be played, the present one first."""
+        self.refinement = Refinement(context)
+        """How what is shown came about."""
 
     @property
     def reply(self) -> Reply | None:
@@ -70,9 +66,29 @@ class Answering:
 
     @property
     def shown(self) -> Allocation | None:
-        """The answer with the chosen mode's or sample's command, or the step of the refinement on show."""
-        if self._frames:
-            return self._frames[0]
+        """What is on the robot: a step of the refinement, or the answer with the chosen mode's or sample's
+        command."""
+        step = self.step
+        return self._end if step is None else step.answer
+
+    @property
+    def step(self) -> Step | None:
+        """The step of the refinement that is on the robot, None while none is."""
+        return self.refinement.step if self.is_refined else None
+
+    @property
+    def is_refined(self) -> bool:
+        """Whether the refinement that is known is that of what is chosen."""
+        of = self.refinement.of
+        return of is not None and of.reply is self.reply and of.place == self._place
+
+    @property
+    def _place(self) -> tuple[int, int | None]:
+        return self._session.mode, self._session.sample
+
+    @property
+    def _end(self) -> Allocation | None:
+        """The answer with the chosen mode's or sample's command."""
         best, mode, sample = self.best, self._session.mode, self._session.sample
         if best is None:
             return None
@@ -81,11 +97,6 @@ class Answering:
         if 0 < mode < len(self.modes.shown):
             return self._variant(best, self.modes.shown[mode].mode.command)
         return best
-
-    @property
-    def frame(self) -> int | None:
-        """Which step of the refinement is on the robot, None while none is played."""
-        return STEPS + 2 - len(self._frames) if self._frames else None
 
     def _variant(self, best: Allocation, command: Array) -> Allocation:
         """The answer with another command; kept, because every refresh asks for it."""
@@ -99,24 +110,28 @@ class Answering:
         self._answer.ask(self._session.state)
 
     def play(self) -> None:
-        """Show step by step how the refinement makes a raw candidate exact; a change of the state ends it.
+        """Show step by step how the mode that is shown came about; a change of the question ends it.
 
         Raises:
-            FinlabError: there is no answer to the present state yet.
+            FinlabError: there is no answer to the present state yet, or it is the only one of its method.
         """
         if self.reply is None or self.busy:
             raise FinlabError("there is no answer yet; wait for one")
-        self._steps.forget()
-        self._steps.ask(self.reply)
+        modes = self.modes.shown
+        if not modes:
+            raise FinlabError(f"method {self.reply.answer.method!r} refines no candidates; use 'search'")
+        self._session.show_sample(None)
+        mode, end = min(self._session.mode, len(modes) - 1), self._end
+        assert end is not None
+        self.refinement.play(Shown(self.reply, self._place, end, f"Mode {mode + 1}, {modes[mode].name}"))
 
     def forget(self) -> None:
         """Nothing is known of the robot any more: another one was opened, or the page has gone."""
-        self._frames = ()
-        for task in (self._answer, self._search, self._steps):
+        for task in (self._answer, self._search, self.refinement):
             task.forget()
 
     def _take(self) -> None:
-        self._frames = ()
+        self.refinement.forget()
         error = self._answer.error
         if self.reply is not None:
             self._search.ask(self.reply)
@@ -135,20 +150,3 @@ class Answering:
             if 0 < mode < len(before):
                 self._session.show_mode(same_mode(before[mode].mode, self.modes.shown))
         self._changed()
-
-    def _take_steps(self) -> None:
-        steps = self._steps
-        if steps.error is not None:
-            self._notify("Not possible", steps.error)
-        elif steps.answered is self.reply and not self.busy:
-            self._show(steps.findings or ())
-
-    def _show(self, frames: tuple[Allocation, ...]) -> None:
-        self._frames = frames
-        self._changed()
-        if frames:
-            self._loop.later(FRAME_S, partial(self._show_next, frames))
-
-    def _show_next(self, frames: tuple[Allocation, ...]) -> None:
-        if self._frames is frames:  # else it was ended, or started again
-            self._show(frames[1:])

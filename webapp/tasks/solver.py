@@ -14,15 +14,10 @@ from finlab.allocation.judging import judge
 from finlab.allocation.methods import load_allocator
 from finlab.allocation.modes import Mode
 from finlab.allocation.solution import Candidates, Insight
-from finlab.errors import AllocationError
 from finlab.forces.reach import axis_ranges
 from finlab.layout import Layout
 from webapp.session.state import State
 from webapp.tasks.mode_names import Modes, known_modes, listed_modes
-
-STEPS = 6
-"""Steps of Levenberg-Marquardt that are shown; the error has long vanished by then."""
-
 
 Load = Callable[..., Allocator]
 
@@ -111,25 +106,6 @@ class Solver:
         """All distinct ways to do what an answer does: a search of its own, tens of milliseconds."""
         answer = reply.answer
         return listed_modes(judged_modes(answer, answer.explore()), answer.samples)
-
-    def refinement(self, reply: Reply) -> tuple[Allocation, ...]:
-        """The best raw candidate of an answer, what each step makes of it, and the answer itself at the end.
-
-        Raises:
-            AllocationError: the method draws no candidates, or shows no steps of their refinement.
-        """
-        allocator, answer = self.allocator(reply.state), reply.answer
-        if answer.samples is None:
-            raise AllocationError(f"method {allocator.name!r} draws no candidates; use method 'mdn'")
-        layout = answer.layout.without(answer.failed) if answer.failed else answer.layout
-        alive = np.isfinite(answer.command[:, 0])
-        raw = answer.samples.command[answer.samples.err_norm.argmin()][alive]
-        frames = []
-        for steps in range(STEPS + 1):
-            command = np.full_like(answer.command, np.nan)
-            command[alive] = allocator.refined(layout, answer.target, raw, steps)
-            frames.append(answer.with_command(command))
-        return (*frames, answer)
 
     def solve(self, state: State) -> Allocation:
         """The answer to a state.

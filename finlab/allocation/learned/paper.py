@@ -5,12 +5,14 @@ from functools import lru_cache
 from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.judging import costs
 from finlab.allocation.learned.settings import STEPS, PaperSettings
+from finlab.allocation.policy import Policy
 from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
-from finlab.allocation.solution import Candidates, Solution
+from finlab.allocation.solution import Candidates, Path, Solution
 from finlab.arrays import AnyArray
 from finlab.inference.features import raw_features
 from finlab.inference.mixture import MixtureArrays
@@ -25,6 +27,8 @@ from finlab.physics.energy import EnergyMeter
 
 CHUNK = 250
 """Targets that are solved together; keeps memory flat for any number of targets."""
+TOLD_STEPS = (0, 2, 5, 10, 20, 40, 80, 120)
+"""Steps of Adam that a path tells: the first ones do most."""
 ADAM_RATE = 0.03
 """Adam's first step, in units of half a limit range; it falls to a twentieth of that."""
 ADAM_DECAY = (0.9, 0.999)
@@ -95,21 +99,12 @@ class PaperAllocator(Allocator):
         return Solution(np.concatenate([part.command for part in parts]), np.concatenate(wrench))
 
     def _solve_chunk(self, robot: _Robot, targets: AnyArray, seed: int) -> Solution:
-        std, settings = self.normalization.std, self.settings
-        wanted = ((targets - robot.surrogate.bias) / std).astype(np.float32)
-        mixture = self._predict(robot, (targets - self.normalization.mean) / std)
-        sampled = clamp_to_limits(to_command(self._draw(mixture, seed), *robot.limits), *robot.limits)
-        by_likelihood = settings.ranking == "nll" and not settings.mean_only
-        if by_likelihood:
-            x = to_normalized(sampled, *robot.limits)
-            score = -mixture.log_likelihood(x)
-        else:
-            score = self._score(robot, sampled, wanted)
-        sampled = _take(sampled, np.argsort(score, axis=1, kind="stable"))
+        settings = self.settings
+        sampled, wanted = self._sampled(robot, targets, seed)
         chosen = sampled[:, : settings.n_refined]
         if not settings.mean_only:
             chosen = self._refine(robot, chosen, wanted)
-        if not by_likelihood:  # without physics in the ranking the likeliest candidate stays the answer
+        if not self._by_likelihood:  # without physics in the ranking the likeliest candidate stays the answer
             chosen = _take(chosen, np.argsort(self._score(robot, chosen, wanted), axis=1, kind="stable"))
         return Solution(
             _inside(robot, chosen[:, 0]),
@@ -117,6 +112,43 @@ class PaperAllocator(Allocator):
             candidates=lambda: self._candidates(robot, chosen[0], targets[0], "refined"),
             samples=lambda: self._candidates(robot, sampled[0], targets[0], "sample"),
         )
+
+    @property
+    def _by_likelihood(self) -> bool:
+        return self.settings.ranking == "nll" and not self.settings.mean_only
+
+    def _sampled(self, robot: _Robot, targets: AnyArray, seed: int) -> tuple[AnyArray, AnyArray]:
+        """Raw candidates (N, K, n, 3) for targets (N, 6), best first, and what they are to give (N, 6)."""
+        std = self.normalization.std
+        wanted = ((targets - robot.surrogate.bias) / std).astype(np.float32)
+        mixture = self._predict(robot, (targets - self.normalization.mean) / std)
+        sampled = clamp_to_limits(to_command(self._draw(mixture, seed), *robot.limits), *robot.limits)
+        if self._by_likelihood:
+            score = -mixture.log_likelihood(to_normalized(sampled, *robot.limits))
+        else:
+            score = self._score(robot, sampled, wanted)
+        return _take(sampled, np.argsort(score, axis=1, kind="stable")), wanted
+
+    def path(
+        self, layout: Layout, wrench: ArrayLike, command: AnyArray, policy: Policy, seed: int = 0
+    ) -> Path | None:
+        """The best so far after some of Adam's steps that led to a command (n, 3); None where it is not
+        Adam that refines, or another target than this wrench was refined for."""
+        settings, robot = self.settings, self._prepared(layout)
+        if settings.refinement != "adam" or settings.mean_only or policy.kind == "direction":
+            return None
+        seen: list[AnyArray] = []
+        with self._one_thread():
+            sampled, wanted = self._sampled(robot, np.asarray(wrench, dtype=float)[None], seed)
+            chosen = sampled[0, : settings.n_refined]
+            steps = STEPS["adam"] if settings.n_steps is None else settings.n_steps
+            self._adam(robot, chosen, wanted.repeat(len(chosen), axis=0), steps, seen)
+        ends = np.stack([_inside(robot, end) for end in seen[-1]])
+        k = int(np.abs(ends - command).max(axis=(1, 2)).argmin())
+        told = [step for step in TOLD_STEPS if step < steps]
+        begun = [_inside(robot, seen[step][k]) for step in told]
+        names = ["start" if step == 0 else f"Adam, step {step}" for step in told]
+        return Path(np.stack([*begun, command]), (*names, "answer"), "sample")
 
     def _prepare(self, layout: Layout) -> _Robot:
         surrogate, std = surrogate_on(layout, self.weights), self.normalization.std
@@ -164,11 +196,19 @@ class PaperAllocator(Allocator):
             return np.concatenate(parts).reshape(shape)
         return refine(robot.problem, target, flat, steps, damping=LM_DAMPING).command.reshape(shape)
 
-    def _adam(self, robot: _Robot, command: AnyArray, target: AnyArray, steps: int) -> AnyArray:
+    def _adam(
+        self,
+        robot: _Robot,
+        command: AnyArray,
+        target: AnyArray,
+        steps: int,
+        seen: list[AnyArray] | None = None,
+    ) -> AnyArray:
         """Adam on J for commands (R, n, 3) and normalized targets (R, 6); the best step of each.
 
         It works in normalized coordinates, inside the limits, with a step that falls linearly. Zero
-        directions that turn fully go on beyond the seam.
+        directions that turn fully go on beyond the seam. `seen` takes the best so far after each step, the
+        start first.
         """
         lower, upper = robot.limits
         x, half = to_normalized(command, lower, upper), np.float32(0.5) * (upper - lower)
@@ -179,6 +219,8 @@ class PaperAllocator(Allocator):
             score, slopes = self._score_and_slopes(robot, to_command(x, lower, upper), target)
             better = score < least
             best[better], least[better] = x[better], score[better]
+            if seen is not None:
+                seen.append(to_command(best, lower, upper))
             if step == steps:
                 break
             gradient = half * slopes

@@ -143,8 +143,7 @@ class Pipeline:
         """
         target = targets / self.std
         if seeds is None:
-            own = prepared.seeds if self.settings.subsets else prepared.seeds[:1]
-            seeds = own[None].repeat(len(target), axis=0)
+            seeds = self.own_seeds(prepared)[None].repeat(len(target), axis=0)
         many = prepared.plant.n_fins >= SEEDS.many
         start = _Start(seeds, many and self.settings.subsets and not self.objective.convex, fallback)
         if previous is None:
@@ -160,19 +159,31 @@ class Pipeline:
 
         Fins rest alone and in pairs, for good where the objective would have them all work.
         """
-        target, n = targets / self.std, prepared.plant.n_fins
-        maximum = prepared.planar.fins.maximum
-        if self.objective.convex:
-            works = resting_seeds(np.ones(n), resting_fins(n), 0.0)
-            seeds = works * maximum
-        else:
-            drawn = np.random.default_rng(0).random((SEARCH.wide_seeds, n)) ** 2 * maximum
-            seeds, works = np.concatenate([prepared.seeds, drawn]), None
+        target = targets / self.std
+        seeds, works = self.wide_seeds(prepared)
         command, origin, _ = self._search(
             prepared, target, seeds[None], False, keep=len(seeds), steps=SEARCH.wide_steps, works=works
         )
         found = refine_candidates(prepared, target, command, origin, MISSED.first_lm_steps)
         return found.with_first(answer)
+
+    def own_seeds(self, prepared: Prepared) -> Array:
+        """Sizes of forces (S, n) [N] from which every search begins, unless it is told others."""
+        return prepared.seeds if self.settings.subsets else prepared.seeds[:1]
+
+    def wide_seeds(self, prepared: Prepared) -> tuple[Array, Array | None]:
+        """The same (S, n) for the wide search, and which fins may work (S, n), where not all may."""
+        n, maximum = prepared.plant.n_fins, prepared.planar.fins.maximum
+        if self.objective.convex:
+            works = resting_seeds(np.ones(n), resting_fins(n), 0.0)
+            return works * maximum, works
+        drawn = np.random.default_rng(0).random((SEARCH.wide_seeds, n)) ** 2 * maximum
+        return np.concatenate([prepared.seeds, drawn]), None
+
+    def steps(self, n: int) -> int:
+        """Most quadratic problems of a search with n fins."""
+        usual = SEARCH.few_fins_steps if n < SEEDS.many else SEARCH.many_fins_steps
+        return self.settings.search_steps or (SEARCH.convex_steps if self.objective.convex else usual)
 
     def bound(self, prepared: Prepared, target: Array, best: float) -> float:
         """A lower bound on the cost of a wrench (6,) [N, N m]; `best` is that of the answer."""
@@ -289,10 +300,7 @@ class Pipeline:
             works = None if works is None else np.repeat(works, n_arcs, axis=0)
         n_starts = seeds.shape[1]
         flat = target if rows == 1 else np.repeat(target, n_starts, axis=0)
-        usual = SEARCH.few_fins_steps if n < SEEDS.many else SEARCH.many_fins_steps
-        steps = (
-            steps or self.settings.search_steps or (SEARCH.convex_steps if self.objective.convex else usual)
-        )
+        steps = steps or self.steps(n)
         planar = force_space.descend(problem, flat, seeds.reshape(-1, *seeds.shape[2:]), steps, works)
         if n_starts == 1 and self.objective.convex:
             command, cost = force_space.realize(problem, planar)

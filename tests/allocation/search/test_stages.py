@@ -503,15 +503,6 @@ def test_other_settings_keep_what_is_known_of_layouts(search: SearchAllocator) -
     np.testing.assert_array_equal(answers[0].command, answers[1].command)
 
 
-def test_commands_are_refined_on_request(search: SearchAllocator) -> None:
-    layout = load_layout("A")
-    answer = search.allocate(layout, EASY)
-    off = np.clip(answer.command + 0.02, layout.lower, layout.upper)
-    assert search.normalization.error(Plant(layout).wrench(off), answer.target) > 1e-3
-    found = search.refined(layout, EASY, off, 8)
-    assert search.normalization.error(Plant(layout).wrench(found), answer.target) < 1e-12
-
-
 def test_constants_of_the_search_keep_their_order() -> None:
     assert RANKING.exact_error < RANKING.error_resolution < SEARCH.alternative_error
     assert SEARCH.alternative_error < SEARCH.promising_error < 0.1
