@@ -27,6 +27,7 @@
     const hand = { watched, name: nameOf(box), dirty: false, rested: false, refused: false, sent: 0, timer: 0 };
     held.set(box, hand);
     Object.defineProperty(box, 'value', { configurable: true, get: () => value.get.call(box), set: () => {} });
+    box.setSelectionRange = () => {}; // the framework would bring the caret back after a selection of the user's
     return hand;
   }
 
@@ -35,6 +36,7 @@
     clearTimeout(hand.timer);
     held.delete(box);
     box.removeAttribute('aria-invalid');
+    delete box.setSelectionRange;
     Object.defineProperty(box, 'value', hand.watched);
     hand.watched.set.call(box, text ?? box.defaultValue);
   }

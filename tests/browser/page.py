@@ -103,11 +103,17 @@ class Page:
         script = "document.querySelectorAll('.mantine-Notification-closeButton').forEach(b => b.click())"
         self.page.evaluate(script)
 
-    def until(self, condition: Callable[[], bool], seconds: float = 120.0) -> None:
-        """Wait for the server or the page to come round; longer on a page that needs patience."""
+    def until(
+        self,
+        condition: Callable[[], bool],
+        seconds: float = 120.0,
+        told: Callable[[], str] = lambda: "what was waited for did not happen",
+    ) -> None:
+        """Wait for the server or the page to come round, longer on a page that needs patience; `told` says
+        what was there instead."""
         end = time.monotonic() + seconds * self.patience
         while not condition():
-            assert time.monotonic() < end, "what was waited for did not happen"
+            assert time.monotonic() < end, told()
             self.page.wait_for_timeout(50)
 
     def catch_up(self) -> None:
@@ -163,6 +169,17 @@ class Page:
         """The inputs beside a label."""
         found = self.page.locator("label:visible", has_text=label).first
         return found.locator(ROW).locator("input:not([type=hidden])")
+
+    def shows(self, label: str, text: str) -> None:
+        """Wait until the first box beside a label shows a text."""
+        seen = ""
+
+        def there() -> bool:
+            nonlocal seen
+            seen = self.row(label).first.input_value()
+            return seen == text
+
+        self.until(there, told=lambda: f"{label} shows {seen!r}, not {text!r}; {self.session.state}")
 
     def type(self, label: str, value: str, place: int = -1) -> None:
         """Type into a number box."""

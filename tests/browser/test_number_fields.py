@@ -162,6 +162,23 @@ def test_nothing_is_written_into_a_box_that_has_the_focus(page: Any) -> None:
     page.until(lambda: box.input_value() == "2")
 
 
+def test_a_slow_framework_leaves_the_selection_alone(page: Any) -> None:
+    page.key("n")
+    page.tab("Design")
+    page.until(lambda: page.row("Shaft [°]").last.input_value() == "-60")
+    page.page.evaluate("""() => {
+      const soon = window.soon = window.setTimeout;
+      window.setTimeout = (act, time, ...more) => soon(act, (time || 0) + 300, ...more);
+    }""")
+    page.row("Shaft [°]").last.click(position={"x": 2, "y": 10})  # before the sign, where no caret may stay
+    page.page.keyboard.press("Control+a")
+    page.page.evaluate("() => new Promise(done => window.soon(done, 600))")
+    page.page.evaluate("window.setTimeout = window.soon")
+    page.page.keyboard.type("33.25", delay=10)
+    page.page.keyboard.press("Enter")
+    page.shows("Shaft [°]", "33.25")
+
+
 def test_escape_and_an_emptied_box_bring_back_what_is_in_force(page: Any, steps: list[Any]) -> None:
     def typed() -> Any:
         box = begin(page, "Fx [N]")

@@ -41,12 +41,12 @@ def test_reload_and_reconnect_restore(page: Any, served: Any) -> None:
     page.ready()
     assert page.view.session is page.session
     page.tab("Allocate")
-    page.until(lambda: page.row("Fy [N]").last.input_value() == "0.5")
+    page.shows("Fy [N]", "0.5")
     page.tab("Improve")
-    page.until(lambda: page.row("Goal").first.input_value() == "worst single failure")
-    page.until(lambda: page.row("Reach ± [m]").first.input_value() == "0.03")
+    page.shows("Goal", "worst single failure")
+    page.shows("Reach ± [m]", "0.03")
     page.tab("Simulate")
-    page.until(lambda: page.row("Path").first.input_value() == "square")
+    page.shows("Path", "square")
     page.tab("Allocate")
     before = page.view
     disconnect_all(served.server)
@@ -87,7 +87,7 @@ def test_token_opens_and_a_restart_loses_nothing(browser: Any, tmp_path: Path) -
     page.until(lambda: len(second.app.views) == 1)
     session = next(iter(second.app.views.values())).session
     assert session is not page.session and session.state.target[1] == 0.5
-    page.until(lambda: page.row("Fy [N]").last.input_value() == "0.5")
+    page.shows("Fy [N]", "0.5")
     assert session.history.undo_name == "Set Fy"
     page.press("Undo")
     page.until(lambda: session.state.target[1] == 0.0)
