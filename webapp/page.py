@@ -244,7 +244,7 @@ class Page(ABC):
     def _refresh(self) -> None:
         with self.client.atomic():
             try:
-                self.sweep.note(self.answering)
+                self._take_in()
                 # Before the panels: it settles the scale that the legend tells.
                 self.scenery.robot.editing = self.session.task == "Design"
                 self.scenery.refresh(self.answering, self.comparison, self.improver, self.analyst.findings)
@@ -253,6 +253,12 @@ class Page(ABC):
                 self.fault(error)
             for panel in self._panels:
                 panel.refresh()
+
+    def _take_in(self) -> None:
+        """What follows from what is on the robot now, before anything is written."""
+        self.sweep.note(self.answering)
+        if self.shown is not None and not self.busy:
+            self.session.take(self.shown)
 
     # From the session to the workers and back.
 

@@ -3,9 +3,11 @@
 from typing import Any
 
 import numpy as np
+import pytest
 
 from finlab.physics import Plant
 from webapp.markup.words import small
+from webapp.scene.wrench_nodes import NUMBER_AT
 
 
 def test_the_tour_sets_each_stop_and_brings_the_work_back(page: Any) -> None:
@@ -30,7 +32,7 @@ def test_the_tour_sets_each_stop_and_brings_the_work_back(page: Any) -> None:
     page.visible("/robot")
     page.until(lambda: "6 of 6 fins" in page.text(".fl-status"))
     page.press("Finish")
-    page.until(lambda: page.session.state == mine and page.session.stop is None)
+    page.until(lambda: page.session.state == mine and not page.session.guided)
     assert page.session.drawer == "Improve" and page.session.history.undo_name == "Set Fy"
     back = page.view.scenery.robot.camera
     page.until(lambda: np.allclose(back, camera, atol=1e-3))
@@ -91,8 +93,31 @@ def test_a_weak_and_stuck_fin_is_told_and_mended(page: Any) -> None:
     page.page.locator(".damage").wait_for(state="detached")
 
 
+@pytest.mark.parametrize("size", [(1400, 860), (900, 700)], ids=lambda size: f"{size[0]}x{size[1]}")
+def test_no_card_lies_over_the_robot(page: Any, size: tuple[int, int]) -> None:
+    before = page.page.viewport_size
+    page.page.set_viewport_size({"width": size[0], "height": size[1]})
+    for word, seen in (("Tour", ".fl-tour"), ("Lessons", ".fl-lesson")):
+        page.key("t") if word == "Tour" else page.press("Lessons")
+        page.page.locator(seen).wait_for()
+        page.until(lambda seen=seen: _apart(page, seen, "canvas[data-engine]"))
+        x, y = page.pixel("/robot/wrench", NUMBER_AT)
+        bar = page.page.locator(".fl-camera").bounding_box()
+        assert x < bar["x"] or y - 30 > bar["y"] + bar["height"], "the torque's number can be read"
+    page.page.locator(".fl-lesson button").last.click()
+    page.until(lambda: not page.session.guided)
+    page.page.set_viewport_size(before)
+
+
+def _apart(page: Any, one: str, other: str) -> bool:
+    """Whether two elements share nothing."""
+    a, b = (page.page.locator(name).bounding_box() for name in (one, other))
+    return bool(a["x"] + a["width"] <= b["x"] or b["x"] + b["width"] <= a["x"])
+
+
 def test_a_link_opens_a_lesson_that_sees_when_its_task_is_done(page: Any) -> None:
-    mine = page.session.state
+    page.session.show_drawer("Comparison")
+    mine, desk = page.session.state, page.session.desk
     page.page.goto(f"{page.page.url.split('?')[0]}?lesson=two-ways")
     page.ready()
     page.until(lambda: "One wrench, several ways" in page.text(".fl-lesson"))
@@ -106,5 +131,6 @@ def test_a_link_opens_a_lesson_that_sees_when_its_task_is_done(page: Any) -> Non
     page.choose("Keep least", "power")
     page.until(lambda: "✓" in page.text(".fl-lesson"))
     page.press("Close")
-    page.until(lambda: page.session.lesson is None and page.session.state == mine)
+    page.until(lambda: not page.session.guided and page.session.state == mine)
+    assert page.session.desk == desk
     assert page.problems == []

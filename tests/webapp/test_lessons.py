@@ -10,7 +10,7 @@ from finlab.allocation import Allocation, load_allocator
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from webapp.markup.first_sight import open_linked
-from webapp.markup.lesson_card import lesson_card
+from webapp.markup.guide_cards import lesson_card
 from webapp.session import Session
 from webapp.session.lessons import BY_NAME, LESSONS
 from webapp.session.state import State
@@ -44,11 +44,14 @@ def test_a_lesson_is_unsolved_until_its_exercise_is_done(name: str) -> None:
     session = Session(load_layout("penta"))
     session.open_lesson(name)
     assert session.lesson is BY_NAME[name] and session.task == BY_NAME[name].task
-    assert not session.check_lesson(_answer(session.state))
+    session.take(_answer(session.state))
+    assert not session.solved
     SOLVED[name](session)
-    assert session.check_lesson(_answer(session.state))
+    session.take(_answer(session.state))
+    assert session.solved
     session.show_mode(0)
-    assert session.check_lesson(None)  # once done, done
+    session.take(_answer(session.state))
+    assert session.solved, "once done, done"
 
 
 def test_wrong_ways_do_not_count() -> None:
@@ -56,23 +59,32 @@ def test_wrong_ways_do_not_count() -> None:
     session.open_lesson("lost-fin")
     for fin in ("front_left", "back_right", "front_right"):  # one fin alone turns nothing
         session.toggle_failure(fin)
-    assert not session.check_lesson(_answer(session.state))
+    session.take(_answer(session.state))
+    assert not session.solved
     session.open_lesson("out-of-reach")
     session.set_setting("policy", "direction")
-    easy = replace(session.state, target=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-    assert not session.check_lesson(_answer(easy))
+    session.take(_answer(replace(session.state, target=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0))))
+    assert not session.solved
 
 
 def test_closing_gives_back_what_was_there_and_next_goes_on_to_the_end() -> None:
     session = Session(load_layout("penta"))
-    before = session.state
+    session.set_target(1, 0.5)
+    session.select("bow")
+    session.set_display("graph", True)
+    session.show_drawer("Reach")
+
+    def all_there_is() -> tuple[object, ...]:
+        return session.state, session.display, session.desk, session.selected, session.history.undo_name
+
+    before = all_there_is()
     session.next_lesson()
+    session.set_display("graph", False)
     names = [session.lesson.name if session.lesson else None]
     while session.lesson is not None:
         session.next_lesson()
         names.append(session.lesson.name if session.lesson else None)
-    assert names == [*BY_NAME, None] and session.state == before
-    assert session.history.undo_name == "Close the lesson"
+    assert names == [*BY_NAME, None] and all_there_is() == before and not session.guided
 
 
 def test_tour_and_lesson_end_each_other() -> None:

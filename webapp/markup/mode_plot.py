@@ -22,7 +22,7 @@ EXACT = 1e-6
 """Error [σ] below which all answers are drawn as equally exact."""
 FAR = 2.0
 """Samples that cost more than so many times the dearest mode are counted, not drawn: modes keep apart."""
-LEGEND = (("refined", 5.0, 6), ("on the robot", 0.0, 72), ("sampled", 2.6, 162))
+LEGEND = (("refined", 5.0, 6), ("on the robot", 0.0, 72), ("sampled", 2.6, 176))
 """Word, radius and place of what is drawn; radius 0 is the ring. The last one is for methods that sample."""
 DOT = 9
 """Radius of the dot of a mode with its rim [px]."""

@@ -142,7 +142,7 @@ class Frame:
 def _style(sections: list[Section], session: Session) -> str:
     """Which regions are there, and which sections in them."""
     task, drawer = session.task, session.drawer
-    about = ("", "robot" if session.selected is None else "fins")
+    about = ("", "robot" if session.selected is None else "fins", *["guide"] * session.guided)
     there = {
         section.marker
         for section in sections
@@ -160,6 +160,7 @@ def _style(sections: list[Section], session: Session) -> str:
         "right": RIGHT in regions,
         "drawer": bool(DRAWERS[task]),
         "open": drawer is not None,
+        "guide": session.guided,
     }
     variables = "".join(f"--has-{name}: {int(there)};" for name, there in counts.items())
     return f"<style>:root {{ {variables} }} {', '.join(gone)} {{ display: none !important; }}</style>"

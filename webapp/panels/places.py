@@ -15,6 +15,7 @@ from webapp.panels.design_panel import DesignPanel
 from webapp.panels.files_tab import FilesTab
 from webapp.panels.fin_inspector import FinInspector
 from webapp.panels.fin_list import FinList
+from webapp.panels.guide import GuidePanel
 from webapp.panels.hull_panel import HullPanel
 from webapp.panels.limits_tab import ImprovePanel, ReachPanel
 from webapp.panels.modes_tab import CandidatesPanel
@@ -48,7 +49,8 @@ class Place(NamedTuple):
     folded: bool = False
     """Whether only its heading is seen at first."""
     about: str = ""
-    """What must be selected for it to be there: `fins`, or none of them (`robot`); nothing where any may."""
+    """What must be selected for it to be there: `fins`, or none of them (`robot`); `guide` where a tour or a
+    lesson must be under way; nothing where it is there always."""
 
 
 PLACES = (
@@ -56,6 +58,7 @@ PLACES = (
     Place(TOP, TASKS, "History", HistoryBar),
     Place(TOP, TASKS, "Tasks", TaskBar),
     Place(TOP, TASKS, "Answers", AnsweringBar),
+    Place(LEFT, TASKS, "Guide", GuidePanel, about="guide"),
     Place(LEFT, (DESIGN,), "Fins", FinList),
     Place(LEFT, (DESIGN,), "Design", DesignPanel),
     Place(RIGHT, (DESIGN,), "Fin", FinInspector, about="fins"),

@@ -8,7 +8,6 @@ import viser
 from finlab.allocation.methods import METHODS
 from webapp.handles import put
 from webapp.markup.first_sight import tell
-from webapp.markup.lesson_card import lesson_card
 from webapp.page import Page
 from webapp.session.lessons import LESSONS
 from webapp.session.looking import TASKS
@@ -39,7 +38,7 @@ class RobotBar:
 
 
 class HistoryBar:
-    """Undo and redo, by name; and the card of the tour."""
+    """Undo and redo, by name."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
@@ -47,25 +46,15 @@ class HistoryBar:
         back, forth = viser.Icon.ARROW_BACK_UP, viser.Icon.ARROW_FORWARD_UP
         self._undo = page.add_button("Undo", session.undo, icon=back, hint="Ctrl+Z")
         self._redo = page.add_button("Redo", session.redo, icon=forth, hint="Ctrl+Y or Ctrl+Shift+Z")
-        self._card = gui.add_html("", visible=False)
 
     def refresh(self) -> None:
-        """Write what can be undone, and where the tour is."""
+        """Write what can be undone and redone."""
         history = self._page.session.history
         for button, word, name in (
             (self._undo, "Undo", history.undo_name),
             (self._redo, "Redo", history.redo_name),
         ):
             put(button, label=f"{word}: {name}" if name else word)
-        guide = self._guide()
-        put(self._card, content=guide, visible=bool(guide))
-
-    def _guide(self) -> str:
-        """The card of the lesson, or of the tour."""
-        page, session = self._page, self._page.session
-        if session.lesson is not None:
-            return lesson_card(session.lesson, session.check_lesson(None if page.busy else page.shown))
-        return "" if session.stop is None else tour_card(session.stop)
 
 
 class TaskBar:
@@ -109,20 +98,3 @@ class AnsweringBar:
 
     def refresh(self) -> None:
         """Nothing but what is bound."""
-
-
-def tour_card(index: int) -> str:
-    """Title and text of a stop, and the way on."""
-    step = STEPS[index]
-    last = index + 1 == len(STEPS)
-    words = {"back": "Back", "tour": "Finish" if last else "Next", "end": "End the tour"}
-    buttons = "".join(
-        f"<button {'class=primary' * (word == 'tour')} {'disabled' * (word == 'back' and not index)} "
-        f'onclick="{tell(f"{word},")}">{label}</button>'
-        for word, label in words.items()
-        if not (last and word == "end")
-    )
-    return (
-        f"<div class='fl fl-tour tour'><b>{index + 1} of {len(STEPS)} · {escape(step.title)}</b>"
-        f"<p>{escape(step.text)}</p><div class='row'>{buttons}</div></div>"
-    )

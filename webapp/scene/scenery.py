@@ -7,6 +7,7 @@ from webapp.markup.corner import graph_row, legend, overlay_row, set_rows
 from webapp.scene.robot_scene import RobotScene
 from webapp.scene.swim_scene import SwimScene
 from webapp.scene.wrench_nodes import LENGTH
+from webapp.session.lessons import Lesson
 from webapp.session.swim_plan import SwimSettings
 from webapp.session.tour import STEPS
 from webapp.tasks.analyst import Findings
@@ -17,6 +18,9 @@ from webapp.tasks.improving import Improver
 from webapp.tasks.swimming import Swimming
 from webapp.theme import BRAND
 
+NOWHERE = (None, None)
+"""Neither at a stop of the tour nor in a lesson."""
+
 
 class Scenery:
     """Both scenes of one page, of which one is shown, and the theme."""
@@ -25,9 +29,9 @@ class Scenery:
         """Build the nodes of the scene of a page's browser."""
         self._client, self._session, self._swimming = context.client, context.session, swimming
         self._dark: bool | None = None
-        self._stop: int | None = None
+        self._guide: tuple[int | None, Lesson | None] = NOWHERE
         self._camera = (np.zeros(3), np.zeros(3))
-        """Where the camera stood before the tour, and looked at."""
+        """Where the camera stood before the tour or lesson, and looked at."""
         self.robot = RobotScene(context)
         self.swim = SwimScene(self._client, swimming)
         self.swims = False
@@ -39,7 +43,7 @@ class Scenery:
         self, answering: Answering, comparison: Comparison, improver: Improver, findings: Findings | None
     ) -> None:
         """Show what has been found for the session's state."""
-        self._follow_tour()
+        self._follow_guide()
         self._apply_theme()
         found, reply = improver.findings, answering.reply
         offered = found.layout if found is not None and found.improved else None
@@ -85,22 +89,23 @@ class Scenery:
             self._swimming.stop()
             self.robot.look_from("3D")
 
-    def _follow_tour(self) -> None:
-        """The robot fills the view at each stop of the tour, and swims at some; to come to a stop, or to
-        leave the tour, ends a swim. At its end the camera stands where it stood before."""
-        stop, before = self._session.stop, self._stop
-        if stop != before:
-            self._stop = stop
-            self.end_swim()
-            if before is None:
-                self._camera = self.robot.camera
-            if stop is None:
-                self.robot.aim(*self._camera)
-            else:
-                self.robot.look_from("3D")
-                self.robot.frame()
-            if stop is not None and STEPS[stop].swims:
-                self._swimming.start(SwimSettings().plan(self._session.state, None))
+    def _follow_guide(self) -> None:
+        """The robot fills the view at each stop of the tour and in each lesson, and swims at some; to come to
+        one, or to leave, ends a swim. At its end the camera stands where it stood before."""
+        session, before = self._session, self._guide
+        stop, _ = self._guide = session.stop, session.lesson
+        if self._guide == before:
+            return
+        self.end_swim()
+        if before == NOWHERE:
+            self._camera = self.robot.camera
+        if not session.guided:
+            self.robot.aim(*self._camera)
+            return
+        self.robot.look_from("3D")
+        self.robot.frame()
+        if stop is not None and STEPS[stop].swims:
+            self._swimming.start(SwimSettings().plan(session.state, None))
 
     def _apply_theme(self) -> None:
         """Light or dark."""

@@ -35,6 +35,9 @@ SHORTEST_TURN = math.radians(60.0)
 """The longest ring is no shorter than this [rad], unless nothing is asked to speak of."""
 HEIGHT = 0.16
 """How far above the hull the arrows begin [m]; inside it they could not be seen."""
+NUMBER_AT = (0.0, -1.3 * RING_RADIUS, 0.0)
+"""Where the number of the torque ends, from the hub [m]: at the left, as one sees it first; there the view
+is free."""
 LARGEST = 0.42
 """How far the drawn set may reach from the centre of gravity [m]."""
 
@@ -70,12 +73,11 @@ class WrenchNodes:
 
         self._asked = node("asked_force", ASKED, 0.4), node("asked_torque", ASKED, 0.4)
         self._given = node("delivered_force", DELIVERED, None), node("delivered_torque", DELIVERED, None)
-        place = (-1.1 * RING_RADIUS, 0.0, 0.05)
         self._number = scene.add_label(
             "/robot/wrench/torque",
             "",
-            position=place,
-            anchor="bottom-center",
+            position=NUMBER_AT,
+            anchor="center-right",
             font_screen_scale=0.8,
             visible=False,
         )

@@ -9,6 +9,7 @@ import numpy as np
 from finlab.allocation.allocation import Allocation
 from finlab.errors import FinlabError
 from webapp.session.files import shipped
+from webapp.session.looking import Desk
 from webapp.session.state import State
 from webapp.session.targets import PRESETS
 from webapp.session.tour import Guiding
@@ -160,7 +161,6 @@ class Learning(Guiding):
     """It, if any."""
     solved = False
     """Whether its exercise has been done since it was opened."""
-    _before_lesson: State | None = None
 
     def open_lesson(self, name: str) -> None:
         """Prepare a lesson's state; what was there before comes back when it is closed.
@@ -171,14 +171,12 @@ class Learning(Guiding):
         if name not in BY_NAME:
             raise FinlabError(f"lesson: expected one of {', '.join(BY_NAME)}, got {name!r:.40}")
         lesson = BY_NAME[name]
-        if self.stop is not None:
-            self.end_tour()
-        if self.lesson is None:
-            self._before_lesson = self.state
+        self.end_tour()
+        self._leave()
         self._commit(f"Lesson: {lesson.title}", lesson.state(self.state))
         self.lesson, self.solved = lesson, False
         self.mode, self.sample, self.selected = 0, None, None
-        self.show_task(lesson.task)
+        self.desk = Desk(lesson.task)
 
     def next_stop(self) -> None:
         """The tour's next stop, after the lesson is closed."""
@@ -195,19 +193,17 @@ class Learning(Guiding):
             self.close_lesson()
 
     def close_lesson(self) -> None:
-        """Back to what was there before."""
-        if self._before_lesson is not None:
-            self._commit("Close the lesson", self._before_lesson)
-            self.mode, self.sample = 0, None
-        self.lesson, self.solved, self._before_lesson = None, False, None
+        """Back to the work."""
+        if self.lesson is not None:
+            self.lesson, self.solved = None, False
+            self._come_back()
 
-    def check_lesson(self, answer: Allocation | None) -> bool:
-        """Whether the exercise is done; once it was, it stays so until another lesson is opened."""
-        if self.lesson is not None and answer is not None and answer.layout == self.state.layout:
+    def take(self, answer: Allocation) -> None:
+        """See what the fins do now; an exercise that is done stays so until another lesson is opened."""
+        if self.lesson is not None and answer.layout == self.state.able:
             self.solved = self.solved or self.lesson.done(Seen(self.state, answer, self.mode))
-        return self.solved
 
     def start_over(self) -> None:
         """Everything as at first sight, outside any lesson."""
-        self.lesson, self.solved, self._before_lesson = None, False, None
+        self.lesson, self.solved = None, False
         super().start_over()

@@ -2,9 +2,8 @@
 
 from dataclasses import dataclass, replace
 
-from webapp.session.display import Display
 from webapp.session.files import shipped
-from webapp.session.looking import Desk, Looking
+from webapp.session.returning import Returning
 from webapp.session.state import State
 from webapp.session.targets import PRESETS
 
@@ -104,55 +103,35 @@ STEPS = (
 """The stops in order."""
 
 
-@dataclass(frozen=True)
-class Left:
-    """What is left behind when the tour begins."""
-
-    state: State
-    past: tuple[tuple[str, State], ...]
-    future: tuple[tuple[str, State], ...]
-    display: Display
-    chosen: tuple[str, ...]
-    shown: tuple[int, int | None]
-    desk: Desk
-
-
-class Guiding(Looking):
+class Guiding(Returning):
     """The tour."""
 
     stop: int | None = None
     """Where the tour is, None while there is none."""
-    _left: Left | None = None
 
     def next_stop(self) -> None:
         """The tour's first stop, or the one after this; after the last one the tour is over."""
-        if self.stop is None:
-            history, shown = self.history, (self.mode, self.sample)
-            past, future = tuple(history.past), tuple(history.future)
-            self._left = Left(self.state, past, future, self.display, self._chosen, shown, self.desk)
         stop = 0 if self.stop is None else self.stop + 1
         if stop == len(STEPS):
             self.end_tour()
         else:
+            self._leave()
             self._go(stop)
 
     def previous_stop(self) -> None:
         """The tour's stop before this one."""
-        self._go(max((self.stop or 0) - 1, 0))
+        if self.stop is not None:
+            self._go(max(self.stop - 1, 0))
 
     def end_tour(self) -> None:
-        """All is as it was before the tour, and what could be undone then can be undone now."""
-        left, self.stop, self._left = self._left, None, None
-        if left is None:
-            return
-        self.history.resume(left.state, left.past, left.future)
-        self._settled()
-        self.display, self.desk, self._chosen = left.display, left.desk, left.chosen
-        self.mode, self.sample = left.shown
+        """Back to the work."""
+        if self.stop is not None:
+            self.stop = None
+            self._come_back()
 
     def start_over(self) -> None:
         """Everything as at first sight, outside the tour."""
-        self.stop, self._left = None, None
+        self.stop = None
         super().start_over()
 
     def _go(self, stop: int) -> None:
