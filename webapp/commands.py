@@ -79,7 +79,7 @@ def commands(page: Page) -> list[Command]:
         Command("Design", "Lock or unlock the selected fins", partial(mark, "locked")),
         Command("Design", "Hide or show the selected fins", partial(mark, "hidden"), "H"),
         Command("Design", "New design", page.designs.new),
-        Command("Design", "Save the design", page.designs.save),
+        Command("Design", "Save the design", page.designs.save, "S", CTRL),
         Command("Design", "Share the design by a link", page.designs.share),
         Command("Design", "Unlink the selected fin from its mirror image", session.unlink_fin),
         Command("Design", "Stick the selected fin to the hull", session.stick_fin),

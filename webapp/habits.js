@@ -1,5 +1,5 @@
 // What the page of viser does otherwise: with Ctrl the camera stays where it is, keys have their usual second names,
-// the drawer is dragged taller, and the first card and the sheet of keys come and go.
+// buttons have hints, the drawer is dragged taller, and the first card and the sheet of keys come and go.
 (() => {
   if (window.finlabFrame) return;
   const page = document.documentElement;
@@ -35,6 +35,15 @@
   // Commands listen on the root of the document, the camera on the document, which comes after.
   page.addEventListener('keydown', (event) => {
     if ((event.ctrlKey || event.metaKey || event.altKey) && MOVES.test(event.code)) event.stopPropagation();
+  });
+
+  // The hint of a button, after its label where that is cut.
+  window.addEventListener('pointerover', (event) => {
+    const button = event.target.closest?.('.mantine-Button-root');
+    const label = button?.querySelector('.mantine-Button-label');
+    if (!label) return;
+    const isCut = label.scrollWidth > label.clientWidth;
+    button.title = [isCut && label.textContent, window.finlabHints?.get(button.id)].filter(Boolean).join('\n');
   });
 
   window.addEventListener('pointerdown', (event) => {

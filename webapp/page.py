@@ -4,6 +4,7 @@ Everything here runs on viser's event loop; what takes time is handed to the wor
 """
 
 import asyncio
+import json
 import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
@@ -31,12 +32,13 @@ from webapp.tasks.designs import Designs
 from webapp.tasks.exports import Exports
 from webapp.tasks.fitting import Fitting
 from webapp.tasks.improving import Improver
+from webapp.tasks.opening import Opening
 from webapp.tasks.solver import Solver
 from webapp.tasks.sweeping import Sweep
 from webapp.tasks.swim_files import SwimFiles
 from webapp.tasks.swimming import Swimming
 from webapp.theme import VERMILLION
-from webapp.viser_internals import limit_uploads
+from webapp.viser_internals import limit_uploads, run_script, uuid_of
 
 CARD_REST_S = 0.35
 """How long a layout may not change before its card is worked out [s]: that takes a second."""
@@ -106,6 +108,8 @@ class Page(ABC):
         """Names and cells that are edited where they stand."""
         self.designs = Designs(context, self.exports, self.editables)
         """Designs as a whole."""
+        self.opening = Opening(client.gui, self.editables, self.do)
+        """Files of any kind."""
         limit_uploads(client.gui, MAX_UPLOAD, self._refuse_upload)
         self._panels: list[Panel] = []
         self._panels, self._swim_panels = self._build()
@@ -185,6 +189,7 @@ class Page(ABC):
     def add_button(self, label: str, act: Callable[[], object], **options: Any) -> viser.GuiButtonHandle:
         """A button that carries out an intent; `options` as viser has them."""
         button = self.client.gui.add_button(label, **options)
+        self._hint(button)
 
         @button.on_click
         async def _clicked(event: Any) -> None:
@@ -198,6 +203,7 @@ class Page(ABC):
     ) -> viser.GuiUploadButtonHandle:
         """A button that carries out `act(name, content)` when the user has chosen a file."""
         button = self.client.gui.add_upload_button(label, **options)
+        self._hint(button)
 
         @button.on_upload
         async def _uploaded(event: Any) -> None:
@@ -205,6 +211,11 @@ class Page(ABC):
             self.do(partial(act, file.name, file.content))
 
         return button
+
+    def _hint(self, button: Any) -> None:
+        """Let the page show the hint of a button: viser takes it, and shows those of other inputs alone."""
+        told = json.dumps([uuid_of(button), button.hint or ""])
+        run_script(self.client.gui, f"(window.finlabHints ??= new Map()).set(...{told});")
 
     def add_buttons(
         self, label: str, acts: Mapping[str, Callable[[], object]], **options: Any

@@ -95,7 +95,7 @@ def test_the_page_gives_the_bundle_that_the_command_writes(trained: Page, tmp_pa
     page = trained
     page.tab("Export")
     with page.page.expect_download() as download:
-        page.press("Bundle (ZIP)")
+        page.press("Export the bundle (ZIP)")
     download.value.save_as(tmp_path / "page.zip")
     assert main(["export", "ucat", "-o", str(tmp_path / "ucat"), "--zip"]) == 0
     assert (tmp_path / "page.zip").read_bytes() == (tmp_path / "ucat.zip").read_bytes()

@@ -31,12 +31,12 @@ def test_a_noisy_file_becomes_a_fin(page: Any, tmp_path: Path, monkeypatch: pyte
 
     page.tab("Export")
     with page.page.expect_download() as download:
-        page.press("Layout (YAML)")
+        page.press("Save")
     download.value.save_as(tmp_path / "robot.zip")
     page.press("Undo")
     page.press("Undo")
     page.until(lambda: page.session.state == before)
-    page.upload("Open a layout file", tmp_path / "robot.zip")
+    page.upload("Open", tmp_path / "robot.zip")
     page.until(lambda: [fin.model.type for fin in page.session.state.layout.fins] == ["table"] * 4)
     assert load_allocator().allocate(page.session.state.layout, [0.3, 0, 0.2, 0, 0, 0]).err_norm < 1e-6
 

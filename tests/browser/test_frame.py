@@ -32,7 +32,7 @@ SMALL = """() => {
 }"""
 WIDE = """() => {
   const found = [];
-  for (const name of ['left', 'right', 'drawer']) {
+  for (const name of ['top', 'left', 'right', 'drawer']) {
     const box = document.querySelector(`.fl-${name}`).closest('.mantine-Paper-root');
     if (box.scrollWidth > box.clientWidth + 1)
       found.push(`${name}: ${box.scrollWidth} of ${box.clientWidth} px`);
@@ -64,6 +64,7 @@ def overlaps(boxes: dict[str, dict[str, float]]) -> list[str]:
 def test_nothing_lies_over_anything_else(resized: Any, size: tuple[int, int]) -> None:
     page, (width, height) = resized, size
     page.page.set_viewport_size({"width": width, "height": height})
+    page.session.rename_robot("A robot with quite a long name")  # and so a step with one
     narrow = width < 720  # one region at a time
     for task in TASKS:
         seen = "drawer" if narrow and DRAWERS[task] else "right"
@@ -84,6 +85,16 @@ def test_nothing_lies_over_anything_else(resized: Any, size: tuple[int, int]) ->
             assert page.page.evaluate(SMALL) == [], f"type of 13 px at least, in {name}"
             assert page.page.evaluate(WIDE) == [], f"nothing is cut off in {name} at {width} x {height}"
     assert page.problems == []
+
+
+def test_a_step_that_is_cut_in_the_bar_is_told_whole(page: Any) -> None:
+    page.session.rename_robot("A robot with quite a long name")
+    page.tab("Design")
+    undo = page.page.get_by_role("button", name="Undo: Rename the robot to A robot with quite a long name")
+    undo.wait_for()
+    assert undo.locator(".mantine-Button-label").evaluate("label => label.scrollWidth > label.clientWidth")
+    undo.hover()
+    page.until(lambda: (undo.get_attribute("title") or "").endswith("quite a long name\nCtrl+Z"))
 
 
 def test_one_region_at_a_time_on_a_narrow_page(resized: Any) -> None:

@@ -119,20 +119,20 @@ def test_page_picture_and_command_to_take_home(page: Any, tmp_path: Path) -> Non
 def test_save_open_and_a_bad_file(page: Any, tmp_path: Path) -> None:
     page.tab("Export")
     with page.page.expect_download() as download:
-        page.press("Layout (YAML)")
+        page.press("Save")
     saved = tmp_path / "saved.yaml"
     download.value.save_as(saved)
     text = saved.read_text()
     changed = tmp_path / "changed.yaml"
     changed.write_text(text.replace("front_right", "bow"))
     with page.page.expect_file_chooser() as chooser:
-        page.press("Open a layout file")
+        page.press("Open")
     chooser.value.set_files(changed)
     page.until(lambda: page.session.state.layout.names[0] == "bow")
     broken = tmp_path / "broken.yaml"
     broken.write_text(text.replace("version: 1", "version: 99"))
     with page.page.expect_file_chooser() as chooser:
-        page.press("Open a layout file")
+        page.press("Open")
     chooser.value.set_files(broken)
     page.until(lambda: any("broken.yaml" in note and "version" in note for note in page.notes()))
     assert page.session.state.layout.names[0] == "bow", "nothing is lost"
@@ -147,12 +147,12 @@ def test_a_strangers_layout_opens_no_file_and_runs_nothing(page: Any, tmp_path: 
     values["fins"][0] |= {"name": EVIL[:60], "model": {"type": "table", "path": "/etc/passwd"}}
     (tmp_path / "robot.yaml").write_text(yaml_text(values))
     page.tab("Export")
-    page.upload("Open a layout file", tmp_path / "robot.yaml")
+    page.upload("Open", tmp_path / "robot.yaml")
     page.until(lambda: any("'passwd', which did not come along" in note for note in page.notes()))
     assert page.session.state == before and "root:" not in "".join(page.notes())
     values["fins"][0]["model"] = {"type": "drag"}
     (tmp_path / "robot.yaml").write_text(yaml_text(values))
-    page.upload("Open a layout file", tmp_path / "robot.yaml")
+    page.upload("Open", tmp_path / "robot.yaml")
     page.until(lambda: page.session.state.layout.name == EVIL and not page.view.busy)
     page.until(lambda: EVIL[:20] in page.text(".fl-robot"))
     page.key("n")
@@ -174,11 +174,11 @@ def test_a_layout_brings_its_table_along_and_takes_it_home(
         archive.writestr("robot.yaml", yaml_text(values))
         archive.write(tmp_path / "soft.csv", "tables/soft.csv")
     page.tab("Export")
-    page.upload("Open a layout file", tmp_path / "robot.zip")
+    page.upload("Open", tmp_path / "robot.zip")
     page.until(lambda: page.session.state.layout.name == "measured" and not page.view.busy)
     page.until(lambda: "measured" in page.text(".fl-robot") and "Exact" in page.text(".fl-status"))
     with page.page.expect_download() as download:
-        page.press("Layout (YAML)")
+        page.press("Save")
     download.value.save_as(tmp_path / "home.zip")
     names = zipfile.ZipFile(tmp_path / "home.zip").namelist()
     assert names[0] == "measured.yaml" and names[1].startswith("tables/") and len(names) == 2

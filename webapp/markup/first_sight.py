@@ -1,4 +1,5 @@
-"""What lies over the page for a while: the card of the first visit, and the sheet of all keys."""
+"""What lies over the page for a while: the card of the first visit, the sheet of all keys, and what is said
+while files are dragged over it."""
 
 from collections.abc import Sequence
 from html import escape
@@ -49,6 +50,18 @@ def welcome() -> str:
         f'<button class="primary" onclick="{tell("tour,")} finlabFrame.met()">Take the tour</button>'
         "<button onclick='finlabFrame.met()'>Close</button></div></section>"
     )
+
+
+def drop_card() -> str:
+    """What can be dropped; `dropping.js` shows it while files are over the page."""
+    kinds = (
+        ("A design", "YAML, JSON or ZIP; its tables and its mesh at once with it", "opens it"),
+        ("Measurements", "CSV", "are fitted to the fin that is selected, or on whose row they are dropped"),
+        ("A hull", "STL, OBJ, GLB or PLY", "becomes this robot's"),
+        ("A path", "CSV with t, x, y, z", "is swum"),
+    )
+    rows = "".join(f"<li><b>{a}</b> {c}<span>{b}</span></li>" for a, b, c in kinds)
+    return f"<div class='fl fl-drop' aria-hidden='true'><div><h2>Drop to open</h2><ul>{rows}</ul></div></div>"
 
 
 def key_sheet(rows: Sequence[tuple[str, str, str]]) -> str:

@@ -1,6 +1,5 @@
-"""The design as a whole: new, open, save, copy, share; what is shipped, and what this browser had lately."""
+"""Where designs come from: the shipped ones, a copy of this one, and those that this browser had lately."""
 
-from collections.abc import Callable
 from importlib.resources import files
 
 import viser
@@ -8,7 +7,6 @@ import viser
 from webapp.handles import put
 from webapp.markup.design_list import design_card
 from webapp.page import Page
-from webapp.session.design_links import MAX_LINK
 from webapp.session.files import shipped, shipped_name
 from webapp.viser_internals import run_script
 
@@ -17,31 +15,19 @@ SCRIPT = files("webapp").joinpath("designs.js").read_text("utf-8")
 
 
 class DesignPanel:
-    """Buttons for designs, the list of shipped ones, and what is said of this one."""
+    """The list of shipped designs, what is said of this one, and the recent ones."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page, designs = page, page.designs
-        acts: dict[str, Callable[[], object]] = {
-            "New": designs.new,
-            "Duplicate": page.session.duplicate_layout,
-            "Save": designs.save,
-            "Share": designs.share,
-        }
-        hint = (
-            "Save sends the file, with measured fins in a ZIP. Share makes a link that carries the design, "
-            f"up to {MAX_LINK:,} characters."
-        )
-        page.add_buttons("Design", acts, hint=hint)
-        page.add_upload(
-            "Open a design",
-            designs.open,
-            icon=viser.Icon.FOLDER_OPEN,
-            mime_type=".yaml,.yml,.json,.zip",
-            hint="A layout file (YAML, JSON), a graph file, a bundle, or a layout zipped with its tables.",
-        )
         self._layouts = gui.add_dropdown("Layout", tuple(shipped()), hint="Shipped layouts to start from.")
         page.on_change(self._layouts, self._open)
+        page.add_button(
+            "Duplicate the design",
+            page.session.duplicate_layout,
+            icon=viser.Icon.COPY,
+            hint="A copy under another name; the next changes are the copy's.",
+        )
         self._card = gui.add_html("")
         page.editables.on("save-as", lambda _, text: designs.save_as(text))
         run_script(gui, SCRIPT)

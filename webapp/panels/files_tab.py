@@ -1,10 +1,11 @@
-"""Files: open and save a layout, take home what the robot needs, copy the question as a command."""
+"""Export: what the robot needs, what is seen and found, and the question as a command to copy."""
 
 from html import escape
 
 import viser
 
 from webapp.handles import put
+from webapp.markup.picking import marker
 from webapp.markup.snippets import command_line, export_line, python_lines
 from webapp.page import Page
 from webapp.session import files
@@ -16,26 +17,18 @@ class FilesTab:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
-        page.add_upload(
-            "Open a layout file",
-            page.designs.open,
-            icon=viser.Icon.FOLDER_OPEN,
-            mime_type=".yaml,.yml,.json,.zip",
-            hint="A layout file (YAML, JSON), a graph file, a bundle, or a layout zipped with its tables.",
-        )
-        hint = "Measured fins come along in a ZIP. The HTML page moves by itself and needs no server."
-        saves = {
-            "Layout (YAML)": page.designs.save,
+        about = "Graph, the fins' physics, README and checksums: what finlab export makes."
+        gui.add_html(marker("fl-primary"))
+        icon = viser.Icon.PACKAGE_EXPORT
+        page.add_button("Export the bundle (ZIP)", page.exports.bundle, icon=icon, hint=about)
+        parts = {
+            "Graph file": page.exports.graph,
             "Candidates (CSV)": self._send_candidates,
             "Picture (PNG)": page.exports.picture,
             "3D view (HTML)": lambda: page.exports.html(page.shown),
         }
-        page.add_buttons("Save", saves, hint=hint)
-        page.add_buttons(
-            "For the robot",
-            {"Graph file": page.exports.graph, "Bundle (ZIP)": page.exports.bundle},
-            hint="The layout graph alone, or with the fins' physics and checksums: what finlab export makes.",
-        )
+        hint = "The layout graph alone, and what is seen; the HTML page moves by itself and needs no server."
+        page.add_buttons("Single files", parts, hint=hint)
         self._command = gui.add_html("")
 
     def _send_candidates(self) -> None:

@@ -15,6 +15,9 @@ from webapp.session.files import file_stem
 from webapp.session.fin_edits import FORMULAS, words
 from webapp.tasks.fitting import MAX_BYTES, Fitted
 
+CSV = ".csv,.txt"
+"""How the names of files of measurements end."""
+
 
 class FinModelPanel:
     """Widgets of one folder."""
@@ -31,11 +34,12 @@ class FinModelPanel:
             for kind in FORMULAS:
                 self._add_numbers(gui, kind)
             self._curves = gui.add_html("")
+            page.opening.add(CSV, self._upload)
             self._upload_button = page.add_upload(
                 "Fit from measurements (CSV)",
                 self._upload,
                 icon=viser.Icon.UPLOAD,
-                mime_type=".csv,.txt",
+                mime_type=CSV,
                 hint=(
                     "For the selected fin: noisy rows of A, f, phi, Fx, Fy, Fz, a raw series, or a finished "
                     f"force table. Up to {MAX_BYTES // 1_000_000} MB."
@@ -91,6 +95,7 @@ class FinModelPanel:
         if session.selected is None:
             raise FinlabError("no fin is selected; click the one that was measured, or choose it in the list")
         self._page.fitting.start(session.selected, name, content)
+        session.show_task("Design")
 
     def _found(self) -> Fitted:
         found = self._page.fitting.findings

@@ -9,7 +9,7 @@ import viser
 from scipy.spatial.transform import Rotation
 
 from finlab.errors import FinlabError
-from finlab.layout.body import HULL_SHAPES, Hull
+from finlab.layout.body import HULL_SHAPES, MESH_SUFFIXES, Hull
 from webapp.handles import put
 from webapp.page import Page
 from webapp.scene.meshes.hull import hull_of
@@ -30,6 +30,8 @@ from webapp.session.state import chosen, number
 
 MESH = "mesh file"
 """Entry of the list of shapes while the hull comes from a file."""
+MESHES = ",".join(MESH_SUFFIXES)
+"""How the names of files of hulls end."""
 TURNS = ("x", "y", "z")
 """Axes that a hull from a file can be turned about."""
 
@@ -61,11 +63,12 @@ class HullPanel:
             self._choose_unit,
             self._unit_now,
         )
+        page.opening.add(MESHES, self._import)
         page.add_upload(
             "Import a hull (STL, OBJ, GLB)",
             self._import,
             icon=viser.Icon.UPLOAD,
-            mime_type=".stl,.obj,.glb,.ply",
+            mime_type=MESHES,
             hint=f"Up to {MAX_BYTES // 1_000_000} MB; more than {MAX_FACES:,} triangles are simplified.",
         )
         self._report = gui.add_html("")
@@ -83,7 +86,10 @@ class HullPanel:
         )
 
     def _import(self, name: str, content: bytes) -> None:
-        self._page.session.import_hull(stored_hull(name, content, self._chosen))
+        session = self._page.session
+        session.import_hull(stored_hull(name, content, self._chosen))
+        session.show_task("Design")
+        session.select(None)  # so that the report is seen, wherever the file was dropped
 
     def _choose_unit(self, unit: str) -> None:
         """Another unit, for the next file and for the one that is here; a reshaped one is in metres."""

@@ -23,7 +23,7 @@ from webapp.panels.pilot import PilotPanel
 from webapp.panels.sweep import SweepPanel
 from webapp.panels.swim_tab import RunPanel, ScenarioPanel, SwimCardPanel
 from webapp.panels.timeline import Timeline
-from webapp.panels.top_bar import AnsweringBar, HistoryBar, RobotBar, TaskBar
+from webapp.panels.top_bar import AnsweringBar, FileBar, HistoryBar, RobotBar, TaskBar
 from webapp.panels.view_tab import ViewPanel
 from webapp.panels.wrench_tab import AnswerPanel, FinsPanel, TargetPanel
 from webapp.session.looking import TASKS
@@ -55,12 +55,13 @@ class Place(NamedTuple):
 
 PLACES = (
     Place(TOP, TASKS, "Robot", RobotBar),
+    Place(TOP, TASKS, "File", FileBar),
     Place(TOP, TASKS, "History", HistoryBar),
     Place(TOP, TASKS, "Tasks", TaskBar),
     Place(TOP, TASKS, "Answers", AnsweringBar),
     Place(LEFT, TASKS, "Guide", GuidePanel, about="guide"),
     Place(LEFT, (DESIGN,), "Fins", FinList),
-    Place(LEFT, (DESIGN,), "Design", DesignPanel),
+    Place(LEFT, (DESIGN,), "Designs", DesignPanel),
     Place(RIGHT, (DESIGN,), "Fin", FinInspector, about="fins"),
     Place(RIGHT, (DESIGN,), "Body", BodyInspector, about="robot"),
     Place(RIGHT, (DESIGN,), "Hull", HullPanel, folded=True, about="robot"),

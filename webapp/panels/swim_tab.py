@@ -12,7 +12,7 @@ from webapp.markup.scenario import scenario_card
 from webapp.markup.swim_card import swim_card
 from webapp.page import Page
 from webapp.panels.damage import FinButtons
-from webapp.session.files import read_path
+from webapp.session.files import is_path, read_path
 from webapp.session.scenarios import SCENARIOS
 from webapp.session.state import COMPARED
 from webapp.session.swim_plan import ALONE, CONTROLLERS, NUMBERS, OWN, SPEEDS
@@ -83,6 +83,7 @@ class ScenarioPanel(SwimPanel):
                 self._bind(key, gui.add_number(label, first, step=step, hint=hint), digits=3)
             follow = gui.add_checkbox("Follow", False, hint="The camera goes along with the first robot.")
             page.on_change(follow, page.scenery.swim.look)
+            page.opening.add(".csv", self._take_path, knows=is_path)
             page.add_upload(
                 "Open a path (CSV)",
                 self._take_path,
@@ -95,6 +96,7 @@ class ScenarioPanel(SwimPanel):
         self._page.swimming.own_path = read_path(name, content)
         put(self._path, options=(*SHIPPED, OWN))
         self._page.session.set_swim("path", OWN)
+        self._page.session.show_task("Simulate")
 
     def refresh(self) -> None:
         """Say what is true and what the robot believes."""

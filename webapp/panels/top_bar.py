@@ -1,4 +1,4 @@
-"""The bar above all: whose design it is, what can be undone, the tasks, who answers, and help."""
+"""The bar above all: whose design it is, its file, what can be undone, the tasks, who answers, and help."""
 
 from functools import partial
 from html import escape
@@ -8,12 +8,17 @@ import viser
 from finlab.allocation.methods import METHODS
 from webapp.handles import put
 from webapp.markup.first_sight import tell
+from webapp.markup.picking import marker
 from webapp.page import Page
+from webapp.session.design_links import MAX_LINK
 from webapp.session.lessons import LESSONS
 from webapp.session.looking import TASKS
 from webapp.session.state import OBJECTIVES
 from webapp.session.tour import STEPS
+from webapp.tasks.opening import KINDS
 
+DESIGNS = ".yaml,.yml,.json,.zip"
+"""How the names of files of designs end."""
 PALETTE = (
     "document.documentElement.dispatchEvent(new KeyboardEvent('keydown', "
     "{ key: 'k', code: 'KeyK', ctrlKey: true, bubbles: true }))"
@@ -35,6 +40,27 @@ class RobotBar:
         changed = "" if layout == session.saved else "<span class='dim'>edited</span>"
         name = escape(layout.name)
         put(self._name, content=f"<div class='fl-robot' title='{name}'><b>{name}</b>{changed}</div>")
+
+
+class FileBar:
+    """The design as a file: a new one, one that is opened, and this one saved or shared."""
+
+    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
+        """Build the buttons."""
+        self._page, designs = page, page.designs
+        gui.add_html(marker("fl-file"))
+        page.add_button("New", designs.new, icon=viser.Icon.FILE_PLUS, hint="One hull with one fin.")
+        page.opening.add(DESIGNS, designs.open)
+        hint = f"{KINDS[0].upper()}{KINDS[1:]}. Files can be dropped on the page as well."
+        self._open = page.add_upload("Open", page.opening.open, icon=viser.Icon.FOLDER_OPEN, hint=hint)
+        save = "The layout's file; with measured fins or an imported hull a ZIP with theirs."
+        page.add_button("Save", designs.save, icon=viser.Icon.DEVICE_FLOPPY, hint=save)
+        share = f"A link that carries the whole design, up to {MAX_LINK:,} characters."
+        page.add_button("Share", designs.share, icon=viser.Icon.LINK, hint=share)
+
+    def refresh(self) -> None:
+        """Tell the browser what can be opened; the panels below have said it by now."""
+        put(self._open, mime_type=self._page.opening.suffixes)
 
 
 class HistoryBar:

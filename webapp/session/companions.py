@@ -113,7 +113,8 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
 
     Args:
         layout: it may name any path.
-        parts: contents of what came along, by the paths by which the layout can name it.
+        parts: contents of what came along, by the paths by which the layout can name it; a file of the
+            same name does where there is no other, since files that are sent at once have lost their folders.
         folder: where to keep them.
         source: what to call the layout in errors.
 
@@ -121,10 +122,12 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
         LayoutError: it names a force table that did not come along.
         FinlabError: a file cannot be kept, or is no hull.
     """
+    by_name = {Path(path).name: path for path in parts}
     fins, missing = [], []
     for fin in layout.fins:
         if fin.model.type == "table":
             path = str(fin.model.values()["path"])
+            path = path if path in parts else by_name.get(Path(path).name, path)
             if path not in parts:
                 raise LayoutError(
                     f"fin {fin.name!r:.40} names the table {Path(path).name!r:.60}, which did not come "
@@ -136,6 +139,7 @@ def adopted(layout: Layout, parts: Mapping[str, bytes], folder: Path, source: st
     body = layout.body
     if body is not None and body.hull is not None and body.hull.mesh is not None:
         mesh = body.hull.mesh
+        mesh = mesh if mesh in parts else by_name.get(Path(mesh).name, mesh)
         if mesh in parts:
             hull = replace(body.hull, mesh=stored_mesh(Path(mesh).name, parts[mesh], body.hull.scale, folder))
             body = replace(body, hull=hull)

@@ -22,7 +22,7 @@ from finlab.layout.reading import MAX_BYTES, decode_text, parse_json
 from finlab.layout.yaml_file import parse_yaml, yaml_text
 from finlab.physics import plant_of
 from finlab.sim import Trajectory
-from finlab.sim.task import read_trajectory
+from finlab.sim.task import COLUMNS, read_trajectory
 from webapp.scene.meshes.mesh import Mesh
 from webapp.scene.meshes.mesh_file import stl_of
 from webapp.scene.meshes.mesh_hull import UNITS, MeshHull
@@ -155,6 +155,12 @@ def reshaped_hull(hull: Hull, change: Callable[[Mesh], Mesh]) -> Hull:
     drawn = MeshHull.load(hull.mesh, hull.scale, (0.0, 0.0, 0.0))
     content = stl_of(change(drawn.mesh()))
     return replace(hull, mesh=stored_mesh("hull.stl", content, 1.0, cache_folder()), scale=1.0)
+
+
+def is_path(content: bytes) -> bool:
+    """Whether a CSV file has the columns of a way to swim."""
+    names = content[:200].decode("utf-8-sig", "replace").split("\n", 1)[0].split(",")
+    return {name.strip() for name in names} >= set(COLUMNS)
 
 
 def read_path(name: str, content: bytes) -> Trajectory:
