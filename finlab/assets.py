@@ -23,6 +23,10 @@ def checkpoints_dir() -> Path:
     return _shipped("checkpoints")
 
 
+PAPER_LAYOUTS = ("A", "B", "C", "D")
+"""The shipped layouts that are the paper's."""
+
+
 def shipped_layouts() -> dict[str, Path]:
     """Shipped layouts: file name without its ending, to path; sorted by name."""
     return {path.stem: path for path in sorted(layouts_dir().glob("*.yaml"))}

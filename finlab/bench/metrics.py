@@ -15,7 +15,7 @@ from finlab.arrays import Array
 from finlab.bench.problems import KINDS, Problems
 from finlab.bench.protocol import FAILURES
 from finlab.bench.runner import Answer, Answers, failures
-from finlab.layout.angles import wrapped
+from finlab.layout.angles import command_change
 from finlab.physics import Plant, plant_of
 from finlab.physics.energy import command_energy
 
@@ -147,9 +147,7 @@ def _path_rows(problems: Problems, answers: Answers, noisy: bool) -> Row | None:
         errors.append(score(path, plant, sigma, wrench, best).relative)
         for last, now in zip(path[:-1], path[1:], strict=True):
             if last.command is not None and now.command is not None:
-                step = np.abs(now.command - last.command)
-                step[:, 2] = np.abs(wrapped(step[:, 2]))
-                steps.append(step)
+                steps.append(command_change([last.command, now.command])[0])
     if not errors:
         return None
     error, step = np.concatenate(errors), np.concatenate(steps) if steps else np.full((1, 3), np.nan)

@@ -1,15 +1,14 @@
 """The robots of the benchmark, set by set: shipped layouts, held-out splits, and sizes far from both."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
 
+from finlab.assets import PAPER_LAYOUTS
 from finlab.evaluation.splits import make_split
 from finlab.layout import Fin, FinModelSpec, Layout, Limits, load_layout, random_layout
+from finlab.layout.random_fins import log_uniform
 
-PAPER = ("A", "B", "C", "D")
-"""The paper's layouts."""
 SHIPPED = ("asymmetric", "hexa", "mixed", "no_yaw", "octo", "pair", "penta", "restricted")
 """The other shipped ones; `ucat` has the fins of A."""
 DRAWN = (
@@ -38,7 +37,9 @@ def robots(seed: int, per_split: int) -> list[tuple[str, Layout]]:
         seed: of what is drawn; robot k of a set depends on the set, the seed and k alone.
         per_split: robots of each drawn set.
     """
-    found = [("paper", _bare(name)) for name in PAPER] + [("shipped", _bare(name)) for name in SHIPPED]
+    found = [("paper", _bare(name)) for name in PAPER_LAYOUTS] + [
+        ("shipped", _bare(name)) for name in SHIPPED
+    ]
     for split in DRAWN:
         found += [(split, case.healthy) for case in make_split(split, per_split, 1, seed)]
     for place, (name, draw) in enumerate((("big", _big_fin), ("tiny", _tiny_fin))):
@@ -55,16 +56,12 @@ def _bare(name: str) -> Layout:
     return replace(load_layout(name), body=None, description="")
 
 
-def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    return float(np.exp(rng.uniform(math.log(low), math.log(high))))
-
-
 def _model(rng: np.random.Generator, area: tuple[float, float], length: tuple[float, float]) -> FinModelSpec:
     """A plate of the law `drag`, or a fin of Lighthill's."""
     if rng.uniform() < 0.5:
-        size = (("area", _log_uniform(rng, *area)), ("lever", _log_uniform(rng, *length) / 2))
+        size = (("area", log_uniform(rng, *area)), ("lever", log_uniform(rng, *length) / 2))
         return FinModelSpec("drag", size)
-    span = _log_uniform(rng, *length)
+    span = log_uniform(rng, *length)
     return FinModelSpec("lighthill", (("length", span), ("width", span / 2)))
 
 

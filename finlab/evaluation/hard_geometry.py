@@ -6,12 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from finlab.assets import PAPER_LAYOUTS
 from finlab.layout import Fin, FinModelSpec, Layout, load_layout, random_layout
 from finlab.layout.angles import wrapped
 from finlab.layout.random import TRAINING_BOX
 
-PAPER_LAYOUTS = ("A", "B", "C", "D")
-"""The paper's robots."""
 MOVED_M, TURNED_RAD = 0.02, math.radians(20.0)
 """How far their fins are moved along each axis [m] and turned, at most, as a builder's hand may."""
 CLUSTER_M = 0.03
@@ -81,7 +80,9 @@ def scaled(size: float) -> DrawLayout:
 
     def draw(rng: np.random.Generator, name: str) -> Layout:
         layout = random_layout(rng, name)
-        model = FinModelSpec("drag", (("area", 0.02 * size**2), ("lever", 0.1 * size)))
+        blade = FinModelSpec().values()
+        bigger = ("area", float(blade["area"]) * size**2), ("lever", float(blade["lever"]) * size)
+        model = FinModelSpec("drag", bigger)
         fins = _placed(layout.fins, size * _positions(layout.fins))
         low, high = fins[0].limits.frequency
         slower = (low / max(size, 1.0), high / max(size, 1.0))

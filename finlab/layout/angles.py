@@ -24,3 +24,13 @@ def is_full_turn(arc: Any) -> Any:
 def wrapped(angle: ArrayLike) -> Array:
     """Returns the same angles within [-pi, pi) [rad]."""
     return np.asarray(np.mod(np.asarray(angle) + math.pi, TURN) - math.pi)
+
+
+def command_change(command: ArrayLike) -> Array:
+    """Changes from each command to the next, without their sign: (T, n, 3) to (T - 1, n, 3).
+
+    Amplitude [rad], frequency [Hz], and the zero direction the short way round [rad]; NaN stays NaN.
+    """
+    change = np.abs(np.diff(np.asarray(command), axis=0))
+    change[..., 2] = np.abs(wrapped(change[..., 2]))
+    return change

@@ -3,7 +3,8 @@
 import math
 from typing import Any
 
-from finlab.evaluation.experiments.hard_days import CURRENT, HARD_DAYS, PAPERS, TWO, HardDay
+from finlab.assets import PAPER_LAYOUTS
+from finlab.evaluation.experiments.hard_days import CURRENT, HARD_DAYS, TWO, HardDay
 from finlab.sim import SteadyCurrent, TurningCurrent, Water, Waves
 
 LOST_IN_CURRENT = HardDay(
@@ -17,7 +18,7 @@ LOST_IN_CURRENT = HardDay(
 SCENARIOS: dict[str, HardDay] = {
     day.name: day
     for day in (*HARD_DAYS, LOST_IN_CURRENT)
-    if day.fins == "own" and day.layouts in (PAPERS, TWO, PAPERS[:1])
+    if day.fins == "own" and day.layouts in (PAPER_LAYOUTS, TWO, PAPER_LAYOUTS[:1])
 }
 """Scenarios by name."""
 

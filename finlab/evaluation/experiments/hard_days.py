@@ -10,6 +10,7 @@ from itertools import combinations, islice
 from typing import Any, Literal, NamedTuple
 
 from finlab.allocation.allocator import Allocator
+from finlab.assets import PAPER_LAYOUTS
 from finlab.control import PATH_CONTROLLERS, Completion, FaultMonitor, TrackingController
 from finlab.errors import DataError
 from finlab.evaluation.splits import make_split
@@ -29,8 +30,6 @@ from finlab.sim import (
     perturbed,
 )
 
-PAPERS = ("A", "B", "C", "D")
-"""The layouts of the paper."""
 TWO = ("A", "C")
 """Those that swim most of the days: a symmetric one and one that is not."""
 CURRENT = (0.05, -0.05, 0.0)
@@ -166,7 +165,7 @@ HARD_DAYS = (
         "nominal",
         "Everything is as drawn; sensors are noisy, biased and late.",
         "nominal",
-        PAPERS,
+        PAPER_LAYOUTS,
         reason=(
             "On A and D the pseudo-inverse takes the least power there is, within a thousandth; and a "
             "body that got what is asked at once would still err by 0.945 of it."
@@ -178,14 +177,14 @@ HARD_DAYS = (
         "parameters-low",
         "Damping, added mass and inertia are 30 % less than drawn.",
         "law kept",
-        PAPERS,
+        PAPER_LAYOUTS,
         truth={"damping": 0.7, "added_mass": 0.7, "inertia": 0.7},
     ),
     HardDay(
         "parameters-high",
         "Damping, added mass and inertia are 30 % more than drawn.",
         "law kept",
-        PAPERS,
+        PAPER_LAYOUTS,
         truth={"damping": 1.3, "added_mass": 1.3, "inertia": 1.3},
     ),
     HardDay(

@@ -19,7 +19,7 @@ from finlab.evaluation.progress import progress
 from finlab.evaluation.statistics.tables import Row
 from finlab.forces.envelopes import largest_forces
 from finlab.layout import Layout
-from finlab.layout.angles import wrapped
+from finlab.layout.angles import command_change, wrapped
 from finlab.layout.arrays import layout_effectiveness
 from finlab.physics import Plant
 
@@ -94,10 +94,8 @@ def rollout(allocator: Allocator, layout: Layout, path: Array, *, steady: bool) 
     for _ in range(SETTLING):  # from rest to the first command
         lag.step(command[0])
     motion = np.array([lag.step(each) for each in command])
-    step = np.abs(np.diff(command, axis=0))
-    step[..., 2] = np.abs(wrapped(step[..., 2]))
     return Rollout(
-        step=step,
+        step=command_change(command),
         power=np.array([answer.power for answer in answers]),
         effort=np.array([answer.energy for answer in answers]),
         err_norm=allocator.normalization.error(plant.wrench(command), path),

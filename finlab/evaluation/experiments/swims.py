@@ -15,7 +15,7 @@ from finlab.evaluation.experiments.closed_loop_runs import LOST_M, Row, follow_r
 from finlab.evaluation.experiments.hard_days import HardDay, Kind
 from finlab.evaluation.progress import progress
 from finlab.evaluation.statistics.bootstrap import Interval, mean_interval, spread_interval
-from finlab.layout.angles import wrapped
+from finlab.layout.angles import command_change
 from finlab.sim import RunLog
 
 GAP_N = 0.1
@@ -66,8 +66,7 @@ def swim_figures(log: RunLog, cpu_s: float) -> Row:
     """
     minutes = log.n_ticks * float(log.time[1] - log.time[0]) / 60.0
     gap = np.linalg.norm((log.asked - log.allocated) / [1, 1, 1, LEVER_M, LEVER_M, LEVER_M], axis=1)
-    step = np.abs(np.diff(log.command, axis=0))
-    step[..., 2] = np.abs(wrapped(step[..., 2]))
+    step = command_change(log.command)
     works = log.command[..., 0] > 0.0  # not so for lost fins, which are NaN
     told = np.isfinite(log.command[..., 0])
     both, kept = works[1:] & works[:-1], told[1:] & told[:-1]

@@ -6,6 +6,7 @@ from typing import Any
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.methods import load_allocator
+from finlab.assets import PAPER_LAYOUTS
 from finlab.evaluation.experiments.ablation import ablation_method, run_variant
 from finlab.evaluation.experiments.beyond_reach import beyond_reach_rows
 from finlab.evaluation.experiments.closed_loop_runs import Run, Scenario, run_all
@@ -40,8 +41,6 @@ from finlab.sim import make_trajectory
 
 LATENCY_FINS = 4
 """Fins of the layouts whose calls are timed."""
-PAPER_LAYOUTS = ("A", "B", "C", "D")
-"""The paper's robots."""
 TRACK = "track "
 """Leads the name of a column of time, position and reference (K, 7); layout and method follow."""
 
