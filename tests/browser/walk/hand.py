@@ -43,7 +43,9 @@ class Hand:
     def index(spot: Spot) -> int:
         """Place of a section in `PLACES`."""
         task, title = spot
-        return next(k for k, place in enumerate(PLACES) if place.title == title and task in place.tasks)
+        found = [k for k, place in enumerate(PLACES) if place.title == title and task in place.tasks]
+        assert found, f"there is no section {title} in {task}; the walk's tables name another one"
+        return found[0]
 
     def section(self, spot: Spot) -> Any:
         """The folder of a section."""
@@ -81,7 +83,10 @@ class Hand:
             self.labels(spot, label).first.wait_for()
 
     def click(self, spot: Spot, label: str, button: str | int) -> None:
-        """A button of a group, by its words or its place."""
+        """A button of a group, by its words or its place; without a label one that stands alone."""
+        if not label:
+            self.section(spot).get_by_role("button", name=str(button), exact=True).click()
+            return
         buttons = self.row(spot, label).locator("button")
         if isinstance(button, int):
             buttons.nth(button).click()

@@ -31,7 +31,7 @@ from webapp.session.search_request import ALL, GOAL_WORDS
 from webapp.session.state import AXIS_WORDS, KINDS, OBJECTIVES
 from webapp.session.swim_plan import ALONE, CONTROLLERS, PLANTS, SHIPPED
 
-TOP, FINS, LAYOUTS = ("Allocate", "Answers"), ("Design", "Fins"), ("Design", "Design")
+TOP, FINS, LAYOUTS = ("Allocate", "Answers"), ("Design", "Fins"), ("Design", "Designs")
 BODY, REACH, PILOT = ("Design", "Body"), ("Design", "Reach"), ("Allocate", "Steer by hand")
 COMPARED, ANSWERED = ("Allocate", "Comparison"), ("Allocate", "Fins")
 METHODS = ("search", "mdn", "analytic", "qp", "sqp")

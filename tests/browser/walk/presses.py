@@ -20,7 +20,7 @@ from webapp.panels.fin_list import RING_SIZES, RINGS
 from webapp.session.display import DRAWN
 from webapp.session.targets import PRESETS
 
-TOP, FINS, LAYOUTS = ("Allocate", "Answers"), ("Design", "Fins"), ("Design", "Design")
+TOP, FINS, LAYOUTS = ("Allocate", "Answers"), ("Design", "Fins"), ("Design", "Designs")
 BODY, REACH, PILOT = ("Design", "Body"), ("Design", "Reach"), ("Allocate", "Steer by hand")
 COMPARED, ANSWERED = ("Allocate", "Comparison"), ("Allocate", "Fins")
 METHODS = ("search", "mdn", "analytic", "qp", "sqp")
@@ -36,7 +36,7 @@ def always(_model: Model) -> bool:
 
 @dataclass(frozen=True)
 class Press:
-    """A button of a group; by its place where its words change."""
+    """A button of a group, by its place where its words change; without a label one that stands alone."""
 
     spot: Spot
     label: str
@@ -108,6 +108,9 @@ def presses() -> list[Press]:
                 for name in ("none", "analytic", "qp")
             },
         ),
+        *on(FINS, "", {"Add a fin": one(lambda s: s.add_fin())}),
+        *on(LAYOUTS, "", {"Duplicate the design": one(lambda s: s.duplicate_layout())}),
+        *on(("Allocate", "File"), "", {"New": one(lambda s: s.new_layout())}),
         Press(ANSWERED, "Fail a fin", any_fin, toggle),
         Press(IMPROVE, "May move", any_fin, hold),
         Press(CANDIDATES, "Mode", lambda *_: 0, lambda m, k: m.session.show_mode(k)),

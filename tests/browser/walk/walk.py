@@ -63,7 +63,7 @@ class Walk:
             self.compare()
         except Exception as error:
             where = "\n".join(self.log[-8:])
-            raise AssertionError(f"action {len(self.log)} of seed {self.seed}: {error}\n{where}") from error
+            raise AssertionError(f"action {len(self.log)} of seed {self.seed}: {error!r}\n{where}") from error
 
     def told(self, on_page: Callable[[], object], intent: Callable[[Model], object]) -> None:
         """Do something on the page and tell the model; what that refuses the page must refuse in a note."""
