@@ -63,8 +63,11 @@ def served() -> Iterator[Served]:
 
 
 @contextlib.contextmanager
-def serving() -> Iterator[Served]:
-    """The app with the stand-in allocator; no shadows and still fins, so that software rendering keeps up."""
+def serving(solver: Any = None) -> Iterator[Served]:
+    """The app with the stand-in allocator, or another solver.
+
+    No shadows and still fins, so that software rendering keeps up.
+    """
     from finlab.assets import shipped_layouts
     from finlab.layout import load_layout
     from tests.webapp.stand_in import load_stand_in
@@ -75,7 +78,7 @@ def serving() -> Iterator[Served]:
 
     server = start_server()
     layout = load_layout(shipped_layouts()["ucat"])
-    app = App(server, Solver(load=load_stand_in), layout, Display(shadows=False, frozen=True))
+    app = App(server, solver or Solver(load=load_stand_in), layout, Display(shadows=False, frozen=True))
     yield Served(f"http://127.0.0.1:{server.get_port()}/?fixedDpr=0.3", app, server)
     app.stop()
     stop_server(server)
