@@ -113,6 +113,7 @@ def commands(page: Page) -> list[Command]:
         Command("View", "Show or hide the fin graph", partial(session.toggle, "graph")),
         Command("View", "Show or hide the centre of gravity", partial(session.toggle, "center")),
         Command("View", "Dark or light theme", partial(session.toggle, "dark")),
+        Command("View", "Presenter's view, or the usual one", partial(session.toggle, "large"), "V"),
         Command("Help", "Tour: start, or next stop", session.next_stop, "T"),
         *(
             Command("Help", f"Lesson: {lesson.title}", partial(session.open_lesson, lesson.name))

@@ -26,7 +26,8 @@ SMALL = """() => {
     const box = text.parentElement, style = getComputedStyle(box);
     if (!text.data.trim() || style.visibility !== 'visible' || !box.getClientRects().length) continue;
     if (box.closest('style, script, svg, .fl-chrome')) continue;
-    if (parseFloat(style.fontSize) < 13) found.add(`${text.data.trim()}: ${style.fontSize}`);
+    const size = parseFloat(style.fontSize) * box.currentCSSZoom;
+    if (size < 13) found.add(`${text.data.trim()}: ${size}`);
   }
   return [...found];
 }"""
@@ -95,6 +96,34 @@ def test_a_step_that_is_cut_in_the_bar_is_told_whole(page: Any) -> None:
     assert undo.locator(".mantine-Button-label").evaluate("label => label.scrollWidth > label.clientWidth")
     undo.hover()
     page.until(lambda: (undo.get_attribute("title") or "").endswith("quite a long name\nCtrl+Z"))
+
+
+@pytest.mark.parametrize("size", [(1400, 860), (1920, 1080)], ids=lambda size: f"{size[0]}x{size[1]}")
+def test_the_presenters_view_is_large_and_whole(resized: Any, size: tuple[int, int]) -> None:
+    page, (width, height) = resized, size
+    page.page.set_viewport_size({"width": width, "height": height})
+    arrow = "/robot/wrench/delivered_force"
+    thin = page.vertices(arrow)
+    page.key("v")
+    page.until(lambda: page.session.display.large)
+    page.until(lambda: page.vertices(arrow) != thin, told=lambda: "the arrow is as thin as before")
+    for task in TASKS:
+        page.tab(task)
+        page.catch_up()
+        page.until(
+            lambda: overlaps(page.page.evaluate(REGIONS)) == [],
+            told=lambda: str(overlaps(page.page.evaluate(REGIONS))),
+        )
+        boxes = page.page.evaluate(REGIONS)
+        assert boxes["canvas"]["width"] >= 0.6 * width and boxes["canvas"]["height"] >= 0.4 * height
+        small = page.page.evaluate(SMALL.replace("< 13", f"< {height / 46}"))
+        assert small == [], f"in {task}"
+        assert page.page.evaluate(WIDE) == [], f"nothing is cut off in {task} at {width} x {height}"
+        told = page.page.locator(".fl-status").bounding_box()
+        assert told["x"] >= 0 and told["x"] + told["width"] <= boxes["canvas"]["right"]
+    page.key("v")
+    page.until(lambda: page.page.evaluate(REGIONS)["top"]["height"] < 60)
+    assert page.problems == []
 
 
 def test_one_region_at_a_time_on_a_narrow_page(resized: Any) -> None:

@@ -104,7 +104,7 @@ def corner(
         in_reach: whether any command of the working fins gives what is asked.
     """
     fins = f"{len(state.healthy)} of {state.layout.n_fins} fins"
-    parts = [f"<span>{fins}</span>"]
+    parts = [f"<span class='aside'>{fins}</span>"]
     if error is not None:
         parts.append(f"<span class='missing'>{escape(error)}</span>")
     elif allocation is not None:
@@ -132,7 +132,7 @@ def _figures(allocation: Allocation, instead: str, least: bool, in_reach: bool) 
         f"<span title='missing, by the fins’ own laws: {rest}'><span class='dim'>error</span> "
         f"<b class='err'>{small(allocation.err_norm)}</b> σ</span>",
         *costs,
-        f"<span><span class='dim'>{method}</span> {time} ms</span>",
+        f"<span class='aside'><span class='dim'>{method}</span> {time} ms</span>",
         f"<span class='pill' style='background:{css(color)}'>{escape(verdict)}</span>",
     ]
 

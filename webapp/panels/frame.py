@@ -31,11 +31,19 @@ NAMES = files("webapp").joinpath("names.js").read_text("utf-8")
 _VARIABLES = (
     f":root {{ --fl-asked: {css(ASKED)}; --fl-delivered: {css(DELIVERED)}; --fl-missing: {css(MISSING)}; }}"
 )
-_SHEETS = "".join(
-    files("webapp.markup").joinpath(name).read_text("utf-8") for name in ("style.css", "frame.css")
-)
-STYLE = f"<style>{_VARIABLES}{_SHEETS}</style>"
+
+
+def _sheet(name: str) -> str:
+    return files("webapp.markup").joinpath(name).read_text("utf-8")
+
+
+NARROW = _sheet("narrow.css")
+_MEDIA = f"@media (max-width: 1099px) {{ {NARROW} }}"
+STYLE = f"<style>{_VARIABLES}{_sheet('style.css')}{_sheet('frame.css')}{_MEDIA}{_sheet('single.css')}</style>"
 """A style element, to be put into the page once."""
+_NESTED = NARROW.replace(":root", "&") + _sheet("large.css")
+LARGE = f"@media (min-width: 1000px) {{ :root {{ {_NESTED} }} }}"
+"""Rules of the presenter's view, which has little room for much type."""
 PANES = "".join(
     f"<button class='to-{region}' onclick='finlabFrame.pane(\"{region}\")'>{word}</button>"
     for region, word in ((LEFT, "Fins"), (RIGHT, "Settings"), (DRAWER, "Plots"))
@@ -163,7 +171,9 @@ def _style(sections: list[Section], session: Session) -> str:
         "guide": session.guided,
     }
     variables = "".join(f"--has-{name}: {int(there)};" for name, there in counts.items())
-    return f"<style>:root {{ {variables} }} {', '.join(gone)} {{ display: none !important; }}</style>"
+    large = LARGE if session.display.large else ""
+    hidden = f"{', '.join(gone)} {{ display: none !important; }}"
+    return f"<style>:root {{ {variables} }} {large} {hidden}</style>"
 
 
 def _strip(task: str, opened: str, folded: bool) -> str:

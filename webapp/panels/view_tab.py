@@ -27,6 +27,7 @@ SWITCHES = {
     "center": ("Centre of gravity", "Mark it, and look through the hull."),
     "shadows": ("Shadows", "Slow without a graphics card."),
     "dark": ("Dark", "Dark theme."),
+    "large": ("Presenter’s view", "Type and strokes for the last row of a lecture hall (V)."),
 }
 """Field of `Display`, label and hint of each switch."""
 

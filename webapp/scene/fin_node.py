@@ -23,6 +23,8 @@ APART = 1.9
 depend on them."""
 LIMP = math.pi / 2
 """Where the blade of a failed fin hangs [rad]: down."""
+LABEL = 0.85
+"""Size of a fin's number."""
 GIZMO_SIZE = 0.24
 RING_SIZE = 0.20
 HELD: tuple[Any, ...] = (None, "cmd/ctrl", "shift")
@@ -124,7 +126,7 @@ class FinNode:
         fan = fin_mesh.sweep(0.1)
         self._fan = Shape(scene, f"{name}/turn/fan", fin.color, fan, opacity=0.3, side="double", **UNLIT)
         self._label = scene.add_label(
-            f"{name}/label", str(index + 1), anchor="center-center", font_screen_scale=0.85
+            f"{name}/label", str(index + 1), anchor="center-center", font_screen_scale=LABEL
         )
         self._strut = Shape(scene, f"/robot/struts/{index}", LIGHT.metal)
 
@@ -147,7 +149,15 @@ class FinNode:
         put(self._turn, active_axes=(False,) * 3)
         put(self._strut.node, visible=False)
 
-    def place(self, fin: Fin, hull: AnyHull, selected: bool, label: str | None, owned_by_user: bool) -> None:
+    def place(
+        self,
+        fin: Fin,
+        hull: AnyHull,
+        selected: bool,
+        label: str | None,
+        owned_by_user: bool,
+        stroke: float = 1.0,
+    ) -> None:
         """Show a fin.
 
         Args:
@@ -156,6 +166,7 @@ class FinNode:
             selected: whether its gizmos are shown.
             label: text at its root, None for none.
             owned_by_user: True while it is dragged; the gizmo's pose is then left alone.
+            stroke: how many times as large as usual the label is.
         """
         put(self._move, visible=True, active_axes=(selected,) * 3)
         put(self._turn, active_axes=(selected, selected, False))
@@ -163,13 +174,17 @@ class FinNode:
             put(self._move, position=np.array(fin.position))
             put(self._turn, wxyz=quaternion(fin.mounting_angle, 2))
         put(self._label, visible=label is not None, text=label or "", position=np.array([0.0, 0.0, 0.04]))
+        put(self._label, font_screen_scale=LABEL * stroke)
         shaft = np.array([math.cos(fin.mounting_angle), math.sin(fin.mounting_angle), 0.0])
         servo = np.array(fin.position) - 0.03 * shaft
         self._strut.show(_strut, servo, hull)
         put(self._strut.node, visible=True)
 
-    def command(self, command: Array | None, arrow: Array, mounting_angle: float, fans: bool) -> None:
-        """Show a command (3,), None for a failed fin, and its force as a body-frame arrow (3,) [m]."""
+    def command(
+        self, command: Array | None, arrow: Array, mounting_angle: float, fans: bool, stroke: float = 1.0
+    ) -> None:
+        """Show a command (3,), None for a failed fin, and its force as a body-frame arrow (3,) [m], so many
+        times as thick as usual."""
         alive = command is not None
         self.shapes.paint(alive)
         put(self._fan.node, visible=fans and alive)
@@ -178,7 +193,7 @@ class FinNode:
             return
         self._fan.show(fin_mesh.sweep, float(command[0]))
         put(self._fan.node, wxyz=quaternion(float(command[2]), 0))
-        self.shapes.push(arrow, mounting_angle, 0.007)
+        self.shapes.push(arrow, mounting_angle, 0.007 * stroke)
 
 
 def _strut(servo: Array, hull: AnyHull) -> Mesh:
