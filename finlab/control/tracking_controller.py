@@ -108,7 +108,9 @@ class TrackingController:
         """Wrenches (K, 6) that will be asked for at the K setpoints after the first, which is that of now:
         the last one, and what the path will take more than now."""
         current = np.zeros(2) if self.estimate is None else self.estimate.current
-        along = wrenches_along(self._observer, setpoints, current, self.gains.slow, self.period_s)
+        # Turning is looked ahead to more cautiously: in a current it is steep where the robot hardly moves
+        # through the water, and there the estimated current decides it.
+        along = wrenches_along(self._observer, setpoints, current, 2.0 * self.gains.slow, self.period_s)
         expected: Array = (self._wrench + along[1:] - along[0]).clip(-self._most, self._most)
         return expected
 
