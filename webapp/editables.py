@@ -4,22 +4,18 @@
 in which one types is made by the other half, `editables.js`.
 """
 
-import json
 from collections.abc import Callable
 from functools import partial
 from html import escape
 from importlib.resources import files
-from typing import Any
 
 import viser
 
 from finlab.errors import FinlabError
-from webapp.markup.picking import marker
-from webapp.viser_internals import run_script, uuid_of
+from webapp.mailbox import Mailbox
 
 SCRIPT = files("webapp").joinpath("editables.js").read_text("utf-8")
 """What runs in the page."""
-CHANNEL = "fl-edited"
 MAX_MESSAGE = 2_000_000
 """Longest message of the page that is read."""
 
@@ -53,44 +49,22 @@ def press(kind: str, key: str) -> str:
 
 
 class Editables:
-    """The channel of one page."""
+    """All of one page."""
 
     def __init__(self, gui: viser.GuiApi, attempt: Attempt) -> None:
-        """Open the channel, a hidden box of text; `attempt` carries out what comes by it."""
-        self._gui, self._attempt = gui, attempt
+        """Listen to the page; `attempt` carries out what comes from it."""
+        self._attempt = attempt
         self._acts: dict[str, Act] = {}
-        self._last = 0
-        gui.add_html(f"<style>div:has(>.{CHANNEL}) + div {{ display: none; }}</style>{marker(CHANNEL)}")
-        self._box = gui.add_text(CHANNEL, "")
-
-        @self._box.on_update
-        async def _told(event: Any) -> None:
-            if event.client is not None:
-                self._hear(str(event.target.value))
+        self.mailbox = Mailbox(gui, "finlabEditables", SCRIPT, (str, str, str), self._hear, MAX_MESSAGE)
+        """Where the page tells what was edited or pressed."""
 
     def on(self, kind: str, act: Act) -> None:
         """Who hears of elements of a kind."""
         self._acts[kind] = act
 
-    def start(self) -> None:
-        """Let the page's half begin."""
-        run_script(self._gui, f"{SCRIPT}\nfinlabEditables.start({json.dumps(uuid_of(self._box))});")
-
-    def _hear(self, message: str) -> None:
-        """What the page has told and got no answer to yet, oldest first; it may send anything."""
-        try:
-            words = json.loads(message) if len(message) <= MAX_MESSAGE else []
-        except (ValueError, RecursionError):
-            return
-        answers: list[tuple[int, str | None]] = []
-        for word in words if isinstance(words, list) else []:
-            if not (isinstance(word, list) and [type(part) for part in word] == [int, str, str, str]):
-                continue
-            number, kind, key, text = word
-            if number <= self._last or kind not in self._acts:
-                continue
-            self._last = number
-            refusal = self._attempt(partial(self._acts[kind], key, text))
-            answers.append((number, None if refusal is None else str(refusal)))
-        if answers:
-            run_script(self._gui, f"finlabEditables.answer({json.dumps(answers)});")
+    def _hear(self, kind: str, key: str, text: str) -> tuple[str | None] | None:
+        """Why something was refused, None where it was not; no answer where nobody hears of it."""
+        if kind not in self._acts:
+            return None
+        refusal = self._attempt(partial(self._acts[kind], key, text))
+        return (None if refusal is None else str(refusal),)

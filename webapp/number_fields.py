@@ -1,7 +1,6 @@
 """Boxes for numbers: what is typed comes here as text, is read with units and arithmetic, and is taken whole
 or refused in place. The other half, which keeps a box to the user while he types, is `number_fields.js`."""
 
-import json
 import re
 from collections.abc import Callable
 from functools import partial
@@ -13,13 +12,12 @@ import viser
 
 from finlab.errors import FinlabError
 from webapp.handles import on_user_change, put
-from webapp.markup.picking import marker
+from webapp.mailbox import Mailbox
 from webapp.session.quantities import read_number
-from webapp.viser_internals import run_script, uuid_of
+from webapp.viser_internals import uuid_of
 
 SCRIPT = files("webapp").joinpath("number_fields.js").read_text("utf-8")
 """What runs in the page."""
-CHANNEL = "fl-typed"
 MAX_MESSAGE = 10_000
 """Longest message of the page that is read."""
 HOW = ("enter", "pause", "escape", "empty", "step")
@@ -165,20 +163,14 @@ class NumberField:
 
 
 class NumberFields:
-    """All of one page, and the channel on which they tell what was typed."""
+    """All of one page."""
 
     def __init__(self, gui: viser.GuiApi, fault: Callable[[Exception], None]) -> None:
-        """Open the channel, a hidden box of text; `fault` is told what we have got wrong."""
-        self._gui, self._fault = gui, fault
+        """Listen to the page; `fault` is told what we have got wrong."""
+        self._fault = fault
         self._fields: dict[str, NumberField] = {}
-        self._last = 0
-        gui.add_html(f"<style>div:has(>.{CHANNEL}) + div {{ display: none; }}</style>{marker(CHANNEL)}")
-        self._box = gui.add_text(CHANNEL, "")
-
-        @self._box.on_update
-        async def _typed(event: Any) -> None:
-            if event.client is not None:
-                self._hear(str(event.target.value))
+        self.mailbox = Mailbox(gui, "finlabFields", SCRIPT, (str, int, str, str), self._hear, MAX_MESSAGE)
+        """Where the page tells what was typed."""
 
     def add(self, field: NumberField) -> Callable[[], None]:
         """One more; what comes back writes it, and lets go of a text in the page whose refusal is past."""
@@ -188,14 +180,13 @@ class NumberFields:
 
         def write() -> None:
             if field.refresh():
-                run_script(self._gui, f"finlabFields.drop({json.dumps(uuid)});")
+                self.mailbox.tell("drop", uuid)
 
         return write
 
     def start(self) -> None:
         """All are there: let the page's half begin."""
-        arguments = json.dumps([uuid_of(self._box), list(self._fields)])
-        run_script(self._gui, f"{SCRIPT}\nfinlabFields.start(...{arguments});")
+        self.mailbox.start(list(self._fields))
 
     def _safely(self, act: Callable[[], Answer]) -> Answer | None:
         try:
@@ -204,22 +195,7 @@ class NumberFields:
             self._fault(error)
             return None
 
-    def _hear(self, message: str) -> None:
-        """What the page has typed and not been told about yet, oldest first; it may send anything."""
-        try:
-            words = json.loads(message) if len(message) <= MAX_MESSAGE else []
-        except (ValueError, RecursionError):
-            return
-        answers: list[tuple[int, bool, str]] = []
-        for word in words if isinstance(words, list) else []:
-            if not (isinstance(word, list) and [type(part) for part in word] == [int, str, int, str, str]):
-                continue
-            number, uuid, place, how, text = word
-            if number <= self._last or uuid not in self._fields:
-                continue
-            self._last = number
-            answer = self._safely(partial(self._fields[uuid].hear, place, how, text))
-            if answer is not None:
-                answers.append((number, *answer))
-        if answers:
-            run_script(self._gui, f"finlabFields.answer({json.dumps(answers)});")
+    def _hear(self, uuid: str, place: int, how: str, text: str) -> tuple[bool, str] | None:
+        if uuid not in self._fields:
+            return None
+        return self._safely(partial(self._fields[uuid].hear, place, how, text))

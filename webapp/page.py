@@ -114,7 +114,7 @@ class Page(ABC):
         self._panels: list[Panel] = []
         self._panels, self._swim_panels = self._build()
         self.fields.start()
-        self.editables.start()
+        self.editables.mailbox.start()
         self._refresh()
         self._ask()
 

@@ -18,6 +18,7 @@ from finlab.layout.reading import MAX_BYTES
 from finlab.layout.yaml_file import yaml_text
 from finlab.physics import make_law
 from finlab.physics.table_file import write_table
+from tests.webapp.hands import move_fin
 from webapp.session import Session
 from webapp.session.companions import stored_table
 from webapp.session.design_links import ARCHIVE, FRAGMENT, MAX_LINK, PLAIN, packed, unpacked
@@ -125,7 +126,7 @@ def test_designs_that_made_room_are_kept_newest_first_and_opened_again() -> None
     for k in range(MOST + 2):
         session.new_layout()
         session.rename_robot(f"robot {k}")
-        session.move_fin("left", (0.01 * k, 0.2, 0.0))
+        move_fin(session, "left", (0.01 * k, 0.2, 0.0))
         designs.note()
     assert [one.name for one in designs.recent] == [f"robot {k}" for k in range(MOST, 0, -1)]
     again = designs_of(session, browser)

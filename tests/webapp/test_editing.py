@@ -13,6 +13,7 @@ from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from finlab.layout.body import Hull
 from finlab.layout.layout import MAX_FINS
+from tests.webapp.hands import move_fin, turn_fin
 from webapp.markup.score_card import warnings
 from webapp.scene.meshes.hull import hull_of
 from webapp.scene.meshes.mesh_file import MAX_BYTES, MAX_FACES, MeshReport, read_mesh, simplified, turned
@@ -32,15 +33,15 @@ def test_linked_twins_move_together_until_unlinked(session: Session) -> None:
     session.mirror_fin()
     assert session.state.layout.n_fins == 4, "its image stands there already"
     assert session.state.links == (("front_left", "front_right"),) and session.selected == "front_right"
-    session.move_fin("front_left", (0.2, 0.18, 0.01))
-    session.turn_fin("front_left", 0.5)
+    move_fin(session, "front_left", (0.2, 0.18, 0.01))
+    turn_fin(session, "front_left", 0.5)
     twin = session.state.layout.fins[0]
     assert twin.position == (0.2, -0.18, 0.01) and twin.mounting_angle == pytest.approx(-0.5)
     session.undo()
     session.undo()
     assert session.state.layout == load_layout(shipped_layouts()["ucat"])
     session.unlink_fin()
-    session.move_fin("front_left", (0.1, 0.2, 0.0))
+    move_fin(session, "front_left", (0.1, 0.2, 0.0))
     assert session.state.layout.fins[0].position[0] == pytest.approx(0.25753)
     with pytest.raises(FinlabError, match="not linked"):
         session.unlink_fin()
@@ -72,7 +73,7 @@ def test_ring_around_the_vertical_axis(session: Session) -> None:
 
 def test_stuck_fin_stands_off_the_surface_along_its_normal(session: Session) -> None:
     session.set_display("stick", True)
-    session.move_fin("front_left", (0.1, 0.4, 0.0))
+    move_fin(session, "front_left", (0.1, 0.4, 0.0))
     fin = session.state.layout.fins[1]
     point, normal = hull_of(session.state.layout).nearest(np.array(fin.position))
     assert np.linalg.norm(np.subtract(fin.position, point)) == pytest.approx(0.02, abs=2e-3)
@@ -207,7 +208,7 @@ def test_only_what_was_moved_snaps(session: Session) -> None:
     session.set_display("angle_snap", "45°")
     x, y, z = session.state.layout.fins[0].position
     angle = session.state.layout.fins[0].mounting_angle
-    session.move_fin("front_right", (0.262, y, z))
+    move_fin(session, "front_right", (0.262, y, z))
     assert session.state.layout.fins[0].position == (0.25, y, z)
     for k in range(4):
         session.drag_fin("front_right", (0.25, y, 0.01 * k), angle)

@@ -131,7 +131,7 @@ def test_every_widget_survives_a_fault_in_what_is_written(
             if not isinstance(handle, viser.GuiUploadButtonHandle):
                 use(server, view, handle, others(handle)[0])
         word = [[1, next(iter(view.fields._fields)), 0, "enter", "0.1"]]
-        on_loop(server, lambda: view.fields._hear(json.dumps(word)))
+        on_loop(server, lambda: view.fields.mailbox.read(json.dumps(word)))
         assert any(WORDS in note for note in faults(view))
     view.client.notes.clear()
     on_loop(server, lambda: view.do(view.session.start_over))

@@ -9,6 +9,7 @@ from websockets.sync.client import connect
 
 from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
+from tests.webapp.hands import move_fin
 from tests.webapp.stand_in import load_stand_in
 from webapp.app import App
 from webapp.guard import COOKIE, Guard, is_loopback
@@ -98,7 +99,7 @@ def test_session_survives_the_server(tmp_path: Path) -> None:
             session.toggle_failure("back_left")
             session.select("front_left")
             session.mirror_fin()
-            session.move_fin("front_left", (0.2, 0.2, 0.0))
+            move_fin(session, "front_left", (0.2, 0.2, 0.0))
             session.set_display("dark", True)
             session.undo()
             session.pin()

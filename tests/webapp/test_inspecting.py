@@ -8,6 +8,7 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import FinModelSpec, Layout, load_layout
+from tests.webapp.hands import move_fin
 from webapp.markup.fin_list import fin_list
 from webapp.markup.thrust_curves import thrust_within
 from webapp.panels.fin_inspector import differences
@@ -129,7 +130,7 @@ def test_a_locked_fin_stays_until_it_is_unlocked(session: Session) -> None:
     session.toggle_mark("locked", ["front_left", "front_right"])
     assert session.history.undo_name == "Lock 2 fins"
     for act in (
-        lambda: session.move_fin("front_left", (0.0, 0.1, 0.0)),
+        lambda: move_fin(session, "front_left", (0.0, 0.1, 0.0)),
         lambda: session.drag_fin("front_left", (0.0, 0.1, 0.0), 0.0),
         lambda: session.turn_selected(0.1),
         lambda: session.set_parameter("area", 0.05),

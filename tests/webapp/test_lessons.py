@@ -9,6 +9,7 @@ import pytest
 from finlab.allocation import Allocation, load_allocator
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
+from tests.webapp.hands import turn_fin
 from webapp.markup.first_sight import open_linked
 from webapp.markup.guide_cards import lesson_card
 from webapp.session import Session
@@ -25,7 +26,7 @@ def _answer(state: State) -> Allocation:
 
 def _turn_a_shaft(session: Session) -> None:
     name = session.state.layout.names[0]
-    session.turn_fin(name, session.state.layout.fins[0].mounting_angle + 1.2)
+    turn_fin(session, name, session.state.layout.fins[0].mounting_angle + 1.2)
 
 
 SOLVED: dict[str, Callable[[Session], object]] = {

@@ -26,7 +26,7 @@ class Boxes:
         return [self._number, uuid_of(self._fields[label].handle), place, how, text]
 
     def hear(self, *words: list[Any]) -> None:
-        on_loop(self.server, lambda: self.view.fields._hear(json.dumps(words)))
+        on_loop(self.server, lambda: self.view.fields.mailbox.read(json.dumps(words)))
 
     def type(self, label: str, text: str, how: str = "enter", place: int = 0) -> None:
         self.hear(self.word(label, text, how, place))
@@ -99,7 +99,7 @@ def test_escape_takes_back_what_rested_and_nothing_else(boxes: Boxes, view: View
 @pytest.mark.parametrize("text", ["", "[", "[1]", "[[1]]", "3", "null", "[" * 5000, "x" * (MAX_MESSAGE + 1)])
 def test_any_message_may_come(boxes: Boxes, view: View, server: viser.ViserServer, text: str) -> None:
     before = view.session.state
-    on_loop(server, lambda: view.fields._hear(text))
+    on_loop(server, lambda: view.fields.mailbox.read(text))
     boxes.hear([1e9, 2, 3, 4, 5], [True, "a", 0, "enter", "1"], boxes.word("Fx [N]", "1", "rm"))
     boxes.hear(boxes.word("Fx [N]", "1", place=7), boxes.word("Fx [N]", "1", place=-1))
     assert view.session.state == before

@@ -7,6 +7,7 @@ import pytest
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
+from tests.webapp.hands import move_fin, turn_fin
 from webapp.session import Session
 
 
@@ -67,9 +68,9 @@ def test_bad_settings_change_nothing(session: Session) -> None:
         with pytest.raises(FinlabError):
             session.set_display(key, value)
     with pytest.raises(FinlabError, match="no fin"):
-        session.move_fin("nobody", (0.0, 0.0, 0.0))
+        move_fin(session, "nobody", (0.0, 0.0, 0.0))
     with pytest.raises(FinlabError, match=r"y of"):
-        session.move_fin(session.state.layout.names[0], (0.0, math.nan, 0.0))
+        move_fin(session, session.state.layout.names[0], (0.0, math.nan, 0.0))
     assert session.state == before
 
 
@@ -106,8 +107,8 @@ def test_mirror_duplicate_add_and_selection(session: Session) -> None:
     assert added is not None
     with pytest.raises(FinlabError, match="mirror plane"):
         session.mirror_fin()
-    session.move_fin(added, (-0.1, 0.2, 0.05))
-    session.turn_fin(added, 2.0)
+    move_fin(session, added, (-0.1, 0.2, 0.05))
+    turn_fin(session, added, 2.0)
     session.mirror_fin()
     twin = session.state.layout.fins[-1]
     assert twin.position == (-0.1, -0.2, 0.05) and twin.mounting_angle == pytest.approx(-2.0)

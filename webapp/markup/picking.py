@@ -42,11 +42,19 @@ def button_colors(name: str, colors: list[tuple[str, str]]) -> str:
     return f"<style>{''.join(rules)}</style>{marker(name)}"
 
 
-def add_channel(gui: viser.GuiApi, name: str, hear: Callable[[list[str]], None]) -> None:
-    """A hidden text box behind a marker; `hear` gets the comma-separated parts of each word sent there."""
+def open_box(
+    gui: viser.GuiApi, name: str, hear: Callable[[str], None], longest: int
+) -> viser.GuiInputHandle[str]:
+    """A hidden text box behind a marker; `hear` gets each text that the page puts there, up to so long."""
     gui.add_html(f"<style>div:has(>.{name}) + div {{ display: none; }}</style>{marker(name)}")
     box = gui.add_text(name, "")
-    on_user_change(box, lambda word: hear(word.split(",")) if 0 < len(word) <= MAX_LENGTH else None)
+    on_user_change(box, lambda text: hear(text) if 0 < len(text) <= longest else None)
+    return box
+
+
+def add_channel(gui: viser.GuiApi, name: str, hear: Callable[[list[str]], None]) -> None:
+    """A hidden box; `hear` gets the comma-separated parts of each word sent there."""
+    open_box(gui, name, lambda word: hear(word.split(",")), MAX_LENGTH)
 
 
 def send(name: str, word: str) -> str:

@@ -1,10 +1,12 @@
 """What a network proposes: for each fin a disc with the forces that the samples of the mixture ask of it."""
 
 from html import escape
+from typing import NamedTuple
 
 import numpy as np
 
 from finlab.allocation.allocation import Allocation
+from finlab.allocation.solution import Candidates
 from finlab.arrays import Array
 from finlab.physics import plant_of
 from webapp.markup.answer import swatch
@@ -24,6 +26,24 @@ SAID = (
 )
 
 
+class Asked(NamedTuple):
+    """What samples ask of n fins, in the fins' own planes."""
+
+    dots: Array
+    """Forces of the K samples (K, n, 2) [N]."""
+    given: Array
+    """Those of the answer (n, 2) [N]."""
+    rim: float
+    """Force up to which a plane is drawn [N]."""
+
+
+def asked_of_fins(answer: Allocation, samples: Candidates) -> Asked:
+    """Planar forces of an answer and of its samples, and how much of the planes is drawn."""
+    plant = plant_of(answer.layout)
+    dots, given = (plant.forces(command)[..., 1:] for command in (samples.command, answer.command))
+    return Asked(dots, given, FAR * max(float(np.nanmax(np.linalg.norm(given, axis=-1))), 1e-3))
+
+
 def proposal_discs(answer: Allocation, modes: Modes) -> str:
     """One disc for each working fin; nothing for methods that draw no samples.
 
@@ -34,9 +54,7 @@ def proposal_discs(answer: Allocation, modes: Modes) -> str:
     samples = answer.samples
     if samples is None:
         return ""
-    plant = plant_of(answer.layout)
-    dots, given = (plant.forces(command)[..., 1:] for command in (samples.command, answer.command))
-    rim = FAR * max(float(np.linalg.norm(given, axis=-1).max()), 1e-3)
+    dots, given, rim = asked_of_fins(answer, samples)
     # What is beyond the rim stands on it.
     dots, given = dots / np.maximum(np.linalg.norm(dots, axis=-1, keepdims=True), rim), given / rim
     dots, given = dots * RADIUS, given * RADIUS

@@ -44,7 +44,7 @@ class LinePlot:
             widths: of the lines [px], the last one for all that follow.
             visible: whether it is shown from the start.
         """
-        self._title, self._n_lines = title, len(colors)
+        self._n_lines = len(colors)
         thick = [widths[min(k, len(widths) - 1)] for k in range(len(colors))]
         self._plot = gui.add_uplot(
             (np.array([0.0, 1.0]), *(np.full(2, np.nan) for _ in colors)),

@@ -8,9 +8,9 @@ from finlab.allocation.solution import Insight
 from finlab.arrays import Array
 from finlab.forces.envelopes import largest_forces
 from finlab.layout.arrays import layout_effectiveness
-from finlab.physics import plant_of
 from webapp.handles import Changes
-from webapp.markup.mode_plot import FAR, sample_colors
+from webapp.markup.mode_plot import sample_colors
+from webapp.markup.proposals import asked_of_fins
 from webapp.tasks.mode_names import Modes
 from webapp.tasks.solver import Proposal
 from webapp.theme import Rgb, fin_color
@@ -51,9 +51,8 @@ class ForcePlanes:
         self._nodes = []
         if answer is None or modes is None or answer.samples is None:
             return
-        layout, plant = answer.layout, plant_of(answer.layout)
-        dots, given = (plant.forces(command)[..., 1:] for command in (answer.samples.command, answer.command))
-        rim = FAR * max(float(np.nanmax(np.linalg.norm(given, axis=-1))), 1e-3)
+        layout = answer.layout
+        dots, _, rim = asked_of_fins(answer, answer.samples)
         axes = layout_effectiveness(layout)[:3].reshape(3, -1, 2)
         colors = np.array(sample_colors(modes, len(answer.samples)), dtype=np.uint8)
         largest = largest_forces(layout)

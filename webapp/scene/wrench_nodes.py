@@ -66,7 +66,7 @@ class WrenchNodes:
         self._root = scene.add_frame("/robot/wrench", show_axes=False)
         stalk = tube(np.array([[0, 0, -HEIGHT - 0.2], [0, 0, 0.0]]), 0.0025, 10)
         Shape(scene, "/robot/wrench/stalk", LIGHT.line, stalk, cast_shadow=False)
-        self._hub = scene.add_icosphere("/robot/wrench/hub", 0.012, color=(70, 78, 86), cast_shadow=False)
+        scene.add_icosphere("/robot/wrench/hub", 0.012, color=(70, 78, 86), cast_shadow=False)
 
         def node(name: str, color: tuple[int, int, int], opacity: float | None) -> Shape:
             return Shape(scene, f"/robot/wrench/{name}", color, opacity=opacity, **UNLIT)

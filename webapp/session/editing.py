@@ -42,20 +42,6 @@ class Editing(Core):
         """The layout has been saved as it is."""
         self.saved = self.state.layout
 
-    def move_fin(self, name: str, position: Vector) -> None:
-        """A fin at another place [m], snapped."""
-        self.state.check_free([name])
-        layout = layout_edits.moved(self.state.layout, name, position, self._step_m)
-        if self.display.stick:
-            layout = layout_edits.stuck(layout, name)
-        self._edit(f"Move {name}", followed(layout, self.state.links, name), f"move {name}")
-
-    def turn_fin(self, name: str, angle: float) -> None:
-        """A fin with another mounting angle [rad], snapped."""
-        self.state.check_free([name])
-        layout = layout_edits.turned(self.state.layout, name, angle, self._step_rad)
-        self._edit(f"Turn {name}", followed(layout, self.state.links, name), f"turn {name}")
-
     def drag_fin(self, name: str, position: Vector, angle: float) -> None:
         """A fin on its way in the user's hand: not snapped yet, and one step of undo for the whole drag."""
         self._drag(name, self._placed(name, position, angle, 0.0, 0.0))

@@ -148,9 +148,11 @@ class Pipeline:
         start = _Start(seeds, many and self.settings.subsets and not self.objective.convex, fallback)
         if previous is None:
             candidates = self._descend(prepared, target, start)
-            return self._trade_error_for_energy(prepared, target, candidates, None)
-        candidates = self._descend_from_previous(prepared, target, start, previous)
-        candidates = self._trade_error_for_energy(prepared, target, candidates, previous)
+            return self._trade_error_for_energy(prepared, target, candidates)
+        candidates, near = self._descend_from_previous(prepared, target, start, previous)
+        if self.settings.energy_tradeoff > 0.0:
+            near = near or within_rates(prepared, previous, self.settings.period_s)
+            candidates = self._trade_error_for_energy(near, target, candidates)
         # Arcs that pass the seam are brought back inside the fin's own limits.
         return candidates._replace(command=prepared.commands.feasible(candidates.command))
 
@@ -195,9 +197,9 @@ class Pipeline:
 
     def _descend_from_previous(
         self, prepared: Prepared, target: Array, start: _Start, previous: Array
-    ) -> RefinedCandidates:
+    ) -> tuple[RefinedCandidates, Prepared | None]:
         """Answers within what the servos allow after a previous command (n, 3): mostly the cheapest one of
-        all is among them.
+        all is among them. With them the layout within these rates, where it was needed.
 
         Where cost grows faster than force there is but one valley, and the search goes on from where the
         robot is. Otherwise the way that it moves now is kept, fins at rest turn to where they would be
@@ -208,12 +210,13 @@ class Pipeline:
             start = start._replace(seeds=force)
             free = self._descend(prepared, target, start)
             if is_within_rates(prepared, previous, free.command[0, 0], period):
-                return free
-            return self._descend(within_rates(prepared, previous, period), target, start, keep_mode=True)
+                return free, None
+            near = within_rates(prepared, previous, period)
+            return self._descend(near, target, start, keep_mode=True), near
         free = self._descend(prepared, target, start)
         if is_within_rates(prepared, previous, free.command[0, 0], period):
             # The first seed is how the robot moves now, which was not tried.
-            return free._replace(origin=np.where(free.origin < 0, -1, free.origin + 1))
+            return free._replace(origin=np.where(free.origin < 0, -1, free.origin + 1)), None
         near = within_rates(prepared, previous, period, free.command[0, 0, :, 2])
         kept = force if start.seeds.ndim == 4 else np.hypot(force[:, :, 0], force[:, :, 1])
         start = start._replace(seeds=np.concatenate([kept, start.seeds], axis=1))
@@ -222,18 +225,16 @@ class Pipeline:
             towards, fresh = near.commands.feasible(free.command[:, :1]), np.full((1, 1), -1)
             other = refine_candidates(near, target, towards, fresh, SEARCH.leaving_lm_steps)
             if other.error[0, 0] <= max(exact_error(prepared), found.error[0, 0]):
-                return found.with_first(other)
-        return found
+                return found.with_first(other), near
+        return found, near
 
     def _trade_error_for_energy(
-        self, prepared: Prepared, target: Array, candidates: RefinedCandidates, previous: Array | None
+        self, prepared: Prepared, target: Array, candidates: RefinedCandidates
     ) -> RefinedCandidates:
         """Trade error for effort, where the settings ask for the weighted sum."""
         weight, effort = self.settings.energy_tradeoff, prepared.cost
         if weight == 0.0 or not isinstance(effort, EnergyMeter):
             return candidates
-        if previous is not None:
-            prepared = within_rates(prepared, previous, self.settings.period_s)
         rows, p, n, _ = candidates.command.shape
         start = prepared.commands.feasible(candidates.command.reshape(-1, n, 3))
         found, energy = minimize_weighted_sum(
