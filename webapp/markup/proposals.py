@@ -1,7 +1,6 @@
 """What a network proposes: for each fin a disc with the forces that the samples of the mixture ask of it."""
 
 from html import escape
-from typing import NamedTuple
 
 import numpy as np
 
@@ -26,22 +25,11 @@ SAID = (
 )
 
 
-class Asked(NamedTuple):
-    """What samples ask of n fins, in the fins' own planes."""
-
-    dots: Array
-    """Forces of the K samples (K, n, 2) [N]."""
-    given: Array
-    """Those of the answer (n, 2) [N]."""
-    rim: float
-    """Force up to which a plane is drawn [N]."""
-
-
-def asked_of_fins(answer: Allocation, samples: Candidates) -> Asked:
-    """Planar forces of an answer and of its samples, and how much of the planes is drawn."""
+def asked_of_fins(answer: Allocation, samples: Candidates) -> tuple[Array, Array, float]:
+    """Forces [N] of K samples (K, n, 2) and of the answer (n, 2) in its fins' planes; the largest drawn."""
     plant = plant_of(answer.layout)
     dots, given = (plant.forces(command)[..., 1:] for command in (samples.command, answer.command))
-    return Asked(dots, given, FAR * max(float(np.nanmax(np.linalg.norm(given, axis=-1))), 1e-3))
+    return dots, given, FAR * max(float(np.nanmax(np.linalg.norm(given, axis=-1))), 1e-3)
 
 
 def proposal_discs(answer: Allocation, modes: Modes) -> str:

@@ -60,7 +60,9 @@ class CandidatesPanel:
         self._steps = gui.add_html("")
         self._sample = gui.add_html("")
         self._origin = gui.add_html("")
-        self._proposals = ProposalPanel(gui, page)
+        self._drawn = Changes()
+        with gui.add_folder("What the network proposes", expand_by_default=False) as self._proposals:
+            self._discs = gui.add_html("")
 
     def _setting(self, key: str) -> float:
         """A setting in force; what the widget shows at first while the method has none of the kind."""
@@ -86,7 +88,10 @@ class CandidatesPanel:
         way = refined.way if answering.is_refined else None
         put(self._steps, content=way_table(way, refined.at), visible=way is not None)
         put(self._sample, content=_sample_words(page))
-        self._proposals.refresh()
+        answer, modes = answering.best, answering.modes
+        put(self._proposals, visible=answer is not None and answer.samples is not None)
+        if answer is not None and self._drawn(answer, modes):
+            put(self._discs, content=proposal_discs(answer, modes))
 
 
 def _origin_words(method: str) -> str:
@@ -166,21 +171,3 @@ class ModePicker:
         if best is not None:
             plot = mode_plot(best, modes, self.shown, sample, self._height, self.name)
         put(self._plot, content=plot)
-
-
-class ProposalPanel:
-    """Widgets of one folder."""
-
-    def __init__(self, gui: viser.GuiApi, page: Page) -> None:
-        """Build it, empty."""
-        self._page, self._changes = page, Changes()
-        with gui.add_folder("What the network proposes", expand_by_default=False) as self._folder:
-            self._discs = gui.add_html("")
-
-    def refresh(self) -> None:
-        """Draw what was sampled, or hide the folder where nothing was."""
-        answering = self._page.answering
-        answer, modes = answering.best, answering.modes
-        put(self._folder, visible=answer is not None and answer.samples is not None)
-        if answer is not None and self._changes(answer, modes):
-            put(self._discs, content=proposal_discs(answer, modes))

@@ -96,6 +96,9 @@ def quaternion(angle: float, axis: int) -> Array:
 class FinNode:
     """The nodes of the fin at one place of the layout. Made once; hidden while the layout has fewer fins."""
 
+    stroke = 1.0
+    """How many times as thick and large as usual arrow and label are."""
+
     def __init__(
         self,
         scene: viser.SceneApi,
@@ -149,15 +152,7 @@ class FinNode:
         put(self._turn, active_axes=(False,) * 3)
         put(self._strut.node, visible=False)
 
-    def place(
-        self,
-        fin: Fin,
-        hull: AnyHull,
-        selected: bool,
-        label: str | None,
-        owned_by_user: bool,
-        stroke: float = 1.0,
-    ) -> None:
+    def place(self, fin: Fin, hull: AnyHull, selected: bool, label: str | None, owned_by_user: bool) -> None:
         """Show a fin.
 
         Args:
@@ -166,7 +161,6 @@ class FinNode:
             selected: whether its gizmos are shown.
             label: text at its root, None for none.
             owned_by_user: True while it is dragged; the gizmo's pose is then left alone.
-            stroke: how many times as large as usual the label is.
         """
         put(self._move, visible=True, active_axes=(selected,) * 3)
         put(self._turn, active_axes=(selected, selected, False))
@@ -174,17 +168,14 @@ class FinNode:
             put(self._move, position=np.array(fin.position))
             put(self._turn, wxyz=quaternion(fin.mounting_angle, 2))
         put(self._label, visible=label is not None, text=label or "", position=np.array([0.0, 0.0, 0.04]))
-        put(self._label, font_screen_scale=LABEL * stroke)
+        put(self._label, font_screen_scale=LABEL * self.stroke)
         shaft = np.array([math.cos(fin.mounting_angle), math.sin(fin.mounting_angle), 0.0])
         servo = np.array(fin.position) - 0.03 * shaft
         self._strut.show(_strut, servo, hull)
         put(self._strut.node, visible=True)
 
-    def command(
-        self, command: Array | None, arrow: Array, mounting_angle: float, fans: bool, stroke: float = 1.0
-    ) -> None:
-        """Show a command (3,), None for a failed fin, and its force as a body-frame arrow (3,) [m], so many
-        times as thick as usual."""
+    def command(self, command: Array | None, arrow: Array, mounting_angle: float, fans: bool) -> None:
+        """Show a command (3,), None for a failed fin, and its force as a body-frame arrow (3,) [m]."""
         alive = command is not None
         self.shapes.paint(alive)
         put(self._fan.node, visible=fans and alive)
@@ -193,7 +184,7 @@ class FinNode:
             return
         self._fan.show(fin_mesh.sweep, float(command[0]))
         put(self._fan.node, wxyz=quaternion(float(command[2]), 0))
-        self.shapes.push(arrow, mounting_angle, 0.007 * stroke)
+        self.shapes.push(arrow, mounting_angle, 0.007 * self.stroke)
 
 
 def _strut(servo: Array, hull: AnyHull) -> Mesh:

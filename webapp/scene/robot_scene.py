@@ -143,22 +143,23 @@ class RobotScene:
             self.newtons = display.newtons or fitting_newtons(_largest(state, allocation), self.newtons)
         scale = LENGTH / self.newtons
         fits = allocation is not None and allocation.layout.names == state.layout.names
+        self._wrench.stroke = display.stroke
         for i, fin in enumerate(state.layout.fins):
+            self._fins[i].stroke = display.stroke
             selected = fin.name == self._session.selected
             label = _label(state, i, fin.name in self._session.selection) if display.labels else None
             if fin.name in state.hidden:
                 self._fins[i].hide()
                 continue
             gizmos = selected and self.editing and not display.grips and fin.name not in state.locked
-            self._fins[i].place(fin, hull, gizmos, label, i == self.dragged, display.stroke)
+            self._fins[i].place(fin, hull, gizmos, label, i == self.dragged)
             if fin.name in state.failed or allocation is None:
                 self._fins[i].command(None, np.zeros(3), 0.0, False)
             elif fits and np.isfinite(allocation.command[i, 0]):
                 force = allocation.fin_forces[i]
                 # The force belongs to the answer's own mounting angle, which a drag may have left behind.
                 angle = allocation.layout.fins[i].mounting_angle
-                drawn = display.fans, display.stroke
-                self._fins[i].command(allocation.command[i], force * scale, angle, *drawn)
+                self._fins[i].command(allocation.command[i], force * scale, angle, display.fans)
         if fits and allocation is not None:
             self._flapping.take(allocation.command)
         self._proposed.show(moved_fins(offered if display.proposed else None, state.layout))
@@ -176,7 +177,7 @@ class RobotScene:
             most = float(max(np.linalg.norm(torque) for torque in torques))
             self.torque = fitting_torque(most, self.torque)
             self.cut = HALF_TURN * most / self.torque > LONGEST_TURN
-        self._wrench.refresh(target, given, missing, top, scale, HALF_TURN / self.torque, display.stroke)
+        self._wrench.refresh(target, given, missing, top, scale, HALF_TURN / self.torque)
         self.grips.refresh(display.grips, target, self._wrench.hub(top), scale)
         shown = self._session.selected if display.dimensions else None
         self._lines.refresh(state.layout, state.healthy, shown, display.graph, proposal)

@@ -204,6 +204,6 @@ class Learning(Guiding):
             self.solved = self.solved or self.lesson.done(Seen(self.state, answer, self.mode))
 
     def start_over(self) -> None:
-        """Everything as at first sight, outside any lesson."""
-        self.lesson, self.solved = None, False
+        """Everything as at first sight, outside of tour and lessons; nothing comes back."""
+        self.lesson, self.solved, self.stop, self._left = None, False, None, None
         super().start_over()

@@ -46,8 +46,3 @@ class Returning(Looking):
         self._settled()
         self.display, self.desk, self._chosen = left.display, left.desk, left.chosen
         self.mode, self.sample = left.shown
-
-    def start_over(self) -> None:
-        """Everything as at first sight; nothing was left."""
-        self._left = None
-        super().start_over()

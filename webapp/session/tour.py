@@ -129,11 +129,6 @@ class Guiding(Returning):
             self.stop = None
             self._come_back()
 
-    def start_over(self) -> None:
-        """Everything as at first sight, outside the tour."""
-        self.stop = None
-        super().start_over()
-
     def _go(self, stop: int) -> None:
         step = STEPS[stop]
         self._commit(f"Tour: {step.title}", step.state(self.state))
