@@ -30,9 +30,10 @@
     card.innerHTML = '<b></b><p></p><input readonly aria-label="link"><div class="row"><button class="primary">Copy the link</button>'
       + '<button>Close</button></div>';
     card.querySelector('b').textContent = `Share ${name}`;
-    card.querySelector('p').textContent = 'The link carries the whole design. Whoever opens it on a finlab of his own has a copy.';
+    card.querySelector('p').textContent = 'The link carries the whole design. Whoever opens it gets a copy, on a finlab of their own.';
     const box = card.querySelector('input'), [take, close] = card.querySelectorAll('button');
-    box.value = `${location.origin}${location.pathname}#${fragment}`;
+    // Without a query viser's page would take what stands behind the # for a part of its server's name.
+    box.value = `${location.origin}${location.pathname}?shared#${fragment}`;
     take.onclick = () => copy(box).then((done) => { take.textContent = done ? 'Copied' : 'Press Ctrl+C'; });
     close.onclick = () => card.remove();
     card.onkeydown = (event) => {

@@ -1,5 +1,7 @@
 """Takes the pictures of docs/: `python -m tests.browser.pictures docs`, with the shipped checkpoint.
 
+Names behind the folder choose some; `walk` takes one of each step of a designer's walk instead.
+
 Not a test: run it after the app's looks have changed, and look at every picture.
 """
 
@@ -14,8 +16,11 @@ from PIL import Image, ImageOps
 
 from tests.browser.conftest import CHROMIUM, FLAGS, Served
 from tests.browser.page import Page
+from tests.browser.walk import walk
 from tests.fit.cell import columns_of, commands, measured, soft, write
 
+WALK = "walk"
+"""What asks for the pictures of the walk."""
 SIZE = {"width": 1400, "height": 860}
 
 
@@ -238,6 +243,11 @@ def main(folder: Path, wanted: list[str], dark: bool = False) -> None:
                 page.start_over()
                 prepare(page)
                 save(page, folder / f"{name}.png")
+        if WALK in wanted:
+            page.start_over()
+            with TemporaryDirectory() as files:
+                for number, step in enumerate(walk(page, Path(files)), 1):
+                    save(page, folder / f"{WALK}-{number}-{step}.png")
         browser.close()
     app.stop()
     stop_server(server)

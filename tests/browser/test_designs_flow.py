@@ -46,7 +46,7 @@ def test_a_robot_from_nothing_goes_to_another_browser_by_a_link(
     there = browser.new_context(viewport={"width": 900, "height": 600})
     tab = there.new_page()
     before = set(served.app.views)
-    tab.goto(served.url + "#" + link.split("#")[1])
+    tab.goto(link.replace("?", "?fixedDpr=0.3&"))
 
     def others() -> list[Any]:
         return [view.session for key, view in served.app.views.items() if key not in before]

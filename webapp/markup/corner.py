@@ -60,7 +60,9 @@ def set_rows(findings: Findings | None) -> str:
         return ""
     rows = [f"{_patch(css(DELIVERED, 0.5))}<span>working fins</span>"]
     if findings.whole is not None:
-        word = "all fins" if findings.question.failed else findings.question.beside.name
+        asked = findings.question
+        other = "before" if asked.beside.name == asked.layout.name else asked.beside.name
+        word = "all fins" if asked.failed else other
         rows.append(f"{_patch(css(DEAD, 0.45))}<span>{escape(word)}</span>")
     ball = f"<svg width='44' height='12'><circle cx='22' cy='6' r='5' fill='{css(ASKED)}'/></svg>"
     unit = "N" if findings.now.kind == "force" else "N m"

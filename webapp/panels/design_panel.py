@@ -41,7 +41,7 @@ class DesignPanel:
         session, layout, designs = self._page.session, self._page.session.state.layout, self._page.designs
         designs.note()
         name = shipped_name(layout)
-        own = f"{layout.name}, {'from a file' if layout == session.saved else 'edited'}"
+        own = f"{layout.name}, {'yours' if layout == session.saved else 'edited'}"
         put(self._layouts, options=tuple(shipped()) if name else (*shipped(), own), value=name or own)
         first = layout.description.strip().split("\n")[0]
         known = {shipped_layout.description for shipped_layout in shipped().values()}

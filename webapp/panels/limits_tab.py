@@ -182,7 +182,7 @@ class ImprovePanel:
         put(self._cancel, visible=running)
         if progress is not None:
             put(self._bar, value=100.0 * progress.round / progress.n_rounds)
-        put(self._verdict, visible=found is not None)
+        put(self._verdict, visible=found is not None and found.improved)
         put(self._proposed, visible=found is not None and found.improved)
         text = ""
         if improver.error is not None:

@@ -18,15 +18,15 @@ Vector = tuple[float, float, float]
 class Editing(Core):
     """Changes of the layout."""
 
-    def open_layout(self, layout: Layout) -> None:
-        """Another layout; the target stays, damage and links are forgotten."""
+    def open_layout(self, layout: Layout, step: str = "") -> None:
+        """Another layout; the target stays, damage and links are forgotten. `step` is what undo calls it."""
         whole = replace(self.state, layout=layout, failed=(), weak=(), stuck=(), links=())
-        self._commit(f"Open {layout.name}", whole)
+        self._commit(step or f"Open {layout.name}", whole)
         self.saved = layout
 
     def new_layout(self) -> None:
         """A robot to begin with: one hull and one fin."""
-        self.open_layout(layout_edits.blank())
+        self.open_layout(layout_edits.blank(), "New design")
         self.selected = self.state.layout.names[0]
 
     def duplicate_layout(self) -> None:
