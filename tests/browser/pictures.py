@@ -116,8 +116,8 @@ def _fit(page: Page) -> None:
 
 
 def _hull(page: Page) -> None:
-    _layout(page)
-    page.tab("Hull")
+    page.tab("Design")  # with no fin selected: then the inspector is about the robot
+    page.unfold("Hull", "Unit of file")
     _scroll(page)
 
 
