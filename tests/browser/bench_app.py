@@ -159,11 +159,19 @@ def looks(options: argparse.Namespace) -> bool:
     return not other
 
 
+def soak(options: argparse.Namespace) -> bool:
+    """Eight browsers at once: each shows its own answer, and memory stays flat."""
+    from tests.browser.soak import soak
+
+    return soak(options.changes)
+
+
 PARTS: dict[str, Callable[[argparse.Namespace], bool]] = {
     "walk": walk,
     "quick": quick,
     "axe": axe,
     "looks": looks,
+    "soak": soak,
 }
 """What can be printed, by name; each says whether all was well."""
 
@@ -176,6 +184,7 @@ def main() -> int:
     parser.add_argument("--keys", type=int, default=60, help="of a run of quick")
     parser.add_argument("--runs", type=int, default=3, help="of quick")
     parser.add_argument("--actions", type=int, default=2000, help="of the walk")
+    parser.add_argument("--changes", type=int, default=10_000, help="of soak")
     parser.add_argument("--store", action="store_true", help="looks: make them anew")
     parser.add_argument("--states", nargs="*", help="looks: only these states")
     parser.add_argument("--full", help="looks: a folder that gets the pictures in full size, too")

@@ -1,22 +1,25 @@
-"""Eight browsers at once: `python -m tests.browser.soak [seconds]`, with the shipped checkpoint.
+"""Eight browsers at once, with real keys and the shipped checkpoint; `tools/bench-app soak` prints it.
 
 Not a test: it measures the machine as much as the app. It fails where pages get in each other's way, and
 prints how long they wait and whether the server grows. Without a graphics card eight 3D views are too much
 for any machine, so a page draws only so often, as one in the background would; all else of it is real.
 """
 
-import sys
 import time
 from typing import Any
 
 import numpy as np
 
-from tests.browser.conftest import CHROMIUM, FLAGS, Served
+from tests.browser.conftest import CHROMIUM, FLAGS
 from tests.browser.page import Page
 from tests.webapp.bench import memory
 
 BROWSERS = 8
+BURST = 25
+"""Keys on each page between two looks at all of them."""
 SIZE = {"width": 820, "height": 420}
+FLAT = 0.05
+"""Share by which the memory of the server may grow from one look to the last: what its pool keeps."""
 PATIENCE = 4.0
 """How much longer than for a test a page is waited for."""
 SLOW_DRAWING = """
@@ -24,6 +27,8 @@ const soon = window.requestAnimationFrame.bind(window);
 window.requestAnimationFrame = draw => window.setTimeout(() => soon(draw), 500);
 """
 """At most two frames a second."""
+HEAP = "() => performance.memory.usedJSHeapSize / 1e6"
+"""Memory of a page's scripts [MB]."""
 
 
 def nodes(app: Any) -> int:
@@ -34,65 +39,65 @@ def nodes(app: Any) -> int:
     )
 
 
-def changed(pages: list[Page], k: int) -> float:
-    """Ask something else on every page, and wait [s] until each shows its own answer."""
-    values = [round(0.1 * (1 + (k * 7 + i * 3) % 11) + 0.01 * i, 2) for i in range(len(pages))]
+def burst(pages: list[Page], wanted: list[float]) -> float:
+    """Press keys on all pages in turn, and wait [s] until each shows the answer to its own `wanted` Fy."""
+    boxes = [page.row("Fy [N]").last for page in pages]
+    for box in boxes:
+        box.click()
+    for k in range(BURST):
+        for page in pages:
+            page.page.keyboard.press("ArrowUp" if k % 5 else "ArrowDown")
     start = time.perf_counter()
-    for page, value in zip(pages, values, strict=True):
-        page.row("Fy [N]").last.fill(f"{value:g}")
-    for page, value in zip(pages, values, strict=True):
+    for i, page in enumerate(pages):
+        wanted[i] = round(wanted[i] + 0.01 * sum(1 if k % 5 else -1 for k in range(BURST)), 4)
+        if wanted[i] > 2.5:
+            wanted[i] = round(0.1 + 0.01 * i, 4)
+            boxes[i].fill(f"{wanted[i]:g}")
+            page.page.keyboard.press("Enter")
+    for page, value in zip(pages, wanted, strict=True):
         page.until(lambda page=page, value=value: page.session.state.target[1] == value, seconds=60)
         page.until(lambda page=page, value=value: f"+{value:.2f}" in page.text(".bars"), seconds=60)
-    took = time.perf_counter() - start
-    assert [page.session.state.target[1] for page in pages] == values, "pages are apart"
-    return took
+    return time.perf_counter() - start
 
 
-def main(seconds: float) -> None:
-    """Print the figures."""
+def soak(changes: int) -> bool:
+    """Print the figures; whether memory stayed flat and no page saw an error."""
     from playwright.sync_api import sync_playwright
 
-    from finlab.assets import shipped_layouts
-    from finlab.layout import load_layout
-    from webapp.app import App
-    from webapp.session import Display
-    from webapp.session.state import State
-    from webapp.session.targets import FIRST
+    from tests.browser.conftest import serving
     from webapp.tasks.solver import Solver
-    from webapp.viser_internals import start_server, stop_server
 
-    server, solver = start_server(), Solver()
-    ucat = load_layout(shipped_layouts()["ucat"])
-    solver.reply(State(ucat, target=FIRST))
-    app = App(server, solver, ucat, Display(shadows=False, frozen=True))
-    served = Served(f"http://127.0.0.1:{server.get_port()}/?fixedDpr=0.1", app, server)
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=CHROMIUM, headless=True, chromium_sandbox=False, args=FLAGS
-        )
+    with serving(Solver()) as served, sync_playwright() as playwright:
+        served.url = served.url.replace("0.3", "0.1")
+        options: dict[str, Any] = {"executable_path": CHROMIUM, "headless": True, "chromium_sandbox": False}
+        browser = playwright.chromium.launch(args=FLAGS, **options)
         pages = []
-        start = time.perf_counter()
         for _ in range(BROWSERS):  # a context is a browser profile of its own, with its own storage
             context = browser.new_context(viewport=SIZE)
             context.add_init_script(SLOW_DRAWING)
             pages.append(Page(context.new_page(), served, patience=PATIENCE))
-            print(f"browser {len(pages)} is there after {time.perf_counter() - start:.0f} s", flush=True)
-        changed(pages, 0)
-        before, megabytes = nodes(app), memory()
-        times: list[float] = []
-        end = time.perf_counter() + seconds
-        while time.perf_counter() < end:
-            times.append(changed(pages, 1 + len(times)))
+        wanted = [round(0.1 + 0.01 * i, 4) for i in range(BROWSERS)]
+        for page, value in zip(pages, wanted, strict=True):
+            page.type("Fy [N]", f"{value:g}")
+        times, seen = [], []
+        done = 0
+        while done < changes:
+            times.append(burst(pages, wanted))
+            done += BURST * BROWSERS
+            if done % 1000 == 0 or done >= changes:
+                heaps = [float(page.page.evaluate(HEAP)) for page in pages]
+                seen.append((memory(), nodes(served.app)))
+                about = (
+                    f"server {seen[-1][0]:.0f} MB, {seen[-1][1]} nodes and widgets, pages {max(heaps):.0f} MB"
+                )
+                print(f"soak: {done} changes, each page its own answer; {about}", flush=True)
         p50, p95 = np.percentile(times, [50, 95])
-        print(f"{BROWSERS} browsers, {len(times)} rounds: all pages show their own answer")
-        print(f"after {p50:.1f} s in the median, {p95:.1f} s at 95 %")
-        print(f"memory of the server: {megabytes:.0f} MB before, {memory():.0f} MB after")
-        print(f"nodes and widgets: {before} before, {nodes(app)} after")
-        print(f"errors on the pages: {sum(len(page.problems) for page in pages)}")
+        errors = sum(len(page.problems) for page in pages)
+        print(
+            f"soak: all pages show the last answer {p50:.1f} s after the keys in the median, p95 {p95:.1f} s"
+        )
+        print(f"soak: {errors} errors on the pages")
         browser.close()
-    app.stop()
-    stop_server(server)
-
-
-if __name__ == "__main__":
-    main(float(sys.argv[1]) if len(sys.argv) > 1 else 60.0)
+    grown = seen[-1][0] / seen[0][0] - 1.0
+    print(f"soak: memory of the server grew by {100 * grown:.1f} % from the first to the last look")
+    return errors == 0 and grown < FLAT
