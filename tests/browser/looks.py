@@ -110,7 +110,6 @@ STATES: dict[str, Callable[[Any], object]] = {
     "welcome": _welcome,
     "allocate": lambda page: page.tab("Allocate"),
     "failure": _failure,
-    "damage": _damage,
     "beyond": _beyond,
     "candidates": _candidates,
     "keys": _keys,
@@ -121,8 +120,9 @@ STATES: dict[str, Callable[[Any], object]] = {
     "reach": _reach,
     "simulate": lambda page: page.tab("Simulate"),
     "export": lambda page: page.tab("Export"),
+    "damage": _damage,
 }
-"""What is looked at, and what to do before it, from first sight."""
+"""What is looked at, and what to do before it, from first sight; the last one leaves a folder open."""
 
 
 def pictures(page: Any, states: Iterable[str], sizes: Any = SIZES, themes: Any = THEMES) -> Iterable[Any]:
@@ -130,6 +130,10 @@ def pictures(page: Any, states: Iterable[str], sizes: Any = SIZES, themes: Any =
     for state in states:
         page.page.set_viewport_size({"width": 1400, "height": 860})
         page.page.evaluate("document.documentElement.classList.remove('fl-first', 'fl-keys')")
+        loop = page._served.server.get_event_loop()
+        # So that what can be undone is the same whatever was done before.
+        loop.call_soon_threadsafe(page.view.do, lambda: page.session.set_target(0, 0.5))
+        page.until(lambda: page.session.state.target[0] == 0.5)
         page.start_over()
         STATES[state](page)
         for theme in themes:
@@ -149,7 +153,8 @@ def switch(page: Any, theme: str) -> None:
 
 def still(page: Any) -> Image.Image:
     """A picture of the page when it has come to rest: two in a row look the same."""
-    page.until(lambda: not page.view.busy and not page.view.analyst.busy)
+    view = page.view
+    page.until(lambda: not (view.busy or view.analyst.busy or view.ranging.busy or view.answering.searching))
     page.rest(300)
     last: list[Image.Image] = [shot(page)]
 
