@@ -153,6 +153,12 @@ def looks(options: argparse.Namespace) -> bool:
             if options.store:
                 store(look, picture)
                 note(chromium.version)
+            elif not look.path.is_file():
+                other.append(look.path.stem)
+                print(
+                    f"looks: {look.path.stem} is not stored (--store)",
+                    flush=True,
+                )
             elif tiles := differing(small(picture), stored(look)):
                 other.append(look.path.stem)
                 print(f"looks: {look.path.stem} looks different in {len(tiles)} tiles", flush=True)

@@ -23,8 +23,8 @@ SHARE = 4
 """How much smaller than the page a stored picture is, along each side."""
 TILE = 8
 """Side of the tiles in which pictures are compared [px of a stored picture]."""
-SEEN = 14.0
-"""Mean distance of the colours of a tile from which it looks another [of 255]; anti-aliasing stays below."""
+SEEN = 24.0
+"""Mean distance of the colours of a tile from which it looks another [of 255]; compression takes up to 16."""
 STILL_S = 20.0
 """Longest wait for a page that does not move any more."""
 TIMES = """() => {
