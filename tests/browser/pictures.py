@@ -15,8 +15,8 @@ from typing import Any
 from PIL import Image, ImageOps
 
 from tests.browser.conftest import CHROMIUM, FLAGS, Served
+from tests.browser.designer_walk import walk
 from tests.browser.page import Page
-from tests.browser.walk import walk
 from tests.fit.cell import columns_of, commands, measured, soft, write
 
 WALK = "walk"

@@ -120,11 +120,13 @@ class BodyInspector:
         layout, body = self._page.session.state.layout, self._body
         volume = solid_of(hull_of(layout)).volume
         water = three_digits(water_density(layout) * volume)
-        lines = [f"The hull displaces {three_digits(1000 * volume)} L, {water} kg of water."]
+        lines = [f"The hull encloses {three_digits(1000 * volume)} L, {water} kg of water."]
         if body.mass_kg is not None:
             over = self._lift() / GRAVITY - body.mass_kg
             rises = f"{'rises' if over > 0 else 'sinks'} with {three_digits(abs(over))} kg"
-            lines.append(f"It {'is neutral' if abs(over) < 5e-4 * body.mass_kg else rises}.")
+            lines.append(
+                f"By mass and buoyancy below it {'is neutral' if abs(over) < 5e-4 * body.mass_kg else rises}."
+            )
         missing = [word for key, word in KNOWN.items() if getattr(body, key) is None]
         if missing:
             lines.append(f"Not said: {', '.join(missing)}.")

@@ -1,4 +1,4 @@
-"""A designer builds a robot from nothing, and takes it home; the way is in `walk.py`."""
+"""A designer builds a robot from nothing, and takes it home; the way is in `designer_walk.py`."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,8 +8,8 @@ import pytest
 
 import finlab
 from tests.browser.conftest import serving
+from tests.browser.designer_walk import PAIRS, walk
 from tests.browser.page import Page
-from tests.browser.walk import PAIRS, walk
 from webapp.session.design_links import packed
 from webapp.tasks.solver import Solver
 
