@@ -62,6 +62,9 @@ def test_a_sweep_is_one_step_and_ends_when_someone_else_steers(
         class Ready:
             """A worker that is never busy."""
 
+            def forget(self, key: object) -> None:
+                pass
+
             def submit(self, key: object, job: Any, failed: Any) -> None:
                 job()
 
@@ -86,7 +89,7 @@ def test_a_sweep_is_one_step_and_ends_when_someone_else_steers(
             await asyncio.sleep(0.01)
         return sweep
 
-    sweep = asyncio.run(run())
+    sweep = asyncio.run(asyncio.wait_for(run(), 60.0))
     assert sweep.force.shape == (4, POINTS) and (sweep.force >= 0).all()
     session.undo()
     assert session.history.undo_name == "Sweep Fx"
