@@ -193,8 +193,7 @@ HARD_DAYS = (
         "law kept",
         water=SteadyCurrent(CURRENT),
         reason=(
-            "There what is told ahead takes 2 % more power and does not lessen the error (seeds 100 "
-            "and 101)."
+            "There what is told ahead takes 2 % more power and does not lessen the error (seeds 100 and 101)."
         ),
     ),
     HardDay(
