@@ -37,9 +37,8 @@ def robots(seed: int, per_split: int) -> list[tuple[str, Layout]]:
         seed: of what is drawn; robot k of a set depends on the set, the seed and k alone.
         per_split: robots of each drawn set.
     """
-    found = [("paper", _bare(name)) for name in PAPER_LAYOUTS] + [
-        ("shipped", _bare(name)) for name in SHIPPED
-    ]
+    found = [("paper", _bare(name)) for name in PAPER_LAYOUTS]
+    found += [("shipped", _bare(name)) for name in SHIPPED]
     for split in DRAWN:
         found += [(split, case.healthy) for case in make_split(split, per_split, 1, seed)]
     for place, (name, draw) in enumerate((("big", _big_fin), ("tiny", _tiny_fin))):

@@ -23,6 +23,14 @@ CANDIDATES, SWEEP = ("Allocate", "Candidates"), ("Allocate", "Sweep")
 FIN, BODY, HULL = ("Design", "Fin"), ("Design", "Body"), ("Design", "Hull")
 IMPROVE, SCENARIO, RUN = ("Design", "Improve"), ("Simulate", "Scenario"), ("Simulate", "Run")
 DISPLAY = ("Allocate", "Display")
+TOP, FINS, LAYOUTS = ("Allocate", "Answers"), ("Design", "Fins"), ("Design", "Designs")
+REACH, PILOT = ("Design", "Reach"), ("Allocate", "Steer by hand")
+COMPARED, ANSWERED = ("Allocate", "Comparison"), ("Allocate", "Fins")
+
+
+def always(_model: Model) -> bool:
+    """There at any time."""
+    return True
 
 
 @dataclass(frozen=True)
@@ -42,7 +50,7 @@ class Box:
     digits: int = 4
     nth: int = 0
     folder: str = ""
-    there: Callable[[Model], bool] = lambda model: True
+    there: Callable[[Model], bool] = always
 
     @property
     def unit(self) -> str:

@@ -8,12 +8,18 @@ from tests.browser.walk.boxes import (
     DAMAGE,
     DISPLAY,
     FIN,
+    FINS,
     HULL,
     IMPROVE,
+    LAYOUTS,
+    PILOT,
+    REACH,
     RUN,
     SCENARIO,
     SWEEP,
+    TOP,
     Spot,
+    always,
     selected,
 )
 from tests.browser.walk.model import Model
@@ -31,18 +37,8 @@ from webapp.session.search_request import ALL, GOAL_WORDS
 from webapp.session.state import AXIS_WORDS, KINDS, OBJECTIVES
 from webapp.session.swim_plan import ALONE, CONTROLLERS, PLANTS, SHIPPED
 
-TOP, FINS, LAYOUTS = ("Allocate", "Answers"), ("Design", "Fins"), ("Design", "Designs")
-BODY, REACH, PILOT = ("Design", "Body"), ("Design", "Reach"), ("Allocate", "Steer by hand")
-COMPARED, ANSWERED = ("Allocate", "Comparison"), ("Allocate", "Fins")
 METHODS = ("search", "mdn", "analytic", "qp", "sqp")
 """Methods that the walk asks: the others take their time."""
-
-Intent = Callable[[Model], object]
-
-
-def always(_model: Model) -> bool:
-    """There at any time."""
-    return True
 
 
 @dataclass(frozen=True)

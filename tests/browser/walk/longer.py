@@ -5,10 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from finlab.layout import load_layout
-from tests.browser.walk.boxes import IMPROVE, RUN, SWEEP
+from tests.browser.walk.boxes import IMPROVE, PILOT, RUN, SWEEP
 from webapp.panels.pilot import PADS
 
-PILOT = ("Allocate", "Steer by hand")
 MOST_FINS = 6
 """Searches and swims of robots with more take too long for a walk."""
 

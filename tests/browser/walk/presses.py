@@ -7,11 +7,18 @@ from random import Random
 from typing import Any
 
 from tests.browser.walk.boxes import (
+    ANSWERED,
+    BODY,
     CANDIDATES,
+    COMPARED,
     DAMAGE,
+    FINS,
     IMPROVE,
+    LAYOUTS,
+    REACH,
     WRENCH,
     Spot,
+    always,
     selected,
 )
 from tests.browser.walk.model import Model
@@ -20,18 +27,7 @@ from webapp.panels.fin_list import RING_SIZES, RINGS
 from webapp.session.display import DRAWN
 from webapp.session.targets import PRESETS
 
-TOP, FINS, LAYOUTS = ("Allocate", "Answers"), ("Design", "Fins"), ("Design", "Designs")
-BODY, REACH, PILOT = ("Design", "Body"), ("Design", "Reach"), ("Allocate", "Steer by hand")
-COMPARED, ANSWERED = ("Allocate", "Comparison"), ("Allocate", "Fins")
-METHODS = ("search", "mdn", "analytic", "qp", "sqp")
-"""Methods that the walk asks: the others take their time."""
-
 Intent = Callable[[Model], object]
-
-
-def always(_model: Model) -> bool:
-    """There at any time."""
-    return True
 
 
 @dataclass(frozen=True)
