@@ -57,11 +57,13 @@ def test_a_distance_is_measured_between_two_fins(page: Any) -> None:
     page.look_from_above()
     page.key("l")
     page.until(lambda: page.session.display.measure)
-    label = page.view.scenery.robot._measure._label
+    page.catch_up()  # the page listens to clicks once it has been told to
+    rule = page.view.scenery.robot._measure
+    label = rule._label
     roots = [fin.position for fin in page.session.state.layout.fins[:2]]
-    for place in roots:
+    for count, place in enumerate(roots, start=1):
         page.page.mouse.click(*page.pixel("/robot", place))
-        page.rest(300)
+        page.until(lambda count=count: len(rule._places) == count)
     page.visible("/measure/line")
     across = math.dist(*roots)
     assert (

@@ -41,7 +41,7 @@ class HullPanel:
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
-        self._page, self._chosen = page, "m"
+        self._page = page
         shapes = gui.add_dropdown("Shape", (*HULL_SHAPES, MESH), hint="For looks and for sticking.")
         page.bind(shapes, self._choose_shape, lambda: self._shape or MESH)
         ends: dict[str, Any] = {"min": (0.02,) * 3, "max": (5.0,) * 3, "step": 0.01}
@@ -87,22 +87,22 @@ class HullPanel:
 
     def _import(self, name: str, content: bytes) -> None:
         session = self._page.session
-        session.import_hull(stored_hull(name, content, self._chosen))
+        session.import_hull(stored_hull(name, content, session.mesh_unit))
         session.show_task("Design")
         session.select(None)  # so that the report is seen, wherever the file was dropped
 
     def _choose_unit(self, unit: str) -> None:
         """Another unit, for the next file and for the one that is here; a reshaped one is in metres."""
-        self._chosen = chosen(unit, "unit", UNITS)
-        hull = self._hull
+        session, hull = self._page.session, self._hull
+        session.mesh_unit = chosen(unit, "unit", UNITS)
         if hull is not None and hull.mesh is not None:
-            self._page.session.import_hull(replace(hull, scale=UNITS[self._chosen]), "Unit of the hull")
+            session.import_hull(replace(hull, scale=UNITS[unit]), "Unit of the hull")
 
     def _unit_now(self) -> str:
         """The unit of the mesh that is here, else the one for the next."""
         hull = self._hull
         scale = None if hull is None or hull.mesh is None else hull.scale
-        return next((unit for unit, factor in UNITS.items() if factor == scale), self._chosen)
+        return next((unit for unit, factor in UNITS.items() if factor == scale), self._page.session.mesh_unit)
 
     @property
     def _hull(self) -> Hull | None:
@@ -119,7 +119,7 @@ class HullPanel:
         if hull is None:
             raise FinlabError("the hull is drawn from a shape; import a mesh first")
         self._page.session.import_hull(reshaped_hull(hull, change), name)
-        self._chosen = "m"
+        self._page.session.mesh_unit = "m"
 
     def _turn(self, axis: str) -> None:
         rotation = Rotation.from_euler(axis, 90.0, degrees=True).as_matrix()

@@ -123,6 +123,8 @@ class Core:
         """What a search for a better layout is to do."""
         self.swim = SwimSettings()
         """How the robot is to swim."""
+        self.mesh_unit = "m"
+        """What 1 means in the next mesh file of a hull: key of `UNITS`."""
         self.mode = 0
         """Which of the answer's modes is shown; 0 is the best one."""
         self.sample: int | None = None
@@ -213,6 +215,7 @@ class Core:
     def start_over(self) -> None:
         """Everything as at first sight; the way here can be undone."""
         self._commit("Start over", self._first)
+        self.saved, self.mesh_unit = self._first.layout, "m"
         self.selected, self.mode, self.sample = None, 0, None
 
     def undo(self) -> str:
