@@ -61,5 +61,5 @@ def test_what_is_dropped_is_opened(page: Any, tmp_path: Path, monkeypatch: Any) 
     page.until(lambda: page.session.history.undo_name == "Import hull" and page.session.task == "Design")
     drop(page, "body", {"way.csv": b"t,x,y,z\n0,0,0,0\n10,1,0,0\n"})
     page.until(lambda: page.session.task == "Simulate" and page.view.swimming.own_path is not None)
-    assert page.page.get_by_text("File uploaded").locator("visible=true").count() == 0, "said by who opened it"
+    assert page.page.get_by_text("File uploaded").locator("visible=true").count() == 0, "its opener says it"
     assert page.problems == []
