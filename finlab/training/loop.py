@@ -99,7 +99,7 @@ def train(
     optimizer = torch.optim.Adam(model.parameters(), lr=settings.learning_rate, fused=fused)
     average = {k: v.detach().clone() for k, v in model.named_parameters()} if settings.ema else {}
     done, before = load_state(folder, model, optimizer, average, identity)
-    wrapped = nn.parallel.DistributedDataParallel(model) if dist.is_initialized() else model
+    _share_weights(model)
     log = _Log(folder / LOG_FILE, done) if first else None
     limit = math.inf if settings.seconds is None else settings.seconds
     end = min(settings.steps, stop_after or settings.steps)
@@ -118,8 +118,9 @@ def train(
         for group in optimizer.param_groups:
             group["lr"] = rate
         optimizer.zero_grad(set_to_none=True)
-        terms = terms_of_step(wrapped, step)
+        terms = terms_of_step(model, step)
         terms["loss"].backward()
+        _share_gradients(model)
         nn.utils.clip_grad_norm_(model.parameters(), CLIP)
         optimizer.step()
         if average:
@@ -152,6 +153,26 @@ def train(
 
 def _weights(model: nn.Module) -> dict[str, Tensor]:
     return {k: v.detach().clone() for k, v in model.named_parameters()}
+
+
+# PyTorch's DistributedDataParallel would do these two, but it keeps the threads of the group beyond its end, and
+# those abort the process now and then when the interpreter leaves.
+
+
+def _share_weights(model: nn.Module) -> None:
+    """Those of the first process, for all."""
+    if dist.is_initialized():
+        for values in (*model.parameters(), *model.buffers()):
+            dist.broadcast(values.data, 0)
+
+
+def _share_gradients(model: nn.Module) -> None:
+    """Their mean over all processes, in one message."""
+    if dist.is_initialized():
+        gradients = [values.grad for values in model.parameters() if values.grad is not None]
+        flat = nn.utils.parameters_to_vector(gradients)
+        dist.all_reduce(flat)
+        nn.utils.vector_to_parameters(flat / dist.get_world_size(), gradients)
 
 
 def _mean_over_processes(terms: dict[str, Tensor]) -> dict[str, float]:
