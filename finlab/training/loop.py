@@ -155,8 +155,8 @@ def _weights(model: nn.Module) -> dict[str, Tensor]:
     return {k: v.detach().clone() for k, v in model.named_parameters()}
 
 
-# PyTorch's DistributedDataParallel would do these two, but it keeps the threads of the group beyond its end, and
-# those abort the process now and then when the interpreter leaves.
+# PyTorch's DistributedDataParallel would do these two, but it keeps the threads of the group alive beyond its
+# end, and those abort the process now and then when the interpreter leaves.
 
 
 def _share_weights(model: nn.Module) -> None:
