@@ -122,10 +122,10 @@ def _apart(page: Any, one: str, other: str) -> bool:
     return bool(a["x"] + a["width"] <= b["x"] or b["x"] + b["width"] <= a["x"])
 
 
-def test_a_link_opens_a_lesson_that_sees_when_its_task_is_done(page: Any) -> None:
+def test_a_link_opens_a_lesson_that_sees_when_its_task_is_done(page: Any, served: Any) -> None:
     page.session.show_drawer("Comparison")
     mine, desk = page.session.state, page.session.desk
-    page.page.goto(f"{page.page.url.split('?')[0]}?lesson=two-ways")
+    page.page.goto(f"{served.url}&lesson=two-ways")
     page.ready()
     page.until(lambda: "One wrench, several ways" in page.text(".fl-lesson"))
     page.until(lambda: not page.view.busy and len(page.view.answering.modes.shown) > 1)
@@ -140,4 +140,8 @@ def test_a_link_opens_a_lesson_that_sees_when_its_task_is_done(page: Any) -> Non
     page.press("Close")
     page.until(lambda: not page.session.guided and page.session.state == mine)
     assert page.session.desk == desk
+    page.page.reload()
+    page.ready()
+    page.catch_up()
+    assert not page.session.guided and page.session.state == mine, "the address asks for it no more"
     assert page.problems == []
