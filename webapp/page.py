@@ -42,6 +42,8 @@ from webapp.viser_internals import limit_uploads, run_script, uuid_of
 
 CARD_REST_S = 0.35
 """How long a layout may not change before its card is worked out [s]: that takes a second."""
+PATIENCE_S = 0.025
+"""How long a change waits for its answer before the page is written without it [s]."""
 
 MAX_UPLOAD = LARGEST_BUNDLE
 """Largest file that a browser may send [bytes]; each kind of file has a limit of its own below it."""
@@ -75,6 +77,7 @@ class Page(ABC):
         self._loop = page = EventLoop(loop, self.fault)
         self._robot = _robot(session)
         self._faults: set[str] = set()
+        self._soon: asyncio.TimerHandle | None = None
         self._note: viser.NotificationHandle | None = None
         changed = self._refresh
         context = Context(client, session, solver, workers, page, self.do, changed, self.notify)
@@ -151,7 +154,10 @@ class Page(ABC):
         except Exception as error:  # the page must go on, whatever we have got wrong
             self.fault(error)
         self._ask()
-        self._refresh()
+        if refusal is None and self.busy:
+            self._refresh_soon()
+        else:
+            self._refresh()
         return refusal
 
     def on_change(self, handle: Any, act: Callable[[Any], object]) -> None:
@@ -252,7 +258,15 @@ class Page(ABC):
 
     # From the session to the page.
 
+    def _refresh_soon(self) -> None:
+        """A quick answer comes with its question: a browser takes longer to write a page twice than once."""
+        if self._soon is None:
+            self._soon = self._loop.later(PATIENCE_S, self._refresh)
+
     def _refresh(self) -> None:
+        if self._soon is not None:
+            self._soon.cancel()
+            self._soon = None
         with self.client.atomic():
             try:
                 self._take_in()

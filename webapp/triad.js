@@ -2,17 +2,17 @@
 (() => {
   if (window.finlabTriad) return;
   window.finlabTriad = true;
-  const LENGTH = 25;
-  let drawn = '';
+  const LENGTH = 25, TURN = [0, 1, 2, 4, 5, 6, 8, 9, 10];
+  let drawn = [];
   function draw() {
     requestAnimationFrame(draw);
     const svg = document.querySelector('.triad'), view = window.__viserMutable;
     const robot = view?.nodeRefFromName?.['/robot'], camera = view?.camera;
     if (!svg || !robot || !camera) return;
     const c = camera.matrixWorldInverse.elements, r = robot.matrixWorld.elements;
-    const state = [...c.slice(0, 11), ...r.slice(0, 11)].map((value) => value.toFixed(3)).join();
-    if (state === drawn && svg.dataset.drawn) return;
-    drawn = state;
+    const same = (value, k) => Math.abs(value - drawn[k]) < 1e-3;
+    if (svg.dataset.drawn && TURN.every((k) => same(c[k], k) && same(r[k], 16 + k))) return;
+    drawn = [...c, ...r];
     svg.dataset.drawn = '1';
     const arms = [...svg.querySelectorAll('.axis')];
     const depths = new Map();

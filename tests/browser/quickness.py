@@ -14,22 +14,24 @@ import numpy as np
 
 FIRST_HEARD = """
 window.addEventListener('keydown', () => {
-  window.finlabKey = [performance.now(), document.querySelector('.bars span.asked')?.innerText];
+  window.finlabKey = [performance.now(), document.querySelector('.bars span.asked')?.textContent];
 }, { capture: true });
 """
 """Runs before anything of the page's own, which keeps keys to itself."""
 WATCH = """() => {
-  const bars = (kind) => document.querySelector(`.bars span.${kind}`)?.innerText;
+  const bars = (kind) => document.querySelector(`.bars span.${kind}`)?.textContent;
   window.finlabTimes = [];
+  const painted = new MessageChannel();
+  painted.port1.onmessage = (event) => window.finlabTimes.push(performance.now() - event.data);
   window.finlabWatch ??= new MutationObserver(() => {
     const [start, before] = window.finlabKey ?? [0];
     if (!start || bars('asked') === before || bars('given') !== bars('asked')) return;
-    window.finlabTimes.push(performance.now() - start);
     window.finlabKey = null;
+    requestAnimationFrame(() => painted.port2.postMessage(start));
   });
   window.finlabWatch.observe(document.body, { childList: true, subtree: true, characterData: true });
 }"""
-"""Notes the time [ms] from a key until another wrench is asked on the page, and delivered."""
+"""Notes the time [ms] from a key until a frame with another wrench asked, and delivered, has been drawn."""
 READY = """() => document.querySelector('.fl-tasks button') && document.querySelector('.fl-status .err')
   && window.__viserMutable?.nodeRefFromName['/robot/fins/0/turn/blade'] && performance.now()"""
 """Time [ms] since the address was entered, once the panels, the robot and a first answer are there."""

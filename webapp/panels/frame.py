@@ -22,6 +22,8 @@ from webapp.session.looking import DRAWERS
 from webapp.theme import ASKED, DELIVERED, MISSING, css
 from webapp.viser_internals import run_script
 
+NAMED = files("webapp").joinpath("places.js").read_text("utf-8")
+"""Script that gives regions and sections their names, for the styles."""
 HABITS = files("webapp").joinpath("habits.js").read_text("utf-8")
 """Script that mends what viser's page does otherwise."""
 TRIAD = files("webapp").joinpath("triad.js").read_text("utf-8")
@@ -50,8 +52,8 @@ PANES = "".join(
 )
 PANES = f"<nav class='fl-panes' aria-label='Regions'>{PANES}</nav>"
 """On a narrow page one region is seen at a time; these choose it."""
-FOLDER = ".mantine-Paper-root:has(> div > div > div > div > .{})"
-"""Selector of the folder whose first element is a marker."""
+FOLDER = ".mantine-Paper-root[data-fl~={}]"
+"""Selector of the folder of a region or section."""
 
 
 class Section:
@@ -60,13 +62,20 @@ class Section:
 
     def __init__(self, gui: viser.GuiApi, page: Page, place: Place, index: int) -> None:
         """Build the panel, and take over the widgets that it binds to the session."""
-        self.place, self.marker, self._page = place, f"fl-at-{index}", page
+        self.place, self.name, self._page = place, f"at-{index}", page
         with gui.add_folder(place.title, expand_by_default=not place.folded):
-            gui.add_html(marker(f"fl-section {self.marker}"))
+            gui.add_html(marker(f"fl-section fl-{self.name}"))
             self._sentence = gui.add_html("", visible=False)
             with gui.add_folder(None) as self._folder:
                 self._panel = place.make(gui, page)
         self._bound, page.bound = page.bound, []
+
+    def is_there(self, session: Session) -> bool:
+        """Whether it belongs to what is being done."""
+        place = self.place
+        about = ("", "robot" if session.selected is None else "fins", *["guide"] * session.guided)
+        opened = place.region != DRAWER or place.title == session.drawer
+        return session.task in place.tasks and place.about in about and opened
 
     def refresh(self) -> None:
         """Write the session and the answer into it."""
@@ -91,6 +100,7 @@ class Frame:
     def __init__(self, gui: viser.GuiApi, page: Page, over: str) -> None:
         """Build everything; `over` is markup that may lie over the page for a while."""
         self._page = page
+        run_script(gui, NAMED)
         gui.add_html(f"{STYLE}{marker('fl-chrome')}{over}{PANES}")
         self._shown = gui.add_html("")
         add_channel(gui, FRAME, self._hear)
@@ -150,19 +160,12 @@ class Frame:
 def _style(sections: list[Section], session: Session) -> str:
     """Which regions are there, and which sections in them."""
     task, drawer = session.task, session.drawer
-    about = ("", "robot" if session.selected is None else "fins", *["guide"] * session.guided)
-    there = {
-        section.marker
-        for section in sections
-        if task in section.place.tasks
-        and section.place.about in about
-        and (section.place.region != DRAWER or section.place.title == drawer)
-    }
-    regions = {section.place.region for section in sections if section.marker in there}
-    gone = [FOLDER.format(section.marker) for section in sections if section.marker not in there]
-    gone += [FOLDER.format(f"fl-{region}") for region in (LEFT, RIGHT) if region not in regions]
+    there = {section.name for section in sections if section.is_there(session)}
+    regions = {section.place.region for section in sections if section.name in there}
+    gone = [FOLDER.format(section.name) for section in sections if section.name not in there]
+    gone += [FOLDER.format(region) for region in (LEFT, RIGHT) if region not in regions]
     if not DRAWERS[task]:
-        gone.append(FOLDER.format(f"fl-{DRAWER}"))
+        gone.append(FOLDER.format(DRAWER))
     counts = {
         "left": LEFT in regions,
         "right": RIGHT in regions,

@@ -49,7 +49,7 @@ class Hand:
 
     def section(self, spot: Spot) -> Any:
         """The folder of a section."""
-        return self.page.page.locator(FOLDER.format(f"fl-at-{self.index(spot)}"))
+        return self.page.page.locator(FOLDER.format(f"at-{self.index(spot)}"))
 
     def labels(self, spot: Spot, label: str) -> Any:
         """Rows of a section that are called so and seen."""
