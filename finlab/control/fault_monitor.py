@@ -145,7 +145,7 @@ class FaultMonitor:
         """What is believed now."""
         beliefs = self._beliefs
         strength, by_kind = beliefs.strength.copy(), beliefs.probability
-        probability = by_kind.sum(axis=1)
+        probability = beliefs.changed
         stuck = ~np.isnan(self._held)
         failed: tuple[str, ...] = ()
         health = None
@@ -201,8 +201,7 @@ class FaultMonitor:
         if beliefs.doubt < self.settings.threshold or not beliefs.settled:
             self._sure = 0
             return
-        by_kind = beliefs.probability
-        total = by_kind.sum(axis=1)
+        by_kind, total = beliefs.probability, beliefs.changed
         fin = int(total.argmax())
         sure = float(total[fin]) >= self.settings.threshold
         self._sure = (self._sure + 1 if fin == self._suspect else 1) if sure else 0
@@ -210,6 +209,10 @@ class FaultMonitor:
         if self._sure * self.period_s < HOLD_S - 1e-9:
             return
         kind = int(by_kind[fin].argmax())
+        both = np.where((beliefs.pairs == fin).any(axis=1), beliefs.both, 0.0)
+        if self._lost.sum() + 2 < self.layout.n_fins and both.max() > by_kind[fin, kind]:
+            self._lose_both(int(both.argmax()))
+            return
         turned = kind == len(LEVELS)
         level = float(beliefs.strength[fin]) if turned else LEVELS[kind]
         if level == 0.0 and self._lost.sum() == self.layout.n_fins - 1:
@@ -217,6 +220,12 @@ class FaultMonitor:
         beliefs.adopt(fin, kind)
         self._told[fin] = False
         self._mark(fin, level, float(other[fin]) if turned else float(self._held[fin]))
+
+    def _lose_both(self, pair: int) -> None:
+        self._beliefs.adopt_both(pair)
+        for fin in self._beliefs.pairs[pair].tolist():
+            self._told[fin] = False
+            self._mark(fin, 0.0, math.nan)
 
     def _mark(self, fin: int, strength: float, stuck: float) -> None:
         self._lost[fin] = strength < LOST_BELOW

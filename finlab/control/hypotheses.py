@@ -6,6 +6,7 @@ feeds the others.
 """
 
 import math
+from itertools import combinations
 
 import numpy as np
 
@@ -17,6 +18,8 @@ LEVELS = (0.0, 0.35, 0.7, 1.0)
 """Strengths that a fin may suddenly have."""
 LOSSES = 0.6
 """Share of all events that are losses."""
+TOGETHER = 0.1
+"""How often two given fins are lost at one moment (a cable, a collision), as a share of how often one is."""
 APART = 0.2
 """A level this near to a fin's strength is no event."""
 
@@ -32,10 +35,11 @@ MOST_MISFIT = 1e5
 
 
 class Hypotheses:
-    """What is taken for true of n fins, and beside it m beliefs about each fin, that it has just changed.
+    """What is taken for true of n fins, and beside it m beliefs about each fin, that it has just changed, and
+    one about each pair of fins, that both were lost at one moment.
 
-    They are that it has come to one of `LEVELS` of strength, and, the last one, to its other direction: a fin
-    that turned sticks, a stuck one turns again.
+    Those about a fin are that it has come to one of `LEVELS` of strength, and, the last one, to its other
+    direction: a fin that turned sticks, a stuck one turns again.
     """
 
     def __init__(self, n_fins: int, inertia: Array, settings: MonitorSettings) -> None:
@@ -46,10 +50,15 @@ class Hypotheses:
         """State z (14 + n) that is taken for true."""
         self.state[STRENGTH] = 1.0
         m = len(LEVELS) + 1
-        self._rows: Array = np.zeros((1 + n_fins * m, size))
-        self.off: Array = self._rows[1:].reshape(n_fins, m, size)
-        """How the states of the beliefs differ from it (n, m, 14 + n)."""
-        self._strengths_off: Array = np.einsum("iki->ik", self.off[:, :, STRENGTH])
+        self.pairs = np.array([*combinations(range(n_fins), 2)], dtype=int).reshape(-1, 2)
+        """Fins (p, 2) that may be lost at one moment."""
+        self._rows: Array = np.zeros((1 + n_fins * m + len(self.pairs), size))
+        self._off: Array = self._rows[1:]
+        self.off: Array = self._off[: n_fins * m].reshape(n_fins, m, size)
+        """How the states of the beliefs about one fin differ from it (n, m, 14 + n)."""
+        self.both_off: Array = self._off[n_fins * m :]
+        """The same of those about two (p, 14 + n)."""
+        self._turned_off: Array = np.einsum("ii->i", self.off[:, -1, STRENGTH])
         variance = np.zeros(size)
         variance[MOTION] = variance[TILT] = 1e-4
         variance[CURRENT], variance[TORQUE] = s.current**2, s.torque**2
@@ -66,8 +75,7 @@ class Hypotheses:
         self._sensors = np.diag([s.velocity_noise**2] * 3 + [s.rate_noise**2] * 3 + [s.tilt_noise**2] * 2)
         self._slow_sensors = self._sensors[3:, 3:].copy()
         self._most = np.full(n_fins, s.strength**2)
-        self.probability: Array = np.zeros((n_fins, m))
-        """Probability (n, m) of each belief."""
+        self._probability: Array = np.zeros(len(self._off))
         self.doubt = 0.0
         """Their sum: how likely it is that what is taken for true is not."""
         self._age_s = 0.0
@@ -79,19 +87,42 @@ class Hypotheses:
 
     def _settle(self) -> None:
         """All beliefs begin, at their prior probabilities."""
-        jump = np.append(LEVELS, 0.0) - self.strength[:, None]
-        jump[:, -1] = 0.0
-        possible = np.abs(jump) > APART
+        n, m, pairs = self.n_fins, len(LEVELS) + 1, self.pairs
+        level = np.append(LEVELS, 0.0) - self.strength[:, None]
+        level[:, -1] = 0.0
+        possible = np.abs(level) > APART
         possible[:, -1] = True
-        self._jump = jump
-        often = np.full(jump.shape[1], (1.0 - LOSSES) / (jump.shape[1] - 1))
+        often = np.full(m, (1.0 - LOSSES) / (m - 1))
         often[0] = LOSSES
-        self._rate = np.where(possible, self.settings.failures * often, 0.0)
+        single = np.where(possible, self.settings.failures * often, 0.0)
+        both = np.where(possible[pairs, 0].all(axis=1), self.settings.failures * LOSSES * TOGETHER, 0.0)
+        self._rate = np.append(single.ravel(), both)
+        self._jump: Array = np.zeros((len(self._off), n))
+        """How the strengths (n,) of the beliefs begin to differ."""
+        np.einsum("iki->ik", self._jump[: n * m].reshape(n, m, n))[:] = level
+        np.put_along_axis(self._jump[n * m :], pairs, level[pairs, 0], axis=1)
         self._any = float(self._rate.sum())
-        self.off[:] = 0.0
-        self._strengths_off[:] = jump
-        self.probability = self._rate * self.settings.doubt_s
-        self.doubt = float(self.probability.sum())
+        self._off[:] = 0.0
+        self._off[:, STRENGTH] = self._jump
+        self._probability = self._rate * self.settings.doubt_s
+        self.doubt = float(self._probability.sum())
+
+    @property
+    def probability(self) -> Array:
+        """Probability (n, m) of each belief about a fin."""
+        return self._probability[: self.off.shape[0] * self.off.shape[1]].reshape(self.off.shape[:2])
+
+    @property
+    def both(self) -> Array:
+        """Probability (p,) of each belief that two fins are lost."""
+        return self._probability[len(self._probability) - len(self.pairs) :]
+
+    @property
+    def changed(self) -> Array:
+        """Probability (n,) that something has happened to a fin, alone or with another."""
+        total: Array = self.probability.sum(axis=1)
+        np.add.at(total, self.pairs, self.both[:, None])
+        return total
 
     def feed(self, dt: float) -> Array:
         """What is taken for true may have ended just now; returns how much (n, m) of each belief is new."""
@@ -101,17 +132,17 @@ class Hypotheses:
             return np.ones_like(self.probability)
         fresh, kept = dt * (1.0 - self.doubt), 1.0 - dt / self.settings.doubt_s
         new = self._rate * fresh
-        self.probability *= kept
-        self.probability += new
+        self._probability *= kept
+        self._probability += new
         self.doubt = self.doubt * kept + self._any * fresh
-        share: Array = new / np.maximum(self.probability, 1e-300)
-        self.off *= (1.0 - share)[:, :, None]
-        self._strengths_off += share * self._jump
-        return share
+        share: Array = new / np.maximum(self._probability, 1e-300)
+        self._off *= (1.0 - share)[:, None]
+        self._off[:, STRENGTH] += share[:, None] * self._jump
+        return share[: self.off.shape[0] * self.off.shape[1]].reshape(self.off.shape[:2])
 
     def predict(self, step: Step, dt: float) -> None:
         """All beliefs over one period."""
-        turned = self.strength + self._strengths_off[:, -1]
+        turned = self.strength + self._turned_off
         forward = step.transition.T
         self.state = step.state
         self._rows[:] = self._rows @ forward
@@ -151,14 +182,14 @@ class Hypotheses:
         self._rows += correction
         left = self.covariance - seen_by.T @ (inverse @ seen_by)
         self.covariance = 0.5 * (left + left.T)  # what rounding makes uneven would grow
-        better = (0.5 * (self.distance - distance[1:])).reshape(self.probability.shape)
+        better = 0.5 * (self.distance - distance[1:])
         if besides is not None:
-            better += besides
-        best = max(0.0, *better.ravel().tolist())
-        weight = self.probability * np.exp(better - best)
-        total = sum(weight.ravel().tolist())
+            better += np.append(besides.ravel(), besides[self.pairs, 0].sum(axis=1))
+        best = max(0.0, *better.tolist())
+        weight = self._probability * np.exp(better - best)
+        total = sum(weight.tolist())
         whole = total + (1.0 - self.doubt) * math.exp(-best)
-        self.probability, self.doubt = weight / whole, total / whole
+        self._probability, self.doubt = weight / whole, total / whole
 
     @property
     def settled(self) -> bool:
@@ -180,6 +211,12 @@ class Hypotheses:
         """One belief is now taken for true, and all begin anew."""
         self.state = self.state + self.off[fin, kind]
         self._doubt(fin, self.settings.new_strength if 0 < kind < len(LEVELS) - 1 else self.settings.strength)
+
+    def adopt_both(self, pair: int) -> None:
+        """Two fins are now taken for lost, and all beliefs begin anew."""
+        self.state = self.state + self.both_off[pair]
+        for fin in self.pairs[pair].tolist():
+            self._doubt(fin, self.settings.strength)
 
     def believe(self, fin: int, strength: float) -> None:
         """Somebody knows the strength of a fin."""

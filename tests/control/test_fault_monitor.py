@@ -66,6 +66,29 @@ def test_a_lost_fin_is_found_and_no_longer_used(layout_a: Layout, analytic: Allo
     assert log.fault_probability[log.time < 12.0].max() < 0.5
 
 
+@pytest.mark.parametrize("lost", [("front_right", "back_left"), ("front_left", "back_right")])
+def test_two_fins_lost_at_one_moment_are_found(layout_a: Layout, lost: tuple[str, str]) -> None:
+    """Each alone explains as little of it as any other fin would."""
+    loop = swim(layout_a, load_allocator(), [FinFault(name, 12.0) for name in lost])
+    until(loop, 12.0)
+    assert loop.failed == ()
+    until(loop, 16.0)
+    assert loop.failed == lost
+
+
+def test_beliefs_of_pairs_are_beside_those_of_fins(layout_a: Layout) -> None:
+    beliefs = FaultMonitor(layout_a)._beliefs
+    assert beliefs.pairs.tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]
+    np.testing.assert_array_equal(beliefs.both_off[1, 14:], [-1.0, 0.0, -1.0, 0.0])
+    assert beliefs.doubt == pytest.approx(beliefs.probability.sum() + beliefs.both.sum())
+    beliefs.believe(0, 0.0)
+    assert beliefs.both[:3].max() == 0.0 < beliefs.both[3:].min(), "a lost fin is not lost again"
+    beliefs.both[3] = 0.5
+    np.testing.assert_allclose(
+        beliefs.changed - beliefs.probability.sum(axis=1), [0.0, 0.5, 0.5, 0.0], atol=1e-3
+    )
+
+
 def test_a_weak_fin_keeps_its_share(layout_a: Layout, analytic: Allocator) -> None:
     loop = swim(layout_a, analytic, [FinFault("back_left", 12.0, "weak", 0.4)])
     log = until(loop, 30.0)
@@ -150,10 +173,10 @@ def test_what_is_announced_is_told_to_the_monitor(layout_a: Layout, analytic: Al
 def test_a_single_odd_sample_decides_nothing(layout_a: Layout) -> None:
     monitor, nowhere = FaultMonitor(layout_a), np.full(4, np.nan)
     beliefs = monitor._beliefs
-    before = beliefs.probability.copy(), beliefs.doubt
+    before = beliefs._probability.copy(), beliefs.doubt
     beliefs._age_s = monitor.settings.settle_s  # long enough under way to be believed
     for sure in (True, False, True):
-        beliefs.probability, beliefs.doubt = before[0].copy(), before[1]
+        beliefs._probability, beliefs.doubt = before[0].copy(), before[1]
         if sure:
             beliefs.probability[2, 0] = beliefs.doubt = 0.99
         monitor._judge(nowhere)
