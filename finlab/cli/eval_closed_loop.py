@@ -1,6 +1,6 @@
 """`finlab eval trajectory|faults|velocity`: the paper's closed-loop experiments; and `eval monitor`."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from tyro.conf import arg
 
@@ -102,6 +102,7 @@ def monitor(
     seed: Count = 0,
     seeds: Count = 4,
     whole: Count = 0,
+    controller: Literal["tracking", "waypoint"] = "tracking",
     run: Annotated[MethodRun, arg(name="")] = RUN,
 ) -> None:
     """Lose each fin while swimming without telling the allocator; how soon and how surely a monitor finds it.
@@ -116,6 +117,7 @@ def monitor(
         seed: the first seed of times, currents and noise.
         seeds: how many; each loses every fin of every layout once, and swims once without a loss.
         whole: more seeds without a loss, for the false alarms: with four layouts ten make an hour.
+        controller: tracking, or waypoint (heads for a point ahead, as in the paper).
     """
     from finlab.cli.inputs import check_positive
     from finlab.evaluation.experiments.fault_monitoring import monitoring_rows, swim_losses
@@ -132,8 +134,10 @@ def monitor(
         range(seed, end),
         plant=plant,
         whole_seeds=range(end, end + whole),
+        controller=controller,
     )
     rows = monitoring_rows(losses)
-    about = f"{path.name} of {path.duration_s:.0f} s by {method}; plant {plant}; {seeds} seeds from {seed}."
+    about = f"{path.name} of {path.duration_s:.0f} s by {method}, {controller} controller; "
+    about += f"plant {plant}; {seeds} seeds from {seed}."
     about += f" Besides, {whole} seeds of whole swims." if whole else ""
     run.show(*monitoring_blocks(rows), about, rows=rows)

@@ -9,7 +9,7 @@ import numpy as np
 
 from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
-from finlab.control import FaultMonitor, Measurement, Verdict, WaypointController
+from finlab.control import PATH_CONTROLLERS, FaultMonitor, Measurement, Verdict
 from finlab.evaluation.experiments.closed_loop_runs import Row, absolute_error
 from finlab.evaluation.progress import progress
 from finlab.layout import Layout
@@ -83,6 +83,7 @@ def swim_losses(
     feedback: Sequence[bool] = (False, True),
     plant: str = "mean",
     whole_seeds: Sequence[int] = (),
+    controller: str = "tracking",
 ) -> list[Loss]:
     """Every fin of every layout lost once per seed, at a random time in a random current; and whole swims.
 
@@ -94,6 +95,7 @@ def swim_losses(
         feedback: without and with what servos report.
         plant: how fin forces are simulated.
         whole_seeds: of more swims without a loss, one per layout, in which false alarms are counted.
+        controller: one of `finlab.control.PATH_CONTROLLERS`.
     """
     cases = []
     for seed in (*seeds, *whole_seeds):
@@ -104,7 +106,7 @@ def swim_losses(
                 speed, heading = rng.uniform(0.0, CURRENT_M_S), rng.uniform(0.0, 2 * math.pi)
                 current = (speed * math.cos(heading), speed * math.sin(heading), 0.0)
                 cases.append((seed, layout, fin, at, current))
-    losses = []
+    losses, steer = [], PATH_CONTROLLERS[controller]
     for seed, layout, fin, at, current in progress(cases, "swim"):
         failures = [] if fin is None else [FinFault(fin, at)]
         options: dict[str, Any] = {
@@ -115,14 +117,14 @@ def swim_losses(
         }
         told = None
         if fin is not None:
-            told = ClosedLoop(layout, allocator, trajectory, WaypointController(), **options).run()
+            told = ClosedLoop(layout, allocator, trajectory, steer(layout), **options).run()
         for reports in feedback:
             monitor = TimedMonitor(layout)
             swim = ClosedLoop(
                 layout,
                 allocator,
                 trajectory,
-                WaypointController(),
+                steer(layout),
                 announced=False,
                 monitor=monitor,
                 servo_feedback=reports,

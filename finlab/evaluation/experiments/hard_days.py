@@ -245,10 +245,6 @@ HARD_DAYS = (
         ("A",),
         lost=2,
         announced=False,
-        reason=(
-            "Two losses at one moment are more than the monitor is made for, and fins that push little "
-            "are the harder to judge."
-        ),
     ),
     HardDay(
         "restricted",
