@@ -146,7 +146,7 @@ class Page(ABC):
     def attempt(self, act: Callable[[], object]) -> FinlabError | None:
         """Carry out an intent, and give back why it was refused; whoever asks says it where it belongs."""
         self._faults.clear()
-        refusal = None
+        refusal, before = None, self.session.revision
         try:
             act()
         except FinlabError as error:
@@ -154,7 +154,7 @@ class Page(ABC):
         except Exception as error:  # the page must go on, whatever we have got wrong
             self.fault(error)
         self._ask()
-        if refusal is None and self.busy:
+        if self.session.revision != before and self.busy:
             self._refresh_soon()
         else:
             self._refresh()
