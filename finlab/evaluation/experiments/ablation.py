@@ -1,7 +1,6 @@
 """The paper's ablation: one stage of its pipeline changed at a time, scored by surrogate and plant.
 
-The same five rows are run twice: refined by Adam as in the paper, and by Levenberg-Marquardt steps that take
-about as long.
+The same five rows are run twice: refined by Adam as in the paper, and by Levenberg-Marquardt steps.
 """
 
 from collections.abc import Sequence

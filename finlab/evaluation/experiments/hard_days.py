@@ -167,8 +167,8 @@ HARD_DAYS = (
         "nominal",
         PAPER_LAYOUTS,
         reason=(
-            "On A and D the pseudo-inverse takes the least power there is, within a thousandth; and a "
-            "body that got what is asked at once would still err by 0.945 of it."
+            "On A and D the pseudo-inverse takes hardly more than the least power of any exact answer, and "
+            "most of the error comes from controller and sensors, whatever method allocates."
         ),
     ),
     HardDay("damping-half", "The body is damped half as much.", "law kept", truth={"damping": 0.5}),
@@ -193,7 +193,8 @@ HARD_DAYS = (
         "law kept",
         water=SteadyCurrent(CURRENT),
         reason=(
-            "There what is told ahead takes 2 % more power and does not lessen the error (seeds 100 and 101)."
+            "There, answering the wrench that is expected takes more power than answering the present one "
+            "and does not lessen the error."
         ),
     ),
     HardDay(
@@ -220,14 +221,14 @@ HARD_DAYS = (
     HardDay("octo", "Eight fins.", "law kept", ("octo",)),
     HardDay(
         "fins-mixed",
-        "Each fin of A is of a kind of its own, known to all.",
+        "Each fin of A follows a law of its own, which all methods know.",
         "law kept",
         ("A",),
         fins="mixed",
         reason="The fins are others for each seed, which makes intervals wide.",
     ),
-    HardDay("fins-soft", "A has soft fins as measured, known to all.", "law kept", ("A",), fins="soft"),
-    HardDay("weak", "One fin gives 70 % of its thrust, and nobody knows.", "hard", ("A",), weak=0.7),
+    HardDay("fins-soft", "A has soft fins; all methods know their law.", "law kept", ("A",), fins="soft"),
+    HardDay("weak", "One fin gives 70 % of its thrust; no method is given that.", "hard", ("A",), weak=0.7),
     HardDay("lost-one", "One fin is lost half-way, announced.", "hard", ("A",), lost=1),
     HardDay(
         "lost-one-unannounced",
@@ -252,16 +253,17 @@ HARD_DAYS = (
         "hard",
         ("restricted",),
         reason=(
-            "`analytic` knows nothing of arcs, but the observer takes what is missing for a disturbance."
+            "`analytic` heeds arcs by clipping alone, but the observer takes what is missing for a "
+            "disturbance and makes up for it."
         ),
     ),
     HardDay("saturated", "The path asks for more than the fins can give.", "hard", duration_s=36.0),
     HardDay(
         "flexible",
-        "Fins have soft tips that nobody knows of.",
+        "Fins have soft tips, which no method is given.",
         "hard",
         plant="flexible",
-        reason="All methods were given another law, and miss by it what they mean to give.",
+        reason="All methods were given the law of stiff fins, so what fins give is not what they intend.",
     ),
     HardDay("wake", "Fins weaken each other by their jets.", "hard", plant="wake"),
     HardDay("inflow", "Thrust falls with speed.", "hard", plant="inflow"),

@@ -26,6 +26,11 @@ def three(value: float) -> str:
     return f"{value:.{digits}f}" if digits < 7 else f"{value:.2e}"
 
 
+def near(value: float) -> str:
+    """Three decimals where values lie near one, so that 1.000 and 1.016 differ, else as an error."""
+    return f"{value:.3f}" if 0.1 <= abs(value) < 10.0 else error(value)
+
+
 def share(value: float) -> str:
     """As a percentage, with more digits the nearer it is to 100: 48.8 %, 99.97 %, 100 %."""
     if value >= 1.0:
@@ -43,6 +48,7 @@ def change(value: float) -> str:
 
 FORMATS: dict[str, Callable[[Any], str]] = {
     "error": error,
+    "near": near,
     "three": three,
     "share": share,
     "count": "{:,}".format,

@@ -39,7 +39,7 @@ LATENCY_METHODS = ("search", "mdn", "analytic", "qp", "sqp", "multistart", "pape
 N_CANDIDATES = 64
 """Candidates of the ablation, as in the paper."""
 PAPER_SHARE = 10
-"""Method `paper`, which takes ten milliseconds per target, answers one in so many of a split."""
+"""Method `paper`, which takes tens of milliseconds per target, answers one in so many of a split."""
 SCATTER_FINS, SCATTER_TARGETS = 4, 3
 """Fins of the layout, and its targets, whose candidates are drawn before and after refinement."""
 SWIMMERS = {

@@ -62,16 +62,18 @@ def how_made_blocks(results: Results, provenance: Provenance, sizes: Sizes) -> l
         Column("commit", "commit", "code"),
         Column("settings", "settings"),
     )
-    rows = []
+    rows, hours = [], 0.0
     for job in results.plan:
         settings = ", ".join(f"{key} {value}" for key, value in job.settings.items())
         _, made = job.result(results.folder)
         rows.append({**made, "name": job.name, "settings": settings})
+        hours += made["seconds"] / 3600.0
     return [
         "## How this was made",
         f"- Command: `{provenance.command}` (size {sizes.name}, seed {provenance.seed})\n"
         f"- Commit `{provenance.commit}`, {provenance.made}\n"
-        f"- Machine: {machine}" + "".join(prints),
+        f"- Machine: {machine}\n"
+        f"- Time: {hours:.1f} hours of one core for all parts together" + "".join(prints),
         (
             "Each part is kept as a file of records, one entry per target, found by its settings and the "
             "fingerprint of the weights; a report that was stopped goes on where it was. The columns are "

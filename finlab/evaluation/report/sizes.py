@@ -6,7 +6,8 @@ from typing import Any
 Settings = dict[str, Any]
 
 SEED = 6143
-"""Of a report, unless another one is given; nothing was tried, chosen or tuned on its draws."""
+"""Of a report, unless another one is given; kept apart from those of development, as far as the section on
+what is shown says."""
 RERUN = 1000
 """Added to the seed for the rerun that stands beside the wrench tables."""
 
@@ -24,7 +25,7 @@ class Sizes:
     """`quick` or `full`."""
     of_table: dict[str, Settings]
     """Table -> settings of its jobs, as the functions of `work` take them; tables without any are left out.
-    `wrench` has the splits that the paper has, `wrench-other` the others; methods of a tenth of a second per
+    `wrench` has the splits that the paper has, `wrench-other` the others; methods of tenths of a second per
     target solve one on each layout of the former, and `wrench-slow` of the latter."""
 
     def of_split(self, *, main: bool, slow: bool) -> Settings:

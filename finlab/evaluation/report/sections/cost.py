@@ -39,11 +39,11 @@ def introduction(n_starts: int) -> tuple[Block, ...]:
         "## Cost",
         (
             f"The yardstick is the cheapest end of {n_starts} random starts of IPOPT with the wrench as a "
-            f"constraint ({2 * n_starts} of SLSQP where fins are tables), a solver that knows nothing of how "
-            f"the methods search; compared where both deliver the wrench to {TRACKED:g}, by the plant, whose "
-            "physics both sides were given. Power grows faster than force, so its optimum loads all fins and "
-            "is next to always unique; effort is the paper's proxy J_en, whose cheapest answer often lets "
-            "some fins rest. `axes`: pure axes on the layouts A, B, penta, hexa and octo, `axes-mixed`: two "
+            f"constraint ({2 * n_starts} of SLSQP where fins are tables), solvers that share nothing with "
+            f"how the methods search; compared where both deliver the wrench to {TRACKED:g}, by the plant, "
+            "whose physics both sides were given. Power grows faster than force, so its optimum mostly "
+            "loads all fins; effort is the paper's proxy J_en, whose cheapest answer often lets some fins "
+            "rest. `axes`: pure axes on the layouts A, B, penta, hexa and octo, `axes-mixed`: two "
             "or three of them together; `coincident` and `stacked`: pairs of fins at one place, or one above "
             "the other. Error by hand: the largest error of the answers that are cheaper than every start, "
             "by the drag law written out apart from the plant."

@@ -29,7 +29,7 @@ def monitoring_blocks(rows: Sequence[Row]) -> list[Block]:
         Table(COLUMNS, rows),
         (
             f"*A random moment, a steady current of up to {CURRENT_M_S:g} m/s, noisy sensors. Pushing fins "
-            f"are told to give at least {PUSHES_N:g} N from their loss until they are found, or for "
+            f"are commanded to give at least {PUSHES_N:g} N from their loss until they are found, or for "
             f"{FOUND_WITHIN_S:g} s; the others all but rest. Right fin: of all losses that were found. Per "
             "tick: processor's time of the monitor.*"
         ),

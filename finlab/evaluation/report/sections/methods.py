@@ -37,10 +37,10 @@ def method_blocks() -> list[Block]:
         "## Who knows what",
         (
             "Every answer is scored by the plant: the fins' own laws, or their tables, the same for all "
-            "methods, whatever a method believed. Three places say otherwise where they stand: the "
+            "methods, whatever a method's model says. Three places say otherwise where they stand: the "
             "ablation scores by the paper's surrogate as well, the temperature by the surrogate alone, and "
             "in the closed loop a simulated body says where the robot swam. All methods but `paper` were "
-            "given the physics that scores them, so their errors say how well they solve, not how well a "
+            "given the physics that scores them, so their errors show how well they solve, not how well a "
             "model fits a fin in the water."
         ),
         Table(columns, rows),

@@ -33,8 +33,8 @@ def network_blocks(rows: Sequence[Row], n_candidates: int) -> list[Block]:
         "## What the network buys",
         (
             "The same search answers the same targets; only where it begins differs. The search makes the "
-            "answers exact, so a network can only make them cheaper or faster, and only where there are "
-            "valleys to choose from. Robots with fins that no training saw, half of them with one random "
+            "answers exact, so a network can only make them cheaper or faster, and cheaper only where cost "
+            "has several local minima. Robots with fins that no training saw, half of them with one random "
             "model for all fins, half with one for each; every row was given the fins' own laws, which score "
             f"it. {n_candidates} seeds where there are several. Cost is compared where both deliver the "
             f"target to {TRACKED:g}; times are the processor's, of single calls."

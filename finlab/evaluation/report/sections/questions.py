@@ -16,9 +16,9 @@ def mode_blocks(
         Column("fins", "fins", "count"),
         Column("n", "targets", "count"),
         Column("truth", "ways of the starts", "three"),
-        Column("modes", "ways told", "three"),
-        Column("coverage", "of the starts', told", "share"),
-        Column("truth_coverage", "of those told, found by the starts", "share"),
+        Column("modes", "ways by explore()", "three"),
+        Column("coverage", "of the starts' ways, found by explore()", "share"),
+        Column("truth_coverage", "of explore()'s ways, found by the starts", "share"),
         Column("best_cost", f"least {objective} over the starts'", "ratio"),
         Column("distance", "energy distance", "error"),
     )
@@ -51,7 +51,7 @@ def unreachable_blocks(rows: Sequence[Row]) -> list[Block]:
         "## Out of reach",
         (
             "Method `search` under each policy, on random robots of 2 to 8 fins of the law `drag`, beside "
-            "the best that IPOPT proves possible in the fins' forces; scored by the plant. Excess: for "
+            "the best that IPOPT finds in the fins' forces; scored by the plant. Excess: for "
             "`closest`, and for the first group of `priority`, normalized error beyond the least possible; "
             "for `direction`, share of the target lacking to the largest possible. Beside: normalized wrench "
             "beside that share."
@@ -75,10 +75,11 @@ def beyond_blocks(rows: Sequence[Row]) -> list[Block]:
         "## On the boundary and beyond",
         (
             "Every method is asked for the largest wrench of a random direction, as IPOPT finds it in the "
-            "fins' forces, and for 1.2, 2 and 3 times as much, on layouts of split `id`. No method can err "
-            "less than the least possible error, which is IPOPT's too, to about 1e-5; given is what is "
-            "missed beyond that, in standard deviations of the wrenches of training, by the plant. "
-            "`search` stops a target on the boundary when it is missed by less than a hundredth."
+            "fins' forces, and for 1.2, 2 and 3 times as much, on layouts of split `id`. The least possible "
+            "error is IPOPT's, too, and exact to about 1e-5, so what is missed beyond it may be as much "
+            "below zero. Errors are in standard deviations of the wrenches that `paper` was trained on, by "
+            "the plant. `search` takes a target as delivered when its error is at most 0.01, and looks for "
+            "the nearest wrench within reach only beyond that."
         ),
         Table(columns, [method_row(row) for row in rows]),
     ]
@@ -103,12 +104,13 @@ def sequence_blocks(rows: Sequence[Row], noise: float = NOISE) -> list[Block]:
     return [
         "### Sequences with noise",
         (
-            f"The same paths with white noise on every axis, {100 * noise:g} % of the path's root mean "
-            "square, as a controller's wrenches carry it. Every method is given its previous command; `qp`, "
-            "`sqp` and `analytic` take no heed of it. Changes of amplitude, frequency and zero direction "
-            "from tick to tick, over all fins: mean and 99th percentile. `search` and `mdn` keep to the "
-            "rates of the servos and miss a few ticks for it. Late: mean error of what fins give that follow "
-            "with the lags of their servos, which jumps do not make smaller."
+            f"Smooth random paths of wrenches at {RATE:g} Hz with white noise on every axis, "
+            f"{100 * noise:g} % of the path's root mean square, as the noise of sensors makes a controller "
+            "ask for. Every method is given its previous command; `qp`, `sqp` and `analytic` ignore it. "
+            "Changes of amplitude, frequency and zero direction from tick to tick, over all fins: mean and "
+            "99th percentile. `search` and `mdn` change commands no faster than the servos' rates, and miss "
+            "part of the wrench for it (mean error). Late: mean error of what fins give that follow their "
+            "commands with the lags of their servos."
         ),
         Table(columns, [method_row(row) for row in rows]),
     ]
@@ -138,12 +140,13 @@ def steadiness_blocks(rows: Sequence[Row], objective: str = "power") -> list[Blo
     return [
         "## From tick to tick",
         (
-            f"Method `search` follows smooth random paths of wrenches at {RATE:g} Hz, with and without being "
-            f"told its previous command; it keeps {objective} least, by each layout's own fins, and the "
-            "plant scores every tick. Turn, frequency, amplitude: the largest change of any fin's command in "
-            "one tick. Forced: what any answer must turn, where the fins' forces are unique. Missed: ticks "
-            "with an error above 0.01, which the rates of the servos allow no better. Late: mean error of "
-            "what fins give that follow with the lags of their servos."
+            f"Method `search` follows smooth random paths of wrenches at {RATE:g} Hz, with and without its "
+            f"previous command as an argument; it keeps {objective} least, by each layout's own fins, and "
+            "the plant scores every tick. Turn, frequency, amplitude: the largest change of any fin's "
+            "command in one tick. Forced: what any answer must turn, where the fins' forces are unique. "
+            "Missed: ticks with an error above 0.01, since commands change no faster than the servos' rates "
+            "or a limit is in the way. Late: mean error of what fins give that follow their commands with "
+            "the lags of their servos."
         ),
         Table(columns, rows),
     ]

@@ -41,8 +41,9 @@ def robot_fit_blocks(rows: Sequence[Row], layout: str, targets: int, runs: int) 
         (
             f"Layout {layout} swam five minutes of excitation on each plant, with sensor noise, and was "
             f"fitted. {targets} wrenches of random commands are asked of the layout as drawn, of the fitted "
-            "one and of the true model, at random speeds through the water; what fins then truly give tells "
-            "the error. The true model is a layout made from the plant itself, as well as layouts can say it."
+            "one and of the true model, at random speeds through the water; the error is that of what fins "
+            "then truly give. The true model is a layout made from the plant itself, as far as a layout can "
+            "describe it."
         ),
         Table(ERRORS, rows),
         (

@@ -27,9 +27,9 @@ COMPARISONS = (
     Column("measure", "less is better"),
     Column("case", "case"),
     Column("method", "method", "code"),
-    Column("ours", "its value", "error", "our_interval"),
+    Column("ours", "its value", "near", "our_interval"),
     Column("against", "against", "code"),
-    Column("theirs", "the other's", "error", "their_interval"),
+    Column("theirs", "the other's", "near", "their_interval"),
     Column("verdict", "it"),
 )
 
@@ -42,11 +42,12 @@ def summary_blocks(tables: Tables) -> list[Block]:
         "## Who leads",
         (
             "The default method, `search`, against every other one. One leads where the intervals in which "
-            "reruns would land do not overlap; a single run has none and no verdict. Figures that the paper "
+            "reruns should land do not overlap; a single run has none and no verdict. Figures that the paper "
             "prints count as exact. Mean errors below 1e-5 say where a method stops refining, not whether "
-            "it delivers the wrench. Costs are compared with methods that keep the same cost least; watts of "
-            "hard days with pseudo-inverses that take the cheapest command of each force, which is all that "
-            "they choose. `search` needs no network and no training."
+            "it delivers the wrench. Costs of answers are compared only with methods that keep the same cost "
+            "least. The watts of the hard days are compared with two pseudo-inverses that do not: `analytic` "
+            "takes the cheapest command of each fin's force, `on-board` beats at a fixed frequency. `search` "
+            "needs no network and no training."
         ),
         Table(STANDINGS, standings(found)),
         Fold("Every comparison, with its values", (Table(COMPARISONS, found),)),

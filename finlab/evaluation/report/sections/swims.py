@@ -78,7 +78,7 @@ def day_blocks(swims: Sequence[Row]) -> list[Block]:
 
 
 def _not_won(row: Row) -> bool:
-    """Whether one of our rows does not lead in both figures; a single seed tells by its ratios alone."""
+    """Whether one of our rows does not lead in both figures; of a single seed the ratios alone count."""
     if row.get("verdict") == "":
         return bool(max(row["ate_ratio"], row["driving_w_ratio"]) >= 1.0)
     return bool(row.get("verdict", LEADS) != LEADS)

@@ -13,8 +13,8 @@ from finlab.evaluation.statistics.records import Records, join_records
 ORDER = tuple(COLOURS)
 """Methods from top to bottom."""
 SPLIT_WORDS = {
-    "id": "2 to 5 fins within 0.30 m, nominal limits, as the networks were trained on",
-    "ood": "fins out to 0.45 m, beyond what the networks were trained on",
+    "id": "2 to 5 fins within 0.30 m, nominal limits, as `paper` was trained on",
+    "ood": "fins out to 0.45 m, beyond what `paper` was trained on",
     "ood-fins": "6 to 8 fins; method `paper` was trained on 2 to 5",
     "limits": "each fin with limits of its own, a third of them with an arc of directions",
     "failure": "one or two fins lost",
@@ -64,7 +64,7 @@ def accuracy_blocks(results: Results) -> list[Block]:
             "of the wrenches that `paper` was trained on; on `fins`, `fins-mixed`, `tables`, `big` and "
             "`tiny` of the robot's own, so that it is relative to what the robot can do. The fins' own "
             "models score every method. `paper` takes every fin for one of the law `drag` with U-CAT's "
-            "numbers, so on those five splits its errors tell that it does not know the fins; all other "
+            "numbers, so on those five splits its errors show that it does not know the fins; all other "
             "methods were given them. Rerun: the mean error with another seed and fewer targets."
         ),
         Figure(
@@ -72,14 +72,15 @@ def accuracy_blocks(results: Results) -> list[Block]:
             lambda: error_distribution(
                 shown, {split: printed[split]["ours"]["err_norm_mean"] for split in shown}
             ),
-            "How large errors are: the further left and the steeper a curve falls, the better. Errors of "
-            "1e-8 are rounding. Dashes: the mean error that the paper prints for its method.",
+            "How large errors are: the further left and the steeper a curve falls, the better. Errors below "
+            "1e-8 are drawn at 1e-8. Dashes: the mean error that the paper prints for its method.",
         ),
         Figure(
             "error-by-fins",
             lambda: error_by_fins(_by_fins(results), ORDER),
             "Figure B of the paper: the error by number of working fins, splits `id` (2 to 5) and `ood-fins` "
-            "(6 to 8). Dots are means, bars reach from median to 95th percentile; 1e-8 is rounding.",
+            "(6 to 8). Dots are means, bars reach from median to 95th percentile; less than 1e-8 is drawn at "
+            "1e-8.",
         ),
     ]
     for split in results.wrench:
@@ -89,9 +90,10 @@ def accuracy_blocks(results: Results) -> list[Block]:
         title = f"Split {split}: {SPLIT_WORDS[split]}"
         blocks += [f"### {title}", table] if split in printed else [Fold(title, (table,))]
     blocks.append(
-        "*Small print below a number: where a rerun with another seed lands, 95 times of 100 (bootstrap over "
-        "layouts). ms per target: all targets of a layout are solved together; methods with a few hundred "
-        "targets or fewer solve them one by one, from 8 starts, on the first targets of each layout.*"
+        "*Small print below a number: where a rerun with another seed should land, 95 times of 100 "
+        "(bootstrap over layouts). ms per target: all targets of a layout are solved together, and other "
+        "parts of the report run beside it; `trf`, `slsqp` and `ipopt` solve the first targets of each "
+        "layout one by one, from 8 starts.*"
     )
     return blocks
 
