@@ -4,6 +4,7 @@
   if (window.finlabNames) return;
   window.finlabNames = true;
   let asked = 0;
+  document.getElementById('root').role = 'main';  // all that viser draws; it has no landmark
 
   function name() {
     asked = 0;

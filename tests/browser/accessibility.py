@@ -8,7 +8,7 @@ AXE = files("axe_playwright_python").joinpath("axe.min.js").read_text("utf-8")
 RUN = "rules => axe.run(document, { resultTypes: ['violations'], ...(rules && { runOnly: rules }) })"
 NAMED_MS = 300
 """Until what has just come to the page has got its names."""
-GRAVE = ("serious", "critical")
+GRAVE = ("moderate", "serious", "critical")
 """Impacts that are mended before anything lands."""
 
 

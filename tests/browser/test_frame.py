@@ -20,6 +20,8 @@ REGIONS = """() => {
   found.canvas = document.querySelector('canvas[data-engine]').getBoundingClientRect().toJSON();
   return found;
 }"""
+WORDS = """() => Object.fromEntries(['canvas[data-engine]', '.fl-camera', '.fl-corner'].map((name) =>
+  [name, document.querySelector(name).getBoundingClientRect().toJSON()]))"""
 SMALL = """() => {
   const found = new Set(), walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   for (let text; (text = walk.nextNode()); ) {
@@ -86,6 +88,45 @@ def test_nothing_lies_over_anything_else(resized: Any, size: tuple[int, int]) ->
             assert page.page.evaluate(SMALL) == [], f"type of 13 px at least, in {name}"
             assert page.page.evaluate(WIDE) == [], f"nothing is cut off in {name} at {width} x {height}"
     assert page.problems == []
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (900, 700)], ids=lambda size: f"{size[0]}x{size[1]}")
+def test_no_words_lie_over_the_robot_in_a_small_view(resized: Any, size: tuple[int, int]) -> None:
+    page, (width, height) = resized, size
+    page.page.set_viewport_size({"width": width, "height": height})
+    for task in TASKS:
+        page.tab(task)
+        page.rest(300)
+        assert overlaps(page.page.evaluate(WORDS)) == [], task
+    page.tab("Allocate")
+    page.unfold("Display", "Dark")
+    shown = page.page.locator("label:visible", has_text="Dark").bounding_box()
+    assert shown["y"] > page.page.evaluate(WORDS)["canvas[data-engine]"]["top"], "it folds out over the view"
+    page.tab("Display")
+    page.until(lambda: page.page.locator("label:visible", has_text="Dark").count() == 0)
+
+
+def test_what_plays_the_refinement_is_seen_whole_at_once(resized: Any) -> None:
+    page = resized
+    page.page.set_viewport_size({"width": 1280, "height": 720})
+    page.until(lambda: not page.view.busy and len(page.view.answering.modes.shown) > 1)
+    box = page.page.get_by_role("button", name="Play the refinement").bounding_box()
+    drawer = page.page.evaluate(REGIONS)["drawer"]
+    assert drawer["top"] < box["y"] and box["y"] + box["height"] < drawer["bottom"]
+
+
+def test_the_drawer_is_low_until_a_robot_swims(page: Any) -> None:
+    def height() -> float:
+        return float(page.page.evaluate(REGIONS)["drawer"]["height"])
+
+    tall = height()
+    page.tab("Simulate")
+    page.until(lambda: height() < 120)
+    assert "Once a swim is started" in page.text(".fl-unswum")
+    page.press("Start")
+    page.until(lambda: height() == tall)
+    page.press("End")
+    page.until(lambda: height() < 120)
 
 
 def test_a_step_that_is_cut_in_the_bar_is_told_whole(page: Any) -> None:

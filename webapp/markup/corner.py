@@ -32,11 +32,16 @@ def legend(newtons: float, torque: float, cut: bool, also: tuple[str, ...]) -> s
     """
     # By name, so that the dark theme can lighten them.
     rows = [f"{_arrow(f'var(--fl-{word})', alpha)}<span>{word}</span>" for word, alpha in ARROWS]
-    ring = f"ring {math.degrees(HALF_TURN):.0f}° = {torque:g} N m{', cut off' if cut else ''}"
+    ring = f"<i>ring </i>{math.degrees(HALF_TURN):.0f}° = {torque:g} N m{', cut off' if cut else ''}"
     return (
         f"<div class='fl-legend'>{''.join(rows)}{''.join(also)}</div><div class='dim scales'>"
-        f"arrow 0.1 m = {newtons:g} N<br>{ring}</div>"
+        f"<span>{_length(newtons)}</span><span>{ring}</span></div>"
     )
+
+
+def _length(newtons: float) -> str:
+    """What the length of an arrow says; where there is little room, without the word in it."""
+    return f"<i>arrow </i>0.1 m = {newtons:g} N"
 
 
 def overlay_row(other: Allocation | None, dark: bool) -> str:
@@ -163,7 +168,7 @@ def swim_corner(swimming: Swimming, newtons: float) -> str:
         f"<span><span class='dim'>power</span> <b>{power}</b> W</span>",
         f"<span>{pace_words(swimming)}</span>",
     ]
-    scale = f"<div class='dim scales'>arrow 0.1 m = {newtons:g} N</div>"
+    scale = f"<div class='dim scales'><span>{_length(newtons)}</span></div>"
     return _cards(f"<div class='fl-legend'>{trails}</div>{scale}", parts)
 
 

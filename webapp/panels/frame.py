@@ -15,7 +15,7 @@ from webapp.handles import put
 from webapp.markup.first_sight import FRAME, open_linked, tell
 from webapp.markup.picking import add_channel, marker
 from webapp.page import Page, Panel
-from webapp.panels.places import DRAWER, LEFT, PLACES, REGIONS, RIGHT, Place
+from webapp.panels.places import DRAWER, LEFT, PLACES, REGIONS, RIGHT, SIMULATE, Place
 from webapp.panels.status import Corner
 from webapp.session import Session
 from webapp.session.looking import DRAWERS
@@ -46,12 +46,18 @@ STYLE = f"<style>{_VARIABLES}{_sheet('style.css')}{_sheet('frame.css')}{_MEDIA}{
 _NESTED = NARROW.replace(":root", "&") + _sheet("large.css")
 LARGE = f"@media (min-width: 1000px) {{ :root {{ {_NESTED} }} }}"
 """Rules of the presenter's view, which has little room for much type."""
+_SMALL = ("(max-width: 1340px)", "(max-height: 780px)")
+_SMALL_VIEW = ", ".join(f"(min-width: 720px) and {side}" for side in _SMALL)
+COMPACT = f"@media {_SMALL_VIEW} {{ :root {{ {_sheet('compact.css')} }} }}"
+"""Rules of a page with a small view."""
 PANES = "".join(
     f"<button class='to-{region}' onclick='finlabFrame.pane(\"{region}\")'>{word}</button>"
     for region, word in ((LEFT, "Fins"), (RIGHT, "Settings"), (DRAWER, "Plots"))
 )
 PANES = f"<nav class='fl-panes' aria-label='Regions'>{PANES}</nav>"
 """On a narrow page one region is seen at a time; these choose it."""
+LOW = ":root { --tall: calc(var(--z) * 92px); }"
+"""Height of a drawer in which nothing but a sentence stands."""
 FOLDER = ".mantine-Paper-root[data-fl~={}]"
 """Selector of the folder of a region or section."""
 
@@ -128,11 +134,12 @@ class Frame:
     def refresh(self) -> None:
         """Show what belongs to the task."""
         session = self._page.session
-        put(self._shown, content=_style(self._sections, session))
+        plots = session.task != SIMULATE or bool(self._page.swimming.swimmers)
+        put(self._shown, content=_style(self._sections, session, plots))
         assert self._strip is not None
         put(
             self._strip,
-            content=_strip(session.task, session.desk.opened[session.task], session.desk.folded),
+            content=_strip(session.task, session.desk.opened[session.task], session.desk.folded, plots),
         )
 
     def _hear(self, word: list[str]) -> None:
@@ -157,8 +164,8 @@ class Frame:
             self._page.do(lambda: acts[word[0]](word[1]))
 
 
-def _style(sections: list[Section], session: Session) -> str:
-    """Which regions are there, and which sections in them."""
+def _style(sections: list[Section], session: Session, plots: bool) -> str:
+    """Which regions are there, and which sections in them; the drawer is low until there are plots in it."""
     task, drawer = session.task, session.drawer
     there = {section.name for section in sections if section.is_there(session)}
     regions = {section.place.region for section in sections if section.name in there}
@@ -174,13 +181,14 @@ def _style(sections: list[Section], session: Session) -> str:
         "guide": session.guided,
     }
     variables = "".join(f"--has-{name}: {int(there)};" for name, there in counts.items())
-    large = LARGE if session.display.large else ""
+    size = LARGE if session.display.large else COMPACT
+    low = "" if plots else LOW
     hidden = f"{', '.join(gone)} {{ display: none !important; }}"
-    return f"<style>:root {{ {variables} }} {large} {hidden}</style>"
+    return f"<style>:root {{ {variables} }} {size} {low} {hidden}</style>"
 
 
-def _strip(task: str, opened: str, folded: bool) -> str:
-    """The upper edge of the drawer: its handle, its tabs, and the button that folds it."""
+def _strip(task: str, opened: str, folded: bool, plots: bool) -> str:
+    """The upper edge of the drawer: its handle, unless it is low, its tabs, and the button that folds it."""
     tabs = "".join(
         f"<button aria-pressed='{str(name == opened and not folded).lower()}' "
         f'onclick="{tell(f"drawer,{name}")}">{escape(name)}</button>'
@@ -191,5 +199,6 @@ def _strip(task: str, opened: str, folded: bool) -> str:
         f"<button class='fold' aria-label='{word}' title='{word}' "
         f'onclick="{tell("fold,")}">{"▴" if folded else "▾"}</button>'
     )
-    handle = "" if folded else "<div class='fl-handle' title='drag to make the drawer taller'></div>"
+    tall = plots and not folded
+    handle = "<div class='fl-handle' title='drag to make the drawer taller'></div>" if tall else ""
     return f"{handle}<nav class='fl-strip' aria-label='Drawer'>{tabs}{fold}</nav>"

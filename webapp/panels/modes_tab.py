@@ -38,27 +38,29 @@ class CandidatesPanel:
         weight = "How much effort counts in the ranking."
         session = page.session
         self._picker = ModePicker(gui, page, 176, "fl-modes")
-        self._table = gui.add_html("")
-        self._settings = {
-            key: page.bind_number(
-                gui.add_slider(label, ends[0], ends[1], step, DRAWN[key], hint=hint),
-                partial(session.set_setting, key),
-                partial(self._setting, key),
-                digits,
-            )
-            for key, label, ends, step, digits, hint in (
-                ("n_candidates", "Candidates K", CANDIDATE_RANGE, 1.0, 0, count),
-                ("temperature", "Temperature T", TEMPERATURE_RANGE, 0.01, 4, stray),
-                ("gamma", "Effort weight γ", GAMMA_RANGE, 0.005, 4, weight),
-            )
-        }
         hint = "From where it began to the mode that is shown, step by step."
+        gui.add_html(marker("fl-column"))
         self._play = page.add_button(
             "Play the refinement", page.answering.play, icon=viser.Icon.PLAYER_PLAY, hint=hint
         )
+        self._table = gui.add_html("")
         add_channel(gui, STEPS, self._show_step)
         self._steps = gui.add_html("")
         self._sample = gui.add_html("")
+        with gui.add_folder("Draws from the mixture") as self._draws:
+            self._settings = {
+                key: page.bind_number(
+                    gui.add_slider(label, ends[0], ends[1], step, DRAWN[key], hint=hint),
+                    partial(session.set_setting, key),
+                    partial(self._setting, key),
+                    digits,
+                )
+                for key, label, ends, step, digits, hint in (
+                    ("n_candidates", "Candidates K", CANDIDATE_RANGE, 1.0, 0, count),
+                    ("temperature", "Temperature T", TEMPERATURE_RANGE, 0.01, 4, stray),
+                    ("gamma", "Effort weight γ", GAMMA_RANGE, 0.005, 4, weight),
+                )
+            }
         self._origin = gui.add_html("")
         self._drawn = Changes()
         with gui.add_folder("What the network proposes", expand_by_default=False) as self._proposals:
@@ -77,6 +79,7 @@ class CandidatesPanel:
         page, state = self._page, self._page.session.state
         put(self._origin, content=f"<div class='fl dim'>{_origin_words(state.method)}</div>")
         drawing = state.drawing
+        put(self._draws, visible=bool(drawing))
         for key, widget in self._settings.items():
             put(widget, visible=key in drawing)
         put(self._play, visible=bool(page.answering.modes.shown))

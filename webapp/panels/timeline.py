@@ -27,6 +27,11 @@ STEPS = (5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 90.0, 120.0, 180.0, 240.0)
 """Where the axes of time may end [s]."""
 CERTAIN = 114.0
 """End of the axis of probabilities [%]: some room above what is certain."""
+UNSWUM = (
+    "Once a swim is started, its distance from the path, power, wrench, fin forces and what is found broken "
+    "are plotted here over time."
+)
+"""What is said before."""
 CURSOR = "rgba(120,130,140,.9)"
 """Colour of the moment that is looked at."""
 SMOOTH = 1.0
@@ -40,7 +45,7 @@ class Timeline:
         """Build the widgets."""
         self._page, swimming = page, page.swimming
         gui.add_html(marker("fl-timeline"))
-        self._none = gui.add_html("<div class='fl dim'>Start a swim, and its plots stand here.</div>")
+        self._none = gui.add_html(f"<div class='fl dim fl-unswum'>{UNSWUM}</div>")
         hint = "Hold the swim, and look at any moment of it again."
         self._slider = page.bind_number(
             gui.add_slider("At [s]", 0.0, 90.0, 0.1, 0.0, hint=hint),

@@ -39,7 +39,7 @@ class RobotBar:
         layout = session.state.layout
         changed = "" if layout == session.saved else "<span class='dim'>edited</span>"
         name = escape(layout.name)
-        put(self._name, content=f"<div class='fl-robot' title='{name}'><b>{name}</b>{changed}</div>")
+        put(self._name, content=f"<div class='fl-robot' title='{name}'><h1>{name}</h1>{changed}</div>")
 
 
 class FileBar:

@@ -31,7 +31,7 @@ from webapp.tasks.solver import Proposal
 from webapp.theme import ASKED, DELIVERED, HALF_TURN
 
 CAMERAS = {
-    "3D": (0.48, 0.46, 0.58),
+    "3D": (0.42, 0.40, 0.51),
     "Top": (-0.001, 0.0, 1.35),
     "Side": (0.0, -1.3, 0.1),
     "Front": (1.3, 0.0, 0.1),
