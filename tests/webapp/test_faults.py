@@ -161,7 +161,7 @@ def test_no_figure_of_the_robot_before_stays(
         shown = tab.figures()
         told = " ".join([*shown, *tab.client.notes])
         assert WORDS in told or "cannot be analysed" in told
-        assert "<b>B</b>" in told or "shown of B" in told
+        assert "<h1>B</h1>" in told or "shown of B" in told
         fresh = Tab(workers, OPENED)
         assert shown == fresh.figures()
         assert tab.nodes() == fresh.nodes()

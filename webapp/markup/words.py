@@ -29,7 +29,9 @@ def fins_words(numbers: Sequence[int]) -> str:
 
 
 def small(value: float) -> str:
-    """A number of any size that never changes its width: `3.10e−05`."""
+    """A number that is small when all is well: `3.10e−05`, and `16.2` where it is not."""
+    if 0.1 <= abs(value) < 1e4:
+        return three_digits(value)
     return f"{value:.2e}".replace("-", "−") if math.isfinite(value) else "–"
 
 
