@@ -46,8 +46,8 @@ def scope_blocks(seed: int) -> list[Block]:
         "same kind as those here, and checked on seeds 2026 to 2030. Their constants are in the code, one "
         f"set for all layouts. Seed {SEED}, with which a report begins unless another one is given, was kept "
         "apart, with one exception: first runs of the hard days on it showed that `search` took more power "
-        "in a current, and that two fins lost at one moment were not found. The controller's look-ahead and the "
-        "monitor were then changed, by runs on seeds 100 and 101, and those days were run again.",
+        "in a current, and that two fins lost at one moment were not found. The controller's look-ahead and "
+        "the monitor were then changed, by runs on seeds 100 and 101, and those days were run again.",
         "**`paper`** was trained on random layouts of 2 to 5 fins of the law `drag`, and its settings were "
         "chosen on such layouts; its checkpoint's card says what was printed and what was done.",
         "**Baselines** run as strong as we could make them: `sqp` and `multistart` keep the same cost least "
