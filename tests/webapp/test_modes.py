@@ -111,7 +111,8 @@ def test_real_candidates_are_drawn_and_listed() -> None:
 
 
 def test_figures_keep_their_width() -> None:
-    assert {len(small(v)) for v in (0.0, 3.1e-5, 1.2345, 99.0)} == {8}
+    assert {len(small(v)) for v in (0.0, 3.1e-5, 0.099, 2e5)} == {8}
+    assert [small(v) for v in (0.1, 1.2345, 16.24, 9999.0)] == ["0.100", "1.23", "16.2", "9999"]
     assert [three_digits(v) for v in (2.319, 0.041, 0.09996, 0.0)] == ["2.32", "0.0410", "0.100", "0.00"]
     assert three_digits(float("nan")) == small(float("nan")) == "–"
     assert "−" in small(1e-5) and "-" not in three_digits(-2e-9)
