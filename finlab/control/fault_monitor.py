@@ -222,6 +222,7 @@ class FaultMonitor:
         self._mark(fin, level, float(other[fin]) if turned else float(self._held[fin]))
 
     def _lose_both(self, pair: int) -> None:
+        """Two fins are lost at one moment."""
         self._beliefs.adopt_both(pair)
         for fin in self._beliefs.pairs[pair].tolist():
             self._told[fin] = False

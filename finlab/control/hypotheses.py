@@ -54,9 +54,9 @@ class Hypotheses:
         """Fins (p, 2) that may be lost at one moment."""
         self._rows: Array = np.zeros((1 + n_fins * m + len(self.pairs), size))
         self._off: Array = self._rows[1:]
-        self.off: Array = self._off[: n_fins * m].reshape(n_fins, m, size)
+        self.off: Array = self._of_fins(self._off)
         """How the states of the beliefs about one fin differ from it (n, m, 14 + n)."""
-        self.both_off: Array = self._off[n_fins * m :]
+        self.both_off: Array = self._of_pairs(self._off)
         """The same of those about two (p, 14 + n)."""
         self._turned_off: Array = np.einsum("ii->i", self.off[:, -1, STRENGTH])
         variance = np.zeros(size)
@@ -87,7 +87,7 @@ class Hypotheses:
 
     def _settle(self) -> None:
         """All beliefs begin, at their prior probabilities."""
-        n, m, pairs = self.n_fins, len(LEVELS) + 1, self.pairs
+        pairs, m = self.pairs, len(LEVELS) + 1
         level = np.append(LEVELS, 0.0) - self.strength[:, None]
         level[:, -1] = 0.0
         possible = np.abs(level) > APART
@@ -97,25 +97,33 @@ class Hypotheses:
         single = np.where(possible, self.settings.failures * often, 0.0)
         both = np.where(possible[pairs, 0].all(axis=1), self.settings.failures * LOSSES * TOGETHER, 0.0)
         self._rate = np.append(single.ravel(), both)
-        self._jump: Array = np.zeros((len(self._off), n))
+        self._jump: Array = np.zeros((len(self._off), self.n_fins))
         """How the strengths (n,) of the beliefs begin to differ."""
-        np.einsum("iki->ik", self._jump[: n * m].reshape(n, m, n))[:] = level
-        np.put_along_axis(self._jump[n * m :], pairs, level[pairs, 0], axis=1)
+        np.einsum("iki->ik", self._of_fins(self._jump))[:] = level
+        np.put_along_axis(self._of_pairs(self._jump), pairs, level[pairs, 0], axis=1)
         self._any = float(self._rate.sum())
         self._off[:] = 0.0
         self._off[:, STRENGTH] = self._jump
         self._probability = self._rate * self.settings.doubt_s
         self.doubt = float(self._probability.sum())
 
+    def _of_fins(self, values: Array) -> Array:
+        """The part (n, m, ...) that is about single fins of what there is for each belief (n m + p, ...)."""
+        return values[: len(values) - len(self.pairs)].reshape(self.n_fins, -1, *values.shape[1:])
+
+    def _of_pairs(self, values: Array) -> Array:
+        """The part (p, ...) that is about pairs."""
+        return values[len(values) - len(self.pairs) :]
+
     @property
     def probability(self) -> Array:
         """Probability (n, m) of each belief about a fin."""
-        return self._probability[: self.off.shape[0] * self.off.shape[1]].reshape(self.off.shape[:2])
+        return self._of_fins(self._probability)
 
     @property
     def both(self) -> Array:
         """Probability (p,) of each belief that two fins are lost."""
-        return self._probability[len(self._probability) - len(self.pairs) :]
+        return self._of_pairs(self._probability)
 
     @property
     def changed(self) -> Array:
@@ -138,7 +146,7 @@ class Hypotheses:
         share: Array = new / np.maximum(self._probability, 1e-300)
         self._off *= (1.0 - share)[:, None]
         self._off[:, STRENGTH] += share[:, None] * self._jump
-        return share[: self.off.shape[0] * self.off.shape[1]].reshape(self.off.shape[:2])
+        return self._of_fins(share)
 
     def predict(self, step: Step, dt: float) -> None:
         """All beliefs over one period."""
