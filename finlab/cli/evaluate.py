@@ -94,8 +94,9 @@ def report(
         records: folder for the records; DIR/records by default.
         processes: parts that run at once; the number of cores by default.
         sections: run only some: wrench, cost, network, modes, unreachable, beyond, steadiness, sequences,
-            latency, closed-loop, hard-days, ablation, temperature, training; the
-            page shows what is there of all.
+            latency, closed-loop, hard-days, slow-days (the hard days with sqp, multistart and paper: five
+            hours of the processor, no part of all), ablation, temperature, training; the page shows what is
+            there of all.
         as_is: do no work; make the page from what is there.
     """
     from finlab.evaluation.method_specs import Checkpoints

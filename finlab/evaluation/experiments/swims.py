@@ -176,6 +176,30 @@ def _against(row: Row, rows: Sequence[Row], swims: Mapping[tuple[str, str], Sequ
     return {**found, "verdict": ", ".join(lost + words)}
 
 
+def duels(ours: Sequence[Swim], theirs: Sequence[Swim]) -> list[Row]:
+    """One row per day and method: its figures as `swim_rows` has them, and ours against it alone.
+
+    Only swims that both have swum count, so that a method may have swum fewer seeds than ours. Beside
+    its own, a row has our figures under `ours_<figure>`, and from our row ratios, their intervals and
+    verdicts.
+    """
+    mine = {_swum(swim): swim for swim in ours}
+    groups: dict[tuple[str, str], list[Swim]] = {}
+    for swim in theirs:
+        if _swum(swim) in mine:
+            groups.setdefault((swim.scenario, swim.method), []).append(swim)
+    rows = []
+    for group in groups.values():
+        own, other = swim_rows([*(mine[_swum(swim)] for swim in group), *group])
+        rows.append({**own, **other} | {f"ours_{key}": own[key] for key in FIGURES})
+    return rows
+
+
+def _swum(swim: Swim) -> tuple[str, str, tuple[str, ...], int]:
+    """What tells a swim from others of its method."""
+    return swim.scenario, swim.layout, tuple(swim.fins), swim.seed
+
+
 def goal_sentences(days: Sequence[HardDay], rows: Sequence[Row]) -> list[str]:
     """For each kind of day and figure in words: which days miss what is aimed at, by which method."""
     sentences = []

@@ -10,7 +10,7 @@ from finlab.evaluation.method_specs import Checkpoints
 from finlab.evaluation.report.document import Block, Document, figures_of
 from finlab.evaluation.report.jobs import run_jobs
 from finlab.evaluation.report.pages import to_html, to_markdown
-from finlab.evaluation.report.plan import N_STARTS, SECTIONS, SWIMMERS, make_plan
+from finlab.evaluation.report.plan import N_STARTS, SWIMMERS, make_plan, parse_sections
 from finlab.evaluation.report.provenance import Provenance, how_made_blocks, source_commit
 from finlab.evaluation.report.results import Results
 from finlab.evaluation.report.sections import (
@@ -42,7 +42,7 @@ def make_report(
     records: Path,
     command: str,
     processes: int | None = None,
-    sections: Collection[str] = tuple(SECTIONS),
+    sections: Collection[str] = tuple(parse_sections("all")),
 ) -> Path:
     """Make the whole report; parts that are done are taken from `records`.
 
@@ -54,7 +54,8 @@ def make_report(
         records: folder of the results of the parts.
         command: that makes the report, shown on the page.
         processes: parts that run at once; the number of cores by default.
-        sections: those whose missing parts are run, by default all; the page shows what is there of all.
+        sections: those whose missing parts are run, by default all but the optional ones; the page shows what
+            is there of all.
 
     Returns:
         The page.
@@ -66,7 +67,7 @@ def make_report(
     paths = {method: resolve_checkpoint(checkpoint) for method, checkpoint in given.items()}
     prints = {f"{path.name} ({name})": read_checkpoint(path).sha256 for name, path in paths.items()}
     results, provenance = Results(done, records), Provenance(prints, seed, command)
-    missing = len(list(plan)) - len(list(done))
+    missing = sum(not job.done(records) for job in plan.only(parse_sections("all")))
     document = make_document(results, provenance, sizes, missing)
     write_report(out, document, provenance.about() | results.tables)
     return out / PAGE
@@ -106,6 +107,7 @@ def result_blocks(results: Results, sizes: Sizes) -> list[Block]:
         "faults": closed_loop.fault_blocks,
         "velocity": closed_loop.velocity_blocks,
         "swims": swims.day_blocks,
+        "slow_swims": lambda rows: swims.slow_day_blocks(tables.get("swims", ()), rows),
         "ablation": studies.ablation_blocks,
         "temperature": lambda rows: studies.temperature_blocks(rows, results.scatter),
         "training": lambda rows: studies.training_blocks(rows, sizes.of_table["training"]),
@@ -113,7 +115,7 @@ def result_blocks(results: Results, sizes: Sizes) -> list[Block]:
     blocks: list[Block] = []
     for table, make in makers.items():
         if table in tables:
-            if table in (*SWIMMERS, "swims") and closed_loop.INTRODUCTION[0] not in blocks:
+            if table in (*SWIMMERS, "swims", "slow_swims") and closed_loop.INTRODUCTION[0] not in blocks:
                 blocks += closed_loop.INTRODUCTION
             blocks += make(tables[table])
     return blocks

@@ -50,6 +50,8 @@ SWIMMERS = {
 """Experiment in closed loop -> methods that swim."""
 DAY_METHODS = "search,analytic,on-board"
 """Methods that swim the hard days."""
+SLOW_DAY_METHODS = ("sqp", "multistart", "paper")
+"""Those that swim them in a section of their own, as they take hours."""
 SECTIONS = {
     "wrench": ("wrench", "rerun"),
     **{name: (name,) for name in ("cost", "network", "modes", "unreachable", "beyond")},
@@ -57,20 +59,23 @@ SECTIONS = {
     "latency": ("latency", "first_answers"),
     "closed-loop": ("trajectory", "faults", "velocity"),
     "hard-days": ("swims",),
+    "slow-days": ("slow_swims",),
     "ablation": ("ablation",),
     "temperature": ("temperature", "scatter"),
     "training": ("training",),
 }
 """Section of the page -> its tables."""
+OPTIONAL = ("slow-days",)
+"""Sections that take hours: they are run where they are named, and no part of `all`."""
 WHOLE = ("ablation", "temperature")
 """Sections that are left out while a part of them is missing."""
 
 
 def parse_sections(names: str) -> list[str]:
-    """Sections from their names with commas between, or `all`; `DataError` for any other name."""
+    """Sections from their names with commas between, or `all` (but `OPTIONAL`); `DataError` for any other."""
     words = [word.strip() for word in names.split(",") if word.strip()]
     if words == ["all"]:
-        return list(SECTIONS)
+        return [name for name in SECTIONS if name not in OPTIONAL]
     if not words or (unknown := [word for word in words if word not in SECTIONS]):
         got = unknown[0] if words else names
         raise DataError(f"sections: expected all or some of {', '.join(SECTIONS)}, got {got!r}")
@@ -83,9 +88,9 @@ class Plan:
 
     tables: dict[str, dict[Any, Job]] = field(default_factory=dict)
     """Table -> jobs by what tells them apart: `wrench` and `rerun` by (split, method), `cost` by (set of
-    cases, objective), `network` by (fins, objective), `swims` by the day, `ablation` by (variant,
-    refinement), `temperature` and `training` by what is changed; the others are one job each, under the
-    key ()."""
+    cases, objective), `network` by (fins, objective), `swims` by the day, `slow_swims` by (day, method),
+    `ablation` by (variant, refinement), `temperature` and `training` by what is changed; the others are one
+    job each, under the key ()."""
 
     def only(self, sections: Collection[str]) -> "Plan":
         """The jobs of some sections."""
@@ -155,6 +160,9 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
             add(table, (), ["search"], methods=swimmers)
     for day in choose_days(sizes.of_table["swims"]["scenarios"]) if "swims" in sizes.of_table else ():
         add("swims", (day.name,), ["search"], scenarios=day.name, methods=DAY_METHODS)
+        for method in SLOW_DAY_METHODS:
+            about = {"scenarios": day.name, "methods": method, "seeds": sizes.of_table["swims"]["seeds"]}
+            add("slow_swims", (day.name, method), [method], **about)
     if torch:
         tables["training"] = training_jobs(sizes.of_table["training"] | {"seed": seed}, runs)
     return Plan({table: jobs for table, jobs in tables.items() if jobs})

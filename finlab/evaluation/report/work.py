@@ -193,6 +193,9 @@ def swims(*, scenarios: str, methods: str, seeds: int, seed: int, checkpoints: C
     return columns_of_rows([swim._asdict() for swim in found])
 
 
+slow_swims = swims
+
+
 def _swim(
     scenarios: Sequence[Scenario], methods: str, runs: int, seed: int, checkpoints: Checkpoints
 ) -> list[Run]:

@@ -14,6 +14,7 @@ from finlab.evaluation.experiments.hard_days import HARD_DAYS, Case, HardDay, ch
 from finlab.evaluation.experiments.swims import (
     FIGURES,
     Swim,
+    duels,
     goal_sentences,
     not_swum,
     paired_interval,
@@ -23,7 +24,7 @@ from finlab.evaluation.experiments.swims import (
     verdict_of,
 )
 from finlab.evaluation.on_board import OnBoard
-from finlab.evaluation.report.sections.swims import swim_blocks
+from finlab.evaluation.report.sections.swims import slow_day_blocks, swim_blocks
 from finlab.evaluation.report.text import to_text
 from finlab.evaluation.statistics.bootstrap import Interval
 from finlab.physics.vehicle import Vehicle, complete_body
@@ -179,6 +180,28 @@ def test_who_alone_keeps_the_path_and_who_loses_it() -> None:
     lost = [swim._replace(figures={**swim.figures, "max": 3.0}) for swim in ours]
     kept = [swim._replace(figures={**swim.figures, "max": 0.1}) for swim in theirs]
     assert swim_rows([*lost, *kept])[0]["verdict"].startswith("loses its path")
+
+
+def test_slow_methods_are_set_against_the_swims_that_they_share() -> None:
+    ours = [_swim("search", seed, 0.05 * seed, 1.0) for seed in range(1, 6)]
+    sqp = [_swim("sqp", seed, 0.05 * seed + 0.005 + 1e-4 * seed, 0.5 + 0.01 * seed) for seed in range(1, 6)]
+    paper = [_swim("paper", seed, 0.1, 3.0, farthest=2.0) for seed in (1, 2, 7)]  # ours has not swum seed 7
+    against_sqp, against_paper = duels(ours, [*sqp, *paper])
+    assert (against_sqp["method"], against_sqp["swims"]) == ("sqp", 5)
+    assert against_sqp["ours_ate"] == pytest.approx(0.15) and against_sqp["ate"] == pytest.approx(0.1553)
+    assert against_sqp["ate_ratio"] == pytest.approx(0.15 / 0.1553)
+    assert against_sqp["verdict"] == "error better, power worse"
+    assert (against_paper["method"], against_paper["swims"], against_paper["lost"]) == ("paper", 2, 2)
+    assert against_paper["ours_ate"] == pytest.approx(0.075)
+    assert against_paper["verdict"] == "the only one that keeps its path"
+    told = " ".join(
+        to_text(*slow_day_blocks(*([s._asdict() for s in each] for each in (ours, sqp + paper)))).split()
+    )
+    assert (
+        "search against sqp: error better on 1 and worse on 0 of 1 days, at 0.97 to 0.97 of its error; power "
+        "better on 0 and worse on 1 of 1 days (nominal), at 1.89 to 1.89 of its power."
+    ) in told.replace("`", "")
+    assert "`paper` loses its path on 2 of 2." in told
 
 
 def test_goals_depend_on_the_kind_of_day() -> None:

@@ -81,7 +81,7 @@ def comparisons(tables: Tables) -> list[Row]:
     found += compare("ATE", tables.get("trajectory", ()), "ate", lambda row: f"layouts {row['layout']}")
     faults = [row for row in tables.get("faults", ()) if row["controllable"]]
     found += compare("ATE, fins lost", faults, "ate", lambda row: row["fault"])
-    days = swim_rows([Swim(**swim) for swim in tables.get("swims", ())])
+    days = swim_rows([Swim(**swim) for name in ("swims", "slow_swims") for swim in tables.get(name, ())])
     for value, title in TITLES.items():
         found += compare(f"{title}, hard days", days, value, lambda row: row["scenario"])
     found += compare("speed error", tables.get("velocity", ()), "mae", _speed, (OURS, "search-effort"))

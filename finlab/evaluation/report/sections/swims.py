@@ -5,7 +5,15 @@ from collections.abc import Sequence
 from finlab.control.completion import LEVER_M
 from finlab.evaluation.experiments.closed_loop_runs import LOST_M, RTE_DELTA_S
 from finlab.evaluation.experiments.hard_days import HARD_DAYS, HardDay
-from finlab.evaluation.experiments.swims import GAP_N, Swim, goal_sentences, not_swum, swim_rows
+from finlab.evaluation.experiments.swims import (
+    GAP_N,
+    TITLES,
+    Swim,
+    duels,
+    goal_sentences,
+    not_swum,
+    swim_rows,
+)
 from finlab.evaluation.report.document import Block, Column, Row, Table, method_row
 
 WHAT = (Column("scenario", "scenario"), Column("method", "method"), Column("swims", "swims", "count"))
@@ -21,9 +29,9 @@ ERRORS = (
     Column("verdict", "verdict"),
 )
 STEPS = (
-    Column("turn", "turn [rad]", "three"),
-    Column("frequency_step", "frequency [Hz]", "three"),
-    Column("amplitude_step", "amplitude [rad]", "three"),
+    Column("turn", "turn [rad]", "ratio"),
+    Column("frequency_step", "frequency [Hz]", "ratio"),
+    Column("amplitude_step", "amplitude [rad]", "ratio"),
     Column("rests_per_min", "rest and work / min", "three"),
     Column("out_of_reach", "out of reach", "share"),
     Column("cpu_s_per_min", "CPU s / min", "three"),
@@ -31,6 +39,25 @@ STEPS = (
 ABOUT = (
     "All methods swim with one controller, which follows position, velocity and acceleration, under the same "
     "noise. `search` takes from it the wrenches that it expects, the others the present one."
+)
+SLOW = (
+    "`sqp`, `multistart` and `paper` swam the same days with the same seeds and noise, each swim set against "
+    "that of `search`. They take several times the processor's time that a pseudo-inverse takes, `paper` "
+    "twenty times, and are run by `finlab eval report --sections slow-days`. *Over it*: `search` over the "
+    "method of the row."
+)
+DUEL = (
+    Column("ate", "ATE [m]", "metres"),
+    Column("ours_ate", "`search`", "metres"),
+    Column("ate_ratio", "over it", "ratio", "ate_ratio_interval"),
+    Column("rte", "RTE [m]", "metres"),
+    Column("depth_rmse", "depth RMSE [m]", "metres"),
+    Column("driving_w", "power [W]", "three"),
+    Column("ours_driving_w", "`search`", "three"),
+    Column("driving_w_ratio", "over it", "ratio", "driving_w_ratio_interval"),
+    Column("peak_w", "peak [W]", "three"),
+    Column("lost", "lost", "count"),
+    Column("verdict", "`search`"),
 )
 LEADS = "error better, power better"
 
@@ -75,6 +102,41 @@ def day_blocks(swims: Sequence[Row]) -> list[Block]:
     days = [day for day in HARD_DAYS if day.name in names]
     title, *blocks = swim_blocks(days, swim_rows(done), not_swum(days))
     return [title, ABOUT, *blocks]
+
+
+def slow_day_blocks(swims: Sequence[Row], slow: Sequence[Row]) -> list[Block]:
+    """The slow methods against `search` on the hard days, from single swims as `Swim` names their figures."""
+    ours = [Swim(**swim) for swim in swims if swim["method"] == "search"]
+    rows = duels(ours, [Swim(**swim) for swim in slow])
+    methods = dict.fromkeys(row["method"] for row in rows)
+    return [
+        "### Hard days, slow methods",
+        SLOW,
+        Table((*WHAT, *DUEL), rows),
+        Table((*WHAT, *STEPS), rows),
+        "\n".join(f"- {_against(method, rows)}" for method in methods),
+    ]
+
+
+def _against(method: str, rows: Sequence[Row]) -> str:
+    """How `search` fares against one slow method over all days, in a sentence."""
+    mine = [row for row in rows if row["method"] == method]
+    said = []
+    for key, title in TITLES.items():
+        found = [row for row in mine if f"{key}_ratio" in row]
+        days = {
+            verdict: [row["scenario"] for row in found if row.get(f"{key}_verdict") == verdict]
+            for verdict in ("better", "worse")
+        }
+        ratios = sorted(row[f"{key}_ratio"] for row in found)
+        worse = f" ({', '.join(f'`{day}`' for day in days['worse'])})" if days["worse"] else ""
+        between = f", at {ratios[0]:.2f} to {ratios[-1]:.2f} of its {title}" if ratios else ""
+        said.append(
+            f"{title} better on {len(days['better'])} and worse on {len(days['worse'])} of {len(mine)} "
+            f"days{worse}{between}"
+        )
+    lost, swims = (sum(row[key] for row in mine) for key in ("lost", "swims"))
+    return f"`search` against `{method}`: {'; '.join(said)}. `{method}` loses its path on {lost} of {swims}."
 
 
 def _not_won(row: Row) -> bool:
