@@ -164,7 +164,7 @@ class FinMotion:
 
 
 class FinPower(NamedTuple):
-    """Power of each fin (n,) [W] at one moment, by three measures."""
+    """Power of each fin (..., n) [W], by three measures."""
 
     inertial: Array
     """|I alpha omega|, the paper's: what turns the fin's own inertia, braking counted like driving."""
@@ -175,10 +175,9 @@ class FinPower(NamedTuple):
     electronics. Its mean over a steady beat is `Blade.driving_power`."""
 
 
-def fin_power(motion: FinMotion, blade: Blade, copper_loss: float = COPPER_LOSS) -> FinPower:
-    """The power of fins as they move now; the torque is that of a rigid plate in still water, and
-    `copper_loss` the heat in its motor [W/(N m)^2]."""
-    speed, acceleration = motion.speed_and_acceleration()
+def fin_power(speed: Array, acceleration: Array, blade: Blade, copper_loss: float = COPPER_LOSS) -> FinPower:
+    """The power of fins with angular speeds (..., n) [rad/s] and accelerations (..., n) [rad/s^2]; the torque
+    is that of a rigid plate in still water, and `copper_loss` the heat in its motor [W/(N m)^2]."""
     torque = blade.inertia * acceleration + blade.drag * speed * np.abs(speed)
     mechanical = np.maximum(torque * speed, 0.0)
     inertial = np.abs(blade.own_inertia * acceleration * speed)

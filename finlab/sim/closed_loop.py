@@ -246,9 +246,10 @@ class ClosedLoop:
         if self.monitor is not None:
             reported = self.fins.command if self.servo_feedback else None
             self.verdict = self.monitor.step(now, self._command, reported)
-        setpoint = self.task.setpoint(time + self.controller.lead_s)
+        setpoint, lead = self.task.setpoint(time), self.controller.lead_s
         whole = self._complete()
-        asked = whole(self.controller.wrench(now, setpoint, self._given()))
+        followed = self.task.setpoint(time + lead) if lead else setpoint
+        asked = whole(self.controller.wrench(now, followed, self._given()))
         answer = self.allocator.allocate(
             self.layout.moving((*now.velocity, *now.rates)),  # what speed takes from fins, where known
             asked,
@@ -262,7 +263,7 @@ class ClosedLoop:
         self._answered = command = answer.command
         if self.monitor is not None:
             command = self.monitor.probed(command)
-        tick = self._move(time, now, answer.target, command, answer.solve_ms)
+        tick = self._move(now, setpoint, answer.target, command, answer.solve_ms)
         self._command = command
         self._ticks.append(tick)
         return tick
@@ -314,27 +315,32 @@ class ClosedLoop:
         result[:, 2] = np.where(np.isnan(self._held), result[:, 2], self._held)
         return result
 
-    def _move(self, time: float, now: Measurement, asked: Array, command: Array, solve_ms: float) -> Tick:
+    def _move(
+        self, now: Measurement, setpoint: Setpoint, asked: Array, command: Array, solve_ms: float
+    ) -> Tick:
         """Fins and body over one period with a constant command."""
-        before, setpoint = self.state, self.task.setpoint(time)
+        time, before = self.time, self.state
         n_steps = max(1, math.ceil(self.period_s / self._fin_force.step_s - 1e-9))
         dt = self.period_s / n_steps
         moved, commanded = self._moved(command), np.isfinite(command[:, :1])
         alive = self._alive()
         hangs = np.isnan(moved[:, 0])
         some_hang = bool(hangs.any())
-        share = np.ones(self.layout.n_fins)
-        for name in names_of(self.broken, "weak"):
+        share = np.ones((self.layout.n_fins, 1))
+        weak = names_of(self.broken, "weak")
+        for name in weak:
             share[self.layout.index(name)] *= self.broken[name].share
         mean = np.zeros((self.layout.n_fins, 6))
-        power = np.zeros((3, self.layout.n_fins))
+        turning = np.empty((n_steps, 2, self.layout.n_fins))
         for k in range(n_steps):
             self.fins.step(moved, dt)
             self.vehicle.current, self.vehicle.acceleration = self.water.flow(
                 self.state[:3].tolist(), time + (k + 0.5) * dt
             )
             water = self.vehicle.velocity_in_water(self.state)
-            force = self._fin_force.step(self.fins, dt, water) * share[:, None]
+            force = self._fin_force.step(self.fins, dt, water)
+            if weak:
+                force = force * share
             if some_hang:
                 force[hangs] = self._hanging.force(self.fins.direction, water)[hangs]
             wrenches = np.einsum("nk,nkw->nw", force, self._fin_force.columns)
@@ -343,9 +349,9 @@ class ClosedLoop:
             if k + 1 < n_steps:  # the sample at the end belongs to the next period
                 self._sensors.sample(time + (k + 1) * dt, self.state)
             mean += wrenches
-            power += fin_power(self.fins, self._blade, self._copper_loss)
+            turning[k] = self.fins.speed_and_acceleration()
         mean /= n_steps
-        power /= n_steps
+        power = np.mean(fin_power(turning[:, 0], turning[:, 1], self._blade, self._copper_loss), axis=1)
         return Tick(
             time=time,
             position=before[:3].copy(),

@@ -138,7 +138,7 @@ def test_mean_power_is_what_a_sinusoid_has(pair: Layout) -> None:
     inertial, torque, driving = [], [], []
     for _ in range(10 * round(1 / (frequency * DT))):
         motion.step(command, DT)
-        power = fin_power(motion, Blade(), 0.7)
+        power = fin_power(*motion.speed_and_acceleration(), Blade(), 0.7)
         inertial.append(power.inertial[0])
         torque.append(power.torque[0])
         driving.append(power.driving[0])
