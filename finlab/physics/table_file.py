@@ -44,8 +44,12 @@ def read_table(path: str | os.PathLike[str]) -> TableLaw:
             unit cannot be right, its rows do not fill a grid with at least two points per axis, or it has no
             thrust or no power to tell of.
     """
-    source = str(path)
-    rows, lines, notes = _read_rows(Path(path))
+    return parse_table(table_bytes(path), str(path))
+
+
+def parse_table(content: bytes, source: str) -> TableLaw:
+    """Returns the law in the content of a CSV file, which errors call `source`; see `read_table`."""
+    rows, lines, notes = _read_rows(content, source)
     _check_units(rows, source)
     axes, values = _grid(rows, lines, source)
     periodic, axes[2], values = _close_circle(axes[2], values, source)
@@ -91,34 +95,34 @@ def table_bytes(path: str | os.PathLike[str]) -> bytes:
     return content
 
 
-def _read_rows(path: Path) -> tuple[Array, NDArray[np.intp], tuple[str, ...]]:
+def _read_rows(content: bytes, source: str) -> tuple[Array, NDArray[np.intp], tuple[str, ...]]:
     """Returns the table (rows, 6 or 7) in the order of `COLUMNS`, with the power behind, the line (rows,) of
     the file that each row stands in, and the notes above the header."""
     try:
-        text = table_bytes(path).decode("utf-8-sig").splitlines()
+        text = content.decode("utf-8-sig").splitlines()
         above = next((k for k, line in enumerate(text) if not line.startswith("#")), len(text))
         lines = list(csv.reader(text[above:]))
     except (UnicodeDecodeError, csv.Error) as error:
-        raise DataError(f"{path}: cannot be read as CSV text: {error}") from None
+        raise DataError(f"{source}: cannot be read as CSV text: {error}") from None
     notes = tuple(line.lstrip("# ").rstrip() for line in text[:above])
     header = [cell.strip() for cell in lines[0]] if lines else []
     missing = [name for name in COLUMNS if name not in header]
     if missing:
         raise DataError(
-            f"{path}: column {missing[0]} is missing, expected a header with {', '.join(COLUMNS)}"
+            f"{source}: column {missing[0]} is missing, expected a header with {', '.join(COLUMNS)}"
         )
     if len(set(header)) < len(header):
-        raise DataError(f"{path}: a column name appears twice in the header")
+        raise DataError(f"{source}: a column name appears twice in the header")
     columns = [*COLUMNS, POWER_COLUMN] if POWER_COLUMN in header else [*COLUMNS]
     order = [header.index(name) for name in columns]
     rows, numbers = [], []
     for line, cells in enumerate(lines[1:], start=above + 2):
         if not any(cell.strip() for cell in cells):
             continue
-        rows.append(row_numbers(cells, header, order, f"{path}: line {line}"))
+        rows.append(row_numbers(cells, header, order, f"{source}: line {line}"))
         numbers.append(line)
     if not rows:
-        raise DataError(f"{path}: has no rows below its header")
+        raise DataError(f"{source}: has no rows below its header")
     return np.array(rows), np.array(numbers), notes
 
 

@@ -3,9 +3,11 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from finlab import load_allocator, load_layout
+from finlab.physics import plant_of
 from tests.fit.cell import columns_of, commands, measured, soft, write
 
 
@@ -28,6 +30,19 @@ def test_a_noisy_file_becomes_a_fin(page: Any, tmp_path: Path, monkeypatch: pyte
     page.until(lambda: [fin.model.type for fin in page.session.state.layout.fins] == ["table"] * 4)
     page.until(lambda: not page.view.busy and page.view.shown.err_norm < 1e-3)
     page.page.get_by_text("Exact", exact=True).first.wait_for()
+
+    fitted = page.session.state.layout
+    page.press("Share")
+    page.page.locator(".fl-share p", has_text="rounded, to 0.0015 % of their largest force").wait_for()
+    link = page.page.locator(".fl-share input").input_value()
+    page.page.keyboard.press("Escape")
+    page.page.evaluate("hash => { location.hash = hash; }", link.partition("#")[2])
+    page.until(lambda: page.session.history.undo_name == "Open ucat")
+    command = np.random.default_rng(0).uniform((0.05, 0.1, -3.1), (0.6, 2.1, 3.1), (100, 4, 3))
+    wrench, there = (plant_of(one).wrench(command) for one in (fitted, page.session.state.layout))
+    assert 0.0 < np.abs(there - wrench).max() < 2e-4 * np.abs(wrench).max(), "within what the card says"
+    page.press("Undo")
+    page.until(lambda: page.session.state.layout == fitted)
 
     page.tab("Export")
     with page.page.expect_download() as download:

@@ -21,7 +21,7 @@ from finlab.physics.table_file import write_table
 from tests.webapp.hands import move_fin
 from webapp.session import Session
 from webapp.session.companions import stored_table
-from webapp.session.design_links import ARCHIVE, FRAGMENT, MAX_LINK, PLAIN, packed, unpacked
+from webapp.session.design_links import ARCHIVE, FRAGMENT, MAX_LINK, PLAIN, linked, packed, unpacked
 from webapp.session.files import stored_hull, table_folder
 from webapp.tasks.designs import MOST, Designs
 
@@ -56,8 +56,8 @@ def test_a_small_hull_and_table_travel_and_large_ones_are_refused(tmp_path: Path
     rough = trimesh.creation.icosphere(subdivisions=4, radius=0.2)
     rough.vertices *= 1 + 0.05 * np.random.default_rng(0).random((len(rough.vertices), 1))
     session.import_hull(stored_hull("hull.stl", rough.export(file_type="stl"), "m"))
-    with pytest.raises(FinlabError, match=r"and its hull needs [\d,]+ characters, .* share the ZIP"):
-        packed(session.state.layout)
+    with pytest.raises(FinlabError, match=r"with its hull needs [\d,]+ characters, .* share the ZIP"):
+        linked(session.state.layout)
 
 
 WHOLE = packed(load_layout("ucat"))

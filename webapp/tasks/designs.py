@@ -11,7 +11,7 @@ from finlab.layout import Layout
 from webapp.editables import Editables
 from webapp.session import files
 from webapp.session.companions import Opened
-from webapp.session.design_links import FRAGMENT, packed, unpacked
+from webapp.session.design_links import FRAGMENT, linked, packed, unpacked
 from webapp.tasks.context import Context
 from webapp.tasks.exports import Exports
 from webapp.viser_internals import run_script
@@ -94,8 +94,9 @@ class Designs:
             FinlabError: the design is too large for a link.
         """
         layout = self._session.state.layout
-        link = json.dumps([FRAGMENT + packed(layout), layout.name])
-        run_script(self._context.client.gui, f"finlabDesigns.share(...{link});")
+        link = linked(layout)
+        card = json.dumps([FRAGMENT + link.text, layout.name, link.rounded])
+        run_script(self._context.client.gui, f"finlabDesigns.share(...{card});")
         self._remember(layout)
 
     def note(self) -> None:

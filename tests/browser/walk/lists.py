@@ -83,7 +83,7 @@ def choices() -> list[Choice]:
 
     def layout(model: Model) -> str:
         now = model.session.state.layout
-        said = "from a file" if now == model.session.saved else "edited"
+        said = "yours" if now == model.session.saved else "edited"
         return shipped_name(now) or f"{now.name}, {said}"
 
     def shape(model: Model, kind: str) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from finlab.layout import load_layout
+from finlab.layout import layout_to_dict, load_layout
 from tests.browser.walk.boxes import IMPROVE, PILOT, RUN, SWEEP
 from webapp.panels.pilot import PADS
 
@@ -41,7 +41,7 @@ def search(walk: Any) -> None:
     section.get_by_role("button", name="Cancel").click()
     walk.page.until(lambda: improver.findings is not None or improver.error is not None)
     found = improver.findings
-    if found is None:
+    if found is None or not found.improved:  # then there is nothing to accept
         return
     accept = walk.random.random() < 0.5
     section.get_by_role("button", name="Accept" if accept else "Leave").click()
@@ -72,15 +72,15 @@ def swim(walk: Any) -> None:
 
 def saved(walk: Any) -> None:
     """The layout as a file is the layout."""
-    walk.hand.go(("Export", "Files"), walk.model)
     with walk.page.page.expect_download() as download:
-        walk.hand.click(("Export", "Files"), "Save", "Layout (YAML)")
+        walk.hand.click(("Design", "File"), "", "Save")
     walk.model.session.note_saved()
     path = Path(download.value.path())
     named = path.with_name(f"{path.name}-{download.value.suggested_filename}")
     path.rename(named)
     layout, wanted = load_layout(named), walk.model.session.state.layout
-    assert layout == wanted, f"the file holds {layout}, not {wanted}"
+    written, meant = layout_to_dict(layout), layout_to_dict(wanted)  # with angles as a file has them
+    assert written == meant, f"the file holds {written}, not {meant}"
 
 
 def steer(walk: Any) -> None:

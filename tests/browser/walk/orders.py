@@ -64,6 +64,7 @@ def orders() -> dict[str, Callable[[Model], object]]:
         "Show or hide the fin graph": "graph",
         "Show or hide the centre of gravity": "center",
         "Dark or light theme": "dark",
+        "Presenter's view, or the usual one": "large",
     }
     found |= {label: lambda s, key=key: s.toggle(key) for label, key in switches.items()}
     found |= {task: lambda s, task=task: s.show_task(task) for task in TASKS}

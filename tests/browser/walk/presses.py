@@ -28,6 +28,8 @@ from webapp.session.display import DRAWN
 from webapp.session.targets import PRESETS
 
 Intent = Callable[[Model], object]
+MOST_FINS = 8
+"""Robots with more get no rings: each would double them, and the walk would wait for answers."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,7 @@ def presses() -> list[Press]:
     drawn = {word: one(lambda s, word=word: s.set_display("drawn", word)) for word in DRAWN}
     return [
         *on(FINS, "Selected fin", edits),
-        *on(FINS, "How many", rings),
+        *on(FINS, "How many", rings, lambda m: m.session.state.layout.n_fins <= MOST_FINS),
         *on(BODY, "From the hull", {**hulls, "Forget": one(lambda s: s.forget_dynamics())}, bare),
         *on(DAMAGE, "Repair", whole, folder=DAMAGE[1]),
         *on(WRENCH, "Preset", {name: one(lambda s, name=name: s.set_preset(name)) for name in PRESETS}),

@@ -8,6 +8,7 @@ from typing import Any
 from finlab.errors import FinlabError
 from tests.browser.walk.hand import Hand
 from tests.browser.walk.model import Model
+from tests.browser.walk.typist import WAIT_S
 from webapp.session.quantities import read_number
 
 CELLS = ("fin-x", "fin-y", "fin-z", "fin-shaft", "fin-name")
@@ -72,15 +73,15 @@ class Rows:
             self._hand.keys.press("Delete")
         if self._random.random() < 0.15:
             self._hand.keys.press("Escape")
-            page.until(lambda: box.count() == 0, 15)
+            page.until(lambda: box.count() == 0, WAIT_S)
             return f"escape from {kind} of row {index}"
         untouched = box.input_value() == row.locator(f"[data-edit={kind}]").get_attribute("data-value")
         refused = None if untouched else self._model.told(lambda m: self._meant(m, kind, name, text))
         self._hand.keys.press("Enter")
         if refused is not None:
-            page.until(lambda: refused in page.page.locator(".fl-editor-note").inner_text(), 15)
+            page.until(lambda: refused in page.page.locator(".fl-editor-note").inner_text(), WAIT_S)
             self._hand.keys.press("Escape")
-        page.until(lambda: box.count() == 0, 15)
+        page.until(lambda: box.count() == 0, WAIT_S)
         return f"type {text!r} into {kind} of row {index}"
 
     @staticmethod

@@ -11,6 +11,8 @@ from tests.browser.walk.model import Model
 from webapp.number_fields import NumberField
 from webapp.session.quantities import read_number
 
+WAIT_S = 60.0
+"""Longest wait for the page to hear keys, and to show what came of them."""
 NONSENSE = ("1/", "12 kg^2 m", "abc", "--", "1 2", "1e", "(3", "5 5 N", "1/0", "..")
 """Texts that stand for no number."""
 KINDS = {"type": 40, "refuse": 12, "escape": 10, "empty": 6, "arrows": 12, "rest": 3}
@@ -51,14 +53,15 @@ class Typist:
         self._hand.page.catch_up()
         refused = self._follow(box, place, begun)
         if refused:
-            self._hand.page.until(lambda: field.get_attribute("aria-invalid") == "true", 15)
+            self._hand.page.until(lambda: field.get_attribute("aria-invalid") == "true", WAIT_S)
             self._hand.page.until(
                 lambda: self._hand.page.page.locator(".fl.note:visible .missing").count() > 0
             )
             field.click()
             self._hand.keys.press("Escape")
         self._hand.page.until(
-            lambda: field.input_value() == box.text(box.values(self._model)[place]) or self._moved(box), 15
+            lambda: field.input_value() == box.text(box.values(self._model)[place]) or self._moved(box),
+            WAIT_S,
         )
         self._hand.rest_of_page()
         return f"{kind} {said!r} in {box.label} {place}"
@@ -125,7 +128,7 @@ class Typist:
         self._hears("enter", text)
 
     def _hears(self, how: str, text: str) -> None:
-        self._hand.page.until(lambda: any(word[1] == how for word in self._heard), 15)
+        self._hand.page.until(lambda: any(word[1] == how for word in self._heard), WAIT_S)
         assert self._heard[-1][1:] == (how, text), f"{how} {text!r} came as {self._heard[-1]}"
 
     def _type(self, _box: Box, _place: int, _field: Any) -> str:
@@ -159,7 +162,7 @@ class Typist:
         if self._random.random() < 0.2:
             self._hand.page.rest(1250)
         self._hand.keys.press("Escape")
-        self._hand.page.until(lambda: any(word[1] == "escape" for word in self._heard), 15)
+        self._hand.page.until(lambda: any(word[1] == "escape" for word in self._heard), WAIT_S)
         return text
 
     def _empty(self, _box: Box, _place: int, _field: Any) -> str:
@@ -173,6 +176,6 @@ class Typist:
         ways = [self._random.choice(("ArrowUp", "ArrowDown")) for _ in range(self._random.randrange(1, 5))]
         for way in ways:
             self._hand.keys.press(way)
-        self._hand.page.until(lambda: sum(word[1] == "step" for word in self._heard) == len(ways), 15)
+        self._hand.page.until(lambda: sum(word[1] == "step" for word in self._heard) == len(ways), WAIT_S)
         self._hand.keys.press("Escape")
         return " ".join(ways)

@@ -28,7 +28,7 @@ KINDS |= {"palette": 3, "bar": 5, "longer": 3}
 SLIDERS = {"Strength [%]", "Stuck at [°]", "Shaft [°]", "Turn ± [°]", "Motion speed", "Speed"}
 SLIDERS |= {"Current [cm/s]", "flows to [°]", "Waves [cm]", "Buoyancy [%]", "Fx [N]", "Tz [N m]"}
 """Boxes that stand beside a slider; of the wrench two."""
-SETTLE_S = 30.0
+SETTLE_S = 60.0
 """Longest wait for the page to agree with the model."""
 
 
@@ -45,8 +45,10 @@ class Walk:
         self.typist = Typist(self.hand, self.model, self.random)
         self.rows = Rows(self.hand, self.model, self.random)
         self.boxes, self.choices, self.ticks, self.presses = boxes(), choices(), ticks(), presses()
-        self.keys = {c.label: pressed(c.key, c.modifier) for c in commands(page.view) if c.key}
-        self.orders = orders()
+        table, self.orders = commands(page.view), orders()
+        strange = {command.label for command in table} ^ {*self.orders, *ELSEWHERE}
+        assert not strange, f"commands that the page or the walk does not know: {strange}"
+        self.keys = {c.label: pressed(c.key, c.modifier) for c in table if c.key}
         self.log: list[str] = []
         """What was done."""
         self.done: Counter[str] = Counter()
@@ -157,6 +159,7 @@ class Walk:
         self.hand.keys.press("Control+k")
         search = self.page.page.get_by_placeholder("Search commands")
         search.wait_for()
+        self.page.until(lambda: search.evaluate("box => box === document.activeElement"))  # it opens slowly
         self.hand.keys.type(label, delay=5)
         entry = self.page.page.locator(".mantine-Spotlight-action").filter(has_text=label).first
         self.told(entry.click, self.orders[label])
