@@ -29,6 +29,7 @@ Checkpoint = Annotated[str | None, arg(metavar="NAME|FOLDER")]
 Folder = Annotated[Path | None, arg(metavar="DIR")]
 Source = Annotated[str, arg(metavar="NAME|FILE")]
 Objective = Literal["power", "effort"]
+PathController = Literal["tracking", "waypoint"]
 
 
 @dataclass(frozen=True)
@@ -142,12 +143,14 @@ class ClosedLoopRuns:
         if self.figures is not None and not self.figures.is_dir():
             raise DataError(f"figures: expected a folder that exists, got {self.figures}")
 
-    def swim(self, scenarios: Sequence[Scenario], run: MethodRun) -> list[LoggedRun]:
+    def swim(
+        self, scenarios: Sequence[Scenario], run: MethodRun, controller: PathController = "waypoint"
+    ) -> list[LoggedRun]:
         """Every scenario with every method and seed."""
         from finlab.evaluation.experiments.closed_loop_runs import run_all
 
         methods, seeds = run.methods(self.methods), range(self.seed, self.seed + self.runs)
-        return run_all(scenarios, methods, seeds, self.plant)
+        return run_all(scenarios, methods, seeds, self.plant, controller)
 
     def save(self, name: str, draw: Callable[[], Picture]) -> list[str]:
         """Draw into the folder, where one was named; returns the sentence that says so."""

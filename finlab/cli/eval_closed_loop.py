@@ -1,10 +1,19 @@
 """`finlab eval trajectory|faults|velocity`: the paper's closed-loop experiments; and `eval monitor`."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from tyro.conf import arg
 
-from finlab.cli.eval_arguments import ClosedLoopRuns, Count, MethodRun, Name, Names, Source, open_layouts
+from finlab.cli.eval_arguments import (
+    ClosedLoopRuns,
+    Count,
+    MethodRun,
+    Name,
+    Names,
+    PathController,
+    Source,
+    open_layouts,
+)
 
 RUN = MethodRun()
 LAYOUT_RUNS = ClosedLoopRuns()
@@ -15,6 +24,7 @@ SPEED_RUNS = ClosedLoopRuns("search,search-effort,analytic,on-board")
 def trajectory(
     layouts: Names = "A,B,C,D",
     trajectory: Source = "lissajous",
+    controller: PathController = "waypoint",
     loop: Annotated[ClosedLoopRuns, arg(name="")] = LAYOUT_RUNS,
     run: Annotated[MethodRun, arg(name="")] = RUN,
 ) -> None:
@@ -23,6 +33,7 @@ def trajectory(
     Args:
         layouts: names or files with commas between.
         trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
+        controller: waypoint (heads for a point ahead, as in the paper), or tracking.
     """
     from finlab.evaluation.experiments import trajectory_and_velocity as experiment
     from finlab.evaluation.plots.closed_loop_experiments import draw_layouts, track_of
@@ -30,9 +41,10 @@ def trajectory(
     from finlab.sim import make_trajectory
 
     robots, path = open_layouts(layouts), make_trajectory(trajectory)
-    found = loop.swim(experiment.trajectory_scenarios(robots, path), run)
+    found = loop.swim(experiment.trajectory_scenarios(robots, path), run, controller)
     rows = experiment.trajectory_rows(found)
-    about = f"Trajectory {path.name}: {path.length_m:.1f} m in {path.duration_s:.0f} s; plant {loop.plant}."
+    about = f"Trajectory {path.name}: {path.length_m:.1f} m in {path.duration_s:.0f} s; {controller} "
+    about += f"controller; plant {loop.plant}."
     saved = loop.save("trajectory", lambda: draw_layouts([(key, track_of(log)) for key, log in found], rows))
     run.show(*INTRODUCTION, *trajectory_blocks(rows), about, *saved, rows=rows)
 
@@ -40,6 +52,7 @@ def trajectory(
 def faults(
     layout: Annotated[str, arg(metavar="LAYOUT")] = "A",
     trajectory: Source = "circle",
+    controller: PathController = "waypoint",
     loop: Annotated[ClosedLoopRuns, arg(name="")] = FAULT_RUNS,
     run: Annotated[MethodRun, arg(name="")] = RUN,
 ) -> None:
@@ -48,6 +61,7 @@ def faults(
     Args:
         layout: layout file or the name of a shipped layout.
         trajectory: circle, lissajous, square, dive, station, or a CSV file with the columns t, x, y, z.
+        controller: waypoint (heads for a point ahead, as in the paper), or tracking.
     """
     from finlab.cli.inputs import open_robot
     from finlab.evaluation.experiments.faults import all_faults, fault_rows, fault_scenarios
@@ -57,8 +71,9 @@ def faults(
 
     robot, path = open_robot(layout).layout, make_trajectory(trajectory)
     cases = all_faults(robot, path.duration_s / 2)
-    rows = fault_rows(cases, loop.swim(fault_scenarios(robot, path, cases), run))
-    about = f"Layout {robot.name}, {path.name} of {path.duration_s:.0f} s; plant {loop.plant}."
+    rows = fault_rows(cases, loop.swim(fault_scenarios(robot, path, cases), run, controller))
+    about = f"Layout {robot.name}, {path.name} of {path.duration_s:.0f} s; {controller} controller; "
+    about += f"plant {loop.plant}."
     saved = loop.save("faults", lambda: draw_faults(rows))
     run.show(*INTRODUCTION, *fault_blocks(rows), about, *saved, rows=rows)
 
@@ -102,7 +117,7 @@ def monitor(
     seed: Count = 0,
     seeds: Count = 4,
     whole: Count = 0,
-    controller: Literal["tracking", "waypoint"] = "tracking",
+    controller: PathController = "tracking",
     run: Annotated[MethodRun, arg(name="")] = RUN,
 ) -> None:
     """Lose each fin while swimming without telling the allocator; how soon and how surely a monitor finds it.

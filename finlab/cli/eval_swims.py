@@ -1,10 +1,10 @@
 """`finlab eval swims`: the suite of hard days."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from tyro.conf import arg
 
-from finlab.cli.eval_arguments import Count, MethodRun, Names
+from finlab.cli.eval_arguments import Count, MethodRun, Names, PathController
 
 RUN = MethodRun()
 
@@ -14,12 +14,12 @@ def swims(
     methods: Names = "search,analytic,on-board",
     seed: Count = 0,
     seeds: Count = 5,
-    controller: Literal["tracking", "waypoint"] = "tracking",
+    controller: PathController = "tracking",
     run: Annotated[MethodRun, arg(name="")] = RUN,
 ) -> None:
     """Swim hard days: other bodies, water, sensors and fins than believed; errors, watts and who leads.
 
-    One controller for all. A method takes about two minutes of the processor per seed.
+    One controller for all. search, analytic and on-board take two minutes of the processor each per seed.
 
     Args:
         scenarios: all, or names with commas between: nominal, damping-half, damping-double, parameters-low,

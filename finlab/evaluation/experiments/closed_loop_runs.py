@@ -13,7 +13,7 @@ import numpy as np
 
 from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
-from finlab.control import VelocityController, WaypointController
+from finlab.control import PATH_CONTROLLERS, VelocityController
 from finlab.errors import DataError
 from finlab.evaluation.progress import progress
 from finlab.layout import Layout
@@ -105,20 +105,23 @@ def run_all(
     allocators: Mapping[str, Allocator],
     seeds: Sequence[int],
     plant: str = "mean",
+    controller: str = "waypoint",
 ) -> list[Run]:
-    """Every scenario with every method and seed, one after the other, with the paper's controllers.
+    """Every scenario with every method and seed, one after the other.
 
     Args:
         scenarios: what is swum.
         allocators: methods by name.
         seeds: of the sensors' noise.
         plant: how fin forces are simulated.
+        controller: of paths, one of `finlab.control.PATH_CONTROLLERS`, the paper's by default; speeds are
+            kept by the paper's other one.
     """
     done = []
     every = list(product(scenarios, allocators.items(), seeds))
     for (label, layout, task, failures), (name, allocator), seed in progress(every, "run"):
         options: dict[str, Any] = {"failures": failures, "plant": plant, "seed": seed}
-        pilot = VelocityController() if isinstance(task, Cruise) else WaypointController()
+        pilot = VelocityController() if isinstance(task, Cruise) else PATH_CONTROLLERS[controller](layout)
         done.append(((label, name), ClosedLoop(layout, allocator, task, pilot, **options).run()))
     return done
 

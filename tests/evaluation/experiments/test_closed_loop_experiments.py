@@ -50,6 +50,17 @@ def test_trajectory(layout_a: Layout, analytic: Allocator, line: Trajectory) -> 
     assert "paper's method, printed" in report and "0.134" in report and "nothing aligned" in report
 
 
+def test_paths_are_followed_by_the_papers_controller_or_by_ours(
+    layout_a: Layout, analytic: Allocator, line: Trajectory
+) -> None:
+    scenarios = trajectory_scenarios([layout_a], line)
+    (_, paper), (_, ours) = (
+        run_all(scenarios, {"analytic": analytic}, [0], **named)[0]
+        for named in ({}, {"controller": "tracking"})
+    )
+    assert (paper.controller, ours.controller) == ("waypoint", "tracking")
+
+
 def test_faults(layout_a: Layout, analytic: Allocator, line: Trajectory) -> None:
     faults = all_faults(layout_a, 4.0)
     assert len(faults) == 1 + 4 + 6 + 4

@@ -80,6 +80,7 @@ def fault_blocks(rows: Sequence[Row]) -> list[Block]:
         *WHAT,
         *ERRORS,
         Column("ate_over_healthy", "over healthy", "ratio"),
+        Column("driving_w", "power with motor losses [W]", "three"),
         Column("verdict", "verdict"),
     )
     hopeless = [row["fault"] for row in rows if not row["controllable"]]
