@@ -108,7 +108,8 @@ def elu(x: AnyArray) -> AnyArray:
 
 def sigmoid(x: AnyArray) -> AnyArray:
     """Sigmoid."""
-    y = np.tanh(x * np.float32(0.5))
+    y: AnyArray = x * np.float32(0.5)
+    np.tanh(y, out=y)
     y += np.float32(1.0)
     y *= np.float32(0.5)
     return y

@@ -244,9 +244,9 @@ class PaperAllocator(Allocator):
         force, pull = robot.surrogate.fins.force_and_pullback(command)
         error = force.reshape(rows, -1) @ columns - target
         gamma = np.float32(self.settings.gamma)
-        score = np.einsum("ri,ri->r", error, error) + gamma * robot.energy(command)
-        by_command = pull(2.0 * error @ columns.T)
-        return score, by_command + gamma * robot.energy.slopes(command)
+        energy, by_energy = robot.energy.with_slopes(command)
+        score = np.einsum("ri,ri->r", error, error) + gamma * energy
+        return score, pull(2.0 * error @ columns.T) + gamma * by_energy
 
     def _candidates(self, robot: _Robot, command: AnyArray, target: AnyArray, source: str) -> Candidates:
         """Candidates (K, n, 3) of a single target (6,), in their order."""
