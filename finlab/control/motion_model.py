@@ -1,6 +1,6 @@
 """What a robot's velocities should do next, from what its fins do: the model behind `FaultMonitor`.
 
-Fossen's equations with the layout's body, fins that lag as U-CAT's, and what nobody told: a current, torques
+Fossen's equations with the layout's body, fins that lag as U-CAT's, and what is unknown: a current, torques
 that stay, and how much of its law's thrust each fin gives. The state z (14 + n) holds
 
     velocity (3) and rates (3) in the body frame, roll and pitch (2), current (3) in the world, torque (3),
@@ -77,7 +77,7 @@ class MotionModel:
         self._turns_fully = is_full_turn(layout.upper[:, 2] - layout.lower[:, 2])
         self._unsure_s, self._any_unsure = np.zeros(layout.n_fins), False
         self.unsure = self._unknown = np.zeros(layout.n_fins, dtype=bool)
-        """Which fins (n,) were told to turn about just now, so that nobody knows which way round they go."""
+        """Which fins (n,) turn about by command just now; which way round is unknown."""
 
     def step(
         self, state: Array, yaw: float, command: Array, reported: Array | None, held: Array, other: Array

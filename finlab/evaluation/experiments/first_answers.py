@@ -1,4 +1,4 @@
-"""How long a robot waits for its first answer when nobody has seen its fins before.
+"""How long a robot waits for its first answer when its fins were not seen before.
 
 A fin is compiled once, whatever its law, and kept by content. So the first call of a robot with new fins pays
 for compiling them; the first call of another robot with the same fins does not.

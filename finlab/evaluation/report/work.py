@@ -107,7 +107,7 @@ def steadiness(*, layouts: list[str], paths: int, ticks: int, seed: int, checkpo
 
 
 def first_answers(*, robots: int, seed: int, checkpoints: Checkpoints) -> Columns:
-    """Rows of the times until the first answer for fins that nobody has seen."""
+    """Rows of the times until the first answer for fins that were not seen before."""
     method = load_method_spec("search", checkpoints.of("search"))
     return columns_of_rows(first_answer_rows(method, robots=robots, seed=seed))
 
