@@ -122,10 +122,14 @@ def test_names_are_escaped(server: viser.ViserServer, view: View) -> None:
     layout = view.session.state.layout.replace_fin("front_left", name=evil)
     on_loop(server, lambda: view.do(lambda: view.session.open_layout(layout)))
     until(lambda: not view.busy)
-    containers = server.gui._container_handle_from_uuid.values()
-    handles = [handle for container in containers for handle in container._children.values()]
-    texts = [handle.content for handle in handles if isinstance(handle, viser.GuiHtmlHandle)]
-    assert any("&lt;img" in text for text in texts) and not any("<img" in text for text in texts)
+
+    def texts() -> list[str]:
+        containers = server.gui._container_handle_from_uuid.values()
+        handles = [handle for container in containers for handle in container._children.values()]
+        return [handle.content for handle in handles if isinstance(handle, viser.GuiHtmlHandle)]
+
+    until(lambda: any("&lt;img" in text for text in texts()))
+    assert not any("<img" in text for text in texts())
     on_loop(server, lambda: view.do(lambda: view.session.toggle_failure(evil)))
 
 
