@@ -1,4 +1,4 @@
-"""What a script in the page tells the server: numbered words in a hidden box, each heard once and
+"""Messages from a script in the page to the server: numbered words in a hidden box, each heard once and
 answered."""
 
 import json
@@ -48,7 +48,7 @@ class Mailbox:
         run_script(self._gui, f"{self._name}.{what}({json.dumps(argument)});")
 
     def read(self, message: str) -> None:
-        """What the page has told and got no answer to yet, oldest first."""
+        """Messages of the page that are not answered yet, oldest first."""
         try:
             words = json.loads(message)
         except (ValueError, RecursionError):

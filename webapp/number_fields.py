@@ -114,7 +114,7 @@ class NumberField:
         return self._take(place, asked)
 
     def _take(self, place: int, asked: float) -> bool:
-        """Bring a number into force; whether it was refused. What a grid or a turn changed is told."""
+        """Bring a number into force; whether it was refused. What a grid or a turn changed is shown."""
         values = list(self.values)
         if asked == values[place]:
             return False
@@ -166,11 +166,11 @@ class NumberFields:
     """All of one page."""
 
     def __init__(self, gui: viser.GuiApi, fault: Callable[[Exception], None]) -> None:
-        """Listen to the page; `fault` is told what we have got wrong."""
+        """Listen to the page; `fault` gets exceptions that are our own."""
         self._fault = fault
         self._fields: dict[str, NumberField] = {}
         self.mailbox = Mailbox(gui, "finlabFields", SCRIPT, (str, int, str, str), self._hear, MAX_MESSAGE)
-        """Where the page tells what was typed."""
+        """Where the page sends what was typed."""
 
     def add(self, field: NumberField) -> Callable[[], None]:
         """One more; what comes back writes it, and lets go of a text in the page whose refusal is past."""

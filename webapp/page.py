@@ -252,7 +252,7 @@ class Page(ABC):
         self._note = self.client.add_notification(title, body, auto_close_seconds=8.0, color=VERMILLION)
 
     def _refuse_upload(self, name: str, size: int) -> None:
-        """Told when a browser offers a file that is too large to be taken at all."""
+        """Show a note when a browser offers a file that is too large to be taken at all."""
         text = f"{str(name)[-60:]}: has {size:,} bytes, expected at most {MAX_UPLOAD:,}; nothing was read"
         self.notify("Not possible", text)
 
@@ -270,7 +270,7 @@ class Page(ABC):
         with self.client.atomic():
             try:
                 self._take_in()
-                # Before the panels: it settles the scale that the legend tells.
+                # Before the panels: it settles the scale in the legend.
                 self.scenery.robot.editing = self.session.task == "Design"
                 self.scenery.refresh(self.answering, self.comparison, self.improver, self.analyst.findings)
             except Exception as error:
@@ -311,7 +311,7 @@ class Page(ABC):
                 panel.refresh()
 
     def fault(self, error: Exception) -> None:
-        """Something that we have got wrong: it is told, and nothing that was drawn before is trusted."""
+        """An error of our own: it is reported, and nothing that was drawn before is trusted."""
         Changes.faults += 1
         text = f"{type(error).__name__}: {error}"
         if text not in self._faults:  # once is enough, however often the page is written
@@ -332,5 +332,5 @@ class Page(ABC):
 
 
 def _robot(session: Session) -> tuple[str, tuple[str, ...]]:
-    """What tells one robot from another, however its fins are moved."""
+    """What identifies a robot, however its fins are moved."""
     return session.state.layout.name, session.state.layout.names

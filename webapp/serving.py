@@ -1,4 +1,4 @@
-"""Serves the app: opens the port, warms the solver up, and goes on until it is told to stop."""
+"""Serves the app: opens the port, warms the solver up, and serves until it is stopped."""
 
 import signal
 import socket

@@ -27,10 +27,6 @@ def load() -> str:
     return f"load {os.getloadavg()[0]:.1f}"
 
 
-SELDOM = "const draw = requestAnimationFrame; window.requestAnimationFrame = (f) => setTimeout(draw, 80, f);"
-"""Script that has the page draw ten times a second: without a graphics card drawing is most of the work."""
-
-
 @contextlib.contextmanager
 def browser() -> Iterator[Any]:
     """One Chromium."""
@@ -51,7 +47,6 @@ def opened(**options: Any) -> Iterator[tuple[Any, Served]]:
     with serving() as served, browser() as chromium:
         served.url = served.url.replace("0.3", "0.1")  # nobody looks at the view
         context = chromium.new_context(viewport={"width": 1400, "height": 860}, **options)
-        context.add_init_script(SELDOM)
         yield Page(context.new_page(), served), served
 
 

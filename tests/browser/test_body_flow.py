@@ -36,7 +36,7 @@ def test_a_body_is_estimated_from_its_hull_and_typed_over(page: Any) -> None:
     page.until(lambda: shown(page, "Buoyancy [N]") == pytest.approx([9.81 * mass], rel=0.03))
     surge, sway, heave = shown(page, "Added mass [kg]")
     assert 0.1 * mass < surge < sway < heave < 2.0 * mass, "the flatter it is to the way, the more water"
-    assert all(value > 0.0 for value in shown(page, "Square drag [N s²/m²]"))
+    assert all(value > 0.0 for value in shown(page, "Drag ∝ v² [N s²/m²]"))
 
     typed(page, "Mass [kg]", "2*9 kg")
     page.until(lambda: session.state.layout.body.mass_kg == 18.0)

@@ -72,7 +72,7 @@ def test_the_user_changes_what_the_day_says() -> None:
     assert heavy.truth == pytest.approx({"damping": 2.0, "buoyancy": 0.985})
     card = scenario_card(heavy)
     assert "1.5 % too heavy; damping × 2" in card and "Believed: the layout, in still water" in card
-    assert "True: as drawn. Believed: the same. It is told" in scenario_card(SwimSettings())
+    assert "True: as drawn. Believed: the same. Broken fins are announced." in scenario_card(SwimSettings())
     assert "100 ms later" in scenario_card(chosen("late"))
     assert "one fin at 70 %" in scenario_card(chosen("weak"))
     assert "2 fins lost half-way" in scenario_card(chosen("lost-two"))

@@ -17,6 +17,8 @@ from webapp.tasks.moment import ERROR
 from webapp.tasks.swimming import Swimming
 from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, WATER, css, look
 
+LONG = 24
+"""Characters of a verdict above which it takes a line of its own in a small view."""
 ARROWS = (("asked", 0.65), ("delivered", 1.0), ("missing", 1.0))
 """Words and opacities of the three arrows."""
 
@@ -31,7 +33,7 @@ def legend(newtons: float, torque: float, cut: bool, also: tuple[str, ...]) -> s
         also: rows as `overlay_row` and the others here make them; empty ones are left out.
     """
     # By name, so that the dark theme can lighten them.
-    rows = [f"{_arrow(f'var(--fl-{word})', alpha)}<span>{word}</span>" for word, alpha in ARROWS]
+    rows = [_key(_arrow(f"var(--fl-{word})", alpha), word) for word, alpha in ARROWS]
     ring = f"<i>ring </i>{math.degrees(HALF_TURN):.0f}° = {torque:g} N m{', cut off' if cut else ''}"
     return (
         f"<div class='fl-legend'>{''.join(rows)}{''.join(also)}</div><div class='dim scales'>"
@@ -48,7 +50,7 @@ def overlay_row(other: Allocation | None, dark: bool) -> str:
     """Whose forces lie over those of the robot."""
     if other is None:
         return ""
-    return f"{_arrow(css(look(dark).overlay), 1.0)}<span>fins, {escape(other.method)}</span>"
+    return _key(_arrow(css(look(dark).overlay), 1.0), f"fins, {escape(other.method)}")
 
 
 def graph_row(shown: bool, weighed: bool, dark: bool) -> str:
@@ -56,24 +58,29 @@ def graph_row(shown: bool, weighed: bool, dark: bool) -> str:
     if not shown:
         return ""
     line = f"<path d='M0 3L44 3.8V6.2L0 7Z' fill='{css(look(dark).line)}'/>"
-    return f"<svg width='44' height='10'>{line}</svg><span>{'attention' if weighed else 'graph'}</span>"
+    return _key(f"<svg width='44' height='10'>{line}</svg>", "attention" if weighed else "graph")
 
 
 def set_rows(findings: Findings | None) -> str:
     """The bodies of what can be attained, and their scale."""
     if findings is None or findings.now is None:
         return ""
-    rows = [f"{_patch(css(DELIVERED, 0.5))}<span>working fins</span>"]
+    rows = [_key(_patch(css(DELIVERED, 0.5)), "working fins")]
     if findings.whole is not None:
         asked = findings.question
         other = "before" if asked.beside.name == asked.layout.name else asked.beside.name
         word = "all fins" if asked.failed else other
-        rows.append(f"{_patch(css(DEAD, 0.45))}<span>{escape(word)}</span>")
+        rows.append(_key(_patch(css(DEAD, 0.45)), escape(word)))
     ball = f"<svg width='44' height='12'><circle cx='22' cy='6' r='5' fill='{css(ASKED)}'/></svg>"
     unit = "N" if findings.now.kind == "force" else "N m"
     scale = f"body 0.1 m = {three_digits(0.1 / set_scale(findings))} {unit}"
-    rows.append(f"{ball}<span>asked in it</span><span class='dim wide'>{scale}</span>")
+    rows.append(f"{_key(ball, 'asked in it')}<span class='dim wide'>{scale}</span>")
     return "".join(rows)
+
+
+def _key(sign: str, words: str) -> str:
+    """A row of the legend, which stays together where rows stand beside each other."""
+    return f"<div class='key'>{sign}<span>{words}</span></div>"
 
 
 def _patch(color: str) -> str:
@@ -125,6 +132,7 @@ def _figures(allocation: Allocation, instead: str, least: bool, in_reach: bool) 
     """Error, costs, time and verdict of what is on the robot."""
     color = DEAD if instead else verdict_of(allocation, in_reach).color
     verdict = instead or verdict_sentence(allocation, in_reach)
+    pill = "pill long" if len(verdict) > LONG else "pill"
     rest = ", ".join(
         f"{axis} {value:+.2g} {unit}"
         for axis, value, unit in zip(AXES, allocation.unallocated, AXIS_UNITS, strict=True)
@@ -140,7 +148,7 @@ def _figures(allocation: Allocation, instead: str, least: bool, in_reach: bool) 
         f"<b class='err'>{small(allocation.err_norm)}</b> σ</span>",
         *costs,
         f"<span class='aside'><span class='dim'>{method}</span> {time} ms</span>",
-        f"<span class='pill' style='background:{css(color)}'>{escape(verdict)}</span>",
+        f"<span class='{pill}' style='background:{css(color)}'>{escape(verdict)}</span>",
     ]
 
 
@@ -148,8 +156,10 @@ def swim_corner(swimming: Swimming, newtons: float) -> str:
     """The same while robots swim."""
     first, shown = swimming.swimmers[0], swimming.seen[0]
     trails = "".join(
-        f"<svg width='44' height='10'><path d='M0 5H44' stroke='{css(color)}' stroke-width='3.5'/></svg>"
-        f"<span>{escape(word)}</span>"
+        _key(
+            f"<svg width='44' height='10'><path d='M0 5H44' stroke='{css(color)}' stroke-width='3.5'/></svg>",
+            escape(word),
+        )
         for word, color in (
             ("the path", ASKED),
             *((f"{name}, {robot.about}", color) for robot, _, color, name in robots(swimming)),
@@ -157,7 +167,7 @@ def swim_corner(swimming: Swimming, newtons: float) -> str:
     )
     speed = 100.0 * float(np.linalg.norm(shown.flow))
     if speed >= 0.05:
-        trails += f"{_arrow(css(WATER), 0.9)}<span>water, {speed:.1f} cm/s</span>"
+        trails += _key(_arrow(css(WATER), 0.9), f"water, {speed:.1f} cm/s")
     alive = len(first.fins) - len(shown.lost)
     off = f"{100 * float(shown.record[-1, ERROR]):.1f}" if len(shown.record) else "–"
     power = "–" if shown.figures is None else f"{shown.figures.now_w:.1f}"

@@ -7,7 +7,7 @@ from html import escape
 from webapp.markup.picking import send
 
 FRAME = "fl-frame"
-"""Channel on which the frame is told what was pressed in it."""
+"""Channel for what was pressed in the frame."""
 TRIES = (
     ("Ask for a wrench", "Drag Fx: the fins change, and green follows blue.", "task,Allocate"),
     ("Move a fin", "Select one and pull its arrows; what the robot can do changes with it.", "task,Design"),

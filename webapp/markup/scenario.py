@@ -22,13 +22,10 @@ def scenario_card(settings: SwimSettings) -> str:
     day = settings.day
     true = "; ".join(_true(settings)) or "as drawn"
     believed = "the layout, in still water" if true != "as drawn" else "the same"
-    if settings.announced:
-        told = "It is told of broken fins."
-    else:
-        told = "Nobody tells it of broken fins: a monitor watches."
+    losses = "Broken fins are announced." if settings.announced else "A monitor has to detect broken fins."
     return (
         f"<div class='fl scenario'><div>{escape(day.about)}</div>"
-        f"<div class='dim'>True: {escape(true)}. Believed: {believed}. {told}</div></div>"
+        f"<div class='dim'>True: {escape(true)}. Believed: {believed}. {losses}</div></div>"
     )
 
 

@@ -1,4 +1,4 @@
-"""The question of the page told again as a command, and as lines of Python."""
+"""The question of the page as a command, and as lines of Python."""
 
 import math
 import shlex

@@ -30,7 +30,7 @@ def pace_words(swimming: Swimming) -> str:
 
 
 def findings_words(shown: Moment) -> list[str]:
-    """What the monitor has found out of what nobody told, and what it has not."""
+    """Which unannounced losses the monitor has detected, and which it has not."""
     sentences = [
         f"The monitor found {escape(name)} lost {seconds:.1f} s after it broke."
         for name, seconds in shown.found

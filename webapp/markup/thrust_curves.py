@@ -21,7 +21,7 @@ POINTS = 41
 
 
 def thrust_curves(fin: Fin) -> str:
-    """The plot of one fin; nothing where its table cannot be read, which is told elsewhere."""
+    """The plot of one fin; nothing where its table cannot be read, which is reported elsewhere."""
     try:
         amplitude, frequency, thrust = thrust_within(fin.model, fin.limits)
     except DataError:

@@ -24,7 +24,7 @@ class Verdict(Enum):
 
     @property
     def color(self) -> Rgb:
-        """Of everything that tells it."""
+        """Of everything that shows it."""
         return _COLORS[self]
 
 

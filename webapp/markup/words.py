@@ -46,7 +46,7 @@ def three_digits(value: float) -> str:
 
 
 def objective_of(allocation: Allocation) -> str:
-    """What the method that answered keeps least; those that cannot be told keep the paper's effort least."""
+    """What the method that answered keeps least; those without that choice keep the paper's effort least."""
     return str(allocation.settings.get("objective", "effort"))
 
 

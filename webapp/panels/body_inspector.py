@@ -36,11 +36,11 @@ PARTS: dict[str, tuple[tuple[str, int, str], ...]] = {
         ("turning [kg m²]", 3, "About x, y, z. From the hull: its ellipsoid after Lamb, art. 115."),
     ),
     "linear_damping": (
-        ("Linear drag [N s/m]", 0, "Along x, y, z. From the hull: Blasius' friction at 0.2 m/s."),
+        ("Drag ∝ v [N s/m]", 0, "Along x, y, z. From the hull: Blasius' friction at 0.2 m/s."),
         ("turning [N m s]", 3, "About x, y, z. From the hull: by the same friction."),
     ),
     "quadratic_damping": (
-        ("Square drag [N s²/m²]", 0, "Along x, y, z. From the hull: ½ ρ A 0.44 d/l, Hoerner's blunt bodies."),
+        ("Drag ∝ v² [N s²/m²]", 0, "Along x, y, z. From the hull: ½ ρ A 0.44 d/l, Hoerner's blunt bodies."),
         ("turning [N m s²]", 3, "About x, y, z. From the hull: strips in cross-flow but for the round core."),
     ),
     "center_of_buoyancy_m": (("Lift at [m]", 0, "Centre of buoyancy, from the centre of gravity."),),

@@ -1,4 +1,4 @@
-"""What can be told of a layout at once: its axes, what a failure costs, what looks like a mistake."""
+"""What can be said of a layout at once: its axes, what a failure costs, what looks like a mistake."""
 
 import viser
 

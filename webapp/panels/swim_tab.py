@@ -137,8 +137,8 @@ class RunPanel(SwimPanel):
             "fl-breaks",
             lambda name: page.swimming.toggle(name, page.session.swim.announced),
         )
-        tells = "The allocator is told. Off: a monitor must find out from how the robot moves."
-        self._bind("announced", self._gui.add_checkbox("Announced", True, hint=tells))
+        about = "The allocator knows at once. Off: a monitor has to detect it from the robot's motion."
+        self._bind("announced", self._gui.add_checkbox("Announced", True, hint=about))
         now = "At once, while it swims."
         for key, label, step, hint in (
             ("current_cm_s", "Current [cm/s]", 0.1, f"How fast the water flows. {now}"),

@@ -121,9 +121,9 @@ def _parts(content: bytes) -> dict[str, bytes]:
 
 def _joined(parts: dict[str, bytes], levels: int) -> bytes:
     """Files behind a line of JSON that lists their names and sizes; tables are rounded."""
-    told = {n: rounded(part, n, levels) if n.endswith(TABLE) else part for n, part in parts.items()}
-    sizes = json.dumps([[name, len(part)] for name, part in told.items()], separators=(",", ":"))
-    return sizes.encode() + b"\n" + b"".join(told.values())
+    contents = {n: rounded(part, n, levels) if n.endswith(TABLE) else part for n, part in parts.items()}
+    sizes = json.dumps([[name, len(part)] for name, part in contents.items()], separators=(",", ":"))
+    return sizes.encode() + b"\n" + b"".join(contents.values())
 
 
 def _apart(data: bytes) -> bytes:

@@ -1,4 +1,4 @@
-"""A force table in a few kilobytes, for a link: its values are rounded, then each is told by its neighbours.
+"""A force table in a few kilobytes, for a link: values are rounded, then predicted from their neighbours.
 
 Forces are whole multiples of a small share of the largest force, power likewise. Between neighbours on a
 smooth grid they hardly change, and their slopes hardly do: the second differences along all three axes are
@@ -43,10 +43,10 @@ def rounded(content: bytes, source: str, levels: int = LEVELS[0]) -> bytes:
     axes, values, periodic = law.grid
     forces = [np.abs(values[..., :3]).max()] * 3
     steps = np.array([*forces, *values[..., 3:].max((0, 1, 2))]) / levels
-    told = np.rint(values / steps).astype(np.int64)
+    whole = np.rint(values / steps).astype(np.int64)
     for axis in (0, 1, 2, 0, 1, 2):
-        told = np.diff(told, axis=axis, prepend=0)
-    folded = np.where(told < 0, -2 * told - 1, 2 * told).astype("<u4")  # small ones have small bytes
+        whole = np.diff(whole, axis=axis, prepend=0)
+    folded = np.where(whole < 0, -2 * whole - 1, 2 * whole).astype("<u4")  # small ones have small bytes
     digits = np.moveaxis(folded, -1, 0).ravel().view(np.uint8).reshape(-1, 4)
     notes = [note for note in law.notes if not note.startswith(NOTE)]
     notes.append(f"{NOTE}{accuracy(levels)} of the largest force and power")
@@ -92,8 +92,8 @@ def _values(digits: bytes, shape: tuple[int, ...], steps: Array) -> Array:
         raise ValueError
     columns = np.frombuffer(digits, np.uint8).reshape(4, -1).T
     folded = np.ascontiguousarray(columns).view("<u4").reshape(len(steps), *shape).astype(np.int64)
-    told = np.where(folded % 2 == 1, -(folded + 1) // 2, folded // 2)
+    whole = np.where(folded % 2 == 1, -(folded + 1) // 2, folded // 2)
     for axis in (1, 2, 3, 1, 2, 3):
-        told = np.cumsum(told, axis=axis)
-    values: Array = np.moveaxis(told, 0, -1) * steps
+        whole = np.cumsum(whole, axis=axis)
+    values: Array = np.moveaxis(whole, 0, -1) * steps
     return values

@@ -73,7 +73,7 @@ class SwimSettings:
     speed: float = 1.0
     """Simulated time per time on the wall."""
     announced: bool = True
-    """Whether the allocator is told of fins that break and are mended; else the monitor has to find out."""
+    """Whether breaking and mending is announced to the allocator; else the monitor has to detect it."""
     current_cm_s: float = 0.0
     """Speed of the current [cm/s]."""
     heading_deg: float = 0.0
@@ -214,4 +214,4 @@ class Plan(NamedTuple):
     losses: tuple[FinFault, ...] = ()
     """What becomes of fins on the way."""
     announced: bool = True
-    """Whether the allocator is told of that."""
+    """Whether that is announced to the allocator."""

@@ -67,7 +67,7 @@ class Worker:
         Args:
             key: who asks, and what for.
             job: what to do, on the worker's thread.
-            failed: told there, in a sentence, why the job came to nothing.
+            failed: called there with a sentence that says why the job failed.
         """
         with self._wake:
             self._jobs[key] = (job, failed)

@@ -100,7 +100,7 @@ class Designs:
         self._remember(layout)
 
     def note(self) -> None:
-        """Told whenever the page is written: a design that has made room for another one is kept."""
+        """Called whenever the page is written: a design that was replaced by another one is kept."""
         layout, last = self._session.state.layout, self._last
         self._last = layout
         if layout.name != last.name and layout.fins != last.fins:

@@ -65,7 +65,7 @@ class Moment(NamedTuple):
     failed: tuple[str, ...]
     """Those that the allocator takes for lost."""
     found: tuple[tuple[str, float], ...]
-    """Those of which nobody told it, each with the time that the monitor needed to find out [s]."""
+    """Unannounced losses that the monitor has detected, each with the time that it took [s]."""
     doubted: tuple[str, ...]
     """Those that the monitor takes for broken in some way, more likely than not."""
     controllable: bool

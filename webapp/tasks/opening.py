@@ -50,7 +50,7 @@ class Opening:
 
     @property
     def suffixes(self) -> str:
-        """How the names of all files end that are opened, as a browser wants to be told it."""
+        """Suffixes of all files that can be opened, as a browser expects them."""
         return ",".join(dict.fromkeys(suffix for taker in self._takers for suffix in taker.suffixes))
 
     def add(self, suffixes: str, take: Take, knows: Callable[[bytes], bool] | None = None) -> None:
@@ -104,7 +104,7 @@ class Opening:
         return suffix
 
     def _hear(self, text: str) -> None:
-        """What was dropped, from the page, which may send anything; it sends them when it is told so."""
+        """What was dropped, from the page, which may send anything; it sends them when asked to."""
         try:
             told: Any = json.loads(text)
         except (ValueError, RecursionError):
@@ -115,5 +115,5 @@ class Opening:
             self._send_next()
 
     def _send_next(self) -> None:
-        """One at a time: of two files that arrive at once viser tells the second one twice."""
+        """One at a time: of two files that arrive at once viser reports the second one twice."""
         run_script(self._gui, "finlabDropping.sendNext();")

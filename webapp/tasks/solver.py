@@ -40,7 +40,7 @@ class Reply:
     answer: Allocation
     """The answer itself."""
     proposal: Proposal | None
-    """What the network made of the target, for methods with one that tells."""
+    """The network's output for the target, for methods that expose it."""
     modes: Modes
     """Those of its modes that are known anyway: a few."""
     in_reach: bool

@@ -19,7 +19,7 @@ from webapp.tasks.recorded import Recorded
 from webapp.tasks.swimming import Swimming
 
 STEP = 0.05
-"""Share of a file after which the page is told how far it is."""
+"""Share of a file after which the page is sent its progress."""
 SHORTEST = 5
 """Ticks of which pictures can be made."""
 

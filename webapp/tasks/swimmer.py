@@ -68,7 +68,7 @@ class Swimmer:
         return SteadyCurrent(swim.water.flow(swim.state[:3].tolist(), swim.time).velocity)
 
     def _note_findings(self) -> None:
-        """When the monitor found out what nobody told; forgotten once the fin is whole or taken for it."""
+        """When the monitor detected an unannounced loss; forgotten once the fin is whole or taken for it."""
         swim = self.swim
         unknown = [name for name in swim.lost if name not in swim.told]
         self._found = {

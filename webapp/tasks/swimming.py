@@ -123,7 +123,7 @@ class Swimming:
         self._submit(1)
 
     def toggle(self, name: str, announced: bool = True) -> None:
-        """A fin of all robots breaks, or is mended, before the next step; the allocators are told, or not."""
+        """A fin of all robots breaks, or is mended, before the next step, announced to allocators or not."""
         if not self.swimmers:
             raise FinlabError("nothing swims yet; press Start")
         lost = self.swimmers[0].shown.lost

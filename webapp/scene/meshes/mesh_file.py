@@ -40,7 +40,7 @@ def read_mesh(name: str, content: bytes, scale: float) -> tuple[Mesh, MeshReport
     """The mesh in a file: whole scene, in metres, mended, the middle of its box at the origin.
 
     Args:
-        name: the file's name; its ending tells the format.
+        name: the file's name; its suffix gives the format.
         content: what is in it.
         scale: metres per unit.
 
