@@ -142,7 +142,8 @@ def _figures(allocation: Allocation, instead: str, least: bool, in_reach: bool) 
         kept = f"least {word}" if word == objective_of(allocation) and least else word
         cost = f"<b class='{word}'>{three_digits(value)}</b>{unit}"
         costs.append(f"<span><span class='dim'>{kept}</span> {cost}</span>")
-    method, time = escape(allocation.method), three_digits(allocation.solve_ms)
+    method, ms = escape(allocation.method), allocation.solve_ms
+    time = f"{ms:.2g}" if ms < 10.0 else f"{ms:.0f}"  # no measurement repeats to a third digit
     return [
         f"<span title='missing, by the fins’ own laws: {rest}'><span class='dim'>error</span> "
         f"<b class='err'>{small(allocation.err_norm)}</b> σ</span>",

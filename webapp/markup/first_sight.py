@@ -47,8 +47,8 @@ def welcome() -> str:
     )
     return (
         "<section class='fl fl-welcome' aria-label='Welcome'><h2>finlab</h2>"
-        "<p>For robots that swim with fins: say which force and torque the body shall feel, and every fin "
-        f"is told how to flap.</p><ol>{tries}</ol><div class='row'>"
+        "<p>For robots that swim with fins: say which force and torque the body shall feel, and see "
+        f"how each fin has to flap.</p><ol>{tries}</ol><div class='row'>"
         f'<button class="primary" onclick="{tell("tour,")} finlabFrame.met()">Take the tour</button>'
         "<button onclick='finlabFrame.met()'>Close</button></div></section>"
     )

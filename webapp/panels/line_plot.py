@@ -106,7 +106,7 @@ def _scales(ends: tuple[float, float], across: float | None = None) -> dict[str,
 
 def _axes(title: str, below: str) -> tuple[uplot.Axis, uplot.Axis]:
     across = uplot.Axis(
-        label=below, labelSize=18 if below else 0, size=30 if below else 24, labelFont=FONT, font=FONT
+        label=below, labelSize=18 if below else 0, size=30 if below else 28, labelFont=FONT, font=FONT
     )
     if not title:
         return across, uplot.Axis(show=False)

@@ -36,7 +36,7 @@ class SweepPanel:
             lambda: self._ends,
         )
         self._play = page.add_button("Play the sweep", self._toggle, hint="To and fro until you stop it.")
-        self._plot = LinePlot(gui, FIN_LINES, "force of each fin [N]", height=170, widths=(2.0,))
+        self._plot = LinePlot(gui, FIN_LINES, "fin forces [N]", height=170, widths=(2.0,))
         self._said = gui.add_html("")
 
     def _toggle(self) -> None:
@@ -70,7 +70,7 @@ class SweepPanel:
             return
         self._drawn = time.monotonic()
         self._plot.show(True)
-        self._plot.name("force of each fin [N]", f"{AXIS_WORDS[sweep.axis]} asked [{AXIS_UNITS[sweep.axis]}]")
+        self._plot.name("fin forces [N]", f"{AXIS_WORDS[sweep.axis]} asked [{AXIS_UNITS[sweep.axis]}]")
         self._plot.draw(sweep.values, list(sweep.force), (0.0, top_of(sweep.force, 0.0)))
         put(self._said, content=f"<div class='fl'>{_sentence(sweep)}</div>")
 

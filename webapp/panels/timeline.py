@@ -21,7 +21,7 @@ EVERY_S = 0.2
 """Least time between two drawings [s]."""
 SMALL = 0.01
 """What the vertical axes show at least."""
-PLOT_PX = 78
+PLOT_PX = 92
 """Height of a plot [px]."""
 STEPS = (5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 90.0, 120.0, 180.0, 240.0)
 """Where the axes of time may end [s]."""
@@ -54,7 +54,7 @@ class Timeline:
             digits=1,
         )
         wrench = "Asked in blue, delivered in green, of the first robot."
-        self._axis = gui.add_dropdown("Plot the wrench of", AXIS_WORDS, hint=wrench)
+        self._axis = gui.add_dropdown("Plot wrench", AXIS_WORDS, hint=wrench)
         hold_kind(self._axis)
         self._plots = SwimPlots(gui)
 
