@@ -15,7 +15,7 @@ from webapp.scene.gizmos import add_gizmo
 from webapp.scene.meshes import fin as fin_mesh
 from webapp.scene.meshes.hull import AnyHull
 from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, tube
-from webapp.scene.shape import UNLIT, Shape
+from webapp.scene.shape import Shape
 from webapp.theme import DEAD, LIGHT, fin_color
 
 APART = 1.9
@@ -127,7 +127,9 @@ class FinNode:
         self.shapes = fin = FinShapes(scene, f"{name}/turn", index, cast_shadow=False)
         """Its blade, shaft and force."""
         fan = fin_mesh.sweep(0.1)
-        self._fan = Shape(scene, f"{name}/turn/fan", fin.color, fan, opacity=0.3, side="double", **UNLIT)
+        self._fan = Shape(
+            scene, f"{name}/turn/fan", fin.color, fan, opacity=0.3, side="double", cast_shadow=False
+        )
         self._label = scene.add_label(
             f"{name}/label", str(index + 1), anchor="center-center", font_screen_scale=LABEL
         )

@@ -11,7 +11,7 @@ from finlab.layout import Fin, Layout
 from webapp.handles import put
 from webapp.scene.meshes import fin as fin_mesh
 from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, joined, tube
-from webapp.scene.shape import UNLIT, Shape
+from webapp.scene.shape import Shape
 from webapp.tasks.solver import Proposal
 from webapp.theme import DEAD, LIGHT, Rgb, look
 
@@ -32,7 +32,7 @@ class Ghost:
         self, scene: viser.SceneApi, name: str, color: Rgb = DEAD, opacity: float | None = 0.3
     ) -> None:
         """Build the node, showing nothing."""
-        self._shape = Shape(scene, name, color, opacity=opacity, visible=False, **UNLIT)
+        self._shape = Shape(scene, name, color, opacity=opacity, visible=False, cast_shadow=False)
 
     def show(self, fins: tuple[Fin, ...]) -> None:
         """Show fins; none hides the node."""
@@ -82,7 +82,7 @@ class Lines:
 
     def __init__(self, scene: viser.SceneApi) -> None:
         """Build the nodes."""
-        self.graph = Shape(scene, "/robot/graph", LIGHT.line, visible=False, **UNLIT)
+        self.graph = Shape(scene, "/robot/graph", LIGHT.line, visible=False, cast_shadow=False)
         self._steps = scene.add_line_segments(
             "/robot/dimension", NO_LINE, LIGHT.line, thickness=2.0, thickness_units="screen"
         )

@@ -10,9 +10,6 @@ from webapp.handles import put
 from webapp.scene.meshes.mesh import NOTHING, Mesh
 from webapp.theme import Rgb
 
-UNLIT: dict[str, Any] = {"cast_shadow": False, "receive_shadow": False}
-"""Options of a node that has nothing to do with shadows."""
-
 
 class Shape:
     """A node and the arguments that its present shape was made from."""
@@ -20,8 +17,13 @@ class Shape:
     def __init__(
         self, scene: viser.SceneApi, name: str, color: Rgb, mesh: Mesh = NOTHING, **options: Any
     ) -> None:
-        """Add the node; `options` as viser's `add_mesh_simple` takes them."""
-        self.node = scene.add_mesh_simple(name, mesh.vertices, mesh.faces, color=color, **options)
+        """Add the node; `options` as viser's `add_mesh_simple` takes them.
+
+        Shadows fall on the floor alone: on round shapes the map of shadows draws stripes.
+        """
+        self.node = scene.add_mesh_simple(
+            name, mesh.vertices, mesh.faces, color=color, receive_shadow=False, **options
+        )
         self._made_from: tuple[Any, ...] | None = None
 
     def show(self, make: Callable[..., Mesh], *arguments: Any) -> None:

@@ -8,7 +8,7 @@ import viser
 from finlab.layout import Layout
 from webapp.handles import put
 from webapp.scene.meshes.mesh import force_arrow
-from webapp.scene.shape import UNLIT, Shape
+from webapp.scene.shape import Shape
 from webapp.scene.stage import add_floor, aim_camera, paint_floor
 from webapp.scene.swim_robot import SwimRobot, goal
 from webapp.scene.wrench_nodes import LENGTH
@@ -39,7 +39,7 @@ class SwimScene:
         """Build the nodes, hidden."""
         self._client, self._swimming = client, swimming
         scene = client.scene
-        self._goal = Shape(scene, "/swim/goal", ASKED, opacity=0.45, visible=False, **UNLIT)
+        self._goal = Shape(scene, "/swim/goal", ASKED, opacity=0.45, visible=False, cast_shadow=False)
         self._reference = scene.add_icosphere(
             "/swim/reference", 0.035, color=ASKED, visible=False, cast_shadow=False
         )

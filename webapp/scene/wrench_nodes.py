@@ -19,7 +19,7 @@ from webapp.scene.meshes.mesh import (
     torque_ring,
     tube,
 )
-from webapp.scene.shape import UNLIT, Shape
+from webapp.scene.shape import Shape
 from webapp.session.display import NEWTONS
 from webapp.tasks.analyst import Findings
 from webapp.theme import ASKED, DEAD, DELIVERED, HALF_TURN, LIGHT, MISSING
@@ -72,7 +72,7 @@ class WrenchNodes:
         scene.add_icosphere("/robot/wrench/hub", 0.012, color=(70, 78, 86), cast_shadow=False)
 
         def node(name: str, color: tuple[int, int, int], opacity: float | None) -> Shape:
-            return Shape(scene, f"/robot/wrench/{name}", color, opacity=opacity, **UNLIT)
+            return Shape(scene, f"/robot/wrench/{name}", color, opacity=opacity, cast_shadow=False)
 
         self._asked = node("asked_force", ASKED, 0.4), node("asked_torque", ASKED, 0.4)
         self._given = node("delivered_force", DELIVERED, None), node("delivered_torque", DELIVERED, None)
@@ -130,7 +130,7 @@ class AttainableNodes:
         """Build the nodes, showing nothing."""
 
         def glass(name: str, color: tuple[int, int, int], opacity: float) -> Shape:
-            return Shape(scene, name, color, opacity=opacity, side="double", visible=False, **UNLIT)
+            return Shape(scene, name, color, opacity=opacity, side="double", visible=False, cast_shadow=False)
 
         self._now = glass("/robot/attainable/now", DELIVERED, 0.34)
         self._whole = glass("/robot/attainable/whole", DEAD, 0.16)
