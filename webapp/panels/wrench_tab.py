@@ -17,6 +17,9 @@ from webapp.session.state import AXIS_UNITS, AXIS_WORDS
 from webapp.session.targets import PRESETS, axis_reach, full_thrust, slider_end
 from webapp.viser_internals import put_marks
 
+CLOSE = 0.28
+"""Share of a slider below which the texts of two marks would lie on each other."""
+
 
 class FinsPanel:
     """What each fin does, and which have failed."""
@@ -115,16 +118,21 @@ class TargetPanel:
                 put(slider, hint=AXIS_WORDS[k].capitalize())
                 continue
             low, high = float(ranges.low[k]), float(ranges.high[k])
-            put_marks(slider, _marks(low, high))
+            put_marks(slider, reach_marks(low, high, slider.max - slider.min))
             put(slider, hint=_hint(k, low, high, float(most[k])))
 
 
-def _marks(low: float, high: float) -> tuple[tuple[float, str], ...]:
-    """Both ends of a range; one mark where it is a point, none where there is no range."""
+def reach_marks(low: float, high: float, width: float) -> tuple[tuple[float, str], ...]:
+    """Both ends of a range, value and text, on a slider that is `width` long; one mark where it is a point,
+    none where there is no range, and one text for both where two would lie on each other."""
     if not np.isfinite(low):
         return ()
-    marks = ((round(low, 3), _short(low)), (round(high, 3), _short(high)))
-    return marks if high - low > 1e-3 else marks[:1]
+    first, last = _short(low), _short(high)
+    if high - low <= 1e-3:
+        return ((round(low, 3), first),)
+    if high - low < CLOSE * width:
+        first, last = "", f"±{last}" if first == f"−{last}" else f"{first} … {last}"
+    return (round(low, 3), first), (round(high, 3), last)
 
 
 def _short(value: float) -> str:
