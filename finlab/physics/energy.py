@@ -76,24 +76,33 @@ class EnergyMeter:
 
     def __call__(self, command: NDArray[np.floating]) -> AnyArray:
         """Energies (R,) of commands (R, n, 3)."""
-        return self.with_slopes(command)[0]
+        return self._energy(command, self._quadratic_slopes(command))
 
     def slopes(self, command: NDArray[np.floating]) -> AnyArray:
         """Derivatives (R, n, 3) of the energies by commands (R, n, 3)."""
-        return self.with_slopes(command)[1]
+        return self._slopes(command, self._quadratic_slopes(command))
 
     def with_slopes(self, command: NDArray[np.floating]) -> tuple[AnyArray, AnyArray]:
         """Both, for little more than the price of one."""
-        slopes = self._quadratic_slopes(command)
+        quadratic = self._quadratic_slopes(command)
+        return self._energy(command, quadratic), self._slopes(command, quadratic)
+
+    def _energy(self, command: NDArray[np.floating], quadratic: AnyArray) -> AnyArray:
         # Of a quadratic form, half the slopes times the commands.
-        energy: AnyArray = np.einsum("rni,rni->r", slopes, command)
+        energy: AnyArray = np.einsum("rni,rni->r", quadratic, command)
         energy *= 0.5
         if self.weights.inertial:
             a, f = self._beat(command)
             energy += self.weights.inertial * ((a * f) ** 2 * f).sum(-1)
+        return energy
+
+    def _slopes(self, command: NDArray[np.floating], slopes: AnyArray) -> AnyArray:
+        """All slopes, in place of the quadratic ones."""
+        if self.weights.inertial:
+            a, f = self._beat(command)
             slopes[..., 0] += self.weights.inertial * 2.0 * a * f**3 / self._scale[:, 0]
             slopes[..., 1] += self.weights.inertial * 3.0 * (a * f) ** 2 / self._scale[:, 1]
-        return energy, slopes
+        return slopes
 
     def _quadratic_slopes(self, command: NDArray[np.floating]) -> AnyArray:
         """Derivatives (R, n, 3) of all but the inertial part."""

@@ -59,7 +59,7 @@ SECTIONS = {
     "latency": ("latency", "first_answers"),
     "closed-loop": ("trajectory", "faults", "velocity"),
     "hard-days": ("swims",),
-    "slow-days": ("slow_swims",),
+    "slow-days": ("swims", "slow_swims"),
     "ablation": ("ablation",),
     "temperature": ("temperature", "scatter"),
     "training": ("training",),
