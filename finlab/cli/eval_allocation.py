@@ -181,7 +181,7 @@ def ablation(
         temperature: of the draw.
     """
     from finlab.evaluation.experiments.ablation import ablation_rows
-    from finlab.evaluation.report.sections.studies import ablation_blocks
+    from finlab.evaluation.report.sections.ablation import ablation_blocks
 
     options = {"n_candidates": candidates, "temperature": temperature, "checkpoint": run.checkpoint}
     rows = ablation_rows(cases.draw(), seed=cases.seed, **options)

@@ -80,7 +80,8 @@ def run_variant(allocator: Allocator, cases: Sequence[Case], *, seed: int = 0) -
 def variant_rows(variant: str, refinement: str, columns: Columns) -> list[Row]:
     """The two rows of a variant, scored by the surrogate and by the plant, with the intervals of the means.
 
-    `j_norm` is the paper's J_norm, the squared norm of the normalized error, `err_norm` its root.
+    `j_norm` is the paper's J_norm, the squared norm of the normalized error, `err_norm` its root; `err_phys`
+    is the norm in N and N m.
     """
     rows: list[Row] = []
     for scored_by, prefix in (("surrogate", "surrogate_"), ("plant", "")):
@@ -100,6 +101,7 @@ def variant_rows(variant: str, refinement: str, columns: Columns) -> list[Row]:
                 "err_norm_std": float(error.std()),
                 "err_norm_median": float(np.median(error)),
                 "err_phys_mean": float(physical.mean()),
+                "err_phys_square_mean": float((physical**2).mean()),
                 "time_s": float(columns["call_s"]),
             }
         )

@@ -14,6 +14,7 @@ from finlab.evaluation.report.plan import N_STARTS, SWIMMERS, make_plan, parse_s
 from finlab.evaluation.report.provenance import Provenance, how_made_blocks, source_commit
 from finlab.evaluation.report.results import Results
 from finlab.evaluation.report.sections import (
+    ablation,
     closed_loop,
     cost,
     methods,
@@ -108,7 +109,7 @@ def result_blocks(results: Results, sizes: Sizes) -> list[Block]:
         "velocity": closed_loop.velocity_blocks,
         "swims": swims.day_blocks,
         "slow_swims": lambda rows: swims.slow_day_blocks(tables.get("swims", ()), rows),
-        "ablation": studies.ablation_blocks,
+        "ablation": ablation.ablation_blocks,
         "temperature": lambda rows: studies.temperature_blocks(rows, results.scatter),
         "training": lambda rows: studies.training_blocks(rows, sizes.of_table["training"]),
     }

@@ -21,7 +21,7 @@ from finlab.evaluation.experiments.latency import latency_rows, machine
 from finlab.evaluation.experiments.wrench_tracking import run_method, wrench_report, wrench_rows
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.report.numbers import FORMATS
-from finlab.evaluation.report.sections.studies import TITLES, ablation_blocks
+from finlab.evaluation.report.sections.ablation import TITLES, ablation_blocks
 from finlab.evaluation.report.text import to_text
 from finlab.evaluation.splits import SPLITS, make_split
 from finlab.evaluation.statistics.records import load_columns, records_of_columns
@@ -104,6 +104,7 @@ def test_the_ablation_has_the_papers_rows_twice() -> None:
     ours = [
         {"variant": name, "refinement": by, "scored_by": scored_by, "err_norm_mean": 0.5, "time_s": 0.01}
         | {"j_norm_mean": 0.3, "j_norm_mean_interval": (0.2, 0.4), "j_norm_std": 0.1}
+        | {"err_phys_mean": 0.765, "err_phys_square_mean": 0.678}
         for name in VARIANTS
         for by in REFINEMENTS
         for scored_by in ("plant", "surrogate")
@@ -111,7 +112,12 @@ def test_the_ablation_has_the_papers_rows_twice() -> None:
     text = to_text(*ablation_blocks(ours))
     for variant, printed in paper_figures()["ablation"].items():
         lines = [line for line in text.splitlines() if line.startswith(TITLES[variant])]
-        assert len(lines) == 2 and all(FORMATS["error"](printed["err_norm_mean"]) in line for line in lines)
+        show = FORMATS["error"]
+        # For each refinement a table of J_norm and one of the wrench error, where printed values stand last.
+        assert [show(printed["err_norm_mean"]) in line for line in lines[::2]] == [True, True]
+        assert [line.split()[-5:] for line in lines[1::2]] == [
+            ["0.77", "0.77", "0.68", "0.68", show(printed["err_phys_mean"])]
+        ] * 2
 
 
 def test_eval_wrench(statistics: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,28 +1,17 @@
-"""Time per call, ablation, temperature and training: one table and one picture each."""
+"""Time per call, temperature and training: one table and one picture each."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from finlab.allocation.learned.settings import STEPS
-from finlab.evaluation.experiments.ablation import VARIANTS
 from finlab.evaluation.experiments.first_answers import N_FINS
 from finlab.evaluation.experiments.temperature import PAPER_TEMPERATURE
 from finlab.evaluation.experiments.training_study import CHANGES
 from finlab.evaluation.paper_figures import paper_figures
-from finlab.evaluation.plots.studies import ablation_dots, figure_a, latency_dots, training_bars
+from finlab.evaluation.plots.studies import figure_a, latency_dots, training_bars
 from finlab.evaluation.report.document import Block, Column, Figure, Fold, Row, Table, method_row, printed_row
 from finlab.evaluation.report.numbers import three
 from finlab.evaluation.statistics.records import Columns
-
-TITLES = {
-    "mean_only": "mean of the mixture only",
-    "without_refinement": "without refinement",
-    "nll_selection": "ranked by likelihood",
-    "random_warm_start": "random warm start",
-    "ours": "whole pipeline",
-}
-"""The paper's rows in words."""
-REFINED_BY = {"adam": "Adam", "levenberg-marquardt": "Levenberg-Marquardt"}
 
 
 def latency_blocks(rows: Sequence[Row], fins: int = 4) -> list[Block]:
@@ -68,68 +57,6 @@ def first_answer_blocks(rows: Sequence[Row]) -> list[Block]:
             "The slowest robot, in the processor's time."
         ),
         Table(columns, rows),
-    ]
-
-
-def ablation_blocks(
-    rows: Sequence[Row], candidates: int = 64, temperature: float = PAPER_TEMPERATURE
-) -> list[Block]:
-    """The paper's five rows, twice refined, twice scored, from candidates drawn at a temperature."""
-    printed = paper_figures()["ablation"]
-    blocks: list[Block] = [
-        "## Ablation",
-        (
-            "The paper's five rows with the network of the checkpoint `paper`: the same cases, "
-            f"{candidates} candidates, temperature {temperature:g} and refinement budget, one stage changed "
-            "in each row. The paper does not say which model scored its table; that it prints 0.0003 there "
-            "and 0.0857 for wrench tracking suggests two. So the same commands are scored twice: by the "
-            "surrogate that refined them and by the analytic fin model. Nor does it say whether its "
-            "normalized error is J_norm, the squared norm of its equation, or the root of that: both are "
-            "here, and J_norm stands beside the printed value. Steps, learning rate and weight of the energy "
-            "of its refinement are not printed; ours are in `finlab/allocation/learned/settings.py`. Why our "
-            "rows differ from the printed ones we do not know."
-        ),
-        Figure(
-            "ablation",
-            lambda: ablation_dots(
-                rows, {name: row["err_norm_mean"] for name, row in printed.items()}, TITLES
-            ),
-            "Filled: scored by the plant. Hollow: by the surrogate. Diamonds: printed in the paper.",
-        ),
-    ]
-    columns = (
-        Column("title", "row"),
-        Column("surrogate", "J_norm by the surrogate", "error", "surrogate_interval"),
-        Column("surrogate_std", "spread", "error"),
-        Column("plant", "by the plant", "error", "plant_interval"),
-        Column("plant_std", "spread", "error"),
-        Column("printed", "printed", "error"),
-        Column("printed_std", "spread", "error"),
-        Column("surrogate_root", "root, by the surrogate", "error"),
-        Column("plant_root", "by the plant", "error"),
-        Column("time_s", "s per call", "error"),
-        Column("printed_time_s", "printed", "error"),
-    )
-    for refinement, words in REFINED_BY.items():
-        lines = []
-        for variant in VARIANTS:
-            pair = {
-                r["scored_by"]: r for r in rows if (r["variant"], r["refinement"]) == (variant, refinement)
-            }
-            line: Row = {"title": TITLES[variant], "time_s": pair["plant"]["time_s"]}
-            for name, row in pair.items():
-                line |= {name: row["j_norm_mean"], f"{name}_interval": row["j_norm_mean_interval"]}
-                line |= {f"{name}_std": row["j_norm_std"], f"{name}_root": row["err_norm_mean"]}
-            paper = printed[variant]
-            line |= {"printed": paper["err_norm_mean"], "printed_std": paper["err_norm_std"]}
-            line["printed_time_s"] = paper["time_s"]
-            lines.append(line)
-        blocks += [f"### Refined by {words}", Table(columns, lines)]
-        over = ", ".join(f"{line['title']} {three(line['surrogate'] / line['printed'])}" for line in lines)
-        blocks.append(f"J_norm by the surrogate over the printed value: {over}.")
-    return [
-        *blocks,
-        "*s per call: single calls; in a report, timed while another part runs on the other core.*",
     ]
 
 
