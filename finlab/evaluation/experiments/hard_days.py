@@ -221,13 +221,19 @@ HARD_DAYS = (
     HardDay("octo", "Eight fins.", "law kept", ("octo",)),
     HardDay(
         "fins-mixed",
-        "Each fin of A follows a law of its own, which all methods know.",
+        "Each fin of A follows a law of its own, which all methods but `paper` know.",
         "law kept",
         ("A",),
         fins="mixed",
         reason="The fins are others for each seed, which makes intervals wide.",
     ),
-    HardDay("fins-soft", "A has soft fins; all methods know their law.", "law kept", ("A",), fins="soft"),
+    HardDay(
+        "fins-soft",
+        "A has soft fins; all methods but `paper` know their law.",
+        "law kept",
+        ("A",),
+        fins="soft",
+    ),
     HardDay("weak", "One fin gives 70 % of its thrust; no method is given that.", "hard", ("A",), weak=0.7),
     HardDay("lost-one", "One fin is lost half-way, announced.", "hard", ("A",), lost=1),
     HardDay(

@@ -47,7 +47,7 @@ def test_a_row_and_the_best_temperature() -> None:
     rows = [temperature_row(0.1, columns([1.0, 3.0])), temperature_row(1.0, columns([2.0, 4.0]))]
     assert rows[0]["best_j_mean"] == 2.0 and rows[0]["diversity"] == pytest.approx(0.6)
     assert rows[0]["best_j_mean_interval"] == [1.0, 3.0]
-    assert "is lowest at T = 0.100 here" in to_text(*temperature_blocks(rows)).replace("\n", " ")
+    assert "lowest at T = 0.100, and the" in to_text(*temperature_blocks(rows)).replace("\n", " ")
 
 
 def test_every_candidate_before_and_after(untrained_checkpoint: Path) -> None:

@@ -32,8 +32,9 @@ INTRODUCTION = (
         "A robot with six degrees of freedom swims in simulation, sensor noise and servo lag included. "
         "Trajectories, faults and speeds are swum with controllers after the two of the paper where no "
         "other is named, hard days with our own. The paper's runs took place in another simulator "
-        "(trajectories) and in a pool (faults, a circle; speeds), on paths whose size and speed it does not "
-        "print: its figures stand beside ours, not against them. All methods were given the laws by which "
+        "(trajectories) and in a pool (faults, on a circle; speeds). It prints neither the size and speed of "
+        "the paths nor a unit of its errors, which are taken for metres: its figures stand beside ours, not "
+        "against them. All methods were given the laws by which "
         "the simulated fins push in plant `mean`, and none the soft tips of plant `flexible`; `on-board` is "
         "U-CAT's own pseudo-inverse at a fixed frequency, as far as it is published."
     ),

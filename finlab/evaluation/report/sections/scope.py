@@ -16,7 +16,9 @@ SHOWN = (
     "there.",
     "How a **simulated robot** swims: on the hard days, where body, water, sensors, fins or path are not "
     "what its designer assumed, with one controller and one rule for its gains; in the experiments of the "
-    "paper with its two controllers. Whatever method allocates, the controller is the same.",
+    "paper with controllers after its two, whose gains it does not print. Whatever method allocates, the "
+    "controller is the same; on the hard days `search` takes from it the wrenches that it expects, the "
+    "others the present one.",
 )
 NOT_SHOWN = (
     "No robot swam and no fin was measured for this report. Fin laws are means over a cycle in still water. "
@@ -24,12 +26,13 @@ NOT_SHOWN = (
     "`inflow`; on `flexible` fins have soft tips. How strong these effects are is our choice.",
     "Watts are mechanical, by the fins' laws; in the closed loop with the losses of an assumed motor. No "
     "battery was measured.",
-    "Figures marked *printed* are the paper's, from its own simulator, its own surrogate and a pool, with "
-    "robots whose mass and damping, and on paths whose size and speed, it does not print. They stand beside "
-    "ours; that ours are smaller or larger does not make a method better or worse than the paper's was "
-    "there. All methods but `paper` are given the law that scores them, which the paper's method has to "
-    "learn. `paper` is our training of the paper's method and learns the law, too; we do not know why its "
-    "errors of wrench tracking lie below the printed ones.",
+    "Figures marked *printed* are the paper's, from its own simulator, its own surrogate and a pool. It "
+    "prints neither the mass and damping of its robots, nor the size and speed of the paths that they "
+    "tracked, nor how the targets of wrench tracking were drawn, nor how far its layouts OOD lie outside. "
+    "Its figures stand beside ours; that ours are smaller or larger does not make a method better or worse "
+    "than the paper's was there. All methods but `paper` are given the law that scores them, which the "
+    "paper's method has to learn. `paper` is our training of the paper's method and learns the law, too; we "
+    "do not know why its errors of wrench tracking lie below the printed ones.",
     "Times are of this machine, one core; *Time per call* measures single calls with nothing beside them. "
     "No time is of a robot's processor.",
 )

@@ -17,7 +17,7 @@ from finlab.evaluation.statistics.records import Columns
 def latency_blocks(rows: Sequence[Row], fins: int = 4) -> list[Block]:
     """Methods side by side in one run."""
     paper_ms = paper_figures()["inference"]["cycle_s"] * 1e3
-    printed = printed_row("paper's cycle, printed (Jetson Orin Nano)", {"p50_ms": paper_ms})
+    printed = printed_row("paper's cycle, printed (its robot has a Jetson Orin Nano)", {"p50_ms": paper_ms})
     columns = (
         Column("method", "method"),
         Column("calls", "calls", "count"),
@@ -80,11 +80,13 @@ def temperature_blocks(rows: Sequence[Row], scatter: Columns = {}, candidates: i
     return [
         "## Temperature",
         (
-            "Figure A of the paper, for the network of the checkpoint `paper`. Diversity is largest at T = "
-            f"{three(widest['temperature'])}; the mean of the best cost among {candidates} candidates is "
-            f"lowest at T = {three(best['temperature'])} here (the paper uses {PAPER_TEMPERATURE}), and "
-            f"{apart}. Diversity is the mean distance between two candidates in units of the command "
-            "ranges; J is squared error plus weighted energy, by the surrogate, before refinement."
+            "Figure A of the paper, for the network of the checkpoint `paper`. The paper says that diversity "
+            "grows with T throughout, and that the best cost is least at a T in between (it uses "
+            f"{PAPER_TEMPERATURE}). Here diversity is largest at T = {three(widest['temperature'])}; the "
+            f"mean of the best cost among {candidates} candidates is lowest at T = "
+            f"{three(best['temperature'])}, and {apart}. Diversity, which the paper does not "
+            "define, is the mean distance between two candidates in units of the command ranges; J is "
+            "squared error plus weighted energy, by the surrogate, before refinement."
         ),
         Figure(
             "figure-a",

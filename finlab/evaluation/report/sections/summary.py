@@ -46,8 +46,9 @@ def summary_blocks(tables: Tables) -> list[Block]:
             "prints count as exact. Mean errors below 1e-5 say where a method stops refining, not whether "
             "it delivers the wrench. Costs of answers are compared only with methods that keep the same cost "
             "least. The watts of the hard days are compared with two pseudo-inverses that do not: `analytic` "
-            "takes the cheapest command of each fin's force, `on-board` beats at a fixed frequency. `search` "
-            "needs no network and no training."
+            "takes the cheapest command of each fin's force, `on-board` beats at a fixed frequency. The hard "
+            "days' own tables compare swim with swim under the same noise, and so tell apart what is too "
+            "close here. `search` needs no network and no training."
         ),
         Table(STANDINGS, standings(found)),
         Fold("Every comparison, with its values", (Table(COMPARISONS, found),)),

@@ -42,9 +42,8 @@ ABOUT = (
 )
 SLOW = (
     "`sqp`, `multistart` and `paper` swam the same days with the same seeds and noise, each swim set against "
-    "that of `search`. They take several times the processor's time that a pseudo-inverse takes, `paper` "
-    "twenty times, and are run by `finlab eval report --sections slow-days`. *Over it*: `search` over the "
-    "method of the row."
+    "that of `search`. They take several times the processor's time that a pseudo-inverse takes, and are run "
+    "by `finlab eval report --sections slow-days`. *Over it*: `search` over the method of the row."
 )
 DUEL = (
     Column("ate", "ATE [m]", "metres"),

@@ -13,7 +13,7 @@ from finlab.evaluation.statistics.records import Records, join_records
 ORDER = tuple(COLOURS)
 """Methods from top to bottom."""
 SPLIT_WORDS = {
-    "id": "2 to 5 fins within 0.30 m, nominal limits, as `paper` was trained on",
+    "id": "2 to 5 fins within 0.30 m, nominal limits, as half of what `paper` was trained on",
     "ood": "fins out to 0.45 m, beyond what `paper` was trained on",
     "ood-fins": "6 to 8 fins; method `paper` was trained on 2 to 5",
     "limits": "each fin with limits of its own, a third of them with an arc of directions",
@@ -65,7 +65,9 @@ def accuracy_blocks(results: Results) -> list[Block]:
             "`tiny` of the robot's own, so that it is relative to what the robot can do. The fins' own "
             "models score every method. `paper` takes every fin for one of the law `drag` with U-CAT's "
             "numbers, so on those five splits its errors show that it does not know the fins; all other "
-            "methods were given them. Rerun: the mean error with another seed and fewer targets."
+            "methods were given them. Printed rows are for the paper's own layouts and targets, which it "
+            "describes no further, and its SQP solves for the normalized error alone, where `sqp` keeps the "
+            "power least as well. Rerun: the mean error with another seed and fewer targets."
         ),
         Figure(
             "error-distribution",
@@ -78,9 +80,9 @@ def accuracy_blocks(results: Results) -> list[Block]:
         Figure(
             "error-by-fins",
             lambda: error_by_fins(_by_fins(results), ORDER),
-            "Figure B of the paper: the error by number of working fins, splits `id` (2 to 5) and `ood-fins` "
-            "(6 to 8). Dots are means, bars reach from median to 95th percentile; less than 1e-8 is drawn at "
-            "1e-8.",
+            "The error by number of working fins, after the paper's figure B, which has layouts ID and OOD "
+            "of 2 to 5; here splits `id` (2 to 5) and `ood-fins` (6 to 8). Dots are means, bars reach from "
+            "median to 95th percentile; less than 1e-8 is drawn at 1e-8.",
         ),
     ]
     for split in results.wrench:
