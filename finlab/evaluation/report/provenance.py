@@ -73,7 +73,7 @@ def how_made_blocks(results: Results, provenance: Provenance, sizes: Sizes) -> l
         f"- Command: `{provenance.command}` (size {sizes.name}, seed {provenance.seed})\n"
         f"- Commit `{provenance.commit}`, {provenance.made}\n"
         f"- Machine: {machine}\n"
-        f"- Time: {hours:.1f} hours of one core for all parts together" + "".join(prints),
+        f"- Time: {hours:.1f} hours by the clock for all parts together, one core each" + "".join(prints),
         (
             "Each part is kept as a file of records, one entry per target, found by its settings and the "
             "fingerprint of the weights; a report that was stopped goes on where it was. The columns are "
@@ -83,7 +83,8 @@ def how_made_blocks(results: Results, provenance: Provenance, sizes: Sizes) -> l
         (
             "Figures called printed are from Y. Hamamatsu, M. Kruusmaa, A. Ristolainen, Layout-independent "
             "actuation allocator for fin-actuated marine robots; `finlab/evaluation/paper_figures.yaml` "
-            "names the table of each. They are shown, never used to compute anything."
+            "names the table of each. They stand beside ours and in comparisons with them, and enter no "
+            "other number."
         ),
         Fold("Every part, with its settings", (Table(columns, rows),)),
     ]

@@ -43,10 +43,12 @@ def introduction(n_starts: int) -> tuple[Block, ...]:
             f"how the methods search; compared where both deliver the wrench to {TRACKED:g}, by the plant, "
             "whose physics both sides were given. Power grows faster than force, so its optimum mostly "
             "loads all fins; effort is the paper's proxy J_en, whose cheapest answer often lets some fins "
-            "rest. `axes`: pure axes on the layouts A, B, penta, hexa and octo, `axes-mixed`: two "
-            "or three of them together; `coincident` and `stacked`: pairs of fins at one place, or one above "
-            "the other. Error by hand: the largest error of the answers that are cheaper than every start, "
-            "by the drag law written out apart from the plant."
+            "rest. The paper prints no weights of it; ours are 1 for amplitude, frequency and their product, "
+            "0.1 for the zero direction, each over its fin's own limit. `axes`: pure axes on the layouts A, "
+            "B, penta, hexa and octo, `axes-mixed`: two or three of them together; `coincident` and "
+            "`stacked`: pairs of fins at one place, or one above the other. Error by hand: the largest error "
+            "of the answers that are cheaper than every start, by the drag law written out apart from the "
+            "plant."
         ),
     )
 
