@@ -46,9 +46,9 @@ def introduction(n_starts: int) -> tuple[Block, ...]:
             "rest. The paper prints no weights of it; ours are 1 for amplitude, frequency and their product, "
             "0.1 for the zero direction, each over its fin's own limit. `axes`: pure axes on the layouts A, "
             "B, penta, hexa and octo, `axes-mixed`: two or three of them together; `coincident` and "
-            "`stacked`: pairs of fins at one place, or one above the other. Error by hand: the largest error "
-            "of the answers that are cheaper than every start, by the drag law written out apart from the "
-            "plant."
+            "`stacked`: two fins at one place, and pairs one above the other. Error by hand: the largest "
+            "error of the answers that are cheaper than every start, by the drag law written out apart from "
+            "the plant."
         ),
     )
 

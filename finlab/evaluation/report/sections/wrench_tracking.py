@@ -14,11 +14,11 @@ ORDER = tuple(COLOURS)
 """Methods from top to bottom."""
 SPLIT_WORDS = {
     "id": "2 to 5 fins within 0.30 m, nominal limits, as half of what `paper` was trained on",
-    "ood": "fins out to 0.45 m, beyond what `paper` was trained on",
+    "ood": "fins out to 0.45 m, at least one beyond what `paper` was trained on",
     "ood-fins": "6 to 8 fins; method `paper` was trained on 2 to 5",
     "limits": "each fin with limits of its own, a third of them with an arc of directions",
     "failure": "one or two fins lost",
-    "near-singular": "nearly parallel or coincident fins",
+    "near-singular": "nearly parallel shafts, or two fins nearly at one place",
     "fins": "as id, all fins of a robot of one random model (drag, lighthill or soft)",
     "fins-mixed": "as id, each fin of a random model of its own",
     "tables": "the same, the fins being tables with 3 % noise, which score, too",
@@ -26,7 +26,7 @@ SPLIT_WORDS = {
     "perturbed": "the paper's A to D, fins moved by up to 2 cm and turned by up to 20 degrees",
     "parallel": "all shafts along one direction, or against it",
     "collinear": "all fins on one line",
-    "clustered": "all fins within 6 cm of each other",
+    "clustered": "all fins within 3 cm of one place along each axis",
     "coincident": "two fins at one place, shafts along or against each other",
     "stacked": "pairs of fins one above the other",
     "big": "fins out to 3 m, blades ten times as long at a tenth of the frequency",
