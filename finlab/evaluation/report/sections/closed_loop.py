@@ -36,9 +36,9 @@ INTRODUCTION = (
         "the paths nor a unit of its errors, which are taken for metres: its figures stand beside ours, not "
         "against them. Its layouts A to D are read with the table's y ahead and its angle as the azimuth of "
         "the shaft; with x ahead, D could not surge, or, were the angle that of the thrust, B not yaw. All "
-        "methods were given the laws by which the simulated fins push in plant `mean`, and none the soft "
-        "tips of plant `flexible`; `on-board` is U-CAT's own pseudo-inverse at a fixed frequency, as far as "
-        "it is published."
+        "methods but `paper` were given the laws by which the simulated fins push in plant `mean`, and none "
+        "the soft tips of plant `flexible`; `on-board` is U-CAT's own pseudo-inverse at a fixed frequency, "
+        "as far as it is published."
     ),
 )
 """What all experiments share."""
