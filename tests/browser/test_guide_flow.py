@@ -75,6 +75,26 @@ def test_a_command_is_found_by_its_words(page: Any) -> None:
     page.until(lambda: page.session.state.failed == ())
 
 
+def test_keys_typed_while_the_list_of_commands_opens_are_its_own(page: Any) -> None:
+    display = page.session.display
+    page.page.evaluate("document.activeElement?.blur()")
+    page.page.keyboard.press("Control+k")
+    page.page.keyboard.type("preset nmx")  # shortcuts all: freeze, swim, tour, next fin, mirror, fail
+    box = page.page.get_by_placeholder("Search commands")
+    box.wait_for()
+    page.until(lambda: box.input_value() == "preset nmx")
+    page.page.keyboard.press("Escape")
+    box.wait_for(state="hidden")
+    page.catch_up()
+    assert page.session.selected is None and page.session.state.failed == ()
+    assert page.session.display == display
+    page.page.keyboard.press("Control+k")
+    page.page.keyboard.type("heave alone")
+    page.page.keyboard.press("Enter")
+    page.until(lambda: page.session.state.target[2] != 0.0 and page.session.state.target[0] == 0.0)
+    box.wait_for(state="hidden")
+
+
 def test_a_weak_and_stuck_fin_is_told_and_mended(page: Any) -> None:
     page.tab("Damage a fin")
     page.choose("Which fin", "back_left")

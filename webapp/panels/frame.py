@@ -26,6 +26,8 @@ NAMED = files("webapp").joinpath("places.js").read_text("utf-8")
 """Script that gives regions and sections their names, for the styles."""
 HABITS = files("webapp").joinpath("habits.js").read_text("utf-8")
 """Script that mends what viser's page does otherwise."""
+EARLY = files("webapp").joinpath("early_keys.js").read_text("utf-8")
+"""Script that keeps keys for the list of commands while it opens."""
 TRIAD = files("webapp").joinpath("triad.js").read_text("utf-8")
 """Script that turns the axes in the corner of the view."""
 NAMES = files("webapp").joinpath("names.js").read_text("utf-8")
@@ -58,6 +60,8 @@ PANES = f"<nav class='fl-panes' aria-label='Regions'>{PANES}</nav>"
 """On a narrow page one region is seen at a time; these choose it."""
 LOW = ":root { --tall: calc(var(--z) * 92px); }"
 """Height of a drawer in which nothing but a sentence stands."""
+TALL = ":root { --fl-usual: 334px; }"
+"""Usual height of a drawer with two rows of plots."""
 FOLDER = ".mantine-Paper-root[data-fl~={}]"
 """Selector of the folder of a region or section."""
 
@@ -123,7 +127,7 @@ class Frame:
                     for index, place in enumerate(PLACES)
                     if place.region == region
                 ]
-        run_script(gui, HABITS + TRIAD + NAMES + open_linked("lesson"))
+        run_script(gui, HABITS + EARLY + TRIAD + NAMES + open_linked("lesson"))
 
     @property
     def panels(self) -> tuple[list[Panel], list[Panel]]:
@@ -182,9 +186,9 @@ def _style(sections: list[Section], session: Session, plots: bool) -> str:
     }
     variables = "".join(f"--has-{name}: {int(there)};" for name, there in counts.items())
     size = LARGE if session.display.large else COMPACT
-    low = "" if plots else LOW
+    height = LOW if not plots else TALL if task == SIMULATE else ""
     hidden = f"{', '.join(gone)} {{ display: none !important; }}"
-    return f"<style>:root {{ {variables} }} {size} {low} {hidden}</style>"
+    return f"<style>:root {{ {variables} }} {size} {height} {hidden}</style>"
 
 
 def _strip(task: str, opened: str, folded: bool, plots: bool) -> str:

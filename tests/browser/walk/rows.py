@@ -63,6 +63,9 @@ class Rows:
             text = self._random.choice(
                 (f"{self._random.uniform(-0.6, 0.6):.3f}", "12 cm", "1/8", "-.03", "12 q")
             )
+        if not row.locator(f"[data-edit={kind}]").is_visible():
+            assert self._model.session.display.large, f"{kind} is hidden in the list"
+            return f"no {kind} in the list of the presenter's view"
         row.locator(f"[data-edit={kind}]").dblclick()
         box = page.page.locator(".fl-editor")
         box.wait_for()
