@@ -121,7 +121,7 @@ class Page:
         self._marks += 1
         loop, gui = self._served.server.get_event_loop(), self.view.client.gui
         loop.call_soon_threadsafe(run_script, gui, f"window.finlabMark = {self._marks}")
-        self.page.wait_for_function("mark => window.finlabMark === mark", arg=self._marks)
+        self.page.wait_for_function("mark => window.finlabMark === mark", arg=self._marks, polling=20)
 
     def rest(self, milliseconds: int) -> None:
         """Let time pass on the page's own clock: what it had put off until earlier has happened by then."""
