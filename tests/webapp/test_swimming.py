@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -111,6 +112,14 @@ def test_fins_break_and_are_mended_while_it_swims(swimming: Swimming) -> None:
         swimming.toggle("back_right")
     swimming.toggle("front_left")
     until(lambda: "front_left" not in swimming.swimmers[0].shown.failed)
+
+
+def test_a_robot_that_no_fins_can_steer_is_told_with_all_its_fins(swimming: Swimming) -> None:
+    aligned = replace(UCAT, fins=tuple(replace(fin, mounting_angle=0.0) for fin in UCAT.fins))
+    swimming.start(Plan(aligned, (), path=SHORT, methods=("analytic",)))
+    until(lambda: bool(swimming.swimmers))
+    assert swimming.swimmers[0].shown.failed == ()
+    assert "With these fins surge, heave and yaw are not free" in swim_card(swimming, SwimSettings())
 
 
 def test_bad_plans_and_methods_out_of_order(swimming: Swimming) -> None:

@@ -132,9 +132,10 @@ def _warnings(swimming: Swimming, shown: Moment) -> str:
         if s.unknown_fins
     )
     if not shown.controllable:
-        lost = fins_words([first.fins.index(name) for name in shown.failed])
+        lost = [first.fins.index(name) for name in shown.failed]
+        fins = f"Without {fins_words(lost)}" if lost else "With these fins"
         warning += (
-            f"<div class='missing'>Without {lost} surge, heave and yaw are not free of each other: "
+            f"<div class='missing'>{fins} surge, heave and yaw are not free of each other: "
             "expect it to drift off.</div>"
         )
     return warning + "".join(f"<div>{sentence}</div>" for sentence in findings_words(shown))
