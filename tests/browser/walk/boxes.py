@@ -14,7 +14,7 @@ from webapp.panels.body_inspector import PARTS
 from webapp.panels.fin_inspector import DRIVE
 from webapp.panels.hull_panel import center_of_gravity, hull_of
 from webapp.session.fin_edits import FORMULAS, words
-from webapp.session.search_request import ALL, SearchRequest
+from webapp.session.search_request import SearchRequest
 from webapp.session.state import AXIS_UNITS
 
 Values = tuple[float, ...]
@@ -228,8 +228,7 @@ def _search() -> Iterable[Box]:
         return model.session.draft.way(model.bounds_of)
 
     def bound(model: Model, whole: Values) -> None:
-        whose = model.bounds_of if model.bounds_of in model.session.state.layout.names else ALL
-        model.session.set_draft(SearchRequest.with_way(model.session.draft, whose, whole))
+        model.session.set_draft(SearchRequest.with_way(model.session.draft, model.bounds_of, whole))
 
     reach = (lambda m: way(m)[:3]), (lambda m, v: bound(m, (*v, way(m)[3])))
     yield Box(IMPROVE, "Reach ± [m]", *reach, 0.0, 0.5)

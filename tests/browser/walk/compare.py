@@ -10,6 +10,7 @@ from webapp.panels.places import PLACES
 def differences(walk: Any) -> list[str]:
     """In what the server and the page differ from the model, in words."""
     model, page = walk.model, walk.page
+    model.let_go()
     wanted, now = facts(model.session), facts(page.session)
     found = [f"{k}: {now[k]!r:.300}, not {wanted[k]!r:.300}" for k in wanted if now[k] != wanted[k]]
     if found:

@@ -50,6 +50,11 @@ class Model:
         """The fin that the panel of damage is about."""
         return self.session.selected or self.session.state.layout.names[0]
 
+    def let_go(self) -> None:
+        """Leave a fin that is not there any more, as the search's panel does."""
+        if self.bounds_of not in self.session.state.layout.names:
+            self.bounds_of = ALL
+
     def told(self, intent: Any) -> str | None:
         """Carry out an intent; the sentence with which it is refused, if it is."""
         try:
