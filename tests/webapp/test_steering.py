@@ -113,6 +113,13 @@ def test_a_sweep_goes_to_and_fro(session: Session, monkeypatch: pytest.MonkeyPat
     sweep.stop()
     assert not sweep.running
     assert session.state.target[5] == 0.25 and session.history.undo_name is None, "as if nothing had been"
+    session.set_target(1, 0.5)
+    sweep.start(5, -0.1, 0.2)
+    for _ in range(3):
+        loop.ring()
+    assert sweep.running and seen[-3:] == pytest.approx([-0.1, 0.0, 0.1], abs=1e-12), (
+        "what came between is no change"
+    )
 
 
 def test_landing_tells_where_a_held_fin_would_go(session: Session) -> None:

@@ -24,7 +24,8 @@ class Sweep:
         """Move the target of the page's session; everything here runs on the loop."""
         self._session, self._loop, self._do = context.session, context.loop, context.do
         self._timer: asyncio.TimerHandle | None = None
-        self._place, self._step, self._revision = 0, 1, -1
+        self._place, self._step = 0, 1
+        self._revision: int | None = None  # as the last step left it
         self.axis = 0
         """Which component is moved."""
         self.values: Array = np.zeros(POINTS)
@@ -58,7 +59,7 @@ class Sweep:
         self.fins = self._session.state.layout.names
         self.force = np.full((len(self.fins), POINTS), np.nan)
         self.error, self.power = np.full((2, POINTS), np.nan)
-        self._place, self._step = 0, 1
+        self._place, self._step, self._revision = 0, 1, None
         self._session.history.end_merge()
         self._timer = self._loop.later(0.0, self._go)
 
@@ -71,9 +72,8 @@ class Sweep:
 
     def _go(self) -> None:
         # Whoever changes anything else takes over: the sweep ends.
-        taken = self._revision not in (-1, self._session.revision)
+        taken = self._revision not in (None, self._session.revision)
         if taken or self.fins != self._session.state.layout.names:
-            self._revision = -1
             self.stop()
             self._do(lambda: None)
             return
