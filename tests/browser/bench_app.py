@@ -43,12 +43,12 @@ def browser() -> Iterator[Any]:
 def opened(**options: Any) -> Iterator[tuple[Any, Served]]:
     """A page of an app of its own."""
     from tests.browser.page import Page
-    from tests.browser.soak import SLOW_DRAWING
+    from tests.browser.slow_drawing import slow_drawing
 
     with serving() as served, browser() as chromium:
         served.url = served.url.replace("0.3", "0.1")  # nobody looks at the view
         context = chromium.new_context(viewport={"width": 1400, "height": 860}, **options)
-        context.add_init_script(SLOW_DRAWING)
+        context.add_init_script(slow_drawing(250))
         yield Page(context.new_page(), served), served
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from tests.browser.conftest import CHROMIUM, FLAGS
 from tests.browser.page import Page
+from tests.browser.slow_drawing import slow_drawing
 from tests.webapp.bench import memory
 
 BROWSERS = 8
@@ -22,24 +23,6 @@ FLAT = 0.05
 """Share by which the memory of the server may grow from one look to the last: what its pool keeps."""
 PATIENCE = 4.0
 """How much longer than for a test a page is waited for."""
-SLOW_DRAWING = """
-const soon = window.requestAnimationFrame.bind(window), waiting = new Map();
-let last = 0, due = false;
-function draw(time) {
-  const all = [...waiting.values()];
-  due = false;
-  waiting.clear();
-  for (const act of all) act(time);
-}
-window.requestAnimationFrame = act => {
-  waiting.set(++last, act);
-  if (!due) window.setTimeout(() => soon(draw), 250);
-  due = true;
-  return last;
-};
-window.cancelAnimationFrame = number => waiting.delete(number);
-"""
-"""At most four frames a second."""
 HEAP = "() => performance.memory.usedJSHeapSize / 1e6"
 """Memory of a page's scripts [MB]."""
 
@@ -87,7 +70,7 @@ def soak(changes: int) -> bool:
         pages = []
         for _ in range(BROWSERS):  # a context is a browser profile of its own, with its own storage
             context = browser.new_context(viewport=SIZE)
-            context.add_init_script(SLOW_DRAWING)
+            context.add_init_script(slow_drawing(1000))
             pages.append(Page(context.new_page(), served, patience=PATIENCE))
         wanted = [round(0.1 + 0.01 * i, 4) for i in range(BROWSERS)]
         for page, value in zip(pages, wanted, strict=True):
