@@ -1,4 +1,4 @@
-"""Pages that nobody looks at: they draw seldom, as one in the background would, and leave the machine to the rest."""
+"""Pages that nobody looks at: they draw seldom, as one in the background would."""
 
 SCRIPT = """
 const soon = window.requestAnimationFrame.bind(window), waiting = new Map();
