@@ -146,7 +146,15 @@ def choices() -> list[Choice]:
             bare,
             HULL[1],
         ),
-        Choice(HULL, "Unit of file", lambda _: UNITS, *own("unit"), bare, HULL[1]),
+        Choice(
+            HULL,
+            "Unit of file",
+            lambda _: UNITS,
+            lambda m: m.session.mesh_unit,
+            lambda m, v: setattr(m.session, "mesh_unit", v),
+            bare,
+            HULL[1],
+        ),
         Choice(
             REACH,
             "Beside",

@@ -27,8 +27,6 @@ class Model:
         """What the stick steers."""
         self.spring = True
         """Whether it springs back."""
-        self.unit = "m"
-        """Unit of the next hull."""
         self.follow = False
         """Whether the camera follows a swim."""
         self.sweep_axis = "surge"
