@@ -35,11 +35,18 @@ def save(page: Page, path: Path) -> None:
     print(path, path.stat().st_size // 1000, "kB", flush=True)
 
 
-def _scroll(page: Page, drawer: bool = False) -> None:
-    """To the end of what stands at the right, or lies in the drawer."""
-    page.page.mouse.move(*((500, SIZE["height"] - 100) if drawer else (SIZE["width"] - 200, 500)))
+def _scroll(page: Page) -> None:
+    """To the end of what stands at the right."""
+    page.page.mouse.move(SIZE["width"] - 200, 500)
     page.page.mouse.wheel(0, 5000)
     page.page.wait_for_timeout(500)
+
+
+def _drag_drawer(page: Page, height: float) -> None:
+    """Make the drawer as tall [px] by its handle."""
+    handle = page.page.locator(".fl-handle").bounding_box()
+    x, y = SIZE["width"] / 3, handle["y"] + handle["height"] / 2
+    page.drag((x, y), (x, SIZE["height"] - height))
 
 
 def _first(page: Page) -> None:
@@ -133,8 +140,11 @@ def _proposals(page: Page) -> None:
     page.choose("Method", "mdn")
     page.until(lambda: page.session.state.method == "mdn" and not page.view.busy)
     page.tab("What the network proposes")
-    page.until(lambda: not page.view.answering.searching)
-    _scroll(page, drawer=True)
+    page.tab("Display")
+    page.row("Mixture").first.click()
+    page.tab("Display")
+    page.until(lambda: page.session.display.mixture and not page.view.answering.searching)
+    _drag_drawer(page, 440.0)
 
 
 def _limits(page: Page) -> None:
@@ -241,6 +251,7 @@ def main(folder: Path, wanted: list[str], dark: bool = False) -> None:
         for name, prepare in SCENES.items():
             if not wanted or name in wanted:
                 page.start_over()
+                page.page.evaluate("document.documentElement.style.removeProperty('--fl-drawer')")
                 prepare(page)
                 save(page, folder / f"{name}.png")
         if WALK in wanted:

@@ -35,6 +35,9 @@ def test_an_axis_alone_and_the_other_way_round(session: Session) -> None:
 
 
 def test_a_stick_that_springs_back_leaves_no_trace(session: Session) -> None:
+    session.set_target(1, 0.25)
+    session.undo()
+    redo = session.history.redo_name
     before, step = session.state, session.history.undo_name
     for k in range(5):
         session.steer({0: 0.5 * k, 5: -0.1 * k})
@@ -42,6 +45,7 @@ def test_a_stick_that_springs_back_leaves_no_trace(session: Session) -> None:
     revision = session.revision
     session.release(spring_back=True)
     assert session.state == before and session.history.undo_name == step and session.revision > revision
+    assert redo is not None and session.history.redo_name == redo, "what was undone can still be redone"
     session.steer({0: 3.0})
     session.release(spring_back=False)
     assert session.state.target[0] == 3.0 and session.history.undo_name == "Steer"

@@ -38,14 +38,6 @@ class CandidatesPanel:
         weight = "How much effort counts in the ranking."
         session = page.session
         self._picker = ModePicker(gui, page, 176, "fl-modes")
-        hint = "From where it began to the mode that is shown, step by step."
-        gui.add_html(marker("fl-column"))
-        self._play = page.add_button(
-            "Play the refinement", page.answering.play, icon=viser.Icon.PLAYER_PLAY, hint=hint
-        )
-        self._table = gui.add_html("")
-        add_channel(gui, STEPS, self._show_step)
-        self._steps = gui.add_html("")
         self._sample = gui.add_html("")
         with gui.add_folder("Draws from the mixture") as self._draws:
             self._settings = {
@@ -65,6 +57,14 @@ class CandidatesPanel:
         self._drawn = Changes()
         with gui.add_folder("What the network proposes", expand_by_default=False) as self._proposals:
             self._discs = gui.add_html("")
+        hint = "From where it began to the mode that is shown, step by step."
+        gui.add_html(marker("fl-column"))
+        self._play = page.add_button(
+            "Play the refinement", page.answering.play, icon=viser.Icon.PLAYER_PLAY, hint=hint
+        )
+        self._table = gui.add_html("")
+        add_channel(gui, STEPS, self._show_step)
+        self._steps = gui.add_html("")
 
     def _setting(self, key: str) -> float:
         """A setting in force; what the widget shows at first while the method has none of the kind."""

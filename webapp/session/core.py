@@ -34,6 +34,7 @@ class History(Generic[Snapshot]):
         self.merge_key: str | None = None
         """Key of the step that is still being merged into, if any."""
         self._merge_time = 0.0
+        self._before: list[tuple[str, Snapshot]] = []  # what could be redone before the last step
 
     def commit(self, name: str, state: Snapshot, merge_key: str | None = None, timed: bool = True) -> None:
         """Make `state` the present one.
@@ -51,8 +52,8 @@ class History(Generic[Snapshot]):
         if not (same and self.past and (not timed or now - self._merge_time < MERGE_WINDOW_S)):
             self.past.append((name, self.state))
             del self.past[:-MAX_STEPS]
+            self._before, self.future = self.future, []
         self.merge_key, self._merge_time = merge_key, now
-        self.future.clear()
         self.state = state
 
     def resume(
@@ -71,7 +72,7 @@ class History(Generic[Snapshot]):
         if self.merge_key is None or not self.past:
             return False
         _, self.state = self.past.pop()
-        self.merge_key = None
+        self.future, self.merge_key = self._before, None
         return True
 
     @property
