@@ -248,7 +248,7 @@ def modes(
     """Compare the distinct ways that an answer tells with those that many random starts lead to.
 
     Args:
-        method: search or mdn; with power for the objective there is mostly one way.
+        method: search or mdn.
         starts: random starts of the ground truth, per target.
     """
     from finlab.evaluation.experiments.mode_coverage import mode_rows

@@ -64,8 +64,7 @@ class AnswerSettings:
     targets: int = 48
     """Targets for each robot."""
     effort_share: float = 0.75
-    """Share of the robots that keep the effort least; the others keep the power least, which has mostly
-    one way."""
+    """Share of the robots that keep the effort least; the others keep the power least."""
     sharpness: float = 0.03
     """By how much dearer a way may be, as a share of the cost, for its weight to fall to a third."""
 

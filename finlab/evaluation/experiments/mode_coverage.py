@@ -3,7 +3,7 @@
 The ground truth knows neither network nor search in force space: from random commands, a solver looks for the
 least cost that delivers the wrench by the fins' own models. Where it converges is a local minimum; these are
 clustered into modes. Among those of reasonable cost, a mode counts as covered if the allocator's modes hold
-one that does the same. With effort for the cost there are many modes; with power there is mostly one.
+one that does the same.
 """
 
 from collections.abc import Sequence

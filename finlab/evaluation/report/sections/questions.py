@@ -25,8 +25,8 @@ def mode_blocks(
     return [
         "## Distinct ways",
         (
-            "With effort kept least, a wrench can often be delivered in several ways; with power there is "
-            f"mostly one. Here method `{method}` keeps {objective} least on split `{split}`: what "
+            "With four fins and more, a wrench can often be delivered in several ways. Here method "
+            f"`{method}` keeps {objective} least on split `{split}`: what "
             f"`result.explore()` finds, beside what {starts} random starts of IPOPT per target converge to; "
             f"ways of up to {CHEAP:g} times the least {objective}, exact by the plant, whose fins' laws both "
             "were given."
