@@ -53,7 +53,6 @@ class CandidatesPanel:
                     ("gamma", "Effort weight γ", GAMMA_RANGE, 0.005, 4, weight),
                 )
             }
-        self._origin = gui.add_html("")
         self._drawn = Changes()
         with gui.add_folder("What the network proposes", expand_by_default=False) as self._proposals:
             self._discs = gui.add_html("")
@@ -65,6 +64,7 @@ class CandidatesPanel:
         self._table = gui.add_html("")
         add_channel(gui, STEPS, self._show_step)
         self._steps = gui.add_html("")
+        self._origin = gui.add_html("")
 
     def _setting(self, key: str) -> float:
         """A setting in force; what the widget shows at first while the method has none of the kind."""
