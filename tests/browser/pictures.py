@@ -35,9 +35,9 @@ def save(page: Page, path: Path) -> None:
     print(path, path.stat().st_size // 1000, "kB", flush=True)
 
 
-def _scroll(page: Page) -> None:
-    """To the end of what stands at the right."""
-    page.page.mouse.move(SIZE["width"] - 200, 500)
+def _scroll(page: Page, drawer: bool = False) -> None:
+    """To the end of what stands at the right, or lies in the drawer."""
+    page.page.mouse.move(*((300, SIZE["height"] - 100) if drawer else (SIZE["width"] - 200, 500)))
     page.page.mouse.wheel(0, 5000)
     page.page.wait_for_timeout(500)
 
@@ -144,7 +144,8 @@ def _proposals(page: Page) -> None:
     page.row("Mixture").first.click()
     page.tab("Display")
     page.until(lambda: page.session.display.mixture and not page.view.answering.searching)
-    _drag_drawer(page, 440.0)
+    _drag_drawer(page, 420.0)
+    _scroll(page, drawer=True)
 
 
 def _limits(page: Page) -> None:
