@@ -124,7 +124,12 @@ def test_the_drawer_is_low_until_a_robot_swims(page: Any) -> None:
     page.until(lambda: height() < 120)
     assert "Once a swim is started" in page.text(".fl-unswum")
     page.press("Start")
-    page.until(lambda: height() == tall)
+    page.until(lambda: height() > tall)
+    page.until(lambda: page.page.locator(".uplot:visible").count() == 6)
+    ends = page.page.locator(".uplot:visible").evaluate_all(
+        "all => all.map(one => one.getBoundingClientRect().bottom)"
+    )
+    assert max(ends) <= page.page.viewport_size["height"], f"the last plots end at {ends}"
     page.press("End")
     page.until(lambda: height() < 120)
 
