@@ -32,6 +32,9 @@ MOST_FREEDOM = 16.0
 """Most that the strengths, too, are given more freedom then (a variance)."""
 MOST_MISFIT = 1e5
 """Most that the disturbance of the motion grows to (a variance)."""
+ASTRAY, UNKNOWN = 1e6, 100.0
+"""Squared distance of a measurement, in variances, and variance of a velocity [m^2/s^2, rad^2/s^2], beyond
+which the model says nothing of the motion, as of a robot that tumbles."""
 
 
 class Hypotheses:
@@ -63,9 +66,9 @@ class Hypotheses:
         variance[MOTION] = variance[TILT] = 1e-4
         variance[CURRENT], variance[TORQUE] = s.current**2, s.torque**2
         variance[STRENGTH] = s.strength**2
-        self.covariance = np.diag(variance)
+        self._first = np.diag(variance)
+        self.covariance = self._first.copy()
         """Covariance (14 + n, 14 + n) of each."""
-        variance[RISING] = s.rising_current**2
         noise = np.zeros(size)
         noise[CURRENT], noise[TORQUE] = s.current_drift**2, s.torque_drift**2
         noise[RISING] *= (s.rising_current / s.current) ** 2
@@ -106,6 +109,13 @@ class Hypotheses:
         self._off[:, STRENGTH] = self._jump
         self._probability = self._rate * self.settings.doubt_s
         self.doubt = float(self._probability.sum())
+
+    def _begin_anew(self, seen: Array) -> None:
+        """Of the motion only what is measured (8,) is known; what has been learned of strengths stays."""
+        self.state[:8], self.state[CURRENT], self.state[TORQUE] = seen, 0.0, 0.0
+        self.covariance = self._first.copy()
+        self._age_s, self.misfit, self.distance = 0.0, 1.0, 0.0
+        self._settle()
 
     def _of_fins(self, values: Array) -> Array:
         """The part (n, m, ...) that is about single fins of what there is for each belief (n m + p, ...)."""
@@ -170,8 +180,11 @@ class Hypotheses:
     def update(self, seen: Array, slow: bool, besides: Array | None) -> None:
         """Takes velocity, rates, roll and pitch (8,); without the velocity where it is no new one.
 
-        `besides` holds the logarithms (n, m) of what else speaks for each belief.
+        `besides` holds the logarithms (n, m) of what else speaks for each belief. Where the model has nothing
+        to say of the motion any more, all beliefs begin anew, as they also do if it was never a number.
         """
+        if not max(self.covariance.diagonal()[MOTION].tolist()) < UNKNOWN:
+            return self._begin_anew(seen)
         rows, sensors = (slice(3, 8), self._slow_sensors) if slow else (slice(0, 8), self._sensors)
         seen_by = self.covariance[rows]
         inverse = np.linalg.inv(seen_by[:, rows] + sensors)
@@ -180,6 +193,8 @@ class Hypotheses:
         distance = np.einsum("ij,ij->i", weighted, missed)
         # The built-in functions are quicker than numpy's for so few numbers.
         distances = distance.tolist()
+        if not distances[0] < ASTRAY:
+            return self._begin_anew(seen)
         self.distance, least = distances[0], min(distances)
         # Where fins are not what the model says, even the best belief is far off: trust it less.
         surprise = min(least / len(inverse), MOST_SURPRISE) - EXPECTED_SURPRISE

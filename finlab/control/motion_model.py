@@ -138,9 +138,14 @@ class MotionModel:
 
     def _carried(self, body: list[float], wrench: list[float]) -> list[float]:
         """A body's state (13,) after the period, by the midpoint rule in plain floats, which are fast."""
-        slopes = self._vehicle.derivative(body, wrench)
-        middle = [a + 0.5 * self._dt * b for a, b in zip(body, slopes, strict=True)]
-        return [a + self._dt * b for a, b in zip(body, self._vehicle.derivative(middle, wrench), strict=True)]
+        vehicle = self._vehicle
+        n_steps = vehicle.n_steps(body[7:], self._dt)
+        dt = self._dt / n_steps
+        for _ in range(n_steps):
+            slopes = vehicle.derivative(body, wrench)
+            middle = [a + 0.5 * dt * b for a, b in zip(body, slopes, strict=True)]
+            body = [a + dt * b for a, b in zip(body, vehicle.derivative(middle, wrench), strict=True)]
+        return body
 
     def _wrenches(
         self, command: Array, reported: Array | None, held: Array, other: Array

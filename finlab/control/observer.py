@@ -34,6 +34,9 @@ CURRENT_SPEED, CURRENT_CHANGE = 0.05, 0.002
 """Expected current [m/s], and its change per root of a second."""
 VELOCITY_NOISE, RATE_NOISE = 0.02, 0.04
 """Expected noise of a measured velocity [m/s] and yaw rate [rad/s], with what the fins' beat adds."""
+ASTRAY = 1.0
+"""A motion [m/s, rad/s] this far from the one that is seen tells nothing of unknown forces: the model cannot
+follow, as of a robot that water stops within a period."""
 POSE_S, TILT_S = 1.5, 1.0
 """Time constants with which poses and tilts that are seen correct those that are counted on [s]."""
 
@@ -89,7 +92,8 @@ class MotionObserver:
         self._pose_share = LowPass(POSE_S, period_s).share
         self._tilt_share = LowPass(TILT_S, period_s).share
         self._state = np.zeros(9)
-        self._covariance = np.diag([*self._sensors, *self._noise[UNKNOWN] * 100.0, *[CURRENT_SPEED**2] * 2])
+        self._first = np.diag([*self._sensors, *self._noise[UNKNOWN] * 100.0, *[CURRENT_SPEED**2] * 2])
+        self._covariance = self._first
         self._last_velocity: Array | None = None
         self._estimate: Estimate | None = None
 
@@ -149,11 +153,17 @@ class MotionObserver:
 
     def _correct(self, m: Measurement) -> None:
         """What the sensors have seen; a velocity counts where it is a new one."""
+        seen = self._seen(m)
+        missed = seen - self._state[MOTION]
+        if not max(map(abs, missed.tolist())) < ASTRAY:
+            self._state[:], self._covariance = 0.0, self._first
+            self._state[MOTION] = seen
+            return
         rows = slice(3 if m.velocity is self._last_velocity else 0, 4)
         covariance = self._covariance
         spread = covariance[rows, rows] + np.diag(self._sensors[rows])
         gain = np.linalg.solve(spread, covariance[rows]).T
-        self._state += gain @ (self._seen(m) - self._state[MOTION])[rows]
+        self._state += gain @ missed[rows]
         self._covariance = covariance - gain @ covariance[rows]
 
     def _believed(self, m: Measurement, position: Array, roll: float, pitch: float, yaw: float) -> Estimate:

@@ -28,6 +28,9 @@ from finlab.layout import Body, Layout, load_layout
 STATE_SIZE = 13
 GRAVITY = 9.81
 """Acceleration of gravity [m/s^2]."""
+LONGEST, MOST_STEPS = 1.5, 500
+"""Times what is fastest in a motion that a step may last, well within what Runge-Kutta (2.8) and the midpoint
+rule (2) bear; and into how many steps at most a period is cut for a body that water stops almost at once."""
 
 
 @cache
@@ -110,6 +113,33 @@ class Vehicle:
         """Buoyant force [N]."""
         self._linear, self._quadratic = body.linear_damping or zeros, body.quadratic_damping or zeros
         self._center = body.center_of_buoyancy_m or (0.0, 0.0, 0.0)
+        uneven = max(self.inertia[:3]) - min(self.inertia[:3])
+        self._munk = math.sqrt(uneven / min(self.inertia[3:]))
+
+    def n_steps(self, motion: Sequence[float], dt: float) -> int:
+        """Into how many equal steps `dt` [s] has to be cut so that integrating it stays stable.
+
+        One for a robot as robots are; more where damping, Munk's moments or its own turning change the motion
+        (6,) [m/s, rad/s] within `dt`, as of a light body that water holds fast, or of one that tumbles.
+
+        Raises:
+            LayoutError: even `MOST_STEPS` would not do.
+        """
+        u, v, w, p, q, r = (abs(value) for value in motion)
+        stream = sum(abs(value) for value in self.current)
+        speeds = (u + stream, v + stream, w + stream, p, q, r)
+        terms = zip(self._linear, self._quadratic, speeds, self.inertia, strict=True)
+        damping = max((a + 2.0 * b * speed) / m for a, b, speed, m in terms)
+        often = damping + self._munk * max(speeds[:3]) + max(speeds[3:])
+        most = MOST_STEPS * LONGEST / dt
+        if not often <= most:  # nor where it is no number any more
+            got = f"{often:.2g} times a second" if math.isfinite(often) else "beyond all bounds"
+            raise LayoutError(
+                f"its motion changes {got}, at most {most:g} can be simulated; check mass, inertia, "
+                "added mass, damping and buoyancy",
+                "body",
+            )
+        return max(1, math.ceil(often * dt / LONGEST))
 
     def derivative(self, state: Sequence[float], wrench: Sequence[float]) -> list[float]:
         """Rate of change (13,) of a state under a wrench (6,) in the body frame [N, N m]."""
@@ -174,8 +204,18 @@ class Vehicle:
         return velocity
 
     def step(self, state: Array, wrench: Sequence[float], dt: float) -> Array:
-        """The state (13,) after `dt` [s] under a wrench that the body carries along: Runge-Kutta, order 4."""
-        y0: list[float] = state.tolist()
+        """The state (13,) after `dt` [s] under a wrench that the body carries along: Runge-Kutta, order 4.
+
+        Raises:
+            LayoutError: the body moves too fast to be simulated.
+        """
+        y: list[float] = state.tolist()
+        n_steps = self.n_steps(y[7:], dt)
+        for _ in range(n_steps):
+            y = self._runge_kutta(y, wrench, dt / n_steps)
+        return np.array(y)
+
+    def _runge_kutta(self, y0: list[float], wrench: Sequence[float], dt: float) -> list[float]:
         k1 = self.derivative(y0, wrench)
         k2 = self.derivative([a + 0.5 * dt * b for a, b in zip(y0, k1, strict=True)], wrench)
         k3 = self.derivative([a + 0.5 * dt * b for a, b in zip(y0, k2, strict=True)], wrench)
@@ -183,4 +223,4 @@ class Vehicle:
         y = [a + dt / 6 * (b + 2 * (c + d) + e) for a, b, c, d, e in zip(y0, k1, k2, k3, k4, strict=True)]
         norm = math.sqrt(y[3] ** 2 + y[4] ** 2 + y[5] ** 2 + y[6] ** 2)
         y[3:7] = [value / norm for value in y[3:7]]
-        return np.array(y)
+        return y

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from finlab.errors import LayoutError
 from finlab.layout import Body, Layout
 from finlab.physics.vehicle import (
     STATE_SIZE,
@@ -108,8 +109,8 @@ def test_runge_kutta_is_of_fourth_order(ucat: Body) -> None:
     start = at_rest()
     start[7:] = (0.4, -0.2, 0.1, 0.5, -0.4, 0.6)
     wrench = (4.0, 1.0, -2.0, 0.3, 0.2, 0.8)
-    fine = swim(vehicle, start, wrench, 2.0, 0.00125)
-    errors = [np.abs(swim(vehicle, start, wrench, 2.0, dt) - fine).max() for dt in (0.08, 0.04, 0.02)]
+    fine = swim(vehicle, start, wrench, 2.0, 0.000625)
+    errors = [np.abs(swim(vehicle, start, wrench, 2.0, dt) - fine).max() for dt in (0.04, 0.02, 0.01)]
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert (orders > 3.7).all(), orders
     assert np.abs(swim(vehicle, start, wrench, 2.0, 0.01) - fine).max() < 1e-7, "the step that is used"
@@ -129,3 +130,21 @@ def test_a_layout_with_its_own_mass_keeps_ucats_drag(layout_a: Layout) -> None:
     assert own.mass_kg == 7.0
     assert own.linear_damping == complete_body(layout_a).linear_damping
     assert Vehicle(own).lift == Vehicle(own).weight
+
+
+def test_water_that_holds_a_light_body_fast_does_not_shake_it(ucat: Body) -> None:
+    """Damping many times faster than the step: the body comes to the speed at which drag meets the thrust."""
+    body = replace(
+        ucat, linear_damping=(0.0,) * 6, quadratic_damping=(2e3,) * 6, added_mass=None, mass_kg=1.0
+    )
+    state = swim(Vehicle(body), at_rest(), (8.0, 0, 0, 0, 0, 0), 2.0, 0.02)
+    assert state[7] == pytest.approx(math.sqrt(8.0 / 2e3), rel=1e-4)
+
+
+def test_shipped_robots_need_one_step_and_impossible_ones_say_so(ucat: Body) -> None:
+    assert Vehicle(ucat).n_steps((0.6, 0.2, 0.3, 1.0, 0.5, 1.0), 0.02) == 1
+    vehicle = Vehicle(replace(ucat, linear_damping=(0.0,) * 3 + (1e5, 0.0, 0.0)))
+    with pytest.raises(LayoutError, match=r"body: its motion changes .* times a second.*check mass, inertia"):
+        vehicle.step(at_rest(), STILL, 0.02)
+    with pytest.raises(LayoutError, match="beyond all bounds"):
+        vehicle.step(np.full(STATE_SIZE, np.nan), STILL, 0.02)

@@ -1,5 +1,6 @@
 """The closed loop as a whole, with the quickest method."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +10,10 @@ import pytest
 from finlab.allocation import load_allocator
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.search.search_allocator import SearchAllocator
-from finlab.control import FaultMonitor
+from finlab.control import FaultMonitor, TrackingController
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.layout import Layout, load_layout
+from finlab.physics.vehicle import ucat_body
 from finlab.sim import (
     NO_NOISE,
     ClosedLoop,
@@ -219,3 +221,25 @@ def test_a_monitors_pushes_are_no_past_of_the_allocator() -> None:
     assert sum((command != answer.command).any() for command, answer in zip(told, answers, strict=True)) > 3
     for before, after in zip(answers, given[1:], strict=False):
         assert after is before.command
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    "body",
+    [
+        {"mass_kg": 7.0, "buoyancy_n": 3.0, "linear_damping": (14, 8, 6, 15, 18, 18)},
+        {"mass_kg": 1.0, "added_mass": (0.0,) * 6, "linear_damping": (100,) * 6, "inertia_kgm2": (0.1,) * 3},
+        {"mass_kg": 0.5, "quadratic_damping": (1000,) * 6, "inertia_kgm2": (0.001,) * 3},
+    ],
+    ids=["sinks", "held fast", "light"],
+)
+def test_odd_bodies_keep_loop_and_monitor_finite(layout_a: Layout, body: dict[str, Any]) -> None:
+    """A body typed in with weight far from lift, or that water stops within a period."""
+    layout = replace(layout_a, body=replace(ucat_body(), **{"buoyancy_n": None, **body}))
+    monitor = FaultMonitor(layout)
+    task = make_trajectory("lissajous")
+    loop = ClosedLoop(layout, load_allocator("analytic"), task, TrackingController(layout), monitor=monitor)
+    for _ in range(60):
+        tick = loop.step()
+        assert np.isfinite([*tick.motion, *tick.asked, *tick.fault_probability, *tick.strength_std]).all()
+    assert np.abs(loop.state[7:]).max() < 10.0

@@ -12,12 +12,13 @@ from finlab.analysis.score_card import quick_check
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError, LayoutError
 from finlab.layout import FinModelSpec, load_layout
+from finlab.physics.vehicle import GRAVITY
 from tests.webapp.stand_in import StandIn
 from webapp.markup.comparison import comparison_table
 from webapp.markup.corner import corner
 from webapp.markup.score_card import check_card, score_table, warnings
 from webapp.markup.verdict import Verdict, verdict_of, verdict_sentence
-from webapp.markup.words import authority_sentence, rest_sentence
+from webapp.markup.words import authority_sentence, rest_sentence, trim_sentence
 from webapp.scene.wrench_nodes import LENGTH, LONGEST, fitting_newtons
 from webapp.session import Session, files
 from webapp.session.state import State
@@ -177,3 +178,29 @@ def test_the_best_mode_is_shown_again_after_a_tour() -> None:
         assert session.mode == STEPS[1].mode == 1 and session.state == STEPS[1].state(session.state)
         leave()
         assert session.mode == 0, "although the stop asked just what was asked before"
+
+
+@pytest.mark.parametrize(
+    ("lift_n", "words"),
+    [
+        (None, ()),
+        (400.0, ("rises with", "push down with", "cannot keep its depth")),
+        (150.0, ("sinks with", "push up with", "cannot keep its depth")),
+    ],
+)
+def test_whether_the_fins_hold_the_weight_is_said(lift_n: float | None, words: tuple[str, ...]) -> None:
+    ucat = load_layout("ucat")
+    assert ucat.body is not None
+    layout = replace(ucat, body=replace(ucat.body, buoyancy_n=lift_n))
+    sentence = trim_sentence(layout, axis_reach(layout))
+    assert (sentence is None) == (not words)
+    assert all(word in (sentence or "") for word in words)
+
+
+def test_a_weight_that_takes_most_of_what_fins_give_is_said() -> None:
+    ucat = load_layout("ucat")
+    assert ucat.body is not None and ucat.body.mass_kg is not None
+    reach = axis_reach(ucat)
+    lift = ucat.body.mass_kg * GRAVITY - 0.7 * float(reach[2])
+    layout = replace(ucat, body=replace(ucat.body, buoyancy_n=lift))
+    assert "that is most" in (trim_sentence(layout, reach) or "")

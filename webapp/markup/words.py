@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.layout import Layout
+from finlab.physics.vehicle import Vehicle, complete_body
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, State
 
 SMALL = 0.05
@@ -91,6 +92,20 @@ def authority_sentence(layout: Layout, failed: tuple[str, ...], reach: Array) ->
         return None
     without = f"Without {fins_words([layout.index(name) for name in failed])} this" if failed else "This"
     return f"{without} robot cannot {listed(blind)}."
+
+
+def trim_sentence(layout: Layout, reach: Array) -> str | None:
+    """What keeping its depth takes of the working fins, given their reach (6,); None if it is little."""
+    vehicle = Vehicle(complete_body(layout))
+    over = vehicle.lift - vehicle.weight
+    if abs(over) < max(0.5 * float(reach[2]), 1e-3 * vehicle.weight):
+        return None
+    goes, way = ("rises", "down") if over > 0.0 else ("sinks", "up")
+    said = f"By its mass and buoyancy this robot {goes} with {three_digits(abs(over))} N"
+    most = f"{three_digits(float(reach[2]))} N" if reach[2] >= 1e-6 else "nothing"
+    if abs(over) < reach[2]:
+        return f"{said}; of the {most} that its working fins can push {way}, that is most."
+    return f"{said}, and its working fins can push {way} with {most} at most: it cannot keep its depth."
 
 
 def saturated(allocation: Allocation) -> NDArray[np.bool_]:

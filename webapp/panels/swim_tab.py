@@ -10,12 +10,14 @@ from webapp.handles import put
 from webapp.markup.picking import marker
 from webapp.markup.scenario import scenario_card
 from webapp.markup.swim_card import swim_card
+from webapp.markup.words import trim_sentence
 from webapp.page import Page
 from webapp.panels.damage import FinButtons
 from webapp.session.files import is_path, read_path
 from webapp.session.scenarios import SCENARIOS
 from webapp.session.state import COMPARED
 from webapp.session.swim_plan import ALONE, CONTROLLERS, NUMBERS, OWN, SPEEDS
+from webapp.session.targets import axis_reach
 
 
 class SwimPanel:
@@ -189,7 +191,10 @@ class SwimCardPanel:
         self._making = gui.add_progress_bar(0.0, visible=False)
 
     def refresh(self) -> None:
-        """Write the figures."""
-        put(self._card, content=swim_card(self._page.swimming, self._page.session.swim))
+        """Write the figures, and whether the fins hold its weight at all."""
+        state = self._page.session.state
+        trim = trim_sentence(state.layout, axis_reach(state.able, state.failed))
+        warning = "" if trim is None else f"<div class='fl missing'>{trim}</div>"
+        put(self._card, content=swim_card(self._page.swimming, self._page.session.swim) + warning)
         making = self._page.swim_files
         put(self._making, visible=bool(making.making), value=round(100.0 * making.share, 1))
