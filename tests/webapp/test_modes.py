@@ -13,7 +13,7 @@ from tests.webapp.loops import AtOnce, page_of
 from tests.webapp.stand_in import StandIn
 from webapp.markup.mode_plot import DOT, LEFT, WIDTH, _apart, mode_plot
 from webapp.markup.modes import mode_table
-from webapp.markup.words import small, three_digits
+from webapp.markup.words import error_digits, small, three_digits
 from webapp.session import Session
 from webapp.session.targets import PRESETS
 from webapp.tasks.answering import Answering
@@ -115,6 +115,7 @@ def test_figures_keep_their_width() -> None:
     assert [small(v) for v in (0.1, 1.2345, 16.24, 9999.0)] == ["0.100", "1.23", "16.2", "9999"]
     assert [three_digits(v) for v in (2.319, 0.041, 0.09996, 0.0)] == ["2.32", "0.0410", "0.100", "0.00"]
     assert three_digits(float("nan")) == small(float("nan")) == "–"
+    assert [error_digits(v) for v in (0.0, 5.4e-16, 2e-9, 16.24)] == ["≤ 1e−9", "≤ 1e−9", "2.00e−09", "16.2"]
     assert "−" in small(1e-5) and "-" not in three_digits(-2e-9)
 
 

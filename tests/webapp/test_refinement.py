@@ -12,7 +12,7 @@ from finlab.layout import load_layout
 from finlab.physics import Plant
 from tests.webapp.loops import AtOnce, page_of
 from webapp.markup.refinement import way_table
-from webapp.markup.words import small, three_digits
+from webapp.markup.words import error_digits, three_digits
 from webapp.session import Session
 from webapp.session.state import State
 from webapp.session.targets import PRESETS
@@ -45,7 +45,7 @@ def test_each_step_has_the_plants_error_and_power(method: str, failed: tuple[str
             assert step.err_norm == pytest.approx(error, abs=1e-12) and step.power == pytest.approx(power)
             cells = re.findall(r"<td[^>]*>(.*?)</td>", row)
             assert cells[1].lower() == title.lower()
-            assert cells[2:4] == [small(error), three_digits(power)], "what is read is the plant's"
+            assert cells[2:4] == [error_digits(error), three_digits(power)], "what is read is the plant's"
         errors = [step.err_norm for _, step in way.steps]
         assert errors[-1] < errors[0]
 

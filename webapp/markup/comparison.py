@@ -7,7 +7,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.judging import REACHED
 from webapp.markup.picking import pick
 from webapp.markup.verdict import verdict_of
-from webapp.markup.words import listed, objective_of, small, three_digits, unlearned_sentence
+from webapp.markup.words import error_digits, listed, objective_of, three_digits, unlearned_sentence
 from webapp.session.state import COMPARED
 from webapp.tasks.comparison import Comparison
 from webapp.theme import NEARLY, css
@@ -37,7 +37,7 @@ def comparison_table(comparison: Comparison, shown: str | None, stale: bool, pic
         elif isinstance(answer, Allocation):
             color = css(verdict_of(answer, in_reach).color)
             cells = (
-                f"<td>{small(answer.err_norm)}{_bar(answer.err_norm, ERRORS, color)}</td>"
+                f"<td>{error_digits(answer.err_norm)}{_bar(answer.err_norm, ERRORS, color)}</td>"
                 f"<td>{three_digits(answer.power)}</td><td>{three_digits(answer.energy)}</td>"
                 f"<td>{three_digits(answer.solve_ms)}{_bar(answer.solve_ms, TIMES, 'currentColor')}</td>"
             )

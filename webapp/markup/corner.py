@@ -9,7 +9,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES
 from webapp.markup.swim_card import pace_words, robots
 from webapp.markup.verdict import verdict_of, verdict_sentence
-from webapp.markup.words import objective_of, small, three_digits
+from webapp.markup.words import error_digits, objective_of, three_digits
 from webapp.scene.wrench_nodes import set_scale
 from webapp.session.state import AXIS_UNITS, State
 from webapp.tasks.analyst import Findings
@@ -146,7 +146,7 @@ def _figures(allocation: Allocation, instead: str, least: bool, in_reach: bool) 
     time = f"{ms:.2g}" if ms < 10.0 else f"{ms:.0f}"  # no measurement repeats to a third digit
     return [
         f"<span title='missing, by the fins’ own laws: {rest}'><span class='dim'>error</span> "
-        f"<b class='err'>{small(allocation.err_norm)}</b> σ</span>",
+        f"<b class='err'>{error_digits(allocation.err_norm)}</b> σ</span>",
         *costs,
         f"<span class='aside'><span class='dim'>{method}</span> {time} ms</span>",
         f"<span class='{pill}' style='background:{css(color)}'>{escape(verdict)}</span>",

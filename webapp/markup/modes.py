@@ -3,7 +3,7 @@
 from html import escape
 
 from webapp.markup.picking import pick
-from webapp.markup.words import small, source_words, three_digits
+from webapp.markup.words import error_digits, source_words, three_digits
 from webapp.tasks.mode_names import Modes
 from webapp.theme import css, mode_color
 
@@ -26,7 +26,7 @@ def mode_table(modes: Modes, searching: bool, shown: int | None, picker: str) ->
         rows.append(
             f"<tr class='{kind} pick' {pick(picker, k)}><td>{_swatch(k)}</td>"
             f"<td class='words'>{escape(name)}{origin}</td>"
-            f"<td>{small(mode.err_norm)}</td><td>{three_digits(mode.power)}</td>"
+            f"<td>{error_digits(mode.err_norm)}</td><td>{three_digits(mode.power)}</td>"
             f"<td>{three_digits(mode.energy)}</td><td>{100 * mode.saturation:.0f} %</td></tr>"
         )
     header = (

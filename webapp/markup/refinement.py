@@ -3,7 +3,7 @@
 from html import escape
 
 from webapp.markup.picking import send
-from webapp.markup.words import small, source_words, three_digits
+from webapp.markup.words import error_digits, source_words, three_digits
 from webapp.tasks.refinement import Way
 
 STEPS = "fl-step"
@@ -29,7 +29,7 @@ def way_table(way: Way | None, at: int | None) -> str:
         tell = send(STEPS, f"`{k},${{Date.now()}}`")
         rows.append(
             f"<tr class='pick{' chosen' * (k == here)}' onclick=\"{tell}\"><td>{k + 1}</td>"
-            f"<td class='words'>{escape(step_name(name))}</td><td>{small(answer.err_norm)}</td>"
+            f"<td class='words'>{escape(step_name(name))}</td><td>{error_digits(answer.err_norm)}</td>"
             f"<td>{three_digits(answer.power)}</td><td>{three_digits(answer.energy)}</td></tr>"
         )
     return (

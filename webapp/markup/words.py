@@ -14,6 +14,8 @@ from webapp.session.state import AXIS_UNITS, AXIS_WORDS, State
 
 SMALL = 0.05
 """Normalized error of an axis that is too small to speak of."""
+ROUNDING = 1e-9
+"""Normalized error below which the digits are those of the computer's rounding."""
 AT_LIMIT = 0.995
 """Share of the upper limit from which a command counts as saturated."""
 
@@ -34,6 +36,11 @@ def small(value: float) -> str:
     if 0.1 <= abs(value) < 1e4:
         return three_digits(value)
     return f"{value:.2e}".replace("-", "−") if math.isfinite(value) else "–"
+
+
+def error_digits(value: float) -> str:
+    """An error [σ] as `small` has it; what lies below `ROUNDING` is none that anybody could name."""
+    return "≤ 1e−9" if value < ROUNDING else small(value)
 
 
 def three_digits(value: float) -> str:

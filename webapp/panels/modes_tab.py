@@ -10,7 +10,7 @@ from webapp.markup.modes import mode_table
 from webapp.markup.picking import add_channel, chosen_button, marker
 from webapp.markup.proposals import proposal_discs
 from webapp.markup.refinement import STEPS, way_table
-from webapp.markup.words import small, three_digits
+from webapp.markup.words import error_digits, three_digits
 from webapp.page import Page
 from webapp.session.state import CANDIDATE_RANGE, GAMMA_RANGE, TEMPERATURE_RANGE, knows_objective
 
@@ -108,7 +108,7 @@ def _sample_words(page: Page) -> str:
     sample, shown = page.session.sample, page.shown
     if sample is None or shown is None:
         return ""
-    error, power, effort = small(shown.err_norm), three_digits(shown.power), three_digits(shown.energy)
+    error, power, effort = error_digits(shown.err_norm), three_digits(shown.power), three_digits(shown.energy)
     return (
         f"<div class='fl step'><b>Raw sample {sample}{_component_words(page, sample)}</b>: "
         f"error {error} σ, power {power} W, effort {effort}</div>"

@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from webapp.handles import option_index, put
-from webapp.markup.words import small, three_digits
+from webapp.markup.words import error_digits, three_digits
 from webapp.page import Page
 from webapp.panels.line_plot import FIN_LINES, LinePlot, top_of
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS, MAX_TARGET, number
@@ -85,7 +85,7 @@ def _sentence(sweep: Sweep) -> str:
         return "<span class='missing'>Nowhere along the way is the wrench delivered exactly.</span>"
     if exact[known].all():
         low, high = (three_digits(float(value)) for value in (np.nanmin(sweep.power), np.nanmax(sweep.power)))
-        error = small(float(np.nanmax(sweep.error)))
+        error = error_digits(float(np.nanmax(sweep.error)))
         return f"Exact all the way: the largest error is {error} σ; power from {low} to {high} W."
     low, high = (f"{value:.3g}".replace("-", "−") for value in sweep.values[exact][[0, -1]])
     beyond = "<span class='missing'>beyond, something is missing.</span>"
