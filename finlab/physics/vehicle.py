@@ -115,6 +115,9 @@ class Vehicle:
         self._center = body.center_of_buoyancy_m or (0.0, 0.0, 0.0)
         uneven = max(self.inertia[:3]) - min(self.inertia[:3])
         self._munk = math.sqrt(uneven / min(self.inertia[3:]))
+        self._rate_at_rest = max(a / m for a, m in zip(self._linear, self.inertia, strict=True))
+        quadratic = max(b / m for b, m in zip(self._quadratic, self.inertia, strict=True))
+        self._rate_by_speed = 2.0 * quadratic + self._munk + 1.0
 
     def n_steps(self, motion: Sequence[float], dt: float) -> int:
         """Into how many equal steps `dt` [s] has to be cut so that integrating it stays stable.
@@ -125,8 +128,11 @@ class Vehicle:
         Raises:
             LayoutError: even `MOST_STEPS` would not do.
         """
-        u, v, w, p, q, r = (abs(value) for value in motion)
-        stream = sum(abs(value) for value in self.current)
+        cx, cy, cz = self.current
+        stream = abs(cx) + abs(cy) + abs(cz)
+        if dt * (self._rate_at_rest + self._rate_by_speed * (max(map(abs, motion)) + stream)) <= LONGEST:
+            return 1  # as nearly always: known from a bound, which takes less time
+        u, v, w, p, q, r = map(abs, motion)
         speeds = (u + stream, v + stream, w + stream, p, q, r)
         terms = zip(self._linear, self._quadratic, speeds, self.inertia, strict=True)
         damping = max((a + 2.0 * b * speed) / m for a, b, speed, m in terms)
