@@ -4,12 +4,17 @@ import contextlib
 import io
 import threading
 from collections.abc import Callable, Iterator
-from typing import Any
+from functools import cache
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, get_type_hints
 from unittest.mock import patch
+from zipfile import ZipFile
 
 import viser
 import websockets.asyncio.server as websockets_server
-from viser import _messages
+from viser import _icons, _messages
+from viser._assignable_props_api import AssignablePropsBase
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
@@ -22,6 +27,7 @@ LOCAL = Guard("127.0.0.1")
 
 def start_server(guard: Guard = LOCAL, port: int = 0) -> viser.ViserServer:
     """A server behind a guard, without a banner of viser's own; `verbose=False` alone would leave it."""
+    _quicken()
     with _STARTING, _guarded(guard), contextlib.redirect_stdout(io.StringIO()):
         return viser.ViserServer(host=guard.host, port=port, label="finlab", verbose=False)
 
@@ -50,6 +56,31 @@ def _guarded(guard: Guard) -> Iterator[None]:
 
     with patch.object(websockets_server, "serve", guarded):
         yield
+
+
+@cache
+def _opened(archive: Path) -> ZipFile:
+    return ZipFile(archive)
+
+
+@cache
+def _hints(kind: Any) -> dict[str, Any]:
+    return get_type_hints(kind)
+
+
+def _hints_of(handle: Any) -> dict[str, Any]:
+    kind: Any = type(handle._impl.props)
+    return _hints(kind)
+
+
+@cache
+def _quicken() -> None:
+    """Spare a first page what viser does again and again: it opens its archive of 4,000 icons for each one
+    that it draws, half a second in all, and looks up the types of properties for each handle."""
+    icons: Any = _icons
+    icons.zipfile = SimpleNamespace(ZipFile=lambda archive: contextlib.nullcontext(_opened(archive)))
+    handles: Any = AssignablePropsBase
+    handles._prop_hints = property(_hints_of)
 
 
 def put_marks(slider: viser.GuiSliderHandle[float], marks: tuple[tuple[float, str], ...]) -> None:
