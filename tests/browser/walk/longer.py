@@ -39,7 +39,7 @@ def search(walk: Any) -> None:
     walk.hand.go(IMPROVE, walk.model)
     section, improver = walk.hand.section(IMPROVE), walk.page.view.improver
     section.get_by_role("button", name="Search").click()
-    walk.page.until(lambda: improver.busy)
+    walk.page.until(lambda: improver.busy or improver.findings is not None or improver.error is not None)
     try:
         section.get_by_role("button", name="Cancel").click(timeout=2000)
     except TimeoutError:
