@@ -3,6 +3,7 @@
 from typing import Any
 
 from finlab.errors import FinlabError
+from tests.browser.walk.longer import KNOWN
 from tests.browser.walk.model import facts
 from webapp.panels.places import PLACES
 
@@ -40,5 +41,6 @@ def unknown(walk: Any) -> list[str]:
     """Rows of the page now that no part of the walk knows."""
     controls = (*walk.boxes, *walk.choices, *walk.ticks, *walk.presses)
     known = {(walk.hand.index(control.spot), control.label) for control in controls}
+    known |= {(walk.hand.index(spot), label) for spot, label in KNOWN}
     seen = {(section, label) for section, label, _ in walk.hand.shown()}
     return [f"{label} in {PLACES[section].title}" for section, label in sorted(seen - known)]

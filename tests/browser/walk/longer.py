@@ -1,4 +1,4 @@
-"""What takes more than one press: a sweep, a search, a swim, a comparison, files, the stick."""
+"""What takes more than one press: a sweep, a search and its mission, files, the stick. Swims: swims.py."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -7,11 +7,14 @@ from typing import Any
 from playwright.sync_api import TimeoutError
 
 from finlab.layout import layout_to_dict, load_layout
-from tests.browser.walk.boxes import IMPROVE, PILOT, RUN, SWEEP
+from tests.browser.walk.boxes import IMPROVE, PILOT, SWEEP
+from tests.browser.walk.swims import FIGURES, RUN, swim
 from webapp.panels.pilot import PADS
 
 MOST_FINS = 6
-"""Searches and swims of robots with more take too long for a walk."""
+"""A search for robots with more takes too long for a walk."""
+FILES = ("Export", "Files")
+MISSION = "power for a mission"
 
 
 def sweep(walk: Any) -> None:
@@ -34,7 +37,7 @@ def search(walk: Any) -> None:
     held = set(session.draft.held) | set(session.state.locked)
     if session.state.layout.n_fins > MOST_FINS or held >= set(session.state.layout.names):
         return
-    if session.draft.goal == "power for a mission":
+    if session.draft.goal == MISSION:  # each round of it takes seconds
         return
     walk.hand.go(IMPROVE, walk.model)
     section, improver = walk.hand.section(IMPROVE), walk.page.view.improver
@@ -55,24 +58,33 @@ def search(walk: Any) -> None:
     walk.page.until(lambda: improver.findings is None)
 
 
-def swim(walk: Any) -> None:
-    """Start, pause, a step, end."""
-    if walk.model.session.state.layout.n_fins > MOST_FINS:
-        return
-    walk.hand.go(RUN, walk.model)
-    swimming, section = walk.page.view.swimming, walk.hand.section(RUN)
-    if walk.model.told(lambda m: m.session.swim.plan(m.session.state, None)) is not None:
-        return
-    section.get_by_role("button", name="Start").click()
-    walk.page.until(lambda: swimming.active and swimming.time > 0.2 or walk.page.notes() != [])
-    assert walk.page.notes() == [], walk.page.notes()
-    section.get_by_role("button", name="Pause").click()
-    walk.page.until(lambda: not swimming.running and not swimming.busy)
-    before = swimming.time
-    section.get_by_role("button", name="Step").click()
-    walk.page.until(lambda: swimming.time > before)
-    section.get_by_role("button", name="End").click()
-    walk.page.until(lambda: not swimming.active)
+def mission(walk: Any) -> None:
+    """Write the wrenches of a mission, and take the present one into it."""
+    session = walk.model.session
+    walk.hand.go(IMPROVE, walk.model)
+    if session.draft.goal != MISSION:
+        walk.hand.choose(IMPROVE, "Goal", MISSION)
+        session.set_draft(session.draft.with_goal(MISSION))
+    text = walk.random.choice(("1 0 0 0 0 0.1", "0 0 -2 0 0 0", "one two", ""))
+    walk.hand.inputs(IMPROVE, "Mission").first.click()
+    walk.hand.keys.press("Control+a")
+    walk.hand.keys.type(text) if text else walk.hand.keys.press("Delete")
+    session.set_draft(session.draft.with_mission(text))
+    walk.page.until(lambda: walk.page.session.draft.mission == text)
+    if walk.random.random() < 0.5:
+        line = " ".join(f"{value:g}" for value in session.state.target)
+        walk.hand.click(IMPROVE, " ", "Add the present wrench")
+        session.set_draft(session.draft.with_mission(f"{text.rstrip()}\n{line}".lstrip()))
+
+
+def exported(walk: Any) -> None:
+    """A file to take home, with something in it."""
+    walk.hand.go(FILES, walk.model)
+    walk.page.until(lambda: not walk.page.view.busy)
+    name = walk.random.choice(("Graph file", "Candidates (CSV)", "Picture (PNG)", "3D view (HTML)"))
+    with walk.page.page.expect_download() as download:
+        walk.hand.click(FILES, "Single files", name)
+    assert Path(download.value.path()).stat().st_size > 100, f"{name} is empty"
 
 
 def saved(walk: Any) -> None:
@@ -116,6 +128,15 @@ LONGER: dict[str, Callable[[Any], None]] = {
     "search": search,
     "swim": swim,
     "saved": saved,
+    "exported": exported,
+    "mission": mission,
     "steer": steer,
 }
 """By name."""
+KNOWN = {
+    *((RUN, label) for label in ("Run", "Break a fin")),
+    (FIGURES, "Compare"),
+    *((IMPROVE, label) for label in ("Mission", " ")),
+    (FILES, "Single files"),
+}
+"""Rows that are used here."""

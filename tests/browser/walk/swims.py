@@ -1,0 +1,52 @@
+"""A swim on the page: begun, held, its fins broken and mended, kept, ended."""
+
+from typing import Any
+
+from tests.browser.walk.boxes import RUN
+
+MOST_FINS = 6
+"""Swims of robots with more take too long for a walk."""
+FIGURES = ("Simulate", "Figures")
+
+
+def swim(walk: Any) -> None:
+    """Start, pause, something that may be done to a swim, a step, end."""
+    if walk.model.session.state.layout.n_fins > MOST_FINS:
+        return
+    walk.hand.go(RUN, walk.model)
+    swimming = walk.page.view.swimming
+    if walk.model.told(lambda m: m.session.swim.plan(m.session.state, None)) is not None:
+        return
+    walk.hand.click(RUN, "", "Start")
+    walk.page.until(lambda: swimming.active and swimming.time > 0.2 or walk.page.notes() != [])
+    assert walk.page.notes() == [], walk.page.notes()
+    walk.hand.click(RUN, "Run", "Pause")
+    walk.page.until(lambda: not swimming.running and not swimming.busy)
+    walk.random.choice((breaks, kept))(walk, swimming)
+    before = swimming.time
+    walk.hand.click(RUN, "Run", "Step")
+    walk.page.until(lambda: swimming.time > before)
+    walk.hand.click(RUN, "Run", "End")
+    walk.page.until(lambda: not swimming.active)
+
+
+def breaks(walk: Any, swimming: Any) -> None:
+    """A fin breaks and is mended, or is mended and breaks."""
+    robot = swimming.swimmers[0]
+    fin = walk.random.randrange(len(robot.fins))
+    name, before = robot.fins[fin], robot.shown.lost
+    if name not in before and len(before) + 1 >= len(robot.fins):
+        return
+    for wanted in (name not in before, name in before):
+        walk.hand.click(RUN, "Break a fin", fin)
+        walk.page.until(lambda wanted=wanted: (name in robot.shown.lost) == wanted)
+        walk.page.catch_up()
+
+
+def kept(walk: Any, swimming: Any) -> None:
+    """The swim is put aside, and forgotten."""
+    walk.hand.click(FIGURES, "Compare", "Keep this swim")
+    walk.page.until(lambda: swimming.kept is not None)
+    walk.page.catch_up()
+    walk.hand.click(FIGURES, "Compare", "Forget it")
+    walk.page.until(lambda: swimming.kept is None)
