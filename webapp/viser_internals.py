@@ -5,7 +5,6 @@ import io
 import threading
 from collections.abc import Callable, Iterator
 from functools import cache
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, get_type_hints
 from unittest.mock import patch
@@ -59,28 +58,15 @@ def _guarded(guard: Guard) -> Iterator[None]:
 
 
 @cache
-def _opened(archive: Path) -> ZipFile:
-    return ZipFile(archive)
-
-
-@cache
-def _hints(kind: Any) -> dict[str, Any]:
-    return get_type_hints(kind)
-
-
-def _hints_of(handle: Any) -> dict[str, Any]:
-    kind: Any = type(handle._impl.props)
-    return _hints(kind)
-
-
-@cache
 def _quicken() -> None:
     """Spare a first page what viser does again and again: it opens its archive of 4,000 icons for each one
     that it draws, half a second in all, and looks up the types of properties for each handle."""
     icons: Any = _icons
-    icons.zipfile = SimpleNamespace(ZipFile=lambda archive: contextlib.nullcontext(_opened(archive)))
+    opened: Any = cache(ZipFile)
+    icons.zipfile = SimpleNamespace(ZipFile=lambda archive: contextlib.nullcontext(opened(archive)))
     handles: Any = AssignablePropsBase
-    handles._prop_hints = property(_hints_of)
+    hints: Any = cache(get_type_hints)
+    handles._prop_hints = property(lambda handle: hints(type(handle._impl.props)))
 
 
 def put_marks(slider: viser.GuiSliderHandle[float], marks: tuple[tuple[float, str], ...]) -> None:

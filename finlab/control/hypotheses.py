@@ -32,7 +32,7 @@ MOST_FREEDOM = 16.0
 """Most that the strengths, too, are given more freedom then (a variance)."""
 MOST_MISFIT = 1e5
 """Most that the disturbance of the motion grows to (a variance)."""
-ASTRAY, UNKNOWN = 1e6, 100.0
+ASTRAY, MOST_VARIANCE = 1e6, 100.0
 """Squared distance of a measurement, in variances, and variance of a velocity [m^2/s^2, rad^2/s^2], beyond
 which the model says nothing of the motion, as of a robot that tumbles."""
 
@@ -180,10 +180,10 @@ class Hypotheses:
     def update(self, seen: Array, slow: bool, besides: Array | None) -> None:
         """Takes velocity, rates, roll and pitch (8,); without the velocity where it is no new one.
 
-        `besides` holds the logarithms (n, m) of what else speaks for each belief. Where the model has nothing
-        to say of the motion any more, all beliefs begin anew, as they also do if it was never a number.
+        `besides` holds the logarithms (n, m) of what else speaks for each belief. Where the model says
+        nothing of the motion any more, or what it says is no number, all beliefs begin anew.
         """
-        if not max(self.covariance.diagonal()[MOTION].tolist()) < UNKNOWN:
+        if not max(self.covariance.diagonal()[MOTION].tolist()) < MOST_VARIANCE:
             return self._begin_anew(seen)
         rows, sensors = (slice(3, 8), self._slow_sensors) if slow else (slice(0, 8), self._sensors)
         seen_by = self.covariance[rows]

@@ -25,6 +25,7 @@ IMPROVE, SCENARIO, RUN = ("Design", "Improve"), ("Simulate", "Scenario"), ("Simu
 DISPLAY = ("Allocate", "Display")
 TOP, FINS, LAYOUTS = ("Allocate", "Answers"), ("Design", "Fins"), ("Design", "Designs")
 REACH, PILOT = ("Design", "Reach"), ("Allocate", "Steer by hand")
+FIGURES, FILES = ("Simulate", "Figures"), ("Export", "Files")
 COMPARED, ANSWERED = ("Allocate", "Comparison"), ("Allocate", "Fins")
 
 

@@ -7,13 +7,10 @@ from typing import Any
 from playwright.sync_api import TimeoutError
 
 from finlab.layout import layout_to_dict, load_layout
-from tests.browser.walk.boxes import IMPROVE, PILOT, SWEEP
-from tests.browser.walk.swims import FIGURES, RUN, swim
+from tests.browser.walk.boxes import FIGURES, FILES, IMPROVE, PILOT, RUN, SWEEP
+from tests.browser.walk.swims import MOST_FINS, swim
 from webapp.panels.pilot import PADS
 
-MOST_FINS = 6
-"""A search for robots with more takes too long for a walk."""
-FILES = ("Export", "Files")
 MISSION = "power for a mission"
 
 

@@ -2,11 +2,10 @@
 
 from typing import Any
 
-from tests.browser.walk.boxes import RUN
+from tests.browser.walk.boxes import FIGURES, RUN
 
 MOST_FINS = 6
-"""Swims of robots with more take too long for a walk."""
-FIGURES = ("Simulate", "Figures")
+"""Swims of robots with more, and searches for them, take too long for a walk."""
 
 
 def swim(walk: Any) -> None:
