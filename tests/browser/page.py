@@ -249,7 +249,7 @@ class Page:
 
     def notes(self) -> list[str]:
         """Texts of the notes that are shown."""
-        return [str(t) for t in self.page.locator(".mantine-Notification-root").all_inner_texts()]
+        return [str(t) for t in self.page.locator(".mantine-Notification-root:visible").all_inner_texts()]
 
     def vertices(self, node: str) -> list[float]:
         """First coordinates of a mesh as the browser holds it."""

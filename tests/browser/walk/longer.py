@@ -132,7 +132,7 @@ LONGER: dict[str, Callable[[Any], None]] = {
 """By name."""
 KNOWN = {
     *((RUN, label) for label in ("Run", "Break a fin")),
-    (FIGURES, "Compare"),
+    *((FIGURES, label) for label in ("Compare", "Save")),
     *((IMPROVE, label) for label in ("Mission", " ")),
     (FILES, "Single files"),
 }

@@ -1,11 +1,14 @@
 """A swim on the page: begun, held, its fins broken and mended, kept, ended."""
 
+from pathlib import Path
 from typing import Any
 
 from tests.browser.walk.boxes import FIGURES, RUN
 
 MOST_FINS = 6
 """Swims of robots with more, and searches for them, take too long for a walk."""
+LONG_ENOUGH = 0.7
+"""What a swim must have taken [s] before it is saved."""
 
 
 def swim(walk: Any) -> None:
@@ -21,7 +24,7 @@ def swim(walk: Any) -> None:
     assert walk.page.notes() == [], walk.page.notes()
     walk.hand.click(RUN, "Run", "Pause")
     walk.page.until(lambda: not swimming.running and not swimming.busy)
-    walk.random.choice((breaks, kept))(walk, swimming)
+    walk.random.choice((breaks, kept, taken))(walk, swimming)
     before = swimming.time
     walk.hand.click(RUN, "Run", "Step")
     walk.page.until(lambda: swimming.time > before)
@@ -49,3 +52,17 @@ def kept(walk: Any, swimming: Any) -> None:
     walk.page.catch_up()
     walk.hand.click(FIGURES, "Compare", "Forget it")
     walk.page.until(lambda: swimming.kept is None)
+
+
+def taken(walk: Any, swimming: Any) -> None:
+    """Its log as a file has a line for each tick that was swum."""
+    walk.hand.click(RUN, "Run", "Go on")
+    walk.page.until(lambda: swimming.time > LONG_ENOUGH)
+    walk.hand.click(RUN, "Run", "Pause")
+    walk.page.until(lambda: not swimming.running and not swimming.busy)
+    ticks = swimming.records()[0].log.n_ticks
+    with walk.page.page.expect_download() as download:
+        walk.hand.click(FIGURES, "Save", "Table (CSV)")
+    lines = Path(download.value.path()).read_text(encoding="utf-8").splitlines()
+    rows = [line for line in lines if line[:1].isdigit()]
+    assert len(rows) == ticks, f"the file has {len(rows)} rows for {ticks} ticks"
