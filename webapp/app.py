@@ -61,6 +61,9 @@ class App:
         self._keys: dict[int, str] = {}
         self._loop = server.get_event_loop()
         server.scene.world_axes.visible = False
+        # With the first words to a browser: it would else draw its own light and shadows before ours.
+        server.scene.configure_environment_map(None)
+        server.scene.configure_default_lights(cast_shadow=False)
         disable_sharing(server)
         server.on_client_connect(self._connected)
         server.on_client_disconnect(self._disconnected)

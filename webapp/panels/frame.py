@@ -2,7 +2,7 @@
 
 Every region is a folder of viser's that a style takes out of its panel and puts into its place
 (`markup/frame.css`); which of them are there, and which sections in them, is one more style element, written
-here. So all widgets stay mounted, and a change of task is one message.
+here. So widgets that were seen once stay mounted, and a change of task is one message.
 """
 
 from collections.abc import Callable
@@ -76,9 +76,10 @@ class Section:
         with gui.add_folder(place.title, expand_by_default=not place.folded):
             gui.add_html(marker(f"fl-section fl-{self.name}"))
             self._sentence = gui.add_html("", visible=False)
-            with gui.add_folder(None) as self._folder:
+            with gui.add_folder(None, visible=False) as self._folder:
                 self._panel = place.make(gui, page)
         self._bound, page.bound = page.bound, []
+        self._met = False
 
     def is_there(self, session: Session) -> bool:
         """Whether it belongs to what is being done."""
@@ -88,7 +89,9 @@ class Section:
         return session.task in place.tasks and place.about in about and opened
 
     def refresh(self) -> None:
-        """Write the session and the answer into it."""
+        """Write the session and the answer into it. The browser builds its widgets when it is met first, so
+        that a first page does not wait for those of other tasks; from then on they stay."""
+        self._met = self._met or self.is_there(self._page.session)
         try:
             for write in self._bound:
                 write()
@@ -100,7 +103,7 @@ class Section:
             put(self._folder, visible=False)
             self._page.fault(error)
         else:
-            put(self._folder, visible=True)
+            put(self._folder, visible=self._met)
             put(self._sentence, visible=False)
 
 
