@@ -8,6 +8,7 @@ import hashlib
 import re
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import pytest
@@ -19,6 +20,7 @@ from finlab.layout import load_layout
 from tests.webapp.bench import SilentClient
 from tests.webapp.stand_in import load_stand_in
 from webapp.session import Display, Session
+from webapp.session.looking import DRAWERS
 from webapp.tasks.background import Workers
 from webapp.tasks.solver import Solver
 from webapp.view import View
@@ -70,6 +72,7 @@ class Tab:
         solver = Solver(load=load_stand_in)
         loop = self.server.get_event_loop()
         self.view: View = self.on_loop(lambda: View(self.client, session, solver, workers, loop))
+        self.meet_all(session)
         self.settle()
 
     def on_loop(self, act: Callable[[], Any]) -> Any:
@@ -77,6 +80,15 @@ class Tab:
             return act()
 
         return asyncio.run_coroutine_threadsafe(run(), self.server.get_event_loop()).result(30)
+
+    def meet_all(self, session: Session) -> None:
+        """Let the page build each panel; it shows what it has from then on."""
+        first = session.state.layout.names[0]
+        acts: list[Callable[[], object]] = [partial(session.select, name) for name in (first, None)]
+        acts += [partial(session.show_drawer, name) for names in DRAWERS.values() for name in names]
+        acts += [partial(session.show_task, task) for task in ("Export", "Design", "Allocate")]
+        for act in acts:
+            self.on_loop(partial(self.view.do, act))
 
     def open(self, layout: Any) -> None:
         self.on_loop(lambda: self.view.do(lambda: self.view.session.open_layout(layout)))
