@@ -70,7 +70,7 @@ def mission(walk: Any) -> None:
     walk.page.until(lambda: walk.page.session.draft.mission == text)
     if walk.random.random() < 0.5:
         line = " ".join(f"{value:g}" for value in session.state.target)
-        walk.hand.click(IMPROVE, " ", "Add the present wrench")
+        walk.hand.click(IMPROVE, "", "Add the present wrench")
         session.set_draft(session.draft.with_mission(f"{text.rstrip()}\n{line}".lstrip()))
 
 
