@@ -300,3 +300,15 @@ def test_the_first_card_goes_away_for_good(new_page: Any) -> None:
     page.rest(500)
     assert not card.is_visible()
     page.page.context.close()
+
+
+def test_panels_are_built_when_they_are_met_and_stay(new_page: Any) -> None:
+    page = new_page()
+    rows = page.page.locator("label", has_text="Scenario")
+    assert rows.count() == 0, "a first page waits for what nobody has asked for"
+    page.tab("Simulate")
+    page.row("Scenario")
+    page.tab("Allocate")
+    page.shows("Fx [N]", f"{page.session.state.target[0]:g}")
+    assert rows.count() == 1
+    page.page.context.close()
