@@ -1,5 +1,6 @@
 """What the app says about an answer, and what it writes into files."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -142,6 +143,9 @@ def test_cards_say_what_a_layout_can_do() -> None:
     assert "6 of 6" in table and table.count("without") == 3
     both = score_table(ucat, score_card(ucat), score_card(blind))
     assert "before" in both and "▲" in both and "none" in both
+    single = ucat.without(ucat.names[1:])
+    beside = score_table(ucat, score_card(ucat), score_card(single))
+    assert re.search(r"worst loss \[N\]</td><td>–</td><td>[\d.]+</td><td class=''></td>", beside)
     card = check_card(quick_check(blind), True, ("<b>",))
     assert "yaw" in card and "&lt;b&gt;" in card
 

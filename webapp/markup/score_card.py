@@ -1,5 +1,6 @@
 """What a layout can do, as one card, and the quick checks below its editor."""
 
+from collections.abc import Callable
 from html import escape
 from itertools import combinations
 
@@ -13,6 +14,13 @@ from webapp.markup.words import listed, three_digits
 from webapp.scene.meshes.fin import SPAN
 from webapp.scene.meshes.hull import hull_of
 from webapp.session.state import AXIS_UNITS
+
+FIGURES: dict[str, Callable[[ScoreCard], float | None]] = {
+    "weakest direction [N]": lambda card: card.authority.weakest,
+    "isotropy": lambda card: card.authority.isotropy,
+    "weakest after the worst loss [N]": lambda card: card.worst_loss.weakest if card.worst_loss else None,
+}
+"""Words -> figure of a whole robot; None where it has none, as the worst loss of a single fin."""
 
 
 def score_table(layout: Layout, card: ScoreCard, before: ScoreCard | None, name: str = "before") -> str:
@@ -44,30 +52,35 @@ def rank_sentence(a: Authority | QuickCheck) -> str:
 
 
 def _summary(card: ScoreCard, before: ScoreCard | None, name: str) -> str:
-    now, old = card.authority, None if before is None else before.authority
-    ranks = "" if old is None else f"<td>{old.rank} of 6</td><td>{now.rank} of 6</td><td></td>"
-    rows = [f"<tr><td>axes independent</td>{ranks}</tr>"] if ranks else []
-    rows += [
-        _row("weakest direction [N]", now.weakest, None if old is None else old.weakest),
-        _row("isotropy", now.isotropy, None if old is None else old.isotropy),
-    ]
-    if card.worst_loss is not None:
-        lost = None if before is None or before.worst_loss is None else before.worst_loss.weakest
-        rows.append(_row("weakest after the worst loss [N]", card.worst_loss.weakest, lost))
-    head = f"<tr><th></th><th>{name}</th><th>now</th><th></th></tr>" if before is not None else ""
-    return f"<div class='said'>{rank_sentence(card.authority)}</div><table>{head}{''.join(rows)}</table>"
-
-
-def _row(name: str, now: float, old: float | None) -> str:
-    if old is None:
-        return f"<tr><td>{name}</td><td>{three_digits(now)}</td></tr>"
-    change = now - old
-    kind = "" if abs(change) < 1e-3 * max(abs(now), abs(old), 1e-9) else "given" if change > 0 else "missing"
-    sign = "=" if not kind else "▲" if change > 0 else "▼"
-    return (
-        f"<tr><td>{name}</td><td>{three_digits(old)}</td><td>{three_digits(now)}</td>"
-        f"<td class='{kind}'>{sign}</td></tr>"
+    head = ""
+    if before is not None:
+        ranks = f"<td>{before.authority.rank} of 6</td><td>{card.authority.rank} of 6</td><td></td>"
+        head = (
+            f"<tr><th></th><th>{name}</th><th>now</th><th></th></tr><tr><td>axes independent</td>{ranks}</tr>"
+        )
+    rows = "".join(
+        _alone(words, of(card)) if before is None else _beside(words, of(card), of(before))
+        for words, of in FIGURES.items()
     )
+    return f"<div class='said'>{rank_sentence(card.authority)}</div><table>{head}{rows}</table>"
+
+
+def _alone(words: str, now: float | None) -> str:
+    return "" if now is None else f"<tr><td>{words}</td><td>{three_digits(now)}</td></tr>"
+
+
+def _beside(words: str, now: float | None, old: float | None) -> str:
+    """A row of both layouts; a robot of one fin has no worst loss."""
+    if now is None and old is None:
+        return ""
+    kind = sign = ""
+    if now is not None and old is not None:
+        change = now - old
+        same = abs(change) < 1e-3 * max(abs(now), abs(old), 1e-9)
+        kind = "" if same else "given" if change > 0 else "missing"
+        sign = "=" if same else "▲" if change > 0 else "▼"
+    cells = "".join(f"<td>{'–' if value is None else three_digits(value)}</td>" for value in (old, now))
+    return f"<tr><td>{words}</td>{cells}<td class='{kind}'>{sign}</td></tr>"
 
 
 def _axes(card: ScoreCard, before: ScoreCard | None, name: str) -> str:
