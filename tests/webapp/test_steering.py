@@ -11,6 +11,7 @@ from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.webapp.loops import AtOnce, page_of, running
 from webapp.session import Session
+from webapp.session.core import MAX_STEPS
 from webapp.tasks import sweeping
 from webapp.tasks.answering import Answering
 from webapp.tasks.sweeping import POINTS, Sweep
@@ -53,6 +54,17 @@ def test_a_stick_that_springs_back_leaves_no_trace(session: Session) -> None:
     assert session.state.target[0] == 3.0, "nothing is held any more"
     session.undo()
     assert session.state == before
+
+
+def test_a_full_history_keeps_its_oldest_step_when_the_stick_springs_back(session: Session) -> None:
+    for k in range(MAX_STEPS + 5):
+        session.set_only_axis(k % 3)
+    past = list(session.history.past)
+    assert len(past) == MAX_STEPS
+    session.steer({0: 0.5})
+    session.steer({0: 0.6})
+    session.release(spring_back=True)
+    assert session.history.past == past
 
 
 def test_a_sweep_is_one_step_and_ends_when_someone_else_steers(

@@ -35,6 +35,7 @@ class History(Generic[Snapshot]):
         """Key of the step that is still being merged into, if any."""
         self._merge_time = 0.0
         self._before: list[tuple[str, Snapshot]] = []  # what could be redone before the last step
+        self._dropped: list[tuple[str, Snapshot]] = []  # what could be undone before it, and cannot any more
 
     def commit(self, name: str, state: Snapshot, merge_key: str | None = None, timed: bool = True) -> None:
         """Make `state` the present one.
@@ -51,7 +52,7 @@ class History(Generic[Snapshot]):
         same = merge_key is not None and merge_key == self.merge_key
         if not (same and self.past and (not timed or now - self._merge_time < MERGE_WINDOW_S)):
             self.past.append((name, self.state))
-            del self.past[:-MAX_STEPS]
+            self._dropped, self.past = self.past[:-MAX_STEPS], self.past[-MAX_STEPS:]
             self._before, self.future = self.future, []
         self.merge_key, self._merge_time = merge_key, now
         self.state = state
@@ -72,6 +73,7 @@ class History(Generic[Snapshot]):
         if self.merge_key is None or not self.past:
             return False
         _, self.state = self.past.pop()
+        self.past = self._dropped + self.past
         self.future, self.merge_key = self._before, None
         return True
 
