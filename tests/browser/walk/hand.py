@@ -93,6 +93,15 @@ class Hand:
         else:
             buttons.filter(has_text=re.compile(f"^{re.escape(button)}$")).first.click()
 
+    def download(self, spot: Spot, label: str, button: str) -> Any:
+        """The file that a button sends; what the page says instead, if it sends none."""
+        sent: list[Any] = []
+        self.page.page.once("download", lambda file: sent.append(file))
+        self.click(spot, label, button)
+        self.page.until(lambda: sent != [] or self.page.notes() != [])
+        assert sent, f"{button} sends nothing: {self.page.notes()}"
+        return sent[0]
+
     def choose(self, spot: Spot, label: str, entry: str) -> None:
         """An entry of a list."""
         self.inputs(spot, label).first.click()

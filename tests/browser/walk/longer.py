@@ -79,18 +79,16 @@ def exported(walk: Any) -> None:
     walk.hand.go(FILES, walk.model)
     walk.page.until(lambda: not walk.page.view.busy)
     name = walk.random.choice(("Graph file", "Candidates (CSV)", "Picture (PNG)", "3D view (HTML)"))
-    with walk.page.page.expect_download() as download:
-        walk.hand.click(FILES, "Single files", name)
-    assert Path(download.value.path()).stat().st_size > 100, f"{name} is empty"
+    download = walk.hand.download(FILES, "Single files", name)
+    assert Path(download.path()).stat().st_size > 100, f"{name} is empty"
 
 
 def saved(walk: Any) -> None:
     """The layout as a file is the layout."""
-    with walk.page.page.expect_download() as download:
-        walk.hand.click(("Design", "File"), "", "Save")
+    download = walk.hand.download(("Design", "File"), "", "Save")
     walk.model.session.note_saved()
-    path = Path(download.value.path())
-    named = path.with_name(f"{path.name}-{download.value.suggested_filename}")
+    path = Path(download.path())
+    named = path.with_name(f"{path.name}-{download.suggested_filename}")
     path.rename(named)
     layout, wanted = load_layout(named), walk.model.session.state.layout
     written, meant = layout_to_dict(layout), layout_to_dict(wanted)  # with angles as a file has them

@@ -61,8 +61,7 @@ def taken(walk: Any, swimming: Any) -> None:
     walk.hand.click(RUN, "Run", "Pause")
     walk.page.until(lambda: not swimming.running and not swimming.busy)
     ticks = swimming.records()[0].log.n_ticks
-    with walk.page.page.expect_download() as download:
-        walk.hand.click(FIGURES, "Save", "Table (CSV)")
-    lines = Path(download.value.path()).read_text(encoding="utf-8").splitlines()
+    download = walk.hand.download(FIGURES, "Save", "Table (CSV)")
+    lines = Path(download.path()).read_text(encoding="utf-8").splitlines()
     rows = [line for line in lines if line[:1].isdigit()]
     assert len(rows) == ticks, f"the file has {len(rows)} rows for {ticks} ticks"
