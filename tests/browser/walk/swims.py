@@ -22,14 +22,19 @@ def swim(walk: Any) -> None:
     walk.hand.click(RUN, "", "Start")
     walk.page.until(lambda: swimming.active and swimming.time > 0.2 or walk.page.notes() != [])
     assert walk.page.notes() == [], walk.page.notes()
-    walk.hand.click(RUN, "Run", "Pause")
-    walk.page.until(lambda: not swimming.running and not swimming.busy)
+    hold(walk, swimming)
     walk.random.choice((breaks, kept, taken))(walk, swimming)
     before = swimming.time
     walk.hand.click(RUN, "Run", "Step")
     walk.page.until(lambda: swimming.time > before)
     walk.hand.click(RUN, "Run", "End")
     walk.page.until(lambda: not swimming.active)
+
+
+def hold(walk: Any, swimming: Any) -> None:
+    """Pause, and wait until it rests."""
+    walk.hand.click(RUN, "Run", "Pause")
+    walk.page.until(lambda: not swimming.running and not swimming.busy)
 
 
 def breaks(walk: Any, swimming: Any) -> None:
@@ -58,8 +63,7 @@ def taken(walk: Any, swimming: Any) -> None:
     """Its log as a file has a line for each tick that was swum."""
     walk.hand.click(RUN, "Run", "Go on")
     walk.page.until(lambda: swimming.time > LONG_ENOUGH)
-    walk.hand.click(RUN, "Run", "Pause")
-    walk.page.until(lambda: not swimming.running and not swimming.busy)
+    hold(walk, swimming)
     ticks = swimming.records()[0].log.n_ticks
     download = walk.hand.download(FIGURES, "Save", "Table (CSV)")
     lines = Path(download.path()).read_text(encoding="utf-8").splitlines()
