@@ -38,8 +38,9 @@ LATENCY_METHODS = ("search", "mdn", "analytic", "qp", "sqp", "multistart", "pape
 """Methods that are timed side by side."""
 N_CANDIDATES = 64
 """Candidates of the ablation, as in the paper."""
-PAPER_SHARE = 10
-"""Method `paper`, which takes tens of milliseconds per target, answers one in so many of a split."""
+SHARES = {"paper": 50, "multistart": 10}
+"""Method -> it answers one target in so many of a split: those that take tens of milliseconds per target.
+Intervals are by layout, and all layouts are kept."""
 SCATTER_FINS, SCATTER_TARGETS = 4, 3
 """Fins of the layout, and its targets, whose candidates are drawn before and after refinement."""
 SWIMMERS = {
@@ -136,7 +137,7 @@ def make_plan(sizes: Sizes, *, seed: int, checkpoints: Checkpoints, runs: Path) 
         about = {"split": split, "objective": objective, "methods": costed, "starts": N_STARTS}
         add("cost", (split, objective), costed, **about)
     for method, split in product(sorted(names, key=lambda name: name != "paper"), SPLITS):
-        share, about = PAPER_SHARE if method == "paper" else 1, {"split": split, "method": method}
+        share, about = SHARES.get(method, 1), {"split": split, "method": method}
         size = sizes.of_split(main=split in paper_figures()["wrench_tracking"], slow=is_slow(method))
         add("wrench", (split, method), [method], **about, **_fewer(size, share))
         if not is_slow(method):

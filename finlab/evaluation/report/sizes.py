@@ -67,10 +67,10 @@ SIZES = {
         "full",
         {
             "wrench": cases(100, 1000),
-            "wrench-other": cases(100, 100),
+            "wrench-other": cases(100, 50),
             "wrench-slow": cases(25, 1),
             "rerun": cases(25, 40),
-            "cost": cases(25, 3),
+            "cost": cases(20, 2),
             "network": cases(20, 15, fins=[3, 4, 5, 6, 8, 10, 12]),
             "modes": cases(20, 2, starts=256),
             "unreachable": {"layouts": 50},
@@ -85,7 +85,7 @@ SIZES = {
             "swims": {"scenarios": "all", "seeds": 5},
             "ablation": cases(60, 20),
             "temperature": cases(100, 2),
-            "training": cases(40, 25, preset="paper", steps=400, batch_size=256),
+            "training": cases(40, 25, preset="paper", steps=300, batch_size=256),
         },
     ),
 }
