@@ -87,7 +87,7 @@ def report(
 
     Args:
         out: folder for the page.
-        quick: a look on few cases, in minutes; the full size takes hours.
+        quick: a look on few cases, in three minutes; the full size takes an hour on two cores.
         seed: draws layouts, targets and candidates.
         checkpoint: trained checkpoint of method mdn; the shipped one by default.
         paper_checkpoint: trained checkpoint of method paper; the shipped one by default.

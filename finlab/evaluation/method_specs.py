@@ -18,8 +18,6 @@ from finlab.physics.objective import Name
 
 SLOW = ("trf", "slsqp", "ipopt")
 """Methods that take a tenth of a second per target, each from several starts; they run on a subsample."""
-TIME_LIMIT_S = SingleTarget.time_limit_s
-"""What each of them may take for a target from its usual number of starts [s of the processor]."""
 QUICK = ("search", "mdn", "paper", "qp", "sqp", "analytic", "multistart")
 """Methods that run on every target."""
 OWN = (OnBoard, AnalyticAhead)
@@ -81,14 +79,14 @@ def load_method_spec(
     if named := _WITH_OBJECTIVE.fullmatch(name):
         return load_allocator(named[1], checkpoint=checkpoint, objective=named[2])
     method, starts = method_and_starts(name)
-    options: dict[str, Any] = {"time_limit_s": TIME_LIMIT_S} if method in SLOW else {}
+    options: dict[str, Any] = {}
     if starts is not None:
         if method not in SLOW or starts < 1:
             raise AllocationError(
                 f"methods: a number of starts, from 1, goes with {', '.join(SLOW)} only, got {name!r}"
             )
         # Each start has the time that it has in the method's default.
-        limit = TIME_LIMIT_S * max(1.0, starts / SingleTarget.n_starts)
+        limit = SingleTarget.time_limit_s * max(1.0, starts / SingleTarget.n_starts)
         options = {"n_starts": starts, "time_limit_s": limit}
     allocator = load_allocator(method, checkpoint=checkpoint, **options)
     chooses = objective is not None and "objective" in allocator.option_names()

@@ -41,6 +41,9 @@ from finlab.sim import make_trajectory
 
 LATENCY_FINS = 4
 """Fins of the layouts whose calls are timed."""
+PATIENCE_S = 60.0
+"""Processor time [s] that a target may take where answers count and not times: a clock that cut a solver
+short would do so elsewhere in the next run. Starts and steps end it long before."""
 TRACK = "track "
 """Leads the name of a column of time, position and reference (K, 7); layout and method follow."""
 
@@ -50,7 +53,7 @@ def wrench(
 ) -> Columns:
     """Records of a method on a split."""
     cases = make_split(split, layouts, targets, seed)
-    return columns_of_records(run_method(load_method_spec(method, checkpoints.of(method)), cases))
+    return columns_of_records(run_method(_patient([method], checkpoints)[method], cases))
 
 
 rerun = wrench
@@ -61,7 +64,7 @@ def cost(
     *, split: str, objective: Name, methods: list[str], starts: int, checkpoints: Checkpoints, **drawn: int
 ) -> Columns:
     """Rows of the comparison of costs on one set of cases; drawn as in `cost_rows`."""
-    allocators = _allocators(methods, checkpoints)
+    allocators = _patient(methods, checkpoints)
     return columns_of_rows(cost_rows(split, allocators, objective, n_starts=starts, **drawn))
 
 
@@ -86,7 +89,7 @@ def unreachable(*, layouts: int, seed: int, checkpoints: Checkpoints) -> Columns
 
 def beyond(*, layouts: int, targets: int, methods: list[str], seed: int, checkpoints: Checkpoints) -> Columns:
     """Rows of what methods miss on the boundary of what robots can do, and beyond."""
-    allocators = _allocators(methods, checkpoints)
+    allocators = _patient(methods, checkpoints)
     return columns_of_rows(beyond_reach_rows(allocators, layouts=layouts, targets=targets, seed=seed))
 
 
@@ -95,7 +98,7 @@ def sequences(
 ) -> Columns:
     """Rows of what commands change by along noisy sequences."""
     robots = [load_layout(name) for name in layouts]
-    allocators = _allocators(methods, checkpoints)
+    allocators = _patient(methods, checkpoints)
     return columns_of_rows(noisy_sequence_rows(allocators, robots, n_paths=paths, ticks=ticks, seed=seed))
 
 
@@ -205,3 +208,10 @@ def _swim(
 def _allocators(methods: Sequence[str], checkpoints: Checkpoints) -> dict[str, Allocator]:
     """Methods by name, each from its own checkpoint."""
     return {name: load_method_spec(name, checkpoints.of(name)) for name in methods}
+
+
+def _patient(methods: Sequence[str], checkpoints: Checkpoints) -> dict[str, Allocator]:
+    """The same, none of them ended by the clock."""
+    found = _allocators(methods, checkpoints)
+    limited = [name for name, method in found.items() if "time_limit_s" in method.option_names()]
+    return found | {name: found[name].with_settings(time_limit_s=PATIENCE_S) for name in limited}

@@ -51,9 +51,6 @@ def few() -> pytest.MonkeyPatch:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(planning, "QUICK", ("search", "paper", "analytic"))
         patch.setattr(planning, "SLOW", ("ipopt",))
-        patch.setattr(
-            "finlab.evaluation.method_specs.TIME_LIMIT_S", 60.0
-        )  # it cuts short at another place each time
         patch.setattr(planning, "SPLITS", FEW_SPLITS)
         patch.setattr(planning, "COST_METHODS", ("search", "analytic"))
         patch.setattr(planning, "COST_SETS", ("id", "axes", "tables"))
