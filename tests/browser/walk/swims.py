@@ -2,6 +2,7 @@
 
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile, is_zipfile
 
 from tests.browser.walk.boxes import FIGURES, RUN
 
@@ -60,12 +61,19 @@ def kept(walk: Any, swimming: Any) -> None:
 
 
 def taken(walk: Any, swimming: Any) -> None:
-    """Its log as a file has a line for each tick that was swum."""
+    """Its log as a file has a line for each tick that was swum, a ZIP such a file for each robot."""
     walk.hand.click(RUN, "Run", "Go on")
     walk.page.until(lambda: swimming.time > LONG_ENOUGH)
     hold(walk, swimming)
-    ticks = swimming.records()[0].log.n_ticks
+    swum = [record.log.n_ticks for record in swimming.records()]
     download = walk.hand.download(FIGURES, "Save", "Table (CSV)")
-    lines = Path(download.path()).read_text(encoding="utf-8").splitlines()
-    rows = [line for line in lines if line[:1].isdigit()]
-    assert len(rows) == ticks, f"the file has {len(rows)} rows for {ticks} ticks"
+    rows = [sum(line[:1].isdigit() for line in text.splitlines()) for text in tables(download.path())]
+    assert rows == swum, f"the tables have {rows} rows for {swum} ticks"
+
+
+def tables(path: str) -> list[str]:
+    """Text of a table, or of each in a ZIP."""
+    if not is_zipfile(path):
+        return [Path(path).read_text(encoding="utf-8")]
+    with ZipFile(path) as archive:
+        return [archive.read(name).decode() for name in archive.namelist()]
