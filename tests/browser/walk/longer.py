@@ -10,8 +10,11 @@ from finlab.layout import layout_to_dict, load_layout
 from tests.browser.walk.boxes import FIGURES, FILES, IMPROVE, PILOT, RUN, SWEEP
 from tests.browser.walk.swims import MOST_FINS, swim
 from webapp.panels.pilot import PADS
+from webapp.session.files import candidates_csv
 
 MISSION = "power for a mission"
+CANDIDATES = "Candidates (CSV)"
+"""Of methods that have any; others refuse."""
 
 
 def sweep(walk: Any) -> None:
@@ -81,7 +84,10 @@ def exported(walk: Any) -> None:
     state = walk.model.session.state
     if walk.page.view.shown is None or len(state.failed) == state.layout.n_fins:
         return
-    name = walk.random.choice(("Graph file", "Candidates (CSV)", "Picture (PNG)", "3D view (HTML)"))
+    name = walk.random.choice(("Graph file", CANDIDATES, "Picture (PNG)", "3D view (HTML)"))
+    if name == CANDIDATES and walk.page.view.answering.best.candidates is None:
+        walk.told(lambda: walk.hand.click(FILES, "Single files", name), lambda _: candidates_csv(None))
+        return
     download = walk.hand.download(FILES, "Single files", name)
     assert Path(download.path()).stat().st_size > 100, f"{name} is empty"
 
