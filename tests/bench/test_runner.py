@@ -44,7 +44,8 @@ def test_late_answers_are_failures(few: Problems) -> None:
     assert found["summary"]["failed"] > 0.9 and found["summary"]["p50_ms"] >= 60.0
 
 
-def test_the_processors_time_leaves_waiting_out(few: Problems) -> None:
+def test_the_processors_time_leaves_waiting_out(few: Problems, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("finlab.bench.runner.PATIENCE", 1000.0)  # other work may hold a call up for long
     method = Method.of(f"{METHODS}:is_slow", cpu=True)
     found = figures(few, run_method(method, few, 0.05))
     assert found["summary"]["failed"] == 0.0 and found["summary"]["p50_ms"] < 20.0
