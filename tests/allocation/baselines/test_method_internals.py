@@ -154,7 +154,10 @@ def test_qp_linearizes_at_the_middle_of_the_limits(plant: Plant) -> None:
 # SQP.
 
 
-def test_sqp_starts_from_the_pseudo_inverse_the_middle_and_at_random(plant: Plant) -> None:
+def test_sqp_starts_from_the_pseudo_inverse_the_middle_and_at_random(
+    plant: Plant, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sqp, "STAGES", ())
     target = np.array([[0.4, 0.1, 0.5, 0.0, 0.0, 0.1]])
     for n_starts in (1, 3):
         method = Sqp(NORMALIZATION, n_steps=0, n_starts=n_starts)
@@ -168,62 +171,97 @@ def test_sqp_starts_from_the_pseudo_inverse_the_middle_and_at_random(plant: Plan
 
 
 @pytest.mark.parametrize("objective", ["power", "effort"])
-def test_sqp_takes_the_cheaper_of_two_ends_that_meet_the_target(
+def test_sqp_takes_the_cheapest_of_the_ends_that_meet_the_target(
     objective: Name, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The target is met from both starts; the answer is the cheaper end, by the objective."""
+    """By the objective; where none meets the target, the end with the smallest error."""
     free = plant_of(Layout("free", tuple(Fin(f"f{i}", (0.2, 0.1 * i, 0.0), 2.0 * i) for i in range(4))))
-    method, asked = (
-        Sqp(NORMALIZATION, objective=objective),
-        0.3 * free.wrench(free.sample(np.random.default_rng(1), (6,))),
-    )
-    ends = []
-    descend = method._descend
+    asked = np.stack([share * free.wrench(free.upper[None])[0] for share in (0.3, 0.4, 20.0)])
+    method, meter = Sqp(NORMALIZATION, objective=objective), Objective(objective).meter(free)
+    ends: list[tuple[np.ndarray, np.ndarray]] = []
+    leads = method._from
 
     def kept(*arguments: object) -> tuple[np.ndarray, np.ndarray]:
-        ends.append(descend(*arguments))  # type: ignore[arg-type]
-        return ends[-1][0].copy(), ends[-1][1].copy()
+        ends.append(leads(*arguments))  # type: ignore[arg-type]
+        return ends[-1]
 
-    monkeypatch.setattr(method, "_descend", kept)
-    answer, meter = method._commands(free, asked, 0), Objective(objective).meter(free)
-    (one, error), (other, reached) = ends[:2]
-    met = (error <= 1e-8) & (reached <= 1e-8)
-    assert met.sum() >= 3
-    np.testing.assert_allclose(meter(answer)[met], np.minimum(meter(one), meter(other))[met])
-    assert (meter(one) < meter(other))[met].any()
+    monkeypatch.setattr(method, "_from", kept)
+    answer = method._commands(free, asked, 0)
+    command, error = ends[0][0].reshape(3, 5, 4, 3), ends[0][1].reshape(3, 5)
+    met = error <= 1e-8
+    assert (met.sum(axis=1)[:2] >= 3).all() and not met[2].any()
+    for k in range(2):
+        cost = meter(command[k][met[k]])
+        assert meter(answer[k][None])[0] == cost.min() < cost.max()
+    np.testing.assert_array_equal(answer[2], command[2][error[2].argmin()])
+
+
+@pytest.mark.parametrize(("objective", "most"), [("power", 0.85), ("effort", 0.95)])
+def test_sqp_lowers_the_cost_and_meets_the_target_as_well(
+    objective: Name, most: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From the middle of the limits, beside steps on the error alone."""
+    free = plant_of(Layout("free", tuple(Fin(f"f{i}", (0.2, 0.1 * i, 0.0), 2.0 * i) for i in range(4))))
+    asked = 0.3 * free.wrench(free.sample(np.random.default_rng(1), (6,)))
+    method, meter = Sqp(NORMALIZATION, objective=objective), Objective(objective).meter(free)
+    middle = np.tile((free.lower + free.upper) / 2, (len(asked), 1, 1))
+    cost = method._cost(free)
+    cheap, error = method._from(free, middle, asked, cost, TimeLimit())
+    monkeypatch.setattr(sqp, "STAGES", ())
+    plain, reached = method._from(free, middle, asked, cost, TimeLimit())
+    assert (error <= 1e-8).all() and (reached <= 1e-8).all()
+    assert meter(cheap).sum() < most * meter(plain).sum()
+
+
+@pytest.mark.parametrize("objective", ["power", "effort"])
+def test_sqp_models_error_and_cost_by_their_slopes(plant: Plant, objective: Name) -> None:
+    """Half the gradient of J is that of differences; half the Hessian is convex, and bends with the cost."""
+    cost = Sqp(NORMALIZATION, objective=objective)._cost(plant)
+    at = plant.lower + np.array([0.3, 0.6, 0.4]) * plant.width
+    j = sqp._J(plant, plant.wrench(at[None]) * 0.7, SIGMA, cost, 1e4)
+    hessian, gradient = j.model(at[None], np.array([0]), 0.0)
+    step = 1e-6 * np.eye(6).reshape(6, 2, 3) * plant.width
+    rows = np.zeros(6, dtype=int)
+    slope = (j(at + step, rows) - j(at - step, rows)) / 2e-6
+    np.testing.assert_allclose(2.0 * gradient[0], slope, rtol=1e-5, atol=1e-7)
+    assert np.linalg.eigvalsh(hessian[0])[0] > 0.0
+    np.testing.assert_array_equal(hessian[0], hessian[0].T)
+    plain, _ = sqp._J(plant, j.targets, SIGMA, cost, 0.0).model(at[None], np.array([0]), 0.0)
+    assert abs((hessian - plain)[0, 0, 1]) > 0.0 and (hessian - plain)[0, 0, 3] == 0.0
 
 
 def test_sqp_knows_how_far_each_command_may_step(plant: Plant) -> None:
     at = plant.lower + np.array([0.25, 0.5, 0.75]) * plant.width
-    low, high = Sqp._room(plant, at[None])
+    low, high = sqp._room(plant, at[None])
     np.testing.assert_allclose(low[0], [-0.25, -0.5, -0.5, -0.25, -0.5, -0.75])
     np.testing.assert_allclose(high[0], [0.75, 0.5, 0.5, 0.75, 0.5, 0.25])
 
 
-def test_sqp_halves_a_step_until_the_error_falls(plant: Plant) -> None:
+def test_sqp_halves_a_step_until_the_squared_error_falls(plant: Plant) -> None:
     """A step downhill ends at the first length of 1, 1/2, ... that pays; uphill nothing moves."""
-    method, start = Sqp(NORMALIZATION), ((plant.lower + plant.upper) / 2)[None]
+    start = ((plant.lower + plant.upper) / 2)[None]
     target = plant.wrench(start) * 0.8
-    error = NORMALIZATION.error(plant.wrench(start), target)
+    j = sqp._J(plant, target, SIGMA, Sqp(NORMALIZATION)._cost(plant), 0.0)
+    square = NORMALIZATION.error(plant.wrench(start), target) ** 2
     _, slope = plant.linearize(start)
     downhill = -(slope[0].T @ ((plant.wrench(start) - target)[0] / SIGMA**2)).reshape(1, 2, 3)
     for size in (0.01, 1.0, 5.0):
         step = size * downhill / np.abs(downhill).max()
         lengths = [0.5**k for k in range(8)]
-        errors = [
-            NORMALIZATION.error(plant.wrench(plant.feasible(start + length * step)), target)[0]
+        squares = [
+            NORMALIZATION.error(plant.wrench(plant.feasible(start + length * step)), target)[0] ** 2
             for length in lengths
         ]
-        first = next(k for k in range(8) if errors[k] < error[0] * (1 - 1e-4 * lengths[k]))
-        command, reached = start.copy(), error.copy()
-        moved = method._search(plant, command, reached, target, np.array([0]), step)
+        first = next(k for k in range(8) if squares[k] < square[0] * (1 - 1e-4 * lengths[k]))
+        command, reached = start.copy(), square.copy()
+        moved = sqp._search(j, command, reached, np.array([0]), step)
         assert moved.tolist() == [True]
         np.testing.assert_allclose(command, plant.feasible(start + lengths[first] * step))
-        assert reached[0] == pytest.approx(errors[first])
-    command, reached = start.copy(), error.copy()
+        assert reached[0] == pytest.approx(squares[first])
+    command, reached = start.copy(), square.copy()
     uphill = -0.01 * downhill / np.abs(downhill).max()
-    moved = method._search(plant, command, reached, target, np.array([0]), uphill)
-    assert moved.tolist() == [False] and reached[0] == error[0]
+    moved = sqp._search(j, command, reached, np.array([0]), uphill)
+    assert moved.tolist() == [False] and reached[0] == square[0]
     np.testing.assert_array_equal(command, start)
 
 
@@ -286,19 +324,20 @@ def test_multistart_polishes_the_start_that_ends_lowest(plant: Plant) -> None:
 @pytest.mark.parametrize(("place", "length"), [(1, 0.5), (3, 0.125), (7, 1 / 128)])
 @pytest.mark.parametrize("pays", [True, False])
 def test_sqp_asks_a_ten_thousandth_of_the_step_as_gain(place: int, length: float, pays: bool) -> None:
-    """An error of 1 that falls at a single length only, by a little more or less than is asked for it."""
+    """A squared error of 1 that falls at one length only, by a little more or less than is asked for it."""
     asked: list[float] = []
     gain = (1.2e-4 if pays else 0.8e-4) * length
 
     def wrench(command: np.ndarray) -> np.ndarray:
         asked.append(float(command[0, 0, 0]))
-        return np.full((1, 6), [1 - gain if asked[-1] == length else 2.0, 0, 0, 0, 0, 0])
+        return np.full((1, 6), [math.sqrt(1 - gain) if asked[-1] == length else 2.0, 0, 0, 0, 0, 0])
 
     fake = SimpleNamespace(wrench=wrench, feasible=lambda command: command)
-    command, error = np.zeros((1, 1, 3)), np.ones(1)
-    plain = Sqp(Normalization(np.zeros(6), np.ones(6)))
-    step = np.ones((1, 1, 3))
-    moved = plain._search(fake, command, error, np.zeros((1, 6)), np.array([0]), step)  # type: ignore[arg-type]
+    command, square = np.zeros((1, 1, 3)), np.ones(1)
+    j = sqp._J(fake, np.zeros((1, 6)), np.ones(6), None, 0.0)  # type: ignore[arg-type]
+    moved = sqp._search(j, command, square, np.array([0]), np.ones((1, 1, 3)))
     assert moved.tolist() == [pays]
     assert asked == [0.5**k for k in range(place + 1 if pays else 8)]
-    assert command[0, 0, 0] == (length if pays else 0.0) and error[0] == (1 - gain if pays else 1.0)
+    assert command[0, 0, 0] == (length if pays else 0.0) and square[0] == pytest.approx(
+        1 - gain if pays else 1.0, rel=1e-12
+    )
