@@ -41,7 +41,7 @@ class LoopSettings:
     warmup: int = 0
     """Steps over which it rises linearly, if there are as many."""
     cosine: bool = True
-    """Whether it falls to a hundredth along a cosine (True) or stays (the paper)."""
+    """Whether it falls to a hundredth along a cosine (True) or stays (the paper prints one rate)."""
     ema: float = 0.0
     """Decay of the running average of the weights that is shipped; 0 ships the last weights."""
     seconds: float | None = None

@@ -1,5 +1,5 @@
-"""Named training recipes: `default` (method `mdn`), `paper` (as printed), `annealed` (to go on from there)
-and `smoke` (seconds, for tests)."""
+"""Named training recipes: `default` (method `mdn`), `paper` (the printed numbers, our choices elsewhere),
+`annealed` (to go on from there) and `smoke` (seconds, for tests)."""
 
 from dataclasses import dataclass, field, replace
 from typing import TypeVar

@@ -36,8 +36,8 @@ class Qp(ModelBased):
     """Linearized once per layout, solved per target by SciPy's active-set `lsq_linear(method="bvls")`.
 
     Minimizes `||(w_ref + J du - target) / sigma||^2 + regularization ||du||^2` over commands as positions
-    between their limits, where `w_ref` and `J` belong to the middle of the limits. As in the paper,
-    what commands cost plays no part: the answer is the same whatever the objective.
+    between their limits, where `w_ref` and `J` belong to the middle of the limits. What commands cost plays
+    no part: the answer is the same whatever the objective. (What the paper's QP regularizes it does not say.)
     """
 
     name = "qp"

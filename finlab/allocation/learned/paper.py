@@ -55,7 +55,7 @@ class _Robot(NamedTuple):
 
 
 class PaperAllocator(Allocator):
-    """Mixture density network, physics-guided ranking and gradient refinement, as printed."""
+    """Mixture density network, physics-guided ranking and gradient refinement, by the printed equations."""
 
     name = "paper"
     weights: TrainedWeights

@@ -38,8 +38,9 @@ STEPS = {"none": 0, "adam": 160, "levenberg-marquardt": 20}
 class PaperSettings:
     """The stages of the paper's pipeline.
 
-    What the paper does not print is a choice made here: gamma, Adam's rate, the number of refined candidates
-    and steps.
+    What the paper does not print is a choice made here: gamma and the weights of J_en, Adam's rate, the
+    number of refined candidates and steps, that the best step is kept, and that zero directions turn on
+    beyond the seam.
     """
 
     n_candidates: int = 64

@@ -68,9 +68,10 @@ def how_made_blocks(results: Results, provenance: Provenance, sizes: Sizes) -> l
         _, made = job.result(results.folder)
         rows.append({**made, "name": job.name, "settings": settings})
         hours += made["seconds"] / 3600.0
+    then = ", and the same with `--sections slow-days`" if "slow_swims" in results.tables else ""
     return [
         "## How this was made",
-        f"- Command: `{provenance.command}` (size {sizes.name}, seed {provenance.seed})\n"
+        f"- Command: `{provenance.command}`{then} (size {sizes.name}, seed {provenance.seed})\n"
         f"- Commit `{provenance.commit}`, {provenance.made}\n"
         f"- Machine: {machine}\n"
         f"- Time: {hours:.1f} hours by the clock for all parts together, one core each" + "".join(prints),

@@ -1,4 +1,4 @@
-"""How much of everything a report measures: `quick` in minutes, `full` at the paper's size."""
+"""How much of everything a report measures: `quick` in minutes, `full` at the paper's where methods are quick."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,7 @@
 """The paper's learned, differentiable model of the fin physics: commands in, wrench out.
 
-Its allocator never sees the fin model that judges it, only this, trained on forward samples. Torque is
-computed from force and position.
+It is trained on forward samples of the fin model. At inference the paper's allocator asks this alone, never
+the fin model that judges it. Torque is computed from force and position.
 """
 
 from itertools import pairwise

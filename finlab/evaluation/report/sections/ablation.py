@@ -51,7 +51,9 @@ def ablation_blocks(
         (
             "The paper's five rows with the network of the checkpoint `paper`: the same cases, "
             f"{candidates} candidates, temperature {temperature:g} and refinement budget, one stage changed "
-            "in each row. The paper does not say which model scored its table; that it prints 0.0003 there "
+            "in each row; but the mean row draws no candidates and refines nothing, since the paper prints a "
+            "tenth of the refined rows' time for it, and the random warm start is the best four of as many "
+            "uniform draws. The paper does not say which model scored its table; that it prints 0.0003 there "
             "and 0.0857 for wrench tracking suggests two. So the same commands are scored twice: by the "
             "surrogate that refined them and by the analytic fin model. Nor does it say whether its "
             "normalized error is J_norm, the squared norm of its equation, or the root of that: both are "

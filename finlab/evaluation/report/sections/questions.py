@@ -77,9 +77,9 @@ def beyond_blocks(rows: Sequence[Row]) -> list[Block]:
             "Every method is asked for the largest wrench of a random direction, as IPOPT finds it in the "
             "fins' forces, and for 1.2, 2 and 3 times as much, on layouts of split `id`. The least possible "
             "error is IPOPT's, too, and exact to about 1e-5, so what is missed beyond it may be as much "
-            "below zero. Errors are in standard deviations of the wrenches that `paper` was trained on, by "
-            "the plant. `search` takes a target as delivered when its error is at most 0.01, and looks for "
-            "the nearest wrench within reach only beyond that."
+            "below zero. Errors are in standard deviations of the wrenches of random layouts of 2 to 5 of "
+            "U-CAT's fins, by the plant. `search` takes a target as delivered when its error is at most "
+            "0.01, and looks for the nearest wrench within reach only beyond that."
         ),
         Table(columns, [method_row(row) for row in rows]),
     ]
@@ -106,7 +106,7 @@ def sequence_blocks(rows: Sequence[Row], noise: float = NOISE) -> list[Block]:
         (
             f"Smooth random paths of wrenches at {RATE:g} Hz with white noise on every axis, "
             f"{100 * noise:g} % of the path's root mean square, as the noise of sensors makes a controller "
-            "ask for. Every method is given its previous command; `qp`, `sqp` and `analytic` ignore it. "
+            "ask for. Every method is given its previous command; only `search` and `mdn` make use of it. "
             "Changes of amplitude, frequency and zero direction from tick to tick, over all fins: mean and "
             "99th percentile. `search` and `mdn` change commands no faster than the servos' rates, and miss "
             "part of the wrench for it (mean error). Late: mean error of what fins give that follow their "

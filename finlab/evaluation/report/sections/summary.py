@@ -43,12 +43,14 @@ def summary_blocks(tables: Tables) -> list[Block]:
         (
             "The default method, `search`, against every other one. One leads where the intervals in which "
             "reruns should land do not overlap; a single run has none and no verdict. Figures that the paper "
-            "prints count as exact. Mean errors below 1e-5 say where a method stops refining, not whether "
-            "it delivers the wrench. Costs of answers are compared only with methods that keep the same cost "
-            "least. The watts of the hard days are compared with two pseudo-inverses that do not: `analytic` "
-            "takes the cheapest command of each fin's force, `on-board` beats at a fixed frequency. The hard "
-            "days' own tables compare swim with swim under the same noise, and so tell apart what is too "
-            "close here. `search` needs no network and no training."
+            "prints count as exact; rows against `paper (printed)` compare with other robots, targets and "
+            "scoring, take its ablation for J_norm, and are no verdict on the paper. Mean errors below 1e-5 "
+            "say where a method stops refining, not whether it delivers the wrench. Costs of answers are "
+            "compared only with methods that keep the same cost least. The watts of the hard days are "
+            "compared with two pseudo-inverses that do not: `analytic` takes the cheapest command of each "
+            "fin's force, `on-board` beats at a fixed frequency. The hard days' own tables compare swim with "
+            "swim under the same noise, and so tell apart what is too close here. `search` needs no network "
+            "and no training."
         ),
         Table(STANDINGS, standings(found)),
         Fold("Every comparison, with its values", (Table(COMPARISONS, found),)),

@@ -43,7 +43,7 @@ ABOUT = (
 SLOW = (
     "`sqp`, `multistart` and `paper` swam the same days with the same seeds and noise, each swim set against "
     "that of `search`. They take several times the processor's time that a pseudo-inverse takes, and are run "
-    "by `finlab eval report --sections slow-days`. *Over it*: `search` over the method of the row."
+    "by `finlab eval report -o DIR --sections slow-days`. *Over it*: `search` over the method of the row."
 )
 DUEL = (
     Column("ate", "ATE [m]", "metres"),
