@@ -33,7 +33,8 @@ def test_targets_are_seeded_and_within_reach() -> None:
     layout = finlab.load_layout("D")
     case, again, other = (own_case(layout, (), 8, seed) for seed in (3, 3, 4))
     assert np.array_equal(case.targets, again.targets) and not np.array_equal(case.targets, other.targets)
-    assert np.array_equal(own_case(layout, (), 3, 3).targets, case.targets[:3])
+    # Products of fewer rows may round otherwise.
+    np.testing.assert_allclose(own_case(layout, (), 3, 3).targets, case.targets[:3], rtol=1e-12, atol=1e-14)
     assert finlab.load_allocator().allocate_batch(layout, case.targets).reachable.all()
 
 

@@ -100,4 +100,5 @@ def draw_velocity(runs: Sequence[Run]) -> Picture:
             xlabel="MAE of the speed [m/s]", ylabel="inertial power [W]", title="Left and low is better"
         )
         trade.set(xlim=(0.0, None), ylim=(0.0, None))
+        trade.locator_params(axis="x", nbins=5)
         return view

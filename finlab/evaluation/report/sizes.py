@@ -1,4 +1,4 @@
-"""How much of everything a report measures: `quick` in minutes, `full` at the paper's where methods are quick."""
+"""How much of everything a report measures: `quick` in minutes, `full` in an hour."""
 
 from dataclasses import dataclass
 from typing import Any
