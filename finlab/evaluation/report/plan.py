@@ -38,8 +38,8 @@ LATENCY_METHODS = ("search", "mdn", "analytic", "qp", "sqp", "multistart", "pape
 """Methods that are timed side by side."""
 N_CANDIDATES = 64
 """Candidates of the ablation, as in the paper."""
-SHARES = {"paper": 50, "multistart": 10}
-"""Method -> it answers one target in so many of a split: those that take tens of milliseconds per target.
+SHARES = {"paper": 50, "multistart": 10, "sqp": 5}
+"""Method -> it answers one target in so many of a split: those that take milliseconds per target.
 Intervals are by layout, and all layouts are kept."""
 SCATTER_FINS, SCATTER_TARGETS = 4, 3
 """Fins of the layout, and its targets, whose candidates are drawn before and after refinement."""
