@@ -98,8 +98,7 @@ def accuracy_blocks(results: Results) -> list[Block]:
         "*Small print below a number: where a rerun with another seed should land, 95 times of 100 "
         "(bootstrap over layouts). ms per target: all targets of a layout are solved together, and other "
         "parts of the report run beside it. `paper`, `multistart`, `sqp`, `trf`, `slsqp` and `ipopt`, which "
-        "take 
-        "long, solve the first targets of each layout only, the last three one by one, from 8 starts.*"
+        "take long, solve the first targets of each layout only, the last three one by one, from 8 starts.*"
     )
     return blocks
 
