@@ -1,12 +1,15 @@
 """Design a robot: linked pairs, hulls from files, limits with failures, a better layout, other methods."""
 
+import time
 from pathlib import Path
 from typing import Any
 
 import pytest
 import trimesh
 
+from finlab.analysis import Improvement, optimize_layout
 from webapp.session.state import COMPARED
+from webapp.tasks import improving
 
 
 def test_linked_pair_follows_the_gizmo(page: Any) -> None:
@@ -87,7 +90,14 @@ def test_any_layout_stands_beside(page: Any) -> None:
     page.until(lambda: page.session.beside is None)
 
 
-def test_search_is_watched_and_accepted(page: Any) -> None:
+def test_search_is_watched_and_accepted(page: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def patiently(*arguments: Any, progress: Any, **named: Any) -> Improvement:
+        """Rounds so slow that the search never ends before Cancel is pressed, however quick the machine."""
+        return optimize_layout(
+            *arguments, progress=lambda told: (progress(told), time.sleep(0.5)), rounds=1000, **named
+        )
+
+    monkeypatch.setattr(improving, "optimize_layout", patiently)
     page.tab("Improve")
     before = page.session.state.layout
     page.choose("Goal", "power for a mission")
@@ -103,7 +113,7 @@ def test_search_is_watched_and_accepted(page: Any) -> None:
     page.press("Cancel")
     page.until(lambda: page.view.improver.findings is not None)
     found = page.view.improver.findings
-    assert found.goal == "mission_power"
+    assert found.goal == "mission_power" and found.cancelled
     accept = page.page.get_by_role("button", name="Accept")
     page.until(lambda: accept.count() == int(found.improved))
     if found.improved:
