@@ -41,7 +41,7 @@ ABOUT = (
     "noise. `search` takes from it the wrenches that it expects, the others the present one."
 )
 SLOW = (
-    "`sqp`, `multistart` and `paper` swam the same days with the same seeds and noise, each swim set against "
+    "{} swam the same days with the same seeds and noise, each swim set against "
     "that of `search`. They take several times the processor's time that a pseudo-inverse takes, and are run "
     "by `finlab eval report -o DIR --sections slow-days`. *Over it*: `search` over the method of the row."
 )
@@ -107,10 +107,11 @@ def slow_day_blocks(swims: Sequence[Row], slow: Sequence[Row]) -> list[Block]:
     """The slow methods against `search` on the hard days, from single swims as `Swim` names their figures."""
     ours = [Swim(**swim) for swim in swims if swim["method"] == "search"]
     rows = duels(ours, [Swim(**swim) for swim in slow])
-    methods = dict.fromkeys(row["method"] for row in rows)
+    methods = list(dict.fromkeys(row["method"] for row in rows))
+    first, last = ", ".join(f"`{method}`" for method in methods[:-1]), f"`{methods[-1]}`"
     return [
         "### Hard days, slow methods",
-        SLOW,
+        SLOW.format(f"{first} and {last}" if first else last),
         Table((*WHAT, *DUEL), rows),
         Table((*WHAT, *STEPS), rows),
         "\n".join(f"- {_against(method, rows)}" for method in methods),
