@@ -35,6 +35,10 @@ class Bowl(NamedTuple):
     mixed: Array
     """Half those by amplitude and frequency (B, n)."""
 
+    def in_units(self, unit: Array) -> "Bowl":
+        """Returns the same by commands counted in units (n, 3), such as the ranges of their limits."""
+        return Bowl(self.slope * unit, self.diagonal * unit**2, self.mixed * (unit[:, 0] * unit[:, 1]))
+
 
 class CommandCost(ABC):
     """The weighted cost of a robot's commands."""

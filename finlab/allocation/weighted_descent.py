@@ -160,8 +160,7 @@ def _bowl(plant: Robot, command: Array, cost: CommandCost | None) -> Bowl:
     if cost is None:
         nothing = np.zeros(command.shape)
         return Bowl(nothing, nothing, nothing[..., 0])
-    bowl, width = cost.bowl(command), plant.width
-    return Bowl(bowl.slope * width, bowl.diagonal * width**2, bowl.mixed * (width[:, 0] * width[:, 1]))
+    return cost.bowl(command).in_units(plant.width)
 
 
 def _times(vector: Array, diagonal: Array, mixed: Array) -> Array:

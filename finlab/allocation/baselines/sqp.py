@@ -127,12 +127,11 @@ class _J:
         hessian[:, each, each] += np.maximum(regularization * (residual**2).sum(axis=1), least)[:, None]
         gradient = np.einsum("bij,bi->bj", slope, residual)
         if self.weight:
-            bowl = self.cost.bowl(command)
-            gradient += self.weight * (bowl.slope * width).reshape(gradient.shape)
-            hessian[:, each, each] += self.weight * (bowl.diagonal * width**2).reshape(gradient.shape)
-            mixed = self.weight * bowl.mixed * (width[:, 0] * width[:, 1])
-            hessian[:, each[0::3], each[1::3]] += mixed
-            hessian[:, each[1::3], each[0::3]] += mixed
+            bowl = self.cost.bowl(command).in_units(width)
+            gradient += self.weight * bowl.slope.reshape(gradient.shape)
+            hessian[:, each, each] += self.weight * bowl.diagonal.reshape(gradient.shape)
+            hessian[:, each[0::3], each[1::3]] += self.weight * bowl.mixed
+            hessian[:, each[1::3], each[0::3]] += self.weight * bowl.mixed
         return hessian, gradient
 
 
