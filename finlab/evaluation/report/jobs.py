@@ -66,9 +66,10 @@ class Job:
         return load_columns(self.path(folder))
 
     def run(self, folder: Path, commit: str) -> None:
-        """Do the work and keep its result."""
+        """Do the work, on one thread, and keep its result."""
         start = time.perf_counter()
-        columns = self.work(**self.settings, **self.context)
+        with threadpool_limits(1):
+            columns = self.work(**self.settings, **self.context)
         made = {
             "settings": self.key,
             "seconds": time.perf_counter() - start,
@@ -113,8 +114,7 @@ def _run_pool(jobs: Sequence[Job], folder: Path, commit: str, processes: int, ba
 
 
 def _calm() -> None:
-    """One thread for each process, no bars of its own, and an end at once when a user interrupts."""
+    """No more threads than a part may have, no bars of its own, and an end at once when a user interrupts."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")  # of what is loaded later
-    threadpool_limits(1)
+    os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")  # of what a part loads itself
     sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 - for the life of the process

@@ -43,8 +43,8 @@ class Provenance:
     """Of the source tree, `+` for changes that are not in it; the version where there is no tree."""
     made: str = field(default_factory=lambda: time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()))
     """Time of day, UTC."""
-    machine: dict[str, str] = field(default_factory=machine)
-    """Processor, cores and versions."""
+    machine: dict[str, str] = field(default_factory=lambda: machine() | {"threads": "1"})
+    """Processor, cores, threads of a part, and versions."""
 
     def about(self) -> dict[str, Any]:
         """What stands above the rows for scripts."""

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from finlab.errors import DataError
 from finlab.evaluation.report.jobs import Job, columns_of_rows, rows_of_columns, run_jobs
@@ -90,6 +91,19 @@ def test_what_measures_time_runs_last_and_other_weights_are_other_work(tmp_path:
     assert MADE == [2, 1]
     assert not replace(job, prints="other").done(tmp_path)
     assert replace(job, context={"checkpoint": "there"}).done(tmp_path)
+
+
+def _count_threads() -> Columns:
+    return {"threads": np.array([pool["num_threads"] for pool in threadpool_info()])}
+
+
+def test_a_part_runs_on_one_thread(tmp_path: Path) -> None:
+    job = Job("threads", _count_threads, {}, "print", alone=True)
+    with threadpool_limits(2):
+        assert _count_threads()["threads"].max() == 2
+        run_jobs([job], tmp_path, commit="abc")
+        assert _count_threads()["threads"].max() == 2
+    assert job.result(tmp_path)[0]["threads"].max() == 1
 
 
 def test_rows_travel_as_text() -> None:
