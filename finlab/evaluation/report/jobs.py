@@ -19,6 +19,9 @@ from tqdm import tqdm
 
 from finlab.evaluation.statistics.records import VERSION, Columns, load_columns, save_columns
 
+THREADS = 1
+"""Threads of a part, so that parts run beside each other and times are of one core."""
+
 
 def columns_of_rows(rows: list[dict[str, Any]]) -> Columns:
     """Rows of a finished table as one column of JSON texts, for results that have no entry per target."""
@@ -66,9 +69,9 @@ class Job:
         return load_columns(self.path(folder))
 
     def run(self, folder: Path, commit: str) -> None:
-        """Do the work, on one thread, and keep its result."""
+        """Do the work, on `THREADS` threads, and keep its result."""
         start = time.perf_counter()
-        with threadpool_limits(1):
+        with threadpool_limits(THREADS):
             columns = self.work(**self.settings, **self.context)
         made = {
             "settings": self.key,
@@ -116,5 +119,6 @@ def _run_pool(jobs: Sequence[Job], folder: Path, commit: str, processes: int, ba
 def _calm() -> None:
     """No more threads than a part may have, no bars of its own, and an end at once when a user interrupts."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")  # of what a part loads itself
+    # What a part loads itself looks here.
+    os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS"), str(THREADS))
     sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 - for the life of the process

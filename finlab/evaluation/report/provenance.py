@@ -9,6 +9,7 @@ from typing import Any
 import finlab
 from finlab.evaluation.experiments.latency import machine
 from finlab.evaluation.report.document import Block, Column, Fold, Table
+from finlab.evaluation.report.jobs import THREADS
 from finlab.evaluation.report.results import Results
 from finlab.evaluation.report.sizes import Sizes
 
@@ -43,7 +44,7 @@ class Provenance:
     """Of the source tree, `+` for changes that are not in it; the version where there is no tree."""
     made: str = field(default_factory=lambda: time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()))
     """Time of day, UTC."""
-    machine: dict[str, str] = field(default_factory=lambda: machine() | {"threads": "1"})
+    machine: dict[str, str] = field(default_factory=lambda: machine() | {"threads": str(THREADS)})
     """Processor, cores, threads of a part, and versions."""
 
     def about(self) -> dict[str, Any]:
