@@ -93,7 +93,8 @@ def figure_a(
         best.plot(temperature, median, "o--", color=style.ORANGE, markersize=3, linewidth=1.2, label="median")
         best.set(yscale="log")
         best.set_title("best J among them")
-        best.legend(frameon=False)
+        best.margins(y=0.4)  # room for the legend
+        best.legend(frameon=False, loc="upper right")
         for axis in (spread, best):
             axis.axvline(paper_temperature, **style.DASHES)
             axis.set(xscale="log", xlabel="temperature T")
