@@ -8,7 +8,7 @@ HOST_PORT ?= 8080
 THREADS := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup app test test-fast mutate check format checkpoint checkpoint-default checkpoint-paper bench bench-app bench-runtime wheel wheel-check clean
+.PHONY: help setup app test test-fast mutate check format checkpoint checkpoint-default checkpoint-paper bench bench-runtime wheel wheel-check clean
 
 help:
 	@echo "make setup        make .venv with everything pinned in constraints.txt"
@@ -20,7 +20,6 @@ help:
 	@echo "make format       let ruff mend what it can"
 	@echo "make checkpoint   train what is shipped, PRESET=default or PRESET=paper (hours)"
 	@echo "make bench        print data throughput, accuracy and latency"
-	@echo "make bench-app    the app in a real browser: a random walk over every control, and how quick it is"
 	@echo "make bench-runtime  bundles in an environment of numpy and safetensors alone: self-check, speed, memory"
 	@echo "make wheel-check  build the wheel, install it in an empty environment and try it there"
 
@@ -74,9 +73,6 @@ checkpoint-paper:
 
 bench: setup
 	tools/bench
-
-bench-app: setup
-	tools/bench-app
 
 bench-runtime: setup
 	tools/bench-runtime
