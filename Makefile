@@ -8,19 +8,19 @@ HOST_PORT ?= 8080
 THREADS := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup app test test-fast mutate check format checkpoint checkpoint-default checkpoint-paper bench bench-runtime wheel wheel-check clean
+.PHONY: help setup app test test-all test-near test-fast check format checkpoint checkpoint-default checkpoint-paper wheel wheel-check clean
 
 help:
 	@echo "make setup        make .venv with everything pinned in constraints.txt"
 	@echo "make app          serve the app on http://127.0.0.1:$(HOST_PORT)"
-	@echo "make test         every test, browser tests included"
+	@echo "make test         every test, browser tests included; of long tables of cases one in ten"
+	@echo "make test-all     every test and every case"
+	@echo "make test-near    the tests near what was changed since the branch main"
 	@echo "make test-fast    every test but those of the browser and the packaging"
 	@echo "make check        ruff, ruff format and mypy"
-	@echo "make mutate       change the source at MUTANTS=300 random places; which changes does no test notice?"
 	@echo "make format       let ruff mend what it can"
 	@echo "make checkpoint   train what is shipped, PRESET=default or PRESET=paper (hours)"
-	@echo "make bench        print data throughput, accuracy and latency"
-	@echo "make bench-runtime  bundles in an environment of numpy and safetensors alone: self-check, speed, memory"
+	@echo "make     the app in a real browser: a random walk over every control, and how quick it is"
 	@echo "make wheel-check  build the wheel, install it in an empty environment and try it there"
 
 setup: $(STAMP)
@@ -36,8 +36,14 @@ app: setup
 
 test: setup
 	@tools/find-browser || tools/apt-install chromium fonts-dejavu-core || tools/no-browser
-	$(THREADS) $(BIN)/python -m pytest -n 2 --dist loadfile --ignore tests/browser
-	$(THREADS) $(BIN)/python -m pytest tests/browser
+	$(THREADS) $(BIN)/python -m pytest -n 2 --dist loadfile --ignore tests/browser $(CASES)
+	$(THREADS) $(BIN)/python -m pytest tests/browser $(CASES)
+
+test-all: CASES := -m ""
+test-all: test
+
+test-near: setup
+	$(BIN)/python tools/near_tests.py
 
 test-fast: setup
 	$(THREADS) $(BIN)/python -m pytest -n 2 --dist loadfile --ignore tests/browser --ignore tests/packaging
@@ -46,12 +52,6 @@ check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-
-MUTANTS ?= 300
-SEED ?= 0
-
-mutate: setup
-	$(THREADS) $(BIN)/python tools/mutate --mutants $(MUTANTS) --seed $(SEED)
 
 format: setup
 	$(BIN)/ruff check --fix .
@@ -70,12 +70,6 @@ checkpoint-paper:
 	$(BIN)/finlab train surrogate -o runs/surrogate-paper
 	$(BIN)/finlab train allocator --surrogate runs/surrogate-paper -o runs/paper-printed --layouts 100000 --commands 50 --stop-after 23452
 	$(BIN)/finlab train allocator --preset annealed --start runs/paper-printed --surrogate runs/surrogate-paper -o runs/paper --layouts 100000 --commands 50 --seed 1
-
-bench: setup
-	tools/bench
-
-bench-runtime: setup
-	tools/bench-runtime
 
 wheel: setup
 	$(BIN)/python -m pip wheel --disable-pip-version-check --no-deps --no-build-isolation -w dist .

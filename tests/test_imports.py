@@ -85,65 +85,79 @@ def _modules(root: Path) -> dict[str, Path]:
     return named
 
 
-def _loaded_at_once(body: list[ast.stmt]) -> Iterator[ast.Import | ast.ImportFrom]:
-    """The imports that run while a module loads, not those in functions or for type checkers alone."""
-    for node in body:
-        if isinstance(node, ast.Import | ast.ImportFrom):
-            yield node
-        elif isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
-            yield from _loaded_at_once(node.orelse)
-        elif not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-            for block in ("body", "orelse", "finalbody"):
-                yield from _loaded_at_once(getattr(node, block, []))
-            for handler in getattr(node, "handlers", []):
-                yield from _loaded_at_once(handler.body)
+def _imported(node: ast.AST) -> Iterator[ast.AST]:
+    """Everything below a node but what type checkers alone read."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
+            for other in child.orelse:
+                yield other
+                yield from _imported(other)
+        else:
+            yield child
+            yield from _imported(child)
 
 
 def _import_graph(root: Path) -> "nx.DiGraph[str]":
-    """Which module loads which; a package's own file only where something is asked of it by name."""
+    """Which module needs which, at once or later (in functions, or by a name given to `import_module`); a
+    package's own file only where something is asked of it by name."""
     modules = _modules(root)
     graph: nx.DiGraph[str] = nx.DiGraph()
     for name, path in modules.items():
-        for node in _loaded_at_once(ast.parse(path.read_text(encoding="utf-8")).body):
+        text = path.read_text(encoding="utf-8")
+        by_name = "import_module" in text
+        for node in _imported(ast.parse(text)):
+            wanted: list[str] = []
             if isinstance(node, ast.Import):
                 wanted = [alias.name for alias in node.names]
-            else:
+            elif isinstance(node, ast.ImportFrom):
                 inside = [f"{node.module}.{alias.name}" for alias in node.names]
                 wanted = [full if full in modules else str(node.module) for full in inside]
+            elif by_name and isinstance(node, ast.Constant) and isinstance(node.value, str):
+                wanted = [node.value]
             graph.add_edges_from((name, module) for module in wanted if module in modules)
     return graph
 
 
-def _shortest_cycle(graph: "nx.DiGraph[str]") -> list[str]:
-    """The modules around a smallest cycle, the first one again at the end; empty where there is none."""
-    cycles = [
-        [start, *nx.shortest_path(graph, then, start)]
-        for group in nx.strongly_connected_components(graph)
-        for start in group
-        for then in graph.successors(start)
-        if then in group
-    ]
-    return min(cycles, key=lambda cycle: (len(cycle), cycle), default=[])
+def _shortest_circles(graph: "nx.DiGraph[str]") -> list[list[str]]:
+    """One smallest circle for each group of modules that need each other, its first module also last."""
+    circles = []
+    for group in nx.strongly_connected_components(graph):
+        found = [
+            [start, *nx.shortest_path(graph, then, start)]
+            for start in group
+            for then in graph.successors(start)
+            if then in group
+        ]
+        if found:
+            circles.append(min(found, key=lambda circle: (len(circle), circle)))
+    return sorted(circles)
+
+
+KNOWN_CIRCLES = {"finlab.allocation.allocation", "finlab.physics.coupled_plant"}
+"""Where circles are that still have to go, each by the first module of its shortest one; never add to it."""
 
 
 def test_modules_import_each_other_in_no_circle() -> None:
-    cycle = _shortest_cycle(_import_graph(ROOT))
-    assert not cycle, " -> ".join(cycle)
+    circles = [circle for circle in _shortest_circles(_import_graph(ROOT)) if circle[0] not in KNOWN_CIRCLES]
+    assert not circles, "\n".join(map(" -> ".join, circles))
 
 
-def test_a_circle_of_imports_is_found(tmp_path: Path) -> None:
+def test_circles_of_imports_are_found(tmp_path: Path) -> None:
     for name, text in {
         "finlab/__init__.py": "",
         "finlab/first.py": "from finlab import second\n",
         "finlab/second.py": "try:\n    import finlab.third\nexcept ImportError:\n    pass\n",
         "finlab/third.py": "from finlab.first import name\nfrom webapp import fourth\n",
-        "webapp/fourth.py": "def later():\n    import finlab.third\n",
+        "webapp/fourth.py": "if TYPE_CHECKING:\n    import finlab.third\nimport webapp.sixth\n",
+        "webapp/fifth.py": "def later():\n    import webapp.sixth\n",
+        "webapp/sixth.py": "HOME = 'webapp.fifth'\nimportlib.import_module(HOME)\n",
     }.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
-    cycle = _shortest_cycle(_import_graph(tmp_path))
-    assert cycle[0] == cycle[-1]
-    assert set(cycle) == {"finlab.first", "finlab.second", "finlab.third"} and len(cycle) == 4
+    assert _shortest_circles(_import_graph(tmp_path)) == [
+        ["finlab.first", "finlab.second", "finlab.third", "finlab.first"],
+        ["webapp.fifth", "webapp.sixth", "webapp.fifth"],
+    ]
 
 
 @pytest.mark.parametrize(
