@@ -45,9 +45,6 @@ METHODS: dict[str, tuple[str, str]] = {
     "qp": ("finlab.allocation.baselines.qp", "Qp"),
     "sqp": ("finlab.allocation.baselines.sqp", "Sqp"),
     "analytic": ("finlab.allocation.baselines.analytic", "Analytic"),
-    "multistart": ("finlab.allocation.baselines.multistart", "Multistart"),
-    "trf": ("finlab.allocation.baselines.scipy_solvers", "Trf"),
-    "slsqp": ("finlab.allocation.baselines.scipy_solvers", "Slsqp"),
     "ipopt": ("finlab.allocation.baselines.ipopt", "Ipopt"),
 }
 """Name -> module and class; modules are loaded only when their method is asked for."""
@@ -55,13 +52,14 @@ METHODS: dict[str, tuple[str, str]] = {
 GONE = {
     "learned": "is now called 'search'",
     "fast": "has gone; 'search' is exact on any fin and needs no network",
+    **dict.fromkeys(("trf", "slsqp", "multistart"), "has gone; the yardstick is 'ipopt'"),
 }
 """Earlier names -> what to say to those who ask for them."""
 LEARNED = ("mdn", "paper")
 """Methods that need a trained network; the others take only the normalization from a checkpoint."""
 
 
-Method = Literal["search", "mdn", "paper", "qp", "sqp", "analytic", "multistart", "trf", "slsqp", "ipopt"]
+Method = Literal["search", "mdn", "paper", "qp", "sqp", "analytic", "ipopt"]
 """The names again, for type checkers and editors."""
 
 

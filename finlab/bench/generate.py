@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finlab.allocation.baselines.multistart import Multistart
+from finlab.allocation.baselines.sqp import Sqp
 from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.arrays import AnyArray, Array
 from finlab.bench.problems import KINDS, Problems, Robot, Sequences, Targets, save_problems
@@ -41,7 +41,7 @@ YARDSTICKS = {
     "sigma": "standard deviation of the robot's wrenches under 4096 uniform commands, axis by axis, no axis "
     "of force or torque below 5 % of the largest one",
     "best_error": "inside: 0, since a command gives the wrench; else the least error of the answers of "
-    "methods search (closest wrench) and multistart, by the fins' own laws",
+    "methods search (closest wrench) and sqp, by the fins' own laws",
     "error_bound": "a plane beyond which no sum of the fins' forces reaches (convex hulls of what each fin "
     "can push; fins may rest wholly)",
     "power_bound": "the convex dual over the compiled fins, as exact as their tables: nearly always to a "
@@ -74,7 +74,7 @@ class Yardsticks:
     def __init__(self, layout: Layout, sigma: Array, seed: int) -> None:
         own = Normalization(np.zeros(6), sigma)
         self.layout, self.sigma, self.seed = layout, sigma, seed
-        self.search, self.starts = SearchAllocator(own), Multistart(own)
+        self.search, self.starts = SearchAllocator(own), Sqp(own)
         self.sets = planar_sets(self.search.pipeline.prepare(layout).planar)
         self.n_starts = STARTS if has_formulas(layout) else 2 * STARTS
 

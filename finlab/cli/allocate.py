@@ -30,7 +30,6 @@ def allocate(
     health: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=SHARE")] = (),
     stuck: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=DEG")] = (),
     running: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=A,F,DEG")] = (),
-    energy_tradeoff: Annotated[float, arg(metavar="W")] = 0.0,
     bound: bool = False,
     seed: Annotated[int, arg(metavar="N")] = 0,
     json: bool = False,
@@ -41,7 +40,7 @@ def allocate(
         layout: layout file, layout graph file, or the name of a shipped layout.
         wrench: target in the body frame [N, N m].
         failed: name of a fin that does not work.
-        method: search, mdn, paper, qp, sqp, analytic, multistart, trf, slsqp or ipopt.
+        method: search, mdn, paper, qp, sqp, analytic or ipopt.
         objective: what is kept least, power in watts (the default) or the paper's effort.
         checkpoint: trained checkpoint; the shipped one of the method by default.
         policy: for a wrench out of reach: closest, direction (same direction, scaled down) or priority.
@@ -50,8 +49,6 @@ def allocate(
         health: a weak fin: share that is left of its largest amplitude and frequency, such as bow=0.5.
         stuck: a fin that no longer turns: the zero direction at which it stays [deg].
         running: a fin that no longer listens: the command that it keeps [rad, Hz, deg].
-        energy_tradeoff: with objective effort: give up some of the wrench for it, the least
-            err_norm^2 + W J_en; 0 delivers the wrench whole.
         bound: tell as well what no answer can cost less than, by the objective; effort may take seconds.
         seed: same target, layout and seed, same answer.
         json: print one JSON object instead of a table.
@@ -62,9 +59,7 @@ def allocate(
     from finlab.deploy.record import allocation_record
 
     robot = open_robot(layout)
-    options: dict[str, Any] = {"energy_tradeoff": energy_tradeoff} if energy_tradeoff else {}
-    if objective is not None:
-        options["objective"] = objective
+    options: dict[str, Any] = {} if objective is None else {"objective": objective}
     allocator = load_allocator(method, checkpoint=checkpoint, **options)
     answer = policy_from(policy, axis_weights, priority)
     damage = health_from(health, stuck, running)

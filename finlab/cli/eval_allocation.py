@@ -47,7 +47,7 @@ def wrench(
     Args:
         layout: a layout file, graph file or shipped name in place of a split: one case, of that many targets,
             with errors over the robot's own wrenches.
-        methods: names with commas between: search, mdn, paper, qp, sqp, analytic, multistart, trf, slsqp,
+        methods: names with commas between: search, mdn, paper, qp, sqp, analytic,
             ipopt; by default search and paper, on LAYOUT all that are installed. A number of starts may
             follow the last three, as in ipopt-32, an objective the others, as in search-effort.
         single: solve only the first N targets of each layout, one call each, and time the calls.
@@ -207,7 +207,7 @@ def temperature(
 
 
 def latency(
-    methods: Names = "search,mdn,paper,analytic,qp,sqp,multistart,trf,slsqp",
+    methods: Names = "search,mdn,paper,analytic,qp,sqp",
     fins: Count = 4,
     calls: Count = 200,
     budget: Annotated[float, arg(metavar="SECONDS")] = 20.0,
@@ -264,7 +264,7 @@ def fuzz(
     robots: Count = 50,
     targets: Count = 60,
     single: Count = 6,
-    methods: Names = "search,mdn,paper,qp,sqp,analytic,multistart,trf,slsqp",
+    methods: Names = "search,mdn,paper,qp,sqp,analytic",
     seed: Count = 0,
     first: Count = 0,
     run: Annotated[MethodRun, arg(name="")] = METHODS,

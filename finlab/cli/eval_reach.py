@@ -29,7 +29,7 @@ def unreachable(
 
 def beyond(
     cases: Annotated[Cases, arg(name="")] = BOUNDARY,
-    methods: Names = "search,mdn,analytic,sqp,multistart",
+    methods: Names = "search,mdn,analytic,sqp",
     run: Annotated[MethodRun, arg(name="")] = METHODS,
 ) -> None:
     """Ask for the largest wrench of a direction, and for more; what is missed beyond the least possible.

@@ -36,7 +36,7 @@ def steadiness(
 
 def sequences(
     layouts: Names = "A,hexa,restricted",
-    methods: Names = "search,mdn,analytic,sqp,multistart",
+    methods: Names = "search,mdn,analytic,sqp",
     paths: Count = 2,
     ticks: Count = 300,
     noise: Annotated[float, arg(metavar="SHARE")] = 0.1,

@@ -49,7 +49,7 @@ def simulate(
         announced: whether the allocator is told of what happens to fins.
         monitor: let a FaultMonitor watch the robot and tell the allocator what it finds.
         servo_feedback: let the servos report their motion to the monitor.
-        method: search, mdn, paper, qp, sqp, analytic, multistart, trf, slsqp, ipopt or on-board.
+        method: search, mdn, paper, qp, sqp, analytic, ipopt or on-board.
         objective: what the method keeps least: power in watts, or effort, the paper's J_en.
         duration: time for a shipped trajectory.
         plant: what the fins really do: mean (the fin law), ripple (within the flapping cycle), flexible (fins

@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 
 from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, import_casadi
 from finlab.allocation.baselines.plant_in_casadi import plant_formulas
-from finlab.allocation.weighted_descent import DescentOptions, descend
+from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
 from finlab.arrays import Array
 from finlab.layout import Layout, layout_effectiveness
 from finlab.physics import PlanarLaw, Plant, make_law, plant_of
@@ -26,7 +26,7 @@ EXACT = 1e-5
 """Normalized error up to which an end counts as tracking exactly."""
 SAME_DIRECTION = 1e-6
 """Singular values of the fins' effectiveness below this share of the largest count as no authority."""
-DESCENT = DescentOptions(n_steps=40)
+DESCENT_STEPS = 40
 """From a random command onto the target."""
 
 Solve = Callable[[Array, Array], Array]
@@ -59,7 +59,8 @@ class CheapestCommands:
         starts = plant.sample(np.random.default_rng(seed), (n_starts,))
         solve = self._solver(layout)
         if not has_formulas(layout):
-            starts = descend(plant, starts, np.tile(target, (n_starts, 1)), self.sigma, DESCENT).command
+            problem = CommandProblem.of(plant, self.sigma)
+            starts = refine(problem, target[None] / self.sigma, starts, DESCENT_STEPS).command
         command = np.array([solve(target / self.sigma, start) for start in starts])
         command = plant.feasible(command[np.isfinite(command).all((1, 2))].reshape(-1, plant.n_fins, 3))
         error = np.linalg.norm((plant.wrench(command) - target) / self.sigma, axis=-1)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.baselines.single_target import SingleTarget
+from finlab.allocation.baselines.ipopt import Ipopt
 from finlab.allocation.methods import LEARNED, load_allocator
 from finlab.errors import AllocationError
 from finlab.evaluation.ahead import AnalyticAhead
@@ -16,9 +16,9 @@ from finlab.evaluation.on_board import OnBoard
 from finlab.inference.checkpoint import read_checkpoint, read_normalization, resolve_checkpoint
 from finlab.physics.objective import Name
 
-SLOW = ("trf", "slsqp", "ipopt")
+SLOW = ("ipopt",)
 """Methods that take a tenth of a second per target, each from several starts; they run on a subsample."""
-QUICK = ("search", "mdn", "paper", "qp", "sqp", "analytic", "multistart")
+QUICK = ("search", "mdn", "paper", "qp", "sqp", "analytic")
 """Methods that run on every target."""
 OWN = (OnBoard, AnalyticAhead)
 """Methods that are for comparison alone."""
@@ -86,7 +86,7 @@ def load_method_spec(
                 f"methods: a number of starts, from 1, goes with {', '.join(SLOW)} only, got {name!r}"
             )
         # Each start has the time that it has in the method's default.
-        limit = SingleTarget.time_limit_s * max(1.0, starts / SingleTarget.n_starts)
+        limit = Ipopt.time_limit_s * max(1.0, starts / Ipopt.n_starts)
         options = {"n_starts": starts, "time_limit_s": limit}
     allocator = load_allocator(method, checkpoint=checkpoint, **options)
     chooses = objective is not None and "objective" in allocator.option_names()

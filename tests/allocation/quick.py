@@ -6,11 +6,8 @@ from finlab.allocation import Allocator, load_allocator
 
 QUICK: dict[str, dict[str, Any]] = {
     "paper": {"n_candidates": 4, "n_steps": 2},
-    "trf": {"n_starts": 1, "max_evaluations": 10},
-    "slsqp": {"n_starts": 1, "max_iterations": 10},
     "ipopt": {"n_starts": 1},
     "sqp": {"n_starts": 1, "n_steps": 5},
-    "multistart": {"n_candidates": 2, "n_steps": 5},
 }
 
 

@@ -152,7 +152,7 @@ def test_notebooks_show_the_table_of_the_command_line(search: Allocator) -> None
 
 def test_a_copy_explores_like_the_original(search: Allocator) -> None:
     layout = load_layout("A")
-    few = search.with_settings(objective="effort", n_refined=8, energy_tradeoff=1e-3)
+    few = search.with_settings(objective="effort", n_refined=8)
     for allocator, policy, wrench in (
         (search, "closest", SURGE),
         (few, "closest", SURGE),

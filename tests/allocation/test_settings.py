@@ -18,18 +18,15 @@ from finlab.physics.objective import Name
 
 SURGE = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
 OTHER: dict[str, dict[str, Any]] = {
-    "search": {"objective": "effort", "n_refined": 2, "refine_steps": 3, "energy_tradeoff": 0.1},
+    "search": {"objective": "effort", "n_refined": 2, "refine_steps": 3},
     "mdn": {"objective": "effort", "n_refined": 2},
     "paper": {"n_candidates": 4, "n_steps": 3},
-    "multistart": {"n_candidates": 2, "n_steps": 2, "energy_tradeoff": 0.1},
-    "trf": {"n_starts": 1},
-    "slsqp": {"n_starts": 1},
     "ipopt": {"n_starts": 1},
     "qp": {"regularization": 10.0},
     "sqp": {"objective": "effort", "n_steps": 1},
     "analytic": {"rcond": 0.5},
 }
-SAME_ANSWER = ("analytic", "trf", "slsqp", "ipopt")
+SAME_ANSWER = ("analytic", "ipopt")
 """Methods that may find the same answer with those settings."""
 
 pytestmark = pytest.mark.skipif(
@@ -85,8 +82,6 @@ def test_unknown_settings_are_refused(method: str) -> None:
         ({"objective": "speed"}, "objective: expected 'power' or 'effort', got 'speed'"),
         ({"copper_loss": -1.0}, "copper_loss: expected watts"),
         ({"copper_loss": float("nan")}, "copper_loss: expected watts"),
-        ({"energy_tradeoff": 0.1}, "take objective 'effort', or leave energy_tradeoff at 0"),
-        ({"objective": "effort", "energy_tradeoff": -0.1}, "energy_tradeoff: expected a number from 0"),
     ],
 )
 def test_impossible_settings_are_refused(wrong: dict[str, Any], message: str) -> None:

@@ -71,7 +71,7 @@ def test_mode_is_picked_in_plot_and_table(page: Any) -> None:
 
 def test_method_that_fails_says_so_and_the_page_goes_on(page: Any) -> None:
     page.tab("Candidates")
-    page.choose("Method", "slsqp")
+    page.choose("Method", "ipopt")
     page.until(lambda: any("out of order" in note for note in page.notes()))
     page.key("Control+z")
     page.until(lambda: page.session.state.method == "search")

@@ -25,7 +25,7 @@ def test_every_method_on_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert {row["split"] for row in rows} == {"layout pair"} and "layout pair" in capsys.readouterr().out
     by_name = {row["method"]: row for row in rows}
     assert by_name["search"]["err_norm_max"] < 1e-4 and by_name["search"]["n"] == 4
-    assert by_name["trf"]["n"] == 1
+    assert by_name["ipopt"]["n"] == 1
     assert {path.name for path in records.iterdir()} == {f"wrench-layout-pair-{n}.npz" for n in by_name}
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from finlab.allocation.weighted_descent import DescentOptions, descend
+from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
 from finlab.errors import DataError
 from finlab.evaluation.splits import NEAR_ANGLE, NEAR_POSITION, SPLITS, Case, make_split
 from finlab.layout import Limits
@@ -157,8 +157,9 @@ def test_targets_are_reachable(split: str) -> None:
         plant = plant_of(case.layout.without(case.failed) if case.failed else case.layout)
         start = plant.sample(rng, (30 * len(case.targets),))
         unit = sigma if case.sigma is None else case.sigma
-        end = descend(plant, start, np.repeat(case.targets, 30, axis=0), unit, DescentOptions(n_steps=60))
-        assert np.sqrt(end.objective.reshape(len(case.targets), -1).min(axis=1)).max() < 0.02
+        wanted = np.repeat(case.targets / unit, 30, axis=0)
+        end = refine(CommandProblem.of(plant, unit), wanted, start, 60)
+        assert end.error.reshape(len(case.targets), -1).min(axis=1).max() < 0.02
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.baselines.multistart import Multistart
+from finlab.allocation.baselines.sqp import Sqp
 from finlab.allocation.judging import costs
 from finlab.allocation.methods import METHODS
 from finlab.allocation.policy import Policy
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 class StandIn(Allocator):
-    """Single starts of `multistart` as candidates, noise around them as samples."""
+    """Two starts of `sqp` as candidates, noise around them as samples."""
 
     name = "mdn"
 
@@ -37,7 +37,7 @@ class StandIn(Allocator):
         """Settings as method `mdn` has them; the temperature widens the samples."""
         self.normalization = normalization
         self.n_candidates, self.temperature, self.gamma = n_candidates, temperature, gamma
-        self._inner = Multistart(NORMALIZATION, n_candidates=2)
+        self._inner = Sqp(NORMALIZATION, n_starts=2)
 
     def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         if len(targets) > 1:  # a policy asks for many at once, and for commands alone
@@ -68,9 +68,9 @@ def _ranked(layout: Layout, command: Array, target: Array, component: NDArray[np
 
 
 def load_stand_in(method: str = "search", *, checkpoint: Any = None) -> Allocator:
-    """As `load_allocator`: `search` and `mdn` are the stand-in, `slsqp` fails, the rest is `multistart`."""
-    if method == "slsqp":
-        raise AllocationError("slsqp is out of order in this test")
+    """As `load_allocator`: `search` and `mdn` are the stand-in, `ipopt` fails, the rest is `sqp`."""
+    if method == "ipopt":
+        raise AllocationError("ipopt is out of order in this test")
     if method not in METHODS:
         raise AllocationError(f"method: expected one of {', '.join(METHODS)}, got {method!r}")
-    return StandIn() if method in ("search", "mdn") else Multistart(NORMALIZATION)
+    return StandIn() if method in ("search", "mdn") else Sqp(NORMALIZATION)

@@ -46,7 +46,7 @@ def test_all_methods_answer_one_after_the_other() -> None:
 
 def test_a_method_that_fails_keeps_nobody_else_waiting() -> None:
     def load(method: str = "search", checkpoint: object = None) -> object:
-        return load_stand_in("slsqp" if method == "paper" else method)
+        return load_stand_in("ipopt" if method == "paper" else method)
 
     worker, done = Worker(), threading.Event()
     context = page_of(worker, solver=Solver(load=load), changed=lambda: comparison.running or done.set())
@@ -54,8 +54,8 @@ def test_a_method_that_fails_keeps_nobody_else_waiting() -> None:
     comparison.start(State(UCAT, target=PRESETS["Turn"]))
     assert done.wait(60)
     worker.stop()
-    assert comparison.answers["paper"] == "slsqp is out of order in this test"
-    assert isinstance(comparison.answers["multistart"], Allocation)
+    assert comparison.answers["paper"] == "ipopt is out of order in this test"
+    assert isinstance(comparison.answers["sqp"], Allocation)
 
 
 def test_the_table_tells_what_is_kept_least() -> None:
@@ -100,8 +100,8 @@ def test_what_a_page_tries_out_stays_with_its_own_answers() -> None:
     assert few.options["n_candidates"] == 8 and few.options["temperature"] == 1.5
     assert solver.loaded("mdn", "power") is loaded and loaded.options["n_candidates"] == 64
     assert solver.allocator(replace(state, n_candidates=None, temperature=None)) is loaded
-    assert solver.allocator(State(UCAT, target=target, method="multistart", n_candidates=8)).options == (
-        solver.loaded("multistart", "power").options
+    assert solver.allocator(State(UCAT, target=target, method="sqp", n_candidates=8)).options == (
+        solver.loaded("sqp", "power").options
     )
 
 

@@ -125,10 +125,10 @@ def test_a_robot_that_no_fins_can_steer_is_told_with_all_its_fins(swimming: Swim
 def test_bad_plans_and_methods_out_of_order(swimming: Swimming) -> None:
     settings = SwimSettings(method="qp", rival="qp")
     assert settings.plan(State(UCAT), None).methods == ("qp",), "nobody swims beside himself"
-    for key, wrong in (("path", "moon"), ("method", "slsqp"), ("rival", "slsqp"), ("plant", "jelly")):
+    for key, wrong in (("path", "moon"), ("method", "ipopt"), ("rival", "ipopt"), ("plant", "jelly")):
         with pytest.raises(FinlabError, match=wrong):
             settings.with_value(key, wrong)
-    swimming._solver = Solver(load=lambda *_, **__: load_stand_in("slsqp"))
+    swimming._solver = Solver(load=lambda *_, **__: load_stand_in("ipopt"))
     swimming.start(Plan(UCAT, (), make_trajectory("circle"), ("qp",)))
     until(lambda: bool(swimming.notes))  # type: ignore[attr-defined]
     assert not swimming.active

@@ -31,7 +31,7 @@ GAMMA_RANGE = (0.0, 1.0)
 """Weights gamma of the effort in the ranking."""
 STRENGTH_RANGE = (0.05, 1.0)
 """Shares that may be left of a weak fin's largest amplitude and frequency."""
-COMPARED = ("search", "mdn", "paper", "analytic", "qp", "sqp", "multistart")
+COMPARED = ("search", "mdn", "paper", "analytic", "qp", "sqp")
 """Methods that answer quickly enough to be compared while one waits."""
 OBJECTIVES: tuple[str, ...] = get_args(Objective)
 """What answers may keep least."""

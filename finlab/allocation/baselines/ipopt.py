@@ -13,9 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finlab.allocation.baselines.model_based import CACHE_SIZE
+from finlab.allocation.baselines.model_based import CACHE_SIZE, TimeLimit, TimeLimited
 from finlab.allocation.baselines.plant_in_casadi import plant_formulas, plant_in_casadi
-from finlab.allocation.baselines.single_target import Problem, SingleTarget
 from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.physics import PlanarLaw, Plant, make_law
@@ -48,31 +47,43 @@ class Formulas(NamedTuple):
 
 
 @dataclass(eq=False, repr=False, kw_only=True)
-class Ipopt(SingleTarget):
+class Ipopt(TimeLimited):
     """IPOPT on `err_norm^2 + cost` within the limits, exact derivatives by CasADi or the plant.
 
-    The program is built once per layout with the target as its parameter. Of the ends, the lowest objective
-    wins. After the time limit no start begins; each may take half as long.
+    The program is built once per layout with the target as its parameter. It is run from the pseudo-inverse's
+    answer, which no dead zone holds, and from random starts; of the ends, the lowest objective wins. After
+    the time limit no start begins; each may take half as long.
 
     Raises:
         AllocationError: CasADi is not installed.
     """
 
     name = "ipopt"
+    n_starts: int = 8
+    """Uniform random starts per target, beside the pseudo-inverse's answer."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self._casadi = import_casadi()
         self._solver = lru_cache(CACHE_SIZE)(self._build)
 
-    def _minimize(self, problem: Problem, start: Array) -> Array:
-        solver = self._solver(problem.plant)[0]
-        answer = solver(x0=problem.command(start).ravel(), p=problem.target, **self._bounds(problem))
-        return problem.position(np.array(answer["x"], np.float64).reshape(-1, 3))
+    def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
+        random = plant.sample(np.random.default_rng(seed), (self.n_starts,))
+        first = self._inverse(plant).command(targets)
+        result = np.empty((len(targets), plant.n_fins, 3))
+        for i, target in enumerate(targets):
+            limit = TimeLimit(self.time_limit_s)
+            ends = [self._end(plant, target, first[i])]
+            ends += [self._end(plant, target, start) for start in random if not limit.over]
+            result[i] = ends[self._total(plant, np.array(ends), target).argmin()]
+        return result
 
-    @staticmethod
-    def _bounds(problem: Problem) -> dict[str, Array]:
-        return {"lbx": problem.plant.lower.ravel(), "ubx": problem.plant.upper.ravel()}
+    def _end(self, plant: Plant, target: Array, start: Array) -> Array:
+        """The command (n, 3) IPOPT ends at, or the start itself where it breaks down."""
+        limits = {"lbx": plant.lower.ravel(), "ubx": plant.upper.ravel()}
+        answer = self._solver(plant)[0](x0=start.ravel(), p=target, **limits)
+        end = np.array(answer["x"], np.float64).reshape(-1, 3)
+        return plant.feasible(end) if np.isfinite(end).all() else start
 
     def _build(self, plant: Plant) -> tuple[Any, Formulas]:
         """The solver of one layout, and the formulas, which must live as long; its variables are the commands

@@ -32,7 +32,7 @@ class Sqp(TimeLimited):
     """Sequential quadratic programming after the paper's, all targets of a layout stepped together.
 
     The paper's solves for the normalized error alone. Here steps first lower J, the squared error and the
-    cost as `multistart` weighs them, which counts more at first, then the error alone: each minimizes
+    cost, which counts more at first, then the error alone: each minimizes
     `||r + J d||^2` plus a convex quadratic for the cost plus `regularization ||d||^2` within the limits, over
     commands as positions between their limits. Starts are the pseudo-inverse's answer, whose fins give their
     forces by the cheapest commands, the middle of the limits and random commands; of the ends that meet the

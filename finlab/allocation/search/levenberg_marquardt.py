@@ -6,14 +6,16 @@ error that the compiled fins' tables leave. The paper's method uses it with its 
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from finlab.arrays import AnyArray
+from finlab.arrays import AnyArray, Array
 from finlab.forces.small_systems import solve
 from finlab.inference.surrogate import FinForces
+from finlab.least_squares import Damping, levenberg_marquardt
+from finlab.physics.plant import Plant
 
 AT_LIMIT = 1e-9
 """How near [rad, Hz, rad] to a limit a command counts as being at it."""
@@ -53,10 +55,11 @@ class CommandProblem:
     full_turn: NDArray[np.bool_]
     """True (n,) where the zero direction may turn a full circle."""
 
-    @property
-    def n_fins(self) -> int:
-        """How many fins there are."""
-        return len(self.lower)
+    @classmethod
+    def of(cls, plant: Plant, sigma: Array) -> Self:
+        """A robot as its fins' own laws say, wrenches normalized by `sigma` (6,)."""
+        parts, columns = plant.parts
+        return cls(parts, columns / sigma, plant.lower, plant.upper, plant.full_turn)
 
     @cached_property
     def width(self) -> AnyArray:
@@ -95,15 +98,6 @@ class CommandProblem:
         columns = self.columns.reshape(-1, 6)
         return self.fin.force(command).reshape(len(command), len(columns)) @ columns
 
-    def linearize(self, command: AnyArray) -> tuple[AnyArray, AnyArray]:
-        """Normalized wrenches (R, 6) of commands (R, n, 3) and their derivatives (R, 6, 3 n)."""
-        rows, n, _ = command.shape
-        force, slopes = self.fin.force_and_slopes(command)
-        columns = self.columns.reshape(-1, 6)
-        wrench = force.reshape(rows, len(columns)) @ columns
-        jacobian: AnyArray = np.matmul(slopes, self.columns).reshape(rows, 3 * n, 6)
-        return wrench, jacobian.swapaxes(1, 2)
-
     def feasible(self, command: AnyArray) -> AnyArray:
         """Commands (..., n, 3) inside the limits, zero directions wrapped first; the type is kept."""
         return self.make_feasible(command.copy())
@@ -137,8 +131,7 @@ def refine(
     """Reduce the tracking error of commands (R, n, 3) towards normalized targets (R, 6).
 
     Each step is the smallest change, in units of the limit ranges, that cancels the error to first
-    order; commands at a limit that would leave it are held. A step that makes a row worse is undone
-    and that row's damping raised.
+    order; commands at a limit that would leave it are held.
 
     Args:
         problem: the layout.
@@ -147,28 +140,20 @@ def refine(
         steps: number of steps.
         damping: first damping of each row.
     """
-    damping_of = np.full(len(command), damping)
-    # Where nothing better is found this is the answer: it must not lie outside by a turn or a rounding error.
-    command = problem.feasible(command)
-    best = _evaluated(problem, target, command, None if steps else _NO_SLOPES)
-    for step in range(steps):
+
+    def moved(at: _Evaluated, damping: AnyArray, last: bool) -> _Evaluated:
         # (R, n, 3 commands, 6): change of the normalized wrench per unit of each limit range.
-        jacobian = np.matmul(best.slopes, problem.columns)
+        jacobian = np.matmul(at.slopes, problem.columns)
         jacobian *= problem.width[..., None]
-        moved = _step(problem, best, jacobian, damping_of)
-        moved *= problem.width
-        moved += best.command
-        # The last commands are only evaluated: no step follows.
-        last = step == steps - 1
-        new = _evaluated(problem, target, problem.make_feasible(moved), best.slopes if last else None)
-        worse = ~(new.error <= best.error)  # an error that is not a number is no improvement
-        if worse.any():
-            rows = [worse.reshape(-1, *(1,) * (part.ndim - 1)) for part in new]
-            new = _Evaluated(*map(np.where, rows, best, new))
-        if not last:
-            damping_of = np.where(worse, damping_of * 30.0 + 1e-4, damping_of * 0.3)
-        best = new
-    return Refined(best.command, best.wrench, np.sqrt(best.error))
+        there = _step(problem, at, jacobian, damping)
+        there *= problem.width
+        there += at.command
+        return _evaluated(problem, target, problem.make_feasible(there), at.slopes if last else None)
+
+    # Where nothing better is found this is the answer: it must not lie outside by a turn or a rounding error.
+    start = _evaluated(problem, target, problem.feasible(command), None if steps else _NO_SLOPES)
+    best = levenberg_marquardt(start, moved, steps, Damping(damping))
+    return Refined(best.command, best.wrench, np.sqrt(best.cost))
 
 
 class _Evaluated(NamedTuple):
@@ -180,7 +165,7 @@ class _Evaluated(NamedTuple):
     """(R, 6)."""
     residual: AnyArray
     """Target minus wrench (R, 6)."""
-    error: AnyArray
+    cost: AnyArray
     """Its squared size (R,)."""
     slopes: AnyArray
     """Derivatives of each fin's force by each of its commands (R, n, 3 commands, 3)."""

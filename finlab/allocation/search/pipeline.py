@@ -37,15 +37,12 @@ from finlab.allocation.search.refined_candidates import (
     refine_missed,
 )
 from finlab.allocation.search.settings import Settings
-from finlab.allocation.search.weighted_sum import minimize_weighted_sum
 from finlab.arrays import Array
-from finlab.errors import AllocationError
 from finlab.forces import force_space
 from finlab.forces.branch_and_bound import bound_by_branching
 from finlab.forces.compiled_fins import CompiledFins
 from finlab.forces.cost_bound import cost_bound
 from finlab.layout import Layout
-from finlab.physics.energy import EnergyMeter
 from finlab.physics.fin_model import file_stamps
 from finlab.physics.objective import Objective
 
@@ -100,7 +97,7 @@ class Pipeline:
     ) -> None:
         """Make it for wrenches normalized by `std` (6,), with fins that are `compiled` already."""
         self.std, self.objective = std, objective
-        self.settings = self._checked(settings)
+        self.settings = settings
         self._prepared = lru_cache(maxsize=128)(lambda layout, _: prepare(layout, std, objective, compiled))
 
     def prepare(self, layout: Layout) -> Prepared:
@@ -110,16 +107,8 @@ class Pipeline:
     def with_settings(self, settings: Settings) -> Pipeline:
         """The same layouts prepared, with other settings."""
         other = copy(self)
-        other.settings = self._checked(settings)
+        other.settings = settings
         return other
-
-    def _checked(self, settings: Settings) -> Settings:
-        if settings.energy_tradeoff > 0.0 and (self.objective.name != "effort"):
-            raise AllocationError(
-                "energy_tradeoff: the weighted sum is one of error and effort, got objective "
-                f"{self.objective.name!r}; take objective 'effort', or leave energy_tradeoff at 0"
-            )
-        return settings
 
     def solve(
         self,
@@ -147,12 +136,8 @@ class Pipeline:
         many = prepared.plant.n_fins >= SEEDS.many
         start = _Start(seeds, many and self.settings.subsets and not self.objective.convex, fallback)
         if previous is None:
-            candidates = self._descend(prepared, target, start)
-            return self._trade_error_for_energy(prepared, target, candidates)
-        candidates, near = self._descend_from_previous(prepared, target, start, previous)
-        if self.settings.energy_tradeoff > 0.0:
-            near = near or within_rates(prepared, previous, self.settings.period_s)
-            candidates = self._trade_error_for_energy(near, target, candidates)
+            return self._descend(prepared, target, start)
+        candidates = self._descend_from_previous(prepared, target, start, previous)
         # Arcs that pass the seam are brought back inside the fin's own limits.
         return candidates._replace(command=prepared.commands.feasible(candidates.command))
 
@@ -197,9 +182,9 @@ class Pipeline:
 
     def _descend_from_previous(
         self, prepared: Prepared, target: Array, start: _Start, previous: Array
-    ) -> tuple[RefinedCandidates, Prepared | None]:
+    ) -> RefinedCandidates:
         """Answers within what the servos allow after a previous command (n, 3): mostly the cheapest one of
-        all is among them. With them the layout within these rates, where it was needed.
+        all is among them.
 
         Where cost grows faster than force there is but one valley, and the search goes on from where the
         robot is. Otherwise the way that it moves now is kept, fins at rest turn to where they would be
@@ -210,13 +195,13 @@ class Pipeline:
             start = start._replace(seeds=force)
             free = self._descend(prepared, target, start)
             if is_within_rates(prepared, previous, free.command[0, 0], period):
-                return free, None
+                return free
             near = within_rates(prepared, previous, period)
-            return self._descend(near, target, start, keep_mode=True), near
+            return self._descend(near, target, start, keep_mode=True)
         free = self._descend(prepared, target, start)
         if is_within_rates(prepared, previous, free.command[0, 0], period):
             # The first seed is how the robot moves now, which was not tried.
-            return free._replace(origin=np.where(free.origin < 0, -1, free.origin + 1)), None
+            return free._replace(origin=np.where(free.origin < 0, -1, free.origin + 1))
         near = within_rates(prepared, previous, period, free.command[0, 0, :, 2])
         kept = force if start.seeds.ndim == 4 else np.hypot(force[:, :, 0], force[:, :, 1])
         start = start._replace(seeds=np.concatenate([kept, start.seeds], axis=1))
@@ -225,25 +210,8 @@ class Pipeline:
             towards, fresh = near.commands.feasible(free.command[:, :1]), np.full((1, 1), -1)
             other = refine_candidates(near, target, towards, fresh, SEARCH.leaving_lm_steps)
             if other.error[0, 0] <= max(exact_error(prepared), found.error[0, 0]):
-                return found.with_first(other), near
-        return found, near
-
-    def _trade_error_for_energy(
-        self, prepared: Prepared, target: Array, candidates: RefinedCandidates
-    ) -> RefinedCandidates:
-        """Trade error for effort, where the settings ask for the weighted sum."""
-        weight, effort = self.settings.energy_tradeoff, prepared.cost
-        if weight == 0.0 or not isinstance(effort, EnergyMeter):
-            return candidates
-        rows, p, n, _ = candidates.command.shape
-        start = prepared.commands.feasible(candidates.command.reshape(-1, n, 3))
-        found, energy = minimize_weighted_sum(
-            prepared.commands, np.repeat(target, p, axis=0), start, effort, weight
-        )
-        total = (found.error**2 + weight * energy).reshape(rows, p)
-        order = total.argsort(axis=1) + np.arange(0, rows * p, p)[:, None]
-        flat = (*found, energy, candidates.origin.reshape(-1))
-        return RefinedCandidates._make(values.take(order, axis=0) for values in flat)
+                return found.with_first(other)
+        return found
 
     def _descend(
         self, prepared: Prepared, target: Array, start: _Start, keep_mode: bool = False

@@ -74,7 +74,6 @@ def prepare(
         DataError: a fin's force table cannot be read.
     """
     plant = plant_of(layout)
-    parts, columns = plant.parts
     fins = layout_envelopes(layout, objective, compiled)
     planar = planar_problem(layout, fins, std, objective)
     seeds = fins.maximum[None]
@@ -87,7 +86,7 @@ def prepare(
     return Prepared(
         plant,
         planar,
-        CommandProblem(parts, columns / std, plant.lower, plant.upper, plant.full_turn),
+        CommandProblem.of(plant, std),
         seeds,
         objective.meter(plant),
         arcs_to_search(fins, len(seeds)),

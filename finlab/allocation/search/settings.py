@@ -6,8 +6,6 @@ A test holds the typed options against the settings.
 from dataclasses import dataclass
 from typing import TypedDict
 
-import numpy as np
-
 from finlab.errors import AllocationError
 from finlab.physics.energy import EnergyWeights
 from finlab.physics.objective import Name
@@ -29,13 +27,8 @@ class Settings:
     also near the best that any method began with."""
     period_s: float = 0.1
     """Time between ticks [s], by which the previous command is taken to be old."""
-    energy_tradeoff: float = 0.0
-    """w of the weighted sum `err_norm^2 + w J_en` to minimize, with objective `effort`; 0: the least cost
-    among exact answers."""
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.energy_tradeoff < np.inf:
-            raise AllocationError(f"energy_tradeoff: expected a number from 0, got {self.energy_tradeoff}")
         if (
             self.n_refined < 1
             or self.refine_steps < 0
@@ -59,4 +52,3 @@ class SearchOptions(TypedDict, total=False):
     refine_steps: int
     subsets: bool
     period_s: float
-    energy_tradeoff: float

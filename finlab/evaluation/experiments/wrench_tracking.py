@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.baselines.single_target import SingleTarget
+from finlab.allocation.baselines.ipopt import Ipopt
 from finlab.arrays import Array
 from finlab.evaluation.method_specs import method_and_starts
 from finlab.evaluation.paper_figures import paper_wrench_rows
@@ -112,7 +112,7 @@ def interval_rows(records: dict[str, Records], split: str) -> list[dict[str, Any
 def energy_comparison(records: dict[str, Records]) -> list[dict[str, Any]]:
     """Energies of all methods over those of IPOPT, from the most starts that took part; none without it."""
     parsed = {name: method_and_starts(name) for name in records}
-    usual = SingleTarget.n_starts
+    usual = Ipopt.n_starts
     starts = {name: count or usual for name, (method, count) in parsed.items() if method == "ipopt"}
     if not starts or len(records) == 1:
         return []

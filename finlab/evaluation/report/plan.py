@@ -28,17 +28,17 @@ from finlab.evaluation.report.jobs import Job
 from finlab.evaluation.report.sizes import RERUN, Settings, Sizes
 from finlab.evaluation.splits import GEOMETRIES, SPLITS
 
-COST_METHODS = ("search", "mdn", "analytic", "sqp", "multistart")
+COST_METHODS = ("search", "mdn", "analytic", "sqp")
 """Methods whose costs are compared with the best of many starts."""
 N_STARTS = 32
 """Of that yardstick."""
 COST_SETS = tuple(name for name in cost_sets("all") if name not in GEOMETRIES)
 """Sets of cases on which costs are compared: all but those whose geometry alone is hard."""
-LATENCY_METHODS = ("search", "mdn", "analytic", "qp", "sqp", "multistart", "paper", "trf", "slsqp", "ipopt")
+LATENCY_METHODS = ("search", "mdn", "analytic", "qp", "sqp", "paper", "ipopt")
 """Methods that are timed side by side."""
 N_CANDIDATES = 64
 """Candidates of the ablation, as in the paper."""
-SHARES = {"paper": 50, "multistart": 10, "sqp": 5}
+SHARES = {"paper": 50, "sqp": 5}
 """Method -> it answers one target in so many of a split: those that take milliseconds per target.
 Intervals are by layout, and all layouts are kept."""
 SCATTER_FINS, SCATTER_TARGETS = 4, 3
@@ -51,7 +51,7 @@ SWIMMERS = {
 """Experiment in closed loop -> methods that swim."""
 DAY_METHODS = "search,analytic,on-board"
 """Methods that swim the hard days."""
-SLOW_DAY_METHODS = ("sqp", "multistart", "paper")
+SLOW_DAY_METHODS = ("sqp", "paper")
 """Those that swim them in a section of their own, as they take hours."""
 SECTIONS = {
     "wrench": ("wrench", "rerun"),

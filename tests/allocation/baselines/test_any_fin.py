@@ -11,19 +11,16 @@ import pytest
 
 from finlab.allocation import Allocator, load_allocator
 from finlab.allocation.baselines.ipopt import Ipopt
-from finlab.allocation.baselines.multistart import Multistart
-from finlab.allocation.baselines.single_target import Problem
+from finlab.allocation.baselines.sqp import Sqp
 from finlab.allocation.command_cost import command_cost
 from finlab.errors import AllocationError
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.physics import make_law, plant_of
 from finlab.physics.objective import Name, Objective
 
-METHODS = ("analytic", "qp", "sqp", "multistart", "trf", "slsqp", "ipopt")
+METHODS = ("analytic", "qp", "sqp", "ipopt")
 EXACT = METHODS[2:]
-FEW_STARTS: dict[str, dict[str, Any]] = {
-    name: {"n_starts": 2, "time_limit_s": 1.5} for name in ("trf", "slsqp", "ipopt")
-}
+FEW_STARTS: dict[str, dict[str, Any]] = {"ipopt": {"n_starts": 2, "time_limit_s": 1.5}}
 SOFT = FinModelSpec("soft", (("d", 0.12), ("e", 0.15), ("p", 1.5), ("phi_e", 0.4)))
 FORMULAS = {"drag": FinModelSpec("drag"), "lighthill": FinModelSpec("lighthill"), "soft": SOFT}
 AMPLITUDE, FREQUENCY = np.linspace(0.0, 0.62, 9), np.linspace(0.0, 2.2, 9)
@@ -150,7 +147,7 @@ def test_every_method_on_every_fin(
 
 
 @pytest.mark.parametrize("name", ["drag", "soft", "noisy table with power", "mixed"])
-@pytest.mark.parametrize("method", ["analytic", "sqp", "multistart", "trf", "slsqp", "ipopt"])
+@pytest.mark.parametrize("method", ["analytic", "sqp", "ipopt"])
 def test_each_objective_is_kept_lower_by_its_own_setting(
     method: str, name: str, model: Callable[[str], list[FinModelSpec]]
 ) -> None:
@@ -178,7 +175,7 @@ def test_ipopt_minimizes_what_the_plant_says(
     plant = plant_of(robot(model(name)))
     target, at = 0.4 * plant.wrench(plant.upper), plant.sample(np.random.default_rng(4), (2,))
     cost = command_cost(plant, method.aim, method.normalization.std, 1e-4)
-    problem = Problem(plant, target, method.normalization.std, cost=cost)
+    sigma = method.normalization.std
     solver, formulas = method._build(plant)
     total = cs.sumsqr(formulas.residual) + formulas.cost
     gradient = cs.gradient(total, formulas.command)
@@ -186,9 +183,11 @@ def test_ipopt_minimizes_what_the_plant_says(
     hessian = solver.get_function("nlp_hess_l")
     for command in at:
         value, slopes = asked(command.ravel(), target)
-        expected, by = problem.objective(problem.position(command))
-        assert float(value) == pytest.approx(expected, rel=1e-9)
-        np.testing.assert_allclose(np.array(slopes).ravel() * plant.width.ravel(), by, rtol=1e-6, atol=1e-9)
+        wrench, jacobian = plant.linearize(command)
+        residual = (wrench - target) / sigma
+        assert float(value) == pytest.approx(float(residual @ residual + cost(command[None])[0]), rel=1e-9)
+        by = 2.0 * (residual / sigma) @ jacobian + cost.slopes(command[None])[0].ravel()
+        np.testing.assert_allclose(np.array(slopes).ravel(), by, rtol=1e-6, atol=1e-8)
         second = np.array(hessian(command.ravel(), target, 1.0, []))
         second = second + np.triu(second, 1).T
         for k, offset in enumerate(1e-5 * np.eye(3 * plant.n_fins)):
@@ -210,10 +209,8 @@ def test_what_is_no_objective_is_refused(method: str) -> None:
 
 
 def test_settings_are_told_and_changed_like_any_other() -> None:
-    method = load_allocator("multistart", objective="effort", n_steps=7)
+    method = load_allocator("sqp", objective="effort", n_steps=7)
     assert method.options["objective"] == "effort" and method.options["n_steps"] == 7
     other = method.with_settings(copper_loss=0.3, objective="power")
-    assert isinstance(other, Multistart) and other.n_steps == 7
+    assert isinstance(other, Sqp) and other.n_steps == 7
     assert other.aim == Objective("power", copper_loss=0.3)
-    with pytest.raises(AllocationError, match="energy_tradeoff: expected a number from 0, got -1"):
-        load_allocator("multistart", energy_tradeoff=-1.0)

@@ -9,9 +9,7 @@ import pytest
 from finlab.allocation import Allocator
 from finlab.allocation.baselines.analytic import Analytic
 from finlab.allocation.baselines.ipopt import Ipopt
-from finlab.allocation.baselines.multistart import Multistart
 from finlab.allocation.baselines.qp import Qp
-from finlab.allocation.baselines.scipy_solvers import Slsqp, Trf
 from finlab.allocation.baselines.sqp import Sqp
 from finlab.allocation.methods import load_allocator
 from finlab.errors import LayoutError
@@ -21,7 +19,7 @@ from finlab.physics import Plant
 from finlab.physics.objective import Name
 
 NORMALIZATION = Normalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35]))
-EXACT = ("analytic", "sqp", "multistart", "trf", "slsqp", "ipopt")
+EXACT = ("analytic", "sqp", "ipopt")
 ALL = (*EXACT, "qp")
 THRUST = 4.737410112522892
 """Thrust of the default fin over f^2 sin^2(A) [N s^2]."""
@@ -31,10 +29,8 @@ def make(method: str, **aim: Any) -> Allocator:
     """A method, the slow ones with few starts."""
     if method == "ipopt":
         pytest.importorskip("casadi", reason="method ipopt is an optional extra")
-    kinds = {"analytic": Analytic, "qp": Qp, "sqp": Sqp, "multistart": Multistart}
-    if method in kinds:
-        return kinds[method](NORMALIZATION, **aim)
-    return {"trf": Trf, "slsqp": Slsqp, "ipopt": Ipopt}[method](NORMALIZATION, n_starts=4, **aim)
+        return Ipopt(NORMALIZATION, n_starts=4, **aim)
+    return {"analytic": Analytic, "qp": Qp, "sqp": Sqp}[method](NORMALIZATION, **aim)
 
 
 def one_fin(**changes: object) -> Layout:
@@ -155,16 +151,13 @@ def test_unknown_and_last_fins_cannot_fail(method: str) -> None:
 
 
 @pytest.mark.parametrize("objective", ["power", "effort"])
-def test_multistart_and_sqp_need_hardly_more_than_the_search(objective: Name) -> None:
+def test_sqp_needs_hardly_more_than_the_search(objective: Name) -> None:
     layout = random_layout(np.random.default_rng(21), n_fins=5)
     targets = Plant(layout).wrench(
         np.random.default_rng(22).uniform([0.05, 0.1, -3], [0.6, 2.1, 3], (20, 5, 3))
     )
     least = load_allocator(objective=objective).allocate_batch(layout, targets)
-    for method, most in (("multistart", 1.12), ("sqp", 1.06)):
-        answer = make(method, objective=objective).allocate_batch(layout, targets)
-        cost, best = (
-            getattr(found, "power" if objective == "power" else "energy") for found in (answer, least)
-        )
-        exact = (answer.err_norm < 1e-3) & (least.err_norm < 1e-3)
-        assert exact.sum() >= 15 and cost[exact].sum() < most * best[exact].sum()
+    answer = make("sqp", objective=objective).allocate_batch(layout, targets)
+    cost, best = (getattr(found, "power" if objective == "power" else "energy") for found in (answer, least))
+    exact = (answer.err_norm < 1e-3) & (least.err_norm < 1e-3)
+    assert exact.sum() >= 15 and cost[exact].sum() < 1.06 * best[exact].sum()

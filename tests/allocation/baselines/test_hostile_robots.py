@@ -6,10 +6,7 @@ import warnings
 import numpy as np
 import pytest
 
-from finlab.allocation import Allocator
 from finlab.allocation.baselines.box_least_squares import solve_box_quadratics
-from finlab.allocation.baselines.multistart import Multistart
-from finlab.allocation.baselines.scipy_solvers import Slsqp, Trf
 from finlab.allocation.baselines.sqp import Sqp
 from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
@@ -17,7 +14,6 @@ from finlab.layout import Fin, FinModelSpec, Layout, Limits
 from finlab.physics import Plant
 
 NORMALIZATION = Normalization(np.zeros(6), np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35]))
-SLOW = {"sqp": Sqp, "trf": Trf, "slsqp": Slsqp, "multistart": Multistart}
 
 
 def strong(n_fins: int, angle: float = 1.0) -> Layout:
@@ -29,9 +25,8 @@ def strong(n_fins: int, angle: float = 1.0) -> Layout:
     )
 
 
-@pytest.mark.parametrize("method", ["sqp", "multistart"])
 @pytest.mark.parametrize("layout", [strong(1), strong(2, 0.0), strong(4)], ids=["one", "twins", "four"])
-def test_strong_fins_on_long_levers_are_no_singular_problem(method: str, layout: Layout) -> None:
+def test_strong_fins_on_long_levers_are_no_singular_problem(layout: Layout) -> None:
     targets = np.concatenate(
         [np.random.default_rng(0).normal(size=(4, 6)) * 10.0**k for k in range(-12, 7, 3)]
     )
@@ -40,7 +35,7 @@ def test_strong_fins_on_long_levers_are_no_singular_problem(method: str, layout:
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        command = SLOW[method](NORMALIZATION).allocate_batch(layout, np.clip(targets, -1e6, 1e6)).command
+        command = Sqp(NORMALIZATION).allocate_batch(layout, np.clip(targets, -1e6, 1e6)).command
     assert ((command >= layout.lower) & (command <= layout.upper)).all()
 
 
@@ -55,22 +50,19 @@ def many_fins() -> tuple[Layout, np.ndarray]:
     return Layout("many", tuple(fins)), np.array([30.0, -20.0, 40.0, 3.0, -4.0, 5.0])
 
 
-@pytest.mark.parametrize("method", list(SLOW))
-def test_when_the_time_is_up_the_best_so_far_is_the_answer(method: str) -> None:
+def test_when_the_time_is_up_the_best_so_far_is_the_answer() -> None:
     layout, target = many_fins()
-    kind: type[Allocator] = SLOW[method]
     start = time.thread_time()
-    hasty = kind(NORMALIZATION, time_limit_s=1e-6).allocate(layout, target)
+    hasty = Sqp(NORMALIZATION, time_limit_s=1e-6).allocate(layout, target)
     assert time.thread_time() - start < 0.3
     assert ((hasty.command >= layout.lower) & (hasty.command <= layout.upper)).all()
-    patient = kind(NORMALIZATION, time_limit_s=60.0).allocate(layout, target)
+    patient = Sqp(NORMALIZATION, time_limit_s=60.0).allocate(layout, target)
     assert patient.err_norm < hasty.err_norm
 
 
-@pytest.mark.parametrize("method", list(SLOW))
-def test_a_time_limit_is_a_time(method: str) -> None:
+def test_a_time_limit_is_a_time() -> None:
     with pytest.raises(AllocationError, match="time_limit_s: expected a number of seconds above 0, got 0"):
-        SLOW[method](NORMALIZATION, time_limit_s=0.0)
+        Sqp(NORMALIZATION, time_limit_s=0.0)
 
 
 def test_box_quadratics_stop_where_they_are_told_to() -> None:

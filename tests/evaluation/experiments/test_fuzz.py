@@ -15,7 +15,7 @@ from finlab.evaluation.hostile_cases import hostile_robot, hostile_targets
 from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
 
-QUICK = ("search", "mdn", "paper", "qp", "analytic", "multistart", "sqp")
+QUICK = ("search", "mdn", "paper", "qp", "analytic", "sqp")
 
 
 @pytest.mark.parametrize("method", QUICK)
@@ -25,7 +25,7 @@ def test_quick_methods_survive(method: str) -> None:
     assert count.targets == 8 * (12 + 4) and count.calls == 8 * (1 + 4) and count.refused == 0
 
 
-@pytest.mark.parametrize("method", ["trf", "slsqp", "ipopt"])
+@pytest.mark.parametrize("method", ["ipopt"])
 def test_slow_methods_survive(method: str) -> None:
     if method == "ipopt":
         pytest.importorskip("casadi", reason="method ipopt is an optional extra")

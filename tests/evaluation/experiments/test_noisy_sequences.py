@@ -20,9 +20,9 @@ def test_noise_is_white_and_of_its_size() -> None:
 
 def test_the_search_keeps_to_the_rates_that_jumps_break() -> None:
     layout = load_layout("A")
-    methods = {name: load_allocator(name) for name in ("search", "multistart")}
+    methods = {name: load_allocator(name) for name in ("search", "qp")}
     ours, jumpy = noisy_sequence_rows(methods, [layout], n_paths=1, ticks=40, seed=3)
-    assert (ours["method"], jumpy["method"], ours["ticks"]) == ("search", "multistart", 40)
+    assert (ours["method"], jumpy["method"], ours["ticks"]) == ("search", "qp", 40)
     servo = layout.fins[0].servo
     rates = servo.amplitude_rate, servo.frequency_rate, servo.direction_rate
     for what, rate in zip(("amplitude", "frequency", "turn"), rates, strict=True):

@@ -141,13 +141,13 @@ def test_eval_wrench_on_all_splits_keeps_records(
     statistics: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     sizes = ["--split", "all", "--layouts", "1", "--targets", "3", "--subsample", "2"]
-    arguments = ["eval", "wrench", *sizes, "--methods", "qp,trf-1", "--checkpoint", statistics]
+    arguments = ["eval", "wrench", *sizes, "--methods", "qp,ipopt-1", "--checkpoint", statistics]
     file, folder = tmp_path / "rows.json", tmp_path / "records"
     assert main([*arguments, "--json", str(file), "--records", str(folder)]) == 0
     rows = json.loads(file.read_text())["rows"]
-    pairs = [(split, method) for split in SPLITS for method in ("qp", "trf-1")]
+    pairs = [(split, method) for split in SPLITS for method in ("qp", "ipopt-1")]
     assert [(row["split"], row["method"]) for row in rows] == pairs
-    assert {row["method"]: row["n"] for row in rows} == {"qp": 3, "trf-1": 2}
+    assert {row["method"]: row["n"] for row in rows} == {"qp": 3, "ipopt-1": 2}
     assert len(list(folder.iterdir())) == len(pairs)
     columns, meta = load_columns(folder / "wrench-limits-qp.npz")
     again = wrench_row(records_of_columns(columns), split="limits", method="qp")
@@ -169,7 +169,7 @@ def test_eval_latency(statistics: str, capsys: pytest.CaptureFixture[str]) -> No
         ("wrench --methods ,", "methods: expected names with commas between"),
         ("wrench --split nowhere --methods qp", "split: expected one of id, ood"),
         ("wrench --layouts 0 --methods qp", "layouts: expected a number of at least 1, got 0"),
-        ("wrench --methods qp-3", "a number of starts, from 1, goes with trf, slsqp, ipopt only, got 'qp-3'"),
+        ("wrench --methods qp-3", "a number of starts, from 1, goes with ipopt only, got 'qp-3'"),
         ("wrench --subsample 0 --methods qp", "subsample: expected a number of at least 1, got 0"),
         ("wrench --single 0 --methods qp", "single: expected a number of at least 1, got 0"),
         (

@@ -196,7 +196,7 @@ def test_sections_that_take_hours_are_run_where_they_are_named(tmp_path: Path) -
     assert planning.parse_sections("hard-days, slow-days") == ["hard-days", "slow-days"]
     assert set(planning.SECTIONS) - set(planning.parse_sections("all")) == {"slow-days"}
     plan = make_plan(TINY, seed=0, checkpoints=Checkpoints(), runs=tmp_path).only(["slow-days"])
-    compared = {"search,analytic,on-board", "sqp", "multistart", "paper"}
+    compared = {"search,analytic,on-board", "sqp", "paper"}
     assert {job.settings["methods"] for job in plan} == compared
 
 

@@ -13,7 +13,7 @@ from finlab.evaluation.report.verdicts import LEADS, LEVEL, TRAILS, compare, sta
 Tables = Mapping[str, Sequence[Row]]
 """Rows by table; those that have not run are missing."""
 OURS = "search"
-MINIMIZERS = ("search", "mdn", "sqp", "multistart")
+MINIMIZERS = ("search", "mdn", "sqp")
 """Methods that keep the cost least by which they are compared."""
 STANDINGS = (
     Column("measure", "less is better"),
