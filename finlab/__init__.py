@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from finlab.allocation.allocation import Allocation as Allocation
     from finlab.allocation.allocator import Allocator as Allocator
-    from finlab.allocation.health import Health as Health
     from finlab.allocation.methods import load_allocator as load_allocator
     from finlab.allocation.policy import Policy as Policy
     from finlab.errors import FinlabError as FinlabError
     from finlab.layout.body import Body as Body
+    from finlab.layout.damage import Health as Health
     from finlab.layout.file import save_layout as save_layout
     from finlab.layout.fin import Fin as Fin
     from finlab.layout.fin import Limits as Limits
@@ -31,7 +31,7 @@ __version__ = "0.1.0"
 _HOME = {
     "Allocation": "finlab.allocation.allocation",
     "Allocator": "finlab.allocation.allocator",
-    "Health": "finlab.allocation.health",
+    "Health": "finlab.layout.damage",
     "Policy": "finlab.allocation.policy",
     "load_allocator": "finlab.allocation.methods",
     "FinlabError": "finlab.errors",

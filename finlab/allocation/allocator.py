@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.allocation.allocation import Allocation, BatchAllocation
-from finlab.allocation.health import Health
 from finlab.allocation.judging import judge
 from finlab.allocation.method import Method
 from finlab.allocation.notes import fin_notes
@@ -23,6 +22,7 @@ from finlab.allocation.question import (
 from finlab.allocation.solution import Candidates
 from finlab.errors import AllocationError
 from finlab.layout import FinModelSpec, Layout
+from finlab.layout.damage import Health
 
 SAME_COMMAND = 1e-6
 """Two commands [rad, Hz, rad] that differ by less are one answer, given on two machines."""

@@ -6,11 +6,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from finlab.allocation.health import Health
 from finlab.allocation.policy import AXES
 from finlab.arrays import Array
 from finlab.errors import AllocationError, CommandError
 from finlab.layout import Layout
+from finlab.layout.damage import Health
 
 MAX_WRENCH = 1e6
 """Largest magnitude of a target component [N, N m]; beyond it something is wrong upstream."""

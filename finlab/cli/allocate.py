@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json as json_format
-import math
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
@@ -11,7 +10,6 @@ from tyro.conf import Positional, UseAppendAction, arg
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from finlab.allocation import Health
     from finlab.layout import Layout
 
 Wrench = tuple[float, float, float, float, float, float]
@@ -53,7 +51,7 @@ def allocate(
         seed: same target, layout and seed, same answer.
         json: print one JSON object instead of a table.
     """
-    from finlab.allocation import load_allocator
+    from finlab.allocation import Health, load_allocator
     from finlab.allocation.policy import policy_from
     from finlab.cli.inputs import open_robot
     from finlab.deploy.record import allocation_record
@@ -62,7 +60,7 @@ def allocate(
     options: dict[str, Any] = {} if objective is None else {"objective": objective}
     allocator = load_allocator(method, checkpoint=checkpoint, **options)
     answer = policy_from(policy, axis_weights, priority)
-    damage = health_from(health, stuck, running)
+    damage = Health.parse(health, stuck, running)
     lost = robot.with_failed(failed)
     result = allocator.allocate(robot.layout, wrench, failed=lost, policy=answer, health=damage, seed=seed)
     lost_axes = axes_lost(robot.layout, result.layout, lost) if lost or damage is not None else None
@@ -78,35 +76,6 @@ def allocate(
     if least is not None:
         unit = "" if objective == "effort" else " W"
         print(f"no exact answer has less {objective or 'power'} than {least:.4g}{unit}")
-
-
-def health_from(weak: Sequence[str], stuck: Sequence[str], running: Sequence[str]) -> Health | None:
-    """Damaged fins as the command line names them; None where all are whole."""
-    from finlab.allocation import Health
-
-    if not (weak or stuck or running):
-        return None
-    kept = {name: values for name, values in (_named("running", text, 3) for text in running)}
-    return Health.of(
-        weak=dict((name, share) for name, (share,) in (_named("health", text, 1) for text in weak)),
-        stuck={name: math.radians(angle) for name, (angle,) in (_named("stuck", text, 1) for text in stuck)},
-        running={name: (a, f, math.radians(angle)) for name, (a, f, angle) in kept.items()},
-    )
-
-
-def _named(option: str, text: str, count: int) -> tuple[str, tuple[float, ...]]:
-    """Name and numbers of NAME=NUMBER,...; errors say which option."""
-    from finlab.errors import AllocationError
-
-    name, _, numbers = text.partition("=")
-    try:
-        values = tuple(float(number) for number in numbers.split(","))
-    except ValueError:
-        values = ()
-    if not name or len(values) != count:
-        wanted = "NAME=NUMBER" if count == 1 else "NAME=A,F,DEG"
-        raise AllocationError(f"{option}: expected {wanted}, got {text!r}")
-    return name, values
 
 
 def axes_lost(whole: Layout, damaged: Layout, failed: Sequence[str]) -> dict[str, list[str]]:

@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from finlab.allocation.health import Health
 from finlab.arrays import Array
 from finlab.control.hypotheses import LEVELS, Hypotheses
 from finlab.control.measurement import Measurement
@@ -15,6 +14,7 @@ from finlab.control.probe import Probe
 from finlab.control.servo_reports import report_evidence
 from finlab.layout import Body, Layout
 from finlab.layout.angles import TURN
+from finlab.layout.damage import Health
 
 LOST_BELOW = 0.2
 """A strength below which a fin is given up as lost."""

@@ -5,6 +5,8 @@ from finlab.layout.arrays import layout_effectiveness as layout_effectiveness
 from finlab.layout.arrays import stack_layouts as stack_layouts
 from finlab.layout.body import Body as Body
 from finlab.layout.body import Hull as Hull
+from finlab.layout.damage import Damage as Damage
+from finlab.layout.damage import Health as Health
 from finlab.layout.file import layout_to_dict as layout_to_dict
 from finlab.layout.file import parse_layout as parse_layout
 from finlab.layout.file import save_layout as save_layout

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.health import Health
 from finlab.allocation.policy import Policy, as_policy
 from finlab.arrays import Array
 from finlab.control import (
@@ -25,6 +24,7 @@ from finlab.control import (
 from finlab.control.measurement import NO_WRENCH
 from finlab.control.nominal_lag import NominalLag
 from finlab.layout import Layout
+from finlab.layout.damage import Health
 from finlab.physics import plant_of
 from finlab.physics.blade import COPPER_LOSS
 from finlab.physics.fin_motion import FinMotion, fin_power

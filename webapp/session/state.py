@@ -7,12 +7,12 @@ from functools import cache
 from importlib import import_module
 from typing import Any, get_args
 
-from finlab.allocation.health import Health
 from finlab.allocation.learned.settings import MdnSettings, PaperSettings
 from finlab.allocation.methods import METHODS
 from finlab.allocation.policy import AXES, KINDS
 from finlab.errors import FinlabError
 from finlab.layout import Layout
+from finlab.layout.damage import Health
 from finlab.physics.objective import Name as Objective
 from webapp.session.links import Links, kept, linked
 

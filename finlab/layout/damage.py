@@ -1,22 +1,45 @@
-"""Fins that work in part: weaker, torn, no longer turning, or running on as they were when they went deaf.
+"""Fins that do not work as they should: one vocabulary, and what is left of the robot.
 
-Each becomes a layout with other limits, or with a smaller fin, so every method accounts for it and limits
-hold as always: a fin that no longer turns still pushes along its last direction, and the force of one that
-runs on is part of every wrench. A fin that gives no force at all is `failed` and leaves the layout.
+A fin is `lost` (it gives no force and leaves the layout: `failed=` of an allocator), `weak`, `torn`, `stuck`,
+`running`, or `whole`. All but the first are a `Health`: a layout with other limits, or with a smaller fin, so
+that every method accounts for it and limits hold as always.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from finlab.errors import AllocationError
-from finlab.layout import Fin, Layout, Limits
+from finlab.layout.fin import Fin, Limits
+from finlab.layout.layout import Layout
 
+Kind = Literal["lost", "weak", "torn", "stuck", "running", "whole"]
+"""What may be true of a fin."""
+MEANING: dict[Kind, str] = {
+    "lost": "gives no force at all",
+    "weak": "reaches a share of its largest amplitude and frequency",
+    "torn": "gives a share of its law's thrust at every command",
+    "stuck": "beats, but no longer turns",
+    "running": "keeps its last command, come what may",
+    "whole": "works as it should",
+}
+"""The kinds in words."""
 Command = tuple[float, float, float]
+
+
+class Damage(NamedTuple):
+    """What is known of a robot's fins, as an allocator is told it: `allocate(..., **damage._asdict())`."""
+
+    failed: tuple[str, ...] = ()
+    """Names of the fins that are lost."""
+    health: Health | None = None
+    """What is known of fins that work in part; None where there are none."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +96,34 @@ class Health:
             ) from error
         return cls(tuple(shares.items()), tuple(angles.items()), tuple(kept.items()), tuple(thrusts.items()))
 
+    @classmethod
+    def parse(cls, weak: Sequence[str], stuck: Sequence[str], running: Sequence[str]) -> Health | None:
+        """Health from texts, angles in degrees: `bow=0.5`, `bow=20`, `bow=0.3,1.0,20`; None where all are
+        whole.
+
+        Raises:
+            AllocationError: a text that says something else.
+        """
+        if not (weak or stuck or running):
+            return None
+        kept = _named("running", running, 3).items()
+        return cls.of(
+            weak={name: share for name, (share,) in _named("health", weak, 1).items()},
+            stuck={name: math.radians(angle) for name, (angle,) in _named("stuck", stuck, 1).items()},
+            running={name: (a, f, math.radians(angle)) for name, (a, f, angle) in kept},
+        )
+
+    def of_fin(self, name: str) -> dict[Kind, float | Command]:
+        """What is known of one fin: a share for `weak` and `torn`, an angle [rad] for `stuck`, a command for
+        `running`; nothing for a whole one."""
+        known: dict[Kind, Iterable[tuple[str, float | Command]]] = {
+            "weak": self.weak,
+            "torn": self.thrust,
+            "stuck": self.stuck,
+            "running": self.running,
+        }
+        return {kind: value for kind, pairs in known.items() for fin, value in pairs if fin == name}
+
     def applied_to(self, layout: Layout) -> Layout:
         """The layout with the limits that are left.
 
@@ -124,3 +175,19 @@ def _damaged(fin: Fin, share: float | None, angle: float | None, command: Comman
 def _weakened(interval: tuple[float, float], share: float) -> tuple[float, float]:
     low, high = interval
     return min(low, share * high), share * high
+
+
+def _named(option: str, texts: Sequence[str], count: int) -> dict[str, tuple[float, ...]]:
+    """Numbers by name, of texts NAME=NUMBER,...; errors say which option."""
+    named = {}
+    for text in texts:
+        name, _, numbers = text.partition("=")
+        try:
+            values = tuple(float(number) for number in numbers.split(","))
+        except ValueError:
+            values = ()
+        if not name or len(values) != count:
+            wanted = "NAME=NUMBER" if count == 1 else "NAME=A,F,DEG"
+            raise AllocationError(f"{option}: expected {wanted}, got {text!r}")
+        named[name] = values
+    return named
