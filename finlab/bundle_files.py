@@ -13,7 +13,7 @@ import re
 import stat
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from finlab.errors import DataError
@@ -47,8 +47,6 @@ MOST_FILES = len(LARGEST) + 16
 REQUIRED = (GRAPH, ABOUT, COMPILED, CHECKSUMS)
 UNREADABLE = (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, ValueError, zlib.error)
 """What reading a zip archive ends with that is damaged, locked or none."""
-VERSION_1 = "network.onnx"
-"""A file that only bundles of version 1 hold."""
 
 Files = Mapping[str, bytes]
 """Contents by name."""
@@ -71,7 +69,7 @@ def is_bundle(path: str | os.PathLike[str]) -> bool:
     place = Path(path)
     try:
         if place.is_dir():
-            return any((place / name).is_file() for name in (ABOUT, VERSION_1))
+            return (place / ABOUT).is_file()
         return place.suffix == ".zip" and place.is_file()
     except (OSError, ValueError):  # a name that is too long, or holds a NUL byte
         return False
@@ -112,7 +110,7 @@ def read_bundle_files(path: str | os.PathLike[str]) -> dict[str, bytes]:
 
 def check_bundle_files(files: Files, source: str) -> None:
     """Raise a `DataError` unless version, files and checksums are right."""
-    _check_version(files, files.get(ABOUT), source)
+    _check_version(files.get(ABOUT), source)
     for name in REQUIRED:
         if name not in files:
             raise DataError(f"{source}: {name} is missing; a bundle is made by `finlab export LAYOUT -o DIR`")
@@ -157,11 +155,10 @@ class _Contents(dict[str, bytes]):
             raise DataError(f"{self.source}: its files are larger than {LARGEST_BUNDLE:,} bytes together")
         self[name] = content
         if name == ABOUT:
-            _check_version((), content, self.source)
+            _check_version(content, self.source)
 
 
 def _read_folder(path: Path, files: _Contents) -> None:
-    _check_version([VERSION_1] if (path / VERSION_1).exists() else [], None, files.source)
     for name in (ABOUT, *sorted((set(LARGEST) - {ABOUT}) | _tables_in(path))):
         file = path / name
         try:
@@ -186,7 +183,6 @@ def _read_archive(files: _Contents) -> None:
     with zipfile.ZipFile(files.source) as archive:
         # The version comes first: files of another one are not the news.
         entries = sorted(archive.infolist(), key=lambda entry: entry.filename != ABOUT)
-        _check_version([entry.filename for entry in entries], None, files.source)
         for entry in entries:
             # Nothing is unpacked, so a name can do no harm; still, a bundle holds these files only.
             if largest(entry.filename) < 0 or entry.filename in files:
@@ -198,21 +194,16 @@ def _read_archive(files: _Contents) -> None:
                 files.take(entry.filename, stream.read)
 
 
-def _check_version(names: Iterable[str], about: bytes | None, source: str) -> None:
-    """Refuse bundles of other versions; what cannot be understood is left to its reader.
-
-    Version 1 held its weights as ONNX files, version 2 knew fins by networks alone.
-    """
-    version: object = VERSION
-    if VERSION_1 in names:
-        version = 1
-    elif about is not None:
-        try:
-            document = json.loads(about)
-        except (ValueError, RecursionError):
-            return
-        version = document.get("version") if isinstance(document, dict) else VERSION
-    if version != VERSION or isinstance(version, bool):
+def _check_version(about: bytes | None, source: str) -> None:
+    """Refuse bundles of other versions; what cannot be understood is left to its reader."""
+    try:
+        document = json.loads(about or b"null")
+    except (ValueError, RecursionError):
+        return
+    if not isinstance(document, dict):
+        return
+    version = document.get("version")
+    if type(version) is not int or version != VERSION:  # neither 3.0 nor "3"
         raise DataError(
             f"{source}: is a bundle of version {version!r:.40}, this finlab reads version {VERSION}; "
             "export it again with `finlab export LAYOUT -o DIR`"

@@ -10,7 +10,6 @@ def export(
     layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
     output: Annotated[Path, arg(metavar="DIR|FILE.graph.json", aliases=["-o"])],
     zip: bool = False,
-    onnx: bool = False,
     failed: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = (),
     method: Literal["search", "mdn"] = "search",
     objective: Literal["power", "effort"] = "power",
@@ -22,7 +21,6 @@ def export(
         layout: layout file, layout graph file, bundle, or the name of a shipped layout.
         output: folder to write; a name that ends in .graph.json takes the layout graph file alone.
         zip: write one archive, DIR.zip, instead of a folder.
-        onnx: write the networks as ONNX files for other runtimes instead; needs finlab[onnx].
         failed: name of a fin that does not work.
         method: who answers on the robot; the networks of mdn travel with it.
         objective: what the robot keeps least, power in watts or the paper's effort.
@@ -33,21 +31,12 @@ def export(
     from finlab.layout.load import SUFFIX
 
     graph_alone = output.name.endswith(SUFFIX)
-    if (zip or onnx) and graph_alone:
+    if zip and graph_alone:
         raise FinlabError(f"{output}: a graph file alone is not zipped; name a folder, or leave out --zip")
-    if zip and onnx:
-        raise FinlabError("--onnx writes a folder of ONNX files; leave out --zip")
     if output.suffix == ".json" and not graph_alone:
         raise FinlabError(f"{output}: expected a file name that ends in {SUFFIX}, or a folder")
     robot = open_robot(layout)  # before a network is loaded
     failed = robot.with_failed(failed)
-    if onnx:
-        from finlab.deploy.onnx_export import write_onnx
-        from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
-
-        names = write_onnx(read_checkpoint(resolve_checkpoint(checkpoint)), output)
-        print(f"{output}: {', '.join(names)}, checkpoint {checkpoint}")
-        return
     from finlab.allocation import load_allocator
 
     allocator = load_allocator(method, checkpoint=checkpoint, objective=objective)

@@ -189,7 +189,7 @@ def _config(files: Mapping[str, bytes], source: str) -> dict[str, Any]:
         raise CheckpointError(f"{place}: not readable as JSON ({error})") from error
     if not isinstance(config, dict) or config.get("format") != FORMAT:
         raise CheckpointError(f"{place}: not a finlab checkpoint (expected format {FORMAT!r})")
-    if config.get("version") != VERSION:
+    if type(config.get("version")) is not int or config["version"] != VERSION:
         raise CheckpointError(
             f"{place}: checkpoint version {config.get('version')!r}, this finlab reads version {VERSION}; "
             "use the finlab that made it, or train again"

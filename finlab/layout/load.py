@@ -139,7 +139,7 @@ def parse_graph_document(found: GraphText) -> GraphDocument:
         if not isinstance(data, dict) or data.get("format") != GRAPH_FORMAT:
             got = shown(data.get("format")) if isinstance(data, dict) else shown(data)
             raise LayoutError(f"expected {GRAPH_FORMAT}, got {got}", "format")
-        if data.get("version") != GRAPH_VERSION or data["version"] is True:
+        if type(data.get("version")) is not int or data["version"] != GRAPH_VERSION:
             got = shown(data.get("version"))
             raise LayoutError(f"this finlab reads version {GRAPH_VERSION}, got {got}", "version")
         mapping(data, "", KEYS, required=KEYS)

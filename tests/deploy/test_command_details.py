@@ -10,15 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from finlab.assets import checkpoint_path
 from finlab.deploy import serve as serve_module
 from finlab.deploy.bundle import Bundle
 from finlab.deploy.command import main
-from finlab.deploy.onnx_export import onnx_files
 from finlab.deploy.robot import Robot, parse_robot
 from finlab.deploy.self_check import N_WARM, Finding, answer_times
 from finlab.deploy.serve import MAX_LINE, Server, Timing
-from finlab.inference.checkpoint import read_checkpoint
 
 WRENCH = [1.0, 0.0, 0.5, 0.0, 0.0, 0.1]
 
@@ -295,10 +292,3 @@ def test_the_longest_request_that_is_read(robot: Robot) -> None:
     server = Server(robot, Timing())
     assert server.answer(line.ljust(MAX_LINE))["status"] == "ok"
     assert server.answer(line.ljust(MAX_LINE + 1))["error"] == "request: longer than 65536 bytes"
-
-
-def test_exports_do_not_depend_on_the_order_of_the_fin_model() -> None:
-    weights = read_checkpoint(checkpoint_path("paper"))
-    small = replace(weights, fin_model={"type": "drag", "parameters": {"a": 1.0}})
-    turned = replace(weights, fin_model={"parameters": {"a": 1.0}, "type": "drag"})
-    assert onnx_files(small) == onnx_files(turned)

@@ -147,6 +147,7 @@ def test_white_space_and_order_of_keys_do_not_matter() -> None:
     ("change", "message"),
     [
         (lambda d: d.update(version=1), "version: this finlab reads version 2, got 1"),
+        (lambda d: d.update(version=2.0), "version: this finlab reads version 2, got 2.0"),
         (lambda d: d.update(format="finlab-layout"), "format: expected finlab-graph, got 'finlab-layout'"),
         (lambda d: d.update(surprise=1), "surprise: unknown key"),
         (lambda d: d.pop("normalization"), "normalization: required key is missing"),

@@ -25,7 +25,7 @@ from finlab.forces.fin_envelope import FinEnvelope
 from finlab.layout import FinModelSpec, Layout
 from finlab.physics import plant_of
 
-HEAVY = ("torch", "scipy", "viser", "matplotlib", "yaml", "tyro", "tqdm", "threadpoolctl", "onnx")
+HEAVY = ("torch", "scipy", "viser", "matplotlib", "yaml", "tyro", "tqdm", "threadpoolctl")
 WRENCH = ["--wrench", "1", "0", "0.5", "0", "0", "0.1"]
 
 

@@ -73,7 +73,7 @@ def test_asks_for_the_core_and_offers_extras(wheel: Path) -> None:
     about = email.message_from_bytes(archive.read(name))
     required = [line for line in about.get_all("Requires-Dist", []) if "extra ==" not in line]
     assert {name_of(line) for line in required} == CORE
-    extras = {"train", "app", "onnx", "urdf", "ipopt", "plot", "fit", "test", "dev"}
+    extras = {"train", "app", "urdf", "ipopt", "plot", "fit", "test", "dev"}
     assert extras == set(about.get_all("Provides-Extra", []))
 
 
@@ -124,7 +124,7 @@ def bare_run(bare: Path, cwd: Path, *argv: str) -> subprocess.CompletedProcess[s
 
 
 def test_without_extras_torch_is_absent_and_missed_in_a_sentence(bare: Path, tmp_path: Path) -> None:
-    for name in ("torch", "viser", "onnx", "onnxruntime", "matplotlib", "pytest"):
+    for name in ("torch", "viser", "matplotlib", "pytest"):
         assert bare_run(bare, tmp_path, "-c", f"import {name}").returncode == 1
     done = bare_run(bare, tmp_path, "-m", "finlab", "train", "surrogate", "-o", "out", "--preset", "smoke")
     assert done.returncode == 2
