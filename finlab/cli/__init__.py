@@ -57,7 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(argv: list[str]) -> int:
     """Parse and run; turn the parser's exit into a code."""
     try:
-        code = _command_line().cli(prog="finlab", description=_DESCRIPTION, args=argv)
+        code = _command_line(argv).cli(prog="finlab", description=_DESCRIPTION, args=argv)
     except SystemExit as exit_:
         return exit_.code if isinstance(exit_.code, int) else 2
     return code or 0
@@ -71,7 +71,7 @@ def _fail(sentence: str) -> int:
 _DESCRIPTION = "Control allocation for fin-actuated underwater robots: a target wrench in, commands out."
 
 
-def _command_line() -> SubcommandApp:
+def _command_line(argv: Sequence[str]) -> SubcommandApp:
     """All verbs; a function may return an exit code, None means 0."""
     from finlab.cli import allocate, app, bench, evaluate, export, fit, layout, simulate, train
 
@@ -79,7 +79,7 @@ def _command_line() -> SubcommandApp:
     root.command(allocate.allocate)
     root.command(layout.verbs, name="layout", help="Check, show and optimize layout files.")
     root.command(train.verbs, name="train", help="Train the surrogate and the allocator.")
-    root.command(evaluate.verbs, name="eval", help="Measure methods against the analytic fin model.")
+    root.command(evaluate.verbs(argv), name="eval", help="Measure methods against the analytic fin model.")
     root.command(bench.bench)
     root.command(fit.verbs, name="fit", help="Fit fins to measurements.")
     root.command(simulate.simulate)

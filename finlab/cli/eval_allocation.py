@@ -2,104 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from itertools import product
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-from tyro.conf import Positional, arg
+from tyro.conf import arg
 
 from finlab.cli.eval_arguments import (
     Cases,
     Count,
-    Folder,
     MethodRun,
     Name,
     Names,
     Run,
-    check_folders,
     parse_counts,
 )
-from finlab.cli.inputs import check_positive, open_robot
-from finlab.errors import DataError
-
-if TYPE_CHECKING:
-    from finlab.evaluation.splits import Case
+from finlab.cli.inputs import check_positive
 
 RUN, METHODS = Run(), MethodRun()
-MANY, TWENTY = Cases(), Cases(layouts=20, targets=100)
+TWENTY = Cases(layouts=20, targets=100)
 FEW, PAIRS = Cases(layouts=20, targets=2), Cases(targets=2)
 EVERYWHERE, WAYS = Cases("all", layouts=20, targets=4), MethodRun(objective="effort")
-SUBSAMPLE = 10
-"""Targets of each layout that methods of a tenth of a second solve unless another number is given."""
-
-
-def wrench(
-    layout: Annotated[Positional[str | None], arg(metavar="LAYOUT")] = None,
-    cases: Annotated[Cases, arg(name="")] = MANY,
-    methods: Names | None = None,
-    single: Annotated[int | None, arg(metavar="N")] = None,
-    subsample: Count = SUBSAMPLE,
-    records: Folder = None,
-    run: Annotated[MethodRun, arg(name="")] = METHODS,
-) -> None:
-    """Track reachable wrenches on your own layout or on held-out ones: error, energy, time of each method.
-
-    Args:
-        layout: a layout file, graph file or shipped name in place of a split: one case, of that many targets,
-            with errors over the robot's own wrenches.
-        methods: names with commas between: search, mdn, paper, qp, sqp, analytic,
-            ipopt; by default search and paper, on LAYOUT all that are installed. A number of starts may
-            follow the last three, as in ipopt-32, an objective the others, as in search-effort.
-        single: solve only the first N targets of each layout, one call each, and time the calls.
-        subsample: trf, slsqp and ipopt solve only the first N targets of each layout; column n says how many.
-        records: folder for the records, one NPZ file for each split and method.
-    """
-    from finlab.evaluation.experiments.wrench_tracking import (
-        energy_comparison,
-        interval_rows,
-        run_method,
-        wrench_report,
-        wrench_rows,
-    )
-    from finlab.evaluation.method_specs import installed_methods, is_slow
-    from finlab.evaluation.splits import SPLITS
-    from finlab.evaluation.statistics.records import columns_of_records, save_columns
-
-    check_positive(single=single, subsample=subsample)
-    check_folders(records=records)
-    own = None if layout is None else _own(layout, cases)
-    allocators = run.methods(methods or ("search,paper" if own is None else ",".join(installed_methods())))
-    rows, intervals, energies = [], [], []
-    named = (cases.split,) if own is None else (f"layout {own.layout.name}",)
-    for k, part in enumerate(SPLITS if cases.split == "all" else named):
-        drawn = cases.draw(part) if own is None else [own]
-        found = {
-            name: run_method(allocator, drawn, single=single, first=subsample if is_slow(name) else None)
-            for name, allocator in allocators.items()
-        }
-        if records is not None:
-            for name, each in found.items():
-                made = asdict(cases) | {"split": part, "method": name}
-                made["checkpoint"] = allocators[name].checkpoint
-                file = f"wrench-{part.replace(' ', '-').replace('/', '-')}-{name}.npz"
-                save_columns(records / file, columns_of_records(each), made)
-        rows += wrench_rows(found, part)
-        intervals += interval_rows(found, part)
-        energies += [{"split": part, **row} for row in energy_comparison(found)]
-        run.write(rows=rows, intervals=intervals, energies=energies)
-        print(("\n" if k else "") + wrench_report(found, part, single=single))
-
-
-def _own(name: str, cases: Cases) -> Case:
-    """The case of a user's own layout."""
-    from finlab.evaluation.own_layout import own_case
-
-    if cases.split != MANY.split:
-        raise DataError(
-            f"split: a layout has none, got {cases.split!r} beside {name!r:.60}; leave one of them out"
-        )
-    robot = open_robot(name)
-    return own_case(robot.layout, robot.failed, cases.targets, cases.seed)
 
 
 def cost(

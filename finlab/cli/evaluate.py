@@ -4,6 +4,7 @@ Here are `training` and `report`, which are made of many jobs that are kept in a
 """
 
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -20,6 +21,7 @@ from finlab.cli import (
     eval_swims,
 )
 from finlab.cli.eval_arguments import Checkpoint, Count, Folder, Name, Names, Output, check_folders
+from finlab.cli.eval_verb import add_experiments
 from finlab.cli.inputs import check_positive
 from finlab.evaluation.report.sizes import SEED
 
@@ -124,10 +126,7 @@ def report(
     print(page)
 
 
-verbs = SubcommandApp()
-
-for verb in (
-    eval_allocation.wrench,
+OTHERS = (
     eval_allocation.cost,
     eval_allocation.network,
     eval_allocation.ablation,
@@ -148,5 +147,15 @@ for verb in (
     eval_robots.robots,
     training,
     report,
-):
-    verbs.command(verb)
+)
+"""Verbs that are no experiment yet, and the report."""
+
+
+def verbs(argv: Sequence[str]) -> SubcommandApp:
+    """All verbs of `finlab eval`, from the arguments after `finlab`."""
+    found = SubcommandApp()
+    known = add_experiments(found, argv)
+    for verb in OTHERS:
+        if verb.__name__ not in known:
+            found.command(verb)
+    return found

@@ -14,11 +14,11 @@ from finlab.layout.file import save_layout
 
 
 def test_every_method_on_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A pair in a file of one's own; the folder of records has a file for each method."""
+    """A pair in a file of one's own."""
     layout = finlab.load_layout("pair")
-    path, file, records = tmp_path / "mine.yaml", tmp_path / "rows.json", tmp_path / "records"
+    path, file = tmp_path / "mine.yaml", tmp_path / "rows.json"
     save_layout(layout, path)
-    sizes = ["--targets", "4", "--subsample", "1", "--records", str(records)]
+    sizes = ["--targets", "4", "--subsample", "1"]
     assert main(["eval", "wrench", str(path), *sizes, "--json", str(file)]) == 0
     rows = json.loads(file.read_text())["rows"]
     assert [row["method"] for row in rows] == installed_methods()
@@ -26,7 +26,6 @@ def test_every_method_on_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[st
     by_name = {row["method"]: row for row in rows}
     assert by_name["search"]["err_norm_max"] < 1e-4 and by_name["search"]["n"] == 4
     assert by_name["ipopt"]["n"] == 1
-    assert {path.name for path in records.iterdir()} == {f"wrench-layout-pair-{n}.npz" for n in by_name}
 
 
 def test_targets_are_seeded_and_within_reach() -> None:

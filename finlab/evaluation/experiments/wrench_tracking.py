@@ -1,63 +1,47 @@
 """Wrench tracking: methods over a split, every answer scored by the plant."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.baselines.ipopt import Ipopt
 from finlab.arrays import Array
-from finlab.evaluation.method_specs import method_and_starts
+from finlab.errors import DataError
+from finlab.evaluation.experiment import Experiment
+from finlab.evaluation.method_specs import installed_methods, is_slow, load_method_specs
+from finlab.evaluation.own_layout import layout_and_failed, own_case
 from finlab.evaluation.paper_figures import paper_wrench_rows
 from finlab.evaluation.progress import progress
-from finlab.evaluation.splits import Case
+from finlab.evaluation.report.document import Column, Row
+from finlab.evaluation.splits import SPLITS, Case, make_split
 from finlab.evaluation.statistics.records import Records, join_records
-from finlab.evaluation.statistics.tables import (
-    FIN_COUNT_COLUMNS,
-    energy_rows,
-    rows_by_fin_count,
-    text_table,
-    wrench_intervals,
-    wrench_row,
-)
+from finlab.evaluation.statistics.tables import wrench_intervals, wrench_row
 from finlab.physics import Plant, plant_of
 from finlab.physics.energy import command_energy
+from finlab.physics.objective import Name as Objective
 
 RESTING = 0.01
 """A fin rests when it gives less than this share of the force that its limits allow."""
 
 
 def run_method(
-    allocator: Allocator,
-    cases: Sequence[Case],
-    *,
-    seed: int = 0,
-    single: int | None = None,
-    first: int | None = None,
+    allocator: Allocator, cases: Sequence[Case], *, seed: int = 0, first: int | None = None
 ) -> Records:
-    """What a method does on the cases of a split.
+    """What a method does on the cases of a split; all targets of a layout are solved together.
 
     Args:
         allocator: the method.
         cases: layouts with targets.
         seed: passed to the method.
-        single: None solves all targets of a layout together and `solve_ms` is their time over their number;
-            otherwise only the first so many targets of each layout are solved, one call each, each timed.
-        first: only the first so many targets of each layout, solved together.
+        first: only the first so many targets of each layout.
     """
     parts = []
     for k, case in enumerate(progress(cases, "layout", allocator.name)):
-        targets = case.targets[: first if single is None else single]
-        if single is None:
-            answer = allocator.allocate_batch(case.layout, targets, failed=case.failed, seed=seed)
-            command, solve_ms = answer.command, answer.solve_ms
-        else:
-            answers = [allocator.allocate(case.layout, t, failed=case.failed, seed=seed) for t in targets]
-            command = np.array([answer.command for answer in answers])
-            solve_ms = np.array([answer.solve_ms for answer in answers])
-        parts.append(score(case, targets, command, solve_ms, allocator.normalization.std, number=k))
+        targets = case.targets[:first]
+        answer = allocator.allocate_batch(case.layout, targets, failed=case.failed, seed=seed)
+        sigma = allocator.normalization.std
+        parts.append(score(case, targets, answer.command, answer.solve_ms, sigma, number=k))
     return join_records(parts)
 
 
@@ -96,51 +80,87 @@ def _count_resting(plant: Plant, command: Array) -> NDArray[np.int64]:
     return np.asarray(rests.sum(axis=-1))
 
 
-def wrench_rows(records: dict[str, Records], split: str) -> list[dict[str, Any]]:
-    """The table's rows, one per method."""
-    return [wrench_row(of_method, split=split, method=method) for method, of_method in records.items()]
+def run(
+    layout: str | None = None,
+    split: tuple[str, ...] = ("id",),
+    methods: tuple[str, ...] | None = None,
+    layouts: int = 100,
+    targets: int = 1000,
+    subsample: int = 10,
+    objective: Objective = "power",
+    checkpoint: str | None = None,
+    seed: int = 0,
+) -> list[Row]:
+    """One row for each split and method.
+
+    Args:
+        layout: a layout file, graph file or shipped name in place of a split: one case, of that many targets,
+            with errors over the robot's own wrenches.
+        split: names, or all: id, ood, ood-fins, limits, failure, near-singular, fins, fins-mixed, tables,
+            many-fins, perturbed, parallel, collinear, clustered, coincident, stacked, big, tiny.
+        methods: names; by default search and paper, on LAYOUT all that are installed. An objective may
+            follow, as in search-effort, and a number of starts ipopt, as in ipopt-32.
+        layouts: of each split.
+        targets: on each layout.
+        subsample: ipopt answers only the first so many of each layout; column n says how many.
+        objective: what methods that can choose keep least.
+        checkpoint: of the learned methods, a shipped name or a folder.
+        seed: of all draws.
+    """
+    sets = _cases(layout, split, layouts, targets, seed)
+    usual = ("search", "paper") if layout is None else installed_methods()
+    allocators = load_method_specs(",".join(methods or usual), checkpoint, objective)
+    rows: list[Row] = []
+    for name, cases in sets.items():
+        for method, allocator in allocators.items():
+            found = run_method(allocator, cases, first=subsample if is_slow(method) else None)
+            intervals = {f"{key}_interval": list(ends) for key, ends in wrench_intervals(found).items()}
+            rows.append(wrench_row(found, split=name, method=method) | intervals)
+    return rows
 
 
-def interval_rows(records: dict[str, Records], split: str) -> list[dict[str, Any]]:
-    """Intervals of the table's columns, one row per method: [low, high] by column."""
-    return [
-        {"split": split, "method": method, **{k: list(v) for k, v in wrench_intervals(part).items()}}
-        for method, part in records.items()
-    ]
+def _cases(
+    layout: str | None, split: tuple[str, ...], layouts: int, targets: int, seed: int
+) -> dict[str, list[Case]]:
+    """Cases by the name of their set."""
+    if layout is None:
+        names = list(SPLITS) if split == ("all",) else split
+        return {name: make_split(name, layouts, targets, seed) for name in names}
+    if split != ("id",):
+        raise DataError(
+            f"split: a layout has none, got {','.join(split)!r} beside {layout!r:.60}; leave one of them out"
+        )
+    own = own_case(*layout_and_failed(layout), targets, seed)
+    return {f"layout {own.layout.name}": [own]}
 
 
-def energy_comparison(records: dict[str, Records]) -> list[dict[str, Any]]:
-    """Energies of all methods over those of IPOPT, from the most starts that took part; none without it."""
-    parsed = {name: method_and_starts(name) for name in records}
-    usual = Ipopt.n_starts
-    starts = {name: count or usual for name, (method, count) in parsed.items() if method == "ipopt"}
-    if not starts or len(records) == 1:
-        return []
-    reference = max(starts, key=lambda name: starts[name])
-    return [
-        {"reference": reference, **row}
-        for method, part in records.items()
-        if method != reference
-        for row in energy_rows(part, records[reference], method=method)
-    ]
+def _printed(rows: Sequence[Row]) -> list[Row]:
+    return [row for split in dict.fromkeys(row["split"] for row in rows) for row in paper_wrench_rows(split)]
 
 
-def wrench_report(records: dict[str, Records], split: str, *, single: int | None = None) -> str:
-    """The table beside the paper's printed figures, its intervals, and the error by fin count, as text."""
-    by_fins = [row for method, part in records.items() for row in rows_by_fin_count(part, method=method)]
-    timing = "one call at a time" if single else "the time of all targets of a layout over their number"
-    energies = energy_comparison(records)
-    beside = [f"energy over that of {energies[0]['reference']}", text_table(energies), ""] if energies else []
-    return "\n".join(
-        [
-            text_table([*wrench_rows(records, split), *paper_wrench_rows(split)]),
-            "",
-            "where a rerun with another seed lands, 95 times of 100 (bootstrap over layouts)",
-            text_table(interval_rows(records, split), ("method", *FIN_COUNT_COLUMNS[1:])),
-            "",
-            text_table(by_fins),
-            "",
-            *beside,
-            f"scored by the plant, the analytic fin model. solve_ms: {timing}.",
-        ]
-    )
+experiment = Experiment(
+    name="wrench",
+    question="How far off are the wrenches of each method, of those that a robot can deliver?",
+    columns=(
+        Column("split", "split", "code"),
+        Column("method", "method", "code"),
+        Column("n", "targets", "count"),
+        Column("err_norm_mean", "mean error", "error", "err_norm_mean_interval"),
+        Column("err_norm_median", "median", "error"),
+        Column("err_norm_p95", "95th percentile", "error"),
+        Column("err_norm_max", "largest", "error"),
+        Column("success_0.01", "within 0.01", "share", "success_0.01_interval"),
+        Column("success_0.5", "within 0.5", "share"),
+        Column("power_mean", "mean power", "three", unit="W"),
+        Column("solve_ms_p50", "median time", "three", unit="ms"),
+    ),
+    run=run,
+    note=(
+        "Scored by the plant. Errors in standard deviations of the wrenches of random layouts, on fins, "
+        "fins-mixed, tables, big and tiny and on a layout of your own of the robot's. Intervals: where "
+        "another seed lands, 95 times of 100. Time: that of all targets of a layout over their number."
+    ),
+    each="split",
+    printed=_printed,
+    less_is_better=("err_norm_mean",),
+)

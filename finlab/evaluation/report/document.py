@@ -33,11 +33,18 @@ class Column:
     key: str
     """Of the rows."""
     title: str
-    """In words, with the unit."""
+    """In words."""
     format: str = "text"
     """Key of `FORMATS`."""
     interval: str | None = None
     """Key of an interval [low, high] that stands below the number in small."""
+    unit: str = ""
+    """Of the numbers; none where they are shares, ratios or counts."""
+
+    @property
+    def heading(self) -> str:
+        """The title with the unit."""
+        return f"{self.title} [{self.unit}]" if self.unit else self.title
 
     @property
     def is_number(self) -> bool:

@@ -61,7 +61,7 @@ def _html_block(block: Block) -> str:
 def _html_table(table: Table) -> str:
     kinds = ["" if column.is_number else ' class="name"' for column in table.columns]
     columns = list(zip(table.columns, kinds, strict=True))
-    head = "".join(f"<th{kind}>{_inline(column.title)}</th>" for column, kind in columns)
+    head = "".join(f"<th{kind}>{_inline(column.heading)}</th>" for column, kind in columns)
     body = []
     for row in table.rows:
         body.append(f'<tr class="{row["_kind"]}">' if "_kind" in row else "<tr>")
@@ -110,7 +110,7 @@ def _text_block(block: Block, pictures: str) -> str:
 
 
 def _text_table(table: Table) -> str:
-    lines = [[column.title for column in table.columns]]
+    lines = [[column.heading for column in table.columns]]
     lines.append(["---:" if column.is_number else "---" for column in table.columns])
     for row in table.rows:
         cells = [table.in_one_cell(row, column) for column in table.columns]

@@ -61,19 +61,6 @@ def join_records(parts: list[Records]) -> Records:
     return Records(**{name: np.concatenate([part[name] for part in columns]) for name in columns[0]})
 
 
-def same_targets(records: Records, reference: Records) -> tuple[Records, Records]:
-    """The entries of two methods that ran on the same targets, in the same order.
-
-    Raises:
-        DataError: they share none.
-    """
-    key, other = (r.layout * 1_000_000 + r.target for r in (records, reference))
-    shared, ours, theirs = np.intersect1d(key, other, return_indices=True)
-    if len(shared) == 0:
-        raise DataError("records: the two methods share no target; run them on the same split and seed")
-    return records.select(ours), reference.select(theirs)
-
-
 def columns_of_records(records: Records) -> Columns:
     """The arrays by their names."""
     return {field.name: getattr(records, field.name) for field in fields(Records)}

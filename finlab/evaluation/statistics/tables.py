@@ -9,29 +9,14 @@ from finlab.evaluation.statistics.bootstrap import (
     Interval,
     mean_interval,
     quantile_interval,
-    ratio_interval,
     share_interval,
 )
-from finlab.evaluation.statistics.records import Records, same_targets
+from finlab.evaluation.statistics.records import Records
 
 Row = dict[str, Any]
 
 SUCCESS_LEVELS = (0.01, 0.05, 0.5, 1.0)
 """Levels t of `success@t`, the share of targets with `err_norm <= t`."""
-MET = 0.05
-"""Normalized error up to which a target counts as met when energies are compared."""
-FIN_COUNT_COLUMNS = (
-    "n",
-    "err_norm_mean",
-    "err_norm_median",
-    "err_norm_p95",
-    "success_0.01",
-    "energy_mean",
-    "power_mean",
-)
-"""Of `wrench_row`, in the table by number of fins."""
-ENERGY_COLUMNS = ("energy_mean", "energy_ratio", "cheaper", "resting")
-"""Columns without a value where no target was met by both."""
 
 
 def wrench_row(records: Records, *, split: str, method: str) -> Row:
@@ -68,43 +53,6 @@ def wrench_intervals(records: Records) -> dict[str, Interval]:
         "energy_mean": mean_interval(records.energy, group),
         "power_mean": mean_interval(records.power, group),
         **shares,
-    }
-
-
-def rows_by_fin_count(records: Records, *, method: str) -> list[Row]:
-    """Error and energy for each number of healthy fins (the paper's figure B as a table)."""
-    rows = []
-    for n_fins in np.unique(records.n_fins):
-        row = wrench_row(records.select(records.n_fins == n_fins), split="", method=method)
-        rows.append({"method": method, "fins": int(n_fins)} | {key: row[key] for key in FIN_COUNT_COLUMNS})
-    return rows
-
-
-def energy_rows(records: Records, reference: Records, *, method: str) -> list[Row]:
-    """Energy over the reference's on the targets that both met, and resting fins: one row per fin count, and
-    one over all of them, whose `fins` is "all"."""
-    ours, theirs = same_targets(records, reference)
-    both = (ours.err_norm <= MET) & (theirs.err_norm <= MET)
-    rows: list[Row] = []
-    for fins in [*np.unique(ours.n_fins).tolist(), "all"]:
-        chosen = both | True if fins == "all" else ours.n_fins == fins
-        a, b = ours.select(both & chosen), theirs.select(both & chosen)
-        row: Row = {"method": method, "fins": fins, "n": int(chosen.sum()), "met_by_both": len(a)}
-        row["success_0.01"] = float((ours.err_norm[chosen] <= 0.01).mean())
-        rows.append(row | (_energy_columns(a, b) if len(a) else dict.fromkeys(ENERGY_COLUMNS)))
-    return rows
-
-
-def _energy_columns(ours: Records, theirs: Records) -> Row:
-    """Energies and resting fins on targets that both met."""
-    ends = ratio_interval(ours.energy, theirs.energy, ours.layout)
-    return {
-        "energy_mean": float(ours.energy.mean()),
-        "energy_ratio": float(ours.energy.sum() / theirs.energy.sum()),
-        "energy_ratio_low": ends.low,
-        "energy_ratio_high": ends.high,
-        "cheaper": float((ours.energy < theirs.energy).mean()),
-        "resting": float(ours.resting.mean()),
     }
 
 

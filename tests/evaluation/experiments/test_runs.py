@@ -18,14 +18,12 @@ from finlab.evaluation.experiments.first_answers import (
     first_answer_rows,
 )
 from finlab.evaluation.experiments.latency import latency_rows, machine
-from finlab.evaluation.experiments.wrench_tracking import run_method, wrench_report, wrench_rows
+from finlab.evaluation.experiments.wrench_tracking import run_method
 from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.report.numbers import FORMATS
 from finlab.evaluation.report.sections.ablation import TITLES, ablation_blocks
 from finlab.evaluation.report.text import to_text
-from finlab.evaluation.splits import SPLITS, make_split
-from finlab.evaluation.statistics.records import load_columns, records_of_columns
-from finlab.evaluation.statistics.tables import wrench_row
+from finlab.evaluation.splits import make_split
 from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
 from finlab.physics import Plant
@@ -57,25 +55,17 @@ def statistics(tmp_path: Path) -> str:
     return str(folder)
 
 
-@pytest.mark.parametrize("single", [None, 2])
-def test_the_plant_scores(single: int | None) -> None:
+@pytest.mark.parametrize("first", [None, 2])
+def test_the_plant_scores(first: int | None) -> None:
     cases = make_split("failure", 3, 4, 11)
-    records = run_method(Idle(), cases, single=single)
+    records = run_method(Idle(), cases, first=first)
     expected = []
     for case in cases:
         command = case.layout.lower.copy()
         command[[name in case.failed for name in case.layout.names]] = np.nan
-        expected.append(NORMALIZATION.error(Plant(case.layout).wrench(command), case.targets[:single]))
+        expected.append(NORMALIZATION.error(Plant(case.layout).wrench(command), case.targets[:first]))
     np.testing.assert_allclose(records.err_norm, np.concatenate(expected))
     assert (records.solve_ms > 0).all()
-
-
-def test_report_shows_the_papers_figures_beside() -> None:
-    records = {"idle": run_method(Idle(), make_split("id", 3, 4, 11))}
-    report = wrench_report(records, "id")
-    assert "ours (printed in the paper)" in report and "0.0857" in report and "time of all targets" in report
-    assert wrench_rows(records, "id")[0]["n"] == 12
-    assert "one call at a time" in wrench_report(records, "limits", single=3)
 
 
 def test_latency_compares_with_search() -> None:
@@ -120,40 +110,6 @@ def test_the_ablation_has_the_papers_rows_twice() -> None:
         ] * 2
 
 
-def test_eval_wrench(statistics: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = tmp_path / "rows.json"
-    cases = ["--split", "limits", "--layouts", "2", "--targets", "3", "--seed", "1000"]
-    arguments = ["eval", "wrench", *cases, "--methods", "analytic,qp", "--checkpoint", statistics]
-    assert main([*arguments, "--json", str(file)]) == 0
-    rows = json.loads(file.read_text())["rows"]
-    assert [(row["split"], row["method"], row["n"]) for row in rows] == [
-        ("limits", "analytic", 6),
-        ("limits", "qp", 6),
-    ]
-    out = capsys.readouterr().out
-    assert "scored by the plant" in out and "where a rerun with another seed lands" in out
-    for row, ends in zip(rows, json.loads(file.read_text())["intervals"], strict=True):
-        low, high = ends["err_norm_mean"]
-        assert ends["method"] == row["method"] and low <= row["err_norm_mean"] <= high
-
-
-def test_eval_wrench_on_all_splits_keeps_records(
-    statistics: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    sizes = ["--split", "all", "--layouts", "1", "--targets", "3", "--subsample", "2"]
-    arguments = ["eval", "wrench", *sizes, "--methods", "qp,ipopt-1", "--checkpoint", statistics]
-    file, folder = tmp_path / "rows.json", tmp_path / "records"
-    assert main([*arguments, "--json", str(file), "--records", str(folder)]) == 0
-    rows = json.loads(file.read_text())["rows"]
-    pairs = [(split, method) for split in SPLITS for method in ("qp", "ipopt-1")]
-    assert [(row["split"], row["method"]) for row in rows] == pairs
-    assert {row["method"]: row["n"] for row in rows} == {"qp": 3, "ipopt-1": 2}
-    assert len(list(folder.iterdir())) == len(pairs)
-    columns, meta = load_columns(folder / "wrench-limits-qp.npz")
-    again = wrench_row(records_of_columns(columns), split="limits", method="qp")
-    assert again == rows[pairs.index(("limits", "qp"))] and meta["method"] == "qp"
-
-
 def test_eval_latency(statistics: str, capsys: pytest.CaptureFixture[str]) -> None:
     few = ["--methods", "analytic", "--calls", "3", "--robots", "1"]
     assert main(["eval", "latency", *few, "--checkpoint", statistics]) == 0
@@ -165,17 +121,6 @@ def test_eval_latency(statistics: str, capsys: pytest.CaptureFixture[str]) -> No
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ("wrench --methods nobody", "method: expected one of"),
-        ("wrench --methods ,", "methods: expected names with commas between"),
-        ("wrench --split nowhere --methods qp", "split: expected one of id, ood"),
-        ("wrench --layouts 0 --methods qp", "layouts: expected a number of at least 1, got 0"),
-        ("wrench --methods qp-3", "a number of starts, from 1, goes with ipopt only, got 'qp-3'"),
-        ("wrench --subsample 0 --methods qp", "subsample: expected a number of at least 1, got 0"),
-        ("wrench --single 0 --methods qp", "single: expected a number of at least 1, got 0"),
-        (
-            "wrench --methods qp --json missing/folder/rows.json",
-            "json: expected a file in an existing",
-        ),
         ("latency --fins 9 --methods qp", "fins: expected 2 to 5"),
     ],
 )

@@ -3,13 +3,10 @@
 import numpy as np
 import pytest
 
-from finlab.evaluation.experiments.wrench_tracking import energy_comparison
 from finlab.evaluation.paper_figures import paper_figures, paper_wrench_rows
-from finlab.evaluation.statistics.records import Records, join_records
+from finlab.evaluation.statistics.records import Records
 from finlab.evaluation.statistics.tables import (
-    energy_rows,
     format_cell,
-    rows_by_fin_count,
     text_table,
     wrench_intervals,
     wrench_row,
@@ -54,32 +51,12 @@ def test_row_of_known_errors() -> None:
     assert (row["solve_ms_p50"], row["solve_ms_p99"]) == (2.0, pytest.approx(3.96))
 
 
-def test_rows_by_fin_count() -> None:
-    both = join_records([_records([0.0, 0.02], 2), _records([1.0], 5)])
-    rows = rows_by_fin_count(both, method="qp")
-    assert [(row["fins"], row["n"], row["success_0.01"]) for row in rows] == [(2, 2, 0.5), (5, 1, 0.0)]
-
-
 def test_intervals_hold_their_means() -> None:
     records = _records([0.01, 0.05, 0.5, 1.0, 3.44])
     row, found = wrench_row(records, split="id", method="qp"), wrench_intervals(records)
     assert set(found) < set(row)
     assert all(low - 1e-9 <= row[column] <= high + 1e-9 for column, (low, high) in found.items())
     assert found["success_1.0"].high == 1.0 and found["success_0.01"].high < 1.0
-
-
-def test_energy_over_a_reference() -> None:
-    reference = _records([0.0, 0.0, 0.2, 0.0], energy=[1.0, 2.0, 9.0, 1.0])
-    ours = _records([0.0, 0.0, 0.0, 0.9], energy=[0.5, 2.5, 1.0, 1.0])
-    by_fins, whole = energy_rows(ours, reference, method="search")
-    assert (by_fins["fins"], whole["fins"]) == (3, "all")
-    # Only the first two targets are met by both.
-    assert (whole["n"], whole["met_by_both"]) == (4, 2)
-    assert whole["energy_ratio"] == pytest.approx(1.0) and whole["cheaper"] == 0.5
-    assert whole["resting"] == 1.0 and whole["success_0.01"] == 0.75
-    assert whole["energy_ratio_low"] <= 1.0 <= whole["energy_ratio_high"]
-    nothing = energy_rows(_records([1.0]), _records([0.0]), method="qp")[-1]
-    assert nothing["met_by_both"] == 0 and nothing["energy_ratio"] is None
 
 
 def test_paper_rows_have_our_columns() -> None:
@@ -106,16 +83,3 @@ def test_text_table_aligns_and_leaves_gaps() -> None:
 )
 def test_cells(value: object, text: str) -> None:
     assert format_cell(value) == text
-
-
-def test_energies_are_compared_with_the_most_starts_of_ipopt() -> None:
-    records = {
-        "search": _records([0.0, 0.0], energy=[2.0, 4.0]),
-        "ipopt": _records([0.0, 0.0], energy=[1.0, 1.0]),
-        "ipopt-32": _records([0.0], energy=[2.5]),
-    }
-    rows = energy_comparison(records)
-    assert {row["reference"] for row in rows} == {"ipopt-32"}
-    ours = next(row for row in rows if (row["method"], row["fins"]) == ("search", "all"))
-    assert ours["n"] == 1 and ours["energy_ratio"] == pytest.approx(0.8)
-    assert energy_comparison({"search": records["search"]}) == []

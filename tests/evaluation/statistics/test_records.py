@@ -16,7 +16,6 @@ from finlab.evaluation.statistics.records import (
     join_records,
     load_columns,
     records_of_columns,
-    same_targets,
     save_columns,
 )
 
@@ -46,15 +45,6 @@ def test_what_is_no_file_of_records_is_refused(tmp_path: Path) -> None:
     path.write_bytes(b"PK\x03\x04 cut off")
     with pytest.raises(DataError, match="delete it and run again"):
         load_columns(path)
-
-
-def test_the_same_targets_of_two_methods() -> None:
-    many = _records([0, 0, 0, 1, 1, 1], [0, 1, 2, 0, 1, 2], [0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
-    few = _records([0, 1], [1, 0], [10.0, 30.0])
-    ours, theirs = same_targets(many, few)
-    assert ours.err_norm.tolist() == [1.0, 3.0] and theirs.err_norm.tolist() == [10.0, 30.0]
-    with pytest.raises(DataError, match="share no target"):
-        same_targets(few, _records([5], [5], [0.0]))
 
 
 def test_join_and_select() -> None:

@@ -1,0 +1,136 @@
+"""An experiment is one value: what is asked, what is run, and the columns of its rows.
+
+The verb `finlab eval NAME`, its `--json FILE`, and the section of the report (question, table, picture, size)
+follow from it. Each module of `EXPERIMENTS` holds one under the name `experiment`, and is imported when it is
+asked for.
+"""
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from types import NoneType
+from typing import Any, get_args, get_type_hints
+
+from finlab.errors import DataError
+from finlab.evaluation.plots.style import Picture
+from finlab.evaluation.report.document import Block, Column, Figure, Row, Table
+
+EXPERIMENTS = {
+    "wrench": "wrench_tracking",
+}
+"""Name -> module in `finlab.evaluation.experiments`, in the order of the report."""
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A question, and how it is answered."""
+
+    name: str
+    """Of the verb and of the report's section."""
+    question: str
+    """One sentence, in Markdown, which is the help of the verb, too."""
+    columns: tuple[Column, ...]
+    """Of the table. Rows may have more keys, which are in the JSON alone; intervals [low, high] are under
+    `<key>_interval`."""
+    run: Callable[..., list[Row]]
+    """From keyword options to rows of plain values. The options of the verb are its parameters: their types
+    (int, float, bool, str, Literal, a tuple of str or int, each perhaps None), their defaults and their words
+    under `Args` in its docstring. An int whose default is 0 may be 0, any other is at least 1. A parameter
+    `layout` is given by position. Times depend on the machine; all other values on the options alone."""
+    note: str = ""
+    """How the columns are to be read, in Markdown."""
+    quick: Mapping[str, Any] = field(default_factory=dict)
+    """Options of the quick report where they differ from the defaults."""
+    full: Mapping[str, Any] = field(default_factory=dict)
+    """Options of the whole report where they differ from the defaults."""
+    each: str | None = None
+    """Option whose values, a tuple, may be run one by one: their rows follow each other."""
+    timed: bool = False
+    """Whether it measures time, so that nothing may run beside it."""
+    needs: tuple[str, ...] = ()
+    """Packages without which the report leaves it out."""
+    draw: Callable[[Sequence[Row]], Picture] | None = None
+    """Draws the picture from the rows; its module is imported there, since it needs matplotlib."""
+    caption: str = ""
+    """Of the picture."""
+    printed: Callable[[Sequence[Row]], list[Row]] | None = None
+    """Figures that the paper prints beside our rows, as rows that stand below them."""
+    less_is_better: tuple[str, ...] = ()
+    """Keys by which methods are compared, row by row: those that differ in `method` alone."""
+
+    def options(self) -> dict[str, inspect.Parameter]:
+        """The parameters of `run`, with their types resolved."""
+        types = get_type_hints(self.run, include_extras=True)
+        parameters = inspect.signature(self.run).parameters
+        return {name: each.replace(annotation=types[name]) for name, each in parameters.items()}
+
+    def check(self, chosen: Mapping[str, Any]) -> dict[str, Any]:
+        """All options: those chosen, and the defaults of the others.
+
+        Raises:
+            DataError: an unknown option, or a whole number below its least.
+        """
+        options = self.options()
+        if unknown := [name for name in chosen if name not in options]:
+            raise DataError(f"{self.name}: expected options among {', '.join(options)}, got {unknown[0]!r}")
+        values = {name: chosen.get(name, each.default) for name, each in options.items()}
+        for name, value in values.items():
+            least = 0 if options[name].default == 0 else 1
+            if isinstance(value, int) and not isinstance(value, bool) and value < least:
+                at_least = f"expected a number of at least {least}, got {value}"
+                raise DataError(f"{name.replace('_', '-')}: {at_least}")
+        return values
+
+    def rows(self, **chosen: Any) -> list[Row]:
+        """Run it; options as in `check`."""
+        return self.run(**self.check(chosen))
+
+    def parts(self, chosen: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """Options of runs whose rows, one after the other, are those of one run."""
+        values = self.check(chosen)
+        if self.each is None:
+            return [values]
+        return [values | {self.each: (value,)} for value in values[self.each]]
+
+    def table(self, rows: Sequence[Row]) -> Table:
+        """The rows of the default method stand out; below them are those that the paper prints."""
+        ours = [{**row, "_kind": "ours"} if str(row.get("method")) == "search" else row for row in rows]
+        printed = [] if self.printed is None else self.printed(rows)
+        return Table(self.columns, [*ours, *({**row, "_kind": "printed"} for row in printed)])
+
+    def words(self) -> list[Block]:
+        """Heading and question."""
+        return [f"## {self.name.capitalize()}", self.question]
+
+    def results(self, rows: Sequence[Row]) -> list[Block]:
+        """Picture, table and note."""
+        blocks: list[Block] = []
+        if self.draw is not None:
+            draw = self.draw
+            blocks.append(Figure(self.name, lambda: draw(rows), self.caption))
+        blocks.append(self.table(rows))
+        return [*blocks, f"*{self.note}*"] if self.note else blocks
+
+
+def is_list(kind: Any) -> bool:
+    """Whether the values of an option of this type are several."""
+    return any(getattr(part, "__origin__", part) is tuple for part in (kind, *get_args(kind)))
+
+
+def plain_type(kind: Any) -> Any:
+    """The type of an option, or of its items, without None."""
+    if is_list(kind):
+        kind = next(part for part in (kind, *get_args(kind)) if getattr(part, "__origin__", part) is tuple)
+        return get_args(kind)[0]
+    parts = [part for part in get_args(kind) if part is not NoneType]
+    return parts[0] if len(parts) == 1 and NoneType in get_args(kind) else kind
+
+
+def load_experiment(name: str) -> Experiment:
+    """The experiment of that name; `DataError` for an unknown one."""
+    if name not in EXPERIMENTS:
+        raise DataError(f"eval: expected one of {', '.join(EXPERIMENTS)}, got {name!r}")
+    found = import_module(f"finlab.evaluation.experiments.{EXPERIMENTS[name]}").experiment
+    assert isinstance(found, Experiment)
+    return found

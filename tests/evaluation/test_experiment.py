@@ -1,0 +1,88 @@
+"""An experiment is one value: the verb, its JSON, its errors and its table follow from it."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from finlab.cli import main
+from finlab.errors import DataError
+from finlab.evaluation.experiment import EXPERIMENTS, load_experiment
+from finlab.evaluation.report.text import to_text
+from finlab.evaluation.splits import SPLITS
+
+WRENCH = ["eval", "wrench", "--layouts", "2", "--targets", "3", "--methods", "analytic,qp"]
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_every_experiment_can_be_shown_and_made(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    experiment = load_experiment(name)
+    assert experiment.name == name and experiment.question.endswith((".", "?"))
+    keys = [column.key for column in experiment.columns]
+    assert len(set(keys)) == len(keys)
+    for options in (experiment.quick, experiment.full):
+        parts = experiment.parts(options)
+        assert parts and all(set(part) == set(experiment.options()) for part in parts)
+    assert main(["eval", name, "--help"]) == 0
+    shown = capsys.readouterr().out
+    assert all(
+        f"--{option.replace('_', '-')}" in shown for option in experiment.options() if option != "layout"
+    )
+    assert "--json" in shown
+
+
+def test_rows_table_and_json_are_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "rows.json"
+    assert main([*WRENCH, "--split", "limits", "--seed", "1000", "--json", str(file)]) == 0
+    text = capsys.readouterr().out
+    rows = json.loads(file.read_text())["rows"]
+    assert [(row["split"], row["method"], row["n"]) for row in rows] == [
+        ("limits", m, 6) for m in ("analytic", "qp")
+    ]
+    table = load_experiment("wrench").table(rows)
+    assert all(line in text for line in to_text(table).splitlines())
+    for row in rows:
+        low, high = row["err_norm_mean_interval"]
+        assert low <= row["err_norm_mean"] <= high
+    assert main([*WRENCH, "--split", "limits", "--seed", "1000", "--json", "-"]) == 0
+    again = json.loads(capsys.readouterr().out)["rows"]
+    assert [row["err_norm_mean"] for row in again] == [row["err_norm_mean"] for row in rows]
+
+
+def test_parts_make_the_whole() -> None:
+    experiment = load_experiment("wrench")
+    chosen = {"split": ("all",), "methods": ("qp",), "layouts": 1, "targets": 2}
+    parts = experiment.parts(chosen | {"split": tuple(SPLITS)[:3]})
+    whole = experiment.rows(**chosen | {"split": tuple(SPLITS)[:3]})
+    apart = [row for part in parts for row in experiment.rows(**part)]
+    assert [row["split"] for row in apart] == [row["split"] for row in whole] == list(SPLITS)[:3]
+    np.testing.assert_array_equal([r["err_norm_mean"] for r in apart], [r["err_norm_mean"] for r in whole])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("wrench --methods nobody", "method: expected one of"),
+        ("wrench --methods ,", "methods: expected names with commas between"),
+        ("wrench --split nowhere --methods qp", "split: expected one of id, ood"),
+        ("wrench --layouts 0 --methods qp", "layouts: expected a number of at least 1, got 0"),
+        ("wrench --subsample 0 --methods qp", "subsample: expected a number of at least 1, got 0"),
+        ("wrench --seed -1 --methods qp", "seed: expected a number of at least 0, got -1"),
+        (
+            "wrench --methods qp --json missing/folder/rows.json",
+            "json: expected a file in an existing folder",
+        ),
+    ],
+)
+def test_bad_input_is_one_sentence(arguments: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["eval", *arguments.split()]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("finlab: error: ") and message in error and error.count("\n") == 1
+
+
+def test_an_unknown_option_is_named() -> None:
+    with pytest.raises(DataError, match="wrench: expected options among layout, split"):
+        load_experiment("wrench").rows(fins=3)
+    with pytest.raises(DataError, match="eval: expected one of wrench"):
+        load_experiment("nothing")
