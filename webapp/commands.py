@@ -97,7 +97,6 @@ def commands(page: Page) -> list[Command]:
             for word in OBJECTIVES
         ),
         Command("Wrench", "Compare the methods", compare),
-        Command("Wrench", "Play the refinement", page.answering.play),
         Command("Wrench", "Stop the sweep", page.sweep.stop),
         Command("Swim", "Swim: pause or go on", swim_on, "B"),
         Command("Swim", "Swim: keep it to compare others with", page.swimming.keep),
@@ -108,12 +107,10 @@ def commands(page: Page) -> list[Command]:
             for view, key in (("3D", "1"), ("Top", "2"), ("Side", "3"), ("Front", "4"))
         ),
         Command("View", "Parallel lines, or perspective", partial(session.toggle, "parallel"), "5"),
-        Command("View", "Measure a distance, or stop it", partial(session.toggle, "measure"), "L"),
         Command("View", "Freeze or move the fins", partial(session.toggle, "frozen"), "P"),
         Command("View", "Show or hide the fin graph", partial(session.toggle, "graph")),
         Command("View", "Show or hide the centre of gravity", partial(session.toggle, "center")),
         Command("View", "Dark or light theme", partial(session.toggle, "dark")),
-        Command("View", "Presenter's view, or the usual one", partial(session.toggle, "large"), "V"),
         Command("Help", "Tour: start, or next stop", session.next_stop, "T"),
         *(
             Command("Help", f"Lesson: {lesson.title}", partial(session.open_lesson, lesson.name))

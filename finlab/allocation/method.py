@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.judging import REACHED
 from finlab.allocation.policy import Policy, largest_share
-from finlab.allocation.solution import Insight, Path, Solution
+from finlab.allocation.solution import Insight, Solution
 from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
@@ -115,20 +115,6 @@ class Method(ABC):
             AllocationError: the method proves none.
         """
         raise AllocationError(f"method {self.name!r} proves no lower bound of the cost; use method 'search'")
-
-    def path(
-        self, layout: Layout, wrench: ArrayLike, command: Array, policy: Policy, seed: int = 0
-    ) -> Path | None:
-        """How an answer came about, step by step; None for methods that do not tell.
-
-        Args:
-            layout: n fins that all work.
-            wrench: target (6,) [N, N m].
-            command: the answer (n, 3), or another way that the method has found.
-            policy: what was to be done if the target was out of reach.
-            seed: that of the answer.
-        """
-        return None
 
     def _solve_by(
         self, policy: Policy, layout: Layout, target: Array, *, seed: int, previous: Array | None

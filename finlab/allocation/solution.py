@@ -70,17 +70,6 @@ class Solution(NamedTuple):
     """Gives many refined answers to a single target, the chosen one first, by a wider search."""
 
 
-class Path(NamedTuple):
-    """How an answer of n fins that all work came about, in S steps."""
-
-    command: Array
-    """The command (S, n, 3) of each step, that of the answer last."""
-    names: tuple[str, ...]
-    """What each step is called."""
-    start: str
-    """Where it began, as `Candidates.source` says it."""
-
-
 class Insight(NamedTuple):
     """One target on a layout of n fins that all work; the mixture has M components."""
 

@@ -3,14 +3,13 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.sqp import Sqp
 from finlab.allocation.judging import costs
 from finlab.allocation.methods import METHODS
-from finlab.allocation.policy import Policy
-from finlab.allocation.solution import Candidates, Path, Solution
+from finlab.allocation.solution import Candidates, Solution
 from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
@@ -51,11 +50,6 @@ class StandIn(Allocator):
         samples = _ranked(layout, sampled, targets[0], chosen)
         candidates = _ranked(layout, refined, targets[0], np.arange(N_REFINED))
         return Solution(candidates.command[:1], candidates=lambda: candidates, samples=lambda: samples)
-
-    def path(self, layout: Layout, wrench: ArrayLike, command: Array, policy: Policy, seed: int = 0) -> Path:
-        """From a little less of everything to the answer."""
-        steps = np.stack([layout.lower + share * (command - layout.lower) for share in (0.8, 0.9, 0.98, 1.0)])
-        return Path(steps, ("start", "search, step 1", "refinement, step 1", "answer"), "component 1")
 
 
 def _ranked(layout: Layout, command: Array, target: Array, component: NDArray[np.int64]) -> Candidates:

@@ -111,7 +111,6 @@ def test_every_widget_survives_a_fault_in_what_it_does(
     "place",
     [
         "webapp.panels.limits_tab.ImprovePanel.refresh",
-        "webapp.panels.pilot.pad",
         "webapp.panels.damage.button_colors",
         "webapp.panels.hull_panel.hull_of",
         "webapp.panels.files_tab.python_lines",

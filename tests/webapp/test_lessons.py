@@ -10,7 +10,6 @@ from finlab.allocation import Allocation, load_allocator
 from finlab.errors import FinlabError
 from finlab.layout import load_layout
 from tests.webapp.hands import turn_fin
-from webapp.markup.first_sight import open_linked
 from webapp.markup.guide_cards import lesson_card
 from webapp.session import Session
 from webapp.session.lessons import BY_NAME, LESSONS
@@ -111,8 +110,3 @@ def test_the_card_says_what_to_do_and_praises_what_is_done() -> None:
         assert all(lesson.exercise in card for card in cards)
         assert [lesson.praise in card for card in cards] == [False, True]
     assert "Finish" in lesson_card(LESSONS[-1], True)
-
-
-def test_links_open_lessons_by_plain_names_alone() -> None:
-    assert all(len(f"lesson,{name},{10**13}") <= 60 for name in BY_NAME)
-    assert "/^[a-z-]{1,40}$/" in open_linked("lesson")

@@ -1,4 +1,4 @@
-"""Ways to ask: one axis alone, a stick that springs back, a sweep; and what is seen of a fin on its way."""
+"""Ways to ask: one axis alone, a sweep; and what is seen of a fin on its way."""
 
 import asyncio
 import math
@@ -35,35 +35,14 @@ def test_an_axis_alone_and_the_other_way_round(session: Session) -> None:
         session.set_only_axis(5)
 
 
-def test_a_stick_that_springs_back_leaves_no_trace(session: Session) -> None:
-    session.set_target(1, 0.25)
-    session.undo()
-    redo = session.history.redo_name
-    before, step = session.state, session.history.undo_name
-    for k in range(5):
-        session.steer({0: 0.5 * k, 5: -0.1 * k})
-    assert session.state.target[0] == 2.0
-    revision = session.revision
-    session.release(spring_back=True)
-    assert session.state == before and session.history.undo_name == step and session.revision > revision
-    assert redo is not None and session.history.redo_name == redo, "what was undone can still be redone"
-    session.steer({0: 3.0})
-    session.release(spring_back=False)
-    assert session.state.target[0] == 3.0 and session.history.undo_name == "Steer"
-    session.release(spring_back=True)
-    assert session.state.target[0] == 3.0, "nothing is held any more"
-    session.undo()
-    assert session.state == before
-
-
-def test_a_full_history_keeps_its_oldest_step_when_the_stick_springs_back(session: Session) -> None:
+def test_a_full_history_keeps_its_oldest_step_when_a_sweep_is_stopped(session: Session) -> None:
     for k in range(MAX_STEPS + 5):
         session.set_only_axis(k % 3)
     past = list(session.history.past)
     assert len(past) == MAX_STEPS
-    session.steer({0: 0.5})
-    session.steer({0: 0.6})
-    session.release(spring_back=True)
+    session.sweep_target(0, 0.5)
+    session.sweep_target(0, 0.6)
+    session.end_sweep()
     assert session.history.past == past
 
 

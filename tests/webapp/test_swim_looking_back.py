@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from finlab.errors import FinlabError
 from finlab.layout import Layout, load_layout
@@ -35,8 +34,7 @@ class Shelf:
         client = SimpleNamespace(send_file_download=lambda name, data, **_: self.sent.update({name: data}))
         context = page_of(self.worker, client=client, notify=lambda _, text: self.notes.append(text))
         self.swimming = Swimming(context, lambda: None)
-        self.told: list[float] = []
-        self.files = SwimFiles(context, self.swimming, lambda: self.told.append(self.files.share))
+        self.files = SwimFiles(context, self.swimming, lambda: None)
 
     def swim(self, seconds: float, *methods: str, scenario: str = "nominal", layout: Layout = UCAT) -> None:
         plan = Plan(layout, (), make_trajectory("circle"), methods, scenario=scenario)
@@ -190,36 +188,29 @@ def test_several_robots_are_sent_as_an_archive(shelf: Shelf) -> None:
     ]
 
 
-def test_pictures_and_films_are_made_beside_the_page(shelf: Shelf) -> None:
+def test_pictures_are_made_beside_the_page(shelf: Shelf) -> None:
     pytest.importorskip("matplotlib")
     shelf.swim(0.2, "analytic")
     with pytest.raises(FinlabError, match="too little"):
-        shelf.files.animation()
+        shelf.files.pictures()
     shelf.swim(2.0, "analytic")
     shelf.files.pictures()
     assert shelf.files.making.endswith("_plots.zip")
     with pytest.raises(FinlabError, match="is being made; wait for it"):
-        shelf.files.animation()
+        shelf.files.table()
     until(lambda: not shelf.files.making)
     archive = zipfile.ZipFile(io.BytesIO(shelf.sent["ucat_analytic_nominal_tracking_plots.zip"]))
     pictures = {name.rpartition("/")[2] for name in archive.namelist()}
     assert pictures == {"path.png", "errors.png", "commands.png", "wrench.png", "compared.png"}
-    shelf.told.clear()
-    shelf.files.animation()
-    until(lambda: not shelf.files.making)
-    film: Any = Image.open(io.BytesIO(shelf.sent["ucat_analytic_nominal_tracking.gif"]))
-    assert film.n_frames == 150
-    assert shelf.told[0] == 0.0 and shelf.told[-1] == 0.0 and len(shelf.told) > 10
-    assert max(shelf.told) > 0.9 and np.all(np.diff(shelf.told[:-1]) > 0)
 
 
 def test_what_fails_is_told(shelf: Shelf, monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: Any, **__: Any) -> bytes:
         raise FinlabError("the ink has dried")
 
-    monkeypatch.setattr("webapp.tasks.swim_files.animation", broken)
+    monkeypatch.setattr("webapp.tasks.swim_files.save_pictures", broken)
     shelf.swim(1.0, "analytic")
-    shelf.files.animation()
+    shelf.files.pictures()
     until(lambda: bool(shelf.notes))
     assert shelf.notes == ["the ink has dried"] and shelf.files.making == "" and not shelf.sent
 

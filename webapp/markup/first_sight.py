@@ -21,23 +21,6 @@ def tell(word: str) -> str:
     return send(FRAME, f"`{word},${{Date.now()}}`")
 
 
-def open_linked(key: str) -> str:
-    """A script that tells the frame what the page's address asks for: `?key=value` as `key,value`, once: a
-    reload goes on with what was made of it.
-
-    The channel may be there later than the script.
-    """
-    box = f"document.querySelector('div:has(>.{FRAME}) + div input')"
-    return (
-        f"(() => {{ const address = new URL(location.href), asked = address.searchParams.get('{key}');"
-        f" if (!asked || !/^[a-z-]{{1,40}}$/.test(asked)) return;"
-        f" const tellIt = () => {{ if (!{box}) return setTimeout(tellIt, 100);"
-        f" address.searchParams.delete('{key}'); history.replaceState(null, '', address);"
-        f" {tell(f'{key},${{asked}}')} }};"
-        " tellIt(); })();"
-    )
-
-
 def welcome() -> str:
     """The card of the first visit; `habits.js` shows it once."""
     tries = "".join(

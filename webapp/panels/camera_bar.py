@@ -1,4 +1,4 @@
-"""How the view is looked at: the axes as they stand, sides to look from, framing, parallel lines, a rule."""
+"""How the view is looked at: the axes as they stand, sides to look from, framing, parallel lines."""
 
 import viser
 
@@ -30,7 +30,6 @@ class CameraBar:
             for word, label, hint, pressed in (
                 ("frame", "Frame", "what is selected fills the view (F)", ""),
                 ("parallel", "Parallel", "no perspective (5)", _pressed(display.parallel)),
-                ("measure", "Measure", "click two points of hull or fins (L)", _pressed(display.measure)),
             )
         )
         rows = f"<div><div>{looks}</div><div>{switches}</div></div>"

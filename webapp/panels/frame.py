@@ -12,7 +12,7 @@ from importlib.resources import files
 import viser
 
 from webapp.handles import put
-from webapp.markup.first_sight import FRAME, open_linked, tell
+from webapp.markup.first_sight import FRAME, tell
 from webapp.markup.picking import add_channel, marker
 from webapp.page import Page, Panel
 from webapp.panels.places import DRAWER, LEFT, PLACES, REGIONS, RIGHT, SIMULATE, Place
@@ -45,9 +45,6 @@ NARROW = _sheet("narrow.css")
 _MEDIA = f"@media (max-width: 1099px) {{ {NARROW} }}"
 STYLE = f"<style>{_VARIABLES}{_sheet('style.css')}{_sheet('frame.css')}{_MEDIA}{_sheet('single.css')}</style>"
 """A style element, to be put into the page once."""
-_NESTED = NARROW.replace(":root", "&") + _sheet("large.css")
-LARGE = f"@media (min-width: 1000px) {{ :root {{ {_NESTED} }} }}"
-"""Rules of the presenter's view, which has little room for much type."""
 _SMALL = ("(max-width: 1340px)", "(max-height: 780px)")
 _SMALL_VIEW = ", ".join(f"(min-width: 720px) and {side}" for side in _SMALL)
 COMPACT = f"@media {_SMALL_VIEW} {{ :root {{ {_sheet('compact.css')} }} }}"
@@ -130,7 +127,7 @@ class Frame:
                     for index, place in enumerate(PLACES)
                     if place.region == region
                 ]
-        run_script(gui, HABITS + EARLY + TRIAD + NAMES + open_linked("lesson"))
+        run_script(gui, HABITS + EARLY + TRIAD + NAMES)
 
     @property
     def panels(self) -> tuple[list[Panel], list[Panel]]:
@@ -165,7 +162,6 @@ class Frame:
             "look": robot.look_from,
             "frame": lambda _: robot.frame(),
             "parallel": lambda _: session.toggle("parallel"),
-            "measure": lambda _: session.toggle("measure"),
         }
         if word[0] in acts and len(word) > 1:
             self._page.do(lambda: acts[word[0]](word[1]))
@@ -188,10 +184,9 @@ def _style(sections: list[Section], session: Session, plots: bool) -> str:
         "guide": session.guided,
     }
     variables = "".join(f"--has-{name}: {int(there)};" for name, there in counts.items())
-    size = LARGE if session.display.large else COMPACT
     height = LOW if not plots else TALL if task == SIMULATE else ""
     hidden = f"{', '.join(gone)} {{ display: none !important; }}"
-    return f"<style>:root {{ {variables} }} {size} {height} {hidden}</style>"
+    return f"<style>:root {{ {variables} }} {COMPACT} {height} {hidden}</style>"
 
 
 def _strip(task: str, opened: str, folded: bool, plots: bool) -> str:

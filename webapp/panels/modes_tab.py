@@ -9,7 +9,6 @@ from webapp.markup.mode_plot import SAMPLES, mode_plot
 from webapp.markup.modes import mode_table
 from webapp.markup.picking import add_channel, chosen_button, marker
 from webapp.markup.proposals import proposal_discs
-from webapp.markup.refinement import STEPS, way_table
 from webapp.markup.words import error_digits, three_digits
 from webapp.page import Page
 from webapp.session.state import CANDIDATE_RANGE, GAMMA_RANGE, TEMPERATURE_RANGE, knows_objective
@@ -56,23 +55,13 @@ class CandidatesPanel:
         self._drawn = Changes()
         with gui.add_folder("What the network proposes", expand_by_default=False) as self._proposals:
             self._discs = gui.add_html("")
-        hint = "From where it began to the mode that is shown, step by step."
         gui.add_html(marker("fl-column"))
-        self._play = page.add_button(
-            "Play the refinement", page.answering.play, icon=viser.Icon.PLAYER_PLAY, hint=hint
-        )
         self._table = gui.add_html("")
-        add_channel(gui, STEPS, self._show_step)
-        self._steps = gui.add_html("")
         self._origin = gui.add_html("")
 
     def _setting(self, key: str) -> float:
         """A setting in force; what the widget shows at first while the method has none of the kind."""
         return float(self._page.session.state.drawing.get(key, DRAWN[key]))
-
-    def _show_step(self, word: list[str]) -> None:
-        if word[0].isdecimal():
-            self._page.do(partial(self._page.answering.refinement.show, int(word[0])))
 
     def refresh(self) -> None:
         """Write settings and candidates."""
@@ -82,14 +71,10 @@ class CandidatesPanel:
         put(self._draws, visible=bool(drawing))
         for key, widget in self._settings.items():
             put(widget, visible=key in drawing)
-        put(self._play, visible=bool(page.answering.modes.shown))
         self._picker.refresh()
         answering, picker = page.answering, self._picker
         table = mode_table(answering.modes, answering.searching, picker.shown, picker.name)
         put(self._table, content=table)
-        refined = answering.refinement
-        way = refined.way if answering.is_refined else None
-        put(self._steps, content=way_table(way, refined.at), visible=way is not None)
         put(self._sample, content=_sample_words(page))
         answer, modes = answering.best, answering.modes
         put(self._proposals, visible=answer is not None and answer.samples is not None)

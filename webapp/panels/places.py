@@ -19,7 +19,6 @@ from webapp.panels.guide import GuidePanel
 from webapp.panels.hull_panel import HullPanel
 from webapp.panels.limits_tab import ImprovePanel, ReachPanel
 from webapp.panels.modes_tab import CandidatesPanel
-from webapp.panels.pilot import PilotPanel
 from webapp.panels.sweep import SweepPanel
 from webapp.panels.swim_tab import RunPanel, ScenarioPanel, SwimCardPanel
 from webapp.panels.timeline import Timeline
@@ -72,7 +71,6 @@ PLACES = (
     Place(LEFT, (ALLOCATE,), "Damage a fin", DamagePanel, folded=True),
     Place(RIGHT, (ALLOCATE,), "Wrench", TargetPanel),
     Place(RIGHT, (ALLOCATE,), "Asked and delivered", AnswerPanel),
-    Place(RIGHT, (ALLOCATE,), "Steer by hand", PilotPanel, folded=True),
     Place(DRAWER, (ALLOCATE,), "Candidates", CandidatesPanel),
     Place(DRAWER, (ALLOCATE,), "Comparison", ComparePanel),
     Place(DRAWER, (ALLOCATE,), "Sweep", SweepPanel),

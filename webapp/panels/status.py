@@ -4,7 +4,6 @@ import viser
 
 from webapp.handles import put
 from webapp.markup.corner import corner, swim_corner
-from webapp.markup.refinement import step_name
 from webapp.page import Page
 from webapp.scene.swim_scene import ARROWS_N
 
@@ -30,10 +29,7 @@ class Corner:
         page, answering = self._page, self._page.answering
         if page.swimming.swimmers:
             return swim_corner(page.swimming, ARROWS_N)
-        step, sample = answering.step, page.session.sample
-        instead = "" if sample is None else "Raw, not refined"
-        if step is not None:
-            instead = step_name(step.name)
+        instead = "" if page.session.sample is None else "Raw, not refined"
         reply = answering.reply
         return corner(
             page.session.state,

@@ -1,6 +1,7 @@
 """Let the robot swim: a scenario, a method or two, what goes wrong on the way, and what it took."""
 
 from functools import partial
+from html import escape
 from typing import Any
 
 import viser
@@ -183,12 +184,9 @@ class SwimCardPanel:
         files = {
             "Table (CSV)": page.swim_files.table,
             "Plots (PNG)": page.swim_files.pictures,
-            "Film (GIF)": page.swim_files.animation,
         }
-        page.add_buttons(
-            "Save", files, hint="The log with units, pictures, an animation; made on the server."
-        )
-        self._making = gui.add_progress_bar(0.0, visible=False)
+        page.add_buttons("Save", files, hint="The log with units, and pictures; made on the server.")
+        self._making = gui.add_html("")
 
     def refresh(self) -> None:
         """Write the figures, and whether the fins hold its weight at all."""
@@ -196,5 +194,5 @@ class SwimCardPanel:
         trim = trim_sentence(state.layout, axis_reach(state.able, state.failed))
         warning = "" if trim is None else f"<div class='fl missing'>{trim}</div>"
         put(self._card, content=swim_card(self._page.swimming, self._page.session.swim) + warning)
-        making = self._page.swim_files
-        put(self._making, visible=bool(making.making), value=round(100.0 * making.share, 1))
+        making = self._page.swim_files.making
+        put(self._making, content=f"<div class='fl dim'>making {escape(making)} …</div>" if making else "")

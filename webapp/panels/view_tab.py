@@ -17,17 +17,11 @@ SWITCHES = {
         "Fin graph",
         "Edges between working fins; with the method mdn, thick where its network lets one look at another.",
     ),
-    "mixture": (
-        "Mixture",
-        "Around each fin, in its plane of force: how dense the network's mixture is, and the samples "
-        "drawn from it (methods mdn and paper).",
-    ),
     "dimensions": ("Dimensions", "Coordinates of the selected fin."),
     "ghost": ("Ghost", "Where moved fins stood when the layout was opened or saved."),
     "center": ("Centre of gravity", "Mark it, and look through the hull."),
     "shadows": ("Shadows", "Slow without a graphics card."),
     "dark": ("Dark", "Dark theme."),
-    "large": ("Presenter’s view", "Type and strokes for the last row of a lecture hall (V)."),
 }
 """Field of `Display`, label and hint of each switch."""
 

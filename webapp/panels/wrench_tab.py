@@ -6,7 +6,7 @@ from html import escape
 import numpy as np
 import viser
 
-from finlab.allocation.policy import AXES
+from finlab.allocation.policy import AXES, KINDS
 from webapp.handles import Changes, put
 from webapp.markup.answer import fin_table, wrench_bars
 from webapp.markup.picking import marker
@@ -89,6 +89,12 @@ class TargetPanel:
         gui.add_html(marker("fl-reach"))
         self._sliders = [self._add_slider(gui, k) for k in range(6)]
         self._end = gui.add_html(marker("fl-reach-end"))
+        policies = "Come closest, keep the direction, or serve axes by priority, heave first."
+        page.bind(
+            gui.add_dropdown("Out of reach", KINDS, hint=policies),
+            partial(page.session.set_setting, "policy"),
+            lambda: page.session.state.policy,
+        )
         self._changes = Changes()
 
     def _add_slider(self, gui: viser.GuiApi, axis: int) -> viser.GuiSliderHandle[float]:

@@ -96,9 +96,6 @@ def quaternion(angle: float, axis: int) -> Array:
 class FinNode:
     """The nodes of the fin at one place of the layout. Made once; hidden while the layout has fewer fins."""
 
-    stroke = 1.0
-    """How many times as thick and large as usual arrow and label are."""
-
     def __init__(
         self,
         scene: viser.SceneApi,
@@ -170,7 +167,6 @@ class FinNode:
             put(self._move, position=np.array(fin.position))
             put(self._turn, wxyz=quaternion(fin.mounting_angle, 2))
         put(self._label, visible=label is not None, text=label or "", position=np.array([0.0, 0.0, 0.04]))
-        put(self._label, font_screen_scale=LABEL * self.stroke)
         shaft = np.array([math.cos(fin.mounting_angle), math.sin(fin.mounting_angle), 0.0])
         servo = np.array(fin.position) - 0.03 * shaft
         self._strut.show(_strut, servo, hull)
@@ -186,7 +182,7 @@ class FinNode:
             return
         self._fan.show(fin_mesh.sweep, float(command[0]))
         put(self._fan.node, wxyz=quaternion(float(command[2]), 0))
-        self.shapes.push(arrow, mounting_angle, 0.007 * self.stroke)
+        self.shapes.push(arrow, mounting_angle, 0.007)
 
 
 def _strut(servo: Array, hull: AnyHull) -> Mesh:

@@ -10,9 +10,7 @@ from finlab.layout import Fin, Layout
 from webapp.handles import put
 from webapp.markup.words import damage_words, missing_part
 from webapp.scene.fin_node import FinNode, Flapping
-from webapp.scene.force_planes import ForcePlanes
 from webapp.scene.gizmos import Grips
-from webapp.scene.measure import Measure
 from webapp.scene.meshes.hull import hull_of
 from webapp.scene.meshes.mesh import LONGEST_TURN
 from webapp.scene.overlays import Ghost, Lines, Overlay, moved_fins
@@ -47,8 +45,6 @@ class RobotScene:
         self._client, self._session, self._do = context.client, context.session, context.do
         scene, session = self._client.scene, self._session
         self._root = scene.add_frame("/robot", show_axes=False)
-        self.shown = True
-        """Whether it is on the screen; else a robot swims."""
         self._stage = Stage(scene, hull_of(session.state.layout))
         self._wrench = WrenchNodes(scene)
         self._lines = Lines(scene)
@@ -56,8 +52,6 @@ class RobotScene:
         self._proposed = Ghost(scene, "/robot/proposed", DELIVERED, None)
         self._landing = Ghost(scene, "/robot/landing", ASKED, 0.45)
         self._overlay = Overlay(scene)
-        self.planes = ForcePlanes(scene)
-        """What a network proposes, around the fins."""
         self._attainable = AttainableNodes(scene)
         self.grips = Grips(scene, session, self._do)
         """Handles of the asked wrench."""
@@ -73,13 +67,11 @@ class RobotScene:
         """Torque [N m] that half a turn of a ring stands for at the moment."""
         self.cut = False
         """Whether a ring is cut off."""
-        self._measure = Measure(scene, session)
         self._parallel = False
         self.look_from("3D")
 
     def show(self, visible: bool) -> None:
         """Show the robot that is designed, or make room for one that swims."""
-        self.shown = visible
         put(self._root, visible=visible)
         self._stage.show_floor(visible)
 
@@ -130,7 +122,6 @@ class RobotScene:
         hull = hull_of(state.layout)
         if display.parallel != self._parallel:
             self.aim(*self.camera)
-        self._measure.refresh(display.measure and self.shown, display.dark)
         if self.dragged is None:  # a hull that breathes with the fin one drags is hard to aim at
             # Glass within glass is not drawn; inside an attainable set the hull is a net.
             net, glass = display.drawn != "none", display.graph or display.center
@@ -143,9 +134,7 @@ class RobotScene:
             self.newtons = display.newtons or fitting_newtons(_largest(state, allocation), self.newtons)
         scale = LENGTH / self.newtons
         fits = allocation is not None and allocation.layout.names == state.layout.names
-        self._wrench.stroke = display.stroke
         for i, fin in enumerate(state.layout.fins):
-            self._fins[i].stroke = display.stroke
             selected = fin.name == self._session.selected
             label = _label(state, i, fin.name in self._session.selection) if display.labels else None
             if fin.name in state.hidden:

@@ -6,7 +6,6 @@ from finlab.allocation.allocation import Allocation
 from webapp.markup.corner import graph_row, legend, overlay_row, set_rows
 from webapp.scene.robot_scene import RobotScene
 from webapp.scene.swim_scene import SwimScene
-from webapp.scene.wrench_nodes import LENGTH
 from webapp.session.lessons import Lesson
 from webapp.session.swim_plan import SwimSettings
 from webapp.session.tour import STEPS
@@ -50,8 +49,6 @@ class Scenery:
         proposal = None if reply is None else reply.proposal
         other, display = self._overlaid(comparison), self._session.display
         self.robot.refresh(answering.shown, other, findings, offered, proposal)
-        drawn = answering.best if display.mixture else None
-        self.robot.planes.refresh(drawn, answering.modes, proposal, LENGTH / self.robot.newtons)
         self.swims = bool(self._swimming.swimmers)
         self.robot.show(not self.swims)
         self.legend = legend(

@@ -61,9 +61,6 @@ def fitting_torque(largest: float, current: float) -> float:
 class WrenchNodes:
     """Arrows and rings over a stalk that stands on the centre of gravity."""
 
-    stroke = 1.0
-    """How many times as thick and large as usual they and their number are."""
-
     def __init__(self, scene: viser.SceneApi) -> None:
         """Build the nodes, showing nothing."""
         self._root = scene.add_frame("/robot/wrench", show_axes=False)
@@ -106,21 +103,20 @@ class WrenchNodes:
         """
         put(self._root, position=self.hub(top))
         zero = np.zeros(3)
-        self._asked[0].show(force_arrow, target[:3] * scale, zero, 0.011 * self.stroke)
-        self._asked[1].show(torque_ring, target[3:] * turn, zero, 0.0085 * self.stroke)
+        self._asked[0].show(force_arrow, target[:3] * scale, zero, 0.011)
+        self._asked[1].show(torque_ring, target[3:] * turn, zero, 0.0085)
         given = np.zeros(6) if wrench is None else wrench
-        self._given[0].show(force_arrow, given[:3] * scale, zero, 0.0065 * self.stroke)
-        self._given[1].show(torque_ring, given[3:] * turn, zero, 0.005 * self.stroke)
+        self._given[0].show(force_arrow, given[:3] * scale, zero, 0.0065)
+        self._given[1].show(torque_ring, given[3:] * turn, zero, 0.005)
         self._tell(target[3:], turn)
-        self._missing[0].show(force_arrow, missing[:3] * scale, given[:3] * scale, 0.006 * self.stroke)
-        self._missing[1].show(torque_ring, missing[3:] * turn, zero, 0.005 * self.stroke, 1.35 * RING_RADIUS)
+        self._missing[0].show(force_arrow, missing[:3] * scale, given[:3] * scale, 0.006)
+        self._missing[1].show(torque_ring, missing[3:] * turn, zero, 0.005, 1.35 * RING_RADIUS)
 
     def _tell(self, torque: Array, turn: float) -> None:
         """The torque's size as a number beside its ring."""
         size = float(np.linalg.norm(torque))
         drawn = size * turn >= SMALLEST_TURN
         put(self._number, visible=drawn, text=f"{size:.3g} N m" if drawn else "")
-        put(self._number, font_screen_scale=0.8 * self.stroke)
 
 
 class AttainableNodes:

@@ -13,8 +13,6 @@ ANGLE_STEPS = {"off": 0.0, "5°": 5.0, "15°": 15.0, "45°": 45.0}
 """Grids [deg] that a mounting angle can snap to."""
 NEWTONS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """Forces [N] that an arrow of 0.1 m may stand for."""
-LARGE = 1.7
-"""How much thicker arrows, and larger labels, are in the presenter's view."""
 DRAWN: dict[str, Kind | None] = {"none": None, "forces": "force", "torques": "torque"}
 """What set can be drawn, by the word on its button."""
 
@@ -57,21 +55,10 @@ class Display:
     """Key of `DRAWN`: the attainable set that is shown."""
     alone: bool = True
     """Attainable forces without torques, torques without forces."""
-    mixture: bool = False
-    """Show what a network proposes, around the fins."""
     center: bool = False
     """Mark the centre of gravity."""
     parallel: bool = False
     """Parallel lines stay parallel in the view."""
-    measure: bool = False
-    """Clicks in the view measure distances."""
-    large: bool = False
-    """Type and strokes for the last row of a lecture hall."""
-
-    @property
-    def stroke(self) -> float:
-        """How many times as thick and large as usual arrows and labels of the view are."""
-        return LARGE if self.large else 1.0
 
     def with_value(self, key: str, value: Any) -> "Display":
         """One field changed; the page may send anything.

@@ -1,4 +1,4 @@
-"""Lessons: a link or the list of commands opens a prepared state with a sentence, a task and its check."""
+"""Lessons: the list of commands opens a prepared state with a sentence, a task and its check."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -43,7 +43,7 @@ class Lesson:
     """A prepared state, and what to do in it."""
 
     name: str
-    """In links: `?lesson=NAME`."""
+    """What commands call it."""
     title: str
     """What it is about."""
     text: str

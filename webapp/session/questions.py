@@ -7,13 +7,11 @@ from typing import Any
 from finlab.allocation.policy import AXES
 from finlab.errors import FinlabError
 from webapp.session.core import Core
-from webapp.session.state import AXIS_WORDS, State
+from webapp.session.state import AXIS_WORDS
 from webapp.session.targets import PRESETS, axis_reach
 
 SHARE = 0.25
 """Share of the largest wrench along an axis that its preset asks for."""
-STEER = "steer"
-"""Merge key of a wrench that is steered."""
 
 
 class Questions(Core):
@@ -25,27 +23,13 @@ class Questions(Core):
 
     def drag_target(self, first: int, vector: Sequence[float], over: bool) -> None:
         """Force (`first` 0) or torque (3) of the target in the user's hand; one step of undo for the drag."""
-        word, values = "force" if first == 0 else "torque", dict(enumerate(vector, start=first))
-        self._commit(f"Drag the {word}", self._aimed(values), f"drag {word}", timed=False)
+        state = self.state
+        for axis, value in enumerate(vector, start=first):  # as finely as a hand can mean them
+            state = state.with_target(axis, round(float(value), 2 if axis < 3 else 3))
+        word = "force" if first == 0 else "torque"
+        self._commit(f"Drag the {word}", state, f"drag {word}", timed=False)
         if over:
             self.history.end_merge()
-
-    def steer(self, values: dict[int, float]) -> None:
-        """Some components [N or N m] of the target under the user's thumb: one step of undo."""
-        self._commit("Steer", self._aimed(values), STEER, timed=False)
-
-    def _aimed(self, values: dict[int, float]) -> State:
-        """The state with some components [N or N m] of the target, as finely as a hand can mean them."""
-        state = self.state
-        for axis, value in values.items():
-            state = state.with_target(axis, round(float(value), 2 if axis < 3 else 3))
-        return state
-
-    def release(self, spring_back: bool) -> None:
-        """The thumb is off: the target stays, or goes back to what it was before without leaving a trace."""
-        if spring_back and self.history.merge_key == STEER and self.history.abandon():
-            self._settled()
-        self.history.end_merge()
 
     def sweep_target(self, axis: int, value: float) -> None:
         """One component of the target [N or N m] on its way through a range; one step of undo in all."""

@@ -4,11 +4,9 @@ import numpy as np
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
-from finlab.errors import FinlabError
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
 from webapp.tasks.mode_names import NO_MODES, Modes, same_mode
-from webapp.tasks.refinement import Refinement, Shown, Step
 from webapp.tasks.solver import Reply
 
 SEARCH_REST_S = 0.2
@@ -27,8 +25,6 @@ class Answering:
         loop, worker, solver = context.loop, context.workers.answers, context.solver
         self._answer = Newest(loop, worker, solver.reply, self._take)
         self._search = Newest(loop, worker, solver.modes, self._take_modes, SEARCH_REST_S)
-        self.refinement = Refinement(context)
-        """How what is shown came about."""
 
     @property
     def reply(self) -> Reply | None:
@@ -66,29 +62,7 @@ class Answering:
 
     @property
     def shown(self) -> Allocation | None:
-        """What is on the robot: a step of the refinement, or the answer with the chosen mode's or sample's
-        command."""
-        step = self.step
-        return self._end if step is None else step.answer
-
-    @property
-    def step(self) -> Step | None:
-        """The step of the refinement that is on the robot, None while none is."""
-        return self.refinement.step if self.is_refined else None
-
-    @property
-    def is_refined(self) -> bool:
-        """Whether the refinement that is known is that of what is chosen."""
-        of = self.refinement.of
-        return of is not None and of.reply is self.reply and of.place == self._place
-
-    @property
-    def _place(self) -> tuple[int, int | None]:
-        return self._session.mode, self._session.sample
-
-    @property
-    def _end(self) -> Allocation | None:
-        """The answer with the chosen mode's or sample's command."""
+        """What is on the robot: the answer with the chosen mode's or sample's command."""
         best, mode, sample = self.best, self._session.mode, self._session.sample
         if best is None:
             return None
@@ -109,29 +83,12 @@ class Answering:
         """Have the worker answer the present state, unless it was asked already."""
         self._answer.ask(self._session.state)
 
-    def play(self) -> None:
-        """Show step by step how the mode that is shown came about; a change of the question ends it.
-
-        Raises:
-            FinlabError: there is no answer to the present state yet, or it is the only one of its method.
-        """
-        if self.reply is None or self.busy:
-            raise FinlabError("there is no answer yet; wait for one")
-        modes = self.modes.shown
-        if not modes:
-            raise FinlabError(f"method {self.reply.answer.method!r} refines no candidates; use 'search'")
-        self._session.show_sample(None)
-        mode, end = min(self._session.mode, len(modes) - 1), self._end
-        assert end is not None
-        self.refinement.play(Shown(self.reply, self._place, end, f"Mode {mode + 1}, {modes[mode].name}"))
-
     def forget(self) -> None:
         """Nothing is known of the robot any more: another one was opened, or the page has gone."""
-        for task in (self._answer, self._search, self.refinement):
+        for task in (self._answer, self._search):
             task.forget()
 
     def _take(self) -> None:
-        self.refinement.forget()
         error = self._answer.error
         if self.reply is not None:
             self._search.ask(self.reply)

@@ -1,4 +1,4 @@
-"""A swim to take home: a table, pictures, an animation; made beside the page, which goes on."""
+"""A swim as files: a table, pictures; made beside the page, which goes on."""
 
 import io
 import tempfile
@@ -8,18 +8,14 @@ from functools import partial
 from pathlib import Path
 
 from finlab.errors import FinlabError
-from finlab.evaluation.plots.animation import animation
 from finlab.evaluation.plots.closed_loop_run import save_pictures
 from finlab.evaluation.plots.compared_runs import draw_compared
-from finlab.evaluation.plots.film import Swum
 from finlab.sim.log_csv import csv_of
 from webapp.session.files import file_stem
 from webapp.tasks.context import Context
 from webapp.tasks.recorded import Recorded
 from webapp.tasks.swimming import Swimming
 
-STEP = 0.05
-"""Share of a file after which the page is sent its progress."""
 SHORTEST = 5
 """Ticks of which pictures can be made."""
 
@@ -32,18 +28,16 @@ class SwimFiles:
         self._context, self._swimming, self._changed = context, swimming, changed
         self.making = ""
         """Name of the file that is being made; empty where there is none."""
-        self.share = 0.0
-        """How far that is, 0 to 1."""
 
     def table(self) -> None:
         """Send the log as CSV; an archive of them where there are several robots."""
         records = self._records()
         names = _names(records)
         if len(records) == 1:
-            self._make(f"{names[0]}.csv", lambda tell: csv_of(records[0].log).encode())
+            self._make(f"{names[0]}.csv", lambda: csv_of(records[0].log).encode())
             return
 
-        def archive(tell: Callable[[float], None]) -> bytes:
+        def archive() -> bytes:
             logs = zip(names, records, strict=True)
             return _archive({f"{name}.csv": csv_of(record.log).encode() for name, record in logs})
 
@@ -54,28 +48,18 @@ class SwimFiles:
         records = self._records()
         names = _names(records)
 
-        def made(tell: Callable[[float], None]) -> bytes:
+        def made() -> bytes:
             with tempfile.TemporaryDirectory() as place:
                 folder = Path(place)
-                for k, (name, record) in enumerate(zip(names, records, strict=True)):
+                for name, record in zip(names, records, strict=True):
                     (folder / name).mkdir()
                     save_pictures(record.log, folder / name)
-                    tell((k + 1) / (len(records) + 1))
                 logs = {words: record.log for words, record in zip(_words(records), records, strict=True)}
                 draw_compared(logs).save(folder / "compared.png")
                 files = sorted(folder.rglob("*.png"))
                 return _archive({str(path.relative_to(folder)): path.read_bytes() for path in files})
 
         self._make(f"{names[0]}_plots.zip", made)
-
-    def animation(self) -> None:
-        """Send the swim as an animated picture."""
-        records = self._records()
-        robots = [
-            Swum(words, record.log, record.layout)
-            for words, record in zip(_words(records), records, strict=True)
-        ]
-        self._make(f"{_names(records)[0]}.gif", lambda tell: animation(robots, progress=tell))
 
     def _records(self) -> tuple[Recorded, ...]:
         if self.making:
@@ -85,34 +69,27 @@ class SwimFiles:
             raise FinlabError(f"{short[0].method} has swum too little yet; let it swim for half a second")
         return records
 
-    def _make(self, name: str, make: Callable[[Callable[[float], None]], bytes]) -> None:
+    def _make(self, name: str, make: Callable[[], bytes]) -> None:
         """Have a worker make a file, and send it."""
-        loop, client = self._context.loop, self._context.client
-        self._tell(name, 0.0)
-        told = 0.0
-
-        def tell(share: float) -> None:
-            nonlocal told
-            if share - told >= STEP:
-                told = share
-                loop.post(partial(self._tell, name, share))
+        loop, context = self._context.loop, self._context
+        self._tell(name)
 
         def send(content: bytes) -> None:
-            self._tell("", 0.0)
-            client.send_file_download(name, content, save_immediately=True)
+            self._tell("")
+            context.client.send_file_download(name, content, save_immediately=True)
 
         def failed(text: str) -> None:
-            self._tell("", 0.0)
-            self._context.notify("Not exported", text)
+            self._tell("")
+            context.notify("Not exported", text)
 
-        self._context.workers.fits.submit(
+        context.workers.fits.submit(
             (id(self), "swim"),
-            lambda: loop.post(partial(send, make(tell))),
+            lambda: loop.post(partial(send, make())),
             lambda text: loop.post(partial(failed, text)),
         )
 
-    def _tell(self, name: str, share: float) -> None:
-        self.making, self.share = name, share
+    def _tell(self, name: str) -> None:
+        self.making = name
         self._changed()
 
 

@@ -5,14 +5,12 @@ from functools import lru_cache
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.judging import costs
 from finlab.allocation.learned.settings import STEPS, PaperSettings
-from finlab.allocation.policy import Policy
 from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
-from finlab.allocation.solution import Candidates, Path, Solution
+from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import AnyArray
 from finlab.inference.features import raw_features
 from finlab.inference.mixture import MixtureArrays
@@ -27,8 +25,6 @@ from finlab.physics.energy import EnergyMeter
 
 CHUNK = 250
 """Targets that are solved together; keeps memory flat for any number of targets."""
-TOLD_STEPS = (0, 2, 5, 10, 20, 40, 80, 120)
-"""Steps of Adam that a path tells: the first ones do most."""
 ADAM_RATE = 0.03
 """Adam's first step, in units of half a limit range; it falls to a twentieth of that."""
 ADAM_DECAY = (0.9, 0.999)
@@ -129,27 +125,6 @@ class PaperAllocator(Allocator):
             score = self._score(robot, sampled, wanted)
         return _take(sampled, np.argsort(score, axis=1, kind="stable")), wanted
 
-    def path(
-        self, layout: Layout, wrench: ArrayLike, command: AnyArray, policy: Policy, seed: int = 0
-    ) -> Path | None:
-        """The best so far after some of Adam's steps that led to a command (n, 3); None where it is not
-        Adam that refines, or another target than this wrench was refined for."""
-        settings, robot = self.settings, self._prepared(layout)
-        if settings.refinement != "adam" or settings.mean_only or policy.kind == "direction":
-            return None
-        seen: list[AnyArray] = []
-        with self._one_thread():
-            sampled, wanted = self._sampled(robot, np.asarray(wrench, dtype=float)[None], seed)
-            chosen = sampled[0, : settings.n_refined]
-            steps = STEPS["adam"] if settings.n_steps is None else settings.n_steps
-            self._adam(robot, chosen, wanted.repeat(len(chosen), axis=0), steps, seen)
-        ends = np.stack([_inside(robot, end) for end in seen[-1]])
-        k = int(np.abs(ends - command).max(axis=(1, 2)).argmin())
-        told = [step for step in TOLD_STEPS if step < steps]
-        begun = [_inside(robot, seen[step][k]) for step in told]
-        names = ["start" if step == 0 else f"Adam, step {step}" for step in told]
-        return Path(np.stack([*begun, command]), (*names, "answer"), "sample")
-
     def _prepare(self, layout: Layout) -> _Robot:
         surrogate, std = surrogate_on(layout, self.weights), self.normalization.std
         lower, upper = layout.lower, layout.upper
@@ -196,19 +171,11 @@ class PaperAllocator(Allocator):
             return np.concatenate(parts).reshape(shape)
         return refine(robot.problem, target, flat, steps, damping=LM_DAMPING).command.reshape(shape)
 
-    def _adam(
-        self,
-        robot: _Robot,
-        command: AnyArray,
-        target: AnyArray,
-        steps: int,
-        seen: list[AnyArray] | None = None,
-    ) -> AnyArray:
+    def _adam(self, robot: _Robot, command: AnyArray, target: AnyArray, steps: int) -> AnyArray:
         """Adam on J for commands (R, n, 3) and normalized targets (R, 6); the best step of each.
 
         It works in normalized coordinates, inside the limits, with a step that falls linearly. Zero
-        directions that turn fully go on beyond the seam. `seen` takes the best so far after each step, the
-        start first.
+        directions that turn fully go on beyond the seam.
         """
         lower, upper = robot.limits
         x, half = to_normalized(command, lower, upper), np.float32(0.5) * (upper - lower)
@@ -219,8 +186,6 @@ class PaperAllocator(Allocator):
             score, slopes = self._score_and_slopes(robot, to_command(x, lower, upper), target)
             better = score < least
             best[better], least[better] = x[better], score[better]
-            if seen is not None:
-                seen.append(to_command(best, lower, upper))
             if step == steps:
                 break
             gradient = half * slopes

@@ -12,25 +12,24 @@ from functools import lru_cache
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.in_time import in_time
-from finlab.allocation.judging import REACHED, effort_of, power_of
+from finlab.allocation.judging import effort_of, power_of
 from finlab.allocation.policy import Policy
 from finlab.allocation.question import usable_fins
 from finlab.allocation.search.pipeline import SEARCH, Pipeline
 from finlab.allocation.search.prepared import Prepared, resting_fins
 from finlab.allocation.search.refined_candidates import FallbackForces, RefinedCandidates, nearest_forces
-from finlab.allocation.search.replay import Starts, refined_path, replay
 from finlab.allocation.search.settings import Settings
-from finlab.allocation.solution import Candidates, Path, Solution
+from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array
 from finlab.errors import AllocationError
 from finlab.forces.compiled_fins import CompiledFins
 from finlab.forces.fin_sets import planar_sets
-from finlab.forces.force_space import PlanarProblem, polar, realize
+from finlab.forces.force_space import PlanarProblem
 from finlab.forces.nearest import Nearest, nearest, nearest_along, nearest_in_turn
 from finlab.inference.normalization import Normalization
 from finlab.inference.threads import single_threaded_products
@@ -201,29 +200,6 @@ class SearchAllocator(Allocator):
         return self.pipeline.bound(
             prepared, result.target, float(prepared.cost(result.command[None, fins.alive])[0])
         )
-
-    def path(self, layout: Layout, wrench: ArrayLike, command: Array, policy: Policy, seed: int = 0) -> Path:
-        """The search that led to a command (n, 3), step by step.
-
-        For a wrench that is out of reach it begins with the nearest one that is not, by the policy.
-        """
-        pipeline, std = self.pipeline, self.normalization.std
-        prepared, asked = pipeline.prepare(layout), np.asarray(wrench, dtype=float)
-        with self._one_thread():
-            if self.normalization.error(prepared.plant.wrench(command), asked) > REACHED:
-                served = _within_reach(prepared.planar, policy, asked / std)
-                start, _ = realize(prepared.planar, polar(prepared.planar, served.force))
-                begin = [("nearest within reach", prepared.commands.feasible(start)[0])]
-                return refined_path(prepared, served.wrench, begin, command, "what is within reach")
-            beginning = self._beginning(prepared, asked[None], seed)
-            names = _seed_names(layout)
-            seeds = pipeline.own_seeds(prepared) if beginning.seeds is None else beginning.seeds[0]
-            wide, works = pipeline.wide_seeds(prepared)
-            starts = (
-                Starts(seeds, beginning.names or names, pipeline.steps(layout.n_fins)),
-                Starts(wide, names, SEARCH.wide_steps, works),
-            )
-            return replay(pipeline, prepared, asked, command, starts)
 
     def _in_time(self, layout: Layout, target: Array, reference: Array) -> Array:
         return in_time(layout, target, reference, self.settings.period_s)
