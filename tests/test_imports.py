@@ -142,7 +142,7 @@ def _shortest_circles(graph: "nx.DiGraph[str]") -> list[list[str]]:
     return sorted(circles)
 
 
-KNOWN_CIRCLES = {"finlab.allocation.allocation", "finlab.physics.coupled_plant"}
+KNOWN_CIRCLES = {"finlab.physics.coupled_plant"}
 """Where circles are that still have to go, each by the first module of its shortest one; never add to it."""
 
 

@@ -1,24 +1,19 @@
 """What every allocation method answers: commands, what they give, and what is left undone."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.judging import REACHED, Judge, judge
-from finlab.allocation.modes import Mode, find_modes, force_sizes
 from finlab.allocation.policy import CLOSEST, Policy, describe_binding
 from finlab.allocation.solution import Candidates, PlainData
+from finlab.allocation.tables import allocation_html, allocation_text
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.arrays import layout_effectiveness
-
-if TYPE_CHECKING:
-    from finlab.allocation.allocator import Allocator
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -121,8 +116,6 @@ class Allocation(Answer):
     """Refined candidates, best first; None for methods that have a single answer."""
     samples: Candidates | None = None
     """Raw candidates before refinement, best first; None for methods that draw none."""
-    _allocator: Allocator | None = field(default=None, compare=False)
-    """Who answered; forgotten by copies and pickles."""
 
     @property
     def reachable(self) -> bool:
@@ -148,26 +141,7 @@ class Allocation(Answer):
         pull = (missing @ layout_effectiveness(self.layout)).reshape(-1, 2)
         return tuple(describe_binding(self.fins, self.command, self.layout.lower, self.layout.upper, pull))
 
-    def explore(self, allocator: Allocator | None = None) -> tuple[Mode, ...]:
-        """Distinct ways to deliver the wrench, the chosen one first, by a search of tens of milliseconds.
-
-        Methods that have a single answer know none.
-
-        Args:
-            allocator: the one that answered. It need not be given: the result remembers it, and a copy or a
-                pickle loads it again by method, checkpoint and settings.
-
-        Raises:
-            AllocationError: the allocator gives another answer, such as one of another checkpoint.
-            CheckpointError: the checkpoint is not among the shipped ones; hand over the allocator.
-        """
-        found = (allocator or self._allocator or self._loaded()).alternatives(self)
-        if found is None:
-            return ()
-        force = force_sizes(self.layout, found.command)
-        return find_modes(found, force, self.layout.lower, self.layout.upper, self.previous)
-
-    def with_command(self, command: Array) -> Allocation:
+    def with_command(self, command: Array) -> "Allocation":
         """The same question with another command (n, 3) in place of the answer, judged by the plant."""
         verdict = judge(self.layout, command[None], self.target[None], self.sigma)
         return replace(
@@ -182,20 +156,6 @@ class Allocation(Answer):
             wrench_surrogate=None,
         )
 
-    def _loaded(self) -> Allocator:
-        from finlab.allocation.methods import load_allocator
-        from finlab.errors import CheckpointError
-
-        try:
-            return load_allocator(self.method, checkpoint=self.checkpoint, **self.settings)
-        except CheckpointError as error:
-            raise CheckpointError(
-                f"{error}; hand over the allocator that answered: result.explore(allocator)"
-            ) from None
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_allocator": None}
-
     def __repr__(self) -> str:
         failed = f", failed={', '.join(self.failed)!r:.60}" if self.failed else ""
         return (
@@ -206,12 +166,8 @@ class Allocation(Answer):
         )
 
     def __str__(self) -> str:
-        from finlab.allocation.tables import allocation_text
-
         return allocation_text(self)
 
     def _repr_html_(self) -> str:
         """The table of the command line, for notebooks."""
-        from finlab.allocation.tables import allocation_html
-
         return allocation_html(self)

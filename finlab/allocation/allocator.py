@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from finlab.allocation.allocation import Allocation, BatchAllocation
 from finlab.allocation.judging import judge
 from finlab.allocation.method import Method
+from finlab.allocation.modes import Mode, find_modes, force_sizes
 from finlab.allocation.notes import fin_notes
 from finlab.allocation.policy import CLOSEST, Policy, as_policy
 from finlab.allocation.question import (
@@ -106,8 +107,20 @@ class Allocator(Method):
             notes=self._notes(fins.healthy),
             candidates=_made(solution.candidates, fins),
             samples=_made(solution.samples, fins),
-            _allocator=self,
         )
+
+    def explore(self, result: Allocation) -> tuple[Mode, ...]:
+        """Distinct ways to deliver the wrench of an answer, the chosen one first, by a search of tens of
+        milliseconds. Methods that have a single answer know none.
+
+        Raises:
+            AllocationError: the method, as it is set, gives another answer to that question.
+        """
+        found = self.alternatives(result)
+        if found is None:
+            return ()
+        force = force_sizes(result.layout, found.command)
+        return find_modes(found, force, result.layout.lower, result.layout.upper, result.previous)
 
     def alternatives(self, result: Allocation) -> Candidates | None:
         """Many refined answers to the question of a result, its own first, by a wide search.
@@ -126,7 +139,7 @@ class Allocator(Method):
         if not np.allclose(again, result.command, rtol=0.0, atol=SAME_COMMAND, equal_nan=True):
             raise AllocationError(
                 f"method {self.name!r} with checkpoint {self.checkpoint!r} gives another answer than this "
-                "one; hand over the allocator that answered: result.explore(allocator)"
+                "one; ask the allocator that answered, with its settings"
             )
         return _made(solution.alternatives or solution.candidates, fins)
 

@@ -6,9 +6,9 @@ from dataclasses import asdict, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from finlab.allocation.learned.settings import MdnSettings
-from finlab.allocation.search.settings import Settings
+from finlab.allocation.search.settings import SearchSettings
 from finlab.bundle_files import ABOUT, VERSION, Files
-from finlab.errors import DataError
+from finlab.errors import AllocationError, DataError
 from finlab.inference.normalization import Normalization
 from finlab.physics.energy import EnergyWeights
 
@@ -16,14 +16,10 @@ if TYPE_CHECKING:
     from finlab.allocation.search.search_allocator import SearchAllocator
 
 FORMAT = "finlab-bundle"
-METHODS_ON_BOARD: Mapping[str, type[Settings]] = {"search": Settings, "mdn": MdnSettings}
+METHODS_ON_BOARD: Mapping[str, type[SearchSettings]] = {"search": SearchSettings, "mdn": MdnSettings}
 """Methods that a bundle can answer with, and their settings."""
-AIM = {"objective": "power", "copper_loss": 0.0}
-"""What is kept least, beside the weights of the effort."""
-
-_CHOICES = {"objective": ("power", "effort")}
-_LARGEST = {"n_candidates": 4096, "n_refined": 256, "search_steps": 100, "refine_steps": 100}
-"""Largest settings that a robot accepts from a file; more would keep it from answering."""
+GONE = ("energy_tradeoff",)
+"""Settings that earlier bundles hold and that no method has any more."""
 
 
 class About(NamedTuple):
@@ -42,7 +38,7 @@ class About(NamedTuple):
         """Those settings that another method knows as well; none for methods that do not run on board."""
         if method not in METHODS_ON_BOARD:
             return {}
-        known = {"energy_weights", *AIM, *vars(METHODS_ON_BOARD[method]())}
+        known = METHODS_ON_BOARD[method].__dataclass_fields__
         return {name: value for name, value in self.settings.items() if name in known}
 
 
@@ -80,32 +76,24 @@ def read_about(files: Files, source: str) -> About:
         raise DataError(f"{place}: method must be one of {known}, got {method!r:.40}")
     if not isinstance(checkpoint, str | None) or not isinstance(values, dict):
         raise DataError(f"{place}: checkpoint must be a name and settings must be keys and values")
-    plain = {key: value for key, value in values.items() if key != "energy_weights"}
-    settings = _checked({**AIM, **vars(METHODS_ON_BOARD[method]())}, plain, f"{place}: settings")
-    weights = _checked(
-        vars(EnergyWeights()), values.get("energy_weights"), f"{place}: settings: energy_weights"
-    )
+    try:
+        settings = _settings(METHODS_ON_BOARD[method], values)
+    except (AllocationError, TypeError) as error:
+        raise DataError(f"{place}: settings: {error}") from None
     try:
         normalization = Normalization.parse(document.get("normalization"))
     except ValueError as error:
         raise DataError(f"{place}: {error}") from None
-    return About(method, checkpoint, normalization, {**settings, "energy_weights": EnergyWeights(**weights)})
+    return About(method, checkpoint, normalization, settings)
 
 
-def _checked(usual: Mapping[str, Any], values: Any, place: str) -> dict[str, Any]:
-    """Values by the same names as the usual ones, each of the kind that the usual one is."""
-    if not isinstance(values, Mapping) or set(values) != set(usual):
-        raise DataError(f"{place} must be {', '.join(usual)}")
-    for name, value in values.items():
-        if name in _CHOICES:
-            if value not in _CHOICES[name]:
-                raise DataError(f"{place}: {name} must be {' or '.join(_CHOICES[name])}, got {value!r:.40}")
-        elif isinstance(usual[name], bool):
-            if not isinstance(value, bool):
-                raise DataError(f"{place}: {name} must be true or false, got {value!r:.40}")
-        elif value is not None or usual[name] is not None:
-            kind = (int, float) if isinstance(usual[name], float) else int
-            largest = _LARGEST.get(name, 100)
-            if isinstance(value, bool) or not isinstance(value, kind) or not 0 <= value <= largest:
-                raise DataError(f"{place}: {name} must lie within 0..{largest}, got {value!r:.40}")
-    return dict(values)
+def _settings(kind: type[SearchSettings], values: dict[str, Any]) -> dict[str, Any]:
+    """Settings by name from what a file holds; an `AllocationError` or a `TypeError` where that is wrong."""
+    plain = {key: value for key, value in values.items() if key not in GONE}
+    weights = plain.pop("energy_weights", {})
+    if not isinstance(weights, dict):
+        raise TypeError(f"energy_weights: expected keys and values, got {weights!r:.40}")
+    known = kind.__dataclass_fields__
+    if unknown := [key for key in plain if key not in known]:
+        raise TypeError(f"expected {', '.join(known)}, got {unknown[0]!r:.40}")
+    return vars(kind(**plain, energy_weights=EnergyWeights(**weights)))

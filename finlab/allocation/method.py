@@ -2,8 +2,8 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
+from dataclasses import fields
 from functools import lru_cache
-from inspect import signature
 from typing import Any, Self
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from finlab.allocation.judging import REACHED
 from finlab.allocation.policy import Policy, largest_share
+from finlab.allocation.settings import Settings
 from finlab.allocation.solution import Insight, Solution
 from finlab.arrays import Array
 from finlab.errors import AllocationError
@@ -36,6 +37,10 @@ class Method(ABC):
     """The trained networks; None for methods without networks."""
     policy_under_way: str = "closest"
     """What a control loop asks for by default where a wrench is out of reach."""
+    settings_class: type[Settings] = Settings
+    """What can be set."""
+    settings: Settings = Settings()
+    """Present settings."""
     fin_model: FinModelSpec | None = None
     """Fin model that the networks have learned; None for methods that ask every fin's own model."""
 
@@ -46,12 +51,12 @@ class Method(ABC):
     @classmethod
     def option_names(cls) -> list[str]:
         """Names of what can be set when the method is made."""
-        return list(signature(cls).parameters)[1:]
+        return [field.name for field in fields(cls.settings_class)]
 
     @property
     def options(self) -> dict[str, Any]:
         """Present values of all that can be set, by name; `load_allocator` makes the same method of them."""
-        return {name: getattr(self, name) for name in self.option_names()}
+        return dict(vars(self.settings))
 
     def with_settings(self, **changes: Any) -> Self:
         """The same method with other settings. This one stays as it is; what it has loaded is shared.
@@ -60,10 +65,7 @@ class Method(ABC):
             AllocationError: the method knows no such setting, or cannot work with its value.
         """
         self.check_options(changes)
-        try:
-            return self._made_with({**self.options, **changes})
-        except (TypeError, AttributeError) as error:  # what a value of the wrong type meets first
-            raise AllocationError(f"method {self.name!r}: a setting has the wrong type ({error})") from error
+        return self._made_with({**self.options, **changes})
 
     @classmethod
     def check_options(cls, names: Iterable[str]) -> None:

@@ -47,7 +47,8 @@ METHODS: dict[str, tuple[str, str]] = {
     "analytic": ("finlab.allocation.baselines.analytic", "Analytic"),
     "ipopt": ("finlab.allocation.baselines.ipopt", "Ipopt"),
 }
-"""Name -> module and class; modules are loaded only when their method is asked for."""
+"""Name -> module and class; modules are loaded only when their method is asked for. The one list of methods:
+tests hold `Method` and the command line's words against it."""
 
 GONE = {
     "learned": "is now called 'search'",
@@ -156,12 +157,15 @@ def _made(
     options: Mapping[str, Any],
     compiled: CompiledFins | None = None,
 ) -> Allocator:
-    module, name = METHODS[method]
-    kind = getattr(import_module(module), name)
+    kind: Any = method_class(method)
     kind.check_options(options)
-    try:
-        known = {"compiled": compiled} if compiled and method in METHODS_ON_BOARD else {}
-        allocator: Allocator = kind(model, **options, **known)
-    except (TypeError, AttributeError) as error:  # what a value of the wrong type meets first
-        raise AllocationError(f"method {method!r}: a setting has the wrong type ({error})") from error
+    known = {"compiled": compiled} if compiled and method in METHODS_ON_BOARD else {}
+    allocator: Allocator = kind(model, **options, **known)
     return allocator
+
+
+def method_class(method: str) -> type[Allocator]:
+    """The class of a method in `METHODS`."""
+    module, name = METHODS[method]
+    kind: type[Allocator] = getattr(import_module(module), name)
+    return kind

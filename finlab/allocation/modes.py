@@ -5,21 +5,16 @@ fins rest and all others push about as hard in about the same direction, angles 
 round.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from finlab.allocation.solution import PlainData
+from finlab.allocation.solution import Candidates, PlainData
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
 from finlab.physics import plant_of
-
-if TYPE_CHECKING:
-    from finlab.allocation.solution import Candidates
 
 RESTING = 0.15
 """Share of the strongest fin's thrust below which a fin counts as resting."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.baselines.ipopt import Ipopt
+from finlab.allocation.baselines.ipopt import IpoptSettings
 from finlab.allocation.methods import LEARNED, load_allocator
 from finlab.errors import AllocationError
 from finlab.evaluation.ahead import AnalyticAhead
@@ -86,7 +86,8 @@ def load_method_spec(
                 f"methods: a number of starts, from 1, goes with {', '.join(SLOW)} only, got {name!r}"
             )
         # Each start has the time that it has in the method's default.
-        limit = Ipopt.time_limit_s * max(1.0, starts / Ipopt.n_starts)
+        usual = IpoptSettings()
+        limit = usual.time_limit_s * max(1.0, starts / usual.n_starts)
         options = {"n_starts": starts, "time_limit_s": limit}
     allocator = load_allocator(method, checkpoint=checkpoint, **options)
     chooses = objective is not None and "objective" in allocator.option_names()

@@ -10,6 +10,7 @@ import pytest
 
 from finlab.allocation import METHODS, Allocation, Allocator, Candidates, Solution, allocator, load_allocator
 from finlab.allocation.methods import Method
+from finlab.cli.allocate import allocate
 from finlab.errors import AllocationError, CommandError, LayoutError
 from finlab.inference.normalization import Normalization
 from finlab.layout import Fin, Layout
@@ -193,6 +194,17 @@ def test_unknown_methods_are_refused_with_the_names_that_exist() -> None:
     with pytest.raises(AllocationError) as caught:
         load_allocator("magic")
     assert str(caught.value) == f"method: expected one of {', '.join(METHODS)}, got 'magic'"
+
+
+@pytest.mark.parametrize("method", ["trf", "slsqp", "multistart", "fast"])
+def test_earlier_methods_are_refused_with_a_sentence(method: str) -> None:
+    with pytest.raises(AllocationError, match=f"method: '{method}' has gone; "):
+        load_allocator(method)
+
+
+def test_the_command_line_names_every_method() -> None:
+    words = str(allocate.__doc__)
+    assert all(name in words for name in METHODS)
 
 
 def test_the_method_comes_first_and_the_checkpoint_by_keyword() -> None:

@@ -59,7 +59,8 @@ def test_a_fin_rests_by_its_own_law() -> None:
     assert mode_signature(command, np.array([2.0, 0.0, 0.0])).resting == (1,)
     assert mode_signature(command, np.zeros(3)).resting == ()
     layout = load_layout("mixed")
-    for mode in load_allocator().allocate(layout, [1.2, 0, 0, 0, 0, 0.25]).explore():
+    allocator = load_allocator()
+    for mode in allocator.explore(allocator.allocate(layout, [1.2, 0, 0, 0, 0, 0.25])):
         force = force_sizes(layout, mode.command)
         assert mode.resting == tuple(np.flatnonzero(force < 0.15 * force.max()))
 
@@ -98,7 +99,7 @@ def test_modes_of_an_answer_deliver_the_wrench_in_different_ways(search: SearchA
     target = np.array([1.0, 0.5, 2.0, 0.0, 0.1, 0.1])
     before = search.allocate(layout, 0.9 * target).command
     result = search.allocate(layout, target, failed=["bow"], previous=before)
-    modes = result.explore()
+    modes = search.explore(result)
     assert len(modes) >= 2
     np.testing.assert_array_equal(modes[0].command, result.command)
     assert modes[0].energy == pytest.approx(result.energy) and modes[0].power == pytest.approx(result.power)
@@ -112,7 +113,8 @@ def test_modes_of_an_answer_deliver_the_wrench_in_different_ways(search: SearchA
 
 def test_a_method_with_one_answer_tells_no_modes() -> None:
     layout = load_layout(shipped_layouts()["A"])
-    assert load_allocator("analytic").allocate(layout, [1, 0, 0, 0, 0, 0]).explore() == ()
+    analytic = load_allocator("analytic")
+    assert analytic.explore(analytic.allocate(layout, [1, 0, 0, 0, 0, 0])) == ()
 
 
 def test_signatures_by_hand() -> None:

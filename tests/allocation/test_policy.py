@@ -28,7 +28,7 @@ FAR = (30.0, 5.0, 20.0, 1.0, 1.0, 1.0)
 HEAVY = (0.0, 0.0, 20.0, 3.0, 0.0, 0.0)
 SHALLOW = (30.0, 0.0, 6.0, 0.0, 0.0, 0.0)
 """Its heave alone can be delivered, the whole cannot."""
-PATIENT = ("trf", "slsqp", "ipopt", "multistart")
+PATIENT = ("trf", "slsqp", "ipopt", "sqp")
 """Methods of the table that are left to their own tests here."""
 
 

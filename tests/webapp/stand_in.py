@@ -1,6 +1,7 @@
 """An allocator that needs no trained network, with candidates and samples as method `mdn` has them."""
 
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,7 @@ from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.sqp import Sqp
 from finlab.allocation.judging import costs
 from finlab.allocation.methods import METHODS
+from finlab.allocation.settings import Settings, number
 from finlab.allocation.solution import Candidates, Solution
 from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
@@ -20,23 +22,30 @@ N_REFINED = 4
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class StandInSettings(Settings):
+    """What can be set of it."""
+
+    n_candidates: int = number(64, 1, 4096, "samples")
+    temperature: float = number(0.02, 0.0, 100.0, "width of the samples")
+    gamma: float = number(0.01, 0.0, 1.0, "without effect")
+
+
 class StandIn(Allocator):
     """Two starts of `sqp` as candidates, noise around them as samples."""
 
     name = "mdn"
 
-    def __init__(
-        self,
-        normalization: Normalization = NORMALIZATION,
-        *,
-        n_candidates: int = 64,
-        temperature: float = 0.02,
-        gamma: float = 0.01,
-    ) -> None:
+    settings_class = StandInSettings
+    settings: StandInSettings
+
+    def __init__(self, normalization: Normalization = NORMALIZATION, **settings: Any) -> None:
         """Settings as method `mdn` has them; the temperature widens the samples."""
-        self.normalization = normalization
-        self.n_candidates, self.temperature, self.gamma = n_candidates, temperature, gamma
+        self.normalization, self.settings = normalization, StandInSettings(**settings)
         self._inner = Sqp(NORMALIZATION, n_starts=2)
+
+    def _made_with(self, options: dict[str, Any]) -> Self:
+        return type(self)(self.normalization, **options)
 
     def _solve(self, layout: Layout, targets: Array, *, seed: int, previous: Array | None) -> Solution:
         if len(targets) > 1:  # a policy asks for many at once, and for commands alone
@@ -44,8 +53,10 @@ class StandIn(Allocator):
         starts = [self._inner._solve(layout, targets, seed=seed + k, previous=None) for k in range(N_REFINED)]
         refined = np.concatenate([start.command for start in starts])
         rng = np.random.default_rng(seed)
-        chosen = rng.integers(0, N_REFINED, self.n_candidates)
-        noise = rng.normal(size=(self.n_candidates, layout.n_fins, 3)) * (0.05 + self.temperature)
+        chosen = rng.integers(0, N_REFINED, self.settings.n_candidates)
+        noise = rng.normal(size=(self.settings.n_candidates, layout.n_fins, 3)) * (
+            0.05 + self.settings.temperature
+        )
         sampled = np.clip(refined[chosen] + noise * [0.5, 1.5, 2.0], layout.lower, layout.upper)
         samples = _ranked(layout, sampled, targets[0], chosen)
         candidates = _ranked(layout, refined, targets[0], np.arange(N_REFINED))

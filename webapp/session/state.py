@@ -4,11 +4,10 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib import import_module
 from typing import Any, get_args
 
 from finlab.allocation.learned.settings import MdnSettings, PaperSettings
-from finlab.allocation.methods import METHODS
+from finlab.allocation.methods import METHODS, method_class
 from finlab.allocation.policy import AXES, KINDS
 from finlab.errors import FinlabError
 from finlab.layout import Layout
@@ -219,8 +218,7 @@ class State:
 @cache
 def knows_objective(method: str) -> bool:
     """Whether a method keeps least what is asked; the others keep the paper's effort least."""
-    module, name = METHODS[method]
-    return "objective" in getattr(import_module(module), name).option_names()
+    return "objective" in method_class(method).option_names()
 
 
 def chosen(value: Any, name: str, choices: Iterable[str]) -> Any:

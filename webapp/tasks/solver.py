@@ -105,7 +105,7 @@ class Solver:
     def modes(self, reply: Reply) -> Modes:
         """All distinct ways to do what an answer does: a search of its own, tens of milliseconds."""
         answer = reply.answer
-        return listed_modes(judged_modes(answer, answer.explore()), answer.samples)
+        return listed_modes(judged_modes(answer, self.allocator(reply.state).explore(answer)), answer.samples)
 
     def solve(self, state: State) -> Allocation:
         """The answer to a state.

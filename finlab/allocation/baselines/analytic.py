@@ -4,11 +4,18 @@ from dataclasses import dataclass
 
 from finlab.allocation.baselines.model_based import ModelBased
 from finlab.allocation.baselines.pseudo_inverse import RCOND, PseudoInverse
+from finlab.allocation.settings import AimSettings, number
 from finlab.arrays import Array
 from finlab.physics import Plant
 
 
-@dataclass(eq=False, repr=False, kw_only=True)
+@dataclass(frozen=True)
+class AnalyticSettings(AimSettings):
+    """Settings of method `analytic`."""
+
+    rcond: float = number(RCOND, 0.0, 1.0, "singular values below this share of the largest count as zero")
+
+
 class Analytic(ModelBased):
     """Pseudo-inverse of the planar forces; failed fins have left with their two columns.
 
@@ -18,11 +25,11 @@ class Analytic(ModelBased):
     """
 
     name = "analytic"
-    rcond: float = RCOND
-    """Singular values below this share of the largest count as zero."""
+    settings_class = AnalyticSettings
+    settings: AnalyticSettings
 
     def _invert(self, plant: Plant) -> PseudoInverse:
-        return PseudoInverse(plant, self.normalization.std, self.aim, self.rcond)
+        return PseudoInverse(plant, self.normalization.std, self.aim, self.settings.rcond)
 
     def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
         return self._inverse(plant).command(targets)

@@ -13,10 +13,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from finlab.allocation.baselines.model_based import CACHE_SIZE, TimeLimit, TimeLimited
+from finlab.allocation.baselines.model_based import CACHE_SIZE, ModelBased, TimeLimit, TimeLimitedSettings
 from finlab.allocation.baselines.plant_in_casadi import plant_formulas, plant_in_casadi
+from finlab.allocation.settings import number
 from finlab.arrays import Array
 from finlab.errors import AllocationError
+from finlab.inference.normalization import Normalization
 from finlab.physics import PlanarLaw, Plant, make_law
 
 SOLVER_OPTIONS = {
@@ -46,8 +48,14 @@ class Formulas(NamedTuple):
     """A callback to be kept alive; None where there is none."""
 
 
-@dataclass(eq=False, repr=False, kw_only=True)
-class Ipopt(TimeLimited):
+@dataclass(frozen=True)
+class IpoptSettings(TimeLimitedSettings):
+    """Settings of method `ipopt`."""
+
+    n_starts: int = number(8, 0, 10_000, "random starts per target, beside the pseudo-inverse's answer")
+
+
+class Ipopt(ModelBased):
     """IPOPT on `err_norm^2 + cost` within the limits, exact derivatives by CasADi or the plant.
 
     The program is built once per layout with the target as its parameter. It is run from the pseudo-inverse's
@@ -59,20 +67,20 @@ class Ipopt(TimeLimited):
     """
 
     name = "ipopt"
-    n_starts: int = 8
-    """Uniform random starts per target, beside the pseudo-inverse's answer."""
+    settings_class = IpoptSettings
+    settings: IpoptSettings
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def __init__(self, normalization: Normalization, **settings: Any) -> None:
+        super().__init__(normalization, **settings)
         self._casadi = import_casadi()
         self._solver = lru_cache(CACHE_SIZE)(self._build)
 
     def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
-        random = plant.sample(np.random.default_rng(seed), (self.n_starts,))
+        random = plant.sample(np.random.default_rng(seed), (self.settings.n_starts,))
         first = self._inverse(plant).command(targets)
         result = np.empty((len(targets), plant.n_fins, 3))
         for i, target in enumerate(targets):
-            limit = TimeLimit(self.time_limit_s)
+            limit = TimeLimit(self.settings.time_limit_s)
             ends = [self._end(plant, target, first[i])]
             ends += [self._end(plant, target, start) for start in random if not limit.over]
             result[i] = ends[self._total(plant, np.array(ends), target).argmin()]
@@ -91,7 +99,7 @@ class Ipopt(TimeLimited):
         formulas = self._formulas(plant)
         objective = self._casadi.sumsqr(formulas.residual) + formulas.cost
         program = {"x": formulas.command, "p": formulas.target, "f": objective}
-        options = SOLVER_OPTIONS | formulas.options | {"ipopt.max_cpu_time": 0.5 * self.time_limit_s}
+        options = SOLVER_OPTIONS | formulas.options | {"ipopt.max_cpu_time": 0.5 * self.settings.time_limit_s}
         return self._casadi.nlpsol("allocation", "ipopt", program, options), formulas
 
     def _formulas(self, plant: Plant) -> Formulas:

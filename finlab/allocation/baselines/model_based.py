@@ -3,20 +3,19 @@
 import math
 import time
 from abc import abstractmethod
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.pseudo_inverse import PseudoInverse
 from finlab.allocation.command_cost import CommandCost, command_cost
+from finlab.allocation.settings import AimSettings, number
 from finlab.allocation.solution import Solution
 from finlab.arrays import Array
-from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
 from finlab.layout import Layout
 from finlab.physics import Plant, plant_of
-from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyWeights
-from finlab.physics.objective import Name, Objective
 
 ENERGY_TRADEOFF = 1e-4
 """Weight of the cost beside the squared normalized error where a method weighs both; see `command_cost`."""
@@ -40,25 +39,24 @@ class TimeLimit:
         return time.thread_time() > self._end
 
 
-@dataclass(eq=False, repr=False)
 class ModelBased(Allocator):
-    """A method that optimizes over the fins' own laws and tables, those that score every method.
+    """A method that optimizes over the fins' own laws and tables, those that score every method."""
 
-    All its fields but the first can be set.
-    """
+    settings_class: type[AimSettings] = AimSettings
 
-    normalization: Normalization
-    """The yardstick of the error; nothing else is taken from a checkpoint."""
-    _: KW_ONLY
-    objective: Name = "power"
-    """What is kept least: `power` in watts, or `effort`, the paper's energy proxy."""
-    energy_weights: EnergyWeights = DEFAULT_WEIGHTS
-    """Weights of the effort."""
-    copper_loss: float = 0.0
-    """Heat in a motor's windings [W/(N m)^2] that counts beside the mechanical power."""
+    def __init__(self, normalization: Normalization, **settings: Any) -> None:
+        """Make it.
 
-    def __post_init__(self) -> None:
-        self.aim = Objective(self.objective, self.energy_weights, self.copper_loss)
+        Args:
+            normalization: the yardstick of the error; nothing else is taken from a checkpoint.
+            settings: fields of the method's settings.
+
+        Raises:
+            AllocationError: a setting that the method cannot work with.
+        """
+        self.normalization = normalization
+        self.settings = chosen = self.settings_class(**settings)
+        self.aim = chosen.aim
         self._cost = lru_cache(CACHE_SIZE)(self._weigh)
         self._inverse = lru_cache(CACHE_SIZE)(self._invert)
 
@@ -91,17 +89,15 @@ class ModelBased(Allocator):
         return total
 
 
-@dataclass(eq=False, repr=False, kw_only=True)
-class TimeLimited(ModelBased):
-    """A slow method, which ends in time."""
+@dataclass(frozen=True)
+class TimeLimitedSettings(AimSettings):
+    """Settings of a slow method, which ends in time."""
 
-    time_limit_s: float = 0.6
-    """Processor time [s] per target after which the best command so far is the answer: with what a call does
-    besides, less than a second."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not self.time_limit_s > 0.0:
-            raise AllocationError(
-                f"time_limit_s: expected a number of seconds above 0, got {self.time_limit_s}"
-            )
+    time_limit_s: float = number(
+        0.6,
+        0.0,
+        3600.0,
+        "processor time per target after which the best command so far is the answer",
+        "s",
+        above=True,
+    )

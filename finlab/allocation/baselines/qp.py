@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
 from finlab.allocation.baselines.model_based import CACHE_SIZE, ModelBased
+from finlab.allocation.settings import AimSettings, number
 from finlab.arrays import Array
+from finlab.inference.normalization import Normalization
 from finlab.physics import Plant
 
 DIFFERENCE_STEP = 1e-4
@@ -31,7 +34,13 @@ class LinearMap:
         self.wrench = plant.wrench(self.reference)
 
 
-@dataclass(eq=False, repr=False, kw_only=True)
+@dataclass(frozen=True)
+class QpSettings(AimSettings):
+    """Settings of method `qp`."""
+
+    regularization: float = number(1.0, 0.0, 1e6, "weight of the distance from the middle of the limits")
+
+
 class Qp(ModelBased):
     """Linearized once per layout, solved per target by SciPy's active-set `lsq_linear(method="bvls")`.
 
@@ -41,11 +50,11 @@ class Qp(ModelBased):
     """
 
     name = "qp"
-    regularization: float = 1.0
-    """Weight of the distance from the middle of the limits."""
+    settings_class = QpSettings
+    settings: QpSettings
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def __init__(self, normalization: Normalization, **settings: Any) -> None:
+        super().__init__(normalization, **settings)
         self._map = lru_cache(CACHE_SIZE)(self._prepare)
 
     def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
@@ -53,7 +62,7 @@ class Qp(ModelBased):
         n_free = int(linear.free.sum())
         step = np.zeros((len(targets), linear.free.size))
         if n_free:
-            matrix = np.vstack([linear.matrix, np.sqrt(self.regularization) * np.eye(n_free)])
+            matrix = np.vstack([linear.matrix, np.sqrt(self.settings.regularization) * np.eye(n_free)])
             wanted = np.zeros((len(targets), 6 + n_free))
             wanted[:, :6] = (targets - linear.wrench) / self.normalization.std
             for i, right in enumerate(wanted):

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.allocation.baselines.box_least_squares import EXACTLY, BoxSettings, solve_box_quadratics
-from finlab.allocation.baselines.model_based import TimeLimit, TimeLimited
+from finlab.allocation.baselines.model_based import ModelBased, TimeLimit, TimeLimitedSettings
 from finlab.allocation.command_cost import CommandCost
+from finlab.allocation.settings import number
 from finlab.arrays import Array
 from finlab.physics import Plant
 
@@ -27,8 +28,20 @@ RIDGE = 1e-13
 solution must not be lost to rounding where fins are strong."""
 
 
-@dataclass(eq=False, repr=False, kw_only=True)
-class Sqp(TimeLimited):
+@dataclass(frozen=True)
+class SqpSettings(TimeLimitedSettings):
+    """Settings of method `sqp`."""
+
+    n_steps: int = number(30, 0, 10_000, "most steps per start on the error alone")
+    n_starts: int = number(
+        4, 1, 10_000, "starts per target beside the pseudo-inverse's: the middle of the limits, random ones"
+    )
+    regularization: float = number(
+        1e-4, 0.0, 1e6, "weight of a step's length, as a share of the squared error at the iterate"
+    )
+
+
+class Sqp(ModelBased):
     """Sequential quadratic programming after the paper's, all targets of a layout stepped together.
 
     The paper's solves for the normalized error alone. Here steps first lower J, the squared error and the
@@ -40,18 +53,14 @@ class Sqp(TimeLimited):
     """
 
     name = "sqp"
-    n_steps: int = 30
-    """Most steps per start on the error alone."""
-    n_starts: int = 4
-    """Starts per target beside the pseudo-inverse's answer: the middle of the limits, and random ones."""
-    regularization: float = 1e-4
-    """Weight of a step's length, as a share of the squared error at the iterate."""
+    settings_class = SqpSettings
+    settings: SqpSettings
 
     def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
         first = self._inverse(plant).command(targets)  # a fin is compiled once, which no target pays for
-        limit, cost = TimeLimit(self.time_limit_s * len(targets)), self._cost(plant)
+        limit, cost = TimeLimit(self.settings.time_limit_s * len(targets)), self._cost(plant)
         others = [(plant.lower + plant.upper) / 2]
-        others += [*plant.sample(np.random.default_rng(seed), (self.n_starts - 1,))]
+        others += [*plant.sample(np.random.default_rng(seed), (self.settings.n_starts - 1,))]
         starts = np.concatenate([first[:, None], np.tile(others, (len(targets), 1, 1, 1))], axis=1)
         many, n = len(others) + 1, plant.n_fins
         ends, error = self._from(
@@ -71,7 +80,7 @@ class Sqp(TimeLimited):
         command = start.copy()
         for first in range(0, len(targets), CHUNK):
             rows = slice(first, first + CHUNK)
-            for weight, n_steps in (*STAGES, (0.0, self.n_steps)):
+            for weight, n_steps in (*STAGES, (0.0, self.settings.n_steps)):
                 j = _J(plant, targets[rows], self.normalization.std, cost, weight)
                 command[rows] = self._descend(j, command[rows], n_steps, limit)
         return command, self.normalization.error(plant.wrench(command), targets)
@@ -85,7 +94,7 @@ class Sqp(TimeLimited):
             busy = busy[value[busy] > least]
             if not len(busy) or limit.over:
                 break
-            hessian, gradient = j.model(command[busy], busy, self.regularization)
+            hessian, gradient = j.model(command[busy], busy, self.settings.regularization)
             low, high = _room(j.plant, command[busy])
             step = solve_box_quadratics(hessian, gradient, low, high, exactness, lambda: limit.over)
             step = step.reshape(len(busy), -1, 3) * j.plant.width

@@ -1,6 +1,5 @@
 """The paper's own pipeline: sample the mixture, rank by the surrogate, refine with Adam. numpy only."""
 
-from dataclasses import fields
 from functools import lru_cache
 from typing import Any, NamedTuple, Self
 
@@ -54,6 +53,8 @@ class PaperAllocator(Allocator):
     """Mixture density network, physics-guided ranking and gradient refinement, by the printed equations."""
 
     name = "paper"
+    settings_class = PaperSettings
+    settings: PaperSettings
     weights: TrainedWeights
 
     def __init__(self, weights: TrainedWeights, **settings: Any) -> None:
@@ -70,16 +71,6 @@ class PaperAllocator(Allocator):
         self.network = NumpyNetwork(weights.network, self.config.heads, self.config.n_components)
         self._one_thread = single_threaded_products()
         self._prepared = lru_cache(maxsize=128)(self._prepare)
-
-    @classmethod
-    def option_names(cls) -> list[str]:
-        """Names of the settings."""
-        return [field.name for field in fields(PaperSettings)]
-
-    @property
-    def options(self) -> dict[str, Any]:
-        """Present settings, by name."""
-        return dict(vars(self.settings))
 
     def _made_with(self, options: dict[str, Any]) -> Self:
         return type(self)(self.weights, **options)

@@ -6,28 +6,21 @@ A test holds the typed options against the settings.
 from dataclasses import dataclass
 from typing import TypedDict
 
-import numpy as np
+from finlab.allocation.search.settings import SearchOptions, SearchSettings
+from finlab.allocation.settings import Settings, choice, number, switch
 
-from finlab.allocation.search.settings import SearchOptions, Settings
-from finlab.errors import AllocationError
+MOST_CANDIDATES = 4096
+"""Most candidates that may be drawn; more would keep a robot from answering."""
 
 
 @dataclass(frozen=True)
-class MdnSettings(Settings):
+class MdnSettings(SearchSettings):
     """How many ways the mixture proposes; each of them is searched."""
 
-    n_candidates: int = 16
-    """Number K of proposals: the components' means by falling weight, then samples of the mixture."""
-    temperature: float = 1.0
-    """What the variances of these samples are multiplied by; 1 draws from the mixture itself."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.n_candidates < 1 or not 0.0 <= self.temperature < np.inf:
-            raise AllocationError(
-                "method 'mdn' needs at least one candidate and a temperature from 0, got "
-                f"n_candidates={self.n_candidates}, temperature={self.temperature}"
-            )
+    n_candidates: int = number(
+        16, 1, MOST_CANDIDATES, "proposals K: the components' means by falling weight, then samples"
+    )
+    temperature: float = number(1.0, 0.0, 100.0, "what the variances of these samples are multiplied by")
 
 
 STEPS = {"none": 0, "adam": 160, "levenberg-marquardt": 20}
@@ -35,7 +28,7 @@ STEPS = {"none": 0, "adam": 160, "levenberg-marquardt": 20}
 
 
 @dataclass(frozen=True)
-class PaperSettings:
+class PaperSettings(Settings):
     """The stages of the paper's pipeline.
 
     What the paper does not print is a choice made here: gamma and the weights of J_en, Adam's rate, the
@@ -43,40 +36,15 @@ class PaperSettings:
     beyond the seam.
     """
 
-    n_candidates: int = 64
-    """Number K of candidates drawn from the mixture."""
-    temperature: float = 0.02
-    """T of the sampling; 0.02 in the paper."""
-    gamma: float = 1e-4
-    """Weight of the energy in J = J_norm + gamma J_en."""
-    n_refined: int = 4
-    """Best-ranked candidates that are refined."""
-    refinement: str = "adam"
-    """`adam`, `levenberg-marquardt` (ablation) or `none` (ablation)."""
-    n_steps: int | None = None
-    """Steps of the refinement; as in `STEPS` where None."""
-    warm_start: str = "mdn"
-    """`mdn` samples the mixture, `random` draws uniform commands (ablation)."""
-    ranking: str = "physics"
-    """`physics` ranks by J, `nll` by the mixture's likelihood (ablation)."""
-    mean_only: bool = False
-    """Take the mixture's mean and nothing else (ablation)."""
-
-    def __post_init__(self) -> None:
-        for key, known in (
-            ("refinement", tuple(STEPS)),
-            ("warm_start", ("mdn", "random")),
-            ("ranking", ("physics", "nll")),
-        ):
-            if getattr(self, key) not in known:
-                got = getattr(self, key)
-                raise AllocationError(f"{key}: expected one of {', '.join(known)}, got {got!r}")
-        if self.n_candidates < 1 or self.n_refined < 1 or not self.temperature >= 0.0:
-            raise AllocationError(
-                "method 'paper' needs at least one candidate and refined one and a temperature from 0, got "
-                f"n_candidates={self.n_candidates}, n_refined={self.n_refined}, "
-                f"temperature={self.temperature}"
-            )
+    n_candidates: int = number(64, 1, MOST_CANDIDATES, "candidates K drawn from the mixture")
+    temperature: float = number(0.02, 0.0, 100.0, "T of the sampling; 0.02 in the paper")
+    gamma: float = number(1e-4, 0.0, 1e6, "weight of the effort in J = J_norm + gamma J_en")
+    n_refined: int = number(4, 1, 256, "best-ranked candidates that are refined")
+    refinement: str = choice("adam", tuple(STEPS), "how candidates are refined; all but adam are ablations")
+    n_steps: int | None = number(None, 0, 10_000, "steps of the refinement; None for its usual number")
+    warm_start: str = choice("mdn", ("mdn", "random"), "where candidates come from; random is an ablation")
+    ranking: str = choice("physics", ("physics", "nll"), "by J, or by likelihood, which is an ablation")
+    mean_only: bool = switch(False, "take the mixture's mean and nothing else, which is an ablation")
 
 
 class MdnOptions(SearchOptions, total=False):

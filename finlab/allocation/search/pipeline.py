@@ -36,7 +36,7 @@ from finlab.allocation.search.refined_candidates import (
     refine_candidates,
     refine_missed,
 )
-from finlab.allocation.search.settings import Settings
+from finlab.allocation.search.settings import SearchSettings
 from finlab.arrays import Array
 from finlab.forces import force_space
 from finlab.forces.branch_and_bound import bound_by_branching
@@ -44,7 +44,6 @@ from finlab.forces.compiled_fins import CompiledFins
 from finlab.forces.cost_bound import cost_bound
 from finlab.layout import Layout
 from finlab.physics.fin_model import file_stamps
-from finlab.physics.objective import Objective
 
 
 @dataclass(frozen=True)
@@ -92,19 +91,17 @@ SEARCH = SearchNumbers()
 class Pipeline:
     """Answers targets on layouts without failures; every array is numpy's."""
 
-    def __init__(
-        self, std: Array, settings: Settings, objective: Objective, compiled: CompiledFins | None = None
-    ) -> None:
+    def __init__(self, std: Array, settings: SearchSettings, compiled: CompiledFins | None = None) -> None:
         """Make it for wrenches normalized by `std` (6,), with fins that are `compiled` already."""
-        self.std, self.objective = std, objective
-        self.settings = settings
+        self.std, self.settings = std, settings
+        self.objective = objective = settings.aim
         self._prepared = lru_cache(maxsize=128)(lambda layout, _: prepare(layout, std, objective, compiled))
 
     def prepare(self, layout: Layout) -> Prepared:
         """The layout, kept from the last time; force tables whose files have changed are read again."""
         return self._prepared(layout, file_stamps(layout))
 
-    def with_settings(self, settings: Settings) -> Pipeline:
+    def with_settings(self, settings: SearchSettings) -> Pipeline:
         """The same layouts prepared, with other settings."""
         other = copy(self)
         other.settings = settings

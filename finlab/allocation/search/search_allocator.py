@@ -7,7 +7,6 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
-from dataclasses import fields
 from functools import lru_cache
 from typing import Any, NamedTuple, Self
 
@@ -23,7 +22,7 @@ from finlab.allocation.question import usable_fins
 from finlab.allocation.search.pipeline import SEARCH, Pipeline
 from finlab.allocation.search.prepared import Prepared, resting_fins
 from finlab.allocation.search.refined_candidates import FallbackForces, RefinedCandidates, nearest_forces
-from finlab.allocation.search.settings import Settings
+from finlab.allocation.search.settings import SearchSettings
 from finlab.allocation.solution import Candidates, Solution
 from finlab.arrays import Array
 from finlab.errors import AllocationError
@@ -34,8 +33,7 @@ from finlab.forces.nearest import Nearest, nearest, nearest_along, nearest_in_tu
 from finlab.inference.normalization import Normalization
 from finlab.inference.threads import single_threaded_products
 from finlab.layout import Layout
-from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyWeights
-from finlab.physics.objective import Name, Objective
+from finlab.physics.objective import Objective
 
 CHUNK = 512
 """Targets that are solved together; keeps memory flat for any number of targets."""
@@ -59,62 +57,42 @@ class SearchAllocator(Allocator):
     # A smaller wrench in the same direction still turns a robot to where it should go; the nearest one may
     # only push it on.
     policy_under_way = "direction"
-    settings_class: type[Settings] = Settings
+    settings_class = SearchSettings
+    settings: SearchSettings
 
     def __init__(
-        self,
-        normalization: Normalization,
-        *,
-        objective: Name = "power",
-        energy_weights: EnergyWeights = DEFAULT_WEIGHTS,
-        copper_loss: float = 0.0,
-        compiled: CompiledFins | None = None,
-        **settings: Any,
+        self, normalization: Normalization, *, compiled: CompiledFins | None = None, **settings: Any
     ) -> None:
         """Make it.
 
         Args:
             normalization: the yardstick of the error; nothing else is taken from a checkpoint.
-            objective: what is kept least: `power` in watts, or `effort`, the paper's energy proxy.
-            energy_weights: weights of the effort.
-            copper_loss: heat in a motor's windings [W/(N m)^2] that counts beside the mechanical power.
             compiled: fins that need not be compiled here, such as those in a bundle.
-            settings: fields of `Settings`.
+            settings: fields of the method's settings.
 
         Raises:
             AllocationError: a setting that no search can work with.
         """
         self.normalization = normalization
-        self.objective = Objective(objective, energy_weights, copper_loss)
         self.settings = self.settings_class(**settings)
         self.compiled = compiled or {}
         """Compiled fins that came with the allocator."""
-        self.pipeline = Pipeline(normalization.std, self.settings, self.objective, self.compiled)
+        self.pipeline = Pipeline(normalization.std, self.settings, self.compiled)
         # All products here are too small to be shared among threads; chunks of targets are not.
         self._one_thread = single_threaded_products()
 
-    @classmethod
-    def option_names(cls) -> list[str]:
-        """Names of the settings."""
-        own = [field.name for field in fields(cls.settings_class)]
-        return ["objective", "energy_weights", "copper_loss", *own]
-
     @property
-    def options(self) -> dict[str, Any]:
-        """Present settings, by name."""
-        aim = self.objective
-        chosen = {"objective": aim.name, "energy_weights": aim.weights, "copper_loss": aim.copper_loss}
-        return {**chosen, **vars(self.settings)}
+    def objective(self) -> Objective:
+        """What is kept least."""
+        return self.pipeline.objective
 
     def _made_with(self, options: dict[str, Any]) -> Self:
-        aim = Objective(*(options.pop(k) for k in ("objective", "energy_weights", "copper_loss")))
         other = copy(self)
         other.settings = self.settings_class(**options)
-        if aim == self.objective:  # what is known of layouts does not depend on the other settings
+        if other.settings.aim == self.objective:  # all that is known of layouts depends on nothing else
             other.pipeline = self.pipeline.with_settings(other.settings)
         else:
-            other.objective = aim
-            other.pipeline = Pipeline(self.normalization.std, other.settings, aim, self.compiled)
+            other.pipeline = Pipeline(self.normalization.std, other.settings, self.compiled)
         return other
 
     def _solve(

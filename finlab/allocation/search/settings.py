@@ -4,49 +4,26 @@ A test holds the typed options against the settings.
 """
 
 from dataclasses import dataclass
-from typing import TypedDict
 
-from finlab.errors import AllocationError
-from finlab.physics.energy import EnergyWeights
-from finlab.physics.objective import Name
+from finlab.allocation.settings import AimOptions, AimSettings, number, switch
 
 
 @dataclass(frozen=True)
-class Settings:
+class SearchSettings(AimSettings):
     """How widely and how long the search goes."""
 
-    n_refined: int = 4
-    """Allocations that are refined and offered as candidates."""
-    search_steps: int | None = None
-    """Quadratic problems solved in turn by the search in force space; None: as many as the objective and the
-    number of fins ask for."""
-    refine_steps: int = 1
-    """Levenberg-Marquardt steps on the commands, by the fins' own laws."""
-    subsets: bool = True
-    """Whether allocations that rest some fins are searched, where the objective may prefer them; of many fins
-    also near the best that any method began with."""
-    period_s: float = 0.1
-    """Time between ticks [s], by which the previous command is taken to be old."""
-
-    def __post_init__(self) -> None:
-        if (
-            self.n_refined < 1
-            or self.refine_steps < 0
-            or (self.search_steps is not None and self.search_steps < 1)
-        ):
-            raise AllocationError(
-                "method 'search' needs at least one refined answer, one step of search and no negative "
-                f"number of refining steps, got n_refined={self.n_refined}, "
-                f"search_steps={self.search_steps}, refine_steps={self.refine_steps}"
-            )
+    n_refined: int = number(4, 1, 256, "allocations that are refined and offered as candidates")
+    search_steps: int | None = number(
+        None, 1, 100, "quadratic problems of the search in force space; None for as many as are needed"
+    )
+    refine_steps: int = number(1, 0, 100, "Levenberg-Marquardt steps on the commands, by the fins' own laws")
+    subsets: bool = switch(True, "whether allocations that rest some fins are searched for effort")
+    period_s: float = number(0.1, 0.0, 1000.0, "time between ticks", "s", above=True)
 
 
-class SearchOptions(TypedDict, total=False):
+class SearchOptions(AimOptions, total=False):
     """Settings of the method `search`."""
 
-    objective: Name
-    energy_weights: EnergyWeights
-    copper_loss: float
     n_refined: int
     search_steps: int | None
     refine_steps: int

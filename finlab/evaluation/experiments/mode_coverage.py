@@ -63,7 +63,7 @@ def _compare(
     plant = plant_of(layout)
     ends, _ = ways.ends(layout, target, n_starts, seed)
     truth = ends[[group[0] for group in cluster(_signatures(layout, ends))]]
-    mine = np.array([mode.command for mode in allocator.allocate(layout, target).explore()])
+    mine = np.array([mode.command for mode in allocator.explore(allocator.allocate(layout, target))])
     if not len(truth) or not len(mine):
         return None
     meter = ways.objective.meter(plant)

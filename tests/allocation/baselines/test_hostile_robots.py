@@ -61,7 +61,7 @@ def test_when_the_time_is_up_the_best_so_far_is_the_answer() -> None:
 
 
 def test_a_time_limit_is_a_time() -> None:
-    with pytest.raises(AllocationError, match="time_limit_s: expected a number of seconds above 0, got 0"):
+    with pytest.raises(AllocationError, match="time_limit_s: expected a number above 0 up to 3600 s, got 0"):
         Sqp(NORMALIZATION, time_limit_s=0.0)
 
 

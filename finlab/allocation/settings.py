@@ -1,0 +1,131 @@
+"""What can be set of a method: one frozen dataclass for each, whose fields carry range, unit and meaning.
+
+All that asks for settings (a call, a bundle, the app) makes such an object, which checks itself.
+"""
+
+from dataclasses import Field, dataclass, field, fields
+from numbers import Integral, Real
+from typing import Any, NamedTuple, TypedDict
+
+from finlab.errors import AllocationError
+from finlab.physics.energy import DEFAULT_WEIGHTS, EnergyWeights
+from finlab.physics.objective import Name, Objective
+
+LARGEST_WEIGHT = 100.0
+"""Largest weight of a term of the effort."""
+
+
+class Range(NamedTuple):
+    """What a setting may be."""
+
+    low: float
+    """Least value; a whole number where only whole numbers are meant."""
+    high: float
+    """Largest value."""
+    meaning: str
+    """What it is, in words."""
+    unit: str = ""
+    """Its unit."""
+    above: bool = False
+    """Whether the least value itself is too little."""
+
+    def __str__(self) -> str:
+        kind = "a whole number" if isinstance(self.low, int) else "a number"
+        first, then = ("above", "up to") if self.above else ("from", "to")
+        return f"{kind} {first} {self.low:g} {then} {self.high:g} {self.unit}".rstrip()
+
+
+def number(
+    default: float | None, low: float, high: float, meaning: str, unit: str = "", *, above: bool = False
+) -> Any:
+    """A field that is a number within a range, a whole one where `low` is; None is allowed where it is the
+    default."""
+    return field(default=default, metadata={"range": Range(low, high, meaning, unit, above)})
+
+
+def choice(default: str, choices: tuple[str, ...], meaning: str) -> Any:
+    """A field that is one of some words."""
+    return field(default=default, metadata={"choices": choices, "meaning": meaning})
+
+
+def switch(default: bool, meaning: str) -> Any:
+    """A field that is true or false."""
+    return field(default=default, metadata={"meaning": meaning})
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of a method that has none; base of all others.
+
+    Raises:
+        AllocationError: a value of the wrong kind, or out of its range.
+    """
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            object.__setattr__(self, each.name, _checked(each, getattr(self, each.name)))
+
+
+def _checked(setting: "Field[Any]", value: Any) -> Any:
+    """The value of a field, of the kind that is meant."""
+    name, choices, limits = setting.name, setting.metadata.get("choices"), setting.metadata.get("range")
+    expected = None
+    if choices is not None:
+        expected = None if value in choices else f"one of {', '.join(choices)}"
+    elif limits is not None:
+        return _within(setting, limits, value)
+    elif isinstance(setting.default, EnergyWeights):
+        return _weights(name, value)
+    elif not isinstance(value, bool):
+        expected = "true or false"
+    if expected is not None:
+        raise AllocationError(f"{name}: expected {expected}, got {value!r:.60}")
+    return value
+
+
+def _within(setting: "Field[Any]", limits: Range, value: Any) -> float | None:
+    if value is None and setting.default is None:
+        return None
+    whole = isinstance(limits.low, int)
+    if not isinstance(value, bool) and isinstance(value, Integral if whole else Real):
+        kept = int(value) if whole else float(value)
+        if limits.low <= kept <= limits.high and not (limits.above and kept == limits.low):
+            return kept
+    raise AllocationError(f"{setting.name}: expected {limits}, got {value!r:.60} ({limits.meaning})")
+
+
+def _weights(name: str, value: Any) -> EnergyWeights:
+    if not isinstance(value, EnergyWeights):
+        raise AllocationError(f"{name}: expected EnergyWeights, got {value!r:.60}")
+    for key, weight in vars(value).items():
+        good = isinstance(weight, Real) and not isinstance(weight, bool) and 0.0 <= weight <= LARGEST_WEIGHT
+        if not good:
+            raise AllocationError(
+                f"{name}: {key} must be a number from 0 to {LARGEST_WEIGHT:g}, got {weight!r:.60}"
+            )
+    return value
+
+
+@dataclass(frozen=True)
+class AimSettings(Settings):
+    """What is kept least, for methods that can choose."""
+
+    objective: Name = choice("power", ("power", "effort"), "kept least: watts, or the paper's effort")
+    energy_weights: EnergyWeights = DEFAULT_WEIGHTS
+    """Weights of the effort."""
+    copper_loss: float = number(
+        0.0, 0.0, 1e6, "heat in a motor's windings that counts beside the mechanical power", "W/(N m)^2"
+    )
+
+    @property
+    def aim(self) -> Objective:
+        """The three as one."""
+        return Objective(self.objective, self.energy_weights, self.copper_loss)
+
+
+class AimOptions(TypedDict, total=False):
+    """`AimSettings` for editors and type checkers."""
+
+    objective: Name
+    energy_weights: EnergyWeights
+    copper_loss: float
