@@ -27,7 +27,7 @@ def mode_blocks(
         (
             "With four fins and more, a wrench can often be delivered in several ways. Here method "
             f"`{method}` keeps {objective} least on split `{split}`: what "
-            f"`allocator.explore(result)` finds, beside what {starts} random starts of IPOPT per target converge to; "
+            f"`explore` finds, beside what {starts} random starts of IPOPT per target converge to; "
             f"ways of up to {CHEAP:g} times the least {objective}, exact by the plant, whose fins' laws both "
             "were given."
         ),
