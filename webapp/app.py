@@ -4,7 +4,6 @@ import asyncio
 import contextlib
 import json
 import time
-from collections.abc import Sequence
 from pathlib import Path
 
 import viser
@@ -16,7 +15,7 @@ from webapp.session.store import SessionStore
 from webapp.tasks.background import Workers
 from webapp.tasks.solver import Solver
 from webapp.view import View
-from webapp.viser_internals import disable_sharing
+from webapp.viser_internals import disable_sharing, enter, stored
 
 FRAME_S = 1 / 25
 """Time between two poses of the fins [s]."""
@@ -24,8 +23,10 @@ KEEP_S = 2.0
 """How often changed sessions are written to disk [s]."""
 STORAGE_KEY = "finlab-sessions"
 """Where a browser keeps the keys of its sessions."""
-PATIENCE_S = (0.5, 1.0, 1.5, 2.0, 4.0, 8.0, 16.0)
+PATIENCE_S = (0.5, 1.0, 1.5, 2.0, 4.0, 8.0, 16.0, 30.0, 30.0)
 """How long a page may take to say which sessions it knows [s], try by try."""
+PRESENT_S = (1.0, 1.0)
+"""The same for a page whose work another one asks for: it may be gone without a word."""
 MAX_KEYS = 8
 """Sessions that one browser remembers."""
 
@@ -77,22 +78,22 @@ class App:
         self._workers.stop()
         self._store.keep()
 
-    def _connected(self, client: viser.ClientHandle) -> None:
-        # Plain `def`: viser runs it on a thread of its pool, where waiting for the page is allowed.
+    async def _connected(self, client: viser.ClientHandle) -> None:
+        """Wait for the page to say which sessions it knows; one that says nothing is dropped in time."""
         try:
-            remembered = _session_keys(_stored(client, PATIENCE_S))
-        except (RuntimeError, TimeoutError):  # gone already, or a browser that forbids storage
+            remembered = _session_keys(await stored(client, STORAGE_KEY, PATIENCE_S))
+        except TimeoutError:
+            return
+        except RuntimeError:  # a browser that forbids storage
             remembered = []
-        for client_id, key in list(self._keys.items()):
-            # A connection that broke may still count as open; its tab is perhaps the one that is coming back.
-            view = self.views.get(client_id)
-            if key in remembered and view is not None and not _answers(view.client):
-                self._loop.call_soon_threadsafe(self._drop, client_id)
-        self._loop.call_soon_threadsafe(self._open, client, remembered)
+        # A connection that broke may still count as open; its tab is perhaps the one that is coming back.
+        rivals = [known for known, key in self._keys.items() if key in remembered]
+        await asyncio.gather(*(self._drop_if_gone(rival) for rival in rivals))
+        if client.client_id in self._server.get_clients():
+            self._open(client, remembered)
 
     def _open(self, client: viser.ClientHandle, remembered: list[str]) -> None:
-        if client.client_id not in self._server.get_clients():
-            return
+        enter(client)
         key, session = self._store.enter(remembered)
         self._keys[client.client_id] = key
         if key not in remembered:
@@ -100,14 +101,23 @@ class App:
         client.local_storage.set_item(STORAGE_KEY, json.dumps(remembered[:MAX_KEYS]))
         self.views[client.client_id] = View(client, session, self._solver, self._workers, self._loop)
 
+    async def _drop_if_gone(self, client_id: int) -> None:
+        try:
+            await stored(self.views[client_id].client, STORAGE_KEY, PRESENT_S)
+        except TimeoutError:
+            self._drop(client_id)
+        except (KeyError, RuntimeError):  # being built, or there
+            return
+
     async def _disconnected(self, client: viser.ClientHandle) -> None:
         self._drop(client.client_id)
 
     def _drop(self, client_id: int) -> None:
-        view = self.views.pop(client_id, None)
+        view, key = self.views.pop(client_id, None), self._keys.pop(client_id, None)
         if view is not None:
             view.close()
-            self._store.leave(self._keys.pop(client_id))
+        if key is not None:
+            self._store.leave(key)
 
     async def _animate(self) -> None:
         before = kept = time.monotonic()
@@ -123,27 +133,10 @@ class App:
                 self._store.keep()
 
 
-def _answers(client: viser.ClientHandle) -> bool:
-    """Whether a page is still there. Waits for it, so not to be called on the event loop."""
-    with contextlib.suppress(RuntimeError, TimeoutError):
-        _stored(client, (1.0, 1.0))
-        return True
-    return False
-
-
-def _stored(client: viser.ClientHandle, patience: Sequence[float]) -> str | None:
-    """What the browser keeps for us. A page that is just reconnecting may drop the question, so it is asked
-    again; one on a slow machine takes its time, so each time we wait longer [s]."""
-    for seconds in patience[:-1]:
-        with contextlib.suppress(TimeoutError):
-            return client.local_storage.get_item(STORAGE_KEY, timeout=seconds)
-    return client.local_storage.get_item(STORAGE_KEY, timeout=patience[-1])
-
-
 def _session_keys(text: str | None) -> list[str]:
     """The keys in a browser's storage, which may hold anything."""
     try:
         keys = json.loads(text or "[]")
-    except ValueError:
+    except (ValueError, RecursionError):
         return []
     return [key for key in keys if isinstance(key, str)][:MAX_KEYS] if isinstance(keys, list) else []

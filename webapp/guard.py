@@ -1,15 +1,38 @@
 """Who may talk to the server: pages that it served itself, and beyond this machine only with the token."""
 
 import hmac
+import re
 import secrets
 from dataclasses import dataclass, field
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
 from ipaddress import ip_address
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs
 
 COOKIE = "finlab-token"
 """Cookie that carries the token once the page has been opened with it."""
+LONGEST_PATH, LONGEST_QUERY = 200, 2_000
+"""Most characters of a path, and of what follows it; the page itself has one."""
+SECURE = {
+    # The page is one file with its scripts inside; it evaluates those that the server sends, starts workers
+    # from texts, and opens nothing elsewhere.
+    "Content-Security-Policy": (
+        "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval' blob: data:; "
+        "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; "
+        "connect-src 'self' ws: wss: data: blob:; worker-src 'self' blob: data:; "
+        "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    ),
+    "X-Frame-Options": "DENY",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+}
+"""Headers of every answer: no other site may frame the page, and it loads nothing from one."""
+_HOST = r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9_.-]+)(?::\d{1,5})?"
+_ORIGIN = re.compile(rf"(?P<scheme>[a-z][a-z0-9+.-]*)://(?P<host>{_HOST})")
+_HOST_ALONE = re.compile(_HOST)
+_TARGET = re.compile(r"/(?:[!-$&-~]|%(?!00)[0-9A-Fa-f]{2})*")
 
 
 def is_loopback(host: str) -> bool:
@@ -53,25 +76,46 @@ class Guard:
             path: path and query of the request.
             headers: its headers, names in lower case.
         """
-        host, origin = headers.get("host", ""), headers.get("origin")
-        if is_loopback(self.host) and not is_loopback(urlsplit(f"//{host}").hostname or ""):
-            # Another site's name that was made to point at this machine.
-            return Verdict(HTTPStatus.FORBIDDEN, "This server answers to localhost only.\n")
-        if origin is not None and urlsplit(origin).netloc.lower() != host.lower():
-            return Verdict(HTTPStatus.FORBIDDEN, "Pages of other sites may not use this server.\n")
-        if self.token is None:
-            return None
-        url = urlsplit(path)
-        given = parse_qs(url.query).get("token", [""])[0]
+        refused = self._malformed(path, headers) or self._foreign(headers)
+        if refused is not None or self.token is None:
+            return refused
+        given = parse_qs(path.partition("?")[2]).get("token", [""])[0]
         if self._is_token(given):
             cookie = f"{COOKIE}={self.token}; Path=/; HttpOnly; SameSite=Strict"
-            return Verdict(HTTPStatus.SEE_OTHER, "", {"Location": url.path or "/", "Set-Cookie": cookie})
+            return Verdict(HTTPStatus.SEE_OTHER, "", {"Location": "/", "Set-Cookie": cookie})
         if self._is_token(_cookie(headers.get("cookie", ""))):
             return None
         return Verdict(HTTPStatus.UNAUTHORIZED, "Open the address with the token that finlab app printed.\n")
 
+    def _malformed(self, path: str, headers: dict[str, str]) -> Verdict | None:
+        """Why a request makes no sense."""
+        place, _, query = path.partition("?")
+        if len(place) > LONGEST_PATH or len(query) > LONGEST_QUERY:
+            return Verdict(HTTPStatus.REQUEST_URI_TOO_LONG, "The address is too long.\n")
+        if not _TARGET.fullmatch(path):
+            return Verdict(HTTPStatus.BAD_REQUEST, "The address is malformed.\n")
+        if not _HOST_ALONE.fullmatch(headers.get("host", "").lower()):
+            return Verdict(HTTPStatus.BAD_REQUEST, "The header Host is missing or malformed.\n")
+        origin = headers.get("origin", "null").lower()
+        if origin != "null" and not _ORIGIN.fullmatch(origin):
+            return Verdict(HTTPStatus.BAD_REQUEST, "The header Origin is malformed.\n")
+        return None
+
+    def _foreign(self, headers: dict[str, str]) -> Verdict | None:
+        """Why a request may not come from where it comes from; its headers are well formed."""
+        host = headers["host"].lower()
+        match, origin = _HOST_ALONE.fullmatch(host), headers.get("origin")
+        if is_loopback(self.host) and not (match and is_loopback(match["name"])):
+            # Another site's name that was made to point at this machine.
+            return Verdict(HTTPStatus.FORBIDDEN, "This server answers to localhost only.\n")
+        if origin is not None and origin.lower().partition("://")[2] != host:
+            return Verdict(HTTPStatus.FORBIDDEN, "Pages of other sites may not use this server.\n")
+        return None
+
     def _is_token(self, text: str) -> bool:
-        return self.token is not None and hmac.compare_digest(text.encode(), self.token.encode())
+        return self.token is not None and hmac.compare_digest(
+            text.encode(errors="replace"), self.token.encode()
+        )
 
 
 def _cookie(text: str) -> str:

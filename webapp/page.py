@@ -38,7 +38,8 @@ from webapp.tasks.sweeping import Sweep
 from webapp.tasks.swim_files import SwimFiles
 from webapp.tasks.swimming import Swimming
 from webapp.theme import VERMILLION
-from webapp.viser_internals import limit_uploads, run_script, uuid_of
+from webapp.uploads import Uploads
+from webapp.viser_internals import run_script, uuid_of
 
 CARD_REST_S = 0.35
 """How long a layout may not change before its card is worked out [s]: that takes a second."""
@@ -113,7 +114,7 @@ class Page(ABC):
         """Designs as a whole."""
         self.opening = Opening(client.gui, self.editables, self.do)
         """Files of any kind."""
-        limit_uploads(client.gui, MAX_UPLOAD, self._refuse_upload)
+        self._uploads = Uploads(client.gui, MAX_UPLOAD, partial(self.notify, "Not possible"))
         self._panels: list[Panel] = []
         self._panels, self._swim_panels = self._build()
         self.fields.start()
@@ -210,12 +211,7 @@ class Page(ABC):
         """A button that carries out `act(name, content)` when the user has chosen a file."""
         button = self.client.gui.add_upload_button(label, **options)
         self._hint(button)
-
-        @button.on_upload
-        async def _uploaded(event: Any) -> None:
-            file = event.target.value
-            self.do(partial(act, file.name, file.content))
-
+        self._uploads.on(button, lambda name, content: self.do(partial(act, name, content)))
         return button
 
     def _hint(self, button: Any) -> None:
@@ -250,11 +246,6 @@ class Page(ABC):
         if self._note is not None:
             self._note.remove()
         self._note = self.client.add_notification(title, body, auto_close_seconds=8.0, color=VERMILLION)
-
-    def _refuse_upload(self, name: str, size: int) -> None:
-        """Show a note when a browser offers a file that is too large to be taken at all."""
-        text = f"{str(name)[-60:]}: has {size:,} bytes, expected at most {MAX_UPLOAD:,}; nothing was read"
-        self.notify("Not possible", text)
 
     # From the session to the page.
 
@@ -322,6 +313,7 @@ class Page(ABC):
     def close(self) -> None:
         """The browser has gone."""
         self._loop.close()
+        self._uploads.close()
         self.sweep.stop()
         self.swimming.stop()
         self.comparison.cancel()

@@ -1,10 +1,13 @@
 """Every use of viser's private parts (of 1.1.1), and its habits: look here first when viser is upgraded."""
 
+import asyncio
 import contextlib
 import io
+import secrets
 import threading
-from collections.abc import Callable, Iterator
-from functools import cache
+from collections.abc import Iterator, Sequence
+from functools import cache, partial
+from http import HTTPStatus
 from types import SimpleNamespace
 from typing import Any, get_type_hints
 from unittest.mock import patch
@@ -14,10 +17,10 @@ import viser
 import websockets.asyncio.server as websockets_server
 from viser import _icons, _messages
 from viser._assignable_props_api import AssignablePropsBase
-from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from webapp.guard import Guard
+from webapp.connections import MAX_MESSAGE, REQUEST_S, Connection, Connections, quiet, refusal
+from webapp.guard import SECURE, Guard, Verdict
 
 _STARTING = threading.Lock()
 LOCAL = Guard("127.0.0.1")
@@ -33,28 +36,85 @@ def start_server(guard: Guard = LOCAL, port: int = 0) -> viser.ViserServer:
 
 @contextlib.contextmanager
 def _guarded(guard: Guard) -> Iterator[None]:
-    """Servers that start within this context ask the guard first. Viser has no hook for that."""
-    serve = websockets_server.serve
+    """Servers that start within this context ask the guard first, and keep few connections that say nothing.
+    Viser has no hook for that."""
+    serve, connections = websockets_server.serve, Connections()
 
-    def guarded(*arguments: Any, process_request: Callable[..., Any] | None = None, **options: Any) -> Any:
-        async def ask(connection: Any, request: Request) -> Any:
-            headers = {name.lower(): value for name, value in request.headers.raw_items()}
+    def guarded(*arguments: Any, process_request: Any = None, **options: Any) -> Any:
+        def ask(connection: Any, request: Request) -> Response | None:
+            headers: dict[str, str] = {}
+            for name, value in request.headers.raw_items():
+                headers[name.lower()] = ", ".join(filter(None, (headers.get(name.lower()), value)))
             verdict = guard.check(request.path, headers)
             if verdict is not None:
-                body = verdict.text.encode()
-                answer = Headers({**verdict.headers, "Content-Type": "text/plain; charset=utf-8"})
-                answer["Content-Length"] = str(len(body))
-                answer["Connection"] = "close"
-                return Response(verdict.status.value, verdict.status.phrase, answer, body)
-            if process_request is None:
-                return None
-            result = process_request(connection, request)
-            return await result if hasattr(result, "__await__") else result
+                return refusal(verdict)
+            with contextlib.suppress(OSError, ValueError):  # what is no name of a file
+                answer: Response | None = process_request(connection, request)
+                if answer is None or answer.status_code == HTTPStatus.OK:
+                    return answer
+            return refusal(Verdict(HTTPStatus.NOT_FOUND, "There is no such page.\n"))
 
-        return serve(*arguments, process_request=ask, **options)
+        def secured(connection: Any, request: Request, response: Response) -> None:
+            for name, value in SECURE.items():
+                if name not in response.headers:
+                    response.headers[name] = value
+
+        ours = {
+            "process_request": ask,
+            "process_response": secured,
+            "create_connection": partial(Connection, connections),
+            "open_timeout": REQUEST_S,
+            "max_size": MAX_MESSAGE,
+            "server_header": None,
+            "logger": quiet,
+        }
+        return serve(*arguments, **{**options, **ours})
 
     with patch.object(websockets_server, "serve", guarded):
         yield
+
+
+def enter(client: viser.ClientHandle) -> None:
+    """A connection is a page from now on."""
+    server = client._viser_server._websock_server
+    connection = server._live_connections.get(client.client_id)  # type: ignore[call-overload]
+    if isinstance(connection, Connection):
+        connection.enter()
+
+
+async def stored(client: viser.ClientHandle, key: str, patience: Sequence[float]) -> str | None:
+    """What a browser keeps for us; `client.local_storage` would hold a thread until it answers.
+
+    A page that is just reconnecting may drop the question, so it is asked again, after each time [s] of
+    `patience` but the last one.
+
+    Raises:
+        TimeoutError: it did not answer at all.
+        RuntimeError: it forbids storage.
+    """
+    connection, asked = client._websock_connection, f"finlab-{secrets.token_hex(8)}"
+    answer: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
+
+    def hear(client_id: int, message: Any) -> None:
+        if message.request_uuid == asked and not answer.done():
+            answer.set_result(message)
+
+    kind = _messages.LocalStorageGetItemResponseMessage
+    connection.register_handler(kind, hear)
+    try:
+        for seconds in patience:
+            connection.queue_message(_messages.LocalStorageGetItemRequestMessage(key, asked))
+            client.flush()
+            if (await asyncio.wait([answer], timeout=seconds))[0]:
+                break
+        else:
+            raise TimeoutError(f"the browser said nothing of {key}")
+    finally:
+        connection.unregister_handler(kind, hear)
+    if answer.result().error is not None:
+        raise RuntimeError(f"the browser says nothing of {key}: {answer.result().error}")
+    value = answer.result().value
+    return value if isinstance(value, str) else None
 
 
 @cache
@@ -84,22 +144,6 @@ def uuid_of(handle: Any) -> str:
 def run_script(gui: viser.GuiApi, source: str) -> None:
     """Run a script in the page, as viser does to bring its plots."""
     gui._websock_interface.queue_message(_messages.RunJavascriptMessage(source=source))
-
-
-def limit_uploads(gui: viser.GuiApi, most: int, refuse: Callable[[str, int], None]) -> None:
-    """Take no file that says it has more bytes than `most`: viser would gather it in memory before anybody
-    is asked. `refuse` is told its name and size on the event loop; what comes of it after that is dropped."""
-
-    def begin(client_id: Any, message: Any) -> None:
-        if message.size_bytes <= most:
-            gui._handle_file_transfer_start(client_id, message)
-            return
-        size = message.size_bytes
-        done = _messages.FileTransferPartAck(message.source_component_uuid, message.transfer_uuid, size, size)
-        gui._websock_interface.queue_message(done)  # so that the page stops showing how far it is
-        refuse(message.filename, size)
-
-    gui._websock_interface._incoming_handlers[_messages.FileTransferStartUpload] = [begin]
 
 
 def stop_server(server: viser.ViserServer) -> None:

@@ -1,7 +1,8 @@
 """Event loops for tests without one, and pages without a browser."""
 
 import asyncio
-from collections.abc import Callable
+import functools
+from collections.abc import Callable, Coroutine
 from types import SimpleNamespace
 from typing import Any
 
@@ -50,3 +51,13 @@ def page_of(worker: Any, session: Any = None, **options: Any) -> Context:
         "notify": lambda title, text: None,
     }
     return Context(session=session, workers=workers, **{**silent, **options})
+
+
+def in_loop(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., None]:
+    """A test that runs in an event loop of its own."""
+
+    @functools.wraps(test)
+    def run(*arguments: Any, **named: Any) -> None:
+        asyncio.run(test(*arguments, **named))
+
+    return run

@@ -344,23 +344,3 @@ def test_other_archives_are_refused(parts: dict[str, bytes], sentence: str, tmp_
     assert not (tmp_path / "kept").exists()
     with pytest.raises(LayoutError, match=r"^robot\.zip: cannot be read as a zip archive"):
         read_archive("robot.zip", b"no zip", tmp_path)
-
-
-def test_files_that_say_they_are_too_large_never_come_in() -> None:
-    from viser import _messages
-
-    from webapp.viser_internals import limit_uploads
-
-    begun: list[Any] = []
-    sent: list[Any] = []
-    refused: list[tuple[str, int]] = []
-    wire = SimpleNamespace(_incoming_handlers={}, queue_message=sent.append)
-    gui: Any = SimpleNamespace(
-        _websock_interface=wire, _handle_file_transfer_start=lambda client, message: begun.append(message)
-    )
-    limit_uploads(gui, 100, lambda name, size: refused.append((name, size)))
-    (begin,) = wire._incoming_handlers[_messages.FileTransferStartUpload]
-    for size in (100, 10_000_000_000):
-        begin(1, _messages.FileTransferStartUpload("button", f"t{size}", "big.csv", "text/csv", 1, size))
-    assert [message.size_bytes for message in begun] == [100] and refused == [("big.csv", 10_000_000_000)]
-    assert sent[0].transferred_bytes == sent[0].total_bytes == 10_000_000_000

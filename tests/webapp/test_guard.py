@@ -38,7 +38,7 @@ def test_foreign_origin_and_foreign_host_are_refused() -> None:
         "http://localhost:8080.evil.example",
     ):
         refused = guard.check("/", {**OWN, "origin": origin})
-        assert refused is not None and refused.status == 403
+        assert refused is not None and refused.status in (400, 403)
     rebound = guard.check("/", {"host": "evil.example:8080", "origin": "http://evil.example:8080"})
     assert rebound is not None and rebound.status == 403
 

@@ -74,13 +74,15 @@ def test_folders_and_what_is_too_large_are_not_even_sent() -> None:
     taken = Taken()
     taken.drop(["robots", 0, True])
     taken.drop(["huge.csv", LARGEST_BUNDLE + 1, False])
+    taken.drop(*([f"{k}.csv", LARGEST_BUNDLE // 2, False] for k in range(3)))
     taken.drop(*([f"{k}.csv", 1, False] for k in range(1000)))
     assert [text.split(";")[0] for text in taken.refused] == [
         "'robots' is a folder",
         f"huge.csv: has {LARGEST_BUNDLE + 1:,} bytes, expected at most {LARGEST_BUNDLE:,}",
-        taken.refused[2],
+        *taken.refused[2:],
     ]
-    assert taken.refused[2].startswith("1000 files were dropped") and len(taken.scripts) == 1
+    assert "expected at most" in taken.refused[2] and "in all" in taken.refused[2]
+    assert taken.refused[3].startswith("1000 files were dropped") and len(taken.scripts) == 1
 
 
 def test_a_design_and_its_table_dropped_at_once_are_one_design(

@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterable
 from webapp.session import Session
 from webapp.session.session_files import SessionFiles
 
-MAX_SESSIONS = 64
-"""Sessions that are kept; beyond it the ones left longest ago are forgotten."""
+MOST_WAITING, LONGEST_S = 32, 3600.0
+"""Sessions that are kept in memory after their page has gone, and for how long [s]. Others are in files, if
+the server keeps any."""
 
 
 class SessionStore:
@@ -34,17 +35,19 @@ class SessionStore:
         for key in keys:
             self._resume(key)
         free = [k for k in keys if k in self._sessions and k not in self._open]
-        found = max(free, key=lambda k: self._left.get(k, 0.0), default=None)
-        key = found or secrets.token_urlsafe(12)
-        if found is None:
+        key = max(free, key=lambda k: self._left.get(k, 0.0), default="")
+        if not key:
+            key = secrets.token_urlsafe(12)
             self._add(key, self._make())
         self._open.add(key)
+        self._left.pop(key, None)
         return key, self._sessions[key]
 
     def leave(self, key: str) -> None:
         """The tab has gone; its session waits for the next one."""
         self._open.discard(key)
         self._left[key] = time.monotonic()
+        self.keep()
 
     def _resume(self, key: str) -> None:
         """Bring a session back that an earlier server has kept."""
@@ -55,24 +58,29 @@ class SessionStore:
             self._add(key, session)
 
     def keep(self) -> None:
-        """Write the sessions that have changed since the last time."""
-        if self._files is None:
-            return
-        for key, session in self._sessions.items():
+        """Write the sessions that have changed since the last time, and forget those that nobody wants."""
+        for key, session in self._sessions.items() if self._files is not None else ():
             if _mark(session) != self._kept[key]:
                 self._kept[key] = _mark(session)
                 self._files.write(key, session)
+        self._forget()
 
     def _add(self, key: str, session: Session) -> None:
-        """One more session, of which nothing is new yet; what is too many is forgotten."""
+        """One more session, of which nothing is new yet."""
         self._sessions[key], self._kept[key] = session, _mark(session)
+
+    def _forget(self) -> None:
+        """Of the sessions without a page, those left longest ago are forgotten: too many, or too old."""
+        now = time.monotonic()
         waiting = sorted(
-            (k for k in self._sessions if k not in self._open), key=lambda k: self._left.get(k, 0.0)
+            (key for key in self._sessions if key not in self._open),
+            key=lambda key: self._left.get(key, now),
+            reverse=True,
         )
-        for key in waiting[: max(0, len(self._sessions) - MAX_SESSIONS)]:
-            del self._sessions[key]
-            self._left.pop(key, None)
-            del self._kept[key]
+        for place, key in enumerate(waiting):
+            if place >= MOST_WAITING or now - self._left.get(key, now) > LONGEST_S:
+                del self._sessions[key], self._kept[key]
+                self._left.pop(key, None)
 
 
 def _mark(session: Session) -> object:

@@ -73,6 +73,7 @@ class Opening:
             if size > LARGEST_BUNDLE:
                 raise FinlabError(f"{name[-60:]}: has {size:,} bytes, expected at most {LARGEST_BUNDLE:,}")
             self._check(name)
+        self._check_sum(sum(size for _, size, _ in told))
         if len(told) > 1:
             self._dropped = tuple(name for name, *_ in told)
 
@@ -84,6 +85,7 @@ class Opening:
         """
         if name in self._dropped:
             self._came[name] = content
+            self._check_sum(sum(len(part) for part in self._came.values()))
             if len(self._came) < len(self._dropped):
                 self._send_next()
                 return
@@ -102,6 +104,12 @@ class Opening:
         if not any(suffix in taker.suffixes for taker in self._takers):
             raise FinlabError(f"{PurePath(name).name[-60:]!r} cannot be opened; expected {KINDS}")
         return suffix
+
+    def _check_sum(self, size: int) -> None:
+        """Files that are kept until the last one is there."""
+        if size > LARGEST_BUNDLE:
+            self._dropped, self._came = (), {}
+            raise FinlabError(f"the files have {size:,} bytes, expected at most {LARGEST_BUNDLE:,} in all")
 
     def _hear(self, text: str) -> None:
         """What was dropped, from the page, which may send anything; it sends them when asked to."""
