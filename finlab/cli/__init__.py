@@ -20,7 +20,7 @@ _BROKEN_PIPE = 141
 """128 + SIGPIPE, as shells report it."""
 
 _EXTRAS = {"torch": "train", "viser": "app", "trimesh": "app", "yourdfpy": "urdf"}
-_EXTRAS |= {"matplotlib": "plot", "markdown_it": "plot", "sklearn": "fit"}
+_EXTRAS |= {"matplotlib": "plot", "markdown_it": "plot"}
 """Packages that some verbs need beside the base install, and the extra that brings each."""
 
 

@@ -1,5 +1,8 @@
 """`finlab fit fin|plan|robot`: from measurements to a fin that layouts can name, from a swim to a robot."""
 
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -38,25 +41,32 @@ def fin(
         page: write the page.
         seed: draws samples where there are too many.
     """
-    from finlab.fit.advice import next_measurements, thin_regions
-    from finlab.fit.conventions import Conventions
-    from finlab.fit.fin_file import check_fin_path, summary, write_fin
-    from finlab.fit.fin_fit import fit_fin
-    from finlab.fit.measurements import read_measurements
+    with _progress_bar() as tell:
+        from finlab.fit.advice import next_measurements, thin_regions
+        from finlab.fit.conventions import Conventions
+        from finlab.fit.fin_file import check_fin_path, summary, write_fin
+        from finlab.fit.fin_fit import fit_fin
+        from finlab.fit.measurements import read_measurements
 
-    check_fin_path(output)
-    measurements = read_measurements(data, Conventions(angles, amplitude, frequency, sensor_turn, lever))
-    fit = fit_fin(measurements, seed)
-    write_fin(fit, output)
-    if page:
-        from finlab.evaluation.report.fin_fit_page import write_fin_fit_page
+        check_fin_path(output)
+        conventions = Conventions(angles, amplitude, frequency, sensor_turn, lever)
+        tell("reading", 0.05)
+        measurements = read_measurements(data, conventions)
+        fit = fit_fin(measurements, seed, lambda words, share: tell(words, 0.1 + 0.5 * share))
+        tell("writing the table", 0.6)
+        write_fin(fit, output)
+        if page:
+            tell("writing the page", 0.65)
+            from finlab.evaluation.report.fin_fit_page import write_fin_fit_page
 
-        write_fin_fit_page(fit, output.with_suffix(".html"))
+            write_fin_fit_page(fit, output.with_suffix(".html"))
+        tell("looking for what to measure next", 0.95)
+        thin, advice = thin_regions(fit), next_measurements(fit)
     print("\n".join(summary(fit)))
-    for clause in thin_regions(fit):
+    for clause in thin:
         print(f"data are thin: {clause}")
     print("measure next, A [rad], f [Hz], zero direction [rad]:")
-    for command in next_measurements(fit):
+    for command in advice:
         print("  " + "  ".join(f"{value:7.3f}" for value in command))
     print(f"{output}: name it in a layout, model: {{type: table, path: {output.name}}}")
     if page:
@@ -123,22 +133,41 @@ def robot(
         output: the layout as the swims show it; fins whose law is another one become tables beside it.
         residual: look for another law of thrust, jets and inflow, too, and use what helps on parts not seen.
     """
-    from finlab.cli.inputs import open_robot
-    from finlab.errors import DataError
-    from finlab.fit.robot.fitted_layout import write_robot
-    from finlab.fit.robot.report import summary, table
-    from finlab.fit.robot.robot_fit import fit_robot
-    from finlab.fit.robot.swim_file import read_swim
-    from finlab.fit.robot.unknowns import RESIDUAL
+    with _progress_bar() as tell:
+        from finlab.cli.inputs import open_robot
+        from finlab.errors import DataError
+        from finlab.fit.robot.fitted_layout import write_robot
+        from finlab.fit.robot.report import summary, table
+        from finlab.fit.robot.robot_fit import fit_robot
+        from finlab.fit.robot.swim_file import read_swim
+        from finlab.fit.robot.unknowns import RESIDUAL
 
-    if output.suffix.lower() not in (".yaml", ".yml", ".json"):
-        raise DataError(
-            f"{output}: a layout is a YAML or JSON file, expected a name that ends in .yaml or .json"
-        )
-    believed = open_robot(layout).layout
-    fit = fit_robot(believed, [read_swim(log, believed) for log in logs], RESIDUAL if residual else ())
-    write_robot(fit, output)
+        if output.suffix.lower() not in (".yaml", ".yml", ".json"):
+            raise DataError(
+                f"{output}: a layout is a YAML or JSON file, expected a name that ends in .yaml or .json"
+            )
+        believed = open_robot(layout).layout
+        tell("reading", 0.0)
+        swims = [read_swim(log, believed) for log in logs]
+        fit = fit_robot(believed, swims, RESIDUAL if residual else (), tell)
+        write_robot(fit, output)
     print("\n".join(summary(fit)))
     print()
     print(table(fit))
     print(f"\n{output}: the robot as it swam")
+
+
+@contextmanager
+def _progress_bar() -> Iterator[Callable[[str, float], None]]:
+    """A bar on stderr, and who is told what comes next and the share of the work that is done; no bar where
+    stderr is no terminal."""
+    from tqdm import tqdm
+
+    form = "{desc:<55} {percentage:3.0f}%|{bar}| {elapsed}"
+    with tqdm(total=1.0, desc="loading", bar_format=form, disable=None, leave=False, file=sys.stderr) as bar:
+
+        def tell(words: str, share: float) -> None:
+            bar.n = share
+            bar.set_description_str(words)
+
+        yield tell

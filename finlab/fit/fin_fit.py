@@ -5,12 +5,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from finlab.arrays import Array
 from finlab.fit.gaussian_process import Component
 from finlab.fit.measurements import MIN_SAMPLES, Measurements
-from finlab.fit.outliers import find_outliers
+from finlab.fit.outliers import ROUNDS, find_outliers
+from finlab.fit.progress import Progress, Stages, say_nothing
 from finlab.layout.angles import TURN
+from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 
 MOST_SAMPLES = 1500
 """Samples beyond this number are thinned: the time grows with their cube."""
@@ -122,7 +125,9 @@ class FinFit:
 
     def grid(self, shape: tuple[int, int, int] = (7, 7, 12)) -> Array:
         """Returns commands on a grid (*shape, 3) over what was measured, from rest on, to round numbers."""
-        amplitude, frequency = np.ceil(np.divide(self.measurements.reach, ROUND) - 1e-9) * ROUND
+        amplitude, frequency = np.minimum(
+            np.ceil(np.divide(self.measurements.reach, ROUND) - 1e-9) * ROUND, (MAX_AMPLITUDE, MAX_FREQUENCY)
+        )
         axes = [
             np.linspace(0.0, most, count) for most, count in ((amplitude, shape[0]), (frequency, shape[1]))
         ]
@@ -137,17 +142,16 @@ class FinFit:
         return np.linspace(measured.min(), measured.max(), count)
 
 
-def fit_fin(
-    measurements: Measurements, seed: int = 0, progress: Callable[[str], None] | None = None
-) -> FinFit:
+def fit_fin(measurements: Measurements, seed: int = 0, progress: Progress = say_nothing) -> FinFit:
     """Returns the fin that explains samples, leaving out those that contradict all others.
+
+    The linear algebra runs on one thread: on matrices of this size several wait for each other.
 
     Args:
         measurements: at least `MIN_SAMPLES`.
         seed: draws the samples that are kept where there are more than `MOST_SAMPLES`.
-        progress: told in a few words what comes next, before each step; what it raises ends the fit.
+        progress: called before each step.
     """
-    tell = progress or (lambda _: None)
     notes = list(measurements.notes)
     rest = measurements.command[:, 0] * measurements.command[:, 1] == 0.0
     if rest.any():
@@ -157,13 +161,18 @@ def fit_fin(
         drawn = np.random.default_rng(seed).permutation(len(measurements)) >= MOST_SAMPLES
         notes.append(f"{MOST_SAMPLES} of {len(measurements)} samples, drawn at random, are used")
         measurements = measurements.without(drawn)
-    bad = find_outliers(measurements, tell)
-    outliers = tuple(place for place, out in zip(measurements.places, bad, strict=True) if out)
-    if outliers:
-        shown = ", ".join(outliers[:5]) + (" ..." if len(outliers) > 5 else "")
-        notes.append(f"{len(outliers)} of {len(bad)} samples contradict the others and are left out: {shown}")
-        measurements = measurements.without(bad)
-    return _fitted(measurements, outliers, tuple(notes), tell)
+    stages = Stages(progress, 2 * ROUNDS + 4)
+    with threadpool_limits(limits=1, user_api="blas"):
+        bad = find_outliers(measurements, stages.begin)
+        stages.skip_to(2 * ROUNDS)
+        outliers = tuple(place for place, out in zip(measurements.places, bad, strict=True) if out)
+        if outliers:
+            shown = ", ".join(outliers[:5]) + (" ..." if len(outliers) > 5 else "")
+            notes.append(
+                f"{len(outliers)} of {len(bad)} samples contradict the others and are left out: {shown}"
+            )
+            measurements = measurements.without(bad)
+        return _fitted(measurements, outliers, tuple(notes), stages.begin)
 
 
 def _fitted(

@@ -21,7 +21,8 @@ def find_outliers(measurements: Measurements, tell: Callable[[str], None]) -> ND
     suspects explains are taken back. `tell` is called before each step.
     """
     turned, _ = measurements.thrust()
-    largest = float(np.quantile(np.linalg.norm(measurements.force, axis=-1), 0.98))
+    sizes = np.linalg.norm(measurements.force, axis=-1)
+    largest = float(np.quantile(sizes, 0.98)) or float(sizes.max())
     values = turned / largest
     # Who knows that a sample is bad has not been contradicted by it.
     told = 0.0 if measurements.deviation is None else measurements.deviation[:, 1:].max(axis=1) / largest
@@ -31,7 +32,7 @@ def find_outliers(measurements: Measurements, tell: Callable[[str], None]) -> ND
         kept, before = ~out, out
         tell("looking for samples that contradict the others")
         along = Component(inputs[kept], values[kept, 0], wild=True)
-        tell("looking for samples that contradict the others, across the thrust")
+        tell("looking for such samples across the thrust")
         across = Component(inputs[kept], values[kept, 1], size=along.mean, wild=True)
         size = along.expect(inputs)
         out = np.zeros_like(out)

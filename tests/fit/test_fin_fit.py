@@ -1,14 +1,17 @@
 """Fitted fins beside the laws that were measured: error, band, outliers, doubt, advice, and their file."""
 
+import time
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info
 
 from finlab import load_allocator, load_layout
 from finlab.arrays import Array
 from finlab.errors import DataError
-from finlab.fit.advice import next_measurements, thin_regions
+from finlab.fit.advice import APART, next_measurements, thin_regions
 from finlab.fit.fin_file import summary, write_fin
 from finlab.fit.fin_fit import FinFit, fit_fin
 from finlab.layout import Fin, FinModelSpec, Layout
@@ -185,3 +188,58 @@ def test_many_samples_are_thinned_and_it_is_said(monkeypatch: pytest.MonkeyPatch
     found = fit_fin(samples(command, measured(LAW, command)))
     assert len(found.measurements) + len(found.outliers) == 100
     assert "100 of 130 samples, drawn at random" in " ".join(found.notes)
+
+
+def eight_directions(n: int = 300, along_shaft: float = 0.15, noise: float = 0.03) -> tuple[Array, Array]:
+    """Commands of a rig that turns in eighths, and forces with a part along the shaft."""
+    rng, command = np.random.default_rng(1), commands(n)
+    command[:, 2] = rng.choice(np.arange(-4, 4) * np.pi / 4, n)
+    force = LAW.force(command)
+    size = np.linalg.norm(force, axis=-1)
+    force[:, 0] = along_shaft * size * np.cos(command[:, 2])
+    spread = noise * size.max() * np.array([along_shaft > 0.0, 1.0, 1.0])
+    return command, force + spread * rng.standard_normal(force.shape)
+
+
+def test_a_fit_takes_seconds_on_one_thread_and_says_how_far_it_is() -> None:
+    told: list[tuple[str, float]] = []
+    threads: set[int] = set()
+
+    def progress(words: str, share: float) -> None:
+        told.append((words, share))
+        threads.update(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas")
+
+    began = time.process_time()
+    fit_fin(samples(*eight_directions()), progress=progress)
+    assert time.process_time() - began < 6.0
+    assert threads == {1}
+    shares = [share for _, share in told]
+    assert shares == sorted(shares) and shares[0] == 0.0 and 0.5 < shares[-1] < 1.0 and len(told) >= 5
+
+
+@pytest.mark.parametrize(("along_shaft", "noise"), [(0.0, 0.03), (0.15, 0.0), (0.0, 0.0)])
+def test_axes_without_force_or_noise_raise_no_warning(along_shaft: float, noise: float) -> None:
+    command, force = eight_directions(120, along_shaft, noise)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = fit_fin(samples(command, force))
+        assert np.isfinite(found.predict(TEST)).all() and len(next_measurements(found)) == 5
+    assert np.sqrt(np.mean(error_of(found)[TEST[:, 0] > 0.1] ** 2)) < 0.2
+
+
+@pytest.mark.parametrize("turned", [True, False])
+@pytest.mark.parametrize("noise", [0.02, 0.5])
+def test_no_measurement_is_proposed_twice(turned: bool, noise: float) -> None:
+    command, force = eight_directions(40, noise=noise)
+    if not turned:
+        command[:, 2] = 0.3
+        force = LAW.force(command) + noise * np.random.default_rng(0).standard_normal(force.shape)
+    told = samples(command, force)
+    found = fit_fin(type(told)(command, force, None, None, told.places, (), turned))
+    advised = next_measurements(found, 8)
+    assert len(advised) == 8 and (turned or (advised[:, 2] == 0.3).all())
+    inputs = found.measurements.scaled(advised)
+    away = inputs[:, None] - inputs[None]
+    away[..., 2] = wrapped(away[..., 2])
+    near = (np.abs(away) < APART).all(axis=-1)
+    assert near.sum() == 8, "each is near itself alone"

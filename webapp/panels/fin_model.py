@@ -155,6 +155,6 @@ class FinModelPanel:
             return f"<div class='fl'><div class='said missing'>{escape(fitting.error)}</div></div>"
         if found is None:
             return ""
-        from webapp.markup.fit_card import fit_card  # scikit-learn comes with it
+        from webapp.markup.fit_card import fit_card  # scipy comes with it
 
         return fit_card(found)

@@ -16,7 +16,7 @@ from webapp.session.files import table_folder
 from webapp.tasks.background import Newest
 from webapp.tasks.context import Context
 
-if TYPE_CHECKING:  # scikit-learn takes its time, and only who fits needs it
+if TYPE_CHECKING:  # scipy takes its time, and only who fits needs it
     from finlab.fit.fin_fit import FinFit
     from finlab.fit.thrust_curves import ThrustCurve
 
@@ -162,7 +162,7 @@ class Fitting(Newest[Upload, Fitted]):
         curves = tuple(thrust_curves(fit, CURVES))
         return Fitted(done, model, fit, curves, thin_regions(fit), next_measurements(fit))
 
-    def _tell(self, upload: Upload, words: str) -> None:
+    def _tell(self, upload: Upload, words: str, done: float = 1.0) -> None:
         """On the worker's thread, before each step: a fit for which nobody waits any more ends here."""
         if upload is not self.question:
             raise FinlabError("cancelled")

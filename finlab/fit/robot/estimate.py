@@ -7,7 +7,7 @@ derivatives by differences, all swims integrated side by side; the windows' stat
 normal equations. Each unknown is believed to lie within its scale of what the layout says.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -92,7 +92,7 @@ def fit_windows(
     deviation: Array,
     vector: Array,
     start: Array | None = None,
-    most_steps: int = MOST_STEPS,
+    tell: Callable[[int], None] = lambda _: None,
 ) -> Fitted:
     """Unknowns from windows.
 
@@ -103,11 +103,12 @@ def fit_windows(
         deviation: standard deviation of each channel (12,).
         vector: where to begin (size,).
         start: states of the windows to begin with, instead of the smoothed ones.
-        most_steps: most Gauss-Newton steps.
+        tell: called with the number of each step before it.
     """
     start = windows.start.copy() if start is None else start.copy()
     damping, at = 1e-3, _Linear.at(model, unknowns, windows, deviation, vector, start)
-    for _ in range(most_steps):
+    for k in range(MOST_STEPS):
+        tell(k)
         change, moved = at.step(damping)
         new_vector, new_start = vector + change, start + moved
         cost = _cost(model, unknowns, windows, deviation, new_vector, new_start)

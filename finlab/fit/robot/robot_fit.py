@@ -8,11 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from finlab.arrays import Array
 from finlab.errors import DataError
+from finlab.fit.progress import Progress, Stages, say_nothing
 from finlab.fit.robot.equations import body_velocity
-from finlab.fit.robot.estimate import DEVIATION, Fitted, Windows, cut, fit_windows, unseen_gains
+from finlab.fit.robot.estimate import DEVIATION, MOST_STEPS, Fitted, Windows, cut, fit_windows, unseen_gains
 from finlab.fit.robot.model import RobotModel
 from finlab.fit.robot.swim import ANGLES, CHANNELS, STEP_S, Swim, smoothed
 from finlab.fit.robot.unknowns import BASE, RESIDUAL, Unknowns
@@ -110,13 +112,19 @@ class RobotFit:
         return tuple(found)
 
 
-def fit_robot(layout: Layout, swims: Sequence[Swim], tried: Sequence[str] = RESIDUAL) -> RobotFit:
-    """Learns a robot.
+def fit_robot(
+    layout: Layout,
+    swims: Sequence[Swim],
+    tried: Sequence[str] = RESIDUAL,
+    progress: Progress = say_nothing,
+) -> RobotFit:
+    """Learns a robot. The linear algebra runs on one thread.
 
     Args:
         layout: the robot as it is believed to be; what its body does not say is U-CAT's.
         swims: what was measured.
         tried: what is looked for besides, where it helps: some of `RESIDUAL`.
+        progress: called before each step.
 
     Raises:
         DataError: there is no swim, or the fit goes astray.
@@ -128,6 +136,12 @@ def fit_robot(layout: Layout, swims: Sequence[Swim], tried: Sequence[str] = RESI
             f"layout {layout.name} has an interaction already; fit the layout from which that was fitted, "
             "with all logs together"
         )
+    stages = Stages(progress, ROUNDS + (1 + ROUNDS) * len(tried) + 1, MOST_STEPS)
+    with threadpool_limits(limits=1, user_api="blas"):
+        return _fit(layout, swims, tried, stages)
+
+
+def _fit(layout: Layout, swims: Sequence[Swim], tried: Sequence[str], stages: Stages) -> RobotFit:
     model = RobotModel(layout, swims)
     measured = np.concatenate([swim.measured for swim in swims])
     smooth = np.concatenate([smoothed(swim.measured) for swim in swims])
@@ -136,26 +150,35 @@ def fit_robot(layout: Layout, swims: Sequence[Swim], tried: Sequence[str] = RESI
     unknowns, deviation = Unknowns(model.blocks, BASE), DEVIATION
     vector, start = np.zeros(unknowns.size), windows.start
     for _ in range(ROUNDS):
-        fitted = fit_windows(model, unknowns, windows, deviation, vector, start)
+        stages.begin("fitting fins and body")
+        fitted = fit_windows(model, unknowns, windows, deviation, vector, start, stages.step)
         vector, start = fitted.vector, fitted.start
         deviation = _deviation(fitted, deviation)
         _keep_motion(model, fitted, windows)
-    fitted, deviation, trials = _with_what_helps(model, windows, deviation, fitted, tried)
+    fitted, deviation, trials = _with_what_helps(model, windows, deviation, fitted, tried, stages)
     deviation = _deviation(fitted, deviation)
     _keep_motion(model, fitted, windows)
-    fitted = fit_windows(model, fitted.unknowns, windows, deviation, fitted.vector, fitted.start)
+    stages.skip_to(ROUNDS + (1 + ROUNDS) * len(tried))
+    stages.begin("fitting all together")
+    fitted = fit_windows(model, fitted.unknowns, windows, deviation, fitted.vector, fitted.start, stages.step)
     if not np.isfinite(fitted.vector).all():
         raise DataError(f"{swims[0].name}: the fit goes astray; is the layout that of the robot that swam?")
     return RobotFit(model, fitted, deviation, _explained(fitted, windows), trials, _notes(swims, windows))
 
 
 def _with_what_helps(
-    model: RobotModel, windows: Windows, deviation: Array, fitted: Fitted, left: Sequence[str]
+    model: RobotModel,
+    windows: Windows,
+    deviation: Array,
+    fitted: Fitted,
+    left: Sequence[str],
+    stages: Stages,
 ) -> tuple[Fitted, Array, tuple[Trial, ...]]:
     """The fit with all that helps on windows not seen, deviations (12,), and what was tried."""
     trials: list[Trial] = []
     left = list(left)
     while left:
+        stages.begin("looking for what else helps")
         gains = unseen_gains(model, fitted, windows, deviation, left)
         tried = [Trial(name, float(gain.mean()), _error_of_mean(gain), False) for name, gain in gains.items()]
         best = max(tried, key=lambda trial: trial.gain)
@@ -167,7 +190,8 @@ def _with_what_helps(
         unknowns = Unknowns(model.blocks, (*fitted.unknowns.names, best.name))
         vector = unknowns.taken_over(fitted.unknowns, fitted.vector)
         for _ in range(ROUNDS):
-            fitted = fit_windows(model, unknowns, windows, deviation, vector, fitted.start)
+            stages.begin(f"fitting {best.name}")
+            fitted = fit_windows(model, unknowns, windows, deviation, vector, fitted.start, stages.step)
             vector, deviation = fitted.vector, _deviation(fitted, deviation)
             _keep_motion(model, fitted, windows)
     return fitted, deviation, tuple(trials)

@@ -1,0 +1,38 @@
+"""The Gaussian process beside its textbook formulas, and data that leave its matrices singular."""
+
+import numpy as np
+
+from finlab.fit.gaussian_process import GaussianProcess
+from finlab.fit.thrust_kernel import ThrustKernel
+from tests.fit.cell import commands
+
+KERNEL = ThrustKernel(even=0.7, uneven=0.2, amplitude=0.5, frequency=0.8, turn=1.3)
+INPUTS, RNG = commands(30) / [0.6, 2.1, 1.0], np.random.default_rng(0)
+VALUES, VARIANCE = RNG.standard_normal(30), RNG.uniform(0.01, 0.1, 30)
+
+
+def test_predictions_are_those_of_a_conditioned_normal_distribution() -> None:
+    process, test = GaussianProcess(KERNEL, INPUTS, VALUES, VARIANCE), commands(8, seed=1) / [0.6, 2.1, 1.0]
+    noisy = KERNEL.covariance(INPUTS, INPUTS) + np.diag(VARIANCE)
+    gain = KERNEL.covariance(test, INPUTS) @ np.linalg.inv(noisy)
+    left = KERNEL.covariance(test, test) - gain @ KERNEL.covariance(INPUTS, test)
+    mean, deviation = process.predict(test)
+    np.testing.assert_allclose(mean, gain @ VALUES, rtol=1e-6)
+    np.testing.assert_allclose(process.expect(test), mean)
+    np.testing.assert_allclose(process.covariance(test), left, atol=1e-8)
+    np.testing.assert_allclose(deviation**2, np.diag(left), atol=1e-8)
+
+
+def test_a_value_left_out_is_predicted_by_a_process_without_it() -> None:
+    error, deviation = GaussianProcess(KERNEL, INPUTS, VALUES, VARIANCE).left_out()
+    others = np.arange(30) != 7
+    mean, own = GaussianProcess(KERNEL, INPUTS[others], VALUES[others], VARIANCE[others]).predict(INPUTS[7:8])
+    np.testing.assert_allclose(error[7], VALUES[7] - mean[0], rtol=1e-6)
+    np.testing.assert_allclose(deviation[7] ** 2, own[0] ** 2 + VARIANCE[7], rtol=1e-6)
+
+
+def test_repeated_commands_without_noise_are_bearable() -> None:
+    twice, values = np.repeat(INPUTS, 40, axis=0), np.repeat(VALUES, 40)
+    strong = KERNEL._replace(even=1e4)
+    mean, deviation = GaussianProcess(strong, twice, values, np.zeros(1200)).predict(INPUTS)
+    assert np.isfinite(mean).all() and np.isfinite(deviation).all()
