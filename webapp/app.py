@@ -1,4 +1,4 @@
-"""The server: one `View` for each browser that connects, and the clock that lets the fins flap."""
+"""The server: one `View` for each browser that connects, and the clock of those that swim."""
 
 import asyncio
 import contextlib
@@ -18,7 +18,7 @@ from webapp.view import View
 from webapp.viser_internals import disable_sharing, enter, stored
 
 FRAME_S = 1 / 25
-"""Time between two poses of the fins [s]."""
+"""Time between two poses of robots that swim [s]."""
 KEEP_S = 2.0
 """How often changed sessions are written to disk [s]."""
 STORAGE_KEY = "finlab-sessions"
@@ -125,7 +125,7 @@ class App:
             await asyncio.sleep(FRAME_S)
             now = time.monotonic()
             for view in list(self.views.values()):
-                # A long pause (a busy machine) must not become a leap of the fins.
+                # A long pause (a busy machine) must not become a leap of the robots.
                 view.scenery.animate(min(now - before, 0.2))
             before = now
             if now - kept > KEEP_S:

@@ -106,7 +106,6 @@ def test_nodes_and_widgets_do_not_grow(server: viser.ViserServer, view: View) ->
     def round_trip() -> None:
         for layout in layouts:
             view.do(lambda layout=layout: view.session.open_layout(layout))
-            view.scenery.robot.animate(0.1)
 
     on_loop(server, round_trip)
     until(lambda: not view.busy)

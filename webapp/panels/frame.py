@@ -28,8 +28,8 @@ HABITS = files("webapp").joinpath("habits.js").read_text("utf-8")
 """Script that mends what viser's page does otherwise."""
 EARLY = files("webapp").joinpath("early_keys.js").read_text("utf-8")
 """Script that keeps keys for the list of commands while it opens."""
-TRIAD = files("webapp").joinpath("triad.js").read_text("utf-8")
-"""Script that turns the axes in the corner of the view."""
+FRAMES = files("webapp").joinpath("frames.js").read_text("utf-8")
+"""Script that lets fins flap, and draws only what has changed."""
 NAMES = files("webapp").joinpath("names.js").read_text("utf-8")
 """Script that gives each box a name for readers of the screen."""
 _VARIABLES = (
@@ -127,7 +127,7 @@ class Frame:
                     for index, place in enumerate(PLACES)
                     if place.region == region
                 ]
-        run_script(gui, HABITS + EARLY + TRIAD + NAMES)
+        run_script(gui, HABITS + EARLY + FRAMES + NAMES)
 
     @property
     def panels(self) -> tuple[list[Panel], list[Panel]]:

@@ -37,17 +37,18 @@ class Flapping:
     def __init__(self) -> None:
         """No fins yet."""
         self._phase: NDArray[np.floating] = np.zeros(0)
-        self._command: Array = np.zeros((0, 3))
+        self.command: Array = np.zeros((0, 3))
+        """What they do (n, 3), NaN for failed ones."""
 
     def take(self, command: Array) -> None:
         """Other commands (n, 3), NaN for failed fins; the fins go on from where they are."""
-        if len(command) != len(self._command):
+        if len(command) != len(self.command):
             self._phase = np.arange(len(command)) * APART
-        self._command = command
+        self.command = command
 
     def angles(self, elapsed: float, frozen: bool) -> list[float]:
         """Angle of each blade [rad] after some more time [s]; at its zero direction if `frozen`."""
-        amplitude, frequency, direction = self._command.T
+        amplitude, frequency, direction = self.command.T
         alive = np.isfinite(amplitude)
         if frozen:
             return [float(a) for a in np.where(alive, direction, LIMP)]

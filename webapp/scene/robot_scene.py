@@ -1,5 +1,6 @@
 """The whole 3D view of one browser."""
 
+import json
 from functools import partial
 
 import numpy as np
@@ -27,6 +28,7 @@ from webapp.tasks.analyst import Findings
 from webapp.tasks.context import Context
 from webapp.tasks.solver import Proposal
 from webapp.theme import ASKED, DELIVERED, HALF_TURN
+from webapp.viser_internals import run_script
 
 CAMERAS = {
     "3D": (0.42, 0.40, 0.51),
@@ -60,7 +62,7 @@ class RobotScene:
         """Place of the fin in the user's hand."""
         self.editing = False
         """Whether the selected fin has its gizmos: while the layout is edited."""
-        self._flapping = Flapping()
+        self._flapping, self._flaps = Flapping(), ""
         self.newtons = 1.0
         """Force [N] that an arrow of 0.1 m stands for at the moment."""
         self.torque = 1.0
@@ -179,8 +181,17 @@ class RobotScene:
         landing = self._session.landing(names[self.dragged], *self._fins[self.dragged].pose())
         return () if landing is None else (landing,)
 
+    def flap(self) -> None:
+        """Let the page move the fins (`frames.js`): commands of all, and how fast."""
+        display = self._session.display
+        fins = [row if np.isfinite(row[0]) else None for row in self._flapping.command.tolist()]
+        told = json.dumps([fins, display.speed, display.frozen])[1:-1]
+        if told != self._flaps:
+            self._flaps = told
+            run_script(self._client.gui, f"finlabFrames.flap({told});")
+
     def animate(self, elapsed: float) -> None:
-        """Let the fins flap for some time [s] of the clock on the wall."""
+        """Let the fins flap for some time [s] of the clock on the wall, in a recording."""
         display = self._session.display
         angles = self._flapping.angles(elapsed * display.speed, display.frozen)
         for node, angle in zip(self._fins, angles, strict=False):  # a fin may be newer than the answer

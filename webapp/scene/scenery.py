@@ -49,6 +49,7 @@ class Scenery:
         proposal = None if reply is None else reply.proposal
         other, display = self._overlaid(comparison), self._session.display
         self.robot.refresh(answering.shown, other, findings, offered, proposal)
+        self.robot.flap()
         self.swims = bool(self._swimming.swimmers)
         self.robot.show(not self.swims)
         self.legend = legend(
@@ -73,12 +74,10 @@ class Scenery:
         self.swim.refresh(self._session.display.dark)
 
     def animate(self, elapsed: float) -> None:
-        """Let time pass [s]: fins flap, and a robot that swims moves on."""
+        """Let time pass [s]: robots that swim move on."""
         if self._swimming.active:
             self._swimming.tick(elapsed)
             self.swim.animate(elapsed)
-        else:
-            self.robot.animate(elapsed)
 
     def end_swim(self) -> None:
         """Go back from the robot that swims to the one that is designed."""

@@ -1,0 +1,130 @@
+// Frames of the 3D view: fins flap here, and only what has changed is drawn. viser draws for a quarter of a second after
+// each message, and once a second in any case; on a machine without a graphics card one frame takes as long. A page that
+// nobody touches comes to rest: after REST_MS the fins stand still, until somebody moves the mouse or asks something.
+(() => {
+  if (window.finlabFrames) return;
+  const REST_MS = 30000, LOOKED_AT_MS = 4000; // after the last touch
+  const QUICK_MS = 40, SLOW_MS = 70; // between frames, just after a touch and later
+  const SETTLE_MS = 230; // a little less than viser's own
+  const LONGEST_STEP_S = 0.2; // a long pause must not become a leap of the fins
+  const APART = 1.9, LIMP = Math.PI / 2; // as in fin_node.py
+
+  let fins = [], speed = 1, frozen = true, phases = [];
+  let touched = performance.now(), due = 0, drawnAt = -Infinity, drawn = [], timer = 0, stepped = 0;
+  const viewer = () => window.__viserMutable;
+  const root = () => viewer()?.scene?.__r3f?.root.getState();
+
+  // What is drawn, and when.
+
+  function patch() {
+    const { gl } = root() ?? {};
+    if (!gl || gl.finlab) return;
+    gl.finlab = true;
+    const draw = gl.render.bind(gl);
+    gl.render = (scene, camera) => {
+      if (scene !== viewer().scene || gl.getRenderTarget() || viewer().getRenderRequestState !== 'ready') return draw(scene, camera);
+      camera.updateMatrixWorld();
+      turnTriad();
+      const now = performance.now();
+      const seen = [...camera.matrixWorld.elements, ...camera.projectionMatrix.elements, gl.domElement.width, gl.domElement.height];
+      const moved = seen.some((value, k) => value !== drawn[k]);
+      const settling = now < due + QUICK_MS && now - drawnAt >= QUICK_MS, settled = drawnAt < due && now >= due;
+      if (!moved && !settling && !settled) return;
+      drawn = seen;
+      drawnAt = now;
+      window.finlabFrames.count++;
+      draw(scene, camera);
+    };
+    gl.domElement.addEventListener('webglcontextrestored', ask);
+  }
+
+  const ask = () => { due = performance.now() + SETTLE_MS; };
+
+  function listenToRequests() {
+    const view = viewer(), request = view.requestRender;
+    if (request.finlab) return;
+    view.requestRender = Object.assign(() => { ask(); request(); }, { finlab: true });
+  }
+
+  function touch() {
+    touched = performance.now();
+    due = Math.max(due, touched + 2 * QUICK_MS); // what the pointer is over may look otherwise
+    beat();
+  }
+
+  // How fins flap: amplitude, frequency and direction of each; null for one that hangs limp.
+
+  const flaps = () => !frozen && speed > 0 && fins.some(Boolean) && viewer()?.nodeRefFromName['/robot']?.visible !== false;
+
+  function pose() {
+    const view = viewer();
+    fins.forEach((fin, k) => {
+      const angle = !fin ? LIMP : frozen ? fin[2] : fin[2] + fin[0] * Math.sin(phases[k]);
+      const told = { type: 'SetOrientationMessage', name: `/robot/fins/${k}/turn/blade`, wxyz: [Math.cos(angle / 2), Math.sin(angle / 2), 0, 0] };
+      view.messageQueue.push(told);
+    });
+    due = Math.max(due, performance.now() + 1);
+    root()?.invalidate();
+  }
+
+  function beat() {
+    if (timer || document.hidden || !flaps()) return;
+    const since = performance.now() - touched;
+    if (since > REST_MS) return;
+    timer = setTimeout(() => requestAnimationFrame(() => {
+      timer = 0;
+      const now = performance.now(), elapsed = Math.min((now - stepped) / 1000, LONGEST_STEP_S);
+      stepped = now;
+      fins.forEach((fin, k) => { if (fin) phases[k] = (phases[k] + 2 * Math.PI * fin[1] * elapsed * speed) % (2 * Math.PI); });
+      if (flaps()) pose();
+      beat();
+    }), since < LOOKED_AT_MS ? QUICK_MS : SLOW_MS);
+  }
+
+  // The axes in the corner of the view turn with the camera.
+
+  const LENGTH = 25, TURN = [0, 1, 2, 4, 5, 6, 8, 9, 10];
+  let turned = [];
+
+  function turnTriad() {
+    const svg = document.querySelector('.triad'), view = viewer();
+    const robot = view.nodeRefFromName['/robot'], { camera } = view;
+    if (!svg || !robot || !camera) return;
+    const c = camera.matrixWorldInverse.elements, r = robot.matrixWorld.elements;
+    const same = (value, k) => Math.abs(value - turned[k]) < 1e-3;
+    if (svg.dataset.drawn && TURN.every((k) => same(c[k], k) && same(r[k], 16 + k))) return;
+    turned = [...c, ...r];
+    svg.dataset.drawn = '1';
+    const arms = [...svg.querySelectorAll('.axis')];
+    const depths = new Map();
+    for (const arm of arms) {
+      const k = 'xyz'.indexOf(arm.classList[1]);
+      const [x, y, z] = r.slice(4 * k, 4 * k + 3);
+      const seen = [0, 1, 2].map((row) => c[row] * x + c[4 + row] * y + c[8 + row] * z);
+      const u = LENGTH * seen[0], v = -LENGTH * seen[1];
+      arm.querySelector('line').setAttribute('x2', u);
+      arm.querySelector('line').setAttribute('y2', v);
+      for (const part of arm.querySelectorAll('circle, text')) part.setAttribute('transform', `translate(${u} ${v})`);
+      depths.set(arm, seen[2]);
+    }
+    // The nearest one is drawn last; only where the order changes, so that a click meets what it was aimed at.
+    const order = [...arms].sort((a, b) => depths.get(a) - depths.get(b));
+    if (order.some((arm, k) => arm !== arms[k])) for (const arm of order) svg.append(arm);
+  }
+
+  window.finlabFrames = {
+    count: 0, // frames that were drawn
+    flap(commands, rate, still) {
+      patch();
+      listenToRequests();
+      if (commands.length !== fins.length) phases = commands.map((_, k) => APART * k);
+      [fins, speed, frozen] = [commands, rate, still];
+      stepped = performance.now();
+      pose();
+      touch();
+    },
+  };
+  for (const kind of ['pointermove', 'pointerdown', 'pointerup', 'wheel', 'keydown', 'keyup'])
+    window.addEventListener(kind, touch, { capture: true, passive: true });
+  document.addEventListener('visibilitychange', () => { ask(); touch(); });
+})();
