@@ -1,9 +1,11 @@
 """Candidates that do the same are one mode, and no two modes share a name."""
 
+import re
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from finlab.allocation.modes import find_modes
 from finlab.allocation.solution import Candidates
@@ -11,7 +13,7 @@ from finlab.assets import shipped_layouts
 from finlab.layout import load_layout
 from tests.webapp.loops import AtOnce, page_of
 from tests.webapp.stand_in import StandIn
-from webapp.markup.mode_plot import DOT, LEFT, WIDTH, _apart, mode_plot
+from webapp.markup.mode_plot import LABEL, LEFT, WIDTH, mode_plot
 from webapp.markup.modes import mode_table
 from webapp.markup.words import error_digits, small, three_digits
 from webapp.session import Session
@@ -20,6 +22,7 @@ from webapp.tasks.answering import Answering
 from webapp.tasks.mode_names import (
     MAX_SHOWN,
     NO_MODES,
+    Modes,
     NamedMode,
     known_modes,
     led_to,
@@ -147,9 +150,29 @@ def test_another_sample_of_another_answer_is_shown() -> None:
     assert session.mode == place, "what is on the robot stays there when all modes are known"
 
 
-def test_dots_do_not_cover_each_other_nor_leave_the_plot() -> None:
-    places = _apart([(375.0, 50.0)] * 8 + [(90.0, 52.0)] * 3)
-    assert all(LEFT + DOT <= x <= WIDTH - DOT for x, _ in places)
-    assert [x for x, _ in places[8:]] == sorted(x for x, _ in places[8:]), "none looks cheaper than it is"
-    for k, (x, y) in enumerate(places):
-        assert all(abs(x - u) >= 2 * DOT or abs(y - v) >= 2 * DOT for u, v in places[:k])
+@pytest.mark.parametrize("spread", [0.0, 1e-6, 0.01, 1.0])
+@pytest.mark.parametrize("sampled", [True, False])
+def test_dots_stand_at_their_values_and_their_numbers_beside_them(spread: float, sampled: bool) -> None:
+    answer = StandIn().allocate(load_layout("hexa"), PRESETS["Turn"])
+    first = known_modes(answer)[0]
+    power = np.append(0.801 + spread * np.random.default_rng(3).uniform(size=MAX_SHOWN - 1), 0.957 + spread)
+    shown = tuple(NamedMode(replace(first, power=float(watts)), f"{k}") for k, watts in enumerate(power))
+    of_samples = np.zeros(64, dtype=np.intp) if sampled else None
+    given = replace(answer, settings={"objective": "power"}, samples=answer.samples if sampled else None)
+    plot = mode_plot(given, Modes(shown, MAX_SHOWN, of_samples), 3, None, 200, "here")
+    across = [
+        float(x) for x in re.findall(r"<circle cx='([\d.]+)' cy='[\d.]+' r='[\d.]+' class='mode'", plot)
+    ]
+    labels = re.findall(r"<text x='([\d.]+)' y='([\d.]+)' class='digit'[^>]*>(\d+)<", plot)
+    across, numbers = (
+        across[::-1],
+        [(float(x), float(y)) for x, y, _ in labels][::-1],
+    )  # the best one is on top
+    assert [int(k) for *_, k in labels][::-1] == list(range(1, MAX_SHOWN + 1))
+    scale, start = np.polyfit(power, across, 1)
+    assert scale > 0 and np.abs(scale * power + start - across).max() < 0.2, "each at its value"
+    assert np.argmax(across) == MAX_SHOWN - 1
+    width, height = LABEL
+    for k, (x, y) in enumerate(numbers):
+        assert LEFT <= x <= WIDTH
+        assert all(abs(x - u) >= width - 0.2 or abs(y - v) >= height - 0.2 for u, v in numbers[:k])

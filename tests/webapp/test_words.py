@@ -5,6 +5,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from finlab.allocation import load_allocator
@@ -18,11 +19,18 @@ from tests.webapp.stand_in import StandIn
 from webapp.markup.comparison import comparison_table
 from webapp.markup.corner import corner
 from webapp.markup.score_card import check_card, score_table, warnings
-from webapp.markup.verdict import Verdict, verdict_of, verdict_sentence
-from webapp.markup.words import authority_sentence, rest_sentence, trim_sentence
+from webapp.markup.verdict import (
+    WORKING,
+    Verdict,
+    answer_sentence,
+    rest_sentence,
+    verdict_of,
+    verdict_sentence,
+)
+from webapp.markup.words import authority_sentence, trim_sentence
 from webapp.scene.wrench_nodes import LENGTH, LONGEST, fitting_newtons
 from webapp.session import Session, files
-from webapp.session.state import State
+from webapp.session.state import AXIS_WORDS, State
 from webapp.session.targets import PRESETS, axis_reach, full_thrust
 from webapp.session.tour import STEPS
 from webapp.tasks.analyst import Question, find
@@ -41,6 +49,42 @@ def test_reachable_and_not() -> None:
     assert told.startswith("Out of reach: ") and "of the heave force" in told and "at the limit" in told
     assert not is_within(layout, (0, 0, 60, 0, 0, 0), ()) and is_within(layout, PRESETS["Turn"], ())
     assert "N of heave" in rest_sentence(hard) and rest_sentence(hard).endswith("left undone.")
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.93, 0.985, 0.999, 1.0, 1.02, 1.5])
+@pytest.mark.parametrize("target", [PRESETS["Turn"], (0.0, 0.0, 2.0, 0.0, 0.0, 0.1), (0.0,) * 6])
+def test_all_that_is_said_of_an_answer_agrees(share: float, target: tuple[float, ...]) -> None:
+    layout = load_layout("ucat")
+    exact = StandIn().allocate(layout, target)
+    wrench = np.array(target)
+    wrench[5] *= share
+    wrench[4] += 1e-3 * (share < 1.0)
+    error = float(np.linalg.norm((wrench - target) / exact.sigma))
+    answer = replace(exact, wrench=wrench, err_norm=error)
+    state = State(layout, target=tuple(target), objective="effort")  # type: ignore[arg-type]
+    said, verdict = str(answer_sentence(state, answer, False)), verdict_sentence(answer, True)
+    assert ("Nothing is left undone" in said) == (verdict == "Exact") == (error <= 0.01)
+    assert "100 %" not in said + verdict
+    if verdict != "Exact":
+        axis = int(np.argmax(np.abs((wrench - target) / answer.sigma)))
+        assert AXIS_WORDS[axis] in verdict and AXIS_WORDS[axis] in said
+
+
+def test_no_verdict_stands_beside_a_new_question() -> None:
+    layout = load_layout("ucat")
+    answer = StandIn().allocate(layout, PRESETS["Turn"])
+    state = State(layout, target=(0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+    shown = corner(state, "", answer, True, None, in_reach=True) + answer_sentence(state, answer, True)
+    assert shown.count(WORKING) == 2 and "Exact" not in shown and "undone" not in shown
+    assert css(DELIVERED) not in shown
+
+
+def test_a_method_that_keeps_least_something_else_says_so() -> None:
+    layout = load_layout("ucat")
+    answer = StandIn().allocate(layout, PRESETS["Turn"])
+    for objective, told in (("power", True), ("effort", False)):
+        state = State(layout, target=PRESETS["Turn"], method="mdn", objective=objective)
+        assert ("mdn keeps effort least, not power" in answer_sentence(state, answer, False)) == told
 
 
 def test_fins_that_were_not_learned_are_told_in_words_of_their_own() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.policy import AXES
 from webapp.markup.swim_card import pace_words, robots
-from webapp.markup.verdict import verdict_of, verdict_sentence
+from webapp.markup.verdict import WORKING, verdict_of, verdict_sentence
 from webapp.markup.words import error_digits, objective_of, three_digits
 from webapp.scene.wrench_nodes import set_scale
 from webapp.session.state import AXIS_UNITS, State
@@ -121,10 +121,11 @@ def corner(
     parts = [f"<span class='aside'>{fins}</span>"]
     if error is not None:
         parts.append(f"<span class='missing'>{escape(error)}</span>")
-    elif allocation is not None:
+    elif busy or allocation is None:  # an old verdict would be taken for that of the new question
+        parts.append(f"<span class='aside'><span class='dim'>{state.method}</span></span>")
+        parts.append(f"<span class='pill' style='background:{css(DEAD)}'>{WORKING}</span>")
+    else:
         parts += _figures(allocation, instead, least, in_reach)
-    if error is None and (busy or allocation is None):
-        parts.append("<span class='dim'>computing …</span>")
     return _cards(legend, parts)
 
 

@@ -24,8 +24,14 @@ FAR = 2.0
 """Samples that cost more than so many times the dearest mode are counted, not drawn: modes keep apart."""
 LEGEND = (("refined", 5.0, 6), ("on the robot", 0.0, 72), ("sampled", 2.6, 176))
 """Word, radius and place of what is drawn; radius 0 is the ring. The last one is for methods that sample."""
-DOT = 9
-"""Radius of the dot of a mode with its rim [px]."""
+DOT = 4.5
+"""Radius of the dot of a mode [px]."""
+LABEL = (13.0, 12.0)
+"""Width and height of the number of a mode [px]."""
+FAR_PX = 14.0
+"""Distance of a number from its dot above which a line joins them [px]."""
+Point = tuple[float, float]
+"""Across and down [px]."""
 SAMPLES = "fl-sample"
 """Channel that hears which sample is clicked."""
 
@@ -108,7 +114,7 @@ def mode_plot(
     across = cost_axis(words[order[0]], points[:, 0])
     up = cost_axis(words[order[1]], points[:, 1]) if samples is None else error_axis(points[:, 1])
 
-    def place(point: Array) -> tuple[float, float]:
+    def place(point: Array) -> Point:
         x = LEFT + across.share(float(point[0])) * (WIDTH - LEFT - RIGHT)
         return x, height - BOTTOM - up.share(float(point[1])) * (height - BOTTOM - TOP)
 
@@ -116,21 +122,27 @@ def mode_plot(
     if samples is not None:
         dots = [place(point) if close else None for point, close in zip(raw, near, strict=True)]
         parts.append(_sample_dots(dots, modes, sample, picker))
-    places = [place(point) for point in refined]
-    labels = list(enumerate(zip(_apart(places), places, strict=True)))
-    for k, ((x, y), (u, v)) in reversed(labels):  # the best one on top
-        if (x, y) != (u, v):
-            color = css(mode_color(k))
-            parts.append(f"<path d='M{u:.1f} {v:.1f}L{x:.1f} {y:.1f}' stroke='{color}'/>")
-            parts.append(f"<circle cx='{u:.1f}' cy='{v:.1f}' r='3.5' fill='{color}'/>")
+    parts += _mode_dots([place(point) for point in refined], height - BOTTOM, shown, picker)
+    return f"<div class='fl'><svg class='plot' viewBox='0 0 {WIDTH} {height}'>{''.join(parts)}</svg></div>"
+
+
+def _mode_dots(places: list[Point], floor: float, shown: int | None, picker: str) -> list[str]:
+    """A dot where each mode lies, with its number beside it; the best one on top."""
+    parts = []
+    labels = _labels(places, floor)
+    for k, ((x, y), (u, v)) in reversed(list(enumerate(zip(places, labels, strict=True)))):
+        color = css(mode_color(k))
+        way = f"d='M{x:.1f} {y:.1f}L{u:.1f} {v:.1f}'"
+        line = f"<path {way} stroke='{color}'/>" if math.dist((x, y), (u, v)) > FAR_PX else ""
         parts.append(
-            f"<g class='pick' {pick(picker, k)}>"
-            f"<circle cx='{x:.1f}' cy='{y:.1f}' r='8' class='disc' stroke='{css(mode_color(k))}'/>"
-            f"<text x='{x:.1f}' y='{y + 3.8:.1f}' class='digit'>{k + 1}</text></g>"
+            # What is between a dot and its number can be clicked, too.
+            f"<g class='pick' {pick(picker, k)}><path {way} stroke='transparent' stroke-width='12'/>{line}"
+            f"<circle cx='{x:.1f}' cy='{y:.1f}' r='{DOT}' class='mode' fill='{color}'/>"
+            f"<text x='{u:.1f}' y='{v + 3.8:.1f}' class='digit' text-anchor='middle'>{k + 1}</text></g>"
         )
         if k == shown:
-            parts.append(_ring(x, y, 11))
-    return f"<div class='fl'><svg class='plot' viewBox='0 0 {WIDTH} {height}'>{''.join(parts)}</svg></div>"
+            parts.append(_ring(x, y, DOT + 3.0))
+    return parts
 
 
 def sample_colors(modes: Modes, count: int) -> list[Rgb]:
@@ -143,9 +155,7 @@ def _logarithm(error: Array) -> Array:
     return np.asarray(np.log10(np.maximum(error, EXACT)))
 
 
-def _sample_dots(
-    places: list[tuple[float, float] | None], modes: Modes, sample: int | None, picker: str
-) -> str:
+def _sample_dots(places: list[Point | None], modes: Modes, sample: int | None, picker: str) -> str:
     """Raw samples, a ring around the one on the robot, and how many have no place in the plot."""
     colors = sample_colors(modes, len(places))
     dots = [
@@ -166,19 +176,26 @@ def _ring(x: float, y: float, radius: float) -> str:
     return f"<circle class='ring' cx='{x:.1f}' cy='{y:.1f}' r='{radius:g}'/>"
 
 
-def _apart(places: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Where the numbers of dots stand, so that each can be clicked: on their dots, or beside crowded ones."""
-    apart: list[tuple[float, float]] = []
+def _labels(places: list[Point], floor: float) -> list[Point]:
+    """Where the numbers of dots stand: beside them, clear of all dots and of each other, above `floor`."""
+    labels: list[Point] = []
+    width, height = LABEL
     for x, y in places:
-        rooms = [x + side * step for side in (1, -1) for step in range(0, WIDTH, 2)]
-        free = (
-            room
-            for room in rooms
-            if LEFT + DOT <= room <= WIDTH - RIGHT - DOT
-            and not any(abs(room - u) < 2 * DOT and abs(y - v) < 2 * DOT for u, v in apart)
+        rooms = (
+            (x + radius * math.cos(turn), y - radius * math.sin(turn))
+            for radius in range(12, WIDTH, 4)
+            for turn in np.linspace(0.5 * math.pi, 2.5 * math.pi, 12, endpoint=False)
         )
-        apart.append((next(free, x), y))
-    return apart
+        free = (
+            (u, v)
+            for u, v in rooms
+            if LEFT + width / 2 <= u <= WIDTH - RIGHT - width / 2
+            and TOP <= v <= floor - height / 2
+            and not any(abs(u - a) < width and abs(v - b) < height for a, b in labels)
+            and not any(abs(u - a) < width / 2 + DOT and abs(v - b) < height / 2 + DOT for a, b in places)
+        )
+        labels.append(next(free, (x, y)))
+    return labels
 
 
 def _legend(sampled: bool) -> str:

@@ -1,13 +1,27 @@
-"""What an answer is worth, in one word and one sentence: four things that are told apart."""
+"""What an answer is worth, in a word, in a sentence and axis by axis; all three say the same."""
 
 from enum import Enum
 
 import numpy as np
+from markupsafe import Markup
 
 from finlab.allocation.allocation import Allocation
-from webapp.markup.words import fins_words, saturated, unlearned_sentence
-from webapp.session.state import AXIS_UNITS, AXIS_WORDS
+from webapp.markup.words import (
+    authority_sentence,
+    fins_words,
+    listed,
+    objective_of,
+    saturated,
+    unlearned_sentence,
+)
+from webapp.session.state import AXIS_UNITS, AXIS_WORDS, State
+from webapp.session.targets import axis_reach
 from webapp.theme import DELIVERED, MISSING, NEARLY, UNLEARNED, Rgb
+
+WORKING = "Working …"
+"""What stands in place of a verdict while the present question has no answer."""
+SPOKEN = 0.3
+"""Share of the largest miss, each axis over its scale, from which another axis is spoken of, too."""
 
 
 class Verdict(Enum):
@@ -60,12 +74,59 @@ def verdict_sentence(allocation: Allocation, in_reach: bool) -> str:
     axis = int(np.argmax(np.abs(allocation.unallocated / allocation.sigma)))
     target, given = allocation.target[axis], allocation.wrench[axis]
     kind = "force" if axis < 3 else "torque"
-    if abs(target) > 1e-3 and -0.005 < given / target < 1.0:
-        sentence = f"{verdict.value}: {abs(100 * given / target):.0f} % of the {AXIS_WORDS[axis]} {kind}"
+    share = 100.0 * given / target if abs(target) > 1e-3 else np.nan
+    if -0.5 < share < 99.5:
+        sentence = f"{verdict.value}: {abs(share):.0f} % of the {AXIS_WORDS[axis]} {kind}"
     else:
-        much = f"{abs(given - target):.2g} {AXIS_UNITS[axis]} of {AXIS_WORDS[axis]}"
-        sentence = f"{verdict.value}: {much} too much"
+        word = "missing" if share < 100.0 else "too much"
+        sentence = f"{verdict.value}: {_amount(given - target, axis)} {word}"
     if verdict is Verdict.APPROXIMATE:
         return f"{sentence}; the fins can, {allocation.method} does not"
     full = np.flatnonzero(saturated(allocation).any(axis=1))
     return f"{sentence}; {fins_words(full.tolist())} at the limit" if len(full) else sentence
+
+
+def rest_sentence(allocation: Allocation) -> str:
+    """One sentence on what is left undone, axis by axis; nothing is where the answer is exact."""
+    if allocation.reachable:
+        return "Nothing is left undone."
+    rest, size = allocation.unallocated, np.abs(allocation.unallocated / allocation.sigma)
+    parts = [_amount(rest[k], k) for k in np.argsort(-size) if size[k] >= SPOKEN * size.max()]
+    return f"{listed(parts)} {'is' if len(parts) == 1 else 'are'} left undone."
+
+
+def answer_sentence(state: State, allocation: Allocation | None, busy: bool) -> Markup:
+    """What is left undone, why, and what the method does not heed.
+
+    Args:
+        state: what is asked now.
+        allocation: the newest answer, None while there is none.
+        busy: whether it answers an earlier question.
+    """
+    sentences = []
+    if allocation is not None and not busy:
+        if allocation.unknown_fins:
+            sentences.append(_warning("; ".join(allocation.notes) + "."))
+        sentences.append(rest_sentence(allocation))
+        if not allocation.reachable and not allocation.unknown_fins:
+            share = round(100 * allocation.scale)
+            told = [f"{share} % of what is asked"] if 0 <= share < 100 else []
+            told += [*allocation.binding, *allocation.notes]
+            sentences.append("; ".join(told) + "." if told else "")
+        kept = objective_of(allocation)
+        if kept != state.objective:
+            sentences.append(_warning(f"{allocation.method} keeps {kept} least, not {state.objective}."))
+    elif busy:
+        sentences.append(WORKING)
+    blind = authority_sentence(state.layout, state.failed, axis_reach(state.able, state.failed))
+    if blind is not None:
+        sentences.insert(0, _warning(blind))
+    return Markup(" ").join(filter(None, sentences))
+
+
+def _amount(value: float, axis: int) -> str:
+    return f"{abs(value):.2g} {AXIS_UNITS[axis]} of {AXIS_WORDS[axis]}"
+
+
+def _warning(text: str) -> Markup:
+    return Markup("<span class='missing'>{}</span>").format(text)

@@ -10,7 +10,7 @@ from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics.vehicle import Vehicle, complete_body
-from webapp.session.state import AXIS_UNITS, AXIS_WORDS, State
+from webapp.session.state import AXIS_WORDS, State
 
 SMALL = 0.05
 """Normalized error of an axis that is too small to speak of."""
@@ -77,19 +77,6 @@ def missing_part(allocation: Allocation) -> Array:
 def unlearned_sentence(layout: Layout, fins: Sequence[str]) -> str:
     """Which fins the method's networks have not learned, so that its commands for them are wrong."""
     return f"Not learned: {fins_words([layout.index(name) for name in fins])}. Choose another method"
-
-
-def rest_sentence(allocation: Allocation) -> str:
-    """One sentence on the unallocated wrench, axis by axis, leaving out what does not matter."""
-    rest = allocation.unallocated
-    parts = [
-        f"{abs(rest[k]):.2g} {AXIS_UNITS[k]} of {AXIS_WORDS[k]}"
-        for k in np.argsort(-np.abs(rest / allocation.sigma))
-        if abs(rest[k] / allocation.sigma[k]) > SMALL / 2
-    ]
-    if not parts:
-        return "Nothing is left undone."
-    return f"{listed(parts)} {'is' if len(parts) == 1 else 'are'} left undone."
 
 
 def authority_sentence(layout: Layout, failed: tuple[str, ...], reach: Array) -> str | None:

@@ -10,7 +10,8 @@ from finlab.allocation.policy import AXES, KINDS
 from webapp.handles import Changes, put
 from webapp.markup.answer import fin_table, wrench_bars
 from webapp.markup.picking import marker
-from webapp.markup.words import authority_sentence, rest_sentence, three_digits
+from webapp.markup.verdict import answer_sentence
+from webapp.markup.words import three_digits
 from webapp.page import Page
 from webapp.panels.damage import FinButtons
 from webapp.session.state import AXIS_UNITS, AXIS_WORDS
@@ -53,24 +54,11 @@ class AnswerPanel:
         self._page, self._bars = page, gui.add_html("")
 
     def refresh(self) -> None:
-        """Write the answer."""
-        answer = self._page.shown
+        """Write the answer; one to an earlier question stands beside what was asked then."""
+        answer, state, busy = self._page.shown, self._page.session.state, self._page.busy
+        asked = answer.target if answer is not None and busy else state.target
         given = None if answer is None else answer.wrench
-        put(self._bars, content=wrench_bars(self._page.session.state.target, given, self._sentence()))
-
-    def _sentence(self) -> str:
-        """What is left undone, and why."""
-        answer, state = self._page.shown, self._page.session.state
-        sentence = "" if answer is None else rest_sentence(answer)
-        if answer is not None and answer.unknown_fins:
-            sentence = f"<span class='missing'>{escape('; '.join(answer.notes))}.</span> {sentence}"
-        elif answer is not None and not answer.reachable:
-            told = escape(
-                "; ".join((f"{100 * answer.scale:.0f} % of what is asked", *answer.binding, *answer.notes))
-            )
-            sentence = f"{sentence} {told}."
-        blind = authority_sentence(state.layout, state.failed, axis_reach(state.able, state.failed))
-        return sentence if blind is None else f"<span class='missing'>{blind}</span> {sentence}"
+        put(self._bars, content=wrench_bars(asked, given, answer_sentence(state, answer, busy)))
 
 
 class TargetPanel:

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from finlab.errors import FinlabError
 from finlab.layout import Body, Fin, FinModelSpec, Layout
@@ -88,24 +87,28 @@ def mirrored(layout: Layout, name: str) -> tuple[Layout, str]:
 
 
 def ring(layout: Layout, name: str, count: int, axis: str = "z") -> Layout:
-    """The layout with copies of a fin, so that `count` of them stand evenly around a body axis.
+    """The layout with copies of a fin, so that `count` of them stand evenly around the vertical body axis.
 
-    Shafts are horizontal, so around x and y only the azimuth of a turned shaft is kept; one that would point
-    straight up or down keeps that of the fin.
+    Raises:
+        FinlabError: around x or y, where shafts would leave the horizontal, which no fin can have yet; or the
+            fin stands on the axis.
     """
-    chosen(axis, "axis", AXES)
+    if chosen(axis, "axis", AXES) != "z":
+        raise FinlabError(
+            f"copies around {axis} would turn the shaft of {name} out of the horizontal, and shafts are "
+            "horizontal so far; make copies around z, or mirror the fin"
+        )
     fin = layout.fins[layout.index(name)]
-    place = np.array(fin.position)
-    if np.linalg.norm(np.delete(place, AXES.index(axis))) < 1e-3:
+    x, y, z = fin.position
+    if math.hypot(x, y) < 1e-3:
         raise FinlabError(f"{name} stands on the axis {axis}, so its copies would all be in one place")
-    shaft = np.array([math.cos(fin.mounting_angle), math.sin(fin.mounting_angle), 0.0])
-    for k in range(1, round(number(count, "fins around the axis", 2, MAX_FINS))):
-        turn = Rotation.from_euler(axis, 2 * math.pi * k / count).as_matrix()
-        x, y, z = (round(float(v), 9) for v in turn @ place)
-        ahead, left, _ = turn @ shaft
-        azimuth = fin.mounting_angle if math.hypot(ahead, left) < 0.2 else math.atan2(left, ahead)
-        copy = replace(fin, position=(x, y, z), mounting_angle=float(wrapped(azimuth)))
-        layout, _ = _added(layout, copy, name)
+    whole = round(number(count, "fins around the axis", 2, MAX_FINS))
+    for k in range(1, whole):
+        turn = 2 * math.pi * k / whole
+        c, s = math.cos(turn), math.sin(turn)
+        place = round(c * x - s * y, 9), round(s * x + c * y, 9), z
+        azimuth = float(wrapped(fin.mounting_angle + turn))
+        layout, _ = _added(layout, replace(fin, position=place, mounting_angle=azimuth), name)
     return layout
 
 
