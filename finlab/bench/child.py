@@ -9,7 +9,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Sequence
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 from finlab.errors import DataError
 
@@ -17,6 +17,8 @@ MAX_LINE = 50_000_000
 """Bytes of an answer that are read."""
 ENDING_S = 2.0
 """How long a process may take to end once its input has ended [s]."""
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+"""Small products are slower when many threads wait for each other."""
 
 
 class Reply(NamedTuple):
@@ -29,50 +31,33 @@ class Reply(NamedTuple):
 
 
 class Child:
-    """A process that answers lines with lines, started anew whenever it was lost."""
+    """A process that answers lines with lines."""
 
-    def __init__(self, command: Sequence[str], greets: bool = False) -> None:
-        """Prepare; the process starts with the first question.
-
-        Args:
-            command: program and arguments.
-            greets: whether it says a line of its own before the first question.
-        """
-        self.command, self.greets = list(command), greets
+    def __init__(self, command: Sequence[str]) -> None:
+        """Takes program and arguments; `start` starts them."""
+        self.command = list(command)
         self._process: subprocess.Popen[bytes] | None = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.stop()
 
     @property
     def runs(self) -> bool:
         """Whether the process is there."""
         return self._process is not None and self._process.poll() is None
 
-    def start(self, wait_s: float) -> Reply | None:
-        """Start the process, unless it runs; returns its greeting, where it greets.
+    def start(self) -> None:
+        """Start the process, or start it again.
 
         Raises:
             DataError: there is no such program.
         """
         self.stop()
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115  # lives as long as the process
-        # One thread each: small products are slower when many threads wait for each other.
-        environment = {
-            "OMP_NUM_THREADS": "1",
-            "OPENBLAS_NUM_THREADS": "1",
-            "MKL_NUM_THREADS": "1",
-        } | os.environ
         try:
             self._process = subprocess.Popen(
                 self.command,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._errors,
-                env=environment,
+                env=ONE_THREAD | os.environ,
                 start_new_session=True,
             )
         except OSError as error:
@@ -81,7 +66,6 @@ class Child:
         self._replies: queue.SimpleQueue[Reply] = queue.SimpleQueue()
         talk = (self._process, self._questions, self._replies)
         threading.Thread(target=_talk, args=talk, daemon=True).start()
-        return self.ask("", wait_s) if self.greets else None
 
     def ask(self, line: str, wait_s: float) -> Reply:
         """The answer to a line; a process that is late is ended."""
@@ -93,11 +77,10 @@ class Child:
             return Reply(None, wait_s)
 
     def last_words(self) -> str:
-        """The last line that the process has written to stderr, while it was asked."""
+        """The last line that the process has written to stderr."""
         if self._errors.closed:
             return "it did not answer in time"
-        self._errors.seek(0, os.SEEK_END)
-        self._errors.seek(max(0, self._errors.tell() - 4000))
+        self._errors.seek(max(0, self._errors.seek(0, os.SEEK_END) - 4000))
         lines = self._errors.read().decode(errors="replace").strip().splitlines()
         return lines[-1][:300] if lines else "no word on stderr"
 
@@ -106,8 +89,8 @@ class Child:
         if self._process is None:
             return
         process, self._process = self._process, None
+        self._questions.put(None)
         if not at_once:
-            self._questions.put(None)
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.wait(ENDING_S)
         with contextlib.suppress(ProcessLookupError, PermissionError):

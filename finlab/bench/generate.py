@@ -1,105 +1,74 @@
-"""Makes the file of problems: `python -m finlab.bench.generate -o problems.npz` (ten minutes).
+"""Makes the file of problems: `python -m finlab.bench.generate problems.npz` (some minutes).
 
-Needs CasADi (`pip install 'finlab[ipopt]'`) for the yardsticks of cost; nobody who runs the benchmark does.
+Needs CasADi (extra `ipopt`) for the best costs that are known; running the benchmark does not.
 """
 
-import argparse
-import shlex
 import sys
-from typing import Any, NamedTuple
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from finlab.allocation.baselines.sqp import Sqp
 from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.arrays import AnyArray, Array
+from finlab.assets import PAPER_LAYOUTS
 from finlab.bench.problems import KINDS, Problems, Robot, Sequences, Targets, save_problems
-from finlab.bench.questions import error_bound, path, targets
-from finlab.bench.robots import robots
-from finlab.errors import FinlabError
+from finlab.bench.questions import ASKED, path, targets
 from finlab.evaluation.cheapest_commands import CheapestCommands, has_formulas
 from finlab.evaluation.progress import progress
-from finlab.evaluation.splits import own_sigma
+from finlab.evaluation.splits import make_split, own_sigma
 from finlab.forces.fin_sets import planar_sets
 from finlab.inference.normalization import Normalization
-from finlab.layout import Layout
+from finlab.layout import Layout, load_layout
 from finlab.layout.file import layout_to_dict
 from finlab.physics import plant_of, read_table
 from finlab.physics.objective import Name, Objective
 
 SEED = 8821
 """Of the shipped file; no development run, test or report uses it."""
-PER_SPLIT = 5
-"""Robots of each drawn set."""
+PER_SPLIT = 4
+"""Robots of each split."""
+SHIPPED = ("asymmetric", "hexa", "mixed", "no_yaw", "octo", "pair", "penta", "restricted")
+"""Shipped layouts beside those of the paper; `ucat` has the fins of A."""
+DRAWN = ("id", "ood", "ood-fins", "limits", "failure", "near-singular")
+DRAWN += ("fins", "fins-mixed", "tables", "many-fins", "big", "tiny")
+"""Held-out splits that robots are drawn from."""
 STARTS = 32
 """Random starts of IPOPT for each target and objective; twice as many of SLSQP where fins are tables."""
 WALKED = ("A", "C", "hexa", "ood-fins", "limits", "fins-mixed", "big", "tiny")
 """Layouts, or sets whose first robot is meant, that follow paths."""
 DOMAIN = 0xBE9E
-"""Leads the seed of every yardstick."""
-YARDSTICKS = {
-    "sigma": "standard deviation of the robot's wrenches under 4096 uniform commands, axis by axis, no axis "
-    "of force or torque below 5 % of the largest one",
-    "best_error": "inside: 0, since a command gives the wrench; else the least error of the answers of "
-    "methods search (closest wrench) and sqp, by the fins' own laws",
-    "error_bound": "a plane beyond which no sum of the fins' forces reaches (convex hulls of what each fin "
-    "can push; fins may rest wholly)",
-    "power_bound": "the convex dual over the compiled fins, as exact as their tables: nearly always to a "
-    "thousandth, on weak forces of soft fins to a hundredth",
-    "power_best, effort_best": "cheapest end of 32 random starts of IPOPT with the wrench as a constraint "
-    "(64 of SciPy's SLSQP where fins are tables)",
-}
-"""How each was found."""
+"""Leads the seed of sigma."""
 
 
-class Answers(NamedTuple):
-    """What is known of one target."""
+def robots(seed: int, per_split: int) -> Iterator[tuple[str, Layout]]:
+    """Sets with their layouts, without bodies and failed fins; robot k of a split depends on the split, the
+    seed and k alone."""
+    for group, names in (("paper", PAPER_LAYOUTS), ("shipped", SHIPPED)):
+        yield from ((group, replace(load_layout(name), body=None, description="")) for name in names)
+    for split in DRAWN:
+        yield from ((split, case.healthy) for case in make_split(split, per_split, 1, seed))
 
-    best_error: float
-    error_bound: float
-    power_best: float
-    power_bound: float
-    effort_best: float
 
-
-class Yardsticks:
-    """The best that is known for one robot.
-
-    Args:
-        layout: the robot.
-        sigma: per-axis yardstick (6,).
-        seed: of random starts.
-    """
+class BestKnown:
+    """The best that is known of one robot's targets."""
 
     def __init__(self, layout: Layout, sigma: Array, seed: int) -> None:
-        own = Normalization(np.zeros(6), sigma)
+        """Prepare for a robot, with what errors are divided by (6,) and the seed of random starts."""
         self.layout, self.sigma, self.seed = layout, sigma, seed
-        self.search, self.starts = SearchAllocator(own), Sqp(own)
-        self.sets = planar_sets(self.search.pipeline.prepare(layout).planar)
-        self.n_starts = STARTS if has_formulas(layout) else 2 * STARTS
-
-    def of(self, kind: str, wrench: Array) -> Answers:
-        """What is known of a wrench (6,); costs only where it lies inside."""
-        if kind != "inside":
-            least = float(self.least_errors(wrench[None])[0])
-            return Answers(least, error_bound(self.sets, wrench, self.sigma), *(np.nan,) * 3)
-        found = self.search.allocate(self.layout, wrench)
-        try:
-            bound = self.search.bound(found)
-        except FinlabError:  # where the search has missed it, nothing is proven
-            bound = np.nan
-        return Answers(0.0, 0.0, self._cheapest("power", wrench), bound, self._cheapest("effort", wrench))
+        self.method = SearchAllocator(Normalization(np.zeros(6), sigma))
+        self.sets = planar_sets(self.method.pipeline.prepare(layout).planar)
 
     def least_errors(self, wrenches: Array) -> Array:
         """The least errors (N,) known for wrenches (N, 6)."""
-        answers = (
-            each.allocate_batch(self.layout, wrenches, seed=self.seed) for each in (self.search, self.starts)
-        )
-        return np.minimum(*(answer.err_norm for answer in answers))
+        return self.method.allocate_batch(self.layout, wrenches, seed=self.seed).err_norm
 
-    def _cheapest(self, objective: Name, wrench: Array) -> float:
+    def least_cost(self, objective: Name, wrench: Array) -> float:
+        """The least cost known of a wrench (6,) within reach; NaN where none is."""
+        starts = STARTS if has_formulas(self.layout) else 2 * STARTS
         cheapest = CheapestCommands(Objective(objective), self.sigma)
-        _, cost = cheapest.ends(self.layout, wrench, self.n_starts, self.seed)
+        _, cost = cheapest.ends(self.layout, wrench, starts, self.seed)
         return float(cost[0]) if len(cost) else np.nan
 
 
@@ -107,77 +76,56 @@ def make_problems(seed: int = SEED, per_split: int = PER_SPLIT, costs: bool = Tr
     """All problems of a seed; without costs in seconds."""
     forces: dict[str, AnyArray] = {}
     bots: list[Robot] = []
-    rows: list[tuple[Any, ...]] = []
     walked: dict[str, int] = {}
     for name, drawn in robots(seed, per_split):
+        walked.setdefault(drawn.name, len(bots))
+        walked.setdefault(name, len(bots))
         bots.append(_robot(name, drawn, forces, seed, len(bots)))
-        walked.setdefault(drawn.name, len(bots) - 1)
-        walked.setdefault(name, len(bots) - 1)
-    problems = Problems({}, tuple(bots), _targets([]), _sequences([]), forces)
-    yardsticks: dict[int, Yardsticks] = {}
-    for place in progress(range(len(bots)), "robot"):
-        layout, sigma = problems.layout(place), problems.sigma(place)
-        yardsticks[place] = own = Yardsticks(layout, sigma, seed)
-        kinds, wrenches = targets(layout, own.sets, sigma, (seed, place))
-        for kind, wrench in zip(kinds, wrenches, strict=True):
-            known = own.of(KINDS[kind], wrench) if costs else Answers(0.0, *(np.nan,) * 4)
-            rows.append((place, kind, wrench, *known))
-    chosen = [(walked[name], noisy) for name in WALKED if name in walked for noisy in (False, True)]
+    problems = Problems({}, tuple(bots), _columns(Targets, []), _columns(Sequences, []), forces)
+    best: list[BestKnown] = []
+    rows: list[tuple[Any, ...]] = []
+    for k in progress(range(len(bots)), "robot"):
+        layout, sigma = problems.layout(k), problems.sigma(k)
+        best.append(BestKnown(layout, sigma, seed))
+        wrenches = targets(layout, best[k].sets, sigma, (seed, k))
+        errors = np.where(ASKED, best[k].least_errors(wrenches), 0.0)
+        for kind, wrench, error in zip(ASKED, wrenches, errors, strict=True):
+            asked = costs and KINDS[kind] == "inside"
+            cost = [best[k].least_cost(name, wrench) if asked else np.nan for name in ("power", "effort")]
+            rows.append((k, kind, wrench, error, *cost))
     paths: list[tuple[Any, ...]] = []
-    for k, noisy in progress(chosen, "path"):
-        wrenches = path(problems.layout(k), problems.sigma(k), seed + k, noisy)
-        paths.append((k, noisy, wrenches, yardsticks[k].least_errors(wrenches)))
-    about = {"seed": seed, "starts": STARTS, "yardsticks": YARDSTICKS}
-    return Problems(about, tuple(bots), _targets(rows), _sequences(paths), forces)
+    for k in progress([walked[name] for name in WALKED], "path"):
+        for noisy in (False, True):
+            wrenches = path(problems.layout(k), problems.sigma(k), seed + k, noisy)
+            paths.append((k, noisy, wrenches, best[k].least_errors(wrenches)))
+    asked = {"targets": _columns(Targets, rows), "sequences": _columns(Sequences, paths)}
+    return replace(problems, about={"seed": seed, "starts": STARTS}, **asked)
 
 
-def _robot(name: str, layout: Layout, forces: dict[str, AnyArray], seed: int, place: int) -> Robot:
+def _robot(name: str, layout: Layout, forces: dict[str, AnyArray], seed: int, index: int) -> Robot:
     """A robot as the file describes it; its force tables join `forces`."""
     description, tables = layout_to_dict(layout), {}
     for fin in description["fins"]:
         fin.pop("servo", None)
         if fin.get("model", {}).get("type") == "table":
             grid = read_table(fin["model"]["path"]).grid
-            key, file = f"table_{len(forces)}", f"robot-{place}-{fin['name']}.csv"
-            amplitude, frequency, direction = (axis.tolist() for axis in grid.axes)
-            forces[key] = grid.values[..., :3].astype(np.float32)
-            tables[file] = {
-                "amplitude": amplitude,
-                "frequency": frequency,
-                "direction": direction,
-                "force": key,
-            }
+            key, file = f"table_{len(forces)}", f"robot-{index}-{fin['name']}.csv"
+            axes = zip(("amplitude", "frequency", "direction"), grid.axes, strict=True)
+            forces[key] = grid.values[..., :3].astype(np.float16)
+            tables[file] = {name: axis.tolist() for name, axis in axes} | {"force": key}
             fin["model"] = {"type": "table", "path": file}
-    alone = Problems(
-        {}, (Robot(name, description, (1.0,) * 6, tables),), _targets([]), _sequences([]), forces
-    )
-    rng = np.random.default_rng((DOMAIN, seed, place))
-    return Robot(name, description, tuple(own_sigma(plant_of(alone.layout(0)), rng).tolist()), tables)
+    robot = Robot(name, description, (1.0,) * 6, tables)
+    alone = Problems({}, (robot,), _columns(Targets, []), _columns(Sequences, []), forces)
+    rng = np.random.default_rng((DOMAIN, seed, index))
+    return replace(robot, sigma=tuple(own_sigma(plant_of(alone.layout(0)), rng).tolist()))
 
 
-def _targets(rows: list[tuple[Any, ...]]) -> Targets:
-    columns = list(zip(*rows, strict=True)) or [()] * len(Targets._fields)
-    robot, kind, wrench, *known = columns
-    whole = (np.array(robot, np.int64), np.array(kind, np.int64), np.array(wrench, np.float64).reshape(-1, 6))
-    return Targets(*whole, *(np.array(values, np.float64) for values in known))
-
-
-def _sequences(rows: list[tuple[Any, ...]]) -> Sequences:
-    robot, noisy, wrench, error = list(zip(*rows, strict=True)) or [()] * len(Sequences._fields)
-    whole = (np.array(robot, np.int64), np.array(noisy, bool))
-    return Sequences(*whole, np.array(wrench, np.float64), np.array(error, np.float64))
-
-
-def main(argv: list[str]) -> None:
-    """The command."""
-    parser = argparse.ArgumentParser("python -m finlab.bench.generate", description=__doc__)
-    parser.add_argument("-o", "--output", required=True, help="file to write, .npz")
-    parser.add_argument("--seed", type=int, default=SEED, help="of all draws")
-    arguments = parser.parse_args(argv)
-    problems = make_problems(arguments.seed)
-    problems.about["command"] = shlex.join(["python", "-m", "finlab.bench.generate", *argv])
-    print(save_problems(problems, arguments.output))
+def _columns(kind: Any, rows: list[tuple[Any, ...]]) -> Any:
+    """Rows as the arrays of `Targets` or `Sequences`."""
+    columns = list(zip(*rows, strict=True)) or [()] * len(kind._fields)
+    types = {"robot": np.int64, "kind": np.int64, "noisy": bool, "wrench": np.float32}
+    return kind(*(np.array(c, types.get(n, np.float64)) for n, c in zip(kind._fields, columns, strict=True)))
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    print(save_problems(make_problems(), sys.argv[1]))

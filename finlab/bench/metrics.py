@@ -1,4 +1,4 @@
-"""Figures of a run: every command is judged by the fins' own laws, apart from what the method believed.
+"""Figures of a run: every command is scored by the fins' own laws, whatever the method's model says.
 
 The error is ||(wrench - target) / sigma||, with the robot's own sigma. The relative error is what is missing
 beyond the unavoidable, as a share of what was asked: (error - best error) / ||target / sigma||. A failure
@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.bench.problems import KINDS, Problems
 from finlab.bench.protocol import FAILURES
-from finlab.bench.runner import Answer, Answers, failures
+from finlab.bench.runner import Answer, Answers
 from finlab.layout.angles import command_change
-from finlab.physics import Plant, plant_of
+from finlab.physics import plant_of
 from finlab.physics.energy import command_energy
 
 Row = dict[str, Any]
@@ -24,11 +24,9 @@ SOLVED = 0.01
 """Relative error up to which a target counts as delivered, or as delivered as far as possible."""
 TRACKED = 1e-3
 """Relative error up to which costs are compared."""
-LEVELS = np.logspace(-6.0, 0.0, 37)
-"""Relative errors of the profile."""
 EXAMPLES = 3
 """Failures that are described."""
-WITHIN = KINDS.index("boundary")
+REACHABLE = KINDS.index("boundary")
 """The last kind of targets that can be delivered whole."""
 
 
@@ -37,136 +35,92 @@ class Scores(NamedTuple):
 
     relative: Array
     """Relative error (N,)."""
-    error: Array
-    """Normalized error (N,)."""
     power: Array
     """Mean mechanical power (N,) [W]; NaN for a failure."""
     effort: Array
     """The paper's J_en (N,); NaN for a failure."""
-    seconds: Array
-    """Time of the call (N,); NaN where nothing came back."""
-    failed: NDArray[np.bool_]
-    """Which are no answers (N,)."""
 
 
-def score(answers: list[Answer], plant: Plant, sigma: Array, wrench: Array, best_error: Array) -> Scores:
-    """Scores of answers to wrenches (N, 6) on one robot.
-
-    Args:
-        answers: one for each wrench.
-        plant: the robot's fins.
-        sigma: per-axis yardstick (6,).
-        wrench: what was asked for [N, N m].
-        best_error: least normalized error known (N,).
-    """
+def score(answers: list[Answer], problems: Problems, robot: int, wrench: Array, best_error: Array) -> Scores:
+    """Scores of answers to wrenches (N, 6) [N, N m] on a robot, of which the least errors (N,) are known."""
+    plant, sigma = plant_of(problems.layout(robot)), problems.sigma(robot)
     failed = np.array([answer.command is None for answer in answers])
     rest = np.full((plant.n_fins, 3), np.nan)
     command = np.array([rest if answer.command is None else answer.command for answer in answers])
     error = np.linalg.norm((plant.wrench(command) - wrench) / sigma, axis=-1)
-    asked = np.linalg.norm(wrench / sigma, axis=-1)
     return Scores(
-        np.maximum(error - best_error, 0.0) / asked,
-        error,
+        np.maximum(error - best_error, 0.0) / np.linalg.norm(wrench / sigma, axis=-1),
         np.where(failed, np.nan, plant.power(command).sum(-1)),
         np.where(failed, np.nan, command_energy(command, plant.upper)),
-        np.array([answer.seconds for answer in answers]),
-        failed,
     )
 
 
-def target_scores(problems: Problems, answers: Answers) -> Scores:
-    """Scores of all single targets."""
-    asked, found = problems.targets, [np.empty(len(answers.targets)) for _ in Scores._fields]
-    for place in np.unique(asked.robot).tolist():
-        rows = np.flatnonzero(asked.robot == place)
-        plant, sigma = plant_of(problems.layout(place)), problems.sigma(place)
+def figures(problems: Problems, answers: Answers) -> Row:
+    """All that is kept of a method's run, as plain data."""
+    asked = problems.targets
+    scores = Scores._make(np.empty(len(answers.targets)) for _ in Scores._fields)
+    for robot in np.unique(asked.robot).tolist():
+        rows = np.flatnonzero(asked.robot == robot)
         mine = [answers.targets[row] for row in rows]
-        for values, part in zip(
-            found, score(mine, plant, sigma, asked.wrench[rows], asked.best_error[rows]), strict=True
-        ):
-            values[rows] = part
-    return Scores._make([*found[:-1], found[-1].astype(bool)])
-
-
-def figures(problems: Problems, answers: Answers) -> dict[str, Any]:
-    """All that is kept of a method's run, as plain data: rows for the tables, and the profile."""
-    scores, asked = target_scores(problems, answers), problems.targets
-    names = np.array([robot.set for robot in problems.robots])[asked.robot]
-    sets = {name: _row(scores, problems, names == name) for name in dict.fromkeys(names.tolist())}
-    kinds = {name: _row(scores, problems, asked.kind == k) for k, name in enumerate(KINDS)}
+        part = score(mine, problems, robot, asked.wrench[rows], asked.best_error[rows])
+        for values, found in zip(scores, part, strict=True):
+            values[rows] = found
+    sets = np.array([robot.set for robot in problems.robots])[asked.robot]
+    solved = scores.relative <= SOLVED
     every = answers.targets + [answer for path in answers.sequences for answer in path]
-    seconds = np.array([answer.seconds for answer in every])
-    seconds = seconds[np.isfinite(seconds)]
-    failed = failures(every)
+    failed = [answer.failure for answer in every if answer.failure is not None]
     counts = Counter(failure.kind for failure in failed)
-    paths = [_path_rows(problems, answers, noisy) for noisy in (False, True)]
+    seconds = np.array([answer.seconds for answer in every if np.isfinite(answer.seconds)])
+    p50, p99 = np.quantile(1e3 * seconds, (0.5, 0.99)).tolist() if len(seconds) else (None, None)
+    paths = {
+        name: row
+        for name, noisy in (("smooth", False), ("noisy", True))
+        if (row := _path_row(problems, answers, noisy))
+    }
+    summary = {"calls": len(every), "failed": len(failed) / len(every), **_summary(scores, problems)}
     return {
         "method": answers.method,
-        "summary": {
-            "calls": len(every),
-            "failed": len(failed) / len(every),
-            **_row(scores, problems, np.full(len(names), True)),
-            "turn": paths[1]["turn"] if paths[1] else None,
-            "p50_ms": _quantile_ms(seconds, 0.5),
-            "p99_ms": _quantile_ms(seconds, 0.99),
-        },
-        "sets": sets,
-        "kinds": kinds,
-        "paths": {name: row for name, row in zip(("smooth", "noisy"), paths, strict=True) if row},
-        "profile": [float((scores.relative <= level).mean()) for level in LEVELS],
+        "summary": {**summary, "turn": paths.get("noisy", {}).get("turn"), "p50_ms": p50, "p99_ms": p99},
+        "solved_by_set": {name: _mean(solved[sets == name]) for name in dict.fromkeys(sets.tolist())},
+        "solved_by_kind": {name: _mean(solved[asked.kind == k]) for k, name in enumerate(KINDS)},
+        "paths": paths,
         "failures": {kind: counts[kind] for kind in FAILURES if counts[kind]},
         "examples": list(dict.fromkeys(f"{f.kind}: {f.words}" for f in failed))[:EXAMPLES],
     }
 
 
-def _row(scores: Scores, problems: Problems, chosen: NDArray[np.bool_]) -> Row:
-    """Figures of some of the single targets; None where there is nothing to tell."""
-    asked = problems.targets
-    within, beyond = chosen & (asked.kind <= WITHIN), chosen & (asked.kind > WITHIN)
-    tracked = chosen & (scores.relative <= TRACKED)
+def _summary(scores: Scores, problems: Problems) -> Row:
+    """Errors and costs over all single targets; None where there is nothing to tell."""
+    asked, tracked = problems.targets, scores.relative <= TRACKED
+    reachable = asked.kind <= REACHABLE
     return {
-        "targets": int(chosen.sum()),
-        "solved": _mean(scores.relative[chosen] <= SOLVED),
-        "error": _mean(scores.relative[within]),
-        "error_max": float(scores.relative[within].max()) if within.any() else None,
-        "beyond": _mean(scores.relative[beyond]),
+        "targets": len(tracked),
+        "solved": _mean(scores.relative <= SOLVED),
+        "error": _mean(scores.relative[reachable]),
+        "error_max": float(scores.relative[reachable].max(initial=0.0)),
+        "beyond": _mean(scores.relative[~reachable]),
         "power": _mean_ratio(scores.power, asked.power_best, tracked),
-        "power_over_bound": _mean_ratio(scores.power, asked.power_bound, tracked),
         "effort": _mean_ratio(scores.effort, asked.effort_best, tracked),
-        "compared": int((tracked & np.isfinite(asked.power_best)).sum()),
     }
 
 
-def _path_rows(problems: Problems, answers: Answers, noisy: bool) -> Row | None:
-    """Figures of the paths with or without noise: errors, and changes of commands from tick to tick."""
-    errors, steps = [], []
+def _path_row(problems: Problems, answers: Answers, noisy: bool) -> Row | None:
+    """Errors on the paths with or without noise, and changes of commands from tick to tick [rad, Hz, rad]."""
+    errors, steps = [], [np.empty((0, 3))]
     for k in np.flatnonzero(problems.sequences.noisy == noisy).tolist():
-        place, path = int(problems.sequences.robot[k]), answers.sequences[k]
-        plant, sigma = plant_of(problems.layout(place)), problems.sigma(place)
-        best, wrench = problems.sequences.best_error[k], problems.sequences.wrench[k]
-        errors.append(score(path, plant, sigma, wrench, best).relative)
+        path, wrench = answers.sequences[k], problems.sequences.wrench[k]
+        robot, best = int(problems.sequences.robot[k]), problems.sequences.best_error[k]
+        errors.append(score(path, problems, robot, wrench, best).relative)
         for last, now in zip(path[:-1], path[1:], strict=True):
             if last.command is not None and now.command is not None:
                 steps.append(command_change([last.command, now.command])[0])
     if not errors:
         return None
-    error, step = np.concatenate(errors), np.concatenate(steps) if steps else np.full((1, 3), np.nan)
-    mean, most = step.mean(0), step.max(0)
-    return {
-        "ticks": len(error),
-        "solved": float((error <= SOLVED).mean()),
-        "error": float(error.mean()),
-        "amplitude": _known(mean[0]),
-        "frequency": _known(mean[1]),
-        "turn": _known(mean[2]),
-        "amplitude_max": _known(most[0]),
-        "frequency_max": _known(most[1]),
-        "turn_max": _known(most[2]),
-    }
-
-
-def _known(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+    error, step = np.concatenate(errors), np.concatenate(steps)
+    row: Row = {"ticks": len(error), "solved": float((error <= SOLVED).mean()), "error": float(error.mean())}
+    for k, name in enumerate(("amplitude", "frequency", "turn")):
+        row |= {name: _mean(step[:, k]), f"{name}_max": float(step[:, k].max()) if len(step) else None}
+    return row
 
 
 def _mean(values: Array | NDArray[np.bool_]) -> float | None:
@@ -175,9 +129,4 @@ def _mean(values: Array | NDArray[np.bool_]) -> float | None:
 
 def _mean_ratio(values: Array, best: Array, chosen: NDArray[np.bool_]) -> float | None:
     """Mean of values over the best known, where both are."""
-    both = chosen & np.isfinite(values) & np.isfinite(best)
-    return _mean((values / best)[both])
-
-
-def _quantile_ms(seconds: Array, share: float) -> float | None:
-    return float(1e3 * np.quantile(seconds, share)) if len(seconds) else None
+    return _mean((values / best)[chosen & np.isfinite(values) & np.isfinite(best)])

@@ -40,12 +40,10 @@ class Failure(NamedTuple):
     """What was seen."""
 
 
-def question(
-    number: int, layout: dict[str, Any], sigma: Array, targets: Array, previous: Array | None
-) -> str:
-    """A line that asks for targets (N, 6) on a layout, with the command (n, 3) of the tick before."""
+def question(number: int, layout: dict[str, Any], sigma: Array, target: Array, previous: Array | None) -> str:
+    """A line that asks for a target (6,) on a layout, with the command (n, 3) of the tick before."""
     before = None if previous is None else previous.tolist()
-    asked = {"layout": layout, "sigma": sigma.tolist(), "targets": targets.tolist(), "previous": before}
+    asked = {"layout": layout, "sigma": sigma.tolist(), "targets": [target.tolist()], "previous": before}
     return json.dumps({"id": number, **asked}) + "\n"
 
 
@@ -62,25 +60,25 @@ def parse_answer(line: bytes, number: int) -> dict[str, Any] | Failure:
     return answer
 
 
-def checked_commands(commands: Any, plant: Plant, count: int) -> Array | Failure:
-    """Commands (N, n, 3) within the limits of a robot's fins, from what a method calls its commands.
+def checked_command(answer: dict[str, Any], plant: Plant) -> Array | Failure:
+    """The command (n, 3) of an answer, within the limits of a robot's fins.
 
-    Fins that may turn freely may be told any angle.
+    Fins that may turn freely may be given any angle.
     """
     try:
-        values = np.asarray(commands, dtype=np.float64)
+        values = np.asarray(answer["commands"], dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         return Failure("malformed", "commands: expected numbers, three for each fin")
-    if values.shape != (count, plant.n_fins, 3):
-        return Failure("malformed", f"commands: expected {(count, plant.n_fins, 3)}, got {values.shape}")
+    if values.shape != (1, plant.n_fins, 3):
+        return Failure("malformed", f"commands: expected {(1, plant.n_fins, 3)}, got {values.shape}")
     if not np.isfinite(values).all():
         return Failure("not finite", "commands hold NaN or an infinity")
-    within = plant.feasible(values)
-    away = np.abs(values - within)
-    away[:, plant.full_turn, 2] = 0.0
+    within: Array = plant.feasible(values[0])
+    away = np.abs(values[0] - within)
+    away[plant.full_turn, 2] = 0.0
     room = TOLERANCE * np.maximum(plant.width, 1.0)
     if (away > room).any():
-        _, fin, part = np.unravel_index(int((away - room).argmax()), away.shape)
+        fin, part = np.unravel_index(int((away - room).argmax()), away.shape)
         what = ("amplitude", "frequency", "zero direction")[part]
         return Failure("out of limits", f"{what} of {plant.layout.names[fin]} by {away.max():.3g}")
     return within

@@ -2,18 +2,17 @@
 
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from finlab.arrays import Array
 from finlab.bench.child import Child, Reply
 from finlab.bench.problems import Problems
-from finlab.bench.protocol import CPU, GREETING, Failure, checked_commands, parse_answer, question
+from finlab.bench.protocol import CPU, GREETING, Failure, checked_command, parse_answer, question
 from finlab.errors import AllocationError
-from finlab.evaluation.progress import progress
 from finlab.layout.file import layout_to_dict
 from finlab.physics import Plant, plant_of
 
@@ -21,10 +20,8 @@ LIMIT_S = 1.0
 """Longest time for one target [s]; a later answer is a failure."""
 PATIENCE = 4.0
 """How many times the limit is waited for an answer before the process is ended."""
-START_S = 60.0
-"""Longest time for a process to start [s]."""
 FIRST_S = 60.0
-"""Longest time for the first answer about a robot [s]."""
+"""Longest time for a process to start, and for the first answer about a robot [s]."""
 GIVE_UP = 3
 """Processes that end or hang one after the other before no further question is asked."""
 
@@ -35,7 +32,7 @@ class Answer(NamedTuple):
     command: Array | None
     """The command (n, 3), within its limits; None for a failure."""
     seconds: float
-    """Time of the call over its targets; NaN where nothing came back."""
+    """Time of the call; NaN where nothing came back."""
     failure: Failure | None
     """Why there is no command."""
 
@@ -49,15 +46,14 @@ class Method:
     command: tuple[str, ...]
     """The process that speaks the protocol."""
     greets: bool = False
-    """Whether it says that it is ready, and tells how long each call took: finlab's own worker."""
+    """Whether it says that it is ready, and how long each call took: finlab's own worker."""
 
     @classmethod
-    def of(cls, name: str, cpu: bool = False) -> "Method":
+    def of(cls, name: str, cpu: bool = False) -> Self:
         """One of finlab's methods, `module:function` or `file.py:function`; timed by the processor's time,
         which other work on the machine does not prolong, or by the wall clock."""
-        shown = name.rpartition("/")[2] if ":" in name else name
-        worker = (sys.executable, "-m", "finlab.bench.worker", name)
-        return cls(shown, (*worker, CPU) if cpu else worker, greets=True)
+        worker = (sys.executable, "-m", "finlab.bench.worker", name, *((CPU,) if cpu else ()))
+        return cls(name.rpartition("/")[2] if ":" in name else name, worker, greets=True)
 
 
 @dataclass
@@ -73,7 +69,10 @@ class Answers:
 
 
 def run_method(
-    method: Method, problems: Problems, limit_s: float = LIMIT_S, together: bool = False
+    method: Method,
+    problems: Problems,
+    limit_s: float = LIMIT_S,
+    done: Callable[[], object] = lambda: None,
 ) -> Answers:
     """Ask a method everything.
 
@@ -83,8 +82,7 @@ def run_method(
         method: the process to ask.
         problems: what to ask.
         limit_s: longest time for one target [s].
-        together: ask for all single targets of a robot in one call, in place of one by one; their limits
-            add up.
+        done: called after each answer.
 
     Raises:
         DataError: the program cannot be started.
@@ -92,75 +90,75 @@ def run_method(
     """
     found = Answers(method.name, [_NOTHING] * len(problems.targets.robot))
     with Asker(method, limit_s) as asker:
-        for place in progress(np.unique(problems.targets.robot).tolist(), "robot", method.name):
-            asker.turn_to(problems, place)
-            rows = np.flatnonzero(problems.targets.robot == place)
-            for part in [rows] if together else np.split(rows, len(rows)):
-                for row, answer in zip(part, asker.ask(problems.targets.wrench[part]), strict=True):
-                    found.targets[row] = answer
-        paths = list(zip(problems.sequences.robot.tolist(), problems.sequences.wrench, strict=True))
-        for place, path in progress(paths, "path", method.name):
-            asker.turn_to(problems, place)
+        for robot in np.unique(problems.targets.robot).tolist():
+            asker.turn_to(problems, robot)
+            for row in np.flatnonzero(problems.targets.robot == robot):
+                found.targets[row] = asker.ask(problems.targets.wrench[row])
+                done()
+        for robot, path in zip(problems.sequences.robot.tolist(), problems.sequences.wrench, strict=True):
+            asker.turn_to(problems, robot)
             previous, answers = None, []
             for wrench in path:
-                answers += asker.ask(wrench[None], previous)
+                answers.append(asker.ask(wrench, previous))
                 previous = previous if answers[-1].command is None else answers[-1].command
+                done()
             found.sequences.append(answers)
     return found
 
 
 class Asker:
-    """One method's process and what it is asked at present."""
+    """One method's process and the robot that it is asked about."""
 
     def __init__(self, method: Method, limit_s: float) -> None:
         self.method, self.limit_s = method, limit_s
-        self.child = Child(method.command, method.greets)
+        self.child = Child(method.command)
         self.number, self.lost = 0, 0
         self.plant: Plant
         self.layout: dict[str, Any]
         self.sigma: Array
 
-    def __enter__(self) -> "Asker":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.child.stop()
 
-    def turn_to(self, problems: Problems, place: int) -> None:
-        """Make the robot at a place the one that is asked about; its first call is not counted."""
-        layout = problems.layout(place)
-        self.plant, self.layout, self.sigma = plant_of(layout), layout_to_dict(layout), problems.sigma(place)
-        self.ask(problems.targets.wrench[problems.targets.robot == place][:1], wait_s=FIRST_S)
+    def turn_to(self, problems: Problems, robot: int) -> None:
+        """Ask about a robot from now on; its first call is not counted."""
+        layout = problems.layout(robot)
+        self.plant, self.layout, self.sigma = plant_of(layout), layout_to_dict(layout), problems.sigma(robot)
+        self.ask(problems.targets.wrench[problems.targets.robot == robot][0], wait_s=FIRST_S)
 
-    def ask(self, targets: Array, previous: Array | None = None, wait_s: float = 0.0) -> list[Answer]:
-        """Answers to targets (N, 6) in one call."""
-        count, limit = len(targets), self.limit_s * len(targets)
+    def ask(self, target: Array, previous: Array | None = None, wait_s: float = 0.0) -> Answer:
+        """The answer to a target (6,)."""
         if self.lost >= GIVE_UP:
-            return [Answer(None, math.nan, Failure("died", "not asked any more"))] * count
+            return Answer(None, math.nan, Failure("died", "not asked any more"))
         if not self.child.runs:
             self._start()
             wait_s = max(wait_s, FIRST_S)
         self.number += 1
-        line = question(self.number, self.layout, self.sigma, targets, previous)
-        reply = self.child.ask(line, max(PATIENCE * limit, wait_s))
-        answer = self._read(reply)
+        line = question(self.number, self.layout, self.sigma, target, previous)
+        reply = self.child.ask(line, max(PATIENCE * self.limit_s, wait_s))
+        answer, seconds = self._read(reply), reply.seconds
         if isinstance(answer, Failure):
-            return [Answer(None, reply.seconds / count, answer)] * count
-        seconds = float(answer.get("seconds", reply.seconds)) if self.method.greets else reply.seconds
-        if seconds > max(limit, wait_s):
-            late = Failure("late", f"{seconds:.2f} s for {count} target{'s' * (count > 1)}")
-            return [Answer(None, seconds / count, late)] * count
-        commands = checked_commands(answer["commands"], self.plant, count)
-        if isinstance(commands, Failure):
-            return [Answer(None, seconds / count, commands)] * count
-        return [Answer(command, seconds / count, None) for command in commands]
+            return Answer(None, seconds, answer)
+        seconds = float(answer.get("seconds", seconds)) if self.method.greets else seconds
+        if seconds > max(self.limit_s, wait_s):
+            return Answer(None, seconds, Failure("late", f"{seconds:.2f} s"))
+        command = checked_command(answer, self.plant)
+        if isinstance(command, Failure):
+            return Answer(None, seconds, command)
+        return Answer(command, seconds, None)
 
     def _start(self) -> None:
-        """Start the process; what keeps a method from starting at all is the user's to mend."""
-        hello = self.child.start(START_S)
-        said = None if hello is None else parse_answer(hello.line or b"", GREETING)
+        """Start the process; what keeps finlab's worker from starting at all is the user's to mend."""
+        self.child.start()
+        if not self.method.greets:
+            return
+        hello = self.child.ask("", FIRST_S)
+        said = parse_answer(hello.line or b"", GREETING)
         if isinstance(said, Failure) and self.number == 0:
-            words = said.words if hello and hello.line else self.child.last_words()
+            words = said.words if hello.line else self.child.last_words()
             raise AllocationError(f"method {self.method.name}: {words}")
 
     def _read(self, reply: Reply) -> dict[str, Any] | Failure:
@@ -177,8 +175,3 @@ class Asker:
 
 
 _NOTHING = Answer(None, math.nan, Failure("died", "not asked"))
-
-
-def failures(answers: Sequence[Answer]) -> list[Failure]:
-    """Those that failed."""
-    return [answer.failure for answer in answers if answer.failure is not None]

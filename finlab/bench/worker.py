@@ -1,6 +1,6 @@
 """`python -m finlab.bench.worker METHOD [--cpu]`: a Python function, or a method of finlab, answers in lines.
 
-A callable is handed what its parameters ask for by name: `targets` (N, 6), `layout` (a `finlab.Layout`),
+A function is handed what its parameters ask for by name: `targets` (N, 6), `layout` (a `finlab.Layout`),
 `robot` (the same as plain values of a layout file), `sigma` (6,), `previous` (n, 3) or None.
 It returns commands (N, n, 3).
 """
@@ -13,6 +13,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,7 @@ from finlab.layout import Layout
 from finlab.layout.file import parse_layout
 
 KNOWN = ("targets", "layout", "robot", "sigma", "previous")
-"""Parameters that a callable may have."""
+"""Parameters that a function may have."""
 
 
 def load_callable(name: str) -> Callable[..., Any]:
@@ -54,33 +55,28 @@ def load_callable(name: str) -> Callable[..., Any]:
         parameters = inspect.signature(found).parameters.values()
     except ValueError:
         raise DataError(f"{name}: its parameters are not known; wrap it in a function") from None
-    unknown = [p.name for p in parameters if p.default is p.empty and p.name not in KNOWN]
-    if unknown:
+    if unknown := [p.name for p in parameters if p.default is p.empty and p.name not in KNOWN]:
         raise DataError(f"{name}: expected parameters among {', '.join(KNOWN)}, got {unknown[0]!r}")
     method: Callable[..., Any] = found
     return method
 
 
 def finlab_method(name: str) -> Callable[..., Array]:
-    """One of finlab's methods as a callable, told what the benchmark divides errors by.
-
-    Method `paper` keeps what its network was trained with.
-    """
+    """One of finlab's methods as a function, told what the benchmark divides errors by; `paper` keeps what
+    its network was trained with."""
     base = load_method_spec(name)
     made: dict[Layout, Allocator] = {}
 
     def answer(layout: Layout, targets: Array, sigma: Array, previous: Array | None) -> Array:
         if layout not in made:
             made[layout] = base if base.name == "paper" else _with_sigma(base, sigma)
-        if len(targets) == 1:
-            return made[layout].allocate(layout, targets[0], previous=previous).command[None]
-        return made[layout].allocate_batch(layout, targets).command
+        return made[layout].allocate(layout, targets[0], previous=previous).command[None]
 
     return answer
 
 
 def _with_sigma(method: Allocator, sigma: Array) -> Allocator:
-    """The same method with another yardstick of the error; what the network of `mdn` sees has none."""
+    """The same method with another scale of the error; what the network of `mdn` sees has none."""
     make: Any = type(method)
     own = Normalization(np.zeros(6), sigma)
     known = own if method.weights is None else replace(method.weights, normalization=own)
@@ -88,27 +84,24 @@ def _with_sigma(method: Allocator, sigma: Array) -> Allocator:
     return made
 
 
-def answers(
-    method: Callable[..., Any],
-    asked: dict[str, Any],
-    layouts: dict[str, Layout],
-    clock: Callable[[], float] = time.perf_counter,
-) -> dict[str, Any]:
+@lru_cache(2)
+def _layout(description: str) -> Layout:
+    return parse_layout(json.loads(description))
+
+
+def answers(method: Callable[..., Any], asked: dict[str, Any], clock: Callable[[], float]) -> dict[str, Any]:
     """The answer to one question; only the call itself is timed, by a clock [s]."""
-    key = json.dumps(asked["layout"])
-    if key not in layouts:
-        layouts[key] = parse_layout(asked["layout"])
     before = asked["previous"]
     given: dict[str, Any] = {
         "targets": np.array(asked["targets"]),
-        "layout": layouts[key],
+        "layout": _layout(json.dumps(asked["layout"])),
         "robot": asked["layout"],
         "sigma": np.array(asked["sigma"]),
         "previous": None if before is None else np.array(before),
     }
     wanted = inspect.signature(method).parameters
-    takes_all = any(p.kind is p.VAR_KEYWORD for p in wanted.values())
-    given = {name: value for name, value in given.items() if takes_all or name in wanted}
+    if not any(p.kind is p.VAR_KEYWORD for p in wanted.values()):
+        given = {name: value for name, value in given.items() if name in wanted}
     begin = clock()
     commands = method(**given)
     seconds = clock() - begin
@@ -121,8 +114,7 @@ def main(name: str, *options: str) -> int:
         os.dup2(2, 1)
 
         def say(what: dict[str, Any]) -> None:
-            out.write(json.dumps(what) + "\n")
-            out.flush()
+            print(json.dumps(what), file=out, flush=True)
 
         try:
             method = load_callable(name) if ":" in name else finlab_method(name)
@@ -130,12 +122,11 @@ def main(name: str, *options: str) -> int:
             say({"id": GREETING, "error": str(error)})
             return 2
         say({"id": GREETING, "commands": []})
-        layouts: dict[str, Layout] = {}
         clock = time.process_time if CPU in options else time.perf_counter
         for line in sys.stdin:
             asked = json.loads(line)
             try:
-                say(answers(method, asked, layouts, clock))
+                say(answers(method, asked, clock))
             except Exception as error:  # whatever a method raises is one failure of it
                 say({"id": asked["id"], "error": f"{type(error).__name__}: {error}"})
     return 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,12 +23,12 @@ def bench(
     sets: Names = "all",
     limit: Annotated[float, arg(metavar="SECONDS")] = 1.0,
     cpu: bool = False,
-    together: bool = False,
     problems: Annotated[Path | None, arg(metavar="FILE")] = None,
-    page: Annotated[Path | None, arg(metavar="FILE")] = None,
     json: Annotated[Path | None, arg(metavar="FILE")] = None,
 ) -> None:
     """Measure allocation methods, yours or finlab's, on the same problems: error, power, turn, time.
+
+    Example: finlab bench my_method.py:allocate --quick
 
     Args:
         methods: a method of finlab (search, analytic, ipopt-32, search-effort, ...), or a Python function as
@@ -37,39 +38,41 @@ def bench(
         sets: sets of robots with commas between, such as paper,tiny.
         limit: longest time for one target; a later answer is a failure.
         cpu: time Python functions by the processor's time, which other work on the machine does not prolong.
-        together: ask for all targets of a robot in one call.
         problems: file of problems; the shipped one by default.
-        page: file for a page that needs nothing else.
         json: file for the results.
     """
-    from finlab.bench.metrics import figures
-    from finlab.bench.page import document, rows_of, summary_blocks
-    from finlab.bench.problems import FILE, open_problems
-    from finlab.bench.results import comparable, results, save_results
-    from finlab.bench.runner import LIMIT_S, run_method
-    from finlab.evaluation.report.text import to_text
+    from tqdm import tqdm
 
     if not limit > 0.0:
         raise DataError(f"limit: expected a number of seconds above 0, got {limit}")
-    for file in (page, json):
-        Output(file)
-    if page is not None:
-        from finlab.evaluation.report.pages import to_html  # what a page needs is missed before the run
-    asked = open_problems(problems or FILE)
-    part = asked if sets == "all" else asked.of_sets([name.strip() for name in sets.split(",")])
-    chosen = part.quick() if quick else part
-    tested = _tested(methods, command, cpu)
-    found = [figures(chosen, run_method(method, chosen, limit, together)) for method in tested]
+    Output(json)
+    with tqdm(desc="bench", unit="target", disable=None, leave=False, file=sys.stderr) as bar:
+        from finlab.bench.metrics import figures
+        from finlab.bench.problems import FILE, open_problems
+        from finlab.bench.runner import LIMIT_S, run_method
+
+        asked = open_problems(problems or FILE)
+        part = asked if sets == "all" else asked.of_sets([name.strip() for name in sets.split(",")])
+        chosen = part.quick() if quick else part
+        tested, found = _tested(methods, command, cpu), []
+        for method in tested:
+            bar.set_description(method.name, refresh=False)
+            bar.reset(len(chosen.targets.robot) + chosen.sequences.best_error.size)
+            found.append(figures(chosen, run_method(method, chosen, limit, bar.update)))
+
+    from finlab.bench.results import results, save_results, stored
+    from finlab.bench.table import text
+
     words = ["finlab", "bench", *methods, *(word for each in command for word in ("--command", each))]
-    words += ["--sets", sets] * (part is not asked) + ["--quick"] * quick + ["--together"] * together
+    words += ["--sets", sets] * (part is not asked) + ["--quick"] * quick
     words += ["--cpu"] * cpu + ["--limit", f"{limit:g}"] * (limit != LIMIT_S)
-    run = results(found, asked, quick=quick, together=together, limit_s=limit, command=shlex.join(words))
-    stored = comparable(asked, quick=quick, together=together) if part is asked else None
-    if json is not None:
-        save_results(run, json)
-    if page is not None:
-        page.write_text(to_html(document(run, stored, asked)), "utf-8")
-    print(to_text(*summary_blocks(rows_of(run, stored), stored)))
+    run = results(found, asked, quick=quick, limit_s=limit, command=shlex.join(words))
+    beside = stored(asked, quick=quick) if part is asked else None
+    try:
+        if json is not None:
+            save_results(run, json)
+    finally:  # a full disk does not cost the table
+        print(text(run, beside))
 
 
 def _tested(methods: tuple[str, ...], commands: tuple[str, ...], cpu: bool) -> list[Method]:
