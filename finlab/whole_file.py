@@ -12,13 +12,19 @@ def write_whole(
 ) -> None:
     """Write a file, replacing an existing one; a kill or a full disk never leaves half of it.
 
+    A link is followed; what is no regular file (`/dev/stdout`) is written to, not replaced.
+
     Raises:
         FinlabError: of the kind `error`; the file cannot be written.
     """
-    file = Path(path)
+    file = Path(os.path.realpath(path))
     part = file.with_name(f".{file.name}.{os.getpid()}.part")
+    data = content.encode() if isinstance(content, str) else content
     try:
-        part.write_bytes(content.encode() if isinstance(content, str) else content)
+        if file.exists() and not file.is_file():
+            file.write_bytes(data)
+            return
+        part.write_bytes(data)
         os.replace(part, file)
     except OSError as failure:
         with suppress(OSError):

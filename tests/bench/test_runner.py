@@ -16,8 +16,8 @@ from finlab.physics import plant_of
 METHODS = Path(__file__).with_name("methods.py")
 
 
-def run(name: str, problems: Problems, limit_s: float = 5.0, together: bool = False) -> Answers:
-    return run_method(Method.of(f"{METHODS}:{name}"), problems, limit_s, together)
+def run(name: str, problems: Problems, limit_s: float = 5.0) -> Answers:
+    return run_method(Method.of(f"{METHODS}:{name}"), problems, limit_s)
 
 
 @pytest.mark.parametrize(
@@ -90,13 +90,6 @@ def test_search_is_judged_by_the_plant(few: Problems) -> None:
     summary = figures(few, answers)["summary"]
     assert summary["solved"] == 1.0 and summary["power"] == pytest.approx(1.0, abs=2e-3)
     assert summary["beyond"] < 1e-4 and summary["failed"] == 0.0
-
-
-def test_together_gives_the_same_answers(few: Problems) -> None:
-    apart, together = (run_method(Method.of("analytic"), few, 5.0, way) for way in (False, True))
-    for one, other in zip(apart.targets, together.targets, strict=True):
-        assert one.command is not None and other.command is not None
-        assert np.allclose(one.command, other.command)
 
 
 @pytest.mark.parametrize(
