@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
+from finlab.cli.inputs import open_robot
+from finlab.errors import FinlabError
+from finlab.whole_file import check_new_folder, whole_folder
+
 if TYPE_CHECKING:
+    from finlab.control.measurement import Controller
+    from finlab.layout import Layout
     from finlab.sim import ClosedLoop, FinFault, RunLog
     from finlab.sim.water import Water
 
@@ -34,9 +41,10 @@ def simulate(
     seed: Annotated[int, arg(metavar="N")] = 0,
     checkpoint: Annotated[str | None, arg(metavar="NAME|FOLDER")] = None,
     output: Annotated[Path | None, arg(metavar="FOLDER", aliases=["-o"])] = None,
-    animate: bool = False,
 ) -> None:
     """Let a robot follow a trajectory in simulation, and say how well it did.
+
+    Example: finlab simulate A --trajectory circle --fail front_left@30 -o swim
 
     Args:
         layout: layout file, layout graph file, or the name of a shipped layout.
@@ -66,92 +74,93 @@ def simulate(
         checkpoint: trained checkpoint; the shipped one of the method by default.
         output: new or empty folder for the log (log.npz, and log.csv for other programs) and pictures;
             without it only the summary is printed.
-        animate: write swim.gif into the folder, too: the swim from above, played in a quarter of a minute.
     """
     from tqdm import tqdm
 
-    from finlab.cli.inputs import open_robot
-    from finlab.control import (
-        FaultMonitor,
-        TrackingController,
-        WaypointController,
-        WaypointGains,
-        load_gains,
-    )
-    from finlab.errors import FinlabError
-    from finlab.evaluation.method_specs import load_method_spec
-    from finlab.sim import NO_NOISE, ClosedLoop, FinFault, make_trajectory
-    from finlab.sim.excite import LONGEST_S, excitation
+    if output is not None:
+        check_new_folder(output)
+    with tqdm(desc="swim", unit="s", disable=None, leave=False, file=sys.stderr) as bar:
+        from finlab.sim import FinFault
 
-    robot = open_robot(layout)
-    failures = [FinFault(name, 0.0) for name in robot.failed] + [_failure(text) for text in fail]
-    _check_folder(output)
-    if animate and output is None:
-        raise FinlabError("--animate: expected a folder for swim.gif; name one with --output")
-    water = _water(current, waves, seed)
-    sensors = None if noise else NO_NOISE
-    if excite:
-        if fail or monitor:
-            raise FinlabError(
-                "--excite: a robot is learned with the fins that it has; leave --fail and --monitor out"
+        robot, water = open_robot(layout), _water(current, waves, seed)
+        faults = [*(FinFault(name, 0.0) for name in robot.failed), *map(_fault, fail)]
+        if excite:
+            if fail or monitor:
+                raise FinlabError(
+                    "--excite: a robot is learned with the fins that it has; leave --fail and --monitor out"
+                )
+            loop = _excitation(robot.layout.without(robot.failed), duration, plant, noise, water, seed)
+        else:
+            from finlab.control import FaultMonitor
+            from finlab.evaluation.method_specs import load_method_spec
+            from finlab.sim import NO_NOISE, ClosedLoop, make_trajectory
+
+            pilot = _controller(robot.layout, controller, gains)
+            loop = ClosedLoop(
+                robot.layout,
+                load_method_spec(method, checkpoint, objective),
+                make_trajectory(trajectory, duration),
+                pilot,
+                plant=plant,
+                sensors=None if noise else NO_NOISE,
+                water=water,
+                failures=faults,
+                announced=announced,
+                monitor=FaultMonitor(robot.layout, period_s=pilot.period_s) if monitor else None,
+                servo_feedback=servo_feedback,
+                seed=seed,
             )
-        swum = robot.layout.without(robot.failed) if robot.failed else robot.layout
-        whole = LONGEST_S if duration is None else duration
-        loop = excitation(swum, whole, plant=plant, sensors=sensors, water=water, seed=seed)
-        failures = []
-    else:
-        if controller == "tracking" and gains is not None:
-            raise FinlabError(
-                "--gains: those of the tracking controller follow from the robot; leave it out, or add "
-                "--controller waypoint"
-            )
-        pilot = (
-            TrackingController(robot.layout)
-            if controller == "tracking"
-            else WaypointController(load_gains(WaypointGains, gains or "waypoint"))
-        )
-        loop = ClosedLoop(
-            robot.layout,
-            load_method_spec(method, checkpoint, objective),
-            make_trajectory(trajectory, duration),
-            pilot,
-            plant=plant,
-            sensors=sensors,
-            water=water,
-            failures=failures,
-            announced=announced,
-            monitor=FaultMonitor(robot.layout, period_s=pilot.period_s) if monitor else None,
-            servo_feedback=servo_feedback,
-            seed=seed,
-        )
-    for sentence in _warnings(loop, failures):
-        print(sentence, file=sys.stderr)
-    seconds = round(loop.task.duration_s, 1)
-    with tqdm(total=seconds, unit="s", disable=None, leave=False, file=sys.stderr) as bar:
-        found = Findings()
+            for sentence in _uncontrollable(loop, faults):
+                bar.write(sentence, file=sys.stderr)
+        found = [(0.0, monitored(loop))]
+        bar.reset(round(loop.task.duration_s, 1))
+        bar.bar_format = "{l_bar}{bar}| {n:.0f}/{total:.0f} s [{elapsed}<{remaining}]"
         while not loop.done:
             loop.step()
-            found.note(loop)
+            if (now := monitored(loop)) != found[-1][1]:
+                found.append((loop.time - loop.period_s, now))
             bar.update(loop.period_s)
-    log = loop.log
-    written = ""
-    if output is not None:
-        from finlab.evaluation.plots.animation import save_animation
-        from finlab.evaluation.plots.closed_loop_run import save_pictures
-        from finlab.evaluation.plots.film import Swum
-        from finlab.sim.log_csv import save_csv
+    written = [] if output is None else [f"\n{output}: written {', '.join(_write(loop.log, output))}."]
+    told = excitation_summary(loop.log) if excite else summary(loop.log)
+    changes = [f"{time:.1f} s: the monitor takes {what}" for time, what in found[1:]]
+    print("\n".join([told, *changes, *written]))
 
-        output.mkdir(parents=True, exist_ok=True)
-        log.save(output / "log.npz")
-        save_csv(log, output / "log.csv")
-        pictures = save_pictures(log, output)
-        if animate:
-            pictures.append(save_animation([Swum(log.method, log, loop.layout)], output / "swim.gif"))
-        names = ", ".join(path.name for path in pictures)
-        written = f"\n{output}: written log.npz, log.csv, {names}."
-    print("\n".join([excitation_summary(log) if excite else summary(log), *found.sentences]))
-    if written:
-        print(written)
+
+def _excitation(
+    layout: Layout, duration: float | None, plant: str, noise: bool, water: Water, seed: int
+) -> ClosedLoop:
+    """The swim from which a robot is learned."""
+    from finlab.sim import NO_NOISE
+    from finlab.sim.excite import LONGEST_S, excitation
+
+    seconds = LONGEST_S if duration is None else duration
+    sensors = None if noise else NO_NOISE
+    return excitation(layout, seconds, plant=plant, sensors=sensors, water=water, seed=seed)
+
+
+def _controller(layout: Layout, name: str, gains: str | None) -> Controller:
+    """The controller of a path."""
+    from finlab.control import TrackingController, WaypointController, WaypointGains, load_gains
+
+    if name == "waypoint":
+        return WaypointController(load_gains(WaypointGains, gains or "waypoint"))
+    if gains is not None:
+        raise FinlabError(
+            "--gains: those of the tracking controller follow from the robot; leave it out, or add "
+            "--controller waypoint"
+        )
+    return TrackingController(layout)
+
+
+def _write(log: RunLog, output: Path) -> list[str]:
+    """Log and pictures in a folder; their names."""
+    from finlab.evaluation.plots.closed_loop_run import save_pictures
+    from finlab.sim.log_csv import save_csv
+
+    with whole_folder(output) as folder:
+        log.save(folder / "log.npz")
+        save_csv(log, folder / "log.csv")
+        return ["log.npz", "log.csv", *(path.name for path in save_pictures(log, folder))]
 
 
 def summary(log: RunLog) -> str:
@@ -189,34 +198,17 @@ def excitation_summary(log: RunLog) -> str:
     )
 
 
-class Findings:
-    """What a monitor says on the way, as sentences."""
-
-    def __init__(self) -> None:
-        """Nothing has been found."""
-        self.sentences: list[str] = []
-        """One for each time that the monitor changes its mind."""
-        self._last = ""
-
-    def note(self, loop: ClosedLoop) -> None:
-        """Look at the monitor's verdict after a step."""
-        verdict = loop.verdict
-        if verdict is None:
-            return
-        words = [f"{name} lost" for name in verdict.failed]
-        if verdict.health is not None:
-            stuck = dict(verdict.health.stuck)
-            words += [f"{name} weak" for name, _ in verdict.health.thrust]
-            words += [f"{name} stuck at {math.degrees(angle):.0f} deg" for name, angle in stuck.items()]
-        now = ", ".join(words) or "all fins whole"
-        if now != (self._last or "all fins whole"):
-            self.sentences.append(f"{loop.time - loop.period_s:.1f} s: the monitor takes {now}")
-        self._last = now
+def monitored(loop: ClosedLoop) -> str:
+    """What a monitor takes the fins for, in words."""
+    words = [] if loop.verdict is None else [f"{name} lost" for name in loop.verdict.failed]
+    if loop.verdict is not None and (health := loop.verdict.health) is not None:
+        words += [f"{name} weak" for name, _ in health.thrust]
+        words += [f"{name} stuck at {math.degrees(angle):.0f} deg" for name, angle in health.stuck]
+    return ", ".join(words) or "all fins whole"
 
 
-def _failure(text: str) -> FinFault:
+def _fault(text: str) -> FinFault:
     """What `NAME@SECONDS`, `NAME@SECONDS:KIND` or `NAME@SECONDS:weak=SHARE` says."""
-    from finlab.errors import FinlabError
     from finlab.sim import FinFault
 
     name, at, rest = text.rpartition("@")
@@ -241,20 +233,12 @@ def _water(current: tuple[float, float, float], waves: tuple[float, float], seed
     return Waves(*waves, current=current, seed=seed) if waves[0] else SteadyCurrent(current)
 
 
-def _check_folder(output: Path | None) -> None:
-    """Refuse before the run what would fail after it."""
-    from finlab.errors import FinlabError
-
-    if output is not None and output.exists() and (not output.is_dir() or any(output.iterdir())):
-        raise FinlabError(f"{output}: expected a new or empty folder")
-
-
-def _warnings(loop: ClosedLoop, failures: list[FinFault]) -> list[str]:
+def _uncontrollable(loop: ClosedLoop, faults: Sequence[FinFault]) -> list[str]:
     """What will not be controllable, said before the run."""
     from finlab.control import Completion
 
     sentences, lost = [], []
-    events = sorted((event for event in failures if event.kind == "lost"), key=lambda event: event.time_s)
+    events = sorted((event for event in faults if event.kind == "lost"), key=lambda event: event.time_s)
     for name, time in [("", 0.0), *((event.fin, event.time_s) for event in events)]:
         lost += [name] if name else []
         if not Completion(loop.layout, tuple(lost), loop.controller.axes).controllable:

@@ -1,0 +1,127 @@
+"""`finlab simulate` through `main`: log, pictures, sentences; folders that are whole or untouched."""
+
+import os
+import pty
+import resource
+import signal
+import subprocess
+import sys
+import termios
+from pathlib import Path
+
+import pytest
+
+from finlab.cli import main
+from finlab.sim import load_log
+
+FILES = {"log.npz", "log.csv", "path.png", "errors.png", "commands.png", "wrench.png"}
+
+
+@pytest.fixture
+def line(tmp_path: Path) -> list[str]:
+    """A command that swims a metre ahead in eight seconds."""
+    path = tmp_path / "line.csv"
+    path.write_text("t,x,y,z\n0,0,0,-1\n8,1,0,-1\n")
+    return ["simulate", "A", "--trajectory", str(path), "--method", "analytic"]
+
+
+def test_a_log_and_pictures_are_written(
+    line: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    argv = [*line, "--fail", "front_left@4", "--output", str(out)]
+    assert main(argv) == 0
+    printed = capsys.readouterr().out
+    assert "ATE" in printed and "lost: front_left" in printed and "log.csv, path.png" in printed
+    log = load_log(out / "log.npz")
+    assert log.task == "line" and not log.alive[-1, log.fins.index("front_left")]
+    assert {path.name for path in out.iterdir()} == FILES
+    assert (out / "log.csv").read_text().count("\n") == 1 + log.n_ticks
+    assert all(path.read_bytes().startswith(b"\x89PNG") for path in out.glob("*.png"))
+    assert main(argv) == 2
+    assert "expected a new or empty folder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("after", [1, 5])
+def test_a_killed_run_is_not_refused_its_own_folder(after: int, line: list[str], tmp_path: Path) -> None:
+    out, code = tmp_path / "out", "import os, sys; from finlab.cli import main, simulate;"
+    code += "from finlab.evaluation.plots import style; from pathlib import Path; replace = os.replace\n"
+    code += f"count = 0\ndef killed(*a):\n global count; count += 1\n replace(*a)\n if count == {after}:\n"
+    code += "  os.kill(os.getpid(), 9)\nos.replace = killed\nmain(sys.argv[1:])"
+    ended = subprocess.run([sys.executable, "-c", code, *line, "-o", str(out)], capture_output=True)
+    assert ended.returncode == -signal.SIGKILL
+    assert main([*line, "-o", str(out)]) == 0
+    assert {path.name for path in out.iterdir()} == FILES
+
+
+@pytest.mark.parametrize("limit", [0, 60_000])
+def test_a_full_disk_is_a_sentence_and_leaves_nothing(limit: int, line: list[str], tmp_path: Path) -> None:
+    """A limit on the size of files stands for the disk."""
+    out = tmp_path / "out"
+    ended = subprocess.run(
+        [sys.executable, "-m", "finlab", *line, "-o", str(out)],
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)),
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
+    )
+    assert ended.returncode == 2 and not out.exists()
+    (sentence,) = [text for text in ended.stderr.splitlines() if text.startswith("finlab: error: ")]
+    assert str(out) in sentence and "cannot be written: File too large" in sentence
+
+
+def test_progress_is_shown_at_once(line: list[str]) -> None:
+    leader, follower = pty.openpty()
+    termios.tcsetwinsize(follower, (24, 80))
+    program = [sys.executable, "-m", "finlab", *line]
+    process = subprocess.Popen(program, stderr=follower, stdout=subprocess.DEVNULL)
+    os.close(follower)
+    try:
+        shown = os.read(leader, 1000).decode()
+        user, system = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[11:13]
+    finally:
+        process.kill()
+        process.wait()
+        os.close(leader)
+    assert "swim" in shown
+    spent = (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+    assert spent < 1.5, "the processor's time until a bar is there [s]"
+
+
+def test_uncontrollable_is_said_before_the_run(line: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*line, "--fail", "front_left@0", "--fail", "back_left@0.5"]) == 0
+    err = capsys.readouterr().err
+    assert "from 0.5 s on, A without front_left, back_left cannot give surge, heave and yaw" in err
+
+
+def test_a_monitor_says_what_it_finds(
+    line: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "line.csv").write_text("t,x,y,z\n0,0,0,-1\n16,2,0,-1\n")
+    argv = [*line, "--fail", "front_left@10", "--no-announced"]
+    assert main([*argv, "--monitor", "--servo-feedback", "-o", str(tmp_path / "swim")]) == 0
+    assert "s: the monitor takes front_left lost" in capsys.readouterr().out
+    log = load_log(tmp_path / "swim" / "log.npz")
+    assert log.fault_probability[-1].argmax() == log.fins.index("front_left")
+    assert main(argv) == 0
+    assert "monitor" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("argv", "message"),
+    [
+        (["--fail", "front_left"], "expected NAME@SECONDS"),
+        (["--fail", "front_left@3:melted"], "expected NAME@SECONDS"),
+        (["--fail", "front_left@3:stuck=0.5"], "expected NAME@SECONDS"),
+        (["--fail", "front_left@3:weak=2"], "expected NAME@SECONDS"),
+        (["--fail", "tail@3", "--method", "analytic"], "no fin 'tail'"),
+        (["--trajectory", "spiral", "--method", "analytic"], "circle, lissajous, square"),
+        (["--gains", "waypoint_paper"], "add --controller waypoint"),
+        (["--excite", "--monitor"], "leave --fail and --monitor out"),
+        (["-o", __file__], "got a file"),
+    ],
+)
+def test_bad_input_is_one_sentence(argv: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["simulate", "A", *argv]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("finlab: error: ") and message in err and len(err.splitlines()) == 1
