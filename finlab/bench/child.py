@@ -106,7 +106,7 @@ def _talk(
 ) -> None:
     """Write each question and read its answer, until the input or the process ends."""
     assert process.stdin is not None and process.stdout is not None
-    with process.stdin, process.stdout, contextlib.suppress(OSError, ValueError):
+    with contextlib.suppress(OSError, ValueError), process.stdin, process.stdout:
         while (line := questions.get()) is not None:
             begin = time.perf_counter()
             answer = b""

@@ -25,7 +25,7 @@ from finlab.evaluation.on_board import OnBoard
 from finlab.evaluation.report.sections.closed_loop import fault_blocks, trajectory_blocks, velocity_blocks
 from finlab.evaluation.report.text import to_text
 from finlab.layout import Layout
-from finlab.sim import Trajectory, load_log
+from finlab.sim import Trajectory
 
 MOST_BYTES = 150_000
 
@@ -106,57 +106,9 @@ def test_on_board_is_exact_within_its_limits_and_scales_beyond(layout_a: Layout,
     assert one_lost.err_norm < 0.05
 
 
-def test_simulate_writes_a_log_and_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "line.csv"
-    path.write_text("t,x,y,z\n0,0,0,-1\n8,1,0,-1\n")
-    out = tmp_path / "out"
-    argv = ["simulate", "A", "--trajectory", str(path), "--method", "analytic", "--fail", "front_left@4"]
-    assert main([*argv, "--animate"]) == 2
-    assert "--animate: expected a folder" in capsys.readouterr().err
-    assert main([*argv, "--animate", "--output", str(out)]) == 0
-    printed = capsys.readouterr().out
-    assert "ATE" in printed and "lost: front_left" in printed
-    log = load_log(out / "log.npz")
-    assert log.task == "line" and not log.alive[-1, log.fins.index("front_left")]
-    assert all(is_small_png(out / f"{name}.png") for name in ("path", "errors", "commands", "wrench"))
-    assert (out / "swim.gif").read_bytes()[:3] == b"GIF" and "log.csv, path.png" in printed
-    assert (out / "log.csv").read_text().count("\n") == 1 + log.n_ticks
-    assert main([*argv, "--output", str(out)]) == 2
-    assert "expected a new or empty folder" in capsys.readouterr().err
-
-
-def test_uncontrollable_is_said_before_the_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "line.csv"
-    path.write_text("t,x,y,z\n0,0,0,-1\n1,0.1,0,-1\n")
-    fins = ["--fail", "front_left@0", "--fail", "back_left@0.5"]
-    assert main(["simulate", "A", "--trajectory", str(path), "--method", "analytic", *fins]) == 0
-    err = capsys.readouterr().err
-    assert "from 0.5 s on, A without front_left, back_left cannot give surge, heave and yaw" in err
-
-
-def test_a_monitor_says_what_it_finds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "line.csv"
-    path.write_text("t,x,y,z\n0,0,0,-1\n16,2,0,-1\n")
-    argv = ["simulate", "A", "--trajectory", str(path), "--method", "analytic", "--fail", "front_left@10"]
-    watched = [*argv, "--no-announced", "--monitor", "--servo-feedback", "-o", str(tmp_path / "swim")]
-    assert main(watched) == 0
-    assert "s: the monitor takes front_left lost" in capsys.readouterr().out
-    log = load_log(tmp_path / "swim" / "log.npz")
-    assert log.fault_probability[-1].argmax() == log.fins.index("front_left")
-    assert main([*argv, "--no-announced"]) == 0
-    assert "monitor" not in capsys.readouterr().out
-
-
 @pytest.mark.parametrize(
     ("argv", "message"),
     [
-        (["simulate", "A", "--fail", "front_left"], "expected NAME@SECONDS"),
-        (["simulate", "A", "--fail", "front_left@3:melted"], "expected NAME@SECONDS"),
-        (["simulate", "A", "--fail", "front_left@3:stuck=0.5"], "expected NAME@SECONDS"),
-        (["simulate", "A", "--fail", "front_left@3:weak=2"], "expected NAME@SECONDS"),
-        (["simulate", "A", "--fail", "tail@3", "--method", "analytic"], "no fin 'tail'"),
-        (["simulate", "A", "--trajectory", "spiral", "--method", "analytic"], "circle, lissajous, square"),
-        (["simulate", "A", "--gains", "waypoint_paper"], "add --controller waypoint"),
         (["eval", "trajectory", "--runs", "0"], "runs: expected a number of at least 1"),
         (["eval", "faults", "--methods", ","], "methods: expected names"),
         (["eval", "velocity", "--duration", "5"], "more than 10 s"),
@@ -169,7 +121,7 @@ def test_bad_input_is_one_sentence(argv: list[str], message: str, capsys: pytest
 
 
 def test_verbs_have_help_and_write_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for verb in (["simulate"], ["eval", "trajectory"], ["eval", "faults"], ["eval", "velocity"]):
+    for verb in (["eval", "trajectory"], ["eval", "faults"], ["eval", "velocity"]):
         assert main([*verb, "--help"]) == 0
     capsys.readouterr()
     file = tmp_path / "rows.json"
