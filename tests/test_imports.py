@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 LEVELS = (
     ("errors", "arrays"),
-    ("assets", "bundle_files", "least_squares", "whole_file"),
+    ("assets", "bundle_files", "command_end", "least_squares", "whole_file"),
     ("layout",),
     ("physics", "exchange"),
     ("inference",),

@@ -2,12 +2,16 @@
 
 import argparse
 import json
+import math
 import os
+import shutil
 import sys
 import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from finlab import __version__
+from finlab.command_end import FAILED, exit_code
 from finlab.errors import FinlabError
 
 if TYPE_CHECKING:
@@ -18,31 +22,33 @@ POLICIES = ("closest", "direction", "priority")
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; 0 is good, 1 a self-test that failed, 2 an error in one sentence."""
-    arguments = _parser().parse_args(argv)
+    return exit_code("finlab-runtime", lambda: _run(argv))
+
+
+def _run(argv: Sequence[str] | None) -> int:
+    try:
+        arguments = _parser().parse_args(argv)
+    except SystemExit as end:  # help, version, or a wrong call, of which argparse has told
+        return end.code if isinstance(end.code, int) else FAILED
     # Before numpy is loaded: every product here is too small to be shared among cores.
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
-    try:
-        arguments.started = time.perf_counter()
-        from finlab.deploy.robot import load_robot
-
-        code: int = arguments.run(load_robot(arguments.bundle), arguments)
-        sys.stdout.flush()
-        return code
-    except FinlabError as error:
-        print(f"finlab-runtime: error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 130
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 141
+    arguments.started = time.perf_counter()
+    code: int = arguments.run(arguments)
+    return code
 
 
-def check(robot: "Robot", arguments: argparse.Namespace) -> int:
+def _robot(arguments: argparse.Namespace) -> "Robot":
+    from finlab.deploy.robot import load_robot
+
+    return load_robot(arguments.bundle)
+
+
+def check(arguments: argparse.Namespace) -> int:
     """Print each question of the self-test with its answer."""
     from finlab.deploy.self_check import self_check
 
+    robot = _robot(arguments)
     print(
         f"{arguments.bundle}: {robot.layout.name}, {robot.layout.n_fins} fins, "
         f"method {robot.allocator.name}, ready in {time.perf_counter() - arguments.started:.2f} s"
@@ -58,11 +64,11 @@ def check(robot: "Robot", arguments: argparse.Namespace) -> int:
     return 1
 
 
-def allocate(robot: "Robot", arguments: argparse.Namespace) -> int:
+def allocate(arguments: argparse.Namespace) -> int:
     """Print the commands for one target."""
     from finlab.deploy.record import allocation_record, command_rows
 
-    answer = robot.allocate(
+    answer = _robot(arguments).allocate(
         arguments.wrench, failed=arguments.failed, policy=arguments.policy, seed=arguments.seed
     )
     if arguments.json:
@@ -82,11 +88,12 @@ def allocate(robot: "Robot", arguments: argparse.Namespace) -> int:
     return 0
 
 
-def speed(robot: "Robot", arguments: argparse.Namespace) -> int:
+def speed(arguments: argparse.Namespace) -> int:
     """Print times and memory of single answers, one after the other."""
     from finlab.deploy.graph import random_targets
     from finlab.deploy.self_check import answer_times, peak_memory
 
+    robot = _robot(arguments)
     robot.allocate([0.0] * 6)
     ready = time.perf_counter() - arguments.started
     p50, p99 = answer_times(robot.allocate, random_targets(robot.layout, max(arguments.targets, 1)))
@@ -97,55 +104,103 @@ def speed(robot: "Robot", arguments: argparse.Namespace) -> int:
     return 0
 
 
-def serve(robot: "Robot", arguments: argparse.Namespace) -> int:
-    """Answer requests until they end."""
-    from finlab.deploy.serve import Server, Timing, Transport
-    from finlab.deploy.transport import LoopbackUdp, StandardStreams
+def serve(arguments: argparse.Namespace) -> int:
+    """Answer requests until they end or a signal asks to stop."""
+    from finlab.deploy.stopping import StopSignals
+
+    stop = StopSignals()  # before the robot is loaded, so that no signal is missed
+    robot = _robot(arguments)
+    from finlab.deploy.serve import Server, Timing
+    from finlab.deploy.transport import LoopbackUdp, StandardStreams, Transport
 
     deadline = None if arguments.deadline_ms is None else arguments.deadline_ms / 1e3
-    timing = Timing(deadline, arguments.watchdog_s or None)
+    timing = Timing(deadline, None if arguments.no_watchdog else arguments.watchdog_s)
     transport: Transport
     if arguments.udp is None:
-        transport = StandardStreams(sys.stdin.buffer, sys.stdout.buffer)
+        if sys.stdin is None:
+            raise FinlabError("standard input is closed; connect it, or use --udp PORT")
+        transport = StandardStreams(sys.stdin.fileno(), sys.stdout.fileno(), stop)
     else:
-        transport = LoopbackUdp(arguments.udp)
+        transport = LoopbackUdp(arguments.udp, stop)
         print(f"listening on 127.0.0.1:{transport.port}", file=sys.stderr, flush=True)
     Server(robot, timing).run(transport)
     return 0
 
 
-def _positive(text: str) -> float:
-    value = float(text)
-    if not 0 < value < 1e6:
-        raise argparse.ArgumentTypeError(f"must be above 0, got {text}")
-    return value
+def _within(low: float, high: float) -> Callable[[str], float]:
+    """What reads a number of an option, and refuses those outside a range."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"expected a number from {low:g} to {high:g}, got {text!r:.40}")
+        return value
+
+    return read
+
+
+def _width(prog: str) -> argparse.RawDescriptionHelpFormatter:
+    return argparse.RawDescriptionHelpFormatter(prog, width=min(shutil.get_terminal_size().columns, 100) - 2)
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser("finlab-runtime", description="Control allocation on board.")
+    parser = argparse.ArgumentParser(
+        "finlab-runtime",
+        description="Control allocation on board.",
+        epilog="example:\n  finlab-runtime check my_robot",
+        formatter_class=_width,
+    )
+    parser.add_argument("--version", action="version", version=f"finlab-runtime {__version__}")
     verbs = parser.add_subparsers(required=True, metavar="check|allocate|serve|speed")
 
-    def verb(run: Callable[["Robot", argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
-        made = verbs.add_parser(run.__name__, help=text, description=text)
+    def verb(run: Callable[[argparse.Namespace], int], text: str, example: str) -> argparse.ArgumentParser:
+        epilog = f"example:\n  {example}"
+        made = verbs.add_parser(
+            run.__name__, help=text, description=text, epilog=epilog, formatter_class=_width
+        )
         made.set_defaults(run=run)
-        made.add_argument("bundle", metavar="BUNDLE", help="folder or zip archive made by `finlab export`")
+        about = "folder or zip archive made by `finlab export`, or a layout graph file"
+        made.add_argument("bundle", metavar="BUNDLE", help=about)
         return made
 
-    verb(check, "Run the self-test; do this on the robot before first use.")
-    one = verb(allocate, "Commands for one target.")
+    verb(check, "Run the self-test; do this on the robot before first use.", "finlab-runtime check my_robot")
+    one = verb(
+        allocate, "Commands for one target.", "finlab-runtime allocate my_robot --wrench 1 0 0.5 0 0 0.1"
+    )
     names = ("FX", "FY", "FZ", "TX", "TY", "TZ")
     one.add_argument("--wrench", nargs=6, type=float, required=True, metavar=names, help="[N, N m]")
     one.add_argument("--failed", action="append", default=[], metavar="NAME", help="fin that is lost")
     one.add_argument("--policy", choices=POLICIES, default="closest", help="what to do out of reach")
     one.add_argument("--seed", type=int, default=0, help="seed of the candidates")
     one.add_argument("--json", action="store_true", help="print one JSON object")
-    rate = verb(speed, "How fast this computer answers, how soon, and how much memory it takes.")
+    rate = verb(
+        speed,
+        "How fast this computer answers, how soon, and how much memory it takes.",
+        "finlab-runtime speed my_robot --targets 300",
+    )
     rate.add_argument("--targets", type=int, default=2000, metavar="N", help="number of single answers")
-    loop = verb(serve, "Read targets as JSON lines, write commands as JSON lines.")
+    loop = verb(
+        serve,
+        "Read targets as JSON lines, write commands as JSON lines.",
+        """echo '{"wrench": [1, 0, 0.5, 0, 0, 0.1]}' | finlab-runtime serve my_robot""",
+    )
     loop.add_argument("--udp", type=int, metavar="PORT", help="UDP on 127.0.0.1, not stdin and stdout")
-    loop.add_argument("--deadline-ms", type=_positive, metavar="MS", help="answer no later than this")
     loop.add_argument(
-        "--watchdog-s", type=float, default=1.0, metavar="S", help="silence before the fins rest; 0: never"
+        "--deadline-ms", type=_within(0.001, 1e6), metavar="MS", help="answer no later than this"
+    )
+    silence = loop.add_mutually_exclusive_group()
+    silence.add_argument(
+        "--watchdog-s",
+        type=_within(0.01, 3600.0),
+        default=1.0,
+        metavar="S",
+        help="silence before the fins rest, 1 s if not said",
+    )
+    silence.add_argument(
+        "--no-watchdog", action="store_true", help="keep the last commands however long nobody speaks"
     )
     return parser
 

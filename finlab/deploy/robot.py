@@ -8,14 +8,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finlab.allocation.allocation import Allocation
-from finlab.allocation.methods import allocator_from_bundle
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.bundle_settings import METHODS_ON_BOARD
+from finlab.allocation.methods import allocator_from_bundle, load_allocator
 from finlab.allocation.policy import CLOSEST, Policy
 from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.arrays import Array
-from finlab.bundle_files import ABOUT, GRAPH, Files, check_bundle_files, read_bundle_files
+from finlab.assets import shipped_checkpoints
+from finlab.bundle_files import ABOUT, GRAPH, Files, check_bundle_files, is_bundle, read_bundle_files
 from finlab.deploy.graph import LayoutGraph
-from finlab.deploy.graph_file import parse_graph
+from finlab.deploy.graph_file import parse_graph, read_graph
 from finlab.errors import AllocationError, DataError
+from finlab.forces.compiled_fins import compiled_fins
 from finlab.layout import Layout
 from finlab.layout.load import bundle_graph_text
 
@@ -80,12 +84,36 @@ class Robot:
 
 
 def load_robot(path: str | os.PathLike[str]) -> Robot:
-    """The robot in a bundle, a folder or a zip archive.
+    """The robot in a bundle, a folder or a zip archive; or in a layout graph file, whose fins are compiled
+    here and answer with the usual settings.
 
     Raises:
-        FinlabError: the bundle is not one, was changed, or cannot be run.
+        FinlabError: it is neither, was changed, or cannot be run.
     """
-    return parse_robot(read_bundle_files(path), str(path))
+    if is_bundle(path) or not str(path).endswith((".json", ".yaml", ".yml")):
+        return parse_robot(read_bundle_files(path), str(path))
+    if not str(path).endswith(".json"):
+        raise DataError(f"{path}: is a layout file; run what `finlab export {path} -o DIR` makes of it")
+    return _graph_robot(read_graph(path), str(path))
+
+
+def _graph_robot(graph: LayoutGraph, source: str) -> Robot:
+    allocator: Allocator | None = None
+    if graph.method == SearchAllocator.name:
+        compiled = compiled_fins(graph.layout, SearchAllocator(graph.normalization).objective)
+        allocator = SearchAllocator(graph.normalization, compiled=compiled)
+    elif graph.method in METHODS_ON_BOARD and graph.checkpoint in shipped_checkpoints():
+        allocator = load_allocator(graph.method, checkpoint=graph.checkpoint)
+    if not isinstance(allocator, SearchAllocator) or _sha256(allocator) != graph.checkpoint_sha256:
+        raise DataError(
+            f"{source}: was made for method {graph.method!r}, whose networks are not here; run the bundle "
+            "that `finlab export LAYOUT -o DIR` makes, which brings them"
+        )
+    return Robot(graph, allocator)
+
+
+def _sha256(allocator: SearchAllocator) -> str | None:
+    return None if allocator.weights is None else allocator.weights.sha256
 
 
 def parse_robot(files: Files, source: str = "bundle") -> Robot:
@@ -97,7 +125,7 @@ def parse_robot(files: Files, source: str = "bundle") -> Robot:
     graph = parse_graph(bundle_graph_text(files, source))
     allocator = allocator_from_bundle(files, source)
     assert isinstance(allocator, SearchAllocator)
-    if (None if allocator.weights is None else allocator.weights.sha256) != graph.checkpoint_sha256:
+    if _sha256(allocator) != graph.checkpoint_sha256:
         raise DataError(f"{source}: {GRAPH} and the weights are of different checkpoints; export again")
     if not all(map(np.array_equal, allocator.normalization, graph.normalization)):
         raise DataError(f"{source}: {GRAPH} and {ABOUT} differ in normalization; export again")

@@ -78,7 +78,9 @@ def self_check(robot: Robot) -> list[Finding]:
 
 def compiled_off(robot: Robot) -> float:
     """The largest difference between a bundle's compiled fins and what compiling gives here; infinite where
-    one is missing."""
+    one is missing. 0 for a layout graph file with networks, whose fins are compiled here alone."""
+    if not robot.allocator.compiled:
+        return 0.0
     here = compiled_fins(robot.layout, robot.allocator.objective)
     known = robot.allocator.compiled
     return worst(difference(known[key], fin) if key in known else np.inf for key, fin in here.items())

@@ -14,7 +14,7 @@ status     meaning
 
 From one answer to the next, commands change no faster than the servos' rates allow in a tick of 0.1 s.
 Only the newest request counts: those that waited behind it are skipped, since a robot wants the present, not
-the past. A late answer is thrown away.
+the past. A late answer is thrown away. However the service ends, a neutral command is the last that it sends.
 """
 
 import json
@@ -23,32 +23,20 @@ from collections.abc import Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from concurrent.futures import TimeoutError as TooLate
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.deploy.record import command_rows
+from finlab.deploy.request import parse_request
 from finlab.deploy.robot import Robot
-from finlab.errors import CommandError, FinlabError
+from finlab.deploy.transport import Transport, Unsent
+from finlab.errors import FinlabError
 
-MAX_LINE = 65_536
-"""Longest request that is read [bytes]."""
-KEYS = ("wrench", "id", "failed", "policy", "reference")
-"""What a request may hold."""
 RECENT_S = 0.5
 """Age [s] up to which the last commands bind the next ones by the servos' rates."""
-
-
-class Transport(Protocol):
-    """How requests come and answers go."""
-
-    def newest(self, timeout: float | None) -> bytes | None:
-        """The newest request that waits; None after `timeout` seconds without one. EOFError at the end."""
-
-    def send(self, line: bytes) -> None:
-        """Send one answer to whoever asked last."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +53,6 @@ class Server:
     """Answers requests until they end."""
 
     def __init__(self, robot: Robot, timing: Timing) -> None:
-        """Make it."""
         self._robot, self._timing = robot, timing
         self._worker = ThreadPoolExecutor(1)
         self._sent: Array | None = None  # the last commands, None while the fins rest
@@ -74,29 +61,41 @@ class Server:
         self._busy: Future[Allocation] | None = None
 
     def run(self, transport: Transport) -> None:
-        """Serve until the requests end; then the fins rest."""
-        fresh = time.monotonic()  # when the last good target came
+        """Serve until the requests end or a signal asks to stop; then the fins rest.
+
+        Raises:
+            Unsent: nobody takes the answers any more.
+        """
         try:
-            while True:
-                patience = self._timing.watchdog
-                if patience is not None:
-                    patience = max(patience - (time.monotonic() - fresh), 0.0)
-                line = transport.newest(patience)
-                reply = self._rest() if line is None else self.answer(line)
-                if reply["status"] != "error":  # nonsense does not keep the fins beating
-                    fresh = time.monotonic()
-                transport.send(_line(reply))
+            self._loop(transport)
         except EOFError:
             transport.send(_line(self._rest()))
+        except Unsent:
+            raise
+        except BaseException:  # what nobody foresaw is told after the fins rest
+            transport.send(_line(self._rest()))
+            raise
         finally:
             self._worker.shutdown(wait=False, cancel_futures=True)
+
+    def _loop(self, transport: Transport) -> None:
+        fresh = time.monotonic()  # when the last good target came
+        while True:
+            patience = self._timing.watchdog
+            if patience is not None:
+                patience = max(patience - (time.monotonic() - fresh), 0.0)
+            line = transport.newest(patience)
+            reply = self._rest() if line is None else self.answer(line)
+            if reply["status"] != "error":  # nonsense does not keep the fins beating
+                fresh = time.monotonic()
+            transport.send(_line(reply))
 
     def answer(self, line: bytes) -> dict[str, Any]:
         """The answer to one request, as plain values."""
         start = time.perf_counter()
         name: Any = None
         try:
-            request = _request(line)
+            request = parse_request(line)
             name = request.get("id")
             self._failed = tuple(request.get("failed", ()))
             answer = self._solve(request, start)
@@ -150,29 +149,9 @@ class Server:
         return self._robot.neutral(known)
 
 
-def _request(line: bytes) -> Mapping[str, Any]:
-    """A request, checked as far as the allocator does not check it itself."""
-    if len(line) > MAX_LINE:
-        raise CommandError(f"request: longer than {MAX_LINE} bytes")
-    try:
-        request = json.loads(line)
-    except (ValueError, RecursionError):
-        raise CommandError("request: expected one JSON object in a line") from None
-    if not isinstance(request, dict) or "wrench" not in request:
-        raise CommandError('request: expected {"wrench": [Fx, Fy, Fz, Tx, Ty, Tz]}')
-    if unknown := [key for key in request if key not in KEYS]:
-        raise CommandError(f"request: unknown key {unknown[0]!r:.40}, expected {', '.join(KEYS)}")
-    failed = request.get("failed", [])
-    if not isinstance(failed, list) or not all(isinstance(name, str) for name in failed):
-        raise CommandError("failed: expected a list of fin names")
-    if not isinstance(request.get("policy", ""), str):
-        raise CommandError("policy: expected a name")
-    return request
-
-
 def _reply(name: Any, status: str, fins: tuple[str, ...], command: Array) -> dict[str, Any]:
     return {"id": name, "status": status, "fins": list(fins), "command": command_rows(command)}
 
 
 def _line(reply: Mapping[str, Any]) -> bytes:
-    return json.dumps(reply).encode() + b"\n"
+    return json.dumps(reply, allow_nan=False).encode() + b"\n"

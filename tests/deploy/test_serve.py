@@ -1,26 +1,31 @@
-"""The loop on board: newest target first, deadlines kept, silence leads to rest."""
+"""The loop on board: newest target first, deadlines kept, silence leads to rest, and so does every end."""
 
-import io
 import json
 import os
+import signal
 import socket
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 import pytest
 
 from finlab.allocation import Allocation
+from finlab.deploy import serve as serve_module
 from finlab.deploy.bundle import Bundle
+from finlab.deploy.request import MAX_LINE
 from finlab.deploy.robot import Robot, parse_robot
-from finlab.deploy.serve import MAX_LINE, RECENT_S, Server, Timing
-from finlab.deploy.transport import LoopbackUdp, StandardStreams
+from finlab.deploy.serve import RECENT_S, Server, Timing
+from finlab.deploy.stopping import SIGNALS, StopSignals
+from finlab.deploy.transport import LoopbackUdp, StandardStreams, Unsent
 from finlab.errors import FinlabError
 
-GOOD = {"wrench": [1, 0, 0.5, 0, 0, 0.1]}
+GOOD: dict[str, Any] = {"wrench": [1, 0, 0.5, 0, 0, 0.1]}
+LINE = json.dumps(GOOD).encode() + b"\n"
 
 
 @pytest.fixture(scope="module")
@@ -28,56 +33,67 @@ def robot(bundle: Bundle) -> Robot:
     return parse_robot(bundle.files)
 
 
+@pytest.fixture(scope="module")
+def folder(bundle: Bundle, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("robots") / "A"
+    bundle.write(path)
+    return path
+
+
 class Script:
-    """A transport that plays requests (None is silence) and keeps what was sent."""
+    """A transport that plays requests (None is silence) and keeps what was sent; its clock alone moves on, by
+    0.3 s with each request."""
 
     def __init__(self, *requests: Any) -> None:
-        self.requests = list(requests)
+        self.now, self.requests = 100.0, list(requests)
         self.sent: list[dict[str, Any]] = []
         self.waits: list[float | None] = []
 
     def newest(self, timeout: float | None) -> bytes | None:
         self.waits.append(timeout)
+        self.now += 0.3
         if not self.requests:
             raise EOFError
         request = self.requests.pop(0)
-        if request is None:
-            time.sleep(timeout or 0.0)
-            return None
-        return request if isinstance(request, bytes) else json.dumps(request).encode()
+        if isinstance(request, Exception):
+            raise request
+        return request if isinstance(request, bytes | None) else json.dumps(request).encode()
 
     def send(self, line: bytes) -> None:
-        self.sent.append(json.loads(line))
+        assert line.endswith(b"}\n")
+        self.sent.append(json.loads(line, parse_constant=pytest.fail))
 
 
-def served(robot: Robot, *requests: Any, timing: Timing | None = None) -> Script:
+def served(robot: Robot, *requests: Any, timing: Timing | None = None) -> list[dict[str, Any]]:
     script = Script(*requests)
     Server(robot, timing or Timing()).run(script)
-    return script
+    return script.sent
 
 
 def test_answers_like_the_library(robot: Robot) -> None:
-    first, end = served(robot, {**GOOD, "id": 7, "failed": ["back_left"]}).sent
+    first, end = served(robot, {**GOOD, "id": 7, "failed": ["back_left"]})
     truth = robot.allocate(GOOD["wrench"], failed=["back_left"])
     assert (first["id"], first["status"]) == (7, "ok") and first["fins"] == list(truth.fins)
     assert first["command"][2] is None
     np.testing.assert_array_equal(first["command"][0], truth.command[0])
-    assert [first[key] for key in ("err_norm", "energy", "power")] == [
-        truth.err_norm,
-        truth.energy,
-        truth.power,
-    ]
-    ahead = served(robot, {**GOOD, "reference": [[2, 0, 0.5, 0, 0, 0.1]] * 9}).sent[0]
+    assert [first[key] for key in ("err_norm", "power")] == [truth.err_norm, truth.power]
+    ahead = served(robot, {**GOOD, "reference": [[2, 0, 0.5, 0, 0, 0.1]] * 9})[0]
     assert ahead["wrench"][0] == pytest.approx(2.0, abs=1e-3), "fins will have followed by then"
     assert end["status"] == "neutral" and end["command"][2] is None, "a lost fin gets no command at the end"
+
+
+@pytest.mark.parametrize("id_", [None, 0, -1.5, "a", "\ud800", [1, "x"], {"of": [None, True]}, 10**300])
+def test_an_id_of_any_kind_comes_back(id_: Any, robot: Robot) -> None:
+    assert served(robot, {**GOOD, "id": id_})[0]["id"] == id_
 
 
 @pytest.mark.parametrize(
     ("request_", "message"),
     [
-        (b"nonsense", "expected one JSON object"),
+        (b"nonsense", "expected one JSON object in a line$"),
         (b"[" * 60_000, "expected one JSON object"),
         (b"x" * 70_000, "longer than 65536 bytes"),
+        (LINE.strip().ljust(MAX_LINE + 1), "longer than 65536 bytes"),
         ({"wrench": [1, 2]}, "expected six numbers"),
         ({"force": [1, 2]}, "expected {.wrench.:"),
         ({**GOOD, "speed": 3}, "unknown key 'speed'"),
@@ -86,23 +102,41 @@ def test_answers_like_the_library(robot: Robot) -> None:
         ({**GOOD, "policy": "hope"}, "policy: expected one of"),
         ({**GOOD, "policy": 3}, "policy: expected a name"),
         ({**GOOD, "reference": [1, 0, 0, 0, 0, 0]}, r"reference: expected an array of shape \(N, 6\)"),
-        ({"wrench": [float("nan")] * 6}, "Fx must be finite"),
+        ({**GOOD, "id": "x" * 1000}, "id: longer than 1000 characters"),
+        ({**GOOD, "id": float("nan")}, "NaN is no number in JSON"),
+        ({**GOOD, "id": [float("-inf")]}, "-Infinity is no number in JSON"),
+        (LINE.replace(b"}", b', "id": 1e999}'), "1e999 is too large"),
+        ({"wrench": [float("nan")] * 6}, "NaN is no number in JSON"),
+        ({"wrench": [10**400, 0, 0, 0, 0, 0]}, "10+ is too large"),
     ],
 )
 def test_bad_requests_get_one_sentence_and_no_commands(request_: Any, message: str, robot: Robot) -> None:
-    reply = served(robot, request_).sent[0]
+    reply = served(robot, request_)[0]
     assert reply["status"] == "error" and "command" not in reply
     with pytest.raises(FinlabError, match=message):
         raise FinlabError(reply["error"])
 
 
-def test_silence_leads_to_rest_and_nonsense_is_silence(robot: Robot) -> None:
-    script = served(robot, GOOD, b"nonsense", b"nonsense", None, timing=Timing(watchdog=0.2))
-    assert [reply["status"] for reply in script.sent] == ["ok", "error", "error", "neutral", "neutral"]
-    waits = [wait for wait in script.waits[1:4] if wait is not None]
-    assert waits == sorted(waits, reverse=True) and waits[0] <= 0.2, "nonsense does not feed the watchdog"
-    rest = np.array(script.sent[3]["command"])
-    np.testing.assert_array_equal(rest, robot.neutral())
+def test_only_good_targets_and_rest_wind_up_the_watchdog(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    script = Script(GOOD, b"nonsense", b"nonsense", GOOD, *[b"nonsense"] * 4, None)
+    monkeypatch.setattr("finlab.deploy.serve.time.monotonic", lambda: script.now)
+    Server(robot, Timing(watchdog=1.0)).run(script)
+    status = [reply["status"] for reply in script.sent]
+    assert status == ["ok", *["error"] * 2, "ok", *["error"] * 4, "neutral", "neutral"]
+    assert script.waits == pytest.approx([1.0, 1.0, 0.7, 0.4, 1.0, 0.7, 0.4, 0.1, 0.0, 1.0])
+    np.testing.assert_array_equal(np.array(script.sent[-1]["command"]), robot.neutral())
+    script = Script(GOOD, b"nonsense")
+    Server(robot, Timing(watchdog=None)).run(script)
+    assert script.waits == [None] * 3
+
+
+def test_the_fins_rest_before_an_error_that_nobody_foresaw_is_told(robot: Robot) -> None:
+    script = Script(GOOD, ZeroDivisionError("a fault of ours"))
+    with pytest.raises(ZeroDivisionError, match="a fault of ours"):
+        Server(robot, Timing()).run(script)
+    assert [reply["status"] for reply in script.sent] == ["ok", "neutral"]
 
 
 class Slow(Robot):
@@ -117,115 +151,34 @@ class Slow(Robot):
         return super().allocate(*args, **options)
 
 
-def test_deadline_repeats_what_was_sent_last(robot: Robot) -> None:
+def test_deadline_repeats_what_was_sent_last(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
     slow = Slow(robot, 0.0)
-    server = Server(slow, Timing(deadline=0.15))
-    line = json.dumps(GOOD).encode()
-    assert server.answer(line)["status"] == "ok"
-    sent = server.answer(line)["command"]
+    server = Server(slow, Timing(deadline=20.0))
+    sent = server.answer(LINE)["command"]
     vars(slow)["delay"] = 0.4
-    start = time.perf_counter()
-    late = server.answer(json.dumps({"wrench": [0, 0, 2, 0, 0, 0], "id": 1}).encode())
-    assert time.perf_counter() - start < 0.3
-    assert late["status"] == "late" and late["command"] == sent
-    assert server.answer(line)["status"] == "late", "the computer is still busy with the other target"
+    monkeypatch.setattr(server, "_timing", Timing(deadline=0.01))
+    late = server.answer(b'{"wrench": [0, 0, 2, 0, 0, 0], "id": 1}')
+    assert (late["id"], late["status"], late["command"]) == (1, "late", sent)
+    assert server.answer(LINE)["status"] == "late", "the computer is still busy with the other target"
     vars(slow)["delay"] = 0.0
-    time.sleep(0.6)
-    assert server.answer(line)["status"] == "ok"
+    monkeypatch.setattr(server, "_timing", Timing(deadline=20.0))
+    assert server.answer(LINE)["status"] == "ok"
+    first = Server(Slow(robot, 0.3), Timing(deadline=0.01)).answer(LINE)
+    assert first["status"] == "late"
+    np.testing.assert_array_equal(np.array(first["command"]), robot.neutral())
 
 
-def test_first_answer_too_late_is_neutral(robot: Robot) -> None:
-    late = Server(Slow(robot, 0.3), Timing(deadline=0.01)).answer(json.dumps(GOOD).encode())
-    assert late["status"] == "late"
-    np.testing.assert_array_equal(np.array(late["command"]), robot.neutral())
-
-
-def test_commands_change_no_faster_than_servos_do(robot: Robot) -> None:
-    wrenches = [[1, 0, 0.5, 0, 0, 0.1], [-1, 0.1, 0.5, 0, 0, 0.1]]
-    replies = served(robot, *({"wrench": w} for w in wrenches)).sent
-    before = np.array(replies[0]["command"])
-    truth = robot.allocate(wrenches[1], previous=before)
-    assert truth.err_norm > 0.1  # forwards and backwards are ticks apart
-    np.testing.assert_allclose(np.array(replies[1]["command"]), truth.command, atol=1e-9)
-
-
-def test_commands_of_long_ago_bind_no_more(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_commands_change_no_faster_than_servos_do(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [100.0]
+    monkeypatch.setattr(serve_module.time, "monotonic", lambda: now[0])
     server = Server(robot, Timing())
     forwards, backwards = (json.dumps({"wrench": [x, 0, 0.5, 0, 0, 0]}).encode() for x in (1, -1))
-    server.answer(forwards)
-    assert server.answer(backwards)["err_norm"] > 0.1
-    later = time.monotonic() + RECENT_S
-    monkeypatch.setattr(time, "monotonic", lambda: later)
-    assert server.answer(backwards)["err_norm"] < 1e-5
-
-
-def test_streams_keep_only_the_newest_request() -> None:
-    sink = io.BytesIO()
-    streams = StandardStreams(io.BytesIO(b"one\n\ntwo\nthree\n"), sink)
-    time.sleep(0.2)
-    assert streams.newest(1.0) == b"three\n"
-    with pytest.raises(EOFError):
-        streams.newest(1.0)
-    streams.send(b"answer\n")
-    assert sink.getvalue() == b"answer\n"
-
-
-def test_streams_read_no_more_of_a_line_than_it_takes_to_refuse_it() -> None:
-    class Endless(io.BytesIO):
-        """Remembers how much was asked for at once."""
-
-        asked: list[Any] = []
-
-        def readline(self, size: int | None = -1, /) -> bytes:
-            self.asked.append(size)
-            return super().readline(size)
-
-    source = Endless(b"x" * (MAX_LINE + 1))
-    streams = StandardStreams(source, io.BytesIO())
-    line = streams.newest(5.0)
-    assert line is not None and len(line) == MAX_LINE + 1
-    with pytest.raises(EOFError):
-        streams.newest(5.0)
-    assert source.asked == [MAX_LINE + 1] * 2
-
-
-def test_silence_on_open_streams_is_told_after_the_timeout() -> None:
-    reader, writer = os.pipe()
-    with open(reader, "rb") as source, open(writer, "wb") as end:
-        streams = StandardStreams(source, io.BytesIO())
-        assert streams.newest(0.0) is None and streams.newest(0.05) is None
-        end.write(b"\n  \nlate\n")
-        end.flush()
-        assert streams.newest(5.0) == b"late\n"
-        assert streams.newest(0.05) is None
-        end.close()
-        with pytest.raises(EOFError):
-            streams.newest(5.0)
-
-
-def test_datagrams_on_this_machine_only() -> None:
-    transport = LoopbackUdp(0)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
-        client.settimeout(5)
-        transport.send(b"to nobody")
-        assert transport.newest(0.0) is None and transport.newest(0.01) is None
-        for line in (b"one", b"two"):
-            client.sendto(line, ("127.0.0.1", transport.port))
-        time.sleep(0.05)
-        assert transport.newest(1.0) == b"two"
-        transport.send(b"answer")
-        assert client.recv(100) == b"answer"
-    with pytest.raises(FinlabError, match="cannot listen on 127.0.0.1"):
-        LoopbackUdp(transport.port)
-
-
-def test_command_serves_over_pipes(bundle: Bundle, tmp_path: Path) -> None:
-    bundle.write(tmp_path)
-    command = [sys.executable, "-m", "finlab.deploy.command", "serve", str(tmp_path), "--watchdog-s", "0"]
-    done = subprocess.run(
-        command, input=json.dumps(GOOD).encode() + b"\n", capture_output=True, timeout=120, check=True
-    )
-    assert [json.loads(line)["status"] for line in done.stdout.splitlines()] == ["ok", "neutral"]
+    before = np.array(server.answer(forwards)["command"])
+    truth = robot.allocate([-1, 0, 0.5, 0, 0, 0], previous=before)
+    assert truth.err_norm > 0.1, "forwards and backwards are ticks apart"
+    np.testing.assert_allclose(np.array(server.answer(backwards)["command"]), truth.command, atol=1e-9)
+    now[0] += RECENT_S
+    assert server.answer(forwards)["err_norm"] < 1e-5, "commands of long ago bind no more"
 
 
 def test_an_answer_that_is_no_number_is_an_error(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -236,5 +189,145 @@ def test_an_answer_that_is_no_number_is_an_error(robot: Robot, monkeypatch: pyte
         return solution._replace(command=solution.command * np.nan)
 
     monkeypatch.setattr(type(robot.allocator), "_solve", broken)
-    reply = served(robot, GOOD).sent[0]
+    reply = served(robot, GOOD)[0]
     assert reply["status"] == "error" and "answers with NaN" in reply["error"] and "command" not in reply
+
+
+@pytest.fixture
+def stop() -> Iterator[StopSignals]:
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    yield StopSignals()
+    signal.set_wakeup_fd(-1)
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+def test_streams_keep_only_the_newest_request(stop: StopSignals) -> None:
+    (source, requests), (answers, sink) = os.pipe(), os.pipe()
+    streams = StandardStreams(source, sink, stop)
+    assert streams.newest(0.0) is None and streams.newest(0.02) is None
+    os.write(requests, b"one\n\ntwo\nthree\n   \n")
+    assert streams.newest(1.0) == b"three"
+    streams.send(b"answer\n")
+    assert os.read(answers, 100) == b"answer\n"
+    os.write(requests, b"begun")
+    assert streams.newest(0.02) is None
+    os.write(requests, b" and ended\n" + b"x" * 9_000 + b"\nthe last")
+    assert streams.newest(1.0) == b"x" * 9_000
+    os.close(requests)
+    assert streams.newest(None) == b"the last", "the end of a line may be missing"
+    with pytest.raises(EOFError):
+        streams.newest(None)
+    os.close(answers)
+    with pytest.raises(Unsent, match="nobody reads it any more; the neutral command was not sent"):
+        streams.send(b"to nobody\n")
+
+
+def test_a_line_without_end_takes_no_memory_and_no_time(stop: StopSignals) -> None:
+    source = os.open("/dev/zero", os.O_RDONLY)
+    streams = StandardStreams(source, os.open("/dev/null", os.O_WRONLY), stop)
+    assert streams.newest(0.1) is None
+    assert len(streams._part) <= MAX_LINE + 1
+
+
+def test_a_signal_ends_waiting_and_sending(stop: StopSignals, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("finlab.deploy.transport.PATIENCE", 0.05)
+    (source, requests), (_, sink) = os.pipe(), os.pipe()
+    os.write(requests, LINE)
+    streams = StandardStreams(source, sink, stop)
+    signal.raise_signal(signal.SIGTERM)
+    for transport in (streams, LoopbackUdp(0, stop)):
+        with pytest.raises(EOFError):
+            transport.newest(None)
+    with pytest.raises(Unsent, match="its reader took nothing for 0.05 s"):
+        streams.send(b"x" * 1_000_000)
+
+
+def test_datagrams_on_this_machine_only(stop: StopSignals) -> None:
+    transport = LoopbackUdp(0, stop)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
+        client.settimeout(5)
+        transport.send(b"to nobody")
+        assert transport.newest(0.0) is None and transport.newest(0.01) is None
+        for line in (b"one", b"two"):
+            client.sendto(line, ("127.0.0.1", transport.port))
+        assert transport.newest(1.0) == b"two"
+        transport.send(b"answer")
+        assert client.recv(100) == b"answer"
+    with pytest.raises(FinlabError, match="cannot listen on 127.0.0.1"):
+        LoopbackUdp(transport.port, stop)
+
+
+def started(folder: Path, *options: str, **streams: Any) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "finlab.deploy.command", "serve", str(folder), *options]
+    return subprocess.Popen(command, **{"stdin": subprocess.PIPE, "stderr": subprocess.PIPE, **streams})
+
+
+def pipe(end: IO[bytes] | None) -> IO[bytes]:
+    assert end is not None
+    return end
+
+
+def ended(service: subprocess.Popen[bytes]) -> tuple[list[str], str]:
+    """The status of each line that was still to be read, and what was said on stderr."""
+    out, told = service.communicate(timeout=60)
+    return [json.loads(line)["status"] for line in out.splitlines()], told.decode()
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+@pytest.mark.parametrize("part", [b"", b'{"wrench": [1, '])
+def test_the_fins_rest_once_when_told_to_stop(number: signal.Signals, part: bytes, folder: Path) -> None:
+    service = started(folder, "--no-watchdog", stdout=subprocess.PIPE)
+    pipe(service.stdin).write(LINE + part)
+    pipe(service.stdin).flush()
+    assert json.loads(pipe(service.stdout).readline())["status"] == "ok"
+    service.send_signal(number)
+    service.wait(60)
+    assert ended(service) == (["neutral"], "") and service.returncode == 0
+
+
+@pytest.mark.parametrize(("part", "status"), [(b"", ["neutral"]), (b'{"wr', ["error", "neutral"])])
+def test_the_fins_rest_once_when_the_requests_end(part: bytes, status: list[str], folder: Path) -> None:
+    service = started(folder, stdout=subprocess.PIPE)
+    pipe(service.stdin).write(LINE)
+    pipe(service.stdin).flush()
+    assert json.loads(pipe(service.stdout).readline())["status"] == "ok"
+    pipe(service.stdin).write(part)
+    assert ended(service) == (status, "") and service.returncode == 0
+
+
+def test_a_reader_that_ends_is_noticed_at_once(folder: Path) -> None:
+    service = started(folder, "--no-watchdog", stdout=subprocess.PIPE)
+    pipe(service.stdin).write(LINE)
+    pipe(service.stdin).flush()
+    pipe(service.stdout).readline()
+    pipe(service.stdout).close()
+    assert service.wait(60) == 2
+    told = pipe(service.stderr).read().decode()
+    assert told.startswith("finlab-runtime: error: standard output: nobody reads it any more;")
+    assert told.count("\n") == 1
+
+
+@pytest.mark.parametrize(("closed", "full"), [("0<&-", ""), ("1>&-", ""), ("", "1>/dev/full")])
+def test_without_streams_it_ends_with_a_sentence(closed: str, full: str, folder: Path) -> None:
+    command = f"exec {sys.executable} -m finlab.deploy.command serve {folder} {closed} {full}"
+    done = subprocess.run(["sh", "-c", command], input=LINE, capture_output=True, timeout=60)
+    told = done.stderr.decode()
+    assert done.returncode == 2 and told.count("\n") == 1
+    assert told.startswith("finlab-runtime: error: ") and "standard " in told
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        *(f"--watchdog-s={text}" for text in ("nan", "-1", "inf", "0", "1e-9", "1e9", "soon", "")),
+        *(f"--deadline-ms={text}" for text in ("nan", "-1", "0", "inf")),
+    ],
+)
+def test_times_are_finite_and_above_zero(option: str, capsys: pytest.CaptureFixture[str]) -> None:
+    from finlab.deploy.command import main
+
+    assert main(["serve", "bundle", option]) == 2
+    name, text = option.split("=")
+    assert f"argument {name}: expected a number from" in (told := capsys.readouterr().err)
+    assert told.endswith(f"got {text!r}\n")

@@ -1,0 +1,65 @@
+"""How a command ends: with its exit code, and with one sentence on stderr where something is wrong."""
+
+import errno
+import io
+import os
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+
+from finlab.errors import FinlabError
+
+FAILED = 2
+"""Exit code after an error that is told in one sentence."""
+INTERRUPTED = 130
+"""128 + SIGINT, as shells report it."""
+BROKEN_PIPE = 141
+"""128 + SIGPIPE, as shells report it."""
+
+
+def exit_code(program: str, work: Callable[[], int]) -> int:
+    """The exit code of a command: that of its work, or one of the above after one sentence on stderr.
+
+    Standard output that is closed or full, or that nobody reads any more, is an error like any other.
+    """
+    try:
+        if sys.stdout is None:  # the command was started without it; only those that print are refused
+            sys.stdout = _Closed()
+        code = work()
+        sys.stdout.flush()
+        return code
+    except FinlabError as error:
+        return _fail(program, str(error))
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except OSError as error:
+        if error.filename is not None:
+            return _fail(program, f"{error.filename}: {error.strerror}")
+        _drop_output()
+        if isinstance(error, BrokenPipeError):
+            _fail(program, "cannot print: whoever read the output has ended")
+            return BROKEN_PIPE
+        return _fail(program, f"cannot print: {error.strerror or error}; write the output to another place")
+
+
+def _fail(program: str, sentence: str) -> int:
+    if sys.stderr is not None:
+        with suppress(OSError):
+            print(f"{program}: error: {sentence}", file=sys.stderr)
+    return FAILED
+
+
+def _drop_output() -> None:
+    """Give standard output somewhere to write: Python flushes it once more at exit."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+class _Closed(io.TextIOBase):
+    """Standard output that was closed before the command began."""
+
+    def write(self, text: str, /) -> int:
+        return self.fileno()
+
+    def fileno(self) -> int:
+        raise OSError(errno.EBADF, "standard output is closed")
