@@ -28,7 +28,7 @@ setup: $(STAMP)
 $(STAMP): pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "finlab needs Python 3.11 or newer: apt-get install python3"; exit 1; }
 	test -x $(BIN)/pip || $(PYTHON) -m venv .venv || { tools/apt-install python3-venv && $(PYTHON) -m venv .venv; }
-	$(BIN)/pip install --disable-pip-version-check -c constraints.txt -e '.[train,app,plot,fit,ipopt,urdf,test,dev]'
+	$(BIN)/pip install --disable-pip-version-check -c constraints.txt -e '.[dev]'
 	@touch $@
 
 app: setup

@@ -1,4 +1,5 @@
-"""Where shipped layouts and checkpoints lie: at the top of a source tree, inside the package of a wheel."""
+"""Where shipped layouts, checkpoints and the web app lie: at the top of a source tree, in a wheel inside the
+package."""
 
 from pathlib import Path
 
@@ -11,6 +12,11 @@ def _shipped(folder: str) -> Path:
     """A folder of the source tree, or its copy in an installed wheel."""
     in_wheel = _PACKAGE / "shipped" / folder
     return in_wheel if in_wheel.is_dir() else _PACKAGE.parent / folder
+
+
+def webapp_dir() -> Path:
+    """The folder of the package `webapp`."""
+    return _shipped("webapp")
 
 
 def layouts_dir() -> Path:

@@ -1,6 +1,5 @@
 """How a command ends: with its exit code, and with one sentence on stderr where something is wrong."""
 
-import errno
 import io
 import os
 import sys
@@ -62,4 +61,4 @@ class _Closed(io.TextIOBase):
         return self.fileno()
 
     def fileno(self) -> int:
-        raise OSError(errno.EBADF, "standard output is closed")
+        raise FinlabError("cannot print: standard output is closed; write the output to another place")

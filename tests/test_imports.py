@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 
 LEVELS = (
-    ("errors", "arrays"),
+    ("errors", "arrays", "distribution"),
     ("assets", "bundle_files", "command_end", "least_squares", "whole_file"),
     ("layout",),
     ("physics", "exchange"),

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import json as json_format
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
+
+from finlab.cli.json_file import JsonFile, check_json_file, put_json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,7 +31,7 @@ def allocate(
     running: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=A,F,DEG")] = (),
     bound: bool = False,
     seed: Annotated[int, arg(metavar="N")] = 0,
-    json: bool = False,
+    json: JsonFile = None,
 ) -> None:
     """Find the command of each fin that gives a target wrench.
 
@@ -49,13 +50,14 @@ def allocate(
         running: a fin that no longer listens: the command that it keeps [rad, Hz, deg].
         bound: tell as well what no answer can cost less than, by the objective; effort may take seconds.
         seed: same target, layout and seed, same answer.
-        json: print one JSON object instead of a table.
+        json: file for one JSON object; it is printed in place of the table where no file is named.
     """
     from finlab.allocation import Health, load_allocator
     from finlab.allocation.policy import policy_from
     from finlab.cli.inputs import open_robot
     from finlab.deploy.record import allocation_record
 
+    check_json_file(json)
     robot = open_robot(layout)
     options: dict[str, Any] = {} if objective is None else {"objective": objective}
     allocator = load_allocator(method, checkpoint=checkpoint, **options)
@@ -65,17 +67,15 @@ def allocate(
     result = allocator.allocate(robot.layout, wrench, failed=lost, policy=answer, health=damage, seed=seed)
     lost_axes = axes_lost(robot.layout, result.layout, lost) if lost or damage is not None else None
     least = allocator.bound(result) if bound else None
-    if json:
-        extra: dict[str, object] = {} if lost_axes is None else {"axes": lost_axes}
-        extra |= {} if least is None else {"bound": least}
-        print(json_format.dumps(allocation_record(result) | extra, allow_nan=False))
-        return
-    print(result)
-    if lost_axes:
-        print(loss_text(lost_axes))
+    record, lines = allocation_record(result), [str(result)]
+    if lost_axes is not None:
+        record["axes"] = lost_axes
+        lines.append(loss_text(lost_axes))
     if least is not None:
+        record["bound"] = least
         unit = "" if objective == "effort" else " W"
-        print(f"no exact answer has less {objective or 'power'} than {least:.4g}{unit}")
+        lines.append(f"no exact answer has less {objective or 'power'} than {least:.4g}{unit}")
+    put_json(record, json, "\n".join(lines))
 
 
 def axes_lost(whole: Layout, damaged: Layout, failed: Sequence[str]) -> dict[str, list[str]]:

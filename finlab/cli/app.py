@@ -1,11 +1,9 @@
 """`finlab app`: serve the web app."""
 
+import sys
 from typing import Annotated
 
 from tyro.conf import arg
-
-_EXTRA = ("viser", "trimesh", "matplotlib")
-"""What the extra `app` installs."""
 
 
 def app(
@@ -22,14 +20,19 @@ def app(
         host: address to listen on; the default is reachable from this machine only.
         port: port to listen on.
     """
+    from finlab.assets import webapp_dir
+    from finlab.distribution import EXTRAS, install
     from finlab.errors import FinlabError
 
+    # In a wheel it travels inside this package: an installation has no top-level package of so plain a name.
+    if (home := str(webapp_dir().parent)) not in sys.path:
+        sys.path.insert(0, home)
     try:
         from webapp.serving import serve
     except ModuleNotFoundError as error:
-        if error.name not in _EXTRA:
+        if error.name not in EXTRAS:
             raise
         raise FinlabError(
-            f"the web app needs {error.name!r}, which is not installed; run: pip install 'finlab[app]'"
+            f"the web app needs {error.name!r}, which is not installed; run: {install('app')}"
         ) from error
     serve(host=host, port=port, layout=layout, checkpoint=checkpoint)

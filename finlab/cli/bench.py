@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, UseAppendAction, arg
 
 from finlab.cli.eval_arguments import Names, Output
+from finlab.cli.json_file import STDOUT, JsonFile, put_json
 from finlab.errors import DataError
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ def bench(
     limit: Annotated[float, arg(metavar="SECONDS")] = 1.0,
     cpu: bool = False,
     problems: Annotated[Path | None, arg(metavar="FILE")] = None,
-    json: Annotated[Path | None, arg(metavar="FILE")] = None,
+    json: JsonFile = None,
 ) -> None:
     """Measure allocation methods, yours or finlab's, on the same problems: error, power, turn, time.
 
@@ -39,7 +40,7 @@ def bench(
         limit: longest time for one target; a later answer is a failure.
         cpu: time Python functions by the processor's time, which other work on the machine does not prolong.
         problems: file of problems; the shipped one by default.
-        json: file for the results.
+        json: file for the results; they are printed in place of the table where no file is named.
     """
     from tqdm import tqdm
 
@@ -69,10 +70,10 @@ def bench(
     run = results(found, asked, quick=quick, limit_s=limit, command=shlex.join(words))
     beside = stored(asked, quick=quick) if part is asked else None
     try:
-        if json is not None:
+        if json is not None and json != STDOUT:
             save_results(run, json)
     finally:  # a full disk does not cost the table
-        print(text(run, beside))
+        put_json(run, STDOUT if json == STDOUT else None, text(run, beside))
 
 
 def _tested(methods: tuple[str, ...], commands: tuple[str, ...], cpu: bool) -> list[Method]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_text
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from tyro.conf import arg
 
 from finlab.cli.inputs import check_positive, open_robot
+from finlab.cli.json_file import JsonFile, check_json_file, put_json
 from finlab.errors import DataError, LayoutError
 
 if TYPE_CHECKING:
@@ -58,25 +58,23 @@ class Cases:
 class Output:
     """Where the rows go."""
 
-    json: Annotated[Path | None, arg(metavar="FILE")] = None
-    """File for the rows."""
+    json: JsonFile = None
+    """File for the rows; they are printed in place of the table where no file is named."""
 
     def __post_init__(self) -> None:
         """Refuses a file that cannot be written before the work, not after."""
-        if self.json is not None and (self.json.is_dir() or not self.json.absolute().parent.is_dir()):
-            raise DataError(f"json: expected a file in an existing folder, got {self.json}")
+        check_json_file(self.json)
 
     def write(self, **content: Any) -> None:
-        """Write the rows, where a file was named."""
+        """Write the rows where a file was named."""
         if self.json is not None:
-            self.json.write_text(json_text.dumps(content, indent=1, allow_nan=False) + "\n", "utf-8")
+            put_json(content, self.json)
 
     def show(self, *blocks: Block, **content: Any) -> None:
-        """Write the rows, and print words and tables as the report has them."""
+        """Write the rows where a file was named, and print words and tables as the report has them."""
         from finlab.evaluation.report.text import to_text
 
-        self.write(**content)
-        print(to_text(*blocks))
+        put_json(content, self.json, to_text(*blocks))
 
 
 MOST_FINS = 16

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_format
 import math
 import sys
 from dataclasses import replace
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from tyro.conf import Positional, UseAppendAction, arg
 from tyro.extras import SubcommandApp
 
+from finlab.cli.json_file import JsonFile, check_json_file, put_json
 from finlab.cli.optimize import optimize
 
 if TYPE_CHECKING:
@@ -49,25 +49,23 @@ def check(layouts: Annotated[Positional[tuple[str, ...]], arg(metavar="LAYOUT...
 def show(
     layout: Annotated[Positional[str], arg(metavar="LAYOUT")],
     failed: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = (),
-    json: bool = False,
+    json: JsonFile = None,
 ) -> None:
     """Print the fins of a layout and its score card: what it can do, what that costs, what it can lose.
 
     Args:
         layout: layout file, layout graph file, or the name of a shipped layout.
         failed: name of a fin that does not work.
-        json: print one JSON object instead of tables.
+        json: file for one JSON object; it is printed in place of the tables where no file is named.
     """
     from finlab.analysis import score_card
     from finlab.cli.inputs import open_robot
     from finlab.cli.score_card import score_card_text
 
+    check_json_file(json)
     robot = open_robot(layout)
     card = score_card(robot.layout, robot.with_failed(failed))
-    if json:
-        print(json_format.dumps(card.to_dict(), allow_nan=False))
-    else:
-        print(layout_text(robot.layout), score_card_text(card), sep="\n\n")
+    put_json(card.to_dict(), json, f"{layout_text(robot.layout)}\n\n{score_card_text(card)}")
 
 
 def layout_text(layout: Layout) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json as json_format
 import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
+
+from finlab.cli.json_file import JsonFile, check_json_file, put_json
 
 if TYPE_CHECKING:
     from finlab.analysis import Bounds, Improvement
@@ -30,7 +31,7 @@ def optimize(
     wrench: Annotated[UseAppendAction[tuple[Wrench, ...]], arg(metavar="FX FY FZ TX TY TZ")] = (),
     rounds: Annotated[int, arg(metavar="N")] = 40,
     seed: Annotated[int, arg(metavar="N")] = 0,
-    json: bool = False,
+    json: JsonFile = None,
 ) -> None:
     """Move fins within bounds to raise a goal, and write the layout that results.
 
@@ -46,7 +47,7 @@ def optimize(
         wrench: a wrench of the mission for mission_power [N, N m]; may be given several times.
         rounds: most rounds of the search.
         seed: same arguments and seed, same layout.
-        json: print one JSON object instead of a table.
+        json: file for one JSON object; it is printed in place of the table where no file is named.
     """
     from tqdm import tqdm
 
@@ -55,6 +56,7 @@ def optimize(
     from finlab.cli.inputs import open_robot
     from finlab.layout import save_layout
 
+    check_json_file(json)
     robot = open_robot(layout).layout
     _check(output, reach, turn, rounds)
     space = {name: _bounds(robot, name, bounds, reach, math.radians(turn)) for name in fins}
@@ -77,10 +79,7 @@ def optimize(
             progress=report,
         )
     save_layout(found.layout, output)
-    if json:
-        print(json_format.dumps(improvement_record(found), allow_nan=False))
-    else:
-        print(improvement_text(found, output))
+    put_json(improvement_record(found), json, improvement_text(found, output))
 
 
 def improvement_record(found: Improvement) -> dict[str, object]:

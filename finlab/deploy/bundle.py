@@ -32,6 +32,7 @@ from finlab.bundle_files import (
 )
 from finlab.deploy.graph import LayoutGraph, build_graph
 from finlab.deploy.graph_file import graph_bytes, write_graph
+from finlab.distribution import NAME
 from finlab.errors import AllocationError, DataError
 from finlab.forces.compiled_fins import compiled_bytes, compiled_fins
 from finlab.inference.checkpoint import checkpoint_files
@@ -173,6 +174,7 @@ def readme_text(graph: LayoutGraph) -> str:
     return template.format(
         name=graph.layout.name,
         version=finlab.__version__,
+        wheel=NAME.replace("-", "_"),
         method=graph.method,
         networks="" if graph.checkpoint is None else f" with checkpoint `{graph.checkpoint}`",
         fins="\n".join(rows),

@@ -8,7 +8,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from finlab import __version__
 from finlab.command_end import FAILED, exit_code
@@ -142,24 +142,33 @@ def _within(low: float, high: float) -> Callable[[str], float]:
     return read
 
 
-def _width(prog: str) -> argparse.RawDescriptionHelpFormatter:
-    return argparse.RawDescriptionHelpFormatter(prog, width=min(shutil.get_terminal_size().columns, 100) - 2)
+class _Parser(argparse.ArgumentParser):
+    """Pages of help end with an example and are at most 100 columns wide; errors in printing them are told."""
+
+    def __init__(self, *, example: str, **others: Any) -> None:
+        width = min(shutil.get_terminal_size().columns, 100) - 2
+        super().__init__(
+            epilog=f"example:\n  {example}",
+            formatter_class=lambda prog: argparse.RawDescriptionHelpFormatter(prog, width=width),
+            **others,
+        )
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        print(message, end="", file=file or sys.stderr)
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "finlab-runtime",
+    parser = _Parser(
+        prog="finlab-runtime",
         description="Control allocation on board.",
-        epilog="example:\n  finlab-runtime check my_robot",
-        formatter_class=_width,
+        example="finlab-runtime check my_robot",
     )
     parser.add_argument("--version", action="version", version=f"finlab-runtime {__version__}")
     verbs = parser.add_subparsers(required=True, metavar="check|allocate|serve|speed")
 
     def verb(run: Callable[[argparse.Namespace], int], text: str, example: str) -> argparse.ArgumentParser:
-        epilog = f"example:\n  {example}"
-        made = verbs.add_parser(
-            run.__name__, help=text, description=text, epilog=epilog, formatter_class=_width
+        made: argparse.ArgumentParser = verbs.add_parser(
+            run.__name__, help=text, description=text, example=example
         )
         made.set_defaults(run=run)
         about = "folder or zip archive made by `finlab export`, or a layout graph file"

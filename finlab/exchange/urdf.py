@@ -17,6 +17,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from finlab.arrays import Array
+from finlab.distribution import install
 from finlab.errors import LayoutError
 from finlab.layout import Body, Fin, Layout
 from finlab.layout.rules import under
@@ -76,7 +77,7 @@ def _robot(path: Path) -> Any:
     try:
         from yourdfpy import URDF
     except ImportError:
-        raise LayoutError("reading URDF needs yourdfpy; pip install 'finlab[urdf]'") from None
+        raise LayoutError(f"reading URDF needs yourdfpy; run: {install('urdf')}") from None
     try:
         with path.open("rb") as file:
             content = file.read(MAX_BYTES + 1)

@@ -15,7 +15,7 @@ def test_missing_extra_names_the_command_that_installs_it(
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "viser", None)
     assert main(["app"]) == 2
-    sentence = "the web app needs 'viser', which is not installed; run: pip install 'finlab[app]'"
+    sentence = "the web app needs 'viser', which is not installed; run: pip install 'finlab-marine[app]'"
     assert capsys.readouterr().err == f"finlab: error: {sentence}\n"
 
 

@@ -1,36 +1,56 @@
 """The command as a whole: help, exit codes, and never a traceback for what a user did."""
 
+import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+from tyro.extras import SubcommandApp
 
-from finlab.cli import main
+import finlab
+from finlab.cli import _command_line, main
+from finlab.cli.help_page import EXAMPLES, WIDTH
+from finlab.cli.json_file import with_json_file
 from tests.fit.cell import columns_of, commands, measured, soft, write
 
 FINLAB = [sys.executable, "-m", "finlab"]
+WRENCH = ["--wrench", "1", "0", "0.5", "0", "0", "0.1"]
 
 
-@pytest.mark.parametrize(
-    "argv",
-    [
-        [],
-        ["allocate"],
-        ["layout"],
-        ["layout", "show"],
-        ["data", "generate"],
-        ["train", "surrogate"],
-        ["train", "allocator"],
-        ["export"],
-        ["app"],
-    ],
-    ids=" ".join,
-)
-def test_every_verb_has_help(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([*argv, "--help"]) == 0
-    assert "usage: finlab" in capsys.readouterr().out
+def verbs(app: SubcommandApp, *words: str) -> Iterator[str]:
+    """Every verb and every group of verbs."""
+    yield " ".join(words)
+    for name, inside in app._subcommands.items():
+        if isinstance(inside[0] if isinstance(inside, tuple) else inside, SubcommandApp):
+            yield from verbs(inside[0] if isinstance(inside, tuple) else inside, *words, name)
+        else:
+            yield " ".join([*words, name])
+
+
+@pytest.mark.parametrize("verb", list(verbs(_command_line([]))))
+def test_every_verb_has_a_page_of_help_with_an_example(
+    verb: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "400")
+    assert main([*verb.split(), "--help"]) == 0
+    page = capsys.readouterr().out
+    assert page.startswith(f"usage: finlab {verb}".strip()) and max(map(len, page.splitlines())) <= WIDTH
+    assert page.isascii(), "a page of help goes through any pipe"
+    last = page.splitlines()[-1]
+    assert verb in EXAMPLES or verb.startswith("eval "), "give a new verb its example"
+    assert last.startswith(f"example: finlab {verb}") and os.environ["COLUMNS"] == "400"
+
+
+def test_versions_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+    from finlab.deploy import command
+
+    assert main(["--version"]) == command.main(["--version"]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert shown == [f"finlab {finlab.__version__}", f"finlab-runtime {finlab.__version__}"]
 
 
 @pytest.mark.parametrize(
@@ -66,13 +86,25 @@ def test_interrupt_exits_with_130(monkeypatch: pytest.MonkeyPatch) -> None:
     assert main(["layout", "show", "A"]) == 130
 
 
-def test_reader_that_went_away_is_no_error_message() -> None:
-    read_end, write_end = os.pipe()
-    os.close(read_end)
-    command = [*FINLAB, "layout", "show", "A"]
-    done = subprocess.run(command, stdout=write_end, stderr=subprocess.PIPE, text=True, timeout=30)
-    os.close(write_end)
-    assert (done.returncode, done.stderr) == (141, "")
+RUNTIME = [sys.executable, "-m", "finlab.deploy.command"]
+
+
+@pytest.mark.parametrize("command", [[*FINLAB, "layout", "show", "A"], [*RUNTIME, "--help"]])
+@pytest.mark.parametrize(
+    ("output", "code", "reason"),
+    [
+        (">&-", 2, "standard output is closed; write the output to another place"),
+        (">/dev/full", 2, "No space left on device; write the output to another place"),
+        ("| true", 141, "whoever read the output has ended"),
+    ],
+)
+def test_output_that_cannot_be_written_is_one_sentence(
+    command: list[str], output: str, code: int, reason: str
+) -> None:
+    line = f"{{ sleep 0.2; {' '.join(command)}; echo $? >&2; }} {output}"
+    done = subprocess.run(["bash", "-c", line], stderr=subprocess.PIPE, text=True, timeout=30)
+    name = "finlab" if command[2] == "finlab" else "finlab-runtime"
+    assert done.stderr == f"{name}: error: cannot print: {reason}\n{code}\n"
 
 
 def test_files_are_written_before_anything_is_printed(tmp_path: Path) -> None:
@@ -85,16 +117,8 @@ def test_files_are_written_before_anything_is_printed(tmp_path: Path) -> None:
         command, stdout=write_end, stderr=subprocess.PIPE, text=True, timeout=60, env=unbuffered
     )
     os.close(write_end)
-    assert (done.returncode, done.stderr) == (141, "")
+    assert done.returncode == 141
     assert (tmp_path / "fin.csv").exists() and "</html>" in (tmp_path / "fin.html").read_text()
-
-
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux's always-full device")
-def test_full_disk_under_stdout_is_one_sentence() -> None:
-    with open("/dev/full", "w") as full:
-        command = [*FINLAB, "layout", "show", "A"]
-        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, timeout=30)
-    assert (done.returncode, done.stderr) == (2, "finlab: error: cannot print: No space left on device\n")
 
 
 def test_unwritable_output_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -103,3 +127,47 @@ def test_unwritable_output_is_one_sentence(tmp_path: Path, capsys: pytest.Captur
     assert main(["train", "surrogate", "--preset", "smoke", "--output", str(file / "below")]) == 2
     err = capsys.readouterr().err
     assert err.startswith("finlab: error: ") and len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"),
+    [
+        (["a", "--json"], ["a", "--json", "-"]),
+        (["a", "--json", "--b"], ["a", "--json", "-", "--b"]),
+        (["a", "--json", "-o", "x"], ["a", "--json", "-", "-o", "x"]),
+        (["a", "--json", "-", "b"], ["a", "--json", "-", "b"]),
+        (["a", "--json", "x.json"], ["a", "--json", "x.json"]),
+        (["a", "--json=x"], ["a", "--json=x"]),
+        ([], []),
+    ],
+)
+def test_json_without_a_file_means_stdout(given: list[str], meant: list[str]) -> None:
+    assert with_json_file(given) == meant
+
+
+@pytest.mark.parametrize(
+    "argv",
+    [
+        ["allocate", "A", *WRENCH],
+        ["layout", "show", "A"],
+        ["eval", "wrench", "--layouts", "1", "--targets", "1", "--methods", "analytic"],
+    ],
+)
+def test_every_verb_prints_one_object_or_writes_it(
+    argv: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*argv, "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)
+    assert main([*argv, "--json", str(tmp_path / "x.json")]) == 0
+    assert keys(json.loads((tmp_path / "x.json").read_text())) == keys(shown)
+    with pytest.raises(ValueError, match="Expecting value"):
+        json.loads(capsys.readouterr().out)  # the table
+    assert main([*argv, "--json", str(tmp_path)]) == 2
+    assert "json: expected a file in an existing folder" in capsys.readouterr().err
+
+
+def keys(value: Any) -> Any:
+    """A JSON value without its numbers, which times make differ."""
+    if isinstance(value, dict):
+        return {key: keys(part) for key, part in value.items()}
+    return type(value)

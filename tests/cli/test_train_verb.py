@@ -77,4 +77,4 @@ def test_says_what_to_install_where_torch_is_missing(verb: str, tmp_path: Path) 
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2 and done.stdout == ""
     assert done.stderr.startswith("finlab: error: training needs PyTorch")
-    assert done.stderr.endswith("run: pip install 'finlab[train]'\n")
+    assert done.stderr.endswith("run: pip install 'finlab-marine[train]'\n")

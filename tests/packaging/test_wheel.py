@@ -130,7 +130,7 @@ def test_without_extras_torch_is_absent_and_missed_in_a_sentence(bare: Path, tmp
     assert done.returncode == 2
     assert done.stderr == (
         "finlab: error: training needs PyTorch, which cannot be imported (No module named 'torch'); "
-        "run: pip install 'finlab[train]'\n"
+        "run: pip install 'finlab-marine[train]'\n"
     )
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from finlab.arrays import Array
+from finlab.distribution import install
 from finlab.errors import DataError, FinlabError
 from finlab.layout import FinModelSpec, Layout
 from finlab.physics.table_file import read_table, table_bytes
@@ -154,7 +155,7 @@ class Fitting(Newest[Upload, Fitted]):
             from finlab.fit.measurements import read_measurements
             from finlab.fit.thrust_curves import thrust_curves
         except ImportError as error:
-            raise FinlabError(f"fitting needs {error.name}; run: pip install 'finlab[fit]'") from None
+            raise FinlabError(f"fitting needs {error.name}; run: {install('fit')}") from None
         tell = partial(self._tell, upload)
         fit = fit_fin(read_measurements([path]), progress=tell)
         tell("writing the table")

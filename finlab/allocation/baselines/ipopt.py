@@ -17,6 +17,7 @@ from finlab.allocation.baselines.model_based import CACHE_SIZE, ModelBased, Time
 from finlab.allocation.baselines.plant_in_casadi import plant_formulas, plant_in_casadi
 from finlab.allocation.settings import number
 from finlab.arrays import Array
+from finlab.distribution import install
 from finlab.errors import AllocationError
 from finlab.inference.normalization import Normalization
 from finlab.physics import PlanarLaw, Plant, make_law
@@ -122,6 +123,6 @@ def import_casadi() -> Any:
         import casadi
     except ImportError as error:
         raise AllocationError(
-            "method ipopt needs CasADi, which is not installed; run: pip install 'finlab[ipopt]'"
+            f"method ipopt needs CasADi, which is not installed; run: {install('ipopt')}"
         ) from error
     return casadi

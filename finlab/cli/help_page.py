@@ -1,0 +1,77 @@
+"""`--help` of every verb: at most 100 columns wide, in plain characters, with an example at its end."""
+
+import io
+import os
+import shutil
+from collections.abc import Callable, Sequence
+from contextlib import redirect_stdout
+
+WIDTH = 100
+"""Most columns of a page."""
+EXAMPLES = {
+    "": "finlab allocate A --wrench 1 0 0.5 0 0 0.1",
+    "allocate": "finlab allocate A --wrench 1 0 0.5 0 0 0.1 --failed front_right --json",
+    "layout": "finlab layout show A",
+    "layout check": "finlab layout check my_robot.yaml",
+    "layout show": "finlab layout show A --failed front_right",
+    "layout optimize": "finlab layout optimize A --fins front_right front_left -o better.yaml",
+    "layout import": "finlab layout import fins.csv -o my_robot.yaml",
+    "layout export": "finlab layout export A -o A.urdf",
+    "train": "finlab train mdn -o runs/mine --preset smoke",
+    "train mdn": "finlab train mdn -o runs/mine --preset smoke",
+    "train surrogate": "finlab train surrogate -o runs/surrogate --preset smoke",
+    "train allocator": "finlab train allocator --surrogate runs/surrogate -o runs/paper --preset smoke",
+    "eval": "finlab eval wrench --split id --layouts 10 --targets 10 --methods search,sqp",
+    "bench": "finlab bench search analytic --quick --json bench.json",
+    "fit": "finlab fit fin cell.csv -o fin.csv",
+    "fit fin": "finlab fit fin cell.csv -o fin.csv",
+    "fit plan": "finlab fit plan -o plan.csv",
+    "fit robot": "finlab fit robot my_robot.yaml swim.npz -o fitted.yaml",
+    "simulate": "finlab simulate A --duration 30 -o swim",
+    "export": "finlab export A -o my_robot",
+    "app": "finlab app --layout A --port 8080",
+}
+"""An example for each verb, and for each group of them."""
+
+
+def asks_for_help(argv: Sequence[str]) -> bool:
+    """Whether arguments ask for a page of help, or are too few for anything else."""
+    return "--help" in argv or "-h" in argv
+
+
+def help_page(argv: Sequence[str], write: Callable[[], int]) -> tuple[int, str]:
+    """The page that `write` prints for arguments, in at most `WIDTH` columns and with its example; before it
+    the exit code."""
+    caught, before = io.StringIO(), os.environ.get("COLUMNS")
+    os.environ["COLUMNS"] = str(min(shutil.get_terminal_size().columns, WIDTH))
+    try:
+        with redirect_stdout(caught):  # what is no terminal gets no boxes
+            code = write()
+    finally:
+        if before is None:
+            del os.environ["COLUMNS"]
+        else:
+            os.environ["COLUMNS"] = before
+    lines = [
+        part for line in caught.getvalue().splitlines() for part in _folded(line.rstrip().replace("•", "-"))
+    ]
+    return code, "\n".join([*lines, f"example: {example(argv)}"])
+
+
+def example(argv: Sequence[str]) -> str:
+    """The example of the verb that arguments begin with."""
+    words = [word for word in argv if not word.startswith("-")]
+    if words[:1] == ["eval"] and len(words) > 1:
+        return f"finlab eval {words[1]} --json rows.json"
+    names = (" ".join(words[:count]) for count in range(len(words), -1, -1))
+    return next(EXAMPLES[name] for name in names if name in EXAMPLES)
+
+
+def _folded(line: str) -> list[str]:
+    """A line in parts that are narrow enough, cut behind commas or blanks."""
+    parts = []
+    while len(line) > WIDTH:
+        cut = max(line.rfind(",", 0, WIDTH), line.rfind(" ", 9, WIDTH)) + 1 or WIDTH
+        parts.append(line[:cut].rstrip())
+        line = " " * 8 + line[cut:].lstrip()
+    return [*parts, line]
