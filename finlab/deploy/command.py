@@ -143,7 +143,7 @@ def _within(low: float, high: float) -> Callable[[str], float]:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Pages of help end with an example and are at most 100 columns wide; errors in printing them are told."""
+    """Pages of help are at most 100 columns wide and end with an example; what cannot be printed is told."""
 
     def __init__(self, *, example: str, **others: Any) -> None:
         width = min(shutil.get_terminal_size().columns, 100) - 2
