@@ -111,7 +111,7 @@
     if (!(target instanceof Element) || target === editor?.box) return;
     const press = target.closest('[data-press]'), cell = target.closest('[data-edit]');
     if (cell && (cell.dataset.open === 'click' || event.detail === 2)) return open(cell);
-    if (press && event.detail < 2) tell(press.dataset.press, press.dataset.key, mods(event));
+    if (press && (event.detail < 2 || !cell)) tell(press.dataset.press, press.dataset.key, mods(event));
   });
   listen('mousedown', (event, target) => { // else the browser marks the text between two clicks
     if (target instanceof Element && target.closest('[data-press]') && (event.shiftKey || event.detail > 1))

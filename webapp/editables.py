@@ -51,20 +51,31 @@ def press(kind: str, key: str) -> str:
 class Editables:
     """All of one page."""
 
-    def __init__(self, gui: viser.GuiApi, attempt: Attempt) -> None:
-        """Listen to the page; `attempt` carries out what comes from it."""
-        self._attempt = attempt
-        self._acts: dict[str, Act] = {}
+    def __init__(
+        self, gui: viser.GuiApi, attempt: Attempt, do: Callable[[Callable[[], object]], None]
+    ) -> None:
+        """Listen to the page; `attempt` carries out an edit, whose refusal is shown where it was made, and
+        `do` a press, whose refusal becomes a note."""
+        self._attempt, self._do = attempt, do
+        self._edits: dict[str, Act] = {}
+        self._presses: dict[str, Act] = {}
         self.mailbox = Mailbox(gui, "finlabEditables", SCRIPT, (str, str, str), self._hear, MAX_MESSAGE)
         """Where the page tells what was edited or pressed."""
 
     def on(self, kind: str, act: Act) -> None:
-        """Who hears of elements of a kind."""
-        self._acts[kind] = act
+        """Who hears of edits of a kind."""
+        self._edits[kind] = act
+
+    def on_press(self, kind: str, act: Act) -> None:
+        """Who hears of presses of a kind."""
+        self._presses[kind] = act
 
     def _hear(self, kind: str, key: str, text: str) -> tuple[str | None] | None:
         """Why something was refused, None where it was not; no answer where nobody hears of it."""
-        if kind not in self._acts:
+        if kind in self._presses:
+            self._do(partial(self._presses[kind], key, text))
+            return (None,)
+        if kind not in self._edits:
             return None
-        refusal = self._attempt(partial(self._acts[kind], key, text))
+        refusal = self._attempt(partial(self._edits[kind], key, text))
         return (None if refusal is None else str(refusal),)

@@ -7,7 +7,8 @@ from typing import Any
 
 import viser
 
-from webapp.markup.picking import open_box
+from webapp.handles import on_user_change
+from webapp.markup.picking import marker
 from webapp.viser_internals import run_script, uuid_of
 
 
@@ -36,7 +37,9 @@ class Mailbox:
         self._gui, self._name, self._script = gui, name, script
         self._kinds, self._hear = [int, *kinds], hear
         self._last = 0
-        self._box = open_box(gui, name, self.read, longest)
+        gui.add_html(f"<style>div:has(>.{name}) + div {{ display: none; }}</style>{marker(name)}")
+        self._box = gui.add_text(name, "")
+        on_user_change(self._box, lambda text: self.read(text) if 0 < len(text) <= longest else None)
 
     def start(self, *arguments: object) -> None:
         """Let the page's half begin, with the box and what else it has to know."""

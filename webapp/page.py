@@ -7,7 +7,7 @@ import asyncio
 import json
 import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Protocol, TypeVar
 
@@ -18,7 +18,6 @@ from finlab.bundle_files import LARGEST_BUNDLE
 from finlab.errors import FinlabError
 from webapp.editables import Editables
 from webapp.handles import Changes, on_user_change, put
-from webapp.markup.picking import chosen_button
 from webapp.number_fields import NumberField, NumberFields
 from webapp.scene.scenery import Scenery
 from webapp.session import Session
@@ -108,7 +107,7 @@ class Page(ABC):
         """Each writes what the session holds into a widget; the panel that is being built takes them."""
         self.fields = NumberFields(client.gui, self.fault)
         """The boxes for numbers."""
-        self.editables = Editables(client.gui, self.attempt)
+        self.editables = Editables(client.gui, self.attempt, self.do)
         """Names and cells that are edited where they stand."""
         self.designs = Designs(context, self.exports, self.editables)
         """Designs as a whole."""
@@ -226,20 +225,6 @@ class Page(ABC):
         group = self.client.gui.add_button_group(label, tuple(acts), **options)
         on_user_change(group, lambda button: self.do(acts[button]) if button in acts else None)
         return group
-
-    def add_choice(
-        self,
-        label: str,
-        name: str,
-        choices: Sequence[str],
-        act: Callable[[str], object],
-        chosen: Callable[[], str],
-        hint: str,
-    ) -> None:
-        """A group of buttons, of which that of `chosen()` is filled; `name` is theirs in the markup."""
-        style = self.client.gui.add_html("")
-        self.bound.append(lambda: put(style, content=chosen_button(name, choices.index(chosen()))))
-        self.on_change(self.client.gui.add_button_group(label, tuple(choices), hint=hint), act)
 
     def notify(self, title: str, body: str) -> None:
         """Show a note to the user, in place of the last one."""

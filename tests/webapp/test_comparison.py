@@ -34,13 +34,13 @@ UCAT = load_layout(shipped_layouts()["ucat"])
 def test_all_methods_answer_one_after_the_other() -> None:
     worker, done = Worker(), threading.Event()
     comparison = Comparison(page_of(worker, changed=lambda: comparison.running or done.set()))
-    assert "side by side" in comparison_table(comparison, None, False, "here")
+    assert "side by side" in comparison_table(comparison, None, False)
     comparison.start(State(UCAT, target=PRESETS["Turn"]))
     assert done.wait(60)
     worker.stop()
     assert tuple(comparison.answers) == COMPARED
     assert all(isinstance(answer, Allocation) for answer in comparison.answers.values())
-    table = comparison_table(comparison, "qp", True, "here")
+    table = comparison_table(comparison, "qp", True)
     assert table.count("<tr") == 1 + len(COMPARED) and table.count("chosen") == 1 and "compare again" in table
 
 
@@ -62,7 +62,7 @@ def test_the_table_tells_what_is_kept_least() -> None:
     answers = {method: load_stand_in(method).allocate(UCAT, PRESETS["Turn"]) for method in ("mdn", "qp")}
     answers["search"] = load_allocator().allocate(UCAT, PRESETS["Turn"])
     comparison: Any = SimpleNamespace(state=State(UCAT), answers=answers)
-    table = comparison_table(comparison, None, False, "here")
+    table = comparison_table(comparison, None, False)
     assert three_digits(answers["search"].power) in table and three_digits(answers["qp"].energy) in table
     assert "Kept least: power; mdn keeps effort least" in table, "this stand-in cannot be asked"
 
@@ -82,7 +82,7 @@ def test_each_mode_of_mdn_tells_its_components_and_search_has_no_samples() -> No
     discs = proposal_discs(reply.answer, reply.modes)
     assert discs.count("<svg") == 4 and discs.count("r='2'") == 4 * len(samples)
     dear = replace(samples, power=np.full(len(samples), 1e4))
-    far = mode_plot(replace(reply.answer, samples=dear), modes, 0, None, 200, "here")
+    far = mode_plot(replace(reply.answer, samples=dear), modes, 0, None, 200)
     assert "1e+04" not in far and "e+" not in far, "samples that are far too dear stand at the edge"
     searched = solver.reply(replace(state, method="search"))
     found = solver.modes(searched)
@@ -113,7 +113,7 @@ def test_every_answer_keeps_least_what_is_asked() -> None:
     assert "least power" in corner(state, "", power, False, None)
     assert "least effort" in corner(state, "", effort, False, None)
     for answer, words in ((power, ("power [W]", "effort")), (effort, ("effort", "power [W]"))):
-        plot = mode_plot(answer, listed_modes(known_modes(answer), None), 0, None, 200, "here")
+        plot = mode_plot(answer, listed_modes(known_modes(answer), None), 0, None, 200)
         assert plot.index(f">{words[0]}<") < plot.index(f">{words[1]}<"), "what is kept least lies below"
     plan = SwimSettings().plan(replace(state, objective="effort"), None)
     assert plan.objective == "effort" and state.drawing == {} and not knows_objective("paper")

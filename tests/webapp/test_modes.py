@@ -102,15 +102,15 @@ def test_real_candidates_are_drawn_and_listed() -> None:
         assert place == (led_here[0] if led_here else -1), "the mode that its component led to"
     strange = replace(answer.samples, source=("sample",) * len(led))
     assert set(led_to(strange, modes)) == {-1}, "of no component"
-    plot = mode_plot(answer, listed, 0, None, 200, "here")
-    assert plot.count("onclick") == len(modes) + 1, "one for all samples together"
+    plot = mode_plot(answer, listed, 0, None, 200)
+    assert plot.count("data-press='mode'") == len(modes) and "data-press='sample'" in plot
     assert plot.count("data-k") == len(answer.samples.energy)
-    assert mode_plot(answer, listed, None, 3, 200, "here").count("class='ring'") == 2
-    table = mode_table(listed, False, 0, "here")
+    assert mode_plot(answer, listed, None, 3, 200).count("class='ring'") == 2
+    table = mode_table(listed, False, 0)
     assert table.count("onclick") == len(modes) and "0.0000" not in table and "more are" not in table
-    assert "2 more are" in mode_table(replace(listed, count=listed.count + 2), False, 0, "here")
-    assert "no candidates" in mode_table(NO_MODES, False, 0, "here")
-    assert "looking for more" in mode_table(listed, True, 0, "here")
+    assert "2 more are" in mode_table(replace(listed, count=listed.count + 2), False, 0)
+    assert "no candidates" in mode_table(NO_MODES, False, 0)
+    assert "looking for more" in mode_table(listed, True, 0)
 
 
 def test_figures_keep_their_width() -> None:

@@ -5,7 +5,7 @@ from html import escape
 
 from finlab.allocation.allocation import Allocation
 from finlab.allocation.judging import REACHED
-from webapp.markup.picking import pick
+from webapp.editables import press
 from webapp.markup.verdict import verdict_of
 from webapp.markup.words import error_digits, listed, objective_of, three_digits, unlearned_sentence
 from webapp.session.state import COMPARED
@@ -18,7 +18,7 @@ TIMES = (0.01, 1000.0)
 """Times [ms] at both ends of their bars."""
 
 
-def comparison_table(comparison: Comparison, shown: str | None, stale: bool, picker: str) -> str:
+def comparison_table(comparison: Comparison, shown: str | None, stale: bool) -> str:
     """Error, power, effort and time of each method; the one whose arrows are shown is marked."""
     if comparison.state is None:
         return (
@@ -29,7 +29,7 @@ def comparison_table(comparison: Comparison, shown: str | None, stale: bool, pic
     in_reach = any(
         isinstance(answer, Allocation) and answer.reachable for answer in comparison.answers.values()
     )
-    for k, method in enumerate(COMPARED):
+    for method in COMPARED:
         answer = comparison.answers.get(method)
         if isinstance(answer, Allocation) and answer.unknown_fins:
             words = unlearned_sentence(answer.layout, answer.unknown_fins)
@@ -46,7 +46,9 @@ def comparison_table(comparison: Comparison, shown: str | None, stale: bool, pic
         if isinstance(answer, Allocation) and objective_of(answer) != comparison.state.objective:
             others.append(method)
         kind = "chosen" if method == shown else ""
-        rows.append(f"<tr class='{kind} pick' {pick(picker, k + 1)}><td>{method}</td>{cells}</tr>")
+        rows.append(
+            f"<tr class='{kind} pick' {press('overlay', method)} tabindex='0'><td>{method}</td>{cells}</tr>"
+        )
     header = "<tr><th>method</th><th>error [σ]</th><th>power [W]</th><th>effort</th><th>time [ms]</th></tr>"
     kept = f"Kept least: {comparison.state.objective}"
     if others:
@@ -54,7 +56,8 @@ def comparison_table(comparison: Comparison, shown: str | None, stale: bool, pic
     said = (
         f"<div class='said'><span class='given'>Green</span>: exact, up to {REACHED} σ. "
         f"<span style='color:{css(NEARLY)}'>Ochre</span>: approximate, another method is exact. "
-        f"<span class='missing'>Orange</span>: out of reach of all. Bars are logarithmic. {kept}.</div>"
+        f"<span class='missing'>Orange</span>: out of reach of all. Bars are logarithmic. {kept}. "
+        "Press a method to lay its forces over those of the robot; again, and they go.</div>"
     )
     note = "<div class='missing'>The question has changed since; compare again.</div>" if stale else ""
     body = "".join(rows)

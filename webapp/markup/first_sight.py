@@ -4,35 +4,28 @@ while files are dragged over it."""
 from collections.abc import Sequence
 from html import escape
 
-from webapp.markup.picking import send
+from webapp.editables import press
 
-FRAME = "fl-frame"
-"""Channel for what was pressed in the frame."""
 TRIES = (
-    ("Ask for a wrench", "Drag Fx: the fins change, and green follows blue.", "task,Allocate"),
-    ("Move a fin", "Select one and pull its arrows; what the robot can do changes with it.", "task,Design"),
-    ("Break a fin while it swims", "Start, press its number, and see the others take over.", "task,Simulate"),
+    ("Ask for a wrench", "Drag Fx: the fins change, and green follows blue.", "Allocate"),
+    ("Move a fin", "Select one and pull its arrows; what the robot can do changes with it.", "Design"),
+    ("Break a fin while it swims", "Start, press its number, and see the others take over.", "Simulate"),
 )
-"""Three things to try: in a word, in a sentence, and where."""
-
-
-def tell(word: str) -> str:
-    """A line of script that tells the frame a word; a number behind it makes each one new."""
-    return send(FRAME, f"`{word},${{Date.now()}}`")
+"""Three things to try: in a word, in a sentence, and in which task."""
 
 
 def welcome() -> str:
     """The card of the first visit; `habits.js` shows it once."""
     tries = "".join(
-        f'<li><button onclick="{tell(word)} finlabFrame.met()">{escape(title)}</button>'
+        f"<li><button {press('task', task)} onclick='finlabFrame.met()'>{escape(title)}</button>"
         f"<span>{escape(text)}</span></li>"
-        for title, text, word in TRIES
+        for title, text, task in TRIES
     )
     return (
         "<section class='fl fl-welcome' aria-label='Welcome'><h2>finlab</h2>"
         "<p>For robots that swim with fins: say which force and torque the body shall feel, and see "
         f"how each fin has to flap.</p><ol>{tries}</ol><div class='row'>"
-        f'<button class="primary" onclick="{tell("tour,")} finlabFrame.met()">Take the tour</button>'
+        f"<button class='primary' {press('tour', '')} onclick='finlabFrame.met()'>Take the tour</button>"
         "<button onclick='finlabFrame.met()'>Close</button></div></section>"
     )
 

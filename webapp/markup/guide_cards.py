@@ -2,7 +2,7 @@
 
 from html import escape
 
-from webapp.markup.first_sight import tell
+from webapp.editables import press
 from webapp.session.lessons import LESSONS, Lesson
 from webapp.session.tour import STEPS
 
@@ -39,4 +39,4 @@ def _card(kind: str, title: str, text: str, ways: list[str]) -> str:
 
 
 def _button(label: str, word: str, primary: bool = False) -> str:
-    return f'<button {"class=primary" * primary} onclick="{tell(f"{word},")}">{label}</button>'
+    return f"<button {'class=primary' * primary} {press(word, '')}>{label}</button>"

@@ -7,7 +7,7 @@ import numpy as np
 
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
-from webapp.markup.picking import pick, send
+from webapp.editables import press
 from webapp.markup.words import objective_of
 from webapp.tasks.mode_names import Modes
 from webapp.theme import DEAD, Rgb, css, mode_color
@@ -32,8 +32,6 @@ FAR_PX = 14.0
 """Distance of a number from its dot above which a line joins them [px]."""
 Point = tuple[float, float]
 """Across and down [px]."""
-SAMPLES = "fl-sample"
-"""Channel that hears which sample is clicked."""
 
 
 class Axis(NamedTuple):
@@ -83,7 +81,6 @@ def mode_plot(
     shown: int | None,
     sample: int | None,
     height: int,
-    picker: str,
 ) -> str:
     """What the method keeps least, against the error where samples are drawn, else against the other cost.
 
@@ -95,7 +92,6 @@ def mode_plot(
         shown: mode on the robot, None while it is another command.
         sample: sample on the robot.
         height: of the plot [px].
-        picker: class of the marker before the buttons that choose a mode, and of the channel for samples.
     """
     if not modes.shown:
         return ""
@@ -121,12 +117,12 @@ def mode_plot(
     parts = [_legend(samples is not None), axes(across, up, LEFT, height)]
     if samples is not None:
         dots = [place(point) if close else None for point, close in zip(raw, near, strict=True)]
-        parts.append(_sample_dots(dots, modes, sample, picker))
-    parts += _mode_dots([place(point) for point in refined], height - BOTTOM, shown, picker)
+        parts.append(_sample_dots(dots, modes, sample))
+    parts += _mode_dots([place(point) for point in refined], height - BOTTOM, shown)
     return f"<div class='fl'><svg class='plot' viewBox='0 0 {WIDTH} {height}'>{''.join(parts)}</svg></div>"
 
 
-def _mode_dots(places: list[Point], floor: float, shown: int | None, picker: str) -> list[str]:
+def _mode_dots(places: list[Point], floor: float, shown: int | None) -> list[str]:
     """A dot where each mode lies, with its number beside it; the best one on top."""
     parts = []
     labels = _labels(places, floor)
@@ -136,7 +132,7 @@ def _mode_dots(places: list[Point], floor: float, shown: int | None, picker: str
         line = f"<path {way} stroke='{color}'/>" if math.dist((x, y), (u, v)) > FAR_PX else ""
         parts.append(
             # What is between a dot and its number can be clicked, too.
-            f"<g class='pick' {pick(picker, k)}><path {way} stroke='transparent' stroke-width='12'/>{line}"
+            f"<g class='pick' {press('mode', str(k))}><path {way} stroke='transparent' stroke-width='12'/>{line}"
             f"<circle cx='{x:.1f}' cy='{y:.1f}' r='{DOT}' class='mode' fill='{color}'/>"
             f"<text x='{u:.1f}' y='{v + 3.8:.1f}' class='digit' text-anchor='middle'>{k + 1}</text></g>"
         )
@@ -155,21 +151,20 @@ def _logarithm(error: Array) -> Array:
     return np.asarray(np.log10(np.maximum(error, EXACT)))
 
 
-def _sample_dots(places: list[Point | None], modes: Modes, sample: int | None, picker: str) -> str:
+def _sample_dots(places: list[Point | None], modes: Modes, sample: int | None) -> str:
     """Raw samples, a ring around the one on the robot, and how many have no place in the plot."""
     colors = sample_colors(modes, len(places))
     dots = [
-        f"<circle data-k='{k}' cx='{place[0]:.1f}' cy='{place[1]:.1f}' r='3' fill='{css(color, 0.6)}'/>"
+        f"<circle {press('sample', str(k))} cx='{place[0]:.1f}' cy='{place[1]:.1f}' r='3' "
+        f"fill='{css(color, 0.6)}'/>"
         for k, (place, color) in enumerate(zip(places, colors, strict=True))
         if place is not None
     ]
     beyond = len(places) - len(dots)
     told = f"<text x='{WIDTH - RIGHT}' y='14' text-anchor='end'>{beyond} dearer →</text>" if beyond else ""
-    chosen = send(f"{picker}-{SAMPLES}", "event.target.dataset.k + ',' + Date.now()")
-    click = f"if (event.target.dataset.k) {{ {chosen} }}"
     chosen_place = places[sample] if sample is not None and sample < len(places) else None
     ring = "" if chosen_place is None else _ring(*chosen_place, 6.5)
-    return f'<g class="pick samples" onclick="{click}">{"".join(dots)}</g>{ring}{told}'
+    return f"<g class='pick samples'>{''.join(dots)}</g>{ring}{told}"
 
 
 def _ring(x: float, y: float, radius: float) -> str:

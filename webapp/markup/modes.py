@@ -2,20 +2,19 @@
 
 from html import escape
 
-from webapp.markup.picking import pick
+from webapp.editables import press
 from webapp.markup.words import error_digits, source_words, three_digits
 from webapp.tasks.mode_names import Modes
 from webapp.theme import css, mode_color
 
 
-def mode_table(modes: Modes, searching: bool, shown: int | None, picker: str) -> str:
+def mode_table(modes: Modes, searching: bool, shown: int | None) -> str:
     """Name and origin, error, power, effort and use of the limits of each mode.
 
     Args:
         modes: an answer's modes.
         searching: whether more may be found.
         shown: which mode moves the fins, None while another command does.
-        picker: class of the marker before the buttons that a click on a row presses.
     """
     if not modes.shown:
         return "<div class='fl dim'>This method gives one answer and no candidates.</div>"
@@ -24,7 +23,7 @@ def mode_table(modes: Modes, searching: bool, shown: int | None, picker: str) ->
         kind = "chosen" if k == shown else ""
         origin = f"<div class='dim'>{escape(source_words(mode.sources))}</div>"
         rows.append(
-            f"<tr class='{kind} pick' {pick(picker, k)}><td>{_swatch(k)}</td>"
+            f"<tr class='{kind} pick' {press('mode', str(k))} tabindex='0'><td>{_swatch(k)}</td>"
             f"<td class='words'>{escape(name)}{origin}</td>"
             f"<td>{error_digits(mode.err_norm)}</td><td>{three_digits(mode.power)}</td>"
             f"<td>{three_digits(mode.energy)}</td><td>{100 * mode.saturation:.0f} %</td></tr>"

@@ -2,8 +2,8 @@
 
 import viser
 
+from webapp.editables import press
 from webapp.handles import put
-from webapp.markup.first_sight import tell
 from webapp.page import Page
 from webapp.scene.robot_scene import CAMERAS
 
@@ -22,11 +22,11 @@ class CameraBar:
         """Mark what is on."""
         display = self._page.session.display
         looks = "".join(
-            f"<button onclick=\"{tell(f'look,{name}')}\" title='{key}'>{name}</button>"
+            f"<button {press('look', name)} title='{key}'>{name}</button>"
             for key, name in enumerate(CAMERAS, 1)
         )
         switches = "".join(
-            f"<button onclick=\"{tell(f'{word},')}\" title='{hint}'{pressed}>{label}</button>"
+            f"<button {press(word, '')} title='{hint}'{pressed}>{label}</button>"
             for word, label, hint, pressed in (
                 ("frame", "Frame", "what is selected fills the view (F)", ""),
                 ("parallel", "Parallel", "no perspective (5)", _pressed(display.parallel)),
@@ -43,7 +43,7 @@ def _pressed(on: bool) -> str:
 def triad() -> str:
     """The axes of the body, which a script turns with the camera; a click on a tip looks from it."""
     arms = "".join(
-        f"<g class='axis {axis}' onclick=\"{tell(f'look,{view}')}\"><title>{view}</title>"
+        f"<g class='axis {axis}' {press('look', view)}><title>{view}</title>"
         f"<line/><circle r='9'/><text>{axis}</text></g>"
         for axis, view in AXES
     )

@@ -8,11 +8,9 @@ from webapp.markup.picking import marker
 from webapp.page import Page
 from webapp.session.state import COMPARED
 
-PICKER = "fl-compare"
-
 
 class ComparePanel:
-    """A button, a table, and whose arrows are shown."""
+    """A button and a table, whose rows say whose arrows are shown."""
 
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
@@ -24,14 +22,7 @@ class ComparePanel:
             icon=viser.Icon.SCALE,
             hint="On the wrench and the failures of now.",
         )
-        page.add_choice(
-            "Overlay",
-            PICKER,
-            ("none", *COMPARED),
-            self._choose,
-            lambda: page.session.overlay or "none",
-            hint="The fins' forces by that method, as plain arrows over those of the robot.",
-        )
+        page.editables.on_press("overlay", lambda method, _held: self._choose(method))
         self._table = gui.add_html("")
 
     def _choose(self, method: str) -> None:
@@ -43,4 +34,4 @@ class ComparePanel:
         session, comparison = self._page.session, self._page.comparison
         stale = comparison.state is not None and comparison.state != session.state
         put(self._run, disabled=comparison.running)
-        put(self._table, content=comparison_table(comparison, session.overlay, stale, PICKER))
+        put(self._table, content=comparison_table(comparison, session.overlay, stale))

@@ -27,17 +27,15 @@ class FinList:
         """Build the widgets."""
         self._page, session = page, page.session
         self._table = gui.add_html("")
-        acts: dict[str, Callable[[str, str], object]] = {
-            "fin": self._select,
-            "robot": lambda _key, _held: session.select(None),
-            "fin-name": self._rename,
-            "fin-called": self._rename,
-            "fin-shaft": self._turn,
-            **{f"fin-{axis}": partial(self._place, axis) for axis in AXES},
-            **{mark: partial(self._toggle, mark) for mark in MARKS},
-        }
-        for kind, act in acts.items():
-            page.editables.on(kind, act)
+        page.editables.on_press("fin", self._select)
+        page.editables.on_press("robot", lambda _key, _held: session.select(None))
+        for mark in MARKS:
+            page.editables.on_press(mark, partial(self._toggle, mark))
+        for kind in ("fin-name", "fin-called"):
+            page.editables.on(kind, self._rename)
+        page.editables.on("fin-shaft", self._turn)
+        for axis in AXES:
+            page.editables.on(f"fin-{axis}", partial(self._place, axis))
         gui.add_html(marker("fl-primary"))
         page.add_button("Add a fin", session.add_fin, icon=viser.Icon.PLUS, hint=f"Up to {MAX_FINS} fins.")
         edits: dict[str, Callable[[], object]] = {

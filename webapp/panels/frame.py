@@ -11,9 +11,9 @@ from importlib.resources import files
 
 import viser
 
+from webapp.editables import press
 from webapp.handles import put
-from webapp.markup.first_sight import FRAME, tell
-from webapp.markup.picking import add_channel, marker
+from webapp.markup.picking import marker
 from webapp.page import Page, Panel
 from webapp.panels.places import DRAWER, LEFT, PLACES, REGIONS, RIGHT, SIMULATE, Place
 from webapp.panels.status import Corner
@@ -113,7 +113,7 @@ class Frame:
         run_script(gui, NAMED)
         gui.add_html(f"{STYLE}{marker('fl-chrome')}{over}{PANES}")
         self._shown = gui.add_html("")
-        add_channel(gui, FRAME, self._hear)
+        self._listen()
         self._corner = Corner(gui, page)
         self._strip: viser.GuiHtmlHandle | None = None
         self._sections: list[Section] = []
@@ -146,8 +146,8 @@ class Frame:
             content=_strip(session.task, session.desk.opened[session.task], session.desk.folded, plots),
         )
 
-    def _hear(self, word: list[str]) -> None:
-        """`task,name`, `drawer,name`, or one of the rest; a number behind it makes each word new."""
+    def _listen(self) -> None:
+        """Hear of what is pressed in the frame."""
         session, robot = self._page.session, self._page.scenery.robot
         acts: dict[str, Callable[[str], object]] = {
             "task": session.show_task,
@@ -163,8 +163,8 @@ class Frame:
             "frame": lambda _: robot.frame(),
             "parallel": lambda _: session.toggle("parallel"),
         }
-        if word[0] in acts and len(word) > 1:
-            self._page.do(lambda: acts[word[0]](word[1]))
+        for kind, act in acts.items():
+            self._page.editables.on_press(kind, lambda key, _held, act=act: act(key))
 
 
 def _style(sections: list[Section], session: Session, plots: bool) -> str:
@@ -193,13 +193,13 @@ def _strip(task: str, opened: str, folded: bool, plots: bool) -> str:
     """The upper edge of the drawer: its handle, unless it is low, its tabs, and the button that folds it."""
     tabs = "".join(
         f"<button aria-pressed='{str(name == opened and not folded).lower()}' "
-        f'onclick="{tell(f"drawer,{name}")}">{escape(name)}</button>'
+        f"{press('drawer', name)}>{escape(name)}</button>"
         for name in DRAWERS[task]
     )
     word = "Open the drawer" if folded else "Fold the drawer"
     fold = (
         f"<button class='fold' aria-label='{word}' title='{word}' "
-        f'onclick="{tell("fold,")}">{"▴" if folded else "▾"}</button>'
+        f"{press('fold', '')}>{'▴' if folded else '▾'}</button>"
     )
     tall = plots and not folded
     handle = "<div class='fl-handle' title='drag to make the drawer taller'></div>" if tall else ""

@@ -10,7 +10,7 @@ import viser
 
 from finlab.analysis import Improvement
 from webapp.handles import Changes, put
-from webapp.markup.picking import chosen_button
+from webapp.markup.picking import marker
 from webapp.markup.score_card import score_table
 from webapp.markup.words import fins_words, three_digits
 from webapp.page import Page
@@ -30,14 +30,8 @@ class ReachPanel:
     def __init__(self, gui: viser.GuiApi, page: Page) -> None:
         """Build the widgets."""
         self._page = page
-        page.add_choice(
-            "Draw the set of",
-            "fl-drawn",
-            tuple(DRAWN),
-            partial(page.session.set_display, "drawn"),
-            lambda: page.session.display.drawn,
-            hint="Everything that the fins can give, as a body in the view.",
-        )
+        about = "Everything that the fins can give, as a body in the view."
+        page.bind_display(gui.add_dropdown("Draw the set of", tuple(DRAWN), hint=about), "drawn")
         free = "Forces without any torque, torques without any force; else they are free."
         self._alone = page.bind_display(gui.add_checkbox("Alone", True, hint=free), "alone")
         self._beside = gui.add_dropdown(
@@ -137,7 +131,7 @@ class ImprovePanel:
             "Cancel", page.improver.cancel, icon=viser.Icon.X, visible=False, hint=offered
         )
         self._card = gui.add_html("")
-        gui.add_html(chosen_button("fl-verdict", 0))
+        gui.add_html(marker("fl-verdict"))
         hint = "Where the fins would stand, in green; off: as they stand now."
         self._proposed = page.bind_display(gui.add_checkbox("Show after", True, hint=hint), "proposed")
         verdicts = {"Accept": self._accept, "Leave": page.improver.forget}

@@ -4,10 +4,11 @@ from functools import partial
 
 import viser
 
-from webapp.handles import Changes, numbered, on_user_change, put
-from webapp.markup.mode_plot import SAMPLES, mode_plot
+from finlab.errors import FinlabError
+from webapp.handles import Changes, put
+from webapp.markup.mode_plot import mode_plot
 from webapp.markup.modes import mode_table
-from webapp.markup.picking import add_channel, chosen_button, marker
+from webapp.markup.picking import marker
 from webapp.markup.proposals import proposal_discs
 from webapp.markup.words import error_digits, three_digits
 from webapp.page import Page
@@ -26,6 +27,9 @@ ORIGINS = {
 DRAWN = {"n_candidates": 64.0, "temperature": 0.02, "gamma": 0.01}
 """What the widgets of drawing show at first."""
 
+PLOT_PX = 176
+"""Height of the plot [px]."""
+
 
 class CandidatesPanel:
     """Plot and table, and what is drawn from a mixture."""
@@ -36,7 +40,9 @@ class CandidatesPanel:
         stray, count = "How far draws stray from the mixture's means.", "Draws from the mixture."
         weight = "How much effort counts in the ranking."
         session = page.session
-        self._picker = ModePicker(gui, page, 176, "fl-modes")
+        self._plot, self._plotted = gui.add_html(""), Changes()
+        page.editables.on_press("mode", lambda key, _held: session.show_mode(placed(key, self._modes)))
+        page.editables.on_press("sample", lambda key, _held: session.show_sample(placed(key, self._samples)))
         self._sample = gui.add_html("")
         with gui.add_folder("Draws from the mixture") as self._draws:
             self._settings = {
@@ -63,6 +69,23 @@ class CandidatesPanel:
         """A setting in force; what the widget shows at first while the method has none of the kind."""
         return float(self._page.session.state.drawing.get(key, DRAWN[key]))
 
+    @property
+    def _modes(self) -> int:
+        """How many modes there are."""
+        return len(self._page.answering.modes.shown)
+
+    @property
+    def _samples(self) -> int:
+        """How many samples there are."""
+        best = self._page.answering.best
+        return 0 if best is None or best.samples is None else len(best.samples.energy)
+
+    @property
+    def _shown(self) -> int | None:
+        """The mode on the robot; None while a raw sample is."""
+        session = self._page.session
+        return None if session.sample is not None else min(session.mode, max(self._modes - 1, 0))
+
     def refresh(self) -> None:
         """Write settings and candidates."""
         page, state = self._page, self._page.session.state
@@ -71,12 +94,13 @@ class CandidatesPanel:
         put(self._draws, visible=bool(drawing))
         for key, widget in self._settings.items():
             put(widget, visible=key in drawing)
-        self._picker.refresh()
-        answering, picker = page.answering, self._picker
-        table = mode_table(answering.modes, answering.searching, picker.shown, picker.name)
-        put(self._table, content=table)
+        answering, shown = page.answering, self._shown
+        put(self._table, content=mode_table(answering.modes, answering.searching, shown))
         put(self._sample, content=_sample_words(page))
-        answer, modes = answering.best, answering.modes
+        answer, modes, sample = answering.best, answering.modes, page.session.sample
+        if self._plotted(answer, modes, shown, sample):
+            plot = "" if answer is None else mode_plot(answer, modes, shown, sample, PLOT_PX)
+            put(self._plot, content=plot)
         put(self._proposals, visible=answer is not None and answer.samples is not None)
         if answer is not None and self._drawn(answer, modes):
             put(self._discs, content=proposal_discs(answer, modes))
@@ -111,51 +135,12 @@ def _component_words(page: Page, sample: int) -> str:
     return f" of {source}, which led to mode {led[sample] + 1}" if led[sample] >= 0 else f" of {source}"
 
 
-class ModePicker:
-    """Plot and buttons."""
+def placed(key: str, count: int) -> int:
+    """The place that a page names, of `count`.
 
-    def __init__(self, gui: viser.GuiApi, page: Page, height: int, name: str) -> None:
-        """Build them; `height` of the plot in pixels, `name` marks the buttons on the page."""
-        self._page = page
-        self._height = height
-        self.name = name
-        self._changes = Changes()
-        self._plot = gui.add_html("")
-        add_channel(gui, f"{name}-{SAMPLES}", self._choose_sample)
-        self._chosen = gui.add_html(marker(name))
-        self._choice = gui.add_button_group(
-            "Mode",
-            ("1",),
-            hint="Which mode moves the fins. A click on a dot does it too, on a small one for a raw sample.",
-        )
-        on_user_change(self._choice, self._choose)
-
-    def _choose(self, entry: str) -> None:
-        index = numbered(entry, len(self._page.answering.modes.shown))
-        if index is not None:
-            self._page.do(partial(self._page.session.show_mode, index))
-
-    def _choose_sample(self, word: list[str]) -> None:
-        best = self._page.answering.best
-        count = 0 if best is None or best.samples is None else len(best.samples.energy)
-        if word[0].isdecimal() and int(word[0]) < count:
-            self._page.do(partial(self._page.session.show_sample, int(word[0])))
-
-    @property
-    def shown(self) -> int | None:
-        """The mode on the robot; None while a raw sample is."""
-        session, modes = self._page.session, self._page.answering.modes.shown
-        return None if session.sample is not None else min(session.mode, max(len(modes) - 1, 0))
-
-    def refresh(self) -> None:
-        """Write the modes of the newest answer."""
-        answering, sample = self._page.answering, self._page.session.sample
-        best, modes = answering.best, answering.modes
-        if not self._changes(best, modes, self.shown, sample):
-            return
-        put(self._choice, options=tuple(str(k + 1) for k in range(len(modes.shown))) or ("1",))
-        put(self._chosen, content=chosen_button(self.name, self.shown))
-        plot = ""
-        if best is not None:
-            plot = mode_plot(best, modes, self.shown, sample, self._height, self.name)
-        put(self._plot, content=plot)
+    Raises:
+        FinlabError: there is no such place.
+    """
+    if not key.isdecimal() or len(key) > 6 or int(key) >= count:
+        raise FinlabError("that one is gone")
+    return int(key)

@@ -6,8 +6,8 @@ from html import escape
 import viser
 
 from finlab.allocation.methods import METHODS
+from webapp.editables import press
 from webapp.handles import put
-from webapp.markup.first_sight import tell
 from webapp.markup.picking import marker
 from webapp.page import Page
 from webapp.session.design_links import MAX_LINK
@@ -94,8 +94,7 @@ class TaskBar:
         """Mark the task that is open."""
         here = self._page.session.task
         buttons = "".join(
-            f"<button {'aria-current=page ' if task == here else ''}"
-            f'onclick="{tell(f"task,{task}")}">{task}</button>'
+            f"<button {'aria-current=page ' * (task == here)}{press('task', task)}>{task}</button>"
             for task in TASKS
         )
         put(self._tasks, content=f"<nav class='fl-tasks' aria-label='Tasks'>{buttons}</nav>")
@@ -115,10 +114,9 @@ class AnsweringBar:
         gui.add_html(
             "<div class='fl-help'>"
             f'<button title="all commands (Ctrl+K)" onclick="{PALETTE}">Commands</button>'
-            f'<button title="a tour in {len(STEPS)} stops (T)" '
-            f'onclick="{tell("tour,")}">Tour</button>'
-            f'<button title="{len(LESSONS)} lessons with a task each" '
-            f'onclick="{tell(f"lesson,{LESSONS[0].name}")}">Lessons</button>'
+            f"<button title='a tour in {len(STEPS)} stops (T)' {press('tour', '')}>Tour</button>"
+            f"<button title='{len(LESSONS)} lessons with a task each' "
+            f"{press('lesson', LESSONS[0].name)}>Lessons</button>"
             '<button aria-label="Keys" title="all keys (?)" onclick="finlabFrame.sheet()">?</button></div>'
         )
 

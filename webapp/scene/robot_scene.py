@@ -23,7 +23,7 @@ from webapp.scene.wrench_nodes import (
     fitting_newtons,
     fitting_torque,
 )
-from webapp.session.state import State
+from webapp.session.state import State, chosen
 from webapp.tasks.analyst import Findings
 from webapp.tasks.context import Context
 from webapp.tasks.solver import Proposal
@@ -79,7 +79,7 @@ class RobotScene:
 
     def look_from(self, view: str) -> None:
         """Move the camera to one of `CAMERAS`."""
-        self.aim(np.array(CAMERAS[view]), np.array([0.0, 0.0, 0.03]))
+        self.aim(np.array(CAMERAS[chosen(view, "view", CAMERAS)]), np.array([0.0, 0.0, 0.03]))
 
     def aim(self, place: Array, target: Array) -> None:
         """Let the camera see from a place (3,) to another one (3,) [m], with the lens that is wanted."""

@@ -49,7 +49,7 @@ class Designs:
         self._last = self._session.state.layout
         editables.on("designs-kept", lambda _, text: self._take_kept(text))
         editables.on("design-link", lambda _, text: context.do(partial(self.open_link, text)))
-        editables.on("design-recent", lambda place, _: context.do(partial(self.open_recent, place)))
+        editables.on_press("design-recent", lambda place, _: self.open_recent(place))
 
     def new(self) -> None:
         """A robot with one hull and one fin."""
