@@ -132,7 +132,8 @@ def _mode_dots(places: list[Point], floor: float, shown: int | None) -> list[str
         line = f"<path {way} stroke='{color}'/>" if math.dist((x, y), (u, v)) > FAR_PX else ""
         parts.append(
             # What is between a dot and its number can be clicked, too.
-            f"<g class='pick' {press('mode', str(k))}><path {way} stroke='transparent' stroke-width='12'/>{line}"
+            f"<g class='pick' {press('mode', str(k))}>"
+            f"<path {way} stroke='transparent' stroke-width='12'/>{line}"
             f"<circle cx='{x:.1f}' cy='{y:.1f}' r='{DOT}' class='mode' fill='{color}'/>"
             f"<text x='{u:.1f}' y='{v + 3.8:.1f}' class='digit' text-anchor='middle'>{k + 1}</text></g>"
         )
