@@ -54,6 +54,7 @@ class App:
         self._server = server
         self._solver = solver
         self._workers = Workers()
+        self._workers.readers.warm()
         self._store = SessionStore(
             lambda: Session(layout, display), None if folder is None else SessionFiles(folder)
         )

@@ -16,7 +16,7 @@ from webapp.mailbox import Mailbox
 
 SCRIPT = files("webapp").joinpath("editables.js").read_text("utf-8")
 """What runs in the page."""
-MAX_MESSAGE = 2_000_000
+MAX_MESSAGE = 600_000
 """Longest message of the page that is read."""
 
 Act = Callable[[str, str], object]

@@ -32,6 +32,7 @@ from webapp.tasks.exports import Exports
 from webapp.tasks.fitting import Fitting
 from webapp.tasks.improving import Improver
 from webapp.tasks.opening import Opening
+from webapp.tasks.reading import Reading
 from webapp.tasks.solver import Solver
 from webapp.tasks.sweeping import Sweep
 from webapp.tasks.swim_files import SwimFiles
@@ -80,7 +81,9 @@ class Page(ABC):
         self._soon: asyncio.TimerHandle | None = None
         self._note: viser.NotificationHandle | None = None
         changed = self._refresh
-        context = Context(client, session, solver, workers, page, self.do, changed, self.notify)
+        self.reading = Reading(workers.readers, page, self.do)
+        """What is read and made beside the event loop."""
+        context = Context(client, session, solver, workers, page, self.reading, self.do, changed, self.notify)
         self.answering = Answering(context)
         """The newest answer, its modes and what of it is on the robot."""
         self.ranging = Newest(page, workers.marks, find_ranges, changed, REST_S)
@@ -111,7 +114,7 @@ class Page(ABC):
         """Names and cells that are edited where they stand."""
         self.designs = Designs(context, self.exports, self.editables)
         """Designs as a whole."""
-        self.opening = Opening(client.gui, self.editables, self.do)
+        self.opening = Opening(client.gui, self.editables, self.do, self.designs.open_together)
         """Files of any kind."""
         self._uploads = Uploads(client.gui, MAX_UPLOAD, partial(self.notify, "Not possible"))
         self._panels: list[Panel] = []

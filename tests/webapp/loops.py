@@ -9,6 +9,7 @@ from typing import Any
 from tests.webapp.stand_in import load_stand_in
 from webapp.tasks.background import EventLoop
 from webapp.tasks.context import Context
+from webapp.tasks.reading import Reading
 from webapp.tasks.solver import Solver
 
 
@@ -39,6 +40,20 @@ def running() -> EventLoop:
     return EventLoop(asyncio.get_running_loop(), raised)
 
 
+class ReadAtOnce(Reading):
+    """Reads and makes everything where it is asked to."""
+
+    def __init__(self, do: Callable[[Callable[[], object]], Any]) -> None:
+        """`do` carries out what comes of it."""
+        self._do = do
+
+    def read(self, read: Any, use: Callable[[Any], object], prepare: Any = None) -> None:
+        """Read it now."""
+        self._do(lambda: use(read()))
+
+    make = read
+
+
 def page_of(worker: Any, session: Any = None, **options: Any) -> Context:
     """A page that does all its work on one worker, with the stand-in allocator unless told otherwise."""
     workers: Any = SimpleNamespace(answers=worker, swims=worker, searches=worker, fits=worker)
@@ -47,6 +62,7 @@ def page_of(worker: Any, session: Any = None, **options: Any) -> Context:
         "solver": Solver(load=load_stand_in),
         "loop": AtOnce(),
         "do": lambda act: act(),
+        "reading": ReadAtOnce(options.get("do", lambda act: act())),
         "changed": lambda: None,
         "notify": lambda title, text: None,
     }

@@ -19,6 +19,7 @@ from finlab.layout.yaml_file import yaml_text
 from finlab.physics import make_law
 from finlab.physics.table_file import write_table
 from tests.webapp.hands import move_fin
+from tests.webapp.loops import ReadAtOnce
 from webapp.session import Session
 from webapp.session.companions import stored_table
 from webapp.session.design_links import ARCHIVE, FRAGMENT, MAX_LINK, PLAIN, linked, packed, unpacked
@@ -99,7 +100,10 @@ class Browser:
 def designs_of(session: Session, browser: Browser) -> Designs:
     store = SimpleNamespace(set_item=browser.kept.__setitem__)
     context: Any = SimpleNamespace(
-        session=session, client=SimpleNamespace(local_storage=store, gui=None), notify=lambda *_: None
+        session=session,
+        client=SimpleNamespace(local_storage=store, gui=None),
+        notify=lambda *_: None,
+        reading=ReadAtOnce(lambda act: act()),
     )
     exports: Any = SimpleNamespace(download=lambda name, _: browser.sent.append(name))
     editables: Any = SimpleNamespace(on=browser.heard.__setitem__)

@@ -1,9 +1,7 @@
 """Files that a browser sends, whatever they are: each goes to whom it is for, or a sentence says why not."""
 
 import json
-import zipfile
 from collections.abc import Callable
-from io import BytesIO
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,7 +14,7 @@ from finlab.layout import FinModelSpec, layout_to_dict, load_layout
 from finlab.layout.yaml_file import yaml_text
 from finlab.physics import make_law
 from finlab.physics.table_file import write_table
-from webapp.session.files import is_path, read_layout
+from webapp.session.files import is_path, read_together
 from webapp.tasks.opening import Opening
 
 
@@ -32,7 +30,8 @@ class Taken:
         gui: Any = SimpleNamespace(_websock_interface=interface)
         heard: dict[str, Callable[[str, str], object]] = {}
         editables: Any = SimpleNamespace(on=heard.__setitem__)
-        self.opening = Opening(gui, editables, self._do)
+        self.together: list[dict[str, bytes]] = []
+        self.opening = Opening(gui, editables, self._do, self.together.append)
         self.drop = lambda *told: heard["dropped"]("", json.dumps(told))
         self.tell = lambda text: heard["dropped"]("", text)
         self.opening.add(".csv,.txt", self._taker("fin"))
@@ -100,9 +99,9 @@ def test_a_design_and_its_table_dropped_at_once_are_one_design(
     assert taken.files == [], "the other is still to come"
     assert taken.scripts[1:] == ["finlabDropping.sendNext();"] * 2
     taken.opening.open("robot.yaml", yaml_text(values).encode())
-    ((who, name, content),) = taken.files
-    assert who == "design" and set(zipfile.ZipFile(BytesIO(content)).namelist()) == {"soft.csv", "robot.yaml"}
-    layout = read_layout(name, content).layout
+    (parts,) = taken.together
+    assert taken.files == [] and set(parts) == {"soft.csv", "robot.yaml"}
+    layout = read_together(parts).layout
     assert layout.fins[0].model.type == "table", "found by its name, though its folder was lost"
     taken.opening.open("soft.csv", b"A,f\n")
     assert taken.files[-1][0] == "fin", "later it is a file of its own"

@@ -25,7 +25,7 @@ from webapp.scene.meshes.mesh_file import (
 )
 from webapp.scene.meshes.mesh_hull import UNITS, MeshHull
 from webapp.session.files import reshaped_hull, stored_hull
-from webapp.session.layout_edits import center_of_gravity
+from webapp.session.layout_edits import center_of_gravity, with_hull
 from webapp.session.state import chosen, number
 
 MESH = "mesh file"
@@ -86,8 +86,17 @@ class HullPanel:
         )
 
     def _import(self, name: str, content: bytes) -> None:
+        read = partial(stored_hull, name, content, self._page.session.mesh_unit)
+        self._page.reading.read(read, self._take, self._drawn)
+
+    def _drawn(self, hull: Hull) -> Hull:
+        """The same hull, whose drawing is known from now on: that takes its time. Not on the event loop."""
+        hull_of(with_hull(self._page.session.state.layout, hull))
+        return hull
+
+    def _take(self, hull: Hull) -> None:
         session = self._page.session
-        session.import_hull(stored_hull(name, content, session.mesh_unit))
+        session.import_hull(hull)
         session.show_task("Design")
         session.select(None)  # so that the report is seen, wherever the file was dropped
 
@@ -118,7 +127,14 @@ class HullPanel:
         hull = self._hull
         if hull is None:
             raise FinlabError("the hull is drawn from a shape; import a mesh first")
-        self._page.session.import_hull(reshaped_hull(hull, change), name)
+        self._page.reading.make(
+            lambda: self._drawn(reshaped_hull(hull, change)), partial(self._put_on, name, hull)
+        )
+
+    def _put_on(self, name: str, before: Hull, hull: Hull) -> None:
+        if self._hull != before:
+            raise FinlabError("the hull has been changed in the meantime; do it again")
+        self._page.session.import_hull(hull, name)
         self._page.session.mesh_unit = "m"
 
     def _turn(self, axis: str) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import viser
 
-from finlab.sim import PLANTS, SHIPPED
+from finlab.sim import PLANTS, SHIPPED, Trajectory
 from webapp.handles import put
 from webapp.markup.picking import marker
 from webapp.markup.scenario import scenario_card
@@ -86,17 +86,20 @@ class ScenarioPanel(SwimPanel):
                 self._bind(key, gui.add_number(label, first, step=step, hint=hint), digits=3)
             follow = gui.add_checkbox("Follow", False, hint="The camera goes along with the first robot.")
             page.on_change(follow, page.scenery.swim.look)
-            page.opening.add(".csv", self._take_path, knows=is_path)
+            page.opening.add(".csv", self._open_path, knows=is_path)
             page.add_upload(
                 "Open a path (CSV)",
-                self._take_path,
+                self._open_path,
                 icon=viser.Icon.ROUTE,
                 mime_type=".csv",
                 hint="A table with the columns t [s], x, y, z [m].",
             )
 
-    def _take_path(self, name: str, content: bytes) -> None:
-        self._page.swimming.own_path = read_path(name, content)
+    def _open_path(self, name: str, content: bytes) -> None:
+        self._page.reading.read(partial(read_path, name, content), self._take_path)
+
+    def _take_path(self, path: Trajectory) -> None:
+        self._page.swimming.own_path = path
         put(self._path, options=(*SHIPPED, OWN))
         self._page.session.set_swim("path", OWN)
         self._page.session.show_task("Simulate")

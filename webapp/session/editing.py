@@ -38,9 +38,9 @@ class Editing(Core):
         """A better layout that was found for this one."""
         self._edit("Improve the layout", layout)
 
-    def note_saved(self) -> None:
-        """The layout has been saved as it is."""
-        self.saved = self.state.layout
+    def note_saved(self, layout: Layout) -> None:
+        """A layout has been saved as it is."""
+        self.saved = layout
 
     def drag_fin(self, name: str, position: Vector, angle: float) -> None:
         """A fin on its way in the user's hand: not snapped yet, and one step of undo for the whole drag."""

@@ -5,7 +5,7 @@ import io
 import os
 import re
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -72,6 +72,16 @@ def read_layout(name: str, content: bytes) -> Opened:
         opened = adopted(_read_alone(source, content), {}, cache_folder(), source)
     plant_of(opened.layout)  # reads the tables of its fins
     return opened
+
+
+def read_together(parts: Mapping[str, bytes]) -> Opened:
+    """The layout in files that were sent at once, by their names.
+
+    Raises:
+        LayoutError, DataError: as above.
+    """
+    (first, document), *others = parts.items()
+    return read_layout("files.zip", archive_of(first, document, dict(others)))
 
 
 def _read_alone(source: str, content: bytes) -> Layout:

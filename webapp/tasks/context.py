@@ -7,6 +7,7 @@ import viser
 
 from webapp.session import Session
 from webapp.tasks.background import EventLoop, Workers
+from webapp.tasks.reading import Reading
 from webapp.tasks.solver import Solver
 
 
@@ -24,6 +25,8 @@ class Context:
     """On whose threads all is computed."""
     loop: EventLoop
     """Where all else runs."""
+    reading: Reading
+    """Reads files beside it."""
     do: Callable[[Callable[[], object]], None]
     """Carries out an intent of the user."""
     changed: Callable[[], None]

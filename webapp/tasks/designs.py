@@ -1,7 +1,9 @@
 """Designs as a whole: new, opened, saved, shared by a link, and those that this browser had lately."""
 
+import contextlib
 import json
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -9,9 +11,10 @@ from typing import Any
 from finlab.errors import FinlabError
 from finlab.layout import Layout
 from webapp.editables import Editables
+from webapp.scene.meshes.hull import hull_of
 from webapp.session import files
 from webapp.session.companions import Opened
-from webapp.session.design_links import FRAGMENT, linked, packed, unpacked
+from webapp.session.design_links import FRAGMENT, Link, linked, packed, unpacked
 from webapp.tasks.context import Context
 from webapp.tasks.exports import Exports
 from webapp.viser_internals import run_script
@@ -57,17 +60,24 @@ class Designs:
 
     def open(self, name: str, content: bytes) -> None:
         """A design from a file that the browser sent."""
-        self._take(files.read_layout(name, content))
+        self._read(partial(files.read_layout, name, content))
+
+    def open_together(self, parts: dict[str, bytes]) -> None:
+        """A design from files that the browser sent at once, by their names."""
+        self._read(partial(files.read_together, parts))
 
     def open_link(self, text: str) -> None:
         """A design from the part of an address behind the #; it may be anything."""
-        self._take(unpacked(text.removeprefix(FRAGMENT)))
+        self._read(partial(unpacked, text.removeprefix(FRAGMENT)))
 
     def open_recent(self, place: str) -> None:
         """A design that this browser had, by its place."""
-        if not place.isdecimal() or int(place) >= len(self.recent):
+        if not place.isdecimal() or int(place[:3]) >= len(self.recent):
             raise FinlabError("that design is not kept any more")
-        self._take(unpacked(self.recent[int(place)].text))
+        self._read(partial(unpacked, self.recent[int(place)].text))
+
+    def _read(self, read: Callable[[], Opened]) -> None:
+        self._context.reading.read(read, self._take, lambda opened: hull_of(opened.layout))
 
     def _take(self, opened: Opened) -> None:
         self._session.open_layout(opened.layout)
@@ -78,8 +88,11 @@ class Designs:
     def save(self) -> None:
         """Send the design's file to the browser."""
         layout = self._session.state.layout
-        self._exports.download(*files.layout_file(layout))
-        self._session.note_saved()
+        self._context.reading.make(partial(files.layout_file, layout), partial(self._send, layout))
+
+    def _send(self, layout: Layout, file: tuple[str, bytes]) -> None:
+        self._exports.download(*file)
+        self._session.note_saved(layout)
         self._remember(layout)
 
     def save_as(self, name: str) -> None:
@@ -88,13 +101,11 @@ class Designs:
         self.save()
 
     def share(self) -> None:
-        """Show the link that carries the design, and take it to the clipboard where the browser lets us.
-
-        Raises:
-            FinlabError: the design is too large for a link.
-        """
+        """Show the link that carries the design, and take it to the clipboard where the browser lets us."""
         layout = self._session.state.layout
-        link = linked(layout)
+        self._context.reading.make(partial(linked, layout), partial(self._show, layout))
+
+    def _show(self, layout: Layout, link: Link) -> None:
         card = json.dumps([FRAGMENT + link.text, layout.name, link.rounded])
         run_script(self._context.client.gui, f"finlabDesigns.share(...{card});")
         self._remember(layout)
@@ -107,16 +118,15 @@ class Designs:
             self._remember(last)
 
     def _remember(self, layout: Layout) -> None:
-        if files.shipped_name(layout) is not None:
-            return
-        try:
-            text = packed(layout, LARGEST)
-        except FinlabError:  # it is too large to be kept, or a file of it is gone
-            return
-        newest = Recent(layout.name, layout.n_fins, time.time(), text)
-        self.recent = [newest, *(old for old in self.recent if old.name != layout.name)][:MOST]
-        kept = json.dumps([[r.name, r.fins, r.when, r.text] for r in self.recent])
-        self._context.client.local_storage.set_item(STORED, kept)
+        if files.shipped_name(layout) is None:
+            with contextlib.suppress(FinlabError):  # the page is busy with other files
+                self._context.reading.make(partial(_kept, layout), self._keep)
+
+    def _keep(self, newest: Recent | None) -> None:
+        if newest is not None:
+            self.recent = [newest, *(old for old in self.recent if old.name != newest.name)][:MOST]
+            kept = json.dumps([[r.name, r.fins, r.when, r.text] for r in self.recent])
+            self._context.client.local_storage.set_item(STORED, kept)
 
     def _take_kept(self, text: str) -> None:
         """What the browser has kept, which may be anything; a design is only read when it is opened."""
@@ -129,3 +139,11 @@ class Designs:
             if kinds in ([str, int, float, str], [str, int, int, str]):
                 name, fins, when, design = entry
                 self.recent.append(Recent(name[:64], fins, float(when), design))
+
+
+def _kept(layout: Layout) -> Recent | None:
+    """A design as a browser keeps it; None where it is too large, or a file of it is gone."""
+    try:
+        return Recent(layout.name, layout.n_fins, time.time(), packed(layout, LARGEST))
+    except FinlabError:
+        return None

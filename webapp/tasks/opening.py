@@ -11,7 +11,6 @@ import viser
 from finlab.bundle_files import LARGEST_BUNDLE, MOST_FILES
 from finlab.errors import FinlabError
 from webapp.editables import Editables
-from webapp.session.companions import archive_of
 from webapp.viser_internals import run_script
 
 SCRIPT = files("webapp").joinpath("dropping.js").read_text("utf-8")
@@ -38,10 +37,14 @@ class Opening:
     """Whom files are for; several that are dropped at once are one design with its tables and its mesh."""
 
     def __init__(
-        self, gui: viser.GuiApi, editables: Editables, do: Callable[[Callable[[], object]], None]
+        self,
+        gui: viser.GuiApi,
+        editables: Editables,
+        do: Callable[[Callable[[], object]], None],
+        together: Callable[[dict[str, bytes]], object],
     ) -> None:
-        """Hear from the page what is dropped on it; nobody takes files yet."""
-        self._gui = gui
+        """Hear from the page what is dropped on it; `together` takes what is dropped at once."""
+        self._gui, self._together = gui, together
         self._takers: list[Taker] = []
         self._dropped: tuple[str, ...] = ()
         self._came: dict[str, bytes] = {}
@@ -89,9 +92,10 @@ class Opening:
             if len(self._came) < len(self._dropped):
                 self._send_next()
                 return
-            first, came = self._dropped[0], self._came
+            came = {first: self._came[first] for first in self._dropped}
             self._dropped, self._came = (), {}
-            name, content = "files.zip", archive_of(first, came.pop(first), came)
+            self._together(came)
+            return
         suffix = self._check(name)
         for taker in self._takers:
             if suffix in taker.suffixes and (taker.knows is None or taker.knows(content)):
