@@ -17,6 +17,7 @@ LEVELS = (
     ("assets", "bundle_files", "command_end", "least_squares", "whole_file"),
     ("layout",),
     ("physics", "exchange"),
+    ("vehicle",),
     ("inference",),
     ("forces",),
     ("allocation",),

@@ -187,7 +187,7 @@ def excitation_summary(log: RunLog) -> str:
     """How far the robot went from where it began, in a line or two."""
     import numpy as np
 
-    from finlab.physics.vehicle import euler
+    from finlab.vehicle.attitude import euler
 
     away = np.abs(log.position - log.position[0]).max(axis=0)
     tilt = np.degrees(np.abs(euler(log.quaternion)[:, :2]).max())

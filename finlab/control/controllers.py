@@ -10,7 +10,7 @@ from finlab.control.filters import LowPass, Pid
 from finlab.control.gains import VelocityGains, WaypointGains, load_gains
 from finlab.control.measurement import NO_WRENCH, Measurement, Setpoint
 from finlab.layout.angles import wrapped
-from finlab.physics.vehicle import to_world
+from finlab.vehicle.attitude import in_world
 
 
 class VelocityController:
@@ -124,4 +124,4 @@ class Odometry:
 
 def _over_ground(measurement: Measurement, yaw: float) -> Array:
     """The measured velocity (3,) in the world [m/s], for a heading [rad]."""
-    return to_world(measurement.velocity, measurement.roll, measurement.pitch, yaw)
+    return in_world(measurement.velocity, measurement.roll, measurement.pitch, yaw)

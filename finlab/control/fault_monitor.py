@@ -181,7 +181,7 @@ class FaultMonitor:
 
     def _expected(self, reported: Array) -> Array:
         """What the fins should do (n, 3) if they are what they are taken for, whichever way they turn."""
-        expected = self._model.fins.motion.copy()
+        expected = self._model.fins.command
         expected[:, 2] = np.where(self._model.unsure, reported[:, 2], expected[:, 2])
         expected[:, 2] = np.where(np.isnan(self._held), expected[:, 2], self._held)
         return expected

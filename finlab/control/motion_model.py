@@ -7,17 +7,19 @@ that stay, and how much of its law's thrust each fin gives. The state z (14 + n)
     strength (n).
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.control.nominal_lag import NominalLag
 from finlab.layout import Body, Layout
 from finlab.layout.angles import is_full_turn
 from finlab.physics import plant_of
-from finlab.physics.vehicle import Vehicle, complete_body, quaternion_of
+from finlab.vehicle.attitude import quaternion_of, rotation_of_quaternion, tilt_of, to_body
+from finlab.vehicle.body import complete_body
+from finlab.vehicle.fin_lag import FinLag
+from finlab.vehicle.fossen import jacobian
+from finlab.vehicle.vehicle import Vehicle
 
 MOTION, TILT, CURRENT, TORQUE = slice(0, 6), slice(6, 8), slice(8, 11), slice(11, 14)
 RISING = 10
@@ -54,16 +56,14 @@ class MotionModel:
         self._plant = plant_of(layout)
         self.inertia = np.array(self._vehicle.inertia)
         """Mass and moments (6,), those of the water that goes along included [kg, kg m^2]."""
-        zeros = (0.0,) * 6
-        self._linear, self._quadratic = body.linear_damping or zeros, body.quadratic_damping or zeros
         self._dt = period_s
-        self.fins = NominalLag(layout, period_s)
+        self.fins = FinLag(layout)
         """What the fins do, if they follow their commands."""
         size = FIRST_FIN + layout.n_fins
         self._constant = np.eye(size)
         self._constant[range(3, 6), range(11, 14)] = period_s / self.inertia[3:]
         self._gain = period_s / self.inertia
-        height = (body.center_of_buoyancy_m or zeros)[2]
+        height = self._vehicle.dynamics.center[2]
         # Roll swings within a second: an oscillation over a period is a turn, and a step along it would grow.
         # (Of a robot that is heavy at the top the frequency is imaginary, and the cosine a hyperbolic one.)
         swing = np.sqrt(self._vehicle.lift * height / self.inertia[3:5] + 1e-9j)
@@ -71,7 +71,7 @@ class MotionModel:
         self._constant[range(3, 5), range(6, 8)] = (-swing * sine).real
         self._constant[range(6, 8), range(3, 5)] = (sine / swing).real
         self._constant[range(6, 8), range(6, 8)] = cosine.real
-        self._swing = tuple(cosine.real.tolist())
+        self._swing = np.array([0.0, 0.0, 0.0, *(cosine.real - 1.0), 0.0])
         self._force = np.zeros((2, layout.n_fins, 6))
         self._thrust = np.zeros((layout.n_fins, 3))
         self._turns_fully = is_full_turn(layout.upper[:, 2] - layout.lower[:, 2])
@@ -96,63 +96,41 @@ class MotionModel:
         motion, current = state[MOTION].tolist(), state[CURRENT].tolist()
         roll, pitch = state[TILT].tolist()
         quaternion = quaternion_of(roll, pitch, yaw - self._dt * motion[5])
-        rotation = _rotation(*quaternion)
+        rotation = rotation_of_quaternion(*quaternion)
         self._vehicle.current = tuple(current)
         thrust = state[STRENGTH] @ wrench
         thrust[3:] += state[TORQUE]
-        moved = self._carried([0.0, 0.0, 0.0, *quaternion, *motion], thrust.tolist())
+        moved = self._vehicle.coarse_step([0.0, 0.0, 0.0, *quaternion, *motion], thrust.tolist(), self._dt)
         after = state.copy()
-        after[:8] = (*moved[7:], *_tilt(*moved[3:7]))
+        after[:8] = (*moved[7:], *tilt_of(rotation_of_quaternion(*moved[3:7])))
         gained = wrench * self._gain
         transition = self._constant.copy()
-        by_flow = np.array(self._by_flow(motion, (np.array(current) @ rotation).tolist()))
+        water = to_body(rotation, *current)
+        by_flow = self._by_flow([a - b for a, b in zip(motion, (*water, 0.0, 0.0, 0.0), strict=True)])
         transition[MOTION, MOTION] += by_flow
-        transition[MOTION, CURRENT] = by_flow[:, :3] @ -rotation.T
+        transition[MOTION, CURRENT] = by_flow[:, :3] @ -np.array(rotation).reshape(3, 3)
         transition[MOTION, STRENGTH] = gained.T
         return Step(after, transition, self._gain * turned, self._either_way())
 
-    def _by_flow(self, motion: list[float], current: list[float]) -> list[list[float]]:
-        """What velocities and rates gain over a period (6, 6) per unit of velocity in the water and of rate.
-
-        Damping, Coriolis' forces and Munk's moments: unknown water that streams past turns the robot.
+    def _by_flow(self, flow: list[float]) -> Array:
+        """What velocities and rates gain over a period (6, 6) per unit of velocity in the water and of rate
+        (6,): damping, Coriolis' forces and Munk's moments: unknown water that streams past turns the robot.
         """
-        u, v, w, p, q, r = *(a - b for a, b in zip(motion[:3], current, strict=True)), *motion[3:]
-        mx, my, mz, ix, iy, iz = inertia = self._vehicle.inertia
-        dt = self._dt
+        by_flow = self._dt * np.array(jacobian(self._vehicle.dynamics, flow))
+        own = by_flow.diagonal()
         # A damping that is strong over a period brings to rest, not beyond it.
-        dx, dy, dz, dp, dq, dr = (
-            math.expm1(-dt * (a + 2.0 * b * abs(c)) / m)
-            for a, b, c, m in zip(self._linear, self._quadratic, (u, v, w, p, q, r), inertia, strict=True)
-        )
-        kx, ky, kz = dt / mx, dt / my, dt / mz
-        roll, pitch, yaw = dt * (my - mz) / ix, dt * (mz - mx) / iy, dt * (mx - my) / iz
-        sx, sy = self._swing
-        return [
-            [dx, kx * my * r, -kx * mz * q, 0.0, -kx * mz * w, kx * my * v],
-            [-ky * mx * r, dy, ky * mz * p, ky * mz * w, 0.0, -ky * mx * u],
-            [kz * mx * q, -kz * my * p, dz, -kz * my * v, kz * mx * u, 0.0],
-            [0.0, roll * w, roll * v, sx - 1.0 + dp, 0.0, 0.0],
-            [pitch * w, 0.0, pitch * u, 0.0, sy - 1.0 + dq, 0.0],
-            [yaw * v, yaw * u, 0.0, 0.0, 0.0, dr],
-        ]
-
-    def _carried(self, body: list[float], wrench: list[float]) -> list[float]:
-        """A body's state (13,) after the period, by the midpoint rule in plain floats, which are fast."""
-        vehicle = self._vehicle
-        n_steps = vehicle.n_steps(body[7:], self._dt)
-        dt = self._dt / n_steps
-        for _ in range(n_steps):
-            slopes = vehicle.derivative(body, wrench)
-            middle = [a + 0.5 * dt * b for a, b in zip(body, slopes, strict=True)]
-            body = [a + dt * b for a, b in zip(body, vehicle.derivative(middle, wrench), strict=True)]
-        return body
+        decay = np.expm1(own) + self._swing
+        by_flow[3:, 3:] = 0.0
+        by_flow[range(6), range(6)] = decay
+        return by_flow
 
     def _wrenches(
         self, command: Array, reported: Array | None, held: Array, other: Array
     ) -> tuple[Array, Array]:
         """Wrench (n, 6) of each fin at full strength, mean over the period, and what it gains turned."""
         facing = (np.cos(command[:, 2] - self.fins.direction) < ABOUT_FACE) & self._turns_fully
-        does = self.fins.step(command)
+        self.fins.step(command, self._dt)
+        does = self.fins.command
         if self._any_unsure or True in facing.tolist():
             self._unsure_s -= self._dt
             self._unsure_s[facing] = UNSURE_S
@@ -182,20 +160,3 @@ class MotionModel:
         gained = (most[:, None, None] * self._plant.columns[self._unknown, 1:] * self._gain).reshape(-1, 6)
         noise: Array = gained.T @ gained
         return noise
-
-
-def _tilt(w: float, x: float, y: float, z: float) -> tuple[float, float]:
-    """Roll and pitch of a quaternion [rad]."""
-    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-    return roll, math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0))
-
-
-def _rotation(w: float, x: float, y: float, z: float) -> Array:
-    """The matrix (3, 3) of a quaternion, from the body to the world."""
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )

@@ -19,7 +19,10 @@ from finlab.forces.envelopes import largest_forces
 from finlab.layout import Body, Layout
 from finlab.layout.angles import wrapped
 from finlab.physics import plant_of
-from finlab.physics.vehicle import Vehicle, complete_body, quaternion_of, to_world
+from finlab.vehicle.attitude import in_world, quaternion_of
+from finlab.vehicle.body import complete_body
+from finlab.vehicle.fossen import damping_rates, damping_slopes
+from finlab.vehicle.vehicle import Vehicle
 
 AXES = [0, 1, 2, 5]
 """Surge, sway, heave and yaw among the six."""
@@ -73,11 +76,9 @@ class MotionObserver:
         U-CAT's."""
         body = complete_body(layout) if body is None else body
         self._vehicle, self._dt = Vehicle(body), period_s
+        self._dynamics = self._vehicle.dynamics
         self.inertia = np.array(self._vehicle.inertia)[AXES]
         """Mass and moment (4,) with those of the water that goes along [kg, kg m^2]."""
-        zeros = (0.0,) * 6
-        damping = np.array([body.linear_damping or zeros, body.quadratic_damping or zeros])
-        self._linear, self._quadratic = damping[:, AXES] / self.inertia
         strength = strongest_wrench(layout)[AXES] / self.inertia
         self._noise = period_s * np.concatenate(
             [
@@ -113,7 +114,7 @@ class MotionObserver:
             roll, pitch = roll + tilt * (m.roll - roll), pitch + tilt * (m.pitch - pitch)
             yaw = before.yaw + dt * float(self._state[3])
             yaw = float(wrapped(yaw + self._pose_share * float(wrapped(m.yaw - yaw))))
-            counted = before.position + dt * to_world(self._state, roll, pitch, yaw)
+            counted = before.position + dt * in_world(self._state, roll, pitch, yaw)
             position = counted + self._pose_share * (position - counted)
         self._last_velocity = m.velocity
         self._estimate = self._believed(m, position, roll, pitch, yaw)
@@ -122,15 +123,16 @@ class MotionObserver:
     def swayed(self, sway: float, surge: float, yaw_rate: float) -> float:
         """Sideways speed [m/s] a period after `sway` [m/s] by the model, in a turn [rad/s] at a speed through
         the water [m/s]."""
-        damping = float(self._linear[1]) + float(self._quadratic[1]) * abs(sway)
+        damping = damping_rates(self._dynamics, (0.0, sway, 0.0, 0.0, 0.0, 0.0))[1]
         pushed = float(self.inertia[0] / self.inertia[1]) * surge * yaw_rate
         return math.exp(-self._dt * damping) * sway - self._dt * pushed
 
     def slowed_by(self, motion: Array) -> Array:
         """Decelerations (..., 4) that the water gives motions (..., 4) through it, along surge, sway, heave
         and yaw [m/s^2, rad/s^2]."""
-        slower: Array = (self._linear + self._quadratic * np.abs(motion)) * motion
-        return slower
+        surge, sway, heave, yaw = np.moveaxis(motion, -1, 0)
+        rates = damping_rates(self._dynamics, (surge, sway, heave, 0.0, 0.0, yaw))
+        return np.stack([rates[k] for k in AXES], axis=-1) * motion
 
     def _seen(self, m: Measurement) -> Array:
         return np.array([*m.velocity.tolist(), float(m.rates[2])])
@@ -142,7 +144,9 @@ class MotionObserver:
         c, d = state[CURRENT].tolist()
         flow = state[MOTION].copy()
         flow[:2] -= cosine * c + sine * d, cosine * d - sine * c
-        kept = np.exp(-dt * (self._linear + 2.0 * self._quadratic * np.abs(flow)))
+        surge, sway, heave, yaw = flow.tolist()
+        slopes = damping_slopes(self._dynamics, (surge, sway, heave, 0.0, 0.0, yaw))
+        kept = np.exp(-dt * np.array([slopes[k] for k in AXES]))
         transition[range(4), range(4)] = kept
         carried = 1.0 - kept[:2]
         transition[0, CURRENT] = carried[0] * cosine, carried[0] * sine
@@ -175,7 +179,7 @@ class MotionObserver:
         )
         drift = np.array([slopes[7] + by_surge, slopes[8], slopes[9] + by_heave, slopes[12] + by_yaw])
         velocity, current = self._state[:3].copy(), self._state[CURRENT].copy()
-        world = to_world(velocity, roll, pitch, yaw)
+        world = in_world(velocity, roll, pitch, yaw)
         return Estimate(position, roll, pitch, yaw, velocity, r, world, current, drift)
 
 

@@ -6,7 +6,6 @@
 World: z up. Body: x forward, y left, z up. SI and radians.
 """
 
-from finlab.physics.vehicle import Vehicle as Vehicle
 from finlab.sim.closed_loop import ClosedLoop as ClosedLoop
 from finlab.sim.fin_fault import FinFault as FinFault
 from finlab.sim.log import RunLog as RunLog
@@ -29,3 +28,4 @@ from finlab.sim.water import Still as Still
 from finlab.sim.water import TurningCurrent as TurningCurrent
 from finlab.sim.water import Water as Water
 from finlab.sim.water import Waves as Waves
+from finlab.vehicle.vehicle import Vehicle as Vehicle

@@ -22,13 +22,10 @@ from finlab.control import (
     Verdict,
 )
 from finlab.control.measurement import NO_WRENCH
-from finlab.control.nominal_lag import NominalLag
 from finlab.layout import Layout
 from finlab.layout.damage import Health
 from finlab.physics import plant_of
 from finlab.physics.blade import COPPER_LOSS
-from finlab.physics.fin_motion import FinMotion, fin_power
-from finlab.physics.vehicle import STATE_SIZE, Vehicle, complete_body, quaternion_of_yaw
 from finlab.sim.fin_fault import FinFault, names_of
 from finlab.sim.hanging_fin import HangingFins
 from finlab.sim.log import RunLog, Tick, log_of_ticks
@@ -37,6 +34,11 @@ from finlab.sim.plants import make_plant
 from finlab.sim.sensors import Sensors, SensorSettings
 from finlab.sim.task import Cruise, Task
 from finlab.sim.water import Still, Water
+from finlab.vehicle.attitude import quaternion_of_yaw
+from finlab.vehicle.body import complete_body
+from finlab.vehicle.fin_lag import FinLag
+from finlab.vehicle.fin_motion import FinMotion, fin_power
+from finlab.vehicle.vehicle import STATE_SIZE, Vehicle
 
 AHEAD = 10
 """Ticks of which the allocator is told before."""
@@ -137,7 +139,7 @@ class ClosedLoop:
         self._answered: Array | None = None  # the same, before a monitor's pushes
         self.period_s = self.controller.period_s
         """Length of a step [s]."""
-        self._lag, self._gave = NominalLag(layout, self.period_s), NO_WRENCH
+        self._lag, self._gave = FinLag(layout), NO_WRENCH
         start, heading = task.start()
         self.state = np.zeros(STATE_SIZE)
         """State (13,): position (world), quaternion (w, x, y, z), velocity and rates (body); SI."""
@@ -290,7 +292,8 @@ class ClosedLoop:
         """Wrench (6,) of the fins over the last period, if they do what they were told [N, N m]."""
         if self._command is None or not self.controller.needs_given:
             return NO_WRENCH
-        motion = self._lag.step(self._command)
+        self._lag.step(self._command, self.period_s)
+        motion = self._lag.command
         force = self._plant.force(motion) * (motion[:, :1] * motion[:, 1:2] > 0.0)
         before, self._gave = self._gave, force.ravel() @ self._plant.columns.reshape(-1, 6)
         return 0.5 * (before + self._gave)

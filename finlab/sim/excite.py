@@ -21,10 +21,10 @@ from finlab.layout import Layout
 from finlab.layout.angles import wrapped
 from finlab.layout.arrays import layout_effectiveness
 from finlab.physics import plant_of
-from finlab.physics.vehicle import complete_body
 from finlab.sim.closed_loop import ClosedLoop
 from finlab.sim.sensors import SensorSettings
 from finlab.sim.water import Water
+from finlab.vehicle.body import complete_body
 
 LONGEST_S = 300.0
 """Longest swim [s]."""

@@ -16,7 +16,7 @@ from finlab.layout.angles import wrapped
 from finlab.layout.arrays import force_columns
 from finlab.physics import plant_of
 from finlab.physics.blade import Blade
-from finlab.physics.fin_motion import FinMotion
+from finlab.vehicle.fin_motion import FinMotion
 
 STILL = np.zeros(6)
 """Of a robot at rest in the water; see `FinForce.step`."""

@@ -13,8 +13,8 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.physics import plant_of
-from finlab.physics.fin_motion import FinMotion
 from finlab.sim.fin_force import STILL, MeanForce
+from finlab.vehicle.fin_motion import FinMotion
 
 MOST = 0.4
 """Largest share that is lost, at a speed far beyond that of the tip."""

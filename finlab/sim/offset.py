@@ -11,8 +11,8 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.layout import Layout
 from finlab.layout.arrays import force_columns
-from finlab.physics.fin_motion import FinMotion
 from finlab.sim.fin_force import STILL, MeanForce
+from finlab.vehicle.fin_motion import FinMotion
 
 CENTER = (-0.016, 0.012, 0.0)
 """The true centre of gravity as the layout's frame sees it [m]: 2 cm off."""

@@ -11,7 +11,8 @@ from dataclasses import replace
 from finlab.errors import LayoutError
 from finlab.layout import Body, Layout
 from finlab.layout.rules import number, numbers
-from finlab.physics.vehicle import Vehicle, complete_body
+from finlab.vehicle.body import complete_body
+from finlab.vehicle.vehicle import Vehicle
 
 MOST = 100.0
 """Largest factor."""

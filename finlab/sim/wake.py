@@ -10,9 +10,9 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.physics.fin_motion import FinMotion
 from finlab.physics.wrench import body_force
 from finlab.sim.fin_force import STILL, MeanForce
+from finlab.vehicle.fin_motion import FinMotion
 
 MOST = 0.30
 """Largest share of its thrust that a fin loses."""

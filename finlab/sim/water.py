@@ -15,7 +15,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import FinlabError
-from finlab.physics.vehicle import GRAVITY
+from finlab.vehicle.body import GRAVITY
 
 Vector = tuple[float, float, float]
 REST: Vector = (0.0, 0.0, 0.0)

@@ -8,8 +8,10 @@ from finlab.control import Foresighted, Measurement, TrackingController, Waypoin
 from finlab.control.feed_forward import wrenches_along
 from finlab.control.observer import MotionObserver
 from finlab.evaluation.method_specs import load_method_spec
-from finlab.physics.vehicle import Vehicle, complete_body, quaternion_of_yaw
 from finlab.sim import ClosedLoop, make_trajectory
+from finlab.vehicle.attitude import quaternion_of_yaw
+from finlab.vehicle.body import complete_body
+from finlab.vehicle.vehicle import Vehicle
 
 
 def test_a_body_that_is_given_it_follows_a_path_of_changing_speed() -> None:

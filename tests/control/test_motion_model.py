@@ -5,7 +5,9 @@ import pytest
 
 from finlab.control.motion_model import FIRST_FIN, MotionModel
 from finlab.layout import Layout
-from finlab.physics.vehicle import Vehicle, complete_body, euler
+from finlab.vehicle.attitude import euler
+from finlab.vehicle.body import complete_body
+from finlab.vehicle.vehicle import Vehicle
 
 
 def test_the_model_goes_where_the_vehicle_goes_and_its_slopes_are_its_own(layout_a: Layout) -> None:

@@ -11,8 +11,10 @@ from finlab.control import Measurement, MotionObserver
 from finlab.control.observer import Estimate, strongest_wrench
 from finlab.layout import FinModelSpec, Layout
 from finlab.physics import plant_of
-from finlab.physics.vehicle import Vehicle, complete_body, euler
 from finlab.sim.perturbed import perturbed
+from finlab.vehicle.attitude import euler
+from finlab.vehicle.body import complete_body
+from finlab.vehicle.vehicle import Vehicle
 
 PERIOD_S = 0.1
 

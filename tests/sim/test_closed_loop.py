@@ -13,7 +13,6 @@ from finlab.allocation.search.search_allocator import SearchAllocator
 from finlab.control import FaultMonitor, TrackingController
 from finlab.errors import DataError, FinlabError, LayoutError
 from finlab.layout import Layout, load_layout
-from finlab.physics.vehicle import ucat_body
 from finlab.sim import (
     NO_NOISE,
     ClosedLoop,
@@ -27,6 +26,7 @@ from finlab.sim import (
     make_trajectory,
 )
 from finlab.sim.log import log_of_ticks
+from finlab.vehicle.body import ucat_body
 
 
 def swum(swim: ClosedLoop, seconds: float) -> RunLog:

@@ -6,9 +6,9 @@ import pytest
 from finlab.cli import main
 from finlab.errors import DataError
 from finlab.layout import Layout, load_layout
-from finlab.physics.vehicle import euler
 from finlab.sim import RunLog, load_log
 from finlab.sim.excite import BOUNDS, ExcitingAllocator, excitation
+from finlab.vehicle.attitude import euler
 
 
 @pytest.fixture(scope="module", params=["A", "penta"])

@@ -9,8 +9,8 @@ from finlab.assets import shipped_layouts
 from finlab.layout import Layout, load_layout
 from finlab.physics import Plant
 from finlab.physics.blade import Blade
-from finlab.physics.fin_motion import FinMotion
 from finlab.sim.fin_force import FinForce, FlexibleForce, MeanForce, RippleForce, SoftFin
+from finlab.vehicle.fin_motion import FinMotion
 
 DT = 0.01
 

@@ -10,8 +10,10 @@ from finlab.allocation.allocator import Allocator
 from finlab.errors import LayoutError
 from finlab.layout import FinModelSpec, Layout, load_layout
 from finlab.physics import plant_of
-from finlab.physics.vehicle import Vehicle, complete_body, euler
 from finlab.sim import NO_NOISE, ClosedLoop, make_trajectory, perturbed
+from finlab.vehicle.attitude import euler
+from finlab.vehicle.body import complete_body
+from finlab.vehicle.vehicle import Vehicle
 
 
 def test_nothing_changed_is_the_same_robot(layout_a: Layout) -> None:

@@ -8,9 +8,9 @@ import pytest
 from finlab.arrays import Array
 from finlab.control import Measurement
 from finlab.errors import FinlabError
-from finlab.physics.vehicle import euler
 from finlab.sim import NO_NOISE, NOISE_ALONE, SensorSettings
 from finlab.sim.sensors import Sensors
+from finlab.vehicle.attitude import euler
 
 STATE = np.zeros(13)
 STATE[:4] = (1.0, 2.0, -3.0, 1.0)

@@ -9,14 +9,16 @@ import pytest
 
 from finlab import load_allocator
 from finlab.layout import Layout, load_layout
-from finlab.physics.fin_motion import FinMotion
-from finlab.physics.vehicle import Vehicle, complete_body, euler
 from finlab.sim import PLANTS, ClosedLoop, make_trajectory
 from finlab.sim.fin_force import MeanForce
 from finlab.sim.inflow import InflowForce
 from finlab.sim.offset import OffsetForce
 from finlab.sim.plants import make_plant
 from finlab.sim.wake import MOST, WakeForce
+from finlab.vehicle.attitude import euler
+from finlab.vehicle.body import complete_body
+from finlab.vehicle.fin_motion import FinMotion
+from finlab.vehicle.vehicle import Vehicle
 
 ROOT = Path(__file__).resolve().parents[2]
 TRUTHS = {f"finlab.sim.{name}" for name in ("plants", "wake", "inflow", "offset", "fin_force")}

@@ -8,8 +8,9 @@ import pytest
 
 from finlab.errors import FinlabError
 from finlab.layout import Body
-from finlab.physics.vehicle import GRAVITY, Vehicle
 from finlab.sim import Changing, SteadyCurrent, Still, TurningCurrent, Water, Waves
+from finlab.vehicle.body import GRAVITY
+from finlab.vehicle.vehicle import Vehicle
 
 PLACE = (0.7, -0.3, -1.2)
 LONG = Waves(height_m=0.3, period_s=3.0, spread_rad=0.0, components=1, seed=4)

@@ -9,7 +9,7 @@ from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
 from finlab.layout import Body, load_layout
 from finlab.layout.body import Hull
-from finlab.physics.vehicle import GRAVITY
+from finlab.vehicle.body import GRAVITY
 from webapp.scene.meshes.hull import hull_of
 from webapp.session import Session
 from webapp.session.body_edits import DYNAMICS, estimated, solid_of, water_density, with_dynamics

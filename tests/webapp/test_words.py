@@ -14,7 +14,7 @@ from finlab.analysis.score_card import quick_check
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError, LayoutError
 from finlab.layout import FinModelSpec, load_layout
-from finlab.physics.vehicle import GRAVITY
+from finlab.vehicle.body import GRAVITY
 from tests.webapp.stand_in import StandIn
 from webapp.markup.comparison import comparison_table
 from webapp.markup.corner import corner

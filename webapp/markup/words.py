@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from finlab.allocation.allocation import Allocation
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.physics.vehicle import Vehicle, complete_body
+from finlab.vehicle.body import complete_body
+from finlab.vehicle.vehicle import Vehicle
 from webapp.session.state import AXIS_WORDS, State
 
 SMALL = 0.05

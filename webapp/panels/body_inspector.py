@@ -8,7 +8,7 @@ from typing import Any
 import viser
 
 from finlab.layout import Body
-from finlab.physics.vehicle import GRAVITY
+from finlab.vehicle.body import GRAVITY
 from webapp.editables import edit
 from webapp.handles import put
 from webapp.markup.words import three_digits

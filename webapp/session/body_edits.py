@@ -14,7 +14,7 @@ from finlab.analysis.hull_hydrodynamics import (
 )
 from finlab.errors import FinlabError
 from finlab.layout import Body, Layout
-from finlab.physics.vehicle import GRAVITY
+from finlab.vehicle.body import GRAVITY
 from webapp.scene.meshes.hull import AnyHull, hull_of
 from webapp.session.state import chosen
 

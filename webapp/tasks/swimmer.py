@@ -7,9 +7,10 @@ import numpy as np
 from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
 from finlab.control import PATH_CONTROLLERS, FaultMonitor
-from finlab.physics.vehicle import Vehicle, complete_body
 from finlab.sim import Changing, ClosedLoop, RunLog, SteadyCurrent, Tick, Water, perturbed
 from finlab.sim.log import log_of_ticks
+from finlab.vehicle.body import complete_body
+from finlab.vehicle.vehicle import Vehicle
 from webapp.session.swim_plan import Plan
 from webapp.tasks.moment import FORCES, POINTS, Moment, doubted, figures_of, row_of, thinned
 from webapp.tasks.recorded import Recorded

@@ -14,7 +14,6 @@ import numpy as np
 from finlab.allocation import Allocation, Allocator
 from finlab.allocation.judging import REACHED
 from finlab.arrays import Array
-from finlab.control.nominal_lag import NominalLag
 from finlab.evaluation.progress import progress
 from finlab.evaluation.statistics.tables import Row
 from finlab.forces.envelopes import largest_forces
@@ -22,6 +21,7 @@ from finlab.layout import Layout
 from finlab.layout.angles import command_change, wrapped
 from finlab.layout.arrays import layout_effectiveness
 from finlab.physics import Plant
+from finlab.vehicle.fin_lag import FinLag
 
 TICKS, RATE = 600, 10.0
 """Length of a path, and ticks per second [Hz]: one minute."""
@@ -90,10 +90,13 @@ def rollout(allocator: Allocator, layout: Layout, path: Array, *, steady: bool) 
         previous = answers[-1].command if steady and answers else None
         answers.append(allocator.allocate(layout, wrench, previous=previous))
     command, plant = np.array([answer.command for answer in answers]), Plant(layout)
-    lag = NominalLag(layout, 1.0 / RATE)
+    lag = FinLag(layout)
     for _ in range(SETTLING):  # from rest to the first command
-        lag.step(command[0])
-    motion = np.array([lag.step(each) for each in command])
+        lag.step(command[0], 1.0 / RATE)
+    motion = np.empty_like(command)
+    for tick, each in enumerate(command):
+        lag.step(each, 1.0 / RATE)
+        motion[tick] = lag.command
     return Rollout(
         step=command_change(command),
         power=np.array([answer.power for answer in answers]),

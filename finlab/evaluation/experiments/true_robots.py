@@ -10,11 +10,11 @@ from finlab.arrays import Array
 from finlab.layout import FinModelSpec, Interaction, Jet, Layout
 from finlab.physics import TableLaw, write_table
 from finlab.physics.coupling import WIDE_AND_NARROW
-from finlab.physics.fin_motion import FinMotion
 from finlab.sim import inflow, wake
 from finlab.sim.fin_force import FinForce, FlexibleForce
 from finlab.sim.offset import ASKEW, CENTER
 from finlab.sim.plants import make_plant
+from finlab.vehicle.fin_motion import FinMotion
 
 SETTLE_S, MEAN_S = 2.0, 10.0
 """Time after which, and over which, forces are averaged that swing within the beat."""

@@ -20,8 +20,8 @@ from finlab.evaluation.plots.style import (
     picture,
 )
 from finlab.layout.angles import wrapped
-from finlab.physics.vehicle import euler
 from finlab.sim import RunLog
+from finlab.vehicle.attitude import euler
 
 FIN_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK, YELLOW)
 """Colour of each fin, in the layout's order."""

@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finlab.arrays import Array
-from finlab.fit.robot.equations import Bodies, integrate
 from finlab.fit.robot.model import RobotModel
 from finlab.fit.robot.swim import ANGLES, STEP_S
 from finlab.fit.robot.unknowns import Unknowns
 from finlab.layout.angles import wrapped
+from finlab.vehicle.fossen import Dynamics
+from finlab.vehicle.many_bodies import integrate
 
 WINDOW = 80
 """Steps of a window."""
@@ -207,8 +208,9 @@ class _Linear:
         begin = np.repeat(start[:, None], n_all, axis=1)
         for k in range(12):
             begin[k, 1 + n + k] += DIFFERENCE * START_DEVIATION[k]
-        bodies = Bodies(*(part[..., None] for part in model.bodies(unknowns, vectors)))
-        state = integrate(begin, wrench, bodies, STEP_S)
+        bodies = Dynamics(*(part[..., None] for part in model.bodies(unknowns, vectors)))
+        current = unknowns.of("current", vectors).T[..., None]
+        state = integrate(begin, wrench, bodies, current, STEP_S)
         sensed = model.sensed(unknowns, vectors, state)
         residual = _residual(windows, sensed[:, :, 0], deviation)
         weighted = _clipped(residual)
@@ -269,7 +271,8 @@ def _simulated(model: RobotModel, unknowns: Unknowns, windows: Windows, vector: 
     """What sensors see of simulated states (L, 12, W)."""
     wrench = _wrenches(model, unknowns, windows, vector[None])[:, :, 0]
     with np.errstate(all="ignore"):  # a step too far may make a robot take off
-        state = integrate(start, wrench, model.bodies(unknowns, vector[None]), STEP_S)
+        current = unknowns.of("current", vector[None]).T
+        state = integrate(start, wrench, model.bodies(unknowns, vector[None]), current, STEP_S)
         return model.sensed(unknowns, vector[None], state[:, :, None])[:, :, 0]
 
 

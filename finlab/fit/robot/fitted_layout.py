@@ -136,7 +136,8 @@ def _body(fit: RobotFit) -> Body:
     hull = None if model.layout.body is None else model.layout.body.hull
     if hull is not None:
         hull = replace(hull, center_m=tuple(np.array(hull.center_m) - _found(fit, "center")))
-    added = np.maximum(found.inertia[:, 0] - model.own_inertia, 0.0)
+    own = model.dynamics.inertia - np.array(model.body.added_mass or (0.0,) * 6)
+    added = np.maximum(found.inertia[:, 0] - own, 0.0)
     return replace(
         model.body,
         hull=hull,

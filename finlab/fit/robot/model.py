@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.fit.robot.equations import Bodies
 from finlab.fit.robot.swim import STEP_S, Swim
 from finlab.fit.robot.swing import swing_forces
 from finlab.fit.robot.unknowns import SENSORS, Unknowns, blocks_of
@@ -13,7 +12,9 @@ from finlab.layout import Layout
 from finlab.layout.arrays import force_columns
 from finlab.physics import plant_of
 from finlab.physics.coupling import WIDE_AND_NARROW, foot_velocity, inflow_terms, jet_terms, jet_ways
-from finlab.physics.vehicle import GRAVITY, complete_body
+from finlab.vehicle.body import complete_body, dynamics_of
+from finlab.vehicle.fossen import Dynamics
+from finlab.vehicle.many_bodies import Bodies
 
 TYPICAL_SPEED = np.array([0.2, 0.2, 0.2, 0.5, 0.5, 0.5])
 """At which linear and quadratic damping are compared [m/s, rad/s]."""
@@ -28,19 +29,12 @@ class RobotModel:
 
     def __init__(self, layout: Layout, swims: Sequence[Swim]) -> None:
         """Takes the robot as it is believed to be."""
-        self.layout, body, zeros = layout, complete_body(layout), (0.0,) * 6
-        assert body.mass_kg is not None and body.inertia_kgm2 is not None
-        self.body = body
-        self.own_inertia = np.array([body.mass_kg] * 3 + list(body.inertia_kgm2))
-        """Without added mass (6,)."""
-        self.inertia = self.own_inertia + np.array(body.added_mass or zeros)
-        self.linear = np.array(body.linear_damping or zeros)
-        self.quadratic = np.array(body.quadratic_damping or zeros)
-        self.weight = body.mass_kg * GRAVITY
-        self.lift = self.weight if body.buoyancy_n is None else body.buoyancy_n
-        self.center = np.array(body.center_of_buoyancy_m or (0.0, 0.0, 0.0))
-        at_speed = self.linear + self.quadratic * TYPICAL_SPEED
-        at_speed = np.maximum(at_speed, 0.1 * self.inertia * TYPICAL_SPEED)
+        self.layout, self.body = layout, complete_body(layout)
+        self.dynamics = Dynamics(*map(np.array, dynamics_of(self.body)))
+        """Of that body; arrays."""
+        known = self.dynamics
+        at_speed = known.linear + known.quadratic * TYPICAL_SPEED
+        at_speed = np.maximum(at_speed, 0.1 * known.inertia * TYPICAL_SPEED)
         doubt = DAMPING_DOUBT * np.stack([at_speed, at_speed / TYPICAL_SPEED])
         self.blocks = blocks_of(layout.names, doubt)
         plant = plant_of(layout)
@@ -106,14 +100,14 @@ class RobotModel:
 
     def bodies(self, unknowns: Unknowns, vectors: Array) -> Bodies:
         """The bodies (..., B) of B vectors (B, size)."""
-        return Bodies(
-            (self.inertia * np.exp(unknowns.of("inertia", vectors))).T,
-            np.maximum(self.linear + unknowns.of("linear", vectors), 0.0).T,
-            np.maximum(self.quadratic + unknowns.of("quadratic", vectors), 0.0).T,
-            np.full(len(vectors), self.weight),
-            self.lift + unknowns.of("lift", vectors)[:, 0],
-            (self.center + unknowns.of("buoyancy", vectors)).T,
-            unknowns.of("current", vectors).T,
+        known = self.dynamics
+        return Dynamics(
+            (known.inertia * np.exp(unknowns.of("inertia", vectors))).T,
+            np.maximum(known.linear + unknowns.of("linear", vectors), 0.0).T,
+            np.maximum(known.quadratic + unknowns.of("quadratic", vectors), 0.0).T,
+            np.full(len(vectors), known.weight),
+            known.lift + unknowns.of("lift", vectors)[:, 0],
+            (known.center + unknowns.of("buoyancy", vectors)).T,
         )
 
     def sensed(self, unknowns: Unknowns, vectors: Array, state: Array) -> Array:

@@ -13,12 +13,12 @@ from threadpoolctl import threadpool_limits
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.fit.progress import Progress, Stages, say_nothing
-from finlab.fit.robot.equations import body_velocity
 from finlab.fit.robot.estimate import DEVIATION, MOST_STEPS, Fitted, Windows, cut, fit_windows, unseen_gains
 from finlab.fit.robot.model import RobotModel
 from finlab.fit.robot.swim import ANGLES, CHANNELS, STEP_S, Swim, smoothed
 from finlab.fit.robot.unknowns import BASE, RESIDUAL, Unknowns
 from finlab.layout import Layout
+from finlab.vehicle.many_bodies import body_velocity
 
 SURE = 3.0
 """Standard errors by which what is kept must lessen the error on windows not seen."""

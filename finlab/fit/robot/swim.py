@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from finlab.arrays import Array
-from finlab.fit.robot.equations import body_rates, body_velocity
 from finlab.layout import Layout
 from finlab.layout.angles import TURN
-from finlab.physics.fin_motion import FinMotion
+from finlab.vehicle.fin_motion import FinMotion
+from finlab.vehicle.many_bodies import body_rates, body_velocity
 
 STEP_S = 0.1
 """Spacing of the grid [s]."""

@@ -26,7 +26,7 @@ from finlab.fit.robot.swim import STEP_S
 from finlab.layout import Layout
 from finlab.layout.angles import wrapped
 from finlab.physics import plant_of
-from finlab.physics.fin_motion import FinMotion
+from finlab.vehicle.fin_motion import FinMotion
 
 MOMENTS = 10
 """Moments of each step at which the fins are looked at."""

@@ -27,8 +27,9 @@ from finlab.evaluation.on_board import OnBoard
 from finlab.evaluation.report.sections.swims import slow_day_blocks, swim_blocks
 from finlab.evaluation.report.text import to_text
 from finlab.evaluation.statistics.bootstrap import Interval
-from finlab.physics.vehicle import Vehicle, complete_body
 from finlab.sim import RunLog
+from finlab.vehicle.body import complete_body
+from finlab.vehicle.vehicle import Vehicle
 
 DAYS = {day.name: day for day in HARD_DAYS}
 

@@ -8,8 +8,10 @@ import numpy as np
 from finlab.fit.robot.swim import STEP_S
 from finlab.layout import Layout
 from finlab.physics import plant_of
-from finlab.physics.fin_motion import FinMotion
-from finlab.physics.vehicle import Vehicle, complete_body, euler, quaternion_of_yaw
+from finlab.vehicle.attitude import euler, quaternion_of_yaw
+from finlab.vehicle.body import complete_body
+from finlab.vehicle.fin_motion import FinMotion
+from finlab.vehicle.vehicle import Vehicle
 
 NOISE = np.array([0.01] * 3 + [0.005] * 6 + [0.005] * 3)
 

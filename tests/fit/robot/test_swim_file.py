@@ -11,7 +11,7 @@ from finlab.errors import DataError
 from finlab.fit.robot.swim import CHANNELS, between, smoothed
 from finlab.fit.robot.swim_file import read_swim
 from finlab.layout import Layout, Servo, load_layout
-from finlab.physics.fin_motion import FinMotion
+from finlab.vehicle.fin_motion import FinMotion
 from tests.fit.robot.swims import write_csv
 
 STEPS = 400

@@ -6,8 +6,8 @@ import pytest
 from finlab.fit.robot.swim import STEP_S, replay
 from finlab.fit.robot.swing import KINDS, MOMENTS, TERMS, swing_forces
 from finlab.layout import Layout, load_layout
-from finlab.physics.fin_motion import FinMotion
 from finlab.sim.fin_force import MeanForce, RippleForce
+from finlab.vehicle.fin_motion import FinMotion
 
 
 @pytest.fixture(scope="module")

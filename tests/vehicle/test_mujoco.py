@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from finlab.layout import Body
-from finlab.physics.vehicle import STATE_SIZE, Vehicle
+from finlab.vehicle.vehicle import STATE_SIZE, Vehicle
 
 MASS, INERTIA = 19.0, (0.1574, 0.4646, 0.51151)
 DT, SECONDS, HOLD = 0.01, 60.0, 50

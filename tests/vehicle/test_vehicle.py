@@ -8,13 +8,9 @@ import pytest
 
 from finlab.errors import LayoutError
 from finlab.layout import Body, Layout
-from finlab.physics.vehicle import (
-    STATE_SIZE,
-    Vehicle,
-    complete_body,
-    euler,
-    quaternion_of_yaw,
-)
+from finlab.vehicle.attitude import euler, quaternion_of_yaw
+from finlab.vehicle.body import complete_body
+from finlab.vehicle.vehicle import STATE_SIZE, Vehicle
 
 STILL = (0.0,) * 6
 
@@ -76,7 +72,7 @@ def energy_of(vehicle: Vehicle, state: np.ndarray) -> float:
     kinetic = 0.5 * float(np.dot(vehicle.inertia, state[7:13] ** 2))
     _, _, z, qw, qx, qy, qz = state[:7]
     up = (2 * (qx * qz - qw * qy), 2 * (qy * qz + qw * qx), 1 - 2 * (qx * qx + qy * qy))
-    return kinetic + vehicle.weight * z - vehicle.lift * (z + float(np.dot(up, vehicle._center)))
+    return kinetic + vehicle.weight * z - vehicle.lift * (z + float(np.dot(up, vehicle.dynamics.center)))
 
 
 def test_energy_never_grows_without_thrust(ucat: Body) -> None:

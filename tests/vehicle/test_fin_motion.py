@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from finlab.assets import shipped_layouts
 from finlab.layout import Layout, Servo, load_layout
 from finlab.physics.blade import OWN_INERTIA, Blade
-from finlab.physics.fin_motion import FinMotion, fin_power
+from finlab.vehicle.fin_motion import FinMotion, fin_power
 
 DT = 0.01
 

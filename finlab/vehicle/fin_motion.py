@@ -1,99 +1,54 @@
-"""How fins follow their commands (second-order lag, the servo's speed limit, flapping), and their power.
+"""Fins within their beat: phase, angle, the servo's speed limit, and their power.
 
-Amplitude, frequency and zero direction each follow their command through the critically damped filters of
-`finlab.layout.Servo`. A fin that is given another frequency goes on from where it is in its beat.
+A fin that is given another frequency goes on from where it is in its beat.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Layout
-from finlab.layout.angles import TURN, is_full_turn
+from finlab.layout.angles import TURN
 from finlab.physics.blade import COPPER_LOSS, Blade
+from finlab.vehicle.fin_lag import FinLag
 
 CREEP = 0.1
 """Share of its speed that a servo turns its fin with, however fast that flaps."""
 
 
-class LagStep(NamedTuple):
-    """The exact step of critically damped filters towards aims that stay: for an error e = x - aim,
-    e <- kept e + carried x' and x' <- driven e + slowed x'."""
-
-    kept: Array
-    """Share of the error that is left."""
-    carried: Array
-    """What the rate adds to it [s]."""
-    driven: Array
-    """What the error adds to the rate [1/s]."""
-    slowed: Array
-    """Share of the rate that is left."""
-
-    @classmethod
-    def of(cls, pole: Array, dt: float) -> "LagStep":
-        """The step over `dt` [s] of filters with double poles [rad/s], of any shape."""
-        decay = np.exp(-pole * dt)
-        return cls((1.0 + pole * dt) * decay, dt * decay, -(pole**2) * dt * decay, (1.0 - pole * dt) * decay)
-
-    def follow(self, value: Array, rate: Array, aim: Array) -> tuple[Array, Array]:
-        """Values and rates after the step."""
-        error = value - aim
-        return aim + self.kept * error + self.carried * rate, self.driven * error + self.slowed * rate
-
-
-class FinMotion:
-    """Angles of the fins of one layout over time; all arrays are (n,)."""
+class FinMotion(FinLag):
+    """Angles of the fins of one layout over time, in steps much shorter than a beat; all arrays are (n,)."""
 
     def __init__(self, layout: Layout) -> None:
         """Starts at rest: no amplitude, no frequency, zero directions at the middle of their arcs."""
-        lower, upper = layout.lower[:, 2], layout.upper[:, 2]
-        self._turns_fully = is_full_turn(upper - lower)
-        self._poles = np.ascontiguousarray(layout.servo_poles.T)
+        super().__init__(layout)
         self._speed_limit = layout.speed_limit
         self._creep = CREEP * self._speed_limit
-        # Half amplitude [rad], frequency [Hz], zero direction [rad] counted on over the seam; rates per s.
-        self._value = np.zeros((3, layout.n_fins))
-        self._value[2] = 0.5 * (lower + upper)
         self._before = self._value
-        self._rate = np.zeros((3, layout.n_fins))
         self._change = np.zeros((3, layout.n_fins))
         self.phase = np.zeros(layout.n_fins)
         """Phase of the flapping [rad]."""
-        self._dt = math.nan
-        self._lag: LagStep
 
     def step(self, command: Array, dt: float) -> None:
         """Follows a command (n, 3) for `dt` [s]; a fin whose row is NaN stops at once and hangs still."""
-        if dt != self._dt:
-            self._dt, self._lag = dt, LagStep.of(self._poles, dt)
-        before, aim = self._value, command.T.copy()
-        lost = np.isnan(aim[0])
-        some_lost = bool(lost.any())
-        if some_lost:
-            aim[:, lost] = before[:, lost]
-        aim[0] = np.minimum(aim[0], self._speed_limit / (TURN * np.maximum(aim[1], 1e-9)))
-        turn = aim[2] - before[2]
-        aim[2] = before[2] + np.where(self._turns_fully, turn - TURN * np.rint(turn / TURN), turn)
-        value, rate = self._lag.follow(before, self._rate, aim)
-        swing = TURN * value[1]
+        before, rate_before = self._value, self._rate
+        lost = self._follow(command, dt)
+        value, rate = self._value, self._rate
         # What flapping leaves of the servo's speed is there to turn the fin.
-        value[0] = np.minimum(value[0], self._speed_limit / np.maximum(swing, 1e-9))
-        spare = np.maximum(self._speed_limit - value[0] * swing, self._creep)
+        spare = np.maximum(self._speed_limit - value[0] * (TURN * value[1]), self._creep)
         turned = np.minimum(np.maximum(value[2] - before[2], -spare * dt), spare * dt)
         value[2] = before[2] + turned
         rate[2] = np.minimum(np.maximum(rate[2], -spare), spare)
-        if some_lost:
-            value[:2, lost], value[2, lost], rate[:, lost] = 0.0, before[2, lost], 0.0
+        if lost is not None:
             before = np.where(lost, value, before)
         self.phase = np.mod(self.phase + (0.5 * TURN * dt) * (before[1] + value[1]), TURN)
-        self._change = (rate - self._rate) / dt
-        self._before, self._value, self._rate = before, value, rate
+        self._change = (rate - rate_before) / dt
+        self._before = before
 
     @property
     def amplitude(self) -> Array:
-        """Half amplitude [rad]; a view, and so are the next four."""
+        """Half amplitude [rad]; a view, and so are the next three."""
         amplitude: Array = self._value[0]
         return amplitude
 
@@ -102,12 +57,6 @@ class FinMotion:
         """[Hz]."""
         frequency: Array = self._value[1]
         return frequency
-
-    @property
-    def direction(self) -> Array:
-        """Zero direction [rad], counted on over the seam."""
-        direction: Array = self._value[2]
-        return direction
 
     @property
     def amplitude_rate(self) -> Array:
@@ -122,14 +71,8 @@ class FinMotion:
         return rate
 
     @property
-    def command(self) -> Array:
-        """What the fins do now, as a command (n, 3); a copy."""
-        command: Array = self._value.T.copy()
-        return command
-
-    @property
     def mean_command(self) -> Array:
-        """The same as a mean over the last step (n, 3)."""
+        """`command` as a mean over the last step (n, 3)."""
         command: Array = 0.5 * (self._before + self._value).T
         return command
 

@@ -11,7 +11,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from finlab.layout import Body, Layout
-from finlab.physics.vehicle import Vehicle, complete_body
+from finlab.vehicle.body import complete_body, dynamics_of
+from finlab.vehicle.fossen import accelerations, damping_rates, damping_slopes, jacobian
+from finlab.vehicle.vehicle import Vehicle
 
 SIGNS = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 """Of surge, sway, heave, roll, pitch, yaw under half a turn about x, from NED to FLU or back."""
@@ -108,3 +110,22 @@ def test_derivatives_agree_on_random_states(buoyancy: float | None, layout_a: La
         later = quaternion + h * ours[3:7]
         ours_later = FLIP @ Rotation.from_quat(np.roll(later, -1)).as_matrix() @ FLIP
         np.testing.assert_allclose(ours_later, rotation_of(*(eta[3:] + h * eta_rate[3:])), atol=1e-9)
+
+
+def test_the_jacobian_is_that_of_the_accelerations(layout_a: Layout) -> None:
+    """By central differences, at many states side by side; one body in plain floats agrees."""
+    rng = np.random.default_rng(2)
+    body = dynamics_of(replace(complete_body(layout_a), center_of_buoyancy_m=(0.01, -0.02, 0.05)))
+    flow = rng.uniform(-1, 1, (6, 20))
+    up, wrench, h = np.array([0.1, 0.2, 0.97]), rng.uniform(-5, 5, 6), 1e-6
+    found = np.array(jacobian(body, flow))
+    for k in range(6):
+        step = h * np.eye(6)[k][:, None]
+        ahead, behind = (np.array(accelerations(body, flow + s * step, up, up, wrench)) for s in (1, -1))
+        np.testing.assert_allclose(found[:, k], (ahead - behind) / (2 * h), atol=1e-6)
+    np.testing.assert_allclose(jacobian(body, flow[:, 3].tolist()), found[:, :, 3], atol=1e-12)
+    np.testing.assert_allclose(damping_slopes(body, flow), -found.diagonal().T, atol=1e-12)
+    still = np.zeros((6, 20))
+    still[2] = flow[2]
+    slowed = -np.array(accelerations(body, still, 0.0 * up, 0.0 * up, np.zeros(6)))[2]
+    np.testing.assert_allclose(damping_rates(body, still)[2] * flow[2], slowed, atol=1e-12)
