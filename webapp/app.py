@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import json
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import viser
@@ -62,6 +63,7 @@ class App:
         """The pages that are open, by client."""
         self._keys: dict[int, str] = {}
         self._loop = server.get_event_loop()
+        self._files = ThreadPoolExecutor(1, "finlab-sessions")
         server.scene.world_axes.visible = False
         # With the first words to a browser: it would else draw its own light and shadows before ours.
         server.scene.configure_environment_map(None)
@@ -69,15 +71,19 @@ class App:
         disable_sharing(server)
         server.on_client_connect(self._connected)
         server.on_client_disconnect(self._disconnected)
-        self._clock = asyncio.run_coroutine_threadsafe(self._animate(), self._loop)
+        self._clocks = [
+            asyncio.run_coroutine_threadsafe(run(), self._loop) for run in (self._animate, self._keep)
+        ]
 
     def stop(self) -> None:
-        """Stop the clock and the worker; the server is stopped by its owner."""
-        self._clock.cancel()
-        with contextlib.suppress(TimeoutError, RuntimeError):  # one turn of the loop, so that the clock ends
+        """Stop clocks and workers; the server is stopped by its owner."""
+        for clock in self._clocks:
+            clock.cancel()
+        with contextlib.suppress(TimeoutError, RuntimeError):  # one turn of the loop, so that they end
             asyncio.run_coroutine_threadsafe(asyncio.sleep(0.01), self._loop).result(2.0)
         self._workers.stop()
-        self._store.keep()
+        self._files.shutdown()
+        self._store.write(self._store.changed())
 
     async def _connected(self, client: viser.ClientHandle) -> None:
         """Wait for the page to say which sessions it knows; one that says nothing is dropped in time."""
@@ -90,12 +96,15 @@ class App:
         # A connection that broke may still count as open; its tab is perhaps the one that is coming back.
         rivals = [known for known, key in self._keys.items() if key in remembered]
         await asyncio.gather(*(self._drop_if_gone(rival) for rival in rivals))
+        absent, found = self._store.absent(remembered), {}
+        if absent:
+            found = await self._loop.run_in_executor(self._workers.readers.pool, self._store.read, absent)
         if client.client_id in self._server.get_clients():
-            self._open(client, remembered)
+            self._open(client, remembered, found)
 
-    def _open(self, client: viser.ClientHandle, remembered: list[str]) -> None:
+    def _open(self, client: viser.ClientHandle, remembered: list[str], found: dict[str, Session]) -> None:
         enter(client)
-        key, session = self._store.enter(remembered)
+        key, session = self._store.enter(remembered, found)
         self._keys[client.client_id] = key
         if key not in remembered:
             remembered = [key, *remembered]
@@ -120,8 +129,13 @@ class App:
         if key is not None:
             self._store.leave(key)
 
+    async def _keep(self) -> None:
+        while True:
+            await asyncio.sleep(KEEP_S)
+            await self._loop.run_in_executor(self._files, self._store.write, self._store.changed())
+
     async def _animate(self) -> None:
-        before = kept = time.monotonic()
+        before = time.monotonic()
         while True:
             await asyncio.sleep(FRAME_S)
             now = time.monotonic()
@@ -129,9 +143,6 @@ class App:
                 # A long pause (a busy machine) must not become a leap of the robots.
                 view.scenery.animate(min(now - before, 0.2))
             before = now
-            if now - kept > KEEP_S:
-                kept = now
-                self._store.keep()
 
 
 def _session_keys(text: str | None) -> list[str]:

@@ -92,7 +92,7 @@ def test_session_survives_the_server(tmp_path: Path) -> None:
     for life in range(2):
         server = start_server()
         app = App(server, Solver(load=load_stand_in), layout, folder=tmp_path)
-        key, session = app._store.enter(keys)
+        key, session = app._store.enter(keys, app._store.read(keys))
         if life == 0:
             keys.append(key)
             session.set_target(1, 0.5)
@@ -134,6 +134,6 @@ def test_kept_files_are_checked(tmp_path: Path) -> None:
         path.write_text(text)
         assert not files.read("a" * 16, fresh())
     store = SessionStore(lambda: Session(load_layout(shipped_layouts()["A"])), files)
-    assert store.enter(["a" * 16])[1].state.layout.name == "A", (
+    assert store.enter(["a" * 16], store.read(["a" * 16]))[1].state.layout.name == "A", (
         "a broken file costs the session, not the page"
     )

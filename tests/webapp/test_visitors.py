@@ -67,7 +67,7 @@ def test_hundred_pages_one_after_the_other_and_eighty_at_once(app: App) -> None:
     one_by_one, at_once = asyncio.run(come())
     assert all(one_by_one) and all(at_once)
     until(lambda: not app.views)
-    app._store.keep()
+    app._store.changed()
     assert len(app._store._sessions) <= store.MOST_WAITING and not app._keys
 
 
@@ -78,10 +78,13 @@ def test_more_sessions_than_are_kept_come_back_from_files(tmp_path: Path) -> Non
         key, session = sessions.enter([])
         session.set_target(0, 0.001 * k)
         sessions.leave(key)
+        sessions.write(sessions.changed())
         keys.append(key)
     assert len(sessions._sessions) <= store.MOST_WAITING
-    assert sessions.enter([keys[99]])[1].state.target[0] == pytest.approx(0.099)
-    assert sessions.enter([keys[40]])[1].state.target[0] == pytest.approx(0.04)
+    for k in (99, 40):
+        found = sessions.read(sessions.absent([keys[k]]))
+        assert sessions.enter([keys[k]], found)[1].state.target[0] == pytest.approx(0.001 * k)
+        assert (keys[k] in found) == (k == 40)
     opened = [sessions.enter([])[1] for _ in range(100)]
     assert len({id(session) for session in opened}) == 100, "as many as have a page"
 
@@ -96,7 +99,7 @@ def test_sessions_are_forgotten_after_a_time(monkeypatch: pytest.MonkeyPatch) ->
     assert sessions.enter([key])[1] is session, "a page that comes back in time has it"
     sessions.leave(key)
     time.sleep(0.01)
-    sessions.keep()
+    sessions.changed()
     assert sessions.enter([key])[1] is not session
 
 

@@ -1,5 +1,6 @@
 """Sessions on disk, so that a browser finds its work again after the server was restarted."""
 
+import copy
 import json
 import os
 import re
@@ -70,14 +71,20 @@ class SessionFiles:
             path.unlink(missing_ok=True)
 
 
+def frozen(session: Session) -> Session:
+    """A session as it is now, to be written while it goes on."""
+    kept, history = copy.copy(session), copy.copy(session.history)
+    history.past, history.future = history.past[-MAX_STEPS:], history.future[-MAX_STEPS:]
+    kept.history = history
+    return kept
+
+
 def to_dict(session: Session) -> dict[str, Any]:
     """A session as plain values. Layouts are written once each, however many steps share them."""
-    layouts: list[Layout] = []
+    layouts: dict[Layout, int] = {}
 
     def place(layout: Layout) -> int:
-        if layout not in layouts:
-            layouts.append(layout)
-        return layouts.index(layout)
+        return layouts.setdefault(layout, len(layouts))
 
     def plain(state: State) -> dict[str, Any]:
         return {
