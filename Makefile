@@ -21,7 +21,7 @@ help:
 	@echo "make format       let ruff mend what it can"
 	@echo "make checkpoint   train what is shipped, PRESET=default or PRESET=paper (hours)"
 	@echo "make     the app in a real browser: a random walk over every control, and how quick it is"
-	@echo "make wheel-check  build the wheel, install it in an empty environment and try it there"
+	@echo "make wheel-check  build the wheel, install it in an empty environment of each Python here and try it"
 
 setup: $(STAMP)
 

@@ -21,7 +21,7 @@ def app(
         port: port to listen on.
     """
     from finlab.assets import webapp_dir
-    from finlab.distribution import EXTRAS, install
+    from finlab.distribution import install
     from finlab.errors import FinlabError
 
     # In a wheel it travels inside this package: an installation has no top-level package of so plain a name.
@@ -30,7 +30,7 @@ def app(
     try:
         from webapp.serving import serve
     except ModuleNotFoundError as error:
-        if error.name not in EXTRAS:
+        if str(error.name).split(".")[0] in ("finlab", "webapp"):
             raise
         raise FinlabError(
             f"the web app needs {error.name!r}, which is not installed; run: {install('app')}"

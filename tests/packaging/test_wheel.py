@@ -1,5 +1,6 @@
 """The wheel carries everything a user needs, and works from any folder. Building needs no network."""
 
+import ast
 import email
 import os
 import re
@@ -7,12 +8,17 @@ import subprocess
 import sys
 import tomllib
 import zipfile
+from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+
+from finlab.distribution import EXTRAS, NAME
 
 ROOT = Path(__file__).resolve().parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 CORE = {"numpy", "scipy", "pyyaml", "safetensors", "threadpoolctl", "tyro", "tqdm"}
 
 
@@ -23,76 +29,11 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
-    return next(folder.glob("finlab-*.whl"))
+    return next(folder.glob(f"{NAME.replace('-', '_')}-*.whl"))
 
 
 @pytest.fixture(scope="module")
-def unpacked(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel's contents in a folder of their own, as an installation would place them."""
-    folder = tmp_path_factory.mktemp("site")
-    zipfile.ZipFile(wheel).extractall(folder)
-    return folder
-
-
-def name_of(requirement: str) -> str:
-    """The package that a requirement such as `viser>=1.1.1,<1.2` asks for."""
-    return re.split(r"[<>=!~ ;\[]", requirement)[0].lower().replace("_", "-")
-
-
-def run(unpacked: Path, cwd: Path, *argv: str) -> subprocess.CompletedProcess[str]:
-    """Run the unpacked package, not the tree's, in another folder."""
-    environment = os.environ | {"PYTHONPATH": str(unpacked)}
-    command = [sys.executable, *argv]
-    return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, timeout=120)
-
-
-def test_carries_library_app_layouts_and_checkpoints(wheel: Path) -> None:
-    names = set(zipfile.ZipFile(wheel).namelist())
-    for path in ROOT.glob("layouts/*.yaml"):
-        assert f"finlab/shipped/layouts/{path.name}" in names
-    for name in ("model.safetensors", "config.json"):
-        assert f"finlab/shipped/checkpoints/default/{name}" in names
-    for name in ("finlab/py.typed", "finlab/deploy/graph.schema.json", "finlab/layout/layout.schema.json"):
-        assert name in names
-    for name in ("problems.npz", "problems.md", "problems.schema.json", "results.json"):
-        assert f"finlab/bench/{name}" in names
-    assert "webapp/app.py" in names
-
-
-def test_carries_nothing_else(wheel: Path) -> None:
-    archive = zipfile.ZipFile(wheel)
-    tops = {name.split("/")[0] for name in archive.namelist()}
-    assert {top for top in tops if not top.endswith(".dist-info")} == {"finlab", "webapp"}
-    assert not [n for n in archive.namelist() if n.endswith((".pt", ".pth", ".pkl", ".pyc"))]
-    assert sum(info.file_size for info in archive.infolist()) < 40 * 2**20
-
-
-def test_asks_for_the_core_and_offers_extras(wheel: Path) -> None:
-    archive = zipfile.ZipFile(wheel)
-    name = next(n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
-    about = email.message_from_bytes(archive.read(name))
-    required = [line for line in about.get_all("Requires-Dist", []) if "extra ==" not in line]
-    assert {name_of(line) for line in required} == CORE
-    extras = {"train", "app", "urdf", "ipopt", "plot", "fit", "test", "dev"}
-    assert extras == set(about.get_all("Provides-Extra", []))
-
-
-def test_installed_package_finds_its_own_layouts_and_checkpoints(unpacked: Path, tmp_path: Path) -> None:
-    code = "from finlab.assets import *; print(layouts_dir()); print(checkpoint_path())"
-    done = run(unpacked, tmp_path, "-c", code)
-    assert done.returncode == 0, done.stderr
-    assert all(line.startswith(str(unpacked)) for line in done.stdout.splitlines())
-
-
-def test_installed_package_allocates_from_any_folder(unpacked: Path, tmp_path: Path) -> None:
-    wrench = ["--wrench", "1", "0", "0.5", "0", "0", "0.1"]
-    done = run(unpacked, tmp_path, "-m", "finlab", "allocate", "A", *wrench, "--json")
-    assert done.returncode == 0, done.stderr
-    assert '"checkpoint": null' in done.stdout and '"method": "search"' in done.stdout
-
-
-@pytest.fixture(scope="module")
-def bare(unpacked: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def bare(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Python of an empty environment with the wheel and what it requires without extras.
 
     What it requires is linked from this environment, so that no network is needed.
@@ -100,20 +41,37 @@ def bare(unpacked: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("bare") / "venv"
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True, timeout=120)
     site = next(folder.glob("lib/python3*/site-packages"))
-    waiting, seen = sorted(CORE), set()
-    while waiting:
-        name = waiting.pop()
-        if name in seen:
-            continue
-        seen.add(name)
+    for name in with_requirements(CORE):
         found = metadata.distribution(name)
         for file in found.files or ():
             if file.parts[0] not in ("..", "__pycache__") and not (site / file.parts[0]).exists():
                 os.symlink(Path(str(found.locate_file(file.parts[0]))), site / file.parts[0])
-        waiting += [name_of(line) for line in found.requires or () if ";" not in line]
-    for path in unpacked.iterdir():
-        os.symlink(path, site / path.name)
+    zipfile.ZipFile(wheel).extractall(site)
     return folder / "bin" / "python"
+
+
+def normal(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def with_requirements(names: set[str]) -> set[str]:
+    """Names of distributions and of all that they require without extras."""
+    waiting, seen = set(names), set[str]()
+    while waiting:
+        seen.add(name := waiting.pop())
+        lines = map(Requirement, metadata.distribution(name).requires or ())
+        needed = {normal(line.name) for line in lines if line.marker is None or line.marker.evaluate()}
+        waiting |= needed - seen
+    return seen
+
+
+def declared(*extras: str) -> set[str]:
+    """Names of what the project requires, with extras and the extras that these name."""
+    lines = [Requirement(line) for line in PROJECT["dependencies"]]
+    for extra in extras:
+        lines += map(Requirement, PROJECT["optional-dependencies"][extra])
+    inside = {extra for line in lines if line.name == NAME for extra in line.extras} - set(extras)
+    return declared(*extras, *inside) if inside else {normal(line.name) for line in lines} - {NAME}
 
 
 def bare_run(bare: Path, cwd: Path, *argv: str) -> subprocess.CompletedProcess[str]:
@@ -123,15 +81,70 @@ def bare_run(bare: Path, cwd: Path, *argv: str) -> subprocess.CompletedProcess[s
     )
 
 
-def test_without_extras_torch_is_absent_and_missed_in_a_sentence(bare: Path, tmp_path: Path) -> None:
+def test_carries_library_app_layouts_and_checkpoints_and_nothing_else(wheel: Path) -> None:
+    archive = zipfile.ZipFile(wheel)
+    names = set(archive.namelist())
+    for path in ROOT.glob("layouts/*.yaml"):
+        assert f"finlab/shipped/layouts/{path.name}" in names
+    for name in ("model.safetensors", "config.json"):
+        assert f"finlab/shipped/checkpoints/default/{name}" in names
+    for package in ("finlab", "webapp"):  # sources and all that lies beside them
+        for path in (ROOT / package).rglob("*"):
+            if path.is_file() and path.suffix != ".pyc":
+                inside = path.relative_to(ROOT).as_posix()
+                assert ("finlab/shipped/" if package == "webapp" else "") + inside in names
+    tops = {name.split("/")[0] for name in names}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {"finlab"}
+    assert not [n for n in names if n.endswith((".pt", ".pth", ".pkl", ".pyc"))]
+    assert sum(info.file_size for info in archive.infolist()) < 40 * 2**20
+
+
+def test_asks_for_the_core_and_offers_extras(wheel: Path) -> None:
+    archive = zipfile.ZipFile(wheel)
+    name = next(n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
+    about = email.message_from_bytes(archive.read(name))
+    assert about["Name"] == NAME == PROJECT["name"]
+    required = [line for line in about.get_all("Requires-Dist", []) if "extra ==" not in line]
+    assert {normal(Requirement(line).name) for line in required} == CORE
+    extras = {"train", "app", "urdf", "ipopt", "plot", "fit", "all", "test", "dev"}
+    assert extras == set(about.get_all("Provides-Extra", []))
+    assert set(EXTRAS.values()) <= extras
+
+
+def imported(package: str) -> Iterator[str]:
+    """Names of the packages that a package's files import."""
+    for path in (ROOT / package).rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [str(node.module)] if isinstance(node, ast.ImportFrom) else []
+            yield from (name.split(".")[0] for name in names)
+
+
+@pytest.mark.parametrize(("package", "extra"), [("finlab", "all"), ("webapp", "app")])
+def test_what_is_imported_is_required(package: str, extra: str) -> None:
+    known = with_requirements(declared(extra))
+    home = metadata.packages_distributions()
+    foreign = set(imported(package)) - sys.stdlib_module_names - {"finlab", "webapp"}
+    missing = {name for name in foreign if not {normal(each) for each in home[name]} & known}
+    assert not missing, f"name them in the extra {extra} of pyproject.toml"
+
+
+def test_installed_package_finds_its_own_files(bare: Path, tmp_path: Path) -> None:
+    code = "from finlab.assets import *; print(layouts_dir(), checkpoint_path(), webapp_dir(), sep='\\n')"
+    done = bare_run(bare, tmp_path, "-c", code)
+    assert done.returncode == 0, done.stderr
+    site = next(bare.parents[1].glob("lib/python3*/site-packages"))
+    assert all(line.startswith(str(site)) for line in done.stdout.splitlines())
+    assert bare_run(bare, tmp_path, "-c", "import webapp").returncode == 1
+
+
+def test_without_extras_what_needs_one_says_so_in_a_sentence(bare: Path, tmp_path: Path) -> None:
     for name in ("torch", "viser", "matplotlib", "pytest"):
         assert bare_run(bare, tmp_path, "-c", f"import {name}").returncode == 1
-    done = bare_run(bare, tmp_path, "-m", "finlab", "train", "surrogate", "-o", "out", "--preset", "smoke")
-    assert done.returncode == 2
-    assert done.stderr == (
-        "finlab: error: training needs PyTorch, which cannot be imported (No module named 'torch'); "
-        "run: pip install 'finlab-marine[train]'\n"
-    )
+    for extra, words in {"train": "train surrogate -o out --preset smoke", "app": "app"}.items():
+        done = bare_run(bare, tmp_path, "-m", "finlab", *words.split())
+        assert done.returncode == 2 and done.stderr.count("\n") == 1
+        assert done.stderr.endswith(f"run: pip install '{NAME}[{extra}]'\n")
 
 
 def test_without_extras_every_method_but_ipopt_allocates(bare: Path, tmp_path: Path) -> None:
@@ -143,19 +156,16 @@ def test_without_extras_every_method_but_ipopt_allocates(bare: Path, tmp_path: P
         "    if name != 'ipopt':\n"
         "        result = finlab.load_allocator(name).allocate(layout, [1, 0, 0.5, 0, 0, 0.1])\n"
         "        assert result.err_norm < {'paper': 0.1, 'qp': 1.0}.get(name, 0.01), name\n"
-        "        print(name)\n"
         "assert 'torch' not in sys.modules\n"
     )
     done = bare_run(bare, tmp_path, "-c", code)
     assert done.returncode == 0, done.stderr
-    assert len(done.stdout.splitlines()) == 9
 
 
 def test_without_extras_it_simulates_evaluates_and_exports(bare: Path, tmp_path: Path) -> None:
     for line in (
         "simulate A --duration 12",
         "eval wrench --split id --layouts 2 --targets 3 --methods search,paper,sqp",
-        "layout check ucat",
         "bench analytic --quick --sets paper",
         "export mixed -o robot --objective effort",
     ):
@@ -175,9 +185,14 @@ def test_the_lines_of_the_readme_run_from_any_folder(bare: Path, tmp_path: Path)
 
 def test_constraints_pin_everything_exactly() -> None:
     lines = (ROOT / "constraints.txt").read_text().splitlines()
-    pins = dict(line.split("==") for line in lines if line and not line.startswith("#"))
-    assert pins["torch"] == "2.13.0"
-    assert pins["viser"] == "1.1.1"
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    wanted = [*project["dependencies"], *(r for rs in project["optional-dependencies"].values() for r in rs)]
-    assert {name_of(line) for line in wanted} <= set(pins)
+    pins = {normal(line.split("==")[0]) for line in lines if line and not line.startswith("#")}
+    assert all("==" in line for line in lines if not line.startswith("#"))
+    assert declared("dev") <= pins
+
+
+def test_every_place_tells_the_same_version() -> None:
+    import yaml
+
+    import finlab
+
+    assert yaml.safe_load((ROOT / "CITATION.cff").read_text())["version"] == finlab.__version__
