@@ -4,7 +4,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.bench.problems import KINDS
-from finlab.evaluation.experiments.steadiness import smooth_path
+from finlab.evaluation.smooth_paths import smooth_path
 from finlab.forces.envelopes import largest_forces
 from finlab.forces.fin_sets import FinSets
 from finlab.forces.nearest import nearest_along

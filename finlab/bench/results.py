@@ -9,7 +9,7 @@ from typing import Any
 from finlab import __version__
 from finlab.bench.problems import Problems
 from finlab.errors import DataError
-from finlab.evaluation.experiments.latency import machine
+from finlab.evaluation.report.provenance import machine
 from finlab.whole_file import write_whole
 
 FORMAT, VERSION = "finlab-bench-results", 2

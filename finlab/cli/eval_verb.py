@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import json as json_text
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,13 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 from tyro.conf import Positional, arg
 from tyro.extras import SubcommandApp
 
+from finlab.cli.json_file import JsonFile, check_json_file, put_json
 from finlab.errors import DataError
 
 if TYPE_CHECKING:
     from finlab.evaluation.experiment import Experiment
-
-JSON = "file for the rows, {'rows': [...]}; - prints them in place of the table."
-PICTURE = "file for a picture of the rows, .png or .svg."
 
 
 def add_experiments(verbs: SubcommandApp, argv: Sequence[str]) -> Sequence[str]:
@@ -56,25 +53,18 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
 
     def verb(**given: Any) -> None:
         json, picture = given.pop("json"), given.pop("picture", None)
-        _check_file("json", json)
-        _check_file("picture", picture)
+        check_json_file(json)
         chosen = {name: _parsed(name, options[name], value) for name, value in given.items()}
         rows = experiment.rows(**chosen)
-        content = json_text.dumps({"rows": rows}, indent=1, allow_nan=False)
-        if json is not None and json != Path("-"):
-            from finlab.whole_file import write_whole
-
-            write_whole(json, content + "\n", DataError)
         if picture is not None and experiment.draw is not None:
             experiment.draw(rows).save(picture)
-        print(content if json == Path("-") else to_text(*experiment.words(), *experiment.results(rows)))
+        put_json({"rows": rows}, json, to_text(*experiment.words(), *experiment.results(rows)))
 
     shown = {name: _shown(each) for name, each in options.items()}
-    files = {"json": JSON} | ({"picture": PICTURE} if experiment.draw is not None else {})
-    for name, words in files.items():
-        kind = Annotated[Path | None, arg(metavar="FILE", help=words)]
-        how = inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind)
-        shown[name] = how
+    shown["json"] = _file("json", JsonFile, "file for the rows, {'rows': [...]}; the rows alone without one")
+    if experiment.draw is not None:
+        kind = Annotated[Path | None, arg(metavar="FILE")]
+        shown["picture"] = _file("picture", kind, "file for a picture of the rows (PNG)")
     arguments = inspect.cleandoc(experiment.run.__doc__ or "").partition("Args:")[2].partition("\n\n")[0]
     verb.__doc__ = f"{experiment.question}\n\nArgs:{arguments}"
     verb.__signature__ = inspect.Signature(list(shown.values()))  # type: ignore[attr-defined]
@@ -107,18 +97,17 @@ def _parsed(name: str, option: inspect.Parameter, value: Any) -> Any:
     if not is_list(option.annotation) or value is None:
         return value
     words = [word.strip() for word in value.split(",") if word.strip()]
-    kind, what = (
-        plain_type(option.annotation),
-        "whole numbers" if plain_type(option.annotation) is int else "names",
-    )
-    wrong = [word for word in words if kind is int and not word.isdecimal()]
-    if wrong or not words:
-        got = wrong[0] if wrong else value
-        raise DataError(f"{name.replace('_', '-')}: expected {what} with commas between, got {got!r:.60}")
-    return tuple(dict.fromkeys(kind(word) for word in words))
+    kind = plain_type(option.annotation)
+    try:
+        if words:
+            return tuple(dict.fromkeys(kind(word) for word in words))
+    except ValueError:
+        pass
+    what = "names" if kind is str else "numbers"
+    raise DataError(f"{name.replace('_', '-')}: expected {what} with commas between, got {value!r:.60}")
 
 
-def _check_file(option: str, path: Path | None) -> None:
-    """Refuse a file that cannot be written before the work, not after it."""
-    if path is not None and (path.is_dir() or not path.absolute().parent.is_dir()):
-        raise DataError(f"{option}: expected a file in an existing folder, got {path}")
+def _file(name: str, kind: Any, words: str) -> inspect.Parameter:
+    """An option for a file that is written."""
+    told = Annotated[kind, arg(help=words)]
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=told)

@@ -22,6 +22,7 @@ EXAMPLES = {
     "train surrogate": "finlab train surrogate -o runs/surrogate --preset smoke",
     "train allocator": "finlab train allocator --surrogate runs/surrogate -o runs/paper --preset smoke",
     "eval": "finlab eval wrench --split id --layouts 10 --targets 10 --methods search,sqp",
+    "eval report": "finlab eval report -o runs/report --quick",
     "bench": "finlab bench search analytic --quick --json bench.json",
     "fit": "finlab fit fin cell.csv -o fin.csv",
     "fit fin": "finlab fit fin cell.csv -o fin.csv",
@@ -61,7 +62,7 @@ def help_page(argv: Sequence[str], write: Callable[[], int]) -> tuple[int, str]:
 def example(argv: Sequence[str]) -> str:
     """The example of the verb that arguments begin with."""
     words = [word for word in argv if not word.startswith("-")]
-    if words[:1] == ["eval"] and len(words) > 1:
+    if words[:1] == ["eval"] and len(words) > 1 and " ".join(words[:2]) not in EXAMPLES:
         return f"finlab eval {words[1]} --json rows.json"
     names = (" ".join(words[:count]) for count in range(len(words), -1, -1))
     return next(EXAMPLES[name] for name in names if name in EXAMPLES)

@@ -102,7 +102,7 @@ def _loss_row(loss: Loss, worst: bool) -> tuple[str, ...]:
 
 def table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
     """Rows under a head; the first column and a last one of words are flush left, numbers are flush right."""
-    from finlab.evaluation.statistics.tables import aligned
+    from finlab.evaluation.report.text import aligned
 
     words = [k == 0 or name in ("lost", "model") for k, name in enumerate(head)]
     return aligned(head, rows, words).splitlines()

@@ -17,7 +17,13 @@ from finlab.evaluation.plots.style import Picture
 from finlab.evaluation.report.document import Block, Column, Figure, Row, Table
 
 EXPERIMENTS = {
-    "wrench": "wrench_tracking",
+    "wrench": "wrench",
+    "cost": "cost",
+    "unreachable": "unreachable",
+    "sequences": "sequences",
+    "latency": "latency",
+    "ablation": "ablation",
+    "temperature": "temperature",
 }
 """Name -> module in `finlab.evaluation.experiments`, in the order of the report."""
 
@@ -35,9 +41,10 @@ class Experiment:
     `<key>_interval`."""
     run: Callable[..., list[Row]]
     """From keyword options to rows of plain values. The options of the verb are its parameters: their types
-    (int, float, bool, str, Literal, a tuple of str or int, each perhaps None), their defaults and their words
-    under `Args` in its docstring. An int whose default is 0 may be 0, any other is at least 1. A parameter
-    `layout` is given by position. Times depend on the machine; all other values on the options alone."""
+    (int, float, bool, str, Literal, a tuple of str, int or float, each perhaps None), their defaults and
+    their words under `Args` in its docstring. An int whose default is 0 may be 0, any other is at least 1. A
+    parameter `layout` is given by position. Times depend on the machine; all other values on the options
+    alone."""
     note: str = ""
     """How the columns are to be read, in Markdown."""
     quick: Mapping[str, Any] = field(default_factory=dict)

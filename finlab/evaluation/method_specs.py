@@ -1,19 +1,17 @@
 """Methods as users specify them: a name, with a number of starts or an objective behind it: `ipopt-32`."""
 
-import hashlib
 import re
-from dataclasses import dataclass
+from collections.abc import Iterable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from finlab.allocation.allocator import Allocator
 from finlab.allocation.baselines.ipopt import IpoptSettings
-from finlab.allocation.methods import LEARNED, load_allocator
+from finlab.allocation.methods import load_allocator
 from finlab.errors import AllocationError
 from finlab.evaluation.ahead import AnalyticAhead
 from finlab.evaluation.on_board import OnBoard
-from finlab.inference.checkpoint import read_checkpoint, read_normalization, resolve_checkpoint
 from finlab.physics.objective import Name
 
 SLOW = ("ipopt",)
@@ -22,22 +20,11 @@ QUICK = ("search", "mdn", "paper", "qp", "sqp", "analytic")
 """Methods that run on every target."""
 OWN = (OnBoard, AnalyticAhead)
 """Methods that are for comparison alone."""
+PATIENCE_S = 60.0
+"""Processor time [s] that a target may take where answers count and not times; starts and steps end every
+method long before."""
 _WITH_STARTS = re.compile(r"(\w+)-(\d+)")
 _WITH_OBJECTIVE = re.compile(r"(\w+)-(power|effort)")
-
-
-@dataclass(frozen=True)
-class Checkpoints:
-    """The checkpoints under test: names of shipped ones, or folders."""
-
-    default: str | None = None
-    """Of method `mdn`, which also gives the yardstick of the others."""
-    paper: str | None = None
-    """Of method `paper`."""
-
-    def of(self, method: str) -> str | None:
-        """The checkpoint of a method."""
-        return self.paper if method == "paper" else self.default
 
 
 def is_slow(name: str) -> bool:
@@ -51,13 +38,37 @@ def installed_methods() -> list[str]:
 
 
 def load_method_specs(
-    names: str, checkpoint: str | Path | None = None, objective: Name | None = None
+    names: str | Iterable[str],
+    checkpoint: str | Path | None = None,
+    objective: Name | None = None,
+    *,
+    patient: bool = False,
 ) -> dict[str, Allocator]:
-    """Allocators by name, from names with commas between; `AllocationError` where there is none."""
-    each = dict.fromkeys(name.strip() for name in names.split(",") if name.strip())
+    """Allocators by name, in the order of the names.
+
+    Args:
+        names: of methods, as in `load_method_spec`; as one text with commas between.
+        checkpoint: as in `load_method_spec`.
+        objective: as in `load_method_spec`.
+        patient: whether methods that stop after a time get `PATIENCE_S` for each target, so that the same
+            question has the same answer on a busy machine.
+
+    Raises:
+        AllocationError: no name, or as in `load_method_spec`.
+    """
+    listed = names.split(",") if isinstance(names, str) else names
+    each = dict.fromkeys(name.strip() for name in listed if name.strip())
     if not each:
         raise AllocationError(f"methods: expected names with commas between (search,paper), got {names!r}")
-    return {name: load_method_spec(name, checkpoint, objective) for name in each}
+    found = {name: load_method_spec(name, checkpoint, objective) for name in each}
+    if not patient:
+        return found
+    return {
+        name: method.with_settings(time_limit_s=PATIENCE_S)
+        if "time_limit_s" in method.option_names()
+        else method
+        for name, method in found.items()
+    }
 
 
 def load_method_spec(
@@ -92,22 +103,6 @@ def load_method_spec(
     allocator = load_allocator(method, checkpoint=checkpoint, **options)
     chooses = objective is not None and "objective" in allocator.option_names()
     return allocator.with_settings(objective=objective) if chooses else allocator
-
-
-def fingerprint(name: str, checkpoint: str | Path | None = None) -> str:
-    """What a method's answers depend on besides its settings: the weights' SHA-256 for a learned method,
-    a digest of the normalization for the others."""
-    method = method_and_starts(name)[0]
-    path = resolve_checkpoint(checkpoint or ("paper" if method == "paper" else "default"))
-    if method in LEARNED:
-        return read_checkpoint(path).sha256
-    return hashlib.sha256(b"".join(values.tobytes() for values in read_normalization(path))).hexdigest()
-
-
-def surrogate_fingerprint(checkpoint: str | Path) -> str:
-    """Digest of a checkpoint's surrogate alone, which stays the same while the network learns on."""
-    state = read_checkpoint(resolve_checkpoint(checkpoint)).surrogate
-    return hashlib.sha256(b"".join(state[key].tobytes() for key in sorted(state))).hexdigest()
 
 
 def method_and_starts(name: str) -> tuple[str, int | None]:

@@ -12,7 +12,7 @@ from finlab.bench import problems as module
 from finlab.bench.generate import SEED, make_problems
 from finlab.bench.problems import FILE, KINDS, Problems, open_problems, save_problems
 from finlab.errors import DataError
-from finlab.evaluation.experiments.unreachable import Judge
+from finlab.evaluation.ipopt_reach import IpoptReach
 from finlab.physics import plant_of
 
 BEYOND = KINDS.index("beyond-1.2")
@@ -40,10 +40,10 @@ def test_best_errors_are_what_ipopt_finds(shipped: Problems) -> None:
     assert (asked.best_error[asked.kind == 0] == 0.0).all()
     for set_ in ("paper", "limits", "big"):  # tiny forces are below what IPOPT allows constraints to miss
         robot = next(k for k, robot in enumerate(shipped.robots) if robot.set == set_)
-        judge = Judge(shipped.layout(robot), shipped.sigma(robot))
+        reach = IpoptReach(shipped.layout(robot), shipped.sigma(robot))
         for row in np.flatnonzero((asked.robot == robot) & (asked.kind >= BEYOND)):
             wanted = asked.wrench[row] / shipped.sigma(robot)
-            least = judge.least_error(wanted, np.ones(6, dtype=bool))
+            least = reach.least_error(wanted, np.ones(6, dtype=bool))
             assert asked.best_error[row] == pytest.approx(least, abs=1e-3 * np.linalg.norm(wanted))
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from finlab.errors import AllocationError
-from finlab.evaluation.method_specs import fingerprint, is_slow, load_method_spec, load_method_specs
+from finlab.evaluation.method_specs import is_slow, load_method_spec, load_method_specs
 
 
 @pytest.mark.parametrize("name", ["search", "analytic", "sqp"])
@@ -44,7 +44,3 @@ def test_starts() -> None:
 def test_names_that_are_none(names: str, message: str) -> None:
     with pytest.raises(AllocationError, match=message):
         load_method_specs(names)
-
-
-def test_fingerprints_tell_networks_apart_from_yardsticks() -> None:
-    assert fingerprint("search") == fingerprint("analytic") != fingerprint("mdn") != fingerprint("paper")

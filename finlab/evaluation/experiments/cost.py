@@ -1,9 +1,6 @@
-"""What methods cost under exact tracking, over the best of many random starts: power in watts, or effort.
+"""What methods cost under exact tracking, over the best of many random starts: power in watts, or effort."""
 
-Both sides must deliver the wrench; a target that either of them misses is counted and left out of the ratio.
-"""
-
-from collections.abc import Mapping
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +9,14 @@ from finlab.allocation.allocator import Allocator
 from finlab.arrays import Array
 from finlab.errors import DataError
 from finlab.evaluation.cheapest_commands import CheapestCommands, has_formulas
+from finlab.evaluation.experiment import Experiment
+from finlab.evaluation.method_specs import load_method_specs
+from finlab.evaluation.plots.dots import draw_dots
+from finlab.evaluation.plots.style import Picture
 from finlab.evaluation.progress import progress
+from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.splits import SPLITS, Case, make_split
 from finlab.evaluation.statistics.bootstrap import ratio_interval
-from finlab.evaluation.statistics.recheck import known_by_hand, wrench_by_hand
-from finlab.evaluation.statistics.tables import Row
 from finlab.evaluation.symmetric_cases import SETS, symmetric_cases
 from finlab.physics import plant_of
 from finlab.physics.objective import Name, Objective
@@ -25,112 +25,93 @@ TRACKED = 1e-3
 """Normalized error up to which a method counts as delivering a target."""
 CHEAPER = 1.0 - 1e-4
 """Cost over the reference's below which a method has won."""
-OBJECTIVES: tuple[Name, ...] = ("power", "effort")
-"""What may be kept least."""
 UNITS = {"power": "W", "effort": "J_en"}
-"""What a cost is counted in."""
+"""What may be kept least, and what its cost is counted in."""
 
 
-def cost_sets(split: str) -> list[str]:
-    """The sets of cases that a name stands for, one or `all`; `DataError` for any other name."""
-    known = [*SPLITS, *SETS]
-    if split != "all" and split not in known:
-        raise DataError(f"split: expected all or one of {', '.join(known)}, got {split!r}")
-    return known if split == "all" else [split]
-
-
-def parse_objectives(names: str) -> list[Name]:
-    """Objectives from their names with commas between; `DataError` for any other name."""
-    words = [name.strip() for name in names.split(",") if name.strip()]
-    if not words or (unknown := [name for name in words if name not in OBJECTIVES]):
-        got = unknown[0] if words else names
-        raise DataError(f"objectives: expected power, effort or both with a comma between, got {got!r}")
-    return [name for name in OBJECTIVES if name in words]
-
-
-def cost_rows(
-    name: str,
-    allocators: Mapping[str, Allocator],
-    objective: Name,
-    *,
-    layouts: int,
-    targets: int,
-    seed: int,
-    n_starts: int = 32,
+def run(
+    split: tuple[str, ...] = ("id",),
+    methods: tuple[str, ...] = ("search", "mdn"),
+    objectives: tuple[str, ...] = ("power", "effort"),
+    layouts: int = 20,
+    targets: int = 4,
+    starts: int = 32,
+    checkpoint: str | None = None,
+    seed: int = 0,
 ) -> list[Row]:
-    """One row per method and number of fins, and one over all of them, whose `fins` is "all".
+    """One row for each split, objective and method.
 
     Args:
-        name: a split or a set of symmetric cases.
-        allocators: methods by name; those that can choose are given the objective.
-        objective: what is kept least.
-        layouts: of the split.
+        split: names as in eval wrench, or axes (pure axes on the symmetric shipped layouts), axes-mixed (two
+            or three of them together), or all.
+        methods: names as in eval wrench; those that can choose are given the objective.
+        objectives: power, effort or both.
+        layouts: of each split.
         targets: on each layout.
+        starts: random starts of IPOPT for each target; robots with tables get twice as many, of SLSQP.
+        checkpoint: of the learned methods, a shipped name or a folder.
         seed: of the cases and of the starts.
-        n_starts: random starts per target; robots with tables get twice as many.
     """
-    draw = symmetric_cases if name in SETS else make_split
-    cases = draw(name, layouts, targets, seed)
-    aim = Objective(objective)
-    methods = {
-        key: each.with_settings(objective=objective) if "objective" in each.option_names() else each
-        for key, each in allocators.items()
-    }
-    best, found = [], {key: list[_Answers]() for key in methods}
-    for case in progress(cases, "layout", f"{name}, {objective}"):
-        sigma = case.sigma
-        if sigma is None:
-            sigma = next(iter(methods.values())).normalization.std
-        starts = n_starts if has_formulas(case.healthy) else 2 * n_starts
-        reference = CheapestCommands(aim, sigma)
-        ends = (reference.ends(case.healthy, target, starts, seed)[1] for target in case.targets)
-        best.append(np.array([cost[0] if len(cost) else np.nan for cost in ends]))
-        for key, allocator in methods.items():
-            found[key].append(_answers(allocator, case, aim, sigma))
-    fins = np.repeat([case.healthy.n_fins for case in cases], [len(case.targets) for case in cases])
-    group = np.repeat(np.arange(len(cases)), [len(case.targets) for case in cases])
+    known = [*SPLITS, *SETS]
+    names = known if split == ("all",) else split
+    for what, chosen, possible in (("split", names, known), ("objectives", objectives, list(UNITS))):
+        if unknown := [name for name in chosen if name not in possible]:
+            raise DataError(f"{what}: expected one of {', '.join(possible)}, got {unknown[0]!r:.60}")
     rows: list[Row] = []
-    for key, parts in found.items():
-        cost, error, by_hand = (np.concatenate(part) for part in zip(*parts, strict=True))
-        for count in [*np.unique(fins).tolist(), "all"]:
-            chosen = np.full(len(fins), True) if count == "all" else fins == count
-            about = {"split": name, "objective": objective, "method": key, "fins": count}
-            values = (part[chosen] for part in (cost, error, by_hand, np.concatenate(best), group))
-            rows.append(about | _figures(*values))
+    for name in names:
+        cases = (symmetric_cases if name in SETS else make_split)(name, layouts, targets, seed)
+        for objective in UNITS:
+            if objective in objectives:
+                rows += _rows(name, cases, methods, objective, starts, checkpoint, seed)
     return rows
 
 
-_Answers = tuple[Array, Array, Array]
-"""Cost (N,), normalized error (N,), and the same error by hand (N,), NaN where fins follow other laws."""
+def _rows(
+    split: str,
+    cases: Sequence[Case],
+    methods: tuple[str, ...],
+    objective: Name,
+    starts: int,
+    checkpoint: str | None,
+    seed: int,
+) -> list[Row]:
+    allocators = load_method_specs(methods, checkpoint, objective, patient=True)
+    aim, best = Objective(objective), []
+    found: dict[str, list[tuple[Array, Array]]] = {name: [] for name in allocators}
+    for case in progress(cases, "layout", f"{split}, {objective}"):
+        sigma = next(iter(allocators.values())).normalization.std if case.sigma is None else case.sigma
+        reference = CheapestCommands(aim, sigma)
+        n_starts = starts if has_formulas(case.healthy) else 2 * starts
+        ends = (reference.ends(case.healthy, target, n_starts, seed)[1] for target in case.targets)
+        best.append(np.array([cost[0] if len(cost) else np.nan for cost in ends]))
+        for name, allocator in allocators.items():
+            found[name].append(_answers(allocator, case, aim, sigma))
+    group = np.repeat(np.arange(len(cases)), [len(case.targets) for case in cases])
+    return [
+        {"split": split, "objective": f"{objective} [{UNITS[objective]}]", "method": name}
+        | _figures(*(np.concatenate(part) for part in zip(*parts, strict=True)), np.concatenate(best), group)
+        for name, parts in found.items()
+    ]
 
 
-def _answers(allocator: Allocator, case: Case, aim: Objective, sigma: Array) -> _Answers:
+def _answers(allocator: Allocator, case: Case, aim: Objective, sigma: Array) -> tuple[Array, Array]:
+    """Costs and normalized errors, each (N,)."""
     answer = allocator.allocate_batch(case.layout, case.targets, failed=case.failed)
     works = [name not in case.failed for name in case.layout.names]
-    command, healthy = answer.command[:, works], case.healthy
-    plant = plant_of(healthy)
+    command, plant = answer.command[:, works], plant_of(case.healthy)
     error = np.linalg.norm((plant.wrench(command) - case.targets) / sigma, axis=-1)
     # An answer outside its limits is none, whatever it would cost.
     error[((command < plant.lower) | (command > plant.upper)).any((1, 2))] = np.inf
-    by_hand = np.full(len(error), np.nan)
-    if known_by_hand(healthy):
-        by_hand = np.linalg.norm((wrench_by_hand(healthy, command) - case.targets) / sigma, axis=-1)
-    return np.asarray(aim.meter(plant)(command)), error, by_hand
+    return np.asarray(aim.meter(plant)(command)), error
 
 
-def _figures(cost: Array, error: Array, by_hand: Array, best: Array, group: NDArray[np.int64]) -> Row:
-    known = np.isfinite(best)
-    both = known & (error <= TRACKED)
-    row: Row = {
-        "n": len(cost),
-        "solved_by_starts": int(known.sum()),
-        "tracked": float((error <= TRACKED).mean()),
-    }
+def _figures(cost: Array, error: Array, best: Array, group: NDArray[np.int64]) -> Row:
+    tracked, known = error <= TRACKED, np.isfinite(best)
+    both = known & tracked
+    row: Row = {"n": len(cost), "solved_by_starts": int(known.sum()), "tracked": float(tracked.mean())}
+    if not both.any():
+        return row
     ratio = cost[both] / best[both]
-    if not len(ratio):
-        return row | dict.fromkeys(("cost", "cost_ratio", "cost_ratio_interval", *_OF_TARGETS))
-    wins = by_hand[both][ratio < CHEAPER]
-    known_wins = wins[np.isfinite(wins)]
     return row | {
         "cost": float(cost[both].mean()),
         "cost_ratio": float(cost[both].sum() / best[both].sum()),
@@ -138,8 +119,51 @@ def _figures(cost: Array, error: Array, by_hand: Array, best: Array, group: NDAr
         "ratio_p95": float(np.quantile(ratio, 0.95)),
         "ratio_max": float(ratio.max()),
         "cheaper": float((ratio < CHEAPER).mean()),
-        "win_error": float(known_wins.max()) if len(known_wins) else None,
     }
 
 
-_OF_TARGETS = ("ratio_p95", "ratio_max", "cheaper", "win_error")
+def _draw(rows: Sequence[Row]) -> Picture:
+    shown = [row for row in rows if row["objective"].startswith("power")]
+    return draw_dots(shown, "cost_ratio", "split", "power over that of the best start")
+
+
+experiment = Experiment(
+    name="cost",
+    question="What do answers cost over the best of many random starts, where both deliver the wrench?",
+    columns=(
+        Column("split", "split", "code"),
+        Column("objective", "least"),
+        Column("method", "method", "code"),
+        Column("n", "targets", "count"),
+        Column("tracked", "tracked", "share"),
+        Column("cost", "mean cost", "three"),
+        Column("cost_ratio", "over the best start", "ratio", "cost_ratio_interval"),
+        Column("ratio_p95", "95th percentile", "ratio"),
+        Column("ratio_max", "worst target", "ratio"),
+        Column("cheaper", "cheaper than it", "share"),
+    ),
+    run=run,
+    note=(
+        "The yardstick is the cheapest end of random starts of IPOPT with the wrench as a constraint, of "
+        "SLSQP where fins are tables: solvers that share nothing with how the methods search. Tracked: "
+        f"error up to {TRACKED:g} by the plant. Effort is the paper's J_en."
+    ),
+    quick={
+        "split": ("id", "axes"),
+        "methods": ("search", "mdn", "sqp"),
+        "layouts": 3,
+        "targets": 1,
+        "starts": 8,
+    },
+    full={
+        "split": ("id", "ood-fins", "limits", "failure", "fins-mixed", "axes", "axes-mixed"),
+        "methods": ("search", "mdn", "sqp", "analytic"),
+        "layouts": 15,
+        "targets": 2,
+    },
+    each="split",
+    needs=("casadi",),
+    draw=_draw,
+    caption="Power over that of the best start, with the interval of another seed; below 1 is cheaper.",
+    less_is_better=("cost_ratio",),
+)

@@ -1,108 +1,168 @@
-"""How long one call takes: methods side by side in one run on one machine, single calls only."""
+"""How long one call takes: methods one after the other in one run, and first answers for fins never seen.
 
-import os
-import platform
-import re
+A fin is compiled once, whatever its law, and kept by content: the first call of a robot with new fins pays
+for compiling them.
+"""
+
 import time
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
-from threadpoolctl import threadpool_info
 
 from finlab.allocation.allocator import Allocator
 from finlab.errors import DataError
+from finlab.evaluation.experiment import Experiment
+from finlab.evaluation.method_specs import load_method_spec, load_method_specs
+from finlab.evaluation.noisy_tables import noisy_table
+from finlab.evaluation.paper_figures import paper_figures
 from finlab.evaluation.progress import progress
+from finlab.evaluation.report.document import Column, Row
 from finlab.evaluation.splits import Case, make_split
-from finlab.evaluation.statistics.bootstrap import quantile_interval
-from finlab.evaluation.statistics.tables import Row
+from finlab.layout import Fin, Layout, load_layout, random_layout
+from finlab.layout.random_fins import FAMILIES, random_fin_model
 
+DOMAIN = 0xF1257
+"""Leads the seed of every robot with new fins."""
 REFERENCE = "search"
 """The method that the others are compared with, where it takes part."""
 LAYOUTS = 5
 """Layouts whose calls are timed."""
 WARM_UP = 2
 """First calls on each layout that are not counted; a robot keeps its layout for long."""
+NEW_FINS = 4
+"""Fins of a robot with new fins, each with a model of its own."""
+KINDS = (*FAMILIES, "table")
+"""Models of new fins; a table is one of a random fin, with noise."""
+SMALL = np.array([0.02, 0.02, 0.02, 0.002, 0.002, 0.002])
+"""Size of their targets [N, N m], within reach of the weakest fins."""
 
 
-def latency_cases(fins: int, seed: int) -> list[Case]:
-    """The first layouts of split `id` with so many fins; `DataError` if it has none of them."""
-    if not 2 <= fins <= 5:
-        raise DataError(f"fins: expected 2 to 5, the fin counts of split id, got {fins}")
-    return [case for case in make_split("id", 100, 50, seed) if case.layout.n_fins == fins][:LAYOUTS]
-
-
-def latency_rows(
-    allocators: Mapping[str, Allocator], cases: Sequence[Case], *, n_calls: int = 200, budget_s: float = 20.0
+def run(
+    methods: tuple[str, ...] = ("search", "mdn", "paper", "analytic", "qp", "sqp"),
+    fins: int = 4,
+    calls: int = 200,
+    budget: float = 20.0,
+    robots: int = 3,
+    checkpoint: str | None = None,
+    seed: int = 0,
 ) -> list[Row]:
-    """Median and 99th percentile of whole `allocate` calls [ms], and the ratio to `search`.
+    """One row for each method, and one for the first answers of `search` on each kind of new fins.
 
     Args:
-        allocators: method name -> method.
-        cases: layouts with targets, visited one after the other; every method sees the same.
-        n_calls: calls of each method.
-        budget_s: a slow method stops after this long [s]; its row says how many calls it made.
+        methods: names as in eval wrench; ipopt needs its extra.
+        fins: of the layouts, 2 to 5.
+        calls: of each method.
+        budget: seconds after which a slow method stops.
+        robots: with new fins, of each kind of fin.
+        checkpoint: of the learned methods, a shipped name or a folder.
+        seed: of layouts and targets.
     """
+    if not 2 <= fins <= 5:
+        raise DataError(f"fins: expected 2 to 5, the fin counts of split id, got {fins}")
+    cases = [case for case in make_split("id", 100, 50, seed) if case.layout.n_fins == fins][:LAYOUTS]
     rows: list[Row] = []
-    for name, allocator in progress(allocators.items(), "method"):
-        times = _time_calls(allocator, cases, n_calls, budget_s)
-        rows.append(
-            {
-                "method": name,
-                "calls": len(times),
-                "p50_ms": float(np.quantile(times, 0.5)),
-                "p50_ms_interval": list(quantile_interval(np.array(times), 0.5, np.arange(len(times)))),
-                "p99_ms": float(np.quantile(times, 0.99)),
-            }
-        )
+    for name, allocator in progress(load_method_specs(methods, checkpoint).items(), "method"):
+        times = call_times(allocator, cases, calls, budget)
+        rows.append(_row(name, "same fins as before", times))
     reference = next((row["p50_ms"] for row in rows if row["method"] == REFERENCE), None)
-    if reference is not None:
-        for row in rows:
-            row[f"p50_over_{REFERENCE}"] = row["p50_ms"] / reference
-    return rows
+    for row in rows:
+        row["p50_over_search"] = None if reference is None else row["p50_ms"] / reference
+    search = load_method_spec(REFERENCE, checkpoint)
+    search.allocate(load_layout("A"), np.zeros(6))  # what a process does once is not the fins' doing
+    return rows + [
+        _row(REFERENCE, f"first answer, {NEW_FINS} new fins: {kind}", first_times(search, kind, robots, seed))
+        for kind in progress(KINDS, "kind of fin")
+    ]
 
 
-def _time_calls(allocator: Allocator, cases: Sequence[Case], n_calls: int, budget_s: float) -> list[float]:
-    """Wall time of each counted call [ms]."""
+def _row(method: str, what: str, times: Sequence[float]) -> Row:
+    low, middle, high = (float(np.quantile(times, q)) for q in (0.05, 0.5, 0.99))
+    return {
+        "method": method,
+        "call": what,
+        "calls": len(times),
+        "p5_ms": low,
+        "p50_ms": middle,
+        "p99_ms": high,
+    }
+
+
+def call_times(allocator: Allocator, cases: Sequence[Case], n_calls: int, budget_s: float) -> list[float]:
+    """Wall time of each counted call [ms], of layouts visited one after the other.
+
+    Args:
+        allocator: the method.
+        cases: layouts with targets.
+        n_calls: at most so many.
+        budget_s: no further call on a layout after its part of this time [s].
+    """
     times: list[float] = []
     per_case = -(-n_calls // len(cases))
     for case in cases:
-        if len(times) >= n_calls:
-            break
         begin = time.perf_counter()
         for k in range(WARM_UP + min(per_case, n_calls - len(times))):
-            target = case.targets[k % len(case.targets)]
             start = time.perf_counter()
-            allocator.allocate(case.layout, target, failed=case.failed)
+            allocator.allocate(case.layout, case.targets[k % len(case.targets)], failed=case.failed)
             end = time.perf_counter()
             if k >= WARM_UP:
                 times.append((end - start) * 1e3)
                 if end - begin > budget_s / len(cases):
                     break
+        if len(times) >= n_calls:
+            break
     return times
 
 
-def machine() -> dict[str, str]:
-    """What this ran on: processor, cores, threads and versions of what is installed."""
-    versions = {}
-    for package in ("numpy", "scipy", "torch"):
-        with suppress(PackageNotFoundError):
-            versions[package] = version(package)
-    return {
-        "processor": _processor(),
-        "cores": str(os.cpu_count()),
-        "threads": str(max((pool["num_threads"] for pool in threadpool_info()), default=1)),
-        "python": platform.python_version(),
-        **versions,
-    }
+def first_times(allocator: Allocator, kind: str, robots: int, seed: int) -> list[float]:
+    """The processor's time [ms] of the first call of robots with fins of a kind that were not seen before."""
+    times = []
+    for k in range(robots):
+        rng = np.random.default_rng([DOMAIN, seed, KINDS.index(kind), k])
+        layout = _robot_of_new_fins(rng, kind, f"{seed}-{k}")
+        target = SMALL * rng.standard_normal(6)
+        start = time.process_time()
+        allocator.allocate(layout, target)
+        times.append(1e3 * (time.process_time() - start))
+    return times
 
 
-def _processor() -> str:
-    """The processor's name as Linux tells it, or what Python knows."""
-    with suppress(OSError):
-        named = re.search(r"^model name\s*: *(.+)$", Path("/proc/cpuinfo").read_text("utf-8"), re.MULTILINE)
-        if named:
-            return named[1].strip()
-    return platform.processor() or platform.machine()
+def _robot_of_new_fins(rng: np.random.Generator, kind: str, name: str) -> Layout:
+    layout, fins = random_layout(rng, n_fins=NEW_FINS), []
+    for i, old in enumerate(layout.fins):
+        fin = Fin("new", (0.0, 0.0, 0.0), 0.0, model=random_fin_model(rng, None if kind == "table" else kind))
+        if kind == "table":
+            fin = noisy_table(rng, fin, f"first-answer-{name}-{i}")
+        fins.append(replace(old, model=fin.model))
+    return replace(layout, fins=tuple(fins))
+
+
+def _printed(rows: Sequence[Row]) -> list[Row]:
+    cycle_ms = paper_figures()["inference"]["cycle_s"] * 1e3
+    return [
+        {"method": "paper", "call": "cycle on a Jetson Orin Nano, printed in the paper", "p50_ms": cycle_ms}
+    ]
+
+
+experiment = Experiment(
+    name="latency",
+    question="How long does one call take?",
+    columns=(
+        Column("method", "method", "code"),
+        Column("call", "call"),
+        Column("calls", "calls", "count"),
+        Column("p50_ms", "median", "three", unit="ms"),
+        Column("p99_ms", "99th percentile", "three", unit="ms"),
+        Column("p50_over_search", "times that of search", "three"),
+    ),
+    run=run,
+    note=(
+        "Whole calls of allocate, one target each, one after the other; a report runs nothing beside them. "
+        "First answers in the processor's time: a fin is compiled once, whatever its law, and kept by "
+        "content."
+    ),
+    quick={"calls": 20, "budget": 1.0, "robots": 1},
+    full={"robots": 2},
+    timed=True,
+    printed=_printed,
+)

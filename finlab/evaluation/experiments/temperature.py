@@ -1,87 +1,77 @@
-"""The paper's figure A: what the temperature of the draw does, and what refinement does to a candidate."""
+"""The paper's figure A: what the temperature of the draw does to the candidates of its network."""
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from finlab.allocation.learned.settings import PaperOptions
 from finlab.allocation.methods import load_allocator
 from finlab.arrays import Array
+from finlab.errors import DataError
+from finlab.evaluation.experiment import Experiment
+from finlab.evaluation.plots.style import BLUE, DASHES, VERMILION, Picture, picture
 from finlab.evaluation.progress import progress
-from finlab.evaluation.splits import Case
+from finlab.evaluation.report.document import Column, Row
+from finlab.evaluation.splits import make_split
 from finlab.evaluation.statistics.bootstrap import mean_interval
-from finlab.evaluation.statistics.records import Columns
-from finlab.evaluation.statistics.tables import Row
 from finlab.layout import Layout
 from finlab.layout.angles import is_full_turn
 
-TEMPERATURES = tuple(float(t) for t in np.logspace(-3, 1, 13))
-"""From 0.001 to 10, three to a decade."""
 PAPER_TEMPERATURE = 0.02
 """The paper's choice."""
+TEMPERATURES = (0.001, 0.01, PAPER_TEMPERATURE, 0.05, 0.1, 0.5, 1.0, 10.0)
 
 
-def temperature_columns(
-    cases: Sequence[Case],
-    temperature: float,
-    *,
-    checkpoint: str | Path | None = None,
-    n_candidates: int = 64,
+def run(
+    temperatures: tuple[float, ...] = TEMPERATURES,
+    split: str = "id",
+    layouts: int = 100,
+    targets: int = 2,
+    candidates: int = 64,
+    checkpoint: str | None = None,
     seed: int = 0,
-) -> Columns:
-    """What the draw at one temperature gives, before any refinement, one entry per target.
-
-    Columns: `layout` and `target` (numbers), `n_fins`, `diversity` (see `diversity`), `best_j` and `mean_j`
-    (smallest and mean selection cost J = J_norm + gamma J_en among the candidates, by the surrogate).
+) -> list[Row]:
+    """One row for each temperature, before any refinement.
 
     Args:
-        cases: layouts with targets.
-        temperature: of the draw.
-        checkpoint: of method `paper`; the shipped one by default.
-        n_candidates: candidates drawn per target.
-        seed: of the draw.
+        temperatures: of the draw, above 0.
+        split: name as in eval wrench.
+        layouts: of the split.
+        targets: on each layout.
+        candidates: drawn for each target.
+        checkpoint: of method paper, a shipped name or a folder.
+        seed: of all draws.
     """
-    options: PaperOptions = {"n_candidates": n_candidates, "temperature": temperature, "refinement": "none"}
-    allocator = load_allocator("paper", checkpoint=checkpoint, **options)
+    if min(temperatures) <= 0.0:
+        raise DataError(f"temperatures: expected numbers above 0, got {min(temperatures):g}")
+    cases = make_split(split, layouts, targets, seed)
     rows: list[Row] = []
-    for k, case in enumerate(progress(cases, "layout")):
-        layout = case.healthy
-        for number, target in enumerate(case.targets):
-            samples = allocator.allocate(layout, target, seed=seed).samples
-            assert samples is not None
-            j = samples.err_norm**2 + allocator.settings.gamma * samples.energy
-            row = {"layout": k, "target": number, "n_fins": layout.n_fins}
-            spread = diversity(samples.command, layout)
-            rows.append({**row, "diversity": spread, "best_j": j.min(), "mean_j": j.mean()})
-    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
-
-
-def refinement_columns(
-    case: Case,
-    *,
-    checkpoint: str | Path | None = None,
-    n_candidates: int = 64,
-    temperature: float = PAPER_TEMPERATURE,
-    seed: int = 0,
-) -> Columns:
-    """Every candidate of every target of a case before and after refinement.
-
-    Columns, one entry per candidate, by the surrogate: `target`, `refined` (0 before, 1 after), `energy`,
-    `err_norm`.
-    """
-    options: PaperOptions = {"n_candidates": n_candidates, "temperature": temperature}
-    allocator = load_allocator("paper", checkpoint=checkpoint, n_refined=n_candidates, **options)
-    parts = []
-    for number, target in enumerate(case.targets):
-        result = allocator.allocate(case.layout, target, failed=case.failed, seed=seed)
-        for refined, found in enumerate((result.samples, result.candidates)):
-            assert found is not None
-            about = {"target": number, "refined": refined}
-            columns = {name: np.full(n_candidates, value) for name, value in about.items()}
-            parts.append({**columns, "energy": found.energy, "err_norm": found.err_norm})
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    for temperature in temperatures:
+        method = load_allocator(
+            "paper",
+            checkpoint=checkpoint,
+            n_candidates=candidates,
+            temperature=temperature,
+            refinement="none",
+        )
+        best, spread, group = [], [], []
+        for k, case in enumerate(progress(cases, "layout", f"T = {temperature:g}")):
+            for target in case.targets:
+                samples = method.allocate(case.healthy, target, seed=seed).samples
+                assert samples is not None
+                best.append((samples.err_norm**2 + method.settings.gamma * samples.energy).min())
+                spread.append(diversity(samples.command, case.healthy))
+                group.append(k)
+        rows.append(
+            {
+                "temperature": temperature,
+                "n": len(best),
+                "diversity": float(np.mean(spread)),
+                "best_j_mean": float(np.mean(best)),
+                "best_j_mean_interval": list(mean_interval(np.array(best), np.array(group))),
+                "best_j_median": float(np.median(best)),
+            }
+        )
+    return rows
 
 
 def diversity(command: Array, layout: Layout) -> float:
@@ -97,20 +87,43 @@ def diversity(command: Array, layout: Layout) -> float:
     return float(np.sqrt(((gap / width) ** 2).mean(axis=(1, 2))).mean())
 
 
-def temperature_rows(cases: Sequence[Case], **options: Any) -> list[Row]:
-    """The table's rows, one per temperature; options as in `temperature_columns`."""
-    values = progress(TEMPERATURES, "temperature")
-    return [temperature_row(value, temperature_columns(cases, value, **options)) for value in values]
+def _draw(rows: Sequence[Row]) -> Picture:
+    temperature = [row["temperature"] for row in rows]
+    with picture(1, 2, height=2.8, legend=0) as view:
+        for axis, key, colour, title in zip(
+            view.axes,
+            ("diversity", "best_j_mean"),
+            (BLUE, VERMILION),
+            ("diversity", "mean of the best J"),
+            strict=True,
+        ):
+            axis.plot(temperature, [row[key] for row in rows], "o-", color=colour, markersize=4)
+            axis.set(xscale="log", xlabel="temperature T", title=title)
+            axis.axvline(PAPER_TEMPERATURE, **DASHES)
+        ends = np.array([row["best_j_mean_interval"] for row in rows])
+        view.axes[1].fill_between(temperature, *ends.T, color=VERMILION, alpha=0.15, linewidth=0)
+        view.axes[1].set(yscale="log")
+    return view
 
 
-def temperature_row(temperature: float, columns: Columns) -> Row:
-    """One row of the table, from the records of one temperature."""
-    j, group = columns["best_j"], columns["layout"]
-    return {
-        "temperature": temperature,
-        "n": len(j),
-        "diversity": float(columns["diversity"].mean()),
-        "best_j_median": float(np.median(j)),
-        "best_j_mean": float(j.mean()),
-        "best_j_mean_interval": list(mean_interval(j, group)),
-    }
+experiment = Experiment(
+    name="temperature",
+    question="What does the temperature of the draw do to the candidates of the paper's network (figure A)?",
+    columns=(
+        Column("temperature", "T", "three"),
+        Column("n", "targets", "count"),
+        Column("diversity", "diversity", "three"),
+        Column("best_j_mean", "best J, mean", "error", "best_j_mean_interval"),
+        Column("best_j_median", "best J, median", "error"),
+    ),
+    run=run,
+    note=(
+        "Diversity, which the paper does not define: the mean distance between two candidates in units of "
+        "the command ranges. J: squared error plus weighted effort, by the surrogate, before refinement."
+    ),
+    quick={"layouts": 10, "targets": 1},
+    full={"layouts": 60},
+    each="temperatures",
+    draw=_draw,
+    caption="Dashes: the paper's temperature; band: the interval of another seed.",
+)

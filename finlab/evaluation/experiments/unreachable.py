@@ -1,170 +1,159 @@
-"""What is delivered of wrenches out of reach, against what IPOPT proves to be possible.
+"""Wrenches on the boundary of what a robot can do, and beyond it: what is missed above the least.
 
-In the planar forces of the fins each policy asks for the optimum of a convex problem (for every choice of
-halves of the arcs that are wider than half a turn). IPOPT solves it here with the thrusts of the analytic fin
-model; the answers are scored by the plant. `closest` and the first group of `priority` are compared by their
-error, `direction` by the share of the target that is delivered and by what is delivered beside it.
+A direction is that of a random command's wrench, so that it can be pushed at all. IPOPT finds how far it
+goes, and the least error that any forces leave of each multiple of that wrench. The plant scores the answers.
 """
 
-from itertools import product
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finlab.allocation.allocator import Allocator
-from finlab.allocation.baselines.ipopt import SOLVER_OPTIONS, import_casadi
-from finlab.allocation.policy import KINDS, Policy
+from finlab.allocation.policy import AXES, KINDS, Policy
 from finlab.arrays import Array
+from finlab.errors import DataError
+from finlab.evaluation.experiment import Experiment
+from finlab.evaluation.ipopt_reach import IpoptReach
+from finlab.evaluation.method_specs import load_method_specs
 from finlab.evaluation.progress import progress
-from finlab.evaluation.statistics.tables import Row
-from finlab.layout import Layout, random_layout
-from finlab.layout.angles import is_full_turn
-from finlab.layout.arrays import layout_effectiveness
-from finlab.physics import Plant, plant_of
+from finlab.evaluation.report.document import Column, Row
+from finlab.evaluation.splits import Case, make_split
+from finlab.evaluation.statistics.bootstrap import mean_interval
+from finlab.physics import plant_of
 
-DOMAIN = 0xFA2
-"""Leads the seed of every case."""
-FINS = (2, 8)
-"""Least and most fins."""
-FARTHER = (1.5, 3.0, 10.0)
-"""Targets are reachable wrenches times one of these, or sigma times it in any direction."""
-BESIDE = 1e-6
-"""Normalized wrench beside the target that the judge of `direction` allows on each axis."""
+FAR = 30.0
+"""A random command's wrench times this is out of reach [-]."""
+WITH_POLICIES = ("search", "mdn")
+"""Methods that are asked under every policy; the others know `closest` alone."""
 
 
-Score = tuple[float, float, float]
-"""Of one answer. By `closest` and `priority` the normalized error beyond the least possible, by `direction`
-the share of the target that is lacking to the largest possible; by `direction` the normalized wrench beside
-that share; the time of the call [ms]."""
+class Boundary(NamedTuple):
+    """Targets of one robot, D directions by F factors, and what is possible."""
+
+    targets: Array
+    """(F, D, 6) [N, N m]."""
+    least: dict[str, Array]
+    """The least normalized errors (F, D): under `closest` on all axes, under `priority` on the first
+    group."""
 
 
-class Judge:
-    """The best planar forces for one layout, by IPOPT.
-
-    Args:
-        layout: the robot.
-        sigma: per-axis standard deviation (6,).
-    """
-
-    def __init__(self, layout: Layout, sigma: Array) -> None:
-        self.casadi, self.sigma = import_casadi(), sigma
-        self.effect = layout_effectiveness(layout) / sigma[:, None]
-        plant = plant_of(layout)
-        self.thrust = plant.thrust(plant.upper[:, 0], plant.upper[:, 1])
-        self.arcs = _convex_arcs(plant.lower[:, 2], plant.upper[:, 2])
-
-    def least_error(self, target: Array, axes: NDArray[np.bool_]) -> float:
-        """The least error on some axes (6,) of a normalized target (6,)."""
-        force = self.casadi.SX.sym("force", self.effect.shape[1])
-        missing = (target - self.casadi.DM(self.effect) @ force)[np.flatnonzero(axes).tolist()]
-        return float(np.sqrt(self._best(force, force, self.casadi.sumsqr(missing), [])))
-
-    def largest_share(self, target: Array) -> float:
-        """The largest share, up to one, of a normalized target (6,) that can be had alone."""
-        force, share = self.casadi.SX.sym("force", self.effect.shape[1]), self.casadi.SX.sym("share")
-        beside = self.casadi.DM(self.effect) @ force - share * target
-        limits = [(beside[j], -BESIDE, BESIDE) for j in range(6)] + [(share, 0.0, 1.0)]
-        return -self._best(force, self.casadi.vertcat(force, share), -share, limits)
-
-    def _best(self, force: Any, unknowns: Any, cost: Any, limits: list[tuple[Any, float, float]]) -> float:
-        """The least cost over all choices of halves."""
-        return min(self._solve(unknowns, cost, limits + self._fins(force, arcs)) for arcs in self.arcs)
-
-    def _fins(self, force: Any, arcs: Array) -> list[tuple[Any, float, float]]:
-        """Limits of each fin's thrust and direction, for one choice of halves."""
-        limits: list[tuple[Any, float, float]] = []
-        for i, (first, last) in enumerate(arcs):
-            across, up = force[2 * i], force[2 * i + 1]
-            limits.append((across**2 + up**2, 0.0, self.thrust[i] ** 2))
-            if not is_full_turn(last - first):
-                middle = 0.5 * (first + last)
-                for angle in (first + 0.5 * np.pi, last - 0.5 * np.pi, middle):
-                    limits.append((np.cos(angle) * across + np.sin(angle) * up, 0.0, np.inf))
-        return limits
-
-    def _solve(self, unknowns: Any, cost: Any, limits: list[tuple[Any, float, float]]) -> float:
-        what, low, high = zip(*limits, strict=True)
-        program = {"x": unknowns, "f": cost, "g": self.casadi.vertcat(*what)}
-        solver = self.casadi.nlpsol("judge", "ipopt", program, SOLVER_OPTIONS)
-        return float(solver(x0=0.0, lbg=low, ubg=high)["f"])
-
-
-def unreachable_rows(allocator: Allocator, *, n_layouts: int = 50, seed: int = 0) -> list[Row]:
-    """One row per kind of limits and policy.
+def run(
+    split: tuple[str, ...] = ("id",),
+    methods: tuple[str, ...] = ("search", "mdn", "analytic", "sqp"),
+    factors: tuple[float, ...] = (1.0, 1.2, 2.0),
+    layouts: int = 25,
+    targets: int = 4,
+    checkpoint: str | None = None,
+    seed: int = 0,
+) -> list[Row]:
+    """One row for each split, factor, method and policy.
 
     Args:
-        allocator: a method that knows all policies.
-        n_layouts: random layouts of each kind of limits, one target each, left out if reachable.
-        seed: draws layouts and targets.
+        split: names as in eval wrench, of splits whose fins follow the law drag, such as id, ood or limits.
+        methods: names as in eval wrench; search and mdn are asked under every policy.
+        factors: targets over the largest wrench of their direction, from 1.
+        layouts: of each split.
+        targets: directions on each layout.
+        checkpoint: of the learned methods, a shipped name or a folder.
+        seed: of all draws.
     """
-    rows = []
-    for limits in ("nominal", "varied"):
-        scores: dict[str, list[Score]] = {kind: [] for kind in KINDS}
-        for k in progress(range(n_layouts), "layout", limits):
-            rng = np.random.default_rng((DOMAIN, seed, k))
-            layout = random_layout(rng, n_fins=int(rng.integers(FINS[0], FINS[1] + 1)), limits=limits)
-            target = _far_target(rng, layout, allocator.normalization.std)
-            allocator.allocate(layout, target)  # the first call of a layout is not timed
-            for kind, score in _scores(allocator, layout, target).items():
-                scores[kind].append(score)
-        rows += [_row(limits, kind, found) for kind, found in scores.items() if found]
-    return rows
+    if min(factors) < 1.0:
+        raise DataError(f"factors: expected numbers from 1, got {min(factors):g}")
+    allocators = load_method_specs(methods, checkpoint, patient=True)
+    sigma = next(iter(allocators.values())).normalization.std
+    rows: list[Row] = []
+    for name in split:
+        cases = make_split(name, layouts, targets, seed)
+        if any(fin.model.type != "drag" for case in cases for fin in case.layout.fins):
+            raise DataError(f"split: expected one whose fins follow the law drag, got {name!r}")
+        known = [_boundary(case, sigma, factors) for case in progress(cases, "layout", f"{name}, boundary")]
+        for method, allocator in allocators.items():
+            for policy in KINDS if method in WITH_POLICIES else KINDS[:1]:
+                told = {} if policy == "closest" else {"policy": policy}
+                found = [
+                    _missed(allocator, case, each, sigma, factors, policy, told)
+                    for case, each in zip(progress(cases, "layout", method), known, strict=True)
+                ]
+                rows += [
+                    {"split": name, "factor": factor, "method": method, "policy": policy}
+                    | _figures([each[k] for each in found])
+                    | {"least_mean": float(np.mean([each.least["closest"][k] for each in known]))}
+                    for k, factor in enumerate(factors)
+                ]
+    return sorted(rows, key=lambda row: (split.index(row["split"]), row["factor"]))
 
 
-def _scores(allocator: Allocator, layout: Layout, target: Array) -> dict[str, Score]:
-    """By policy; nothing if the target can be had."""
-    sigma = allocator.normalization.std
-    judge, plant, wanted = Judge(layout, sigma), Plant(layout), target / sigma
-    least = judge.least_error(wanted, np.ones(6, dtype=bool))
-    if least < 0.05:
-        return {}
-    scores: dict[str, Score] = {}
-    for kind in KINDS:
-        answer = allocator.allocate(layout, target, policy=kind)
-        given = plant.wrench(answer.command) / sigma
-        beside = 0.0
-        if kind == "direction":
-            share = float(given @ wanted / (wanted @ wanted))
-            excess = judge.largest_share(wanted) - share
-            beside = float(np.linalg.norm(given - share * wanted))
-        else:
-            axes = np.ones(6, dtype=bool) if kind == "closest" else Policy(kind).groups[0]
-            possible = least if kind == "closest" else judge.least_error(wanted, axes)
-            excess = float(np.linalg.norm((given - wanted)[axes])) - possible
-        scores[kind] = (excess, beside, answer.solve_ms)
-    return scores
+def _boundary(case: Case, sigma: Array, factors: tuple[float, ...]) -> Boundary:
+    reach = IpoptReach(case.healthy, sigma)
+    far = FAR * case.targets
+    largest = np.array([reach.largest_share(each / sigma) for each in far])[:, None] * far
+    asked = np.multiply.outer(np.asarray(factors), largest)
+    first = np.isin(AXES, Policy("priority").order[0])
+    least = {
+        policy: np.array([[reach.least_error(each / sigma, axes) for each in row] for row in asked])
+        for policy, axes in (("closest", np.full(6, True)), ("priority", first))
+    }
+    return Boundary(asked, least)
 
 
-def _row(limits: str, kind: str, scores: list[Score]) -> Row:
-    excess, beside, solve_ms = np.array(scores).T
+def _missed(
+    allocator: Allocator,
+    case: Case,
+    known: Boundary,
+    sigma: Array,
+    factors: tuple[float, ...],
+    policy: str,
+    told: dict[str, str],
+) -> Array:
+    """What is missed beyond the least (F, D) under a policy."""
+    shape = known.targets.shape[:2]
+    answer = allocator.allocate_batch(case.layout, known.targets.reshape(-1, 6), failed=case.failed, **told)
+    works = [fin not in case.failed for fin in case.layout.names]
+    given = plant_of(case.healthy).wrench(answer.command[:, works]).reshape(*shape, 6) / sigma
+    wanted = known.targets / sigma
+    if policy == "direction":
+        share = (given * wanted).sum(axis=-1) / (wanted**2).sum(axis=-1)
+        return np.asarray(1.0 / np.asarray(factors)[:, None] - share)
+    axes = np.full(6, True) if policy == "closest" else np.isin(AXES, Policy("priority").order[0])
+    return np.asarray(np.linalg.norm((given - wanted)[..., axes], axis=-1) - known.least[policy])
+
+
+def _figures(excess: list[Array]) -> Row:
+    values = np.concatenate(excess)
+    group = np.repeat(np.arange(len(excess)), [len(each) for each in excess])
     return {
-        "limits": limits,
-        "policy": kind,
-        "n": len(scores),
-        "excess_median": float(np.median(excess)),
-        "excess_max": float(excess.max()),
-        "beside_max": float(beside.max()) if kind == "direction" else None,
-        "p50_ms": float(np.median(solve_ms)),
-        "max_ms": float(solve_ms.max()),
+        "n": len(values),
+        "excess_mean": float(values.mean()),
+        "excess_mean_interval": list(mean_interval(values, group)),
+        "excess_median": float(np.median(values)),
+        "excess_max": float(values.max()),
     }
 
 
-def _far_target(rng: np.random.Generator, layout: Layout, sigma: Array) -> Array:
-    """A wrench (6,) [N, N m] that is probably out of reach."""
-    farther = rng.choice(FARTHER)
-    if rng.uniform() < 0.5:
-        near = plant_of(layout).wrench(plant_of(layout).sample(rng, ()))
-    else:
-        near = rng.standard_normal(6) * sigma
-    return np.asarray(near * farther)
-
-
-def _convex_arcs(lower: Array, upper: Array) -> list[Array]:
-    """All choices (n, 2) of arcs of at most half a turn that make up the fins' arcs; full turns stay."""
-    choices = []
-    for first, last in zip(lower, upper, strict=True):
-        middle = 0.5 * (first + last)
-        wide = np.pi < last - first and not is_full_turn(last - first)
-        choices.append([(first, middle), (middle, last)] if wide else [(first, last)])
-    return [np.array(arcs) for arcs in product(*choices)]
+experiment = Experiment(
+    name="unreachable",
+    question="What do methods miss beyond the least possible when they are asked for too much?",
+    columns=(
+        Column("split", "split", "code"),
+        Column("factor", "asked over largest", "three"),
+        Column("method", "method", "code"),
+        Column("policy", "policy", "code"),
+        Column("n", "targets", "count"),
+        Column("least_mean", "least possible error", "error"),
+        Column("excess_mean", "missed beyond it, mean", "error", "excess_mean_interval"),
+        Column("excess_median", "median", "error"),
+        Column("excess_max", "largest", "error"),
+    ),
+    run=run,
+    note=(
+        "IPOPT finds in the fins' forces the largest wrench of a random direction, and the least error of "
+        "multiples of it, exact to about 1e-5. Missed: under closest, normalized error beyond that least; "
+        "under priority the same on the first group of axes; under direction the share of the target that is "
+        "lacking to the largest possible."
+    ),
+    quick={"layouts": 4, "targets": 2, "methods": ("search", "analytic")},
+    full={"split": ("id", "limits")},
+    each="split",
+    needs=("casadi",),
+    less_is_better=("excess_mean",),
+)

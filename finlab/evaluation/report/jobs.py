@@ -1,124 +1,143 @@
-"""Jobs: pieces of work with their settings, run on all cores, each kept in a folder when it is done."""
+"""Parts of experiments, run on all cores, each kept as a file of rows as soon as it is done."""
 
 import hashlib
 import json
+import multiprocessing
 import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass, field
-from multiprocessing import get_context
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from finlab.evaluation.statistics.records import VERSION, Columns, load_columns, save_columns
+from finlab.errors import DataError
+from finlab.evaluation.experiment import load_experiment
+from finlab.evaluation.report.document import Row
+from finlab.whole_file import write_whole
 
 THREADS = 1
 """Threads of a part, so that parts run beside each other and times are of one core."""
 
 
-def columns_of_rows(rows: list[dict[str, Any]]) -> Columns:
-    """Rows of a finished table as one column of JSON texts, for results that have no entry per target."""
-    return {"rows": np.array([json.dumps(row) for row in rows])}
-
-
-def rows_of_columns(columns: Columns) -> list[dict[str, Any]]:
-    """Inverse of `columns_of_rows`."""
-    return [json.loads(str(text)) for text in columns["rows"]]
-
-
 @dataclass(frozen=True)
-class Job:
-    """One piece of work."""
+class Part:
+    """One run of an experiment."""
 
-    name: str
-    """What it is, for people; leads the name of its file."""
-    work: Callable[..., Columns]
-    """What is done; a function of a module, so that other processes find it."""
-    settings: dict[str, Any]
-    """Arguments of the work that decide the result, plain values."""
-    prints: str
-    """Fingerprint of what was loaded: checkpoint or normalization."""
-    context: dict[str, Any] = field(default_factory=dict)
-    """Arguments that do not decide the result, such as the folder of a checkpoint."""
-    alone: bool = False
-    """Whether nothing may run beside it, because it measures time."""
+    experiment: str
+    """Its name."""
+    options: dict[str, Any]
+    """All of them, plain values."""
+    source: str
+    """Digest of the code and the weights: another one gives other results."""
 
     @property
-    def key(self) -> dict[str, Any]:
-        """What the result depends on."""
-        return {"work": self.work.__name__, "prints": self.prints, **self.settings}
+    def name(self) -> str:
+        """Leads the name of its file: the experiment, and what tells its parts apart."""
+        each = load_experiment(self.experiment).each
+        return "-".join([self.experiment, *(map(str, self.options[each]) if each else ())])
 
     def path(self, folder: Path) -> Path:
-        """Where its result lies, or will lie: a file named after the job and a digest of its key."""
-        text = json.dumps({"version": VERSION, **self.key}, sort_keys=True)
-        return folder / f"{self.name}-{hashlib.sha256(text.encode()).hexdigest()[:12]}.npz"
+        """Where its rows are, or will be."""
+        key = json.dumps([self.experiment, self.options, self.source], sort_keys=True)
+        return folder / f"{self.name.replace('/', '-')}-{hashlib.sha256(key.encode()).hexdigest()[:12]}.json"
 
     def done(self, folder: Path) -> bool:
-        """Whether its result is there."""
+        """Whether its rows are there."""
         return self.path(folder).is_file()
 
-    def result(self, folder: Path) -> tuple[Columns, dict[str, Any]]:
-        """Its arrays by name, and how they were made; `DataError` if they are not there."""
-        return load_columns(self.path(folder))
+    def record(self, folder: Path) -> dict[str, Any]:
+        """Its `options`, `rows`, and the `seconds` that it took.
 
-    def run(self, folder: Path, commit: str) -> None:
-        """Do the work, on `THREADS` threads, and keep its result."""
+        Raises:
+            DataError: no file, or not one that `run` wrote.
+        """
+        path = self.path(folder)
+        try:
+            found: dict[str, Any] = json.loads(path.read_text("utf-8"))
+            return {key: found[key] for key in ("options", "rows", "seconds")}
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise DataError(f"{path}: not a file of rows ({error}); delete it and run again") from None
+
+    def rows(self, folder: Path) -> list[Row]:
+        """Its rows."""
+        rows: list[Row] = self.record(folder)["rows"]
+        return rows
+
+    def run(self, folder: Path) -> None:
+        """Run it on `THREADS` threads, and keep its rows.
+
+        Raises:
+            DataError: the file cannot be written.
+        """
         start = time.perf_counter()
         with threadpool_limits(THREADS):
-            columns = self.work(**self.settings, **self.context)
-        made = {
-            "settings": self.key,
-            "seconds": time.perf_counter() - start,
-            "made": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
-            "commit": commit,
-        }
-        save_columns(self.path(folder), columns, made)
+            rows = load_experiment(self.experiment).rows(**self.options)
+        found = {"options": self.options, "rows": rows, "seconds": round(time.perf_counter() - start, 1)}
+        write_whole(self.path(folder), json.dumps(found, indent=1, allow_nan=False) + "\n", DataError)
 
 
-def run_jobs(jobs: Sequence[Job], folder: Path, *, commit: str, processes: int | None = None) -> None:
+def run_parts(parts: Sequence[Part], folder: Path, *, processes: int | None = None) -> None:
     """Run what is not done yet: together first, then one by one what measures time.
 
     Args:
-        jobs: in any order; those listed first start first.
-        folder: keeps each result as soon as it is there, so that a run that was stopped goes on.
-        commit: kept with the results.
-        processes: how many at once; the number of cores by default, 0 for this process alone.
+        parts: those listed first start first.
+        folder: for their files, which is made.
+        processes: parts that run at once; the number of cores by default, 0 for this process alone.
+
+    Raises:
+        DataError: a file cannot be written, or a process that ran a part was ended.
     """
-    left = [job for job in jobs if not job.done(folder)]
+    left = [part for part in parts if not part.done(folder)]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise DataError(f"{folder}: cannot be made: {error.strerror}") from None
     processes = os.cpu_count() or 1 if processes is None else processes
-    together = [job for job in left if processes and not job.alone]
+    apart = [part for part in left if load_experiment(part.experiment).timed or not processes]
+    together = [part for part in left if part not in apart]
     with tqdm(total=len(left), unit="part", disable=None, file=sys.stderr) as bar:
         if together:
-            _run_pool(together, folder, commit, min(processes, len(together)), bar)
-        for job in sorted((job for job in left if job.alone or not processes), key=lambda job: job.alone):
-            bar.set_description(job.name)
-            job.run(folder, commit)
+            _run_pool(together, folder, min(processes, len(together)), bar)
+        for part in apart:
+            bar.set_description(part.name)
+            part.run(folder)
             bar.update()
 
 
-def _run_pool(jobs: Sequence[Job], folder: Path, commit: str, processes: int, bar: "tqdm[Any]") -> None:
-    # Fresh processes: a fork would copy the threads of BLAS in whatever state they are.
-    pool = ProcessPoolExecutor(processes, mp_context=get_context("spawn"), initializer=_calm)
+def _run_pool(parts: Sequence[Part], folder: Path, processes: int, bar: "tqdm[Any]") -> None:
+    # A fork would copy the threads of BLAS in whatever state they are.
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(processes, mp_context=context, initializer=_begin_worker)
     try:
-        waiting = {pool.submit(job.run, folder, commit): job for job in jobs}
+        waiting = {pool.submit(part.run, folder): part for part in parts}
         for done in as_completed(waiting):
             done.result()
             bar.set_description(waiting[done].name)
             bar.update()
+    except BrokenProcessPool:
+        raise DataError(f"{folder}: a process that ran a part was ended; the same command goes on") from None
     finally:
         pool.shutdown(cancel_futures=True)
 
 
-def _calm() -> None:
-    """No more threads than a part may have, no bars of its own, and an end at once when a user interrupts."""
+def _begin_worker() -> None:
+    """No bars of its own, an end at once when a user interrupts, and an end with the process that waits for
+    it, however that one ends."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    # What a part loads itself looks here.
-    os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS"), str(THREADS))
     sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 - for the life of the process
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)

@@ -1,133 +1,146 @@
-"""`finlab eval report`: run what is missing, then write the page, its Markdown twin and the pictures."""
+"""`finlab eval report`: run what is missing, then write the page, its Markdown, the pictures and the rows."""
 
 import json
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from finlab.allocation.learned.settings import MdnSettings
-from finlab.evaluation.method_specs import Checkpoints
-from finlab.evaluation.report.document import Block, Document, figures_of
-from finlab.evaluation.report.jobs import run_jobs
+from finlab.errors import DataError
+from finlab.evaluation.experiment import EXPERIMENTS, Experiment, load_experiment
+from finlab.evaluation.report.document import Block, Document, Row, Table, figures_of
+from finlab.evaluation.report.jobs import THREADS, Part, run_parts
 from finlab.evaluation.report.pages import to_html, to_markdown
-from finlab.evaluation.report.plan import N_STARTS, SWIMMERS, make_plan, parse_sections
-from finlab.evaluation.report.provenance import Provenance, how_made_blocks, source_commit
-from finlab.evaluation.report.results import Results
-from finlab.evaluation.report.sections import (
-    ablation,
-    closed_loop,
-    cost,
-    methods,
-    network,
-    questions,
-    scope,
-    studies,
-    summary,
-    swims,
-    wrench_tracking,
-)
-from finlab.evaluation.report.sizes import Sizes
-from finlab.evaluation.statistics.tables import Row
-from finlab.inference.checkpoint import read_checkpoint, resolve_checkpoint
+from finlab.evaluation.report.provenance import machine, source_commit, source_digest
+from finlab.evaluation.report.standings import COLUMNS, standings
+from finlab.whole_file import write_whole
 
 PAGE, TWIN, TABLES, PICTURES = "index.html", "report.md", "tables.json", "pictures"
-"""What a report's folder holds."""
+"""What a report's folder holds, beside `records`."""
+SEED = 6143
+"""Of a report, unless another one is given; kept apart from those on which methods were developed."""
+DIGITS = 6
+"""Significant digits of the numbers in `TABLES`."""
+ABOUT = (
+    "Every answer is scored by the plant: the fins' own laws or tables. All methods but `paper`, which has "
+    "learned one fin law from samples, were given these, so errors show how well methods solve, not how "
+    "well a model fits a fin in the water. No robot swam and no fin was measured for this report: fin laws "
+    "are means over a cycle in still water, bodies, water and sensors are simulated. Methods and "
+    f"controllers were developed on other seeds than {SEED}."
+)
+LEADS = (
+    "Method `search` against the others: a method leads where its interval and the other's do not overlap. "
+    "Mean errors below 1e-5 say where a method stops refining, not whether it delivers the wrench."
+)
+Size = Literal["quick", "full"]
 
 
 def make_report(
     out: Path,
     *,
-    sizes: Sizes,
-    seed: int,
-    checkpoints: Checkpoints,
-    records: Path,
-    command: str,
+    size: Size = "full",
+    seed: int = SEED,
+    names: Sequence[str] = ("all",),
     processes: int | None = None,
-    sections: Collection[str] = tuple(parse_sections("all")),
 ) -> Path:
-    """Make the whole report; parts that are done are taken from `records`.
+    """Make the report; parts that are done are taken from its folder `records`.
 
     Args:
-        out: folder for the page; made if need be.
-        sizes: how much of everything.
+        out: folder for the report, made if need be.
+        size: how much of everything: minutes, or a quarter of an hour on two cores.
         seed: of all draws.
-        checkpoints: under test.
-        records: folder of the results of the parts.
-        command: that makes the report, shown on the page.
-        processes: parts that run at once; the number of cores by default.
-        sections: those whose missing parts are run, by default all but the optional ones; the page shows what
-            is there of all.
+        names: experiments whose missing parts are run, or all; the page shows all that are complete.
+        processes: parts that run at once; the number of cores by default, 0 for this process alone.
 
     Returns:
         The page.
+
+    Raises:
+        DataError: an unknown name, or a file that cannot be written.
     """
-    plan = make_plan(sizes, seed=seed, checkpoints=checkpoints, runs=records / "trainings")
-    run_jobs(list(plan.only(sections)), records, commit=source_commit(), processes=processes)
-    done = plan.only_done(records)
-    given = {"mdn": checkpoints.default or "default", "paper": checkpoints.paper or "paper"}
-    paths = {method: resolve_checkpoint(checkpoint) for method, checkpoint in given.items()}
-    prints = {f"{path.name} ({name})": read_checkpoint(path).sha256 for name, path in paths.items()}
-    results, provenance = Results(done, records), Provenance(prints, seed, command)
-    missing = sum(not job.done(records) for job in plan.only(parse_sections("all")))
-    document = make_document(results, provenance, sizes, missing)
-    write_report(out, document, provenance.about() | results.tables)
+    if unknown := [name for name in names if name not in (*EXPERIMENTS, "all")]:
+        raise DataError(f"sections: expected all or some of {', '.join(EXPERIMENTS)}, got {unknown[0]!r:.60}")
+    digest, records = source_digest(), out / "records"
+    plan = {name: plan_of(load_experiment(name), size, seed, digest) for name in EXPERIMENTS}
+    wanted = EXPERIMENTS if "all" in names else names
+    run_parts([part for name in wanted for part in plan[name]], records, processes=processes)
+    complete = {name: parts for name, parts in plan.items() if parts and all(p.done(records) for p in parts)}
+    rows = {name: [row for part in parts for row in part.rows(records)] for name, parts in complete.items()}
+    seconds = sum(part.record(records)["seconds"] for parts in complete.values() for part in parts)
+    command = f"finlab eval report -o {out}" + (" --quick" if size == "quick" else "")
+    command += f" --seed {seed}" if seed != SEED else ""
+    left = [name for name in EXPERIMENTS if name not in complete]
+    document = make_document(rows, [*_how_made(command, seconds, seed), *_missing(left)], size)
+    write_report(out, document, rows)
     return out / PAGE
 
 
-def make_document(results: Results, provenance: Provenance, sizes: Sizes, missing: int = 0) -> Document:
-    """The page's blocks, from results; so many jobs have none yet."""
-    cards, *standings = summary.summary_blocks(results.tables)
-    blocks: list[Block] = [cards, *scope.scope_blocks(provenance.seed), *standings, *methods.method_blocks()]
-    blocks += result_blocks(results, sizes)
-    blocks += how_made_blocks(results, provenance, sizes)
-    note = "" if sizes.name == "full" else f" A {sizes.name} look on few cases; intervals are wide."
-    note += f" Not run yet when this page was made: {missing} of its parts." if missing else ""
-    subtitle = (
-        "Control allocation for robots with fins: the exact search, the same search from a network's "
-        "proposals, the paper's method and seven others, every answer scored by the fins' own models."
-        f"{note}"
+def plan_of(experiment: Experiment, size: Size, seed: int, digest: str) -> list[Part]:
+    """The parts of an experiment; none where a package that it needs is not installed."""
+    if any(find_spec(package) is None for package in experiment.needs):
+        return []
+    chosen = dict(experiment.quick if size == "quick" else experiment.full)
+    if "seed" in experiment.options():
+        chosen["seed"] = seed
+    return [Part(experiment.name, options, digest) for options in experiment.parts(chosen)]
+
+
+def make_document(rows: dict[str, list[Row]], how_made: Sequence[str], size: Size) -> Document:
+    """The page, from the rows of each experiment."""
+    blocks: list[Block] = [ABOUT]
+    experiments = [load_experiment(name) for name in rows]
+    if compared := [row for each in experiments for row in standings(each, rows[each.name])]:
+        blocks += ["## Who leads", LEADS, Table(COLUMNS, compared)]
+    for experiment in experiments:
+        blocks += [*experiment.words(), *experiment.results(rows[experiment.name])]
+    blocks += ["## How this was made", "\n".join(f"- {line}" for line in how_made)]
+    note = "" if size == "full" else " A quick look on few cases: intervals are wide."
+    return Document(
+        "finlab evaluation", f"Allocation methods and simulated swims, side by side.{note}", tuple(blocks)
     )
-    return Document("finlab evaluation", subtitle, tuple(blocks))
 
 
-def result_blocks(results: Results, sizes: Sizes) -> list[Block]:
-    """Every table that has run, from top to bottom."""
-    tables = results.tables
-    makers: dict[str, Callable[[Sequence[Row]], list[Block]]] = {
-        "wrench": lambda _: wrench_tracking.accuracy_blocks(results),
-        "cost": lambda rows: cost.cost_blocks(rows, N_STARTS),
-        "network": lambda rows: network.network_blocks(rows, MdnSettings().n_candidates),
-        "modes": lambda rows: questions.mode_blocks(rows, sizes.of_table["modes"]["starts"]),
-        "unreachable": questions.unreachable_blocks,
-        "beyond": questions.beyond_blocks,
-        "steadiness": questions.steadiness_blocks,
-        "sequences": questions.sequence_blocks,
-        "latency": studies.latency_blocks,
-        "first_answers": studies.first_answer_blocks,
-        "trajectory": lambda rows: closed_loop.trajectory_blocks(rows, results.tracks),
-        "faults": closed_loop.fault_blocks,
-        "velocity": closed_loop.velocity_blocks,
-        "swims": swims.day_blocks,
-        "slow_swims": lambda rows: swims.slow_day_blocks(tables.get("swims", ()), rows),
-        "ablation": ablation.ablation_blocks,
-        "temperature": lambda rows: studies.temperature_blocks(rows, results.scatter),
-        "training": lambda rows: studies.training_blocks(rows, sizes.of_table["training"]),
-    }
-    blocks: list[Block] = []
-    for table, make in makers.items():
-        if table in tables:
-            if table in (*SWIMMERS, "swims", "slow_swims") and closed_loop.INTRODUCTION[0] not in blocks:
-                blocks += closed_loop.INTRODUCTION
-            blocks += make(tables[table])
-    return blocks
+def _how_made(command: str, seconds: float, seed: int) -> list[str]:
+    about = machine() | {"threads": str(THREADS)}
+    return [
+        f"Command `{command}`, seed {seed}, {seconds / 60.0:.0f} minutes of one core for all parts",
+        f"Commit `{source_commit()}`",
+        "Machine: " + ", ".join(f"{key} {value}" for key, value in about.items()),
+        "Every section is also printed by `finlab eval NAME`; printed figures are those of Y. Hamamatsu, "
+        "M. Kruusmaa, A. Ristolainen, Layout-independent actuation allocator for fin-actuated marine robots",
+    ]
 
 
-def write_report(out: Path, document: Document, tables: dict[str, Any]) -> None:
-    """Page, twin, pictures and rows."""
+def _missing(names: Sequence[str]) -> list[str]:
+    return [f"Not run: {', '.join(names)}"] if names else []
+
+
+def write_report(out: Path, document: Document, rows: dict[str, list[Row]]) -> None:
+    """Page, Markdown, pictures and rows.
+
+    Raises:
+        DataError: a file cannot be written; it is then as it was before.
+    """
     pictures = out / PICTURES
-    pictures.mkdir(parents=True, exist_ok=True)
+    try:
+        pictures.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise DataError(f"{pictures}: cannot be made: {error.strerror}") from None
     for figure in figures_of(document.blocks):
-        (pictures / f"{figure.name}.svg").write_text(figure.svg, "utf-8")
-    (out / PAGE).write_text(to_html(document), "utf-8")
-    (out / TWIN).write_text(to_markdown(document, PICTURES), "utf-8")
-    (out / TABLES).write_text(json.dumps(tables, indent=1) + "\n", "utf-8")
+        write_whole(pictures / f"{figure.name}.svg", figure.svg, DataError)
+    write_whole(out / PAGE, to_html(document), DataError)
+    write_whole(out / TWIN, to_markdown(document, PICTURES), DataError)
+    lines = [
+        f"{json.dumps(name)}: [\n" + ",\n".join(json.dumps(_rounded(row)) for row in each) + "\n]"
+        for name, each in rows.items()
+    ]
+    write_whole(out / TABLES, "{\n" + ",\n".join(lines) + "\n}\n", DataError)
+
+
+def _rounded(value: Any) -> Any:
+    """The same with `DIGITS` significant digits."""
+    if isinstance(value, dict):
+        return {key: _rounded(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_rounded(each) for each in value]
+    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value

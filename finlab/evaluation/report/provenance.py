@@ -1,21 +1,26 @@
-"""Where and from what a report was made: enough to make it again and to trace every number."""
+"""Where and from what a report was made: enough to make it again."""
 
+import hashlib
+import os
+import platform
+import re
 import subprocess
-import time
-from dataclasses import asdict, dataclass, field
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+
+from threadpoolctl import threadpool_info
 
 import finlab
-from finlab.evaluation.experiments.latency import machine
-from finlab.evaluation.report.document import Block, Column, Fold, Table
-from finlab.evaluation.report.jobs import THREADS
-from finlab.evaluation.report.results import Results
-from finlab.evaluation.report.sizes import Sizes
+from finlab.inference.checkpoint import resolve_checkpoint
+
+CHECKPOINTS = ("default", "paper")
+"""Shipped networks that methods use."""
 
 
 def source_commit() -> str:
-    """Commit of the source tree this runs from; the package's version where there is none."""
+    """Commit of the source tree this runs from, `+` for changes that are not in it; the package's version
+    where there is no tree."""
 
     def git(*arguments: str) -> str:
         root = Path(finlab.__file__).resolve().parent.parent
@@ -30,63 +35,39 @@ def source_commit() -> str:
     return f"{commit}+" if changed else commit
 
 
-@dataclass(frozen=True)
-class Provenance:
-    """What a reader needs to make the report again."""
-
-    checkpoints: dict[str, str]
-    """Name of each checkpoint -> SHA-256 of its weights."""
-    seed: int
-    """Of all draws."""
-    command: str
-    """That makes it again."""
-    commit: str = field(default_factory=source_commit)
-    """Of the source tree, `+` for changes that are not in it; the version where there is no tree."""
-    made: str = field(default_factory=lambda: time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()))
-    """Time of day, UTC."""
-    machine: dict[str, str] = field(default_factory=lambda: machine() | {"threads": str(THREADS)})
-    """Processor, cores, threads of a part, and versions."""
-
-    def about(self) -> dict[str, Any]:
-        """What stands above the rows for scripts."""
-        return {key: value for key, value in asdict(self).items() if key not in ("command", "made")}
-
-
-def how_made_blocks(results: Results, provenance: Provenance, sizes: Sizes) -> list[Block]:
-    """The section that says so."""
-    machine = ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in provenance.machine.items())
-    prints = [f"\n- Checkpoint `{name}`: SHA-256 `{value}`" for name, value in provenance.checkpoints.items()]
-    columns = (
-        Column("name", "part", "code"),
-        Column("seconds", "seconds", "three"),
-        Column("made", "made"),
-        Column("commit", "commit", "code"),
-        Column("settings", "settings"),
-    )
-    rows, hours = [], 0.0
-    for job in results.plan:
-        settings = ", ".join(f"{key} {value}" for key, value in job.settings.items())
-        _, made = job.result(results.folder)
-        rows.append({**made, "name": job.name, "settings": settings})
-        hours += made["seconds"] / 3600.0
-    then = ", and the same with `--sections slow-days`" if "slow_swims" in results.tables else ""
-    return [
-        "## How this was made",
-        f"- Command: `{provenance.command}`{then} (size {sizes.name}, seed {provenance.seed})\n"
-        f"- Commit `{provenance.commit}`, {provenance.made}\n"
-        f"- Machine: {machine}\n"
-        f"- Time: {hours:.1f} hours by the clock for all parts together, one core each" + "".join(prints),
-        (
-            "Each part is kept as a file of records, one entry per target, found by its settings and the "
-            "fingerprint of the weights; a report that was stopped goes on where it was. The columns are "
-            "described in [docs/evaluation.md](../evaluation.md). Every table here is computed from those "
-            "files."
-        ),
-        (
-            "Figures called printed are from Y. Hamamatsu, M. Kruusmaa, A. Ristolainen, Layout-independent "
-            "actuation allocator for fin-actuated marine robots; `finlab/evaluation/paper_figures.yaml` "
-            "names the table of each. They stand beside ours and in comparisons with them, and enter no "
-            "other number."
-        ),
-        Fold("Every part, with its settings", (Table(columns, rows),)),
+def source_digest() -> str:
+    """Digest of all modules of the library and of the shipped networks."""
+    total = hashlib.sha256()
+    root = Path(finlab.__file__).resolve().parent
+    folders = [resolve_checkpoint(name) for name in CHECKPOINTS]
+    files = [
+        *root.rglob("*.py"),
+        *(path for folder in folders for path in folder.iterdir() if path.is_file()),
     ]
+    for path in sorted(files):
+        total.update(path.name.encode() + path.read_bytes())
+    return total.hexdigest()
+
+
+def machine() -> dict[str, str]:
+    """What this runs on: processor, cores, threads and versions of what is installed."""
+    versions = {}
+    for package in ("numpy", "scipy", "torch"):
+        with suppress(PackageNotFoundError):
+            versions[package] = version(package)
+    return {
+        "processor": _processor(),
+        "cores": str(os.cpu_count()),
+        "threads": str(max((pool["num_threads"] for pool in threadpool_info()), default=1)),
+        "python": platform.python_version(),
+        **versions,
+    }
+
+
+def _processor() -> str:
+    """The processor's name as Linux tells it, or what Python knows."""
+    with suppress(OSError):
+        named = re.search(r"^model name\s*: *(.+)$", Path("/proc/cpuinfo").read_text("utf-8"), re.MULTILINE)
+        if named:
+            return named[1].strip()
+    return platform.processor() or platform.machine()

@@ -1,9 +1,9 @@
 """Blocks as plain text, for the command line: the words and tables of the page, without its pictures."""
 
 import textwrap
+from collections.abc import Sequence
 
 from finlab.evaluation.report.document import Block, Figure, Fold, Table
-from finlab.evaluation.statistics.tables import aligned
 
 WIDTH = 110
 """Columns of a paragraph."""
@@ -28,3 +28,16 @@ def _block(block: Block) -> str:
             return ""
         case tuple(cards):
             return "\n".join(f"{card.label}: {card.value} ({card.detail})" for card in cards)
+
+
+def aligned(head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[bool]) -> str:
+    """Cells under a head, padded with spaces: columns of words to the left, others to the right."""
+    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
+
+    def line(cells: Sequence[str]) -> str:
+        each = zip(cells, widths, words, strict=True)
+        return "  ".join(
+            cell.ljust(width) if left else cell.rjust(width) for cell, width, left in each
+        ).rstrip()
+
+    return "\n".join(map(line, [head, *rows]))

@@ -1,0 +1,158 @@
+"""How far off each method is from wrenches that the robot can deliver."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from finlab.errors import DataError
+from finlab.evaluation.experiment import Experiment
+from finlab.evaluation.method_specs import installed_methods, is_slow, load_method_specs
+from finlab.evaluation.own_layout import layout_and_failed, own_case
+from finlab.evaluation.paper_figures import paper_wrench_rows
+from finlab.evaluation.plots.dots import draw_dots
+from finlab.evaluation.plots.style import Picture
+from finlab.evaluation.report.document import Column, Row
+from finlab.evaluation.scoring import Columns, run_method
+from finlab.evaluation.splits import SPLITS, Case, make_split
+from finlab.evaluation.statistics.bootstrap import mean_interval, quantile_interval, share_interval
+from finlab.physics.objective import Name as Objective
+
+SUCCESS_LEVELS = (0.01, 0.5)
+"""Levels t of `success_t`, the share of targets with `err_norm <= t`."""
+HARD = (
+    "id",
+    "ood",
+    "ood-fins",
+    "limits",
+    "failure",
+    "near-singular",
+    "fins-mixed",
+    "tables",
+    "many-fins",
+    "tiny",
+)
+"""Splits of the report."""
+
+
+def run(
+    layout: str | None = None,
+    split: tuple[str, ...] = ("id",),
+    methods: tuple[str, ...] | None = None,
+    layouts: int = 100,
+    targets: int = 1000,
+    subsample: int = 10,
+    objective: Objective = "power",
+    checkpoint: str | None = None,
+    seed: int = 0,
+) -> list[Row]:
+    """One row for each split and method.
+
+    Args:
+        layout: a layout file, graph file or shipped name in place of a split: one case, of that many targets,
+            with errors over the robot's own wrenches.
+        split: names, or all: id, ood, ood-fins, limits, failure, near-singular, fins, fins-mixed, tables,
+            many-fins, perturbed, parallel, collinear, clustered, coincident, stacked, big, tiny.
+        methods: names; by default search and paper, on LAYOUT all that are installed. An objective may
+            follow, as in search-effort, and a number of starts ipopt, as in ipopt-32.
+        layouts: of each split.
+        targets: on each layout.
+        subsample: ipopt answers only the first so many of each layout; column n says how many.
+        objective: what methods that can choose keep least.
+        checkpoint: of the learned methods, a shipped name or a folder.
+        seed: of all draws.
+    """
+    sets = _cases(layout, split, layouts, targets, seed)
+    usual = ("search", "paper") if layout is None else installed_methods()
+    allocators = load_method_specs(methods or usual, checkpoint, objective, patient=True)
+    return [
+        {"split": name, "method": method, "n": len(found["layout"]), "scored_by": "plant", **figures(found)}
+        for name, cases in sets.items()
+        for method, allocator in allocators.items()
+        for found in [run_method(allocator, cases, first=subsample if is_slow(method) else None)]
+    ]
+
+
+def figures(found: Columns) -> Row:
+    """Means, quantiles and shares of scores, with their intervals."""
+    error, group = found["err_norm"], found["layout"]
+    row: Row = {
+        "err_norm_mean": error.mean(),
+        "err_norm_median": np.median(error),
+        "err_norm_p95": np.quantile(error, 0.95),
+        "err_norm_max": error.max(),
+        "err_phys_mean": found["err_phys"].mean(),
+        **{f"success_{level}": (error <= level).mean() for level in SUCCESS_LEVELS},
+        "effort_mean": found["effort"].mean(),
+        "power_mean": found["power"].mean(),
+        "solve_ms_p50": np.median(found["solve_ms"]),
+        "solve_ms_p99": np.quantile(found["solve_ms"], 0.99),
+    }
+    intervals = {
+        "err_norm_mean": mean_interval(error, group),
+        "err_norm_p95": quantile_interval(error, 0.95, group),
+        "power_mean": mean_interval(found["power"], group),
+        "success_0.01": share_interval(error <= 0.01, group),
+    }
+    plain = {key: float(value) for key, value in row.items()}
+    return plain | {f"{key}_interval": list(ends) for key, ends in intervals.items()}
+
+
+def _cases(
+    layout: str | None, split: tuple[str, ...], layouts: int, targets: int, seed: int
+) -> dict[str, list[Case]]:
+    """Cases by the name of their set."""
+    if layout is None:
+        names = list(SPLITS) if split == ("all",) else split
+        return {name: make_split(name, layouts, targets, seed) for name in names}
+    if split != ("id",):
+        raise DataError(
+            f"split: a layout has none, got {','.join(split)!r} beside {layout!r:.60}; leave one of them out"
+        )
+    own = own_case(*layout_and_failed(layout), targets, seed)
+    return {f"layout {own.layout.name}": [own]}
+
+
+def _printed(rows: Sequence[Row]) -> list[Row]:
+    return [row for split in dict.fromkeys(row["split"] for row in rows) for row in paper_wrench_rows(split)]
+
+
+def _draw(rows: Sequence[Row]) -> Picture:
+    return draw_dots(rows, "err_norm_mean", "split", "mean error", log=True)
+
+
+experiment = Experiment(
+    name="wrench",
+    question="How far off are the wrenches of each method, of those that a robot can deliver?",
+    columns=(
+        Column("split", "split", "code"),
+        Column("method", "method", "code"),
+        Column("n", "targets", "count"),
+        Column("err_norm_mean", "mean error", "error", "err_norm_mean_interval"),
+        Column("err_norm_median", "median", "error"),
+        Column("err_norm_p95", "95th percentile", "error"),
+        Column("err_norm_max", "largest", "error"),
+        Column("success_0.01", "within 0.01", "share", "success_0.01_interval"),
+        Column("success_0.5", "within 0.5", "share"),
+        Column("power_mean", "mean power", "three", unit="W"),
+        Column("solve_ms_p50", "median time", "three", unit="ms"),
+    ),
+    run=run,
+    note=(
+        "Scored by the plant, the fins' own laws or tables. Errors in standard deviations of the wrenches "
+        "of random layouts; on fins, fins-mixed, tables, big and tiny and on a layout of your own, of the "
+        "robot's wrenches. Intervals: where another seed lands, 95 times of 100. Time: that of all targets "
+        "of a layout over their number. Printed: the paper's figures, on its own layouts and targets."
+    ),
+    quick={"split": HARD[:4], "methods": ("search", "paper", "sqp"), "layouts": 10, "targets": 5},
+    full={
+        "split": HARD,
+        "methods": ("search", "mdn", "paper", "qp", "sqp", "analytic"),
+        "layouts": 50,
+        "targets": 10,
+    },
+    each="split",
+    draw=_draw,
+    caption="Mean normalized error with the interval of another seed; below 1e-8 it is rounding.",
+    printed=_printed,
+    less_is_better=("err_norm_mean",),
+)

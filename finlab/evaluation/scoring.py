@@ -1,0 +1,72 @@
+"""Answers of a method, scored by the plant: one entry per target, under the names of columns."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from finlab.allocation.allocator import Allocator
+from finlab.arrays import AnyArray, Array
+from finlab.evaluation.progress import progress
+from finlab.evaluation.splits import Case
+from finlab.physics import plant_of
+from finlab.physics.energy import command_energy
+
+Columns = dict[str, AnyArray]
+"""Arrays of N entries by name."""
+
+
+def run_method(
+    allocator: Allocator, cases: Sequence[Case], *, seed: int = 0, first: int | None = None
+) -> Columns:
+    """What a method does on cases; all targets of a layout are solved together.
+
+    Args:
+        allocator: the method.
+        cases: layouts with targets.
+        seed: passed to the method.
+        first: only the first so many targets of each layout.
+
+    Returns:
+        The columns of `score`.
+    """
+    parts = []
+    for k, case in enumerate(progress(cases, "layout", allocator.name)):
+        targets = case.targets[:first]
+        answer = allocator.allocate_batch(case.layout, targets, failed=case.failed, seed=seed)
+        sigma = allocator.normalization.std
+        parts.append(score(case, targets, answer.command, answer.solve_ms, sigma, number=k))
+    return joined(parts)
+
+
+def score(
+    case: Case, targets: Array, command: Array, solve_ms: Array, sigma: Array, *, number: int = 0
+) -> Columns:
+    """Scores of answers to targets (N, 6) of a case, the wrench computed by the plant.
+
+    Args:
+        case: the layout.
+        targets: desired wrenches (N, 6).
+        command: the method's answers (N, n, 3).
+        solve_ms: what each took (N,) [ms].
+        sigma: per-axis standard deviation (6,), where the case has none of its own.
+        number: of the layout in its split.
+
+    Returns:
+        Arrays (N,): `layout`, its number; `err_norm`, the norm of what is missing over sigma; `err_phys`, the
+        same in N and N m; `effort`, the paper's J_en; `power` [W]; `solve_ms`.
+    """
+    plant = plant_of(case.layout)
+    missing = plant.wrench(command) - targets
+    return {
+        "layout": np.full(len(targets), number, np.int64),
+        "err_norm": np.linalg.norm(missing / (sigma if case.sigma is None else case.sigma), axis=-1),
+        "err_phys": np.linalg.norm(missing, axis=-1),
+        "effort": command_energy(command, plant.upper),
+        "power": np.nansum(plant.power(command), axis=-1),
+        "solve_ms": np.asarray(solve_ms, np.float64),
+    }
+
+
+def joined(parts: Sequence[Columns]) -> Columns:
+    """Columns one after the other."""
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
