@@ -11,16 +11,19 @@ WIDTH = 110
 
 def to_text(*blocks: Block) -> str:
     """Headings without their marks, paragraphs in lines, tables with aligned columns, folds opened."""
-    return "\n\n".join(text.replace("`", "") for text in map(_block, blocks) if text)
+    return "\n\n".join(text for text in map(_block, blocks) if text)
 
 
 def _block(block: Block) -> str:
     match block:
         case str():
-            return "\n".join(textwrap.fill(line.strip("#* "), WIDTH) for line in block.splitlines())
+            return "\n".join(
+                textwrap.fill(line.strip("#* ").replace("`", ""), WIDTH) for line in block.splitlines()
+            )
         case Table():
             head = [column.heading for column in block.columns]
-            lines = [[block.in_one_cell(row, column) for column in block.columns] for row in block.rows]
+            cells = [[block.in_one_cell(row, column) for column in block.columns] for row in block.rows]
+            lines = [[cell.replace("`", "") for cell in line] for line in cells]
             return aligned(head, lines, [not column.is_number for column in block.columns])
         case Fold(title, hidden):
             return to_text(title, *hidden)

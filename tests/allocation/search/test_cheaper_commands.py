@@ -11,12 +11,12 @@ from finlab.allocation import load_allocator
 from finlab.allocation.search.cheaper_commands import DESCENT, cheaper_commands
 from finlab.allocation.search.levenberg_marquardt import CommandProblem, refine
 from finlab.arrays import Array
-from finlab.evaluation.experiments.fuzz import hostile_robot, hostile_targets
 from finlab.evaluation.splits import make_split
 from finlab.layout import FinModelSpec, Layout
 from finlab.physics import make_law, plant_of, write_table
 from finlab.physics.objective import CostMeter, Name, Objective
 from tests.allocation.search.reference import least_cost
+from tests.hostile_robots import hostile_robot, hostile_targets
 from tests.random_fins import random_robot
 
 EXACT = 1e-5

@@ -1,223 +1,193 @@
-"""A whole report at a tiny size, with an untrained network; then again from what was kept."""
+"""A whole report at a tiny size; then again from what was kept, killed, and on a full disk."""
 
+import io
 import json
-from collections.abc import Collection
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from finlab.evaluation.experiments.training_study import CHANGES
-from finlab.evaluation.method_specs import Checkpoints
-from finlab.evaluation.report import plan as planning
-from finlab.evaluation.report.jobs import Job
+from finlab.cli import main
+from finlab.errors import DataError
+from finlab.evaluation.experiment import Row
+from finlab.evaluation.report import jobs, make
+from finlab.evaluation.report.jobs import Part, run_parts
 from finlab.evaluation.report.make import PAGE, PICTURES, TABLES, TWIN, make_report
-from finlab.evaluation.report.plan import make_plan
-from finlab.evaluation.report.sizes import Sizes, cases
+from finlab.evaluation.report.standings import standings
 
 pytest.importorskip("matplotlib")
 pytest.importorskip("casadi")
 
-TINY = Sizes(
-    "tiny",
-    {
-        "wrench": cases(2, 3),
-        "wrench-other": cases(2, 2),
-        "wrench-slow": cases(1, 1),
-        "cost": cases(2, 1),
-        "network": cases(1, 2, fins=[4]),
-        "modes": cases(2, 1, starts=4),
-        "unreachable": {"layouts": 4},
-        "rerun": cases(2, 2),
-        "beyond": cases(1, 1),
-        "sequences": {"layouts": ["D"], "paths": 1, "ticks": 3},
-        "steadiness": {"layouts": ["D"], "paths": 1, "ticks": 3},
-        "latency": {"calls": 3, "budget_s": 0.5},
-        "first_answers": {"robots": 1},
-        "swims": {"scenarios": "saturated", "seeds": 1},
-        "ablation": cases(2, 2),
-        "temperature": cases(2, 2),
-        "training": cases(2, 2, preset="smoke", steps=4, batch_size=32),
-    },
-)
-
-
-FEW_SPLITS = ("id", "ood", "failure", "tables")
+TINY: dict[str, dict[str, Any]] = {
+    "wrench": {"split": ("id", "tables"), "methods": ("search", "qp"), "layouts": 2, "targets": 2},
+    "cost": {"split": ("id",), "methods": ("search",), "layouts": 2, "targets": 1, "starts": 4},
+    "sequences": {"layouts": ("D",), "methods": ("search", "sqp"), "paths": 1, "ticks": 4},
+    "latency": {"methods": ("search", "qp"), "calls": 2, "robots": 1},
+    "ablation": {"variants": ("ours",), "layouts": 2, "targets": 1, "candidates": 4},
+    "temperature": {"temperatures": (0.01, 1.0), "layouts": 2, "targets": 1, "candidates": 4},
+}
+FINLAB = [sys.executable, "-m", "finlab"]
+SOME = ["eval", "report", "--quick", "--sections", "temperature", "--processes", "2", "-o"]
 
 
 @pytest.fixture(scope="module")
-def few() -> pytest.MonkeyPatch:
-    """Fewer methods, temperatures and trainings than a real report has."""
+def tiny() -> Iterator[None]:
+    """Experiments with quick sizes that take a second."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(planning, "QUICK", ("search", "paper", "analytic"))
-        patch.setattr(planning, "SLOW", ("ipopt",))
-        patch.setattr(planning, "SPLITS", FEW_SPLITS)
-        patch.setattr(planning, "COST_METHODS", ("search", "analytic"))
-        patch.setattr(planning, "COST_SETS", ("id", "axes", "tables"))
-        patch.setattr(planning, "N_STARTS", 4)
-        patch.setattr(planning, "LATENCY_METHODS", ("search", "paper", "analytic", "ipopt"))
-        patch.setattr(planning, "TEMPERATURES", (0.01, 1.0))
-        patch.setattr(planning, "CHANGES", {name: CHANGES[name] for name in ("recipe", "one_component")})
-        patch.setattr("finlab.evaluation.experiments.ablation.TIMED_CALLS", 1)
-        patch.setattr("finlab.evaluation.experiments.first_answers.KINDS", ("drag", "table"))
-        yield patch
+        patch.setattr(make, "EXPERIMENTS", dict.fromkeys(TINY))
+        for name, sizes in TINY.items():
+            module = import_module(f"finlab.evaluation.experiments.{name}")
+            patch.setattr(module, "experiment", replace(module.experiment, quick=sizes))
+        yield
 
 
 @pytest.fixture(scope="module")
-def untrained(untrained_mdn: Path, untrained_checkpoint: Path) -> Checkpoints:
-    return Checkpoints(str(untrained_mdn), str(untrained_checkpoint))
-
-
-@pytest.fixture(scope="module")
-def folder(few: pytest.MonkeyPatch, untrained: Checkpoints, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tiny: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("report")
-    _make(out, untrained)
+    make_report(out, size="quick", seed=3, processes=0)
     return out
 
 
-def _make(out: Path, checkpoints: Checkpoints, **options: Any) -> None:
-    make_report(
-        out,
-        sizes=TINY,
-        seed=0,
-        checkpoints=checkpoints,
-        records=out / "records",
-        command="finlab eval report -o DIR",
-        processes=0,
-        **options,
-    )
+def without_times(rows: Any) -> Any:
+    """Rows without what the machine decides."""
+    if isinstance(rows, dict):
+        return {k: without_times(v) for k, v in rows.items() if not ("_ms" in k or k == "p50_over_search")}
+    return [without_times(row) for row in rows] if isinstance(rows, list) else rows
 
 
-def test_page_twin_pictures_and_rows_say_the_same(folder: Path, untrained_checkpoint: Path) -> None:
+def test_page_markdown_pictures_and_rows_say_the_same(folder: Path) -> None:
     page, twin = (folder / PAGE).read_text("utf-8"), (folder / TWIN).read_text("utf-8")
     tables = json.loads((folder / TABLES).read_text("utf-8"))
-    for words in (
-        "What is not shown",
-        "Who was tuned on what",
-        "Who leads",
-        "asked over largest",
-        "Sequences with noise",
-        "the other leads",
-        "Every comparison",
-        "0.0857",
-        "SHA-256",
-        "random starts of IPOPT",
-    ):
+    assert list(tables) == list(TINY)
+    for words in ("Who leads", "How far off are the wrenches", "0.086", "seed 3"):
         assert words in page and words in twin
-    digest = json.loads((untrained_checkpoint / "config.json").read_text())["sha256"]
-    assert digest in page and digest in twin
     names = {path.name for path in (folder / PICTURES).iterdir()}
-    assert len(names) == page.count("<svg") == twin.count("](pictures/")
-    assert all(f"](pictures/{name})" in twin for name in names)
-    assert len(tables["wrench"]) == len(FEW_SPLITS) * 4 and len(tables["ablation"]) == 20
-    costs = {(row["split"], row["objective"], row["method"]) for row in tables["cost"]}
-    assert costs == {
-        (split, objective, method)
-        for split in ("id", "axes", "tables")
-        for objective in ("power", "effort")
-        for method in ("search", "analytic")
-    }
-    again = {(row["split"], row["method"]): row["err_norm_mean"] for row in tables["rerun"]}
-    assert set(again) == {
-        (split, method) for split in FEW_SPLITS for method in ("search", "paper", "analytic")
-    }
-    for row in tables["wrench"]:  # drawn anew
-        assert row["method"] == "ipopt" or row["err_norm_mean"] != again[row["split"], row["method"]]
-    assert [row["temperature"] for row in tables["temperature"]] == [0.01, 1.0]
-    assert {(row["fins"], row["objective"]) for row in tables["network"]} == {(4, "power"), (4, "effort")}
-    assert [row["fins"] for row in tables["first_answers"]] == ["drag", "drag", "table", "table"]
-    assert [row["layout"] for row in tables["steadiness"]] == ["D"]
-    for section, parts in planning.SECTIONS.items():
-        assert section == "closed-loop" or set(parts) & set(tables)  # hardly anything swims in a tiny report
-    assert "slow_swims" not in tables
-    swum = [(swim["scenario"], swim["layout"], swim["method"]) for swim in tables["swims"]]
-    assert swum == [
-        ("saturated", layout, method)
-        for layout in ("A", "C")
-        for method in ("search", "analytic", "on-board")
-    ]
-    for words in ("Hard days", "The path asks for more than the fins can give", "error, hard days"):
-        assert words in page and words in twin
+    assert names == {"wrench.svg", "cost.svg", "temperature.svg"}
+    assert len(names) == page.count("<svg") and all(f"]({PICTURES}/{name})" in twin for name in names)
+    for name, rows in tables.items():
+        assert rows and f"## {name.capitalize()}" in twin
+    assert [row["split"] for row in tables["wrench"]] == ["id", "id", "tables", "tables"]
 
 
-def test_every_method_says_what_it_was_given(folder: Path) -> None:
-    tables, twin = json.loads((folder / TABLES).read_text("utf-8")), (folder / TWIN).read_text("utf-8")
-    told = twin[twin.index("## Who knows what") : twin.index("## Wrench tracking")]
-    assert all(f"`{row['method']}`" in told for name in ("wrench", "cost", "latency") for row in tables[name])
+def test_two_reports_of_one_seed_have_the_same_rows(folder: Path, tmp_path: Path) -> None:
+    """In another order, and with parts in one run that were parts of another."""
+    again = tmp_path / "again"
+    for names in (["temperature", "sequences"], ["cost"], ["all"]):
+        make_report(again, size="quick", seed=3, names=names, processes=0)
+    first, second = (json.loads((out / TABLES).read_text("utf-8")) for out in (folder, again))
+    assert without_times(first) == without_times(second)
 
 
-def test_the_page_stands_alone(folder: Path) -> None:
-    page = (folder / PAGE).read_text("utf-8")
-    assert "<script" not in page and "<img" not in page and "@import" not in page
-    assert page.index("the other leads") < page.index('<h2 id="wrench-tracking">')
-
-
-def test_the_second_time_nothing_is_done_again(
-    folder: Path, untrained: Checkpoints, monkeypatch: pytest.MonkeyPatch
+def test_a_part_is_run_once_and_other_code_is_another_part(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(*_: object) -> None:
-        raise AssertionError("work was done twice")
-
-    monkeypatch.setattr(Job, "run", refuse)
-    rows = (folder / TABLES).read_text("utf-8")
-    _make(folder, untrained)
-    assert (folder / TABLES).read_text("utf-8") == rows
-
-
-def test_a_report_can_be_made_section_by_section(few: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    def headings(sections: Collection[str]) -> list[str]:
-        _make(tmp_path, Checkpoints(), sections=sections)
-        lines = (tmp_path / TWIN).read_text("utf-8").splitlines()
-        return [line.removeprefix("## ") for line in lines if line.startswith("## ")]
-
-    first, last = ["What is shown", "Who leads", "Who knows what"], ["How this was made"]
-    assert headings(["unreachable"]) == [*first, "Out of reach", *last]
-    assert headings(["steadiness"]) == [*first, "Out of reach", "From tick to tick", *last]
-    assert "Not run yet when this page was made: " in (tmp_path / TWIN).read_text("utf-8")
+    before = {path: path.stat().st_mtime_ns for path in (folder / "records").iterdir()}
+    make_report(folder, size="quick", seed=3, processes=0)
+    assert {path: path.stat().st_mtime_ns for path in (folder / "records").iterdir()} == before
+    part = Part("temperature", {"temperatures": [1.0], "layouts": 2}, "code")
+    assert part.path(folder) != replace(part, source="other code").path(folder)
+    assert part.path(folder) != replace(part, options={**part.options, "layouts": 3}).path(folder)
 
 
-def test_two_runs_with_one_seed_print_the_same(few: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """All but times, digit for digit."""
-
-    def printed(folder: str) -> dict[str, Any]:
-        _make(tmp_path / folder, Checkpoints(), sections=["wrench", "beyond", "sequences"])
-        tables = json.loads((tmp_path / folder / TABLES).read_text("utf-8"))
-        names = "wrench", "rerun", "beyond", "sequences"
-        return {name: list(map(_timeless, tables[name])) for name in names}
-
-    assert printed("first") == printed("second")
+def test_a_damaged_record_is_named(folder: Path, tmp_path: Path) -> None:
+    part = Part("temperature", {"temperatures": [1.0]}, "code")
+    part.path(tmp_path).write_text('{"rows": [')
+    with pytest.raises(DataError, match="temperature-1.0-.*: not a file of rows .*delete it and run again"):
+        part.rows(tmp_path)
 
 
-def _timeless(row: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in row.items() if "ms" not in key.split("_")}
+def test_progress_is_shown_before_the_first_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    shown = Terminal()
+    monkeypatch.setattr(sys, "stderr", shown)
+    seen: list[str] = []
+    monkeypatch.setattr(Part, "run", lambda *_: seen.append(shown.getvalue()))
+    run_parts([Part("temperature", {"temperatures": [1.0]}, "code")], tmp_path, processes=0)
+    assert "0/1" in seen[0] and "temperature-1.0" in seen[0]
 
 
-def test_sections_that_take_hours_are_run_where_they_are_named(tmp_path: Path) -> None:
-    assert planning.parse_sections("hard-days, slow-days") == ["hard-days", "slow-days"]
-    assert set(planning.SECTIONS) - set(planning.parse_sections("all")) == {"slow-days"}
-    plan = make_plan(TINY, seed=0, checkpoints=Checkpoints(), runs=tmp_path).only(["slow-days"])
-    compared = {"search,analytic,on-board", "sqp", "paper"}
-    assert {job.settings["methods"] for job in plan} == compared
+def processes_of(group: int) -> list[int]:
+    """Processes of a group that have not ended."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            state, _, of = path.read_text().rpartition(")")[2].split()[:3]
+        except (OSError, ValueError):
+            continue
+        if int(of) == group and state != "Z":
+            found.append(int(path.parent.name))
+    return found
 
 
-def test_a_study_without_one_of_its_parts_is_left_out(few: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    plan = make_plan(TINY, seed=0, checkpoints=Checkpoints(), runs=tmp_path).only(["temperature"])
-    *parts, last = plan
-    for job in parts:
-        job.path(tmp_path).touch()
-    assert not plan.only_done(tmp_path).tables
-    last.path(tmp_path).touch()
-    assert plan.only_done(tmp_path) == plan
+@pytest.mark.parametrize("how", [pytest.param(signal.SIGTERM, marks=pytest.mark.exhaustive), signal.SIGKILL])
+def test_workers_end_with_their_report(how: signal.Signals, tmp_path: Path) -> None:
+    """And the report goes on from what was kept."""
+    run = subprocess.Popen([*FINLAB, *SOME, str(tmp_path)], start_new_session=True, stderr=subprocess.DEVNULL)
+    records = tmp_path / "records"
+    while not (records.is_dir() and list(records.glob("*.json"))):
+        assert run.poll() is None
+        time.sleep(0.02)
+    assert len(processes_of(run.pid)) >= 3
+    run.send_signal(how)
+    assert run.wait() == -how
+    end = time.monotonic() + 30.0
+    while processes_of(run.pid) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert processes_of(run.pid) == []
+    assert not [path for path in tmp_path.rglob("*") if path.is_file() and path.suffix != ".json"]
 
 
-def test_without_casadi_and_torch_the_rest_is_planned(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+def test_a_full_disk_is_a_sentence_with_the_path(tiny: None, tmp_path: Path) -> None:
+    """Files may grow to 4 kB: records fit, the pictures do not."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4000, hard))
+    try:
+        with pytest.raises(DataError, match=r"pictures/.*svg: cannot be written: File too large"):
+            make_report(tmp_path, size="quick", names=["temperature"], processes=0)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    files = [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert len(files) == 2 and all(json.loads(path.read_text())["rows"] for path in files)
+
+
+def test_a_lead_needs_intervals_that_lie_apart() -> None:
+    from finlab.evaluation.experiment import load_experiment
+
+    def row(split: str, method: str, low: float, high: float) -> Row:
+        return {"split": split, "method": method, "err_norm_mean_interval": [low, high]}
+
+    rows = [row("id", "search", 1.0, 2.0), row("id", "qp", 3.0, 4.0), row("id", "paper", 1.5, 9.0)]
+    rows += [row("ood", "search", 5.0, 6.0), row("ood", "qp", 3.0, 4.0), row("limits", "qp", 0.0, 1.0)]
+    qp, paper = standings(load_experiment("wrench"), rows)
+    assert (qp["against"], qp["cases"], qp["leads"], qp["level"], qp["trails"]) == ("qp", 2, 1, 0, 1)
+    assert (paper["cases"], paper["leads"], paper["level"], paper["trails"]) == (1, 0, 1, 0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("-o README.md", "out: expected a folder, got the file README.md"),
+        ("-o somewhere --processes 0", "processes: expected a number of at least 1, got 0"),
+        ("-o somewhere --sections nothing", "sections: expected all or some of wrench, cost"),
+    ],
+)
+def test_bad_input_is_one_sentence(
+    arguments: str, message: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = make_plan(TINY, seed=0, checkpoints=Checkpoints(), runs=tmp_path).tables
-    monkeypatch.setattr(planning, "find_spec", lambda _: None)
-    bare = make_plan(TINY, seed=0, checkpoints=Checkpoints(), runs=tmp_path).tables
-    assert set(whole) - set(bare) == {"training", "unreachable", "beyond"}
-    assert {method for _, method in set(whole["wrench"]) - set(bare["wrench"])} == {"ipopt"}
-    assert bare["cost"] == whole["cost"]  # SLSQP stands in for IPOPT
-    assert bare["ablation"] == whole["ablation"]
-    assert bare["wrench"]["id", "search"] == whole["wrench"]["id", "search"]
+    monkeypatch.chdir(Path(jobs.__file__).parents[3])
+    assert main(["eval", "report", *arguments.split()]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("finlab: error: ") and message in error and error.count("\n") == 1
+    assert not os.path.exists("somewhere")

@@ -66,7 +66,7 @@ def test_text_has_words_and_tables_but_draws_nothing() -> None:
 
     text = to_text(*DOCUMENT.blocks, Figure("dots", refuse, "Some dots."))
     assert "First section\n\nSee" in text and "\n- one\n- two" in text and "Some dots" not in text
-    assert "method                      error <\n`ours`  0.00029 (0.00020 – 0.00040)\ntheirs\n" in text
+    assert "method                      error <\nours    0.00029 (0.00020 – 0.00040)\ntheirs\n" in text
     assert "a call: 1.8 ms (others 90)" in text
 
 

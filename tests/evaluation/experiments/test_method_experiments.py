@@ -1,0 +1,189 @@
+"""Experiments of methods at small sizes: what the figures of each say is true."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from finlab.allocation import load_allocator
+from finlab.allocation.allocator import Allocator
+from finlab.allocation.baselines.analytic import Analytic
+from finlab.allocation.solution import Solution
+from finlab.errors import DataError
+from finlab.evaluation import method_specs
+from finlab.evaluation.experiment import Row, load_experiment
+from finlab.evaluation.experiments.latency import first_times
+from finlab.evaluation.experiments.temperature import diversity
+from finlab.evaluation.ipopt_reach import IpoptReach
+from finlab.evaluation.scoring import run_method
+from finlab.evaluation.splits import make_split
+from finlab.inference.normalization import Normalization
+from finlab.layout import Fin, Layout, Limits
+from finlab.physics import Plant
+
+SIGMA = np.array([1.4, 1.4, 2.0, 0.35, 0.35, 0.35])
+ALL = np.ones(6, dtype=bool)
+
+
+def by(rows: list[Row], *keys: str) -> dict[Any, Row]:
+    return {tuple(row[key] for key in keys) if len(keys) > 1 else row[keys[0]]: row for row in rows}
+
+
+class Idle(Allocator):
+    """Answers every target with the least command."""
+
+    name = "idle"
+    normalization = Normalization(np.zeros(6), SIGMA)
+
+    def _solve(
+        self, layout: Layout, targets: np.ndarray, *, seed: int, previous: np.ndarray | None
+    ) -> Solution:
+        return Solution(np.tile(layout.lower, (len(targets), 1, 1)))
+
+
+class Cheat(Analytic):
+    """Delivers the wrench from beyond its limits."""
+
+    def _solve(self, layout: Any, targets: Any, *, seed: int, previous: Any) -> Any:
+        solution = super()._solve(layout, targets, seed=seed, previous=previous)
+        return solution._replace(command=solution.command + [0.0, 0.0, 8 * np.pi])
+
+
+@pytest.mark.parametrize("first", [None, 2])
+def test_the_plant_scores(first: int | None) -> None:
+    cases = make_split("failure", 3, 4, 11)
+    found = run_method(Idle(), cases, first=first)
+    expected = []
+    for case in cases:
+        command = case.layout.lower.copy()
+        command[[name in case.failed for name in case.layout.names]] = np.nan
+        wrench = Plant(case.layout).wrench(command)
+        expected.append(np.linalg.norm((wrench - case.targets[:first]) / SIGMA, axis=-1))
+    np.testing.assert_allclose(found["err_norm"], np.concatenate(expected))
+    assert (found["solve_ms"] > 0).all() and np.unique(found["layout"]).tolist() == [0, 1, 2]
+
+
+def test_the_search_costs_no_more_than_the_best_start() -> None:
+    pytest.importorskip("casadi")
+    sizes = {"layouts": 3, "targets": 1, "seed": 6, "starts": 8, "methods": ("search",)}
+    rows = load_experiment("cost").rows(split=("id", "failure", "axes"), objectives=("power",), **sizes)
+    assert [row["split"] for row in rows] == ["id", "failure", "axes"]
+    for row in rows:
+        assert row["tracked"] == 1.0 and row["cost_ratio"] < 1.002 and row["ratio_max"] < 1.005
+        low, high = row["cost_ratio_interval"]
+        assert low <= row["cost_ratio"] <= high
+    effort = load_experiment("cost").rows(split=("id",), objectives=("effort",), **sizes)
+    assert effort[0]["cost"] != rows[0]["cost"] and effort[0]["cost_ratio"] < 1.01
+
+
+def test_an_answer_outside_its_limits_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("casadi")
+    cheat = Cheat(Normalization(np.zeros(6), SIGMA))
+    monkeypatch.setattr(method_specs, "load_method_spec", lambda *_: cheat)
+    (row,) = load_experiment("cost").rows(
+        methods=("cheat",), objectives=("power",), layouts=2, targets=1, starts=2
+    )
+    assert row["tracked"] == 0.0 and "cost_ratio" not in row
+
+
+def surge_robot(arc: tuple[float, float] = (-math.pi, math.pi)) -> tuple[Layout, float]:
+    """Two fins abeam that push along x and z, and the thrust of one [N]."""
+    limits = Limits(zero_direction=arc)
+    fins = [Fin(name, (0.0, y, 0.0), -math.pi / 2, limits) for name, y in (("port", 0.2), ("star", -0.2))]
+    layout = Layout("pair", tuple(fins))
+    full = np.array([[*limits.upper[:2], 0.5 * sum(arc)]] * 2)
+    return layout, float(np.linalg.norm(Plant(layout).fin_forces(full)[0]))
+
+
+def test_ipopt_knows_a_reach_by_hand() -> None:
+    pytest.importorskip("casadi")
+    layout, thrust = surge_robot()
+    reach = IpoptReach(layout, SIGMA)
+    wanted = np.array([4.0 * thrust, 0, 0, 0, 0, 0]) / SIGMA
+    assert reach.largest_share(wanted) == pytest.approx(0.5, abs=1e-5)
+    assert reach.least_error(wanted, ALL) == pytest.approx(2.0 * thrust / SIGMA[0], rel=1e-5)
+    assert reach.least_error(np.array([0, 5.0, 0, 0, 0, 0]), ALL) == pytest.approx(5.0, rel=1e-5)  # no sway
+
+
+def test_arcs_wider_than_half_a_turn_are_tried_in_halves() -> None:
+    pytest.importorskip("casadi")
+    layout, thrust = surge_robot((-math.radians(130), math.radians(130)))
+    reach = IpoptReach(layout, SIGMA)
+    back = np.array([-2.0 * thrust, 0, 0, 0, 0, 0]) / SIGMA
+    # Neither fin can point straight back; both at their stops, one up and one down, would roll the robot.
+    surge = np.array([True, False, False, False, False, False])
+    missing = 2.0 * thrust * (1.0 - math.cos(math.radians(50))) / SIGMA[0]
+    assert reach.least_error(back, surge) == pytest.approx(missing, rel=1e-4)
+
+
+def test_nobody_errs_less_than_possible_and_the_search_hardly_more() -> None:
+    pytest.importorskip("casadi")
+    experiment = load_experiment("unreachable")
+    rows = experiment.rows(layouts=3, targets=2, seed=11, methods=("search", "analytic"), factors=(1.0, 2.0))
+    found = by(rows, "factor", "method", "policy")
+    assert len(found) == 2 * (3 + 1) and all(row["n"] == 6 for row in rows)
+    least = [found[factor, "search", "closest"]["least_mean"] for factor in (1.0, 2.0)]
+    assert least[0] < 1e-3 < least[1]
+    assert all(row["excess_median"] > -1e-3 for row in rows)
+    assert all(row["excess_max"] < 0.01 for row in rows if row["method"] == "search")
+    assert found[2.0, "analytic", "closest"]["excess_mean"] > 0.1  # it does not know what to give up
+    with pytest.raises(DataError, match="split: expected one whose fins follow the law drag"):
+        experiment.rows(split=("fins",), layouts=2, targets=1)
+
+
+def test_only_methods_that_know_the_previous_command_keep_to_the_servos() -> None:
+    rows = load_experiment("sequences").rows(
+        layouts=("D",), methods=("search", "qp"), paths=1, ticks=12, noise=0.3
+    )
+    found = by(rows, "method")
+    assert found["search"]["ticks"] == 12 and found["search"]["frequency_p99"] < 0.35
+    assert found["search"]["turn_p99"] < found["qp"]["turn_p99"] + math.pi
+    calm = load_experiment("sequences").rows(
+        layouts=("D",), methods=("search",), paths=1, ticks=12, noise=0.0
+    )
+    assert calm[0]["err_norm"] < 1e-3 and calm[0]["turn_mean"] < found["search"]["turn_mean"]
+
+
+def test_latency_compares_with_search() -> None:
+    rows = load_experiment("latency").rows(methods=("search", "analytic"), calls=6, robots=1, seed=4711)
+    search, analytic, *first = rows
+    assert (search["calls"], search["p50_over_search"]) == (6, 1.0)
+    assert analytic["p50_over_search"] == pytest.approx(analytic["p50_ms"] / search["p50_ms"])
+    assert all(0 < row["p50_ms"] <= row["p99_ms"] for row in rows)
+    soft = next(row for row in first if row["call"].endswith("soft"))
+    assert soft["p50_ms"] > 5.0 * search["p50_ms"]  # compiling takes many times the call itself
+    assert first_times(load_allocator(), "soft", 1, 4711)[0] < 0.5 * soft["p50_ms"]  # compiled once
+    with pytest.raises(DataError, match="fins: expected 2 to 5"):
+        load_experiment("latency").rows(fins=9)
+
+
+def test_more_temperature_more_diversity_and_none_between_equals() -> None:
+    cold, hot = load_experiment("temperature").rows(
+        temperatures=(1e-3, 1.0), layouts=2, targets=2, candidates=16
+    )
+    assert (cold["temperature"], cold["n"]) == (1e-3, 4) and hot["diversity"] > 1.5 * cold["diversity"]
+    low, high = cold["best_j_mean_interval"]
+    assert low <= cold["best_j_mean"] <= high
+    layout, _ = surge_robot()
+    command = np.array([layout.lower, layout.lower, layout.upper])
+    assert diversity(command[:2], layout) == 0.0
+    # A full turn apart is no difference; amplitude and frequency differ by their whole ranges.
+    assert diversity(command[1:], layout) == pytest.approx(math.sqrt(2.0 / 3.0))
+
+
+def test_the_ablation_scores_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("finlab.evaluation.experiments.ablation.TIMED_CALLS", 1)
+    experiment = load_experiment("ablation")
+    sizes = {"layouts": 2, "targets": 2, "candidates": 8}
+    rows = experiment.rows(variants=("mean_only", "without_refinement", "ours"), **sizes)
+    found = by(rows, "variant", "refinement", "scored_by")
+    assert len(found) == 12 and all(row["n"] == 4 and row["call_ms"] > 0 for row in rows)
+    alike = [found["mean_only", r, "plant"]["j_norm_mean"] for r in ("adam", "levenberg-marquardt")]
+    assert alike[0] == alike[1]  # where nothing is refined, how it would be makes no difference
+    refined, raw = (found[v, "adam", "surrogate"]["j_norm_mean"] for v in ("ours", "without_refinement"))
+    assert refined < 0.1 * raw
+    printed = experiment.table(rows).rows[-3:]
+    assert [row["j_norm_mean"] for row in printed] == [3.64e-2, 1.01e-1, 3.03e-4]
+    with pytest.raises(DataError, match="variants: expected some of mean_only"):
+        experiment.rows(variants=("theirs",))
