@@ -88,6 +88,14 @@ def cost_bound(problem: PlanarProblem, target: Array, multiplier: Array) -> floa
     The ascent is a quasi-Newton one (BFGS) with steps halved until the bound rises.
     """
     dual = CostDual(problem, target)
+    # With nothing to pay for a wrench, fins cost what they cost at least; no bound need be below that.
+    least = dual(np.zeros(6))[0]
+    with np.errstate(over="ignore", invalid="ignore"):
+        return max(least, _ascent(dual, multiplier))
+
+
+def _ascent(dual: CostDual, multiplier: Array) -> float:
+    """The highest bound on the way up from multipliers (6,)."""
     here, (value, slope) = multiplier, dual(multiplier)
     # The bound rises fastest, to first order, along the wrench that is missing over what it costs per square.
     inverse = np.eye(6) * float(here @ here) / max(abs(value), 1e-12)
@@ -101,11 +109,17 @@ def cost_bound(problem: PlanarProblem, target: Array, multiplier: Array) -> floa
             step = 0.3 * step
         else:
             break
-        change, bend = there - here, slope - new_slope
-        if (scale := float(change @ bend)) > 1e-14:
-            shear = np.eye(6) - np.outer(change, bend) / scale
-            inverse = shear @ inverse @ shear.T + np.outer(change, change) / scale
+        inverse = _updated(inverse, there - here, slope - new_slope)
         gain, here, value, slope = new_value - value, there, new_value, new_slope
         if gain <= CLOSED * abs(value):
             break
     return value
+
+
+def _updated(inverse: Array, change: Array, bend: Array) -> Array:
+    """The inverse curvature (6, 6) after a step that changed the multipliers and the slopes so."""
+    scale = float(change @ bend)
+    if not scale > 1e-14:
+        return inverse
+    shear = np.eye(6) - np.outer(change, bend) / scale
+    return np.asarray(shear @ inverse @ shear.T + np.outer(change, change) / scale)

@@ -45,6 +45,8 @@ WAVES = 4
 """Waves around the circle, or degree along an arc, that the smooth cost of a measured fin has."""
 MEASURED = 0.05
 """The same of a measured fin, whose weak forces are hardly known."""
+NARROWEST = 1e-6
+"""Half of an arc [rad] below which a fin has but one direction."""
 POLISHES = 3
 """Newton steps by the law itself."""
 
@@ -357,7 +359,7 @@ def _smooth(cost: Array, wanted: Array, grid: _Grid) -> tuple[Array, Array]:
 
 def _around(values: Array, grid: _Grid) -> Array:
     """Derivatives of values (K, LEVELS) by the direction."""
-    if len(grid.direction) == 1 or grid.half == 0.0:
+    if len(grid.direction) == 1 or grid.half < NARROWEST:
         return np.zeros_like(values)
     if grid.half < np.pi:
         slopes: Array = np.gradient(values, grid.direction, axis=0)

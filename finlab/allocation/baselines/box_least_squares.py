@@ -94,7 +94,7 @@ def _search(
     limit, along which the objective falls; where that has no length, a projected gradient step, which always
     falls.
     """
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         room = np.where(step > 0, (high - at) / step, np.where(step < 0, (low - at) / step, np.inf))
     ahead = np.minimum(room.min(axis=1, keepdims=True), 1.0)
     lipschitz = np.abs(h).sum(axis=2).max(axis=1, keepdims=True)

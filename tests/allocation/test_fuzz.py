@@ -1,0 +1,169 @@
+"""Any robot that a layout may describe gets an answer: within its limits, finite, its error told as it is."""
+
+import math
+import warnings
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from finlab.allocation import Allocator, Health, Policy, load_allocator
+from finlab.errors import AllocationError
+from finlab.layout import Fin, FinModelSpec, Layout, Limits
+from finlab.physics import plant_of
+from tests.exhaustive import sampled
+
+N_CASES = 400
+METHODS = ("search", "search", "search-effort", "mdn", "analytic", "qp", "sqp")
+ARCS = (0.0, 1e-300, 1e-16, 1e-15, 1e-14, 1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0, math.pi, math.pi + 1e-12, 4.0)
+FULL = (2 * math.pi - 1e-12, 2 * math.pi)
+
+
+@cache
+def method(name: str) -> Allocator:
+    kind, _, objective = name.partition("-")
+    options: dict[str, Any] = {"objective": objective} if objective else {}
+    if kind == "sqp":
+        options |= {"n_starts": 1, "n_steps": 4}
+    return load_allocator(kind, **options)
+
+
+def pick(rng: np.random.Generator, values: Any) -> Any:
+    return values[int(rng.integers(len(values)))]
+
+
+def interval(rng: np.random.Generator, most: float, least: float) -> tuple[float, float]:
+    """An interval up to a largest value, often a point or next to one."""
+    high = pick(rng, (most, least, float(np.exp(rng.uniform(math.log(least), math.log(most))))))
+    width = pick(rng, (high, 0.0, 1e-16, 1e-12, 1e-6, 0.5 * high))
+    return max(high - width, 0.0), high
+
+
+def limits(rng: np.random.Generator) -> Limits:
+    if rng.random() < 0.3:
+        return Limits()
+    width = pick(rng, ARCS + FULL) if rng.random() < 0.7 else 2 * math.pi
+    middle = 0.0 if width >= 6.0 else pick(rng, (0.0, 1.0, -3.0, float(rng.uniform(-3, 3))))
+    usual = rng.random() < 0.3
+    return Limits(
+        (0.05, 0.6) if usual else interval(rng, math.pi / 2, 1e-3),
+        (0.1, 2.1) if usual else interval(rng, 20.0, 1e-2),
+        (middle - 0.5 * width, middle + 0.5 * width),
+    )
+
+
+def model(rng: np.random.Generator) -> FinModelSpec:
+    kind = pick(rng, ("drag", "lighthill", "soft", "soft"))
+    if kind == "drag":
+        return FinModelSpec(kind, (("area", 10 ** rng.uniform(-5, 0)), ("lever", 10 ** rng.uniform(-3, 0.3))))
+    if kind == "lighthill":
+        return FinModelSpec(
+            kind, (("length", 10 ** rng.uniform(-2.5, 0)), ("width", 10 ** rng.uniform(-2.5, 0)))
+        )
+    values = {
+        "k": 10 ** rng.uniform(-3, 3),
+        "p": pick(rng, (0.5, 1.0, 2.0, 4.0)),
+        "x0": 10 ** rng.uniform(-2, 1),
+        "q": pick(rng, (1.0, 5.0, 20.0)),
+        "e": pick(rng, (0.0, 0.0, 0.05, 0.5, 0.99)),
+        "phi_e": float(rng.uniform(-3, 3)),
+        "d": pick(rng, (0.0, 0.1, 1.5, -1.5)),
+    }
+    return FinModelSpec(kind, tuple(values.items()))
+
+
+def layout(rng: np.random.Generator) -> Layout:
+    n, size = pick(rng, (1, 1, 2, 3, 4, 5, 8, 16)), 10 ** rng.uniform(-3, 1)
+    place = np.clip(rng.uniform(-size, size, (n, 3)), -10, 10)
+    angle = rng.uniform(-3, 3, n)
+    if rng.random() < 0.3:
+        place[:] = pick(rng, (place[0], np.zeros(3)))
+    if rng.random() < 0.3:
+        angle[:] = pick(rng, (0.0, angle[0]))
+    alike = limits(rng), model(rng)
+    same = rng.random() < 0.3
+    fins = (
+        Fin(f"f{k}", tuple(place[k].tolist()), float(angle[k]), *(alike if same else (limits(rng), model(rng))))
+        for k in range(n)
+    )
+    return Layout("drawn", tuple(fins))
+
+
+def policy(rng: np.random.Generator) -> Policy:
+    kind = pick(rng, ("closest", "closest", "direction", "priority"))
+    weights = pick(rng, ((1.0,) * 6, (1.0, 0.0, 1e-6, 1.0, 1e6, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)))
+    return Policy(kind, axis_weights=weights if kind == "closest" else (1.0,) * 6)
+
+
+def damage(rng: np.random.Generator, robot: Layout) -> dict[str, Any]:
+    names = [str(name) for name in rng.permutation(robot.names)]
+    asked: dict[str, Any] = {}
+    if len(names) > 1 and rng.random() < 0.3:
+        asked["failed"] = names[: int(rng.integers(1, len(names)))]
+    if rng.random() < 0.3:
+        kind = pick(rng, ("weak", "stuck", "running", "thrust"))
+        value = {"weak": 1e-3, "stuck": 0.7, "running": (0.3, 1.0, 0.5), "thrust": 1e-3}[kind]
+        asked["health"] = Health.of(**{kind: {names[-1]: value}})
+    return asked
+
+
+def question(rng: np.random.Generator, robot: Layout) -> dict[str, Any]:
+    """What is asked of a robot, other than the wrench."""
+    plant = plant_of(robot)
+    asked = damage(rng, robot)
+    way = rng.integers(6)
+    if way == 0:
+        asked["previous"] = plant.sample(rng, (1,))[0]
+    elif way == 1:
+        asked["previous"] = np.where(rng.random((robot.n_fins, 1)) < 0.5, np.nan, plant.upper)
+    elif way == 2:
+        asked["previous"] = rng.normal(size=(robot.n_fins, 3)) * 1e6
+    if rng.random() < 0.1:
+        asked["reference"] = rng.normal(size=(4, 6))
+    return asked
+
+
+def ask(seed: int) -> None:
+    """Ask a drawn robot, and look at what it answers."""
+    rng = np.random.default_rng([2026, seed])
+    name = pick(rng, METHODS)
+    robot, allocator, how = layout(rng), method(name), policy(rng)
+    if name not in ("search", "search-effort", "mdn") and not how.is_plain and how.kind != "direction":
+        how = Policy()
+    plant, asked = plant_of(robot), question(rng, robot)
+    reached = plant.wrench(plant.sample(rng, (1,)))[0]
+    anywhere = rng.normal(size=6) * 10.0 ** rng.uniform(-12, 6)
+    target = np.clip(
+        pick(rng, (reached, 0.5 * reached, 2.0 * reached, anywhere, np.zeros(6), 1e-12 * reached)), -1e6, 1e6
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        result = allocator.allocate(robot, target, policy=how, **asked)
+        modes = allocator.explore(result) if name == "search" and seed % 5 == 0 else ()
+        if name == "search" and result.reachable:
+            assert 0.0 <= allocator.bound(result) <= result.power * (1 + 1e-6) + 1e-12
+        batch = allocator.allocate_batch(
+            robot, [target, 0.3 * target], policy=how, failed=asked.get("failed", ())
+        )
+    for found, limited in (
+        (result.command, result.layout),
+        *((each.command, result.layout) for each in modes),
+        *((each, robot) for each in batch.command),
+    ):
+        works = [fin not in result.failed for fin in robot.names]
+        assert np.isfinite(found[works]).all() and np.isnan(np.delete(found, np.flatnonzero(works), 0)).all()
+        assert ((found >= limited.lower) & (found <= limited.upper))[works].all()
+    healthy = result.layout.without(result.failed) if result.failed else result.layout
+    wrench = plant_of(healthy).wrench(result.command[works])
+    rounding = 1e-12 * 20.0 * np.abs(result.fin_forces).sum()
+    np.testing.assert_allclose(result.wrench, wrench, rtol=1e-9, atol=rounding)
+    told = np.linalg.norm((wrench - result.target) / result.sigma)
+    assert result.err_norm == pytest.approx(told, rel=1e-6, abs=1e-9)
+    assert np.isfinite([result.err_norm, result.power, result.energy]).all() and np.isfinite(batch.err_norm).all()
+
+
+@pytest.mark.parametrize("seed", sampled(range(N_CASES)))
+def test_any_robot_gets_an_answer(seed: int) -> None:
+    ask(seed)
