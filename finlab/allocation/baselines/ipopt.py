@@ -13,9 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from finlab.allocation.baselines.ipopt_forces import ForceProgram
 from finlab.allocation.baselines.model_based import CACHE_SIZE, ModelBased, TimeLimit, TimeLimitedSettings
 from finlab.allocation.baselines.plant_in_casadi import plant_formulas, plant_in_casadi
-from finlab.allocation.settings import number
+from finlab.allocation.settings import choice, number
 from finlab.arrays import Array
 from finlab.distribution import install
 from finlab.errors import AllocationError
@@ -54,6 +55,7 @@ class IpoptSettings(TimeLimitedSettings):
     """Settings of method `ipopt`."""
 
     n_starts: int = number(8, 0, 10_000, "random starts per target, beside the pseudo-inverse's answer")
+    space: str = choice("commands", ("commands", "forces"), "what IPOPT varies; forces are far quicker")
 
 
 class Ipopt(ModelBased):
@@ -73,10 +75,18 @@ class Ipopt(ModelBased):
 
     def __init__(self, normalization: Normalization, **settings: Any) -> None:
         super().__init__(normalization, **settings)
+        if self.settings.space == "forces" and self.aim.name != "power":
+            raise AllocationError(
+                f"method ipopt: space 'forces' keeps power least, got objective {self.aim.name!r}; "
+                "take space 'commands'"
+            )
         self._casadi = import_casadi()
         self._solver = lru_cache(CACHE_SIZE)(self._build)
+        self._force_program = lru_cache(CACHE_SIZE)(self._build_forces)
 
     def _commands(self, plant: Plant, targets: Array, seed: int) -> Array:
+        if self.settings.space == "forces":
+            return self._by_forces(plant, targets, seed)
         random = plant.sample(np.random.default_rng(seed), (self.settings.n_starts,))
         first = self._inverse(plant).command(targets)
         result = np.empty((len(targets), plant.n_fins, 3))
@@ -86,6 +96,26 @@ class Ipopt(ModelBased):
             ends += [self._end(plant, target, start) for start in random if not limit.over]
             result[i] = ends[self._total(plant, np.array(ends), target).argmin()]
         return result
+
+    def _by_forces(self, plant: Plant, targets: Array, seed: int) -> Array:
+        """Commands (N, n, 3) for targets (N, 6), found in the space of forces."""
+        program, result = self._force_program(plant), []
+        for target in targets:
+            limit = TimeLimit(self.settings.time_limit_s)
+            starts = program.starts(target, self.settings.n_starts, seed)
+            ends = np.array(
+                [program.command(target, each) for k, each in enumerate(starts) if not (k and limit.over)]
+            )
+            result.append(ends[self._total(plant, ends, target).argmin()])
+        return np.array(result).reshape(len(targets), plant.n_fins, 3)
+
+    def _build_forces(self, plant: Plant) -> ForceProgram:
+        inverse, std = self._inverse(plant), self.normalization.std
+        return ForceProgram(self._casadi, inverse, std, self._cost(plant).weight, self._options)
+
+    @property
+    def _options(self) -> dict[str, Any]:
+        return SOLVER_OPTIONS | {"ipopt.max_cpu_time": 0.5 * self.settings.time_limit_s}
 
     def _end(self, plant: Plant, target: Array, start: Array) -> Array:
         """The command (n, 3) IPOPT ends at, or the start itself where it breaks down."""
@@ -100,7 +130,7 @@ class Ipopt(ModelBased):
         formulas = self._formulas(plant)
         objective = self._casadi.sumsqr(formulas.residual) + formulas.cost
         program = {"x": formulas.command, "p": formulas.target, "f": objective}
-        options = SOLVER_OPTIONS | formulas.options | {"ipopt.max_cpu_time": 0.5 * self.settings.time_limit_s}
+        options = self._options | formulas.options
         return self._casadi.nlpsol("allocation", "ipopt", program, options), formulas
 
     def _formulas(self, plant: Plant) -> Formulas:

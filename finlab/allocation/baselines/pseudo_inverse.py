@@ -29,16 +29,27 @@ class PseudoInverse:
 
     def __init__(self, plant: Plant, sigma: Array, objective: Objective, rcond: float = RCOND) -> None:
         self.plant = plant
-        fins = layout_envelopes(plant.layout, objective)
+        self.fins = fins = layout_envelopes(plant.layout, objective)
+        """What the fins can do, and at what cost."""
+        self.effectiveness = layout_effectiveness(plant.layout)
+        """Wrench (6, 2 n) per newton of each fin's horizontal and vertical force."""
         self._forces = planar_problem(plant.layout, fins, sigma, objective)
         most = np.repeat(np.maximum(fins.maximum, 1e-9), 2)
-        scaled = layout_effectiveness(plant.layout) * most / sigma[:, None]
+        scaled = self.effectiveness * most / sigma[:, None]
         self.inverse = (most[:, None] * np.linalg.pinv(scaled, rcond=rcond) / sigma).T.copy()
         """Target (6,) times this (6, 2 n) gives each fin's horizontal and vertical force [N]."""
 
     def command(self, targets: Array) -> Array:
         """Commands (N, n, 3) for targets (N, 6)."""
-        force = (targets @ self.inverse).reshape(len(targets), self.plant.n_fins, 2)
+        return self.decoded(self.force(targets))
+
+    def force(self, targets: Array) -> Array:
+        """Planar forces (N, n, 2) [N] for targets (N, 6), whatever the limits."""
+        return (targets @ self.inverse).reshape(len(targets), self.plant.n_fins, 2)
+
+    def decoded(self, force: Array) -> Array:
+        """The cheapest commands (N, n, 3) for planar forces (N, n, 2) [N], by the fins' own laws; what a fin
+        cannot give is cut off."""
         found = polar(self._forces, force)
         point = np.stack([np.cos(found.direction), np.sin(found.direction)], axis=-1)
         return self._sharpened(self.plant.feasible(found.command), found.size[..., None] * point)

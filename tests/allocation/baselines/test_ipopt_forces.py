@@ -1,0 +1,72 @@
+"""IPOPT over forces finds what IPOPT over commands finds, and the search, and is far quicker."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from finlab.allocation import Allocator, load_allocator
+from finlab.errors import AllocationError
+from finlab.layout import FinModelSpec, Layout, Limits, load_layout, random_layout
+from finlab.physics import plant_of
+
+pytest.importorskip("casadi", reason="method ipopt is an optional extra")
+UNEVEN = FinModelSpec("soft", (("d", 0.12), ("e", 0.15), ("p", 1.5), ("phi_e", 0.4)))
+
+
+def targets_of(layout: Layout, count: int = 3) -> np.ndarray:
+    plant = plant_of(layout)
+    return 0.6 * plant.wrench(plant.sample(np.random.default_rng(1), (count,)))
+
+
+def timed(allocator: Allocator, layout: Layout, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Power and error of the answers, and the time for one."""
+    allocator.allocate(layout, targets[0])
+    start = time.thread_time()
+    answers = [allocator.allocate(layout, target) for target in targets]
+    spent = (time.thread_time() - start) / len(targets)
+    return np.array([a.power for a in answers]), np.array([a.err_norm for a in answers]), spent
+
+
+@pytest.mark.parametrize("name", ["ucat", "hexa", "restricted"])
+def test_it_agrees_with_ipopt_in_commands_and_with_the_search(name: str) -> None:
+    layout = load_layout(name)
+    targets = targets_of(layout)
+    least, _, _ = timed(load_allocator(), layout, targets)
+    by_commands, _, slow = timed(load_allocator("ipopt", time_limit_s=3.0), layout, targets)
+    by_forces, error, quick = timed(load_allocator("ipopt", space="forces"), layout, targets)
+    print(
+        f"{name}: {1e3 * quick:.1f} ms in forces, {1e3 * slow:.0f} ms in commands: {slow / quick:.0f} times"
+    )
+    assert error.max() < 1e-3
+    np.testing.assert_allclose(by_forces, by_commands, rtol=2e-3)
+    np.testing.assert_allclose(by_forces, least, rtol=2e-3)
+    assert quick < 0.2 * slow
+
+
+@pytest.mark.parametrize("arc", [(-np.pi, np.pi), (-1.0, 0.6), (0.3, 0.3), (-2.5, 2.0)])
+@pytest.mark.parametrize("model", [FinModelSpec("drag"), FinModelSpec("lighthill"), UNEVEN])
+def test_it_agrees_with_the_search_on_any_fin_and_arc(model: FinModelSpec, arc: tuple[float, float]) -> None:
+    drawn = random_layout(np.random.default_rng(5), n_fins=5)
+    fins = [replace(fin, model=model, limits=Limits(zero_direction=arc)) for fin in drawn.fins]
+    layout = replace(drawn, fins=(*fins[:2], replace(fins[2], limits=Limits()), *fins[3:]))
+    targets = targets_of(layout)
+    least, missed, _ = timed(load_allocator(), layout, targets)
+    power, error, _ = timed(load_allocator("ipopt", space="forces"), layout, targets)
+    exact = missed < 1e-4
+    assert exact.any() and error[exact].max() < 5e-3
+    np.testing.assert_allclose(power[exact], least[exact], rtol=0.01)
+
+
+def test_it_keeps_watts_least_and_nothing_else() -> None:
+    with pytest.raises(AllocationError, match="space 'forces' keeps power least, got objective 'effort'"):
+        load_allocator("ipopt", space="forces", objective="effort")
+
+
+def test_out_of_reach_it_comes_as_near_as_the_search() -> None:
+    layout = load_layout("ucat")
+    far = 20.0 * targets_of(layout)
+    _, nearest, _ = timed(load_allocator(), layout, far)
+    _, error, _ = timed(load_allocator("ipopt", space="forces"), layout, far)
+    np.testing.assert_allclose(error, nearest, rtol=1e-3, atol=1e-3)
