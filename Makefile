@@ -8,7 +8,7 @@ HOST_PORT ?= 8080
 THREADS := OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup app test test-all test-near test-fast check format checkpoint checkpoint-default checkpoint-paper wheel wheel-check clean
+.PHONY: schemas help setup app test test-all test-near test-fast check format checkpoint checkpoint-default checkpoint-paper wheel wheel-check clean
 
 help:
 	@echo "make setup        make .venv with everything pinned in constraints.txt"
@@ -18,6 +18,7 @@ help:
 	@echo "make test-near    the tests near what was changed since the branch main"
 	@echo "make test-fast    every test but those of the browser and the packaging"
 	@echo "make check        ruff, ruff format and mypy"
+	@echo "make schemas      write the JSON Schemas of layout and graph files"
 	@echo "make format       let ruff mend what it can"
 	@echo "make checkpoint   train what is shipped, PRESET=default or PRESET=paper (hours)"
 	@echo "make     the app in a real browser: a random walk over every control, and how quick it is"
@@ -52,6 +53,9 @@ check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+schemas: setup
+	$(BIN)/python -m finlab.layout.json_schema
 
 format: setup
 	$(BIN)/ruff check --fix .

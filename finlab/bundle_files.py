@@ -7,16 +7,16 @@ tables to `finlab.layout` and `finlab.physics`, compiled fins to `finlab.forces`
 """
 
 import hashlib
-import json
 import os
 import re
-import stat
-import zipfile
-import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 
 from finlab.errors import DataError
+from finlab.files.archive import member_names, unpacked
+from finlab.files.guarded import is_regular, read_file
+from finlab.files.plain_values import parse_json
 
 VERSION = 3
 """Version of the bundle; a reader knows exactly one."""
@@ -45,8 +45,6 @@ LARGEST_BUNDLE = 100_000_000
 MOST_FILES = len(LARGEST) + 16
 """Most files; a robot has up to 16 fins, each with a table at most."""
 REQUIRED = (GRAPH, ABOUT, COMPILED, CHECKSUMS)
-UNREADABLE = (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, ValueError, zlib.error)
-"""What reading a zip archive ends with that is damaged, locked or none."""
 
 Files = Mapping[str, bytes]
 """Contents by name."""
@@ -67,12 +65,9 @@ def table_name(content: bytes) -> str:
 def is_bundle(path: str | os.PathLike[str]) -> bool:
     """Whether a path looks like a bundle, of whatever version: a zip archive, or a folder with its files."""
     place = Path(path)
-    try:
-        if place.is_dir():
-            return (place / ABOUT).is_file()
-        return place.suffix == ".zip" and place.is_file()
-    except (OSError, ValueError):  # a name that is too long, or holds a NUL byte
-        return False
+    if place.suffix == ".zip" and is_regular(place):
+        return True
+    return is_regular(place / ABOUT)
 
 
 def archive_around(path: str | os.PathLike[str]) -> str | None:
@@ -93,19 +88,9 @@ def read_bundle_files(path: str | os.PathLike[str]) -> dict[str, bytes]:
         DataError: it cannot be read, is of another version, was changed, or holds what no bundle holds.
     """
     source = str(path)
-    files = _Contents(source)
-    try:
-        if os.path.isdir(source):
-            _read_folder(Path(path), files)
-        else:
-            _read_archive(files)
-    except OSError as error:
-        raise DataError(f"{source}: cannot be read: {error.strerror or error}") from None
-    except UNREADABLE as error:
-        reason = str(error).splitlines()[0][:80] if str(error) else type(error).__name__
-        raise DataError(f"{source}: is neither a bundle's folder nor its zip archive ({reason})") from None
+    files = _in_folder(Path(path)) if os.path.isdir(source) else _in_archive(source)
     check_bundle_files(files, source)
-    return dict(files)
+    return files
 
 
 def check_bundle_files(files: Files, source: str) -> None:
@@ -135,75 +120,52 @@ def checkpoint_part(files: Files) -> dict[str, bytes]:
     return {name.removeprefix(CHECKPOINT): c for name, c in files.items() if name.startswith(CHECKPOINT)}
 
 
-class _Contents(dict[str, bytes]):
-    """Files that are being read, of this version, none beyond its largest size, nor all together."""
-
-    def __init__(self, source: str) -> None:
-        super().__init__()
-        self.source, self.left = source, LARGEST_BUNDLE
-
-    def take(self, name: str, read: Callable[[int], bytes]) -> None:
-        """Read one more."""
-        most = largest(name)
-        content = read(min(most, self.left) + 1)
-        if len(content) > most:
-            raise DataError(f"{self.source}: {name} is larger than {most:,} bytes")
-        self.left -= len(content)
-        if len(self) >= MOST_FILES:
-            raise DataError(f"{self.source}: holds more than {MOST_FILES} files")
-        if self.left < 0:
-            raise DataError(f"{self.source}: its files are larger than {LARGEST_BUNDLE:,} bytes together")
-        self[name] = content
-        if name == ABOUT:
-            _check_version(content, self.source)
-
-
-def _read_folder(path: Path, files: _Contents) -> None:
-    for name in (ABOUT, *sorted((set(LARGEST) - {ABOUT}) | _tables_in(path))):
+def _in_folder(path: Path) -> dict[str, bytes]:
+    """The files in a bundle's folder; no link is followed."""
+    names = [*LARGEST]
+    with suppress(FileNotFoundError, NotADirectoryError, PermissionError):
+        names += sorted(f"{TABLES}{name}" for name in os.listdir(path / TABLES))
+    files: dict[str, bytes] = {}
+    left = LARGEST_BUNDLE
+    for name in names:
         file = path / name
-        try:
-            about = file.lstat()
-        except FileNotFoundError:
+        if largest(name) < 0 or not os.path.lexists(file):
             continue
-        if not stat.S_ISREG(about.st_mode) or (file.parent != path and file.parent.is_symlink()):
-            raise DataError(f"{files.source}: {name} is no regular file")
-        with file.open("rb") as stream:
-            files.take(name, stream.read)
+        if file.parent != path and file.parent.is_symlink():
+            raise DataError(f"{path}: {name} is no regular file, but behind a link")
+        files[name] = read_file(file, min(largest(name), left), "a bundle's file", follow=False)
+        left -= len(files[name])
+        if len(files) > MOST_FILES:
+            raise DataError(f"{path}: holds more than {MOST_FILES} files")
+    return files
 
 
-def _tables_in(path: Path) -> set[str]:
-    """Names of the force tables in a bundle's folder."""
-    try:
-        return {name for entry in os.scandir(path / TABLES) if _TABLE.fullmatch(name := TABLES + entry.name)}
-    except (FileNotFoundError, NotADirectoryError):
-        return set()
-
-
-def _read_archive(files: _Contents) -> None:
-    with zipfile.ZipFile(files.source) as archive:
-        # The version comes first: files of another one are not the news.
-        entries = sorted(archive.infolist(), key=lambda entry: entry.filename != ABOUT)
-        for entry in entries:
-            # Nothing is unpacked, so a name can do no harm; still, a bundle holds these files only.
-            if largest(entry.filename) < 0 or entry.filename in files:
-                layout = entry.filename.endswith((".yaml", ".graph.json"))
-                hint = "; unpack it, and name the layout file in it" if layout else ""
-                name = f"{entry.filename!r:.60}"
-                raise DataError(f"{files.source}: holds {name}, which is no part of a bundle{hint}")
-            with archive.open(entry) as stream:
-                files.take(entry.filename, stream.read)
+def _in_archive(source: str) -> dict[str, bytes]:
+    """The files in a bundle's zip archive; nothing is unpacked to the disk."""
+    content = read_file(source, LARGEST_BUNDLE, "a bundle's folder or its zip archive")
+    names = member_names(content, source)
+    about = unpacked(content, source, {ABOUT: LARGEST[ABOUT]}, LARGEST_BUNDLE)
+    # The version comes first: files of another one are not the news.
+    _check_version(about.get(ABOUT), source)
+    if strangers := [name for name in names if largest(name) < 0]:
+        layout = strangers[0].endswith((".yaml", ".graph.json"))
+        hint = "; unpack it, and name the layout file in it" if layout else ""
+        raise DataError(f"{source}: holds {strangers[0]!r:.60}, which is no part of a bundle{hint}")
+    if len(names) > MOST_FILES:
+        raise DataError(f"{source}: holds more than {MOST_FILES} files")
+    return unpacked(content, source, {name: largest(name) for name in names}, LARGEST_BUNDLE)
 
 
 def _check_version(about: bytes | None, source: str) -> None:
     """Refuse bundles of other versions; what cannot be understood is left to its reader."""
     try:
-        document = json.loads(about or b"null")
-    except (ValueError, RecursionError):
+        document = parse_json((about or b"null").decode("utf-8", "replace"), source)
+    except DataError:
         return
     if not isinstance(document, dict):
         return
     version = document.get("version")
-    if type(version) is not int or version != VERSION:  # neither 3.0 nor "3"
+    if type(version) is not int or version != VERSION:
         raise DataError(
             f"{source}: is a bundle of version {version!r:.40}, this finlab reads version {VERSION}; "
             "export it again with `finlab export LAYOUT -o DIR`"

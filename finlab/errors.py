@@ -8,6 +8,11 @@ line prints it behind `finlab: error: ` and exits with status 2; the app shows i
 class FinlabError(Exception):
     """Base of all errors that finlab raises on purpose. Its text is meant to be read by a user."""
 
+    @classmethod
+    def at(cls, source: str, problem: str, key: str = "") -> "FinlabError":
+        """Returns an error about a file that is called `source`, at a key in it."""
+        return cls(": ".join(part for part in (source, key, problem) if part))
+
 
 class LayoutError(FinlabError):
     """A layout, or the file that describes it, is not acceptable.
@@ -22,6 +27,11 @@ class LayoutError(FinlabError):
         self.problem = problem
         self.key = key
         self.source = source
+
+    @classmethod
+    def at(cls, source: str, problem: str, key: str = "") -> "LayoutError":
+        """Returns an error about a file that is called `source`, at a key in it."""
+        return cls(problem, key, source)
 
     def under(self, prefix: str, source: str = "") -> "LayoutError":
         """Returns the same error seen from further out: `prefix` goes before the key."""

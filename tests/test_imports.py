@@ -14,7 +14,8 @@ ROOT = Path(__file__).resolve().parents[1]
 
 LEVELS = (
     ("errors", "arrays", "distribution"),
-    ("assets", "bundle_files", "command_end", "least_squares", "whole_file"),
+    ("files", "assets", "command_end", "least_squares", "whole_file"),
+    ("bundle_files",),
     ("layout",),
     ("physics", "exchange"),
     ("vehicle",),

@@ -9,6 +9,8 @@ from finlab.allocation.learned.settings import MdnSettings
 from finlab.allocation.search.settings import SearchSettings
 from finlab.bundle_files import ABOUT, VERSION, Files
 from finlab.errors import AllocationError, DataError
+from finlab.files.guarded import decoded
+from finlab.files.plain_values import parse_json
 from finlab.inference.normalization import Normalization
 from finlab.physics.energy import EnergyWeights
 
@@ -64,10 +66,7 @@ def read_about(files: Files, source: str) -> About:
         DataError: of another format, or settings that no robot should try.
     """
     place = f"{source}/{ABOUT}"
-    try:
-        document = json.loads(files[ABOUT])
-    except (ValueError, RecursionError):
-        raise DataError(f"{place}: not readable as JSON") from None
+    document = parse_json(decoded(files[ABOUT], place, "JSON"), place)
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise DataError(f"{place}: expected format {FORMAT}; a bundle is made by `finlab export`")
     method, checkpoint, values = (document.get(key) for key in ("method", "checkpoint", "settings"))

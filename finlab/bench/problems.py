@@ -8,7 +8,6 @@ import hashlib
 import io
 import json
 import os
-import zipfile
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 
 from finlab.arrays import AnyArray, Array
 from finlab.errors import DataError
+from finlab.files.archive import json_of, read_arrays
 from finlab.layout import Layout
 from finlab.layout.file import parse_layout
 from finlab.physics import TableLaw, write_table
@@ -185,16 +185,10 @@ def open_problems(path: str | os.PathLike[str] = FILE) -> Problems:
 
 
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, AnyArray]]:
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise DataError(f"{path}: is larger than {MAX_BYTES:,} bytes, too large for a file of problems")
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-        index = json.loads(arrays.pop("index").tobytes().decode())
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except (ValueError, KeyError, EOFError, AttributeError, zipfile.BadZipFile):
-        raise DataError(f"{path}: is no file of problems; expected an NPZ with a member `index`") from None
+    arrays = read_arrays(path, None, MAX_BYTES, "a file of problems")
+    if "index" not in arrays:
+        raise DataError(f"{path}: is no file of problems; expected an NPZ with a member `index`")
+    index = json_of(arrays.pop("index"), f"{path}: index")
     if not isinstance(index, dict):
         raise DataError(f"{path}: index: expected an object, got {type(index).__name__}")
     return index, arrays

@@ -7,9 +7,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
-import yaml
-
 from finlab.errors import DataError
+from finlab.files.guarded import read_text
+from finlab.files.plain_values import parse_yaml
 
 WAYPOINT_GAINS = ("waypoint", "waypoint_paper")
 """Shipped gains of the waypoint controller: with damping, and proportional only as the paper writes it."""
@@ -98,11 +98,8 @@ def load_gains(kind: type[Kind], source: str | Path) -> Kind:
         DataError: the file is missing or not YAML, or a gain is missing, unknown or no number from 0.
     """
     shipped = files("finlab.control").joinpath("gains", f"{source}.yaml")
-    try:
-        content = (shipped if shipped.is_file() else Path(source)).read_text("utf-8")
-        values = yaml.safe_load(content)
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise DataError(f"gains {source}: cannot be read as YAML: {str(error).splitlines()[0]}") from None
+    file = str(shipped) if shipped.is_file() else str(source)
+    values = parse_yaml(read_text(file, 100_000, "a YAML file of gains"), f"gains {source}")
     gains: Kind = _build(kind, values, str(source), "")
     if gains.period_s <= 0.0:
         raise DataError(f"gains {source}: period_s: expected a time above 0, got {gains.period_s:g}")

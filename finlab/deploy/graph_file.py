@@ -7,30 +7,29 @@ Reading checks every value, and refusals name the key.
 
 import json
 import os
-from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from msgspec import to_builtins
 
 from finlab.deploy.graph import SELF_TEST_TOLERANCE, LayoutGraph, SelfTest
 from finlab.errors import LayoutError
 from finlab.inference.normalization import Normalization
 from finlab.layout import layout_to_dict
-from finlab.layout.file import FRAME
+from finlab.layout.file import FRAME, under
+from finlab.layout.graph_form import Units
 from finlab.layout.load import (
     GRAPH_FORMAT,
     GRAPH_VERSION,
     SUFFIX,
-    UNITS,
     GraphDocument,
     GraphText,
     checksum_of,
     parse_graph_document,
     read_graph_text,
 )
-from finlab.layout.rules import mapping, numbers, shown, text, under
 from finlab.whole_file import write_whole
 
 
@@ -90,7 +89,7 @@ def _document_of(graph: LayoutGraph) -> dict[str, Any]:
         "version": GRAPH_VERSION,
         "checksum": "",
         "frame": FRAME,
-        "units": UNITS,
+        "units": to_builtins(Units()),
         "layout": {
             key: layout[key] for key in ("name", "description", "body", "interaction") if key in layout
         },
@@ -99,7 +98,7 @@ def _document_of(graph: LayoutGraph) -> dict[str, Any]:
             "multigraph": False,
             "graph": {"name": graph.layout.name},
             "nodes": nodes,
-            "edges": _edges(graph),
+            "edges": [{"source": a, "target": b} for a, b in graph.edges],
         },
         "normalization": {"mean": graph.normalization.mean.tolist(), "std": graph.normalization.std.tolist()},
         "checkpoint": {"name": graph.checkpoint, "sha256": graph.checkpoint_sha256},
@@ -111,57 +110,23 @@ def _document_of(graph: LayoutGraph) -> dict[str, Any]:
     }
 
 
-def _edges(graph: LayoutGraph) -> list[dict[str, str]]:
-    """Every pair of healthy fins, and each with itself."""
-    return [{"source": a, "target": b} for a, b in graph.edges]
-
-
 def _graph(document: GraphDocument) -> LayoutGraph:
-    """The graph of a file whose layout is right; all the rest is checked here."""
-    data = document.values
-    normalization = _section(data, "normalization", "mean", "std")
-    checkpoint = _section(data, "checkpoint", "name", "sha256")
-    self_test = _section(data, "self_test", "method", "tolerance_err_norm", "cases")
-    cases = self_test["cases"]
-    if not isinstance(cases, list):
-        raise LayoutError(f"expected a list, got {shown(cases)}", "self_test.cases")
+    """The graph of a file; what goes beyond the parts of it is checked here."""
+    data, layout = document.values, document.layout
+    cases = data.self_test.cases
+    for i, case in enumerate(cases):
+        if len(case.command) != layout.n_fins:
+            problem = f"expected a list of {layout.n_fins} rows, one for each fin, got {len(case.command)}"
+            raise LayoutError(problem, f"self_test.cases[{i}].command")
     graph = LayoutGraph(
-        layout=document.layout,
+        layout=layout,
         failed=document.failed,
-        normalization=Normalization(
-            np.array(numbers(normalization["mean"], "normalization.mean", 6)),
-            np.array(numbers(normalization["std"], "normalization.std", 6, low=0.0)),
-        ),
-        checkpoint=_text_or_none(checkpoint["name"], "checkpoint.name", 200),
-        checkpoint_sha256=_text_or_none(checkpoint["sha256"], "checkpoint.sha256", 64),
-        method=text(self_test["method"], "self_test.method", 40),
-        self_test=tuple(_case(case, i, document.layout.n_fins) for i, case in enumerate(cases)),
+        normalization=Normalization(np.array(data.normalization.mean), np.array(data.normalization.std)),
+        checkpoint=data.checkpoint.name,
+        checkpoint_sha256=data.checkpoint.sha256,
+        method=data.self_test.method,
+        self_test=tuple(SelfTest(c.wrench, tuple(c.command), c.delivered_wrench) for c in cases),
     )
-    if data["graph"]["edges"] != _edges(graph):
+    if [(edge.source, edge.target) for edge in data.graph.edges] != list(graph.edges):
         raise LayoutError("expected every pair of healthy fins, and each with itself", "graph.edges")
     return graph
-
-
-def _section(data: Mapping[str, Any], name: str, *keys: str) -> Mapping[str, Any]:
-    """One part of the file, with exactly these keys."""
-    return mapping(data[name], name, keys, required=keys)
-
-
-def _case(data: Any, i: int, n_fins: int) -> SelfTest:
-    keys = ("wrench", "command", "delivered_wrench")
-    key = f"self_test.cases[{i}]"
-    data = mapping(data, key, keys, required=keys)
-    if not isinstance(data["command"], list) or len(data["command"]) != n_fins:
-        raise LayoutError(f"expected a list of {n_fins} rows, one for each fin", f"{key}.command")
-    return SelfTest(
-        wrench=numbers(data["wrench"], f"{key}.wrench", 6),
-        command=tuple(
-            None if row is None else numbers(row, f"{key}.command[{j}]", 3)
-            for j, row in enumerate(data["command"])
-        ),
-        delivered_wrench=numbers(data["delivered_wrench"], f"{key}.delivered_wrench", 6),
-    )
-
-
-def _text_or_none(value: Any, key: str, max_length: int) -> str | None:
-    return None if value is None else text(value, key, max_length)

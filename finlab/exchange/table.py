@@ -7,9 +7,10 @@ import os
 from pathlib import Path
 
 from finlab.errors import LayoutError
+from finlab.files.guarded import read_text
 from finlab.layout import MAX_FINS, Fin, Layout, Limits
-from finlab.layout.reading import read_text
-from finlab.layout.rules import under
+from finlab.layout.file import under
+from finlab.layout.load import MAX_BYTES
 from finlab.whole_file import write_whole
 
 POSITION = ("x_m", "y_m", "z_m")
@@ -33,7 +34,8 @@ def read_csv(path: str | os.PathLike[str]) -> Layout:
         LayoutError: it cannot be read, or a column or a number is wrong; the message names row and column.
     """
     source = str(path)
-    rows = csv.DictReader(io.StringIO(read_text(Path(path), source)), restkey="", strict=True)
+    text = read_text(path, MAX_BYTES, "a CSV file of fins", LayoutError)
+    rows = csv.DictReader(io.StringIO(text), restkey="", strict=True)
     with under(source=source):
         try:
             header = [column.strip() for column in rows.fieldnames or []]

@@ -8,6 +8,7 @@ centre of gravity.
 import io
 import math
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -19,8 +20,9 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.distribution import install
 from finlab.errors import LayoutError
+from finlab.files.guarded import read_text
 from finlab.layout import Body, Fin, Layout
-from finlab.layout.rules import under
+from finlab.layout.file import under
 from finlab.whole_file import write_whole
 
 MAX_BYTES = 5_000_000
@@ -44,10 +46,11 @@ def read_urdf(path: str | os.PathLike[str], fins: Sequence[str], origin: str = "
     """
     if origin not in ORIGINS:
         raise LayoutError(f"origin: expected one of {', '.join(ORIGINS)}, got {origin!r:.40}")
+    text = read_text(path, MAX_BYTES, "a URDF file", LayoutError)
     with under(source=str(path)):
         if not fins:
             raise LayoutError("name the links that are fins: --fins LINK...")
-        robot = _robot(Path(path))
+        robot = _robot(text)
         joints = {joint.child: joint for joint in robot.joints}
         poses = _poses(robot, joints)
         mass, center, inertia = _masses(robot, poses)
@@ -72,26 +75,20 @@ def read_urdf(path: str | os.PathLike[str], fins: Sequence[str], origin: str = "
         return Layout(str(robot.name or Path(path).stem), tuple(made), description, body)
 
 
-def _robot(path: Path) -> Any:
+def _robot(text: str) -> Any:
     """The parsed description; nothing but its text is read."""
     try:
         from yourdfpy import URDF
     except ImportError:
         raise LayoutError(f"reading URDF needs yourdfpy; run: {install('urdf')}") from None
-    try:
-        with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise LayoutError(f"cannot be read: {reason}") from None
-    if len(content) > MAX_BYTES:
-        raise LayoutError(f"is larger than {MAX_BYTES:,} bytes; expected a URDF file")
-    # Entities could pull in other files or grow without bound; robot descriptions have no use for them.
-    if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
+    # Entities could pull in other files or grow without bound; robot descriptions have no use for them. No
+    # other encoding can hide them: the text is UTF-8, whatever its first line says.
+    text = re.sub(r"^\s*<\?xml[^>]*\?>", "", text)
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise LayoutError("declares a DOCTYPE or entities, which are not allowed; remove them")
     try:
         with_files = {"build_scene_graph": False, "load_meshes": False, "load_collision_meshes": False}
-        return URDF.load(io.BytesIO(content), **with_files).robot
+        return URDF.load(io.BytesIO(text.encode()), **with_files).robot
     except Exception as error:  # the reader raises whatever its own parser and conversions do
         reason = str(error).splitlines()[0][:120] if str(error) else type(error).__name__
         raise LayoutError(f"is not a readable URDF: {reason}") from None

@@ -1,11 +1,8 @@
 """What a load cell measured of one fin, read from CSV files: cycle means, or raw series of time and angle."""
 
-import csv
 import os
-from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +10,11 @@ from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.errors import DataError
+from finlab.files.csv_table import read_table
 from finlab.fit.conventions import Columns, Conventions, named_column, to_fin_frame
 from finlab.fit.sensor_checks import check_sensors
 from finlab.fit.time_series import cycle_means
 from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN
-from finlab.physics.table_file import row_numbers
 
 MAX_BYTES = 500_000_000
 """Largest file that is read [bytes]; a raw series of an hour at 1 kHz has half of it."""
@@ -124,41 +121,18 @@ def _read(path: Path, conventions: Conventions) -> tuple[Columns, tuple[str, ...
 
 def _read_columns(path: Path) -> tuple[Columns, NDArray[np.intp]]:
     """The columns that a fit reads, as they stand, and the line of each row."""
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise DataError(
-                f"{path}: is larger than {MAX_BYTES / 1e6:.0f} MB; cut it into shorter series, "
-                "or write cycle means"
-            )
-        if path.exists() and not path.is_file():
-            raise DataError(f"{path}: is not a regular file, expected a CSV file of measurements")
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            above, first = 1, file.readline()
-            while first.startswith("#"):
-                above, first = above + 1, file.readline()
-            reader = csv.reader(chain([first], file), delimiter=max(",;\t", key=first.count))
-            header = next(reader, [])
-            named = [named_column(cell) for cell in header]
-            used = [i for i, (name, _) in enumerate(named) if name]
-            names = [named[i][0] for i in used]
-            if len(set(names)) < len(names):
-                raise DataError(f"{path}: two columns stand for {_repeated(names)}; keep one")
-            numbers, lines = array("d"), array("q")  # lists would take ten times the room
-            for line, cells in enumerate(reader, start=above + 1):
-                if cells and not cells[0].startswith("#") and any(cell.strip() for cell in cells):
-                    numbers.extend(row_numbers(cells, header, used, f"{path}: line {line}"))
-                    lines.append(line)
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise DataError(f"{path}: cannot be read as CSV text: {error}") from None
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read: {error.strerror}") from None
-    if not lines:
-        raise DataError(f"{path}: has no rows below its header")
-    values = dict(zip(names, np.array(numbers).reshape(len(lines), -1).T.copy(), strict=True))
+    table = read_table(path, MAX_BYTES, "a CSV file of measurements; cut longer series, or write cycle means")
+    named = [named_column(cell) for cell in table.header]
+    used = [i for i, (name, _) in enumerate(named) if name]
+    names = [named[i][0] for i in used]
+    if len(set(names)) < len(names):
+        raise DataError(f"{path}: two columns stand for {_repeated(names)}; keep one")
+    numbers, lines = table.numbers(used)
+    values = dict(zip(names, numbers.T.copy(), strict=True))
     told = {names[k] for k, i in enumerate(used) if named[i][1] is not None}
     for k, i in enumerate(used):
         values[names[k]] *= named[i][1] or 1.0
-    return Columns(values, told, str(path)), np.array(lines)
+    return Columns(values, told, str(path)), lines
 
 
 def _repeated(names: list[str]) -> str:

@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 
 from finlab.assets import checkpoint_path, shipped_checkpoints
-from finlab.errors import CheckpointError
+from finlab.errors import CheckpointError, LayoutError
+from finlab.files.guarded import decoded, read_file
+from finlab.files.plain_values import parse_json
 from finlab.inference.normalization import Normalization
 from finlab.inference.weights import (
     AnyNetworkConfig,
@@ -39,6 +41,10 @@ CONFIG_FILE = "config.json"
 """Everything else."""
 LARGEST = {CONFIG_FILE: 1_000_000, WEIGHTS_FILE: 50_000_000}
 """Largest size of each file [bytes]."""
+
+
+_UNFIT = (ArithmeticError, AttributeError, LayoutError, LookupError, TypeError, ValueError)
+"""What reading a configuration ends with that does not fit."""
 
 
 def read_checkpoint(folder: Path) -> TrainedWeights:
@@ -85,7 +91,15 @@ def parse_checkpoint(files: Mapping[str, bytes], source: str, name: str) -> Trai
             metrics=dict(config["metrics"]),
             sha256=sha256,
         )
-    except (AttributeError, KeyError, TypeError, ValueError, SafetensorError) as error:
+    except (
+        ArithmeticError,
+        AttributeError,
+        LayoutError,
+        LookupError,
+        TypeError,
+        ValueError,
+        SafetensorError,
+    ) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise CheckpointError(
             f"{source}: {CONFIG_FILE} and {WEIGHTS_FILE} do not fit together ({reason})"
@@ -165,28 +179,16 @@ def resolve_checkpoint(checkpoint: str | os.PathLike[str]) -> Path:
 
 def _files(folder: Path, names: tuple[str, ...] = tuple(LARGEST)) -> dict[str, bytes]:
     """Those of a checkpoint's files that are there."""
-    files = {}
-    for name in names:
-        path = folder / name
-        if not path.is_file():
-            continue
-        if path.stat().st_size > LARGEST[name]:
-            what = "configuration" if name.endswith(CONFIG_FILE) else "weights"
-            raise CheckpointError(
-                f"{path}: larger than {LARGEST[name]} bytes; this is not a checkpoint's {what}"
-            )
-        files[name] = path.read_bytes()
-    return files
+    there = [name for name in names if os.path.lexists(folder / name)]
+    return {n: read_file(folder / n, LARGEST[n], "a checkpoint's file", CheckpointError) for n in there}
 
 
 def _config(files: Mapping[str, bytes], source: str) -> dict[str, Any]:
     place = f"{source}/{CONFIG_FILE}"
     if CONFIG_FILE not in files:
         raise _missing(source, CONFIG_FILE)
-    try:
-        config = json.loads(files[CONFIG_FILE])
-    except (ValueError, RecursionError) as error:
-        raise CheckpointError(f"{place}: not readable as JSON ({error})") from error
+    text = decoded(files[CONFIG_FILE], place, "JSON", CheckpointError)
+    config = parse_json(text, place, CheckpointError)
     if not isinstance(config, dict) or config.get("format") != FORMAT:
         raise CheckpointError(f"{place}: not a finlab checkpoint (expected format {FORMAT!r})")
     if type(config.get("version")) is not int or config["version"] != VERSION:

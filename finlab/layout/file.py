@@ -2,34 +2,66 @@
 
 Every error names the file and the key, such as
 `layouts/x.yaml: fins[2].limits.amplitude_rad: minimum 0.6 is above maximum 0.05; swap them`.
+`layout.schema.json` beside this module is made of the same declarations.
 """
 
 import json
 import math
 import os
-from dataclasses import asdict, replace
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from msgspec import Meta, Struct, to_builtins
 
 from finlab.errors import LayoutError
-from finlab.layout.body import BODY_KEYS, HULL_KEYS, Body, Hull
-from finlab.layout.fin import Fin, FinModelSpec, Limits
+from finlab.files.plain_values import yaml_text
+from finlab.files.schema import checked, shown
+from finlab.layout.body import Body, Hull
+from finlab.layout.checked import form, given
+from finlab.layout.fin import Fin, FinModelSpec, Limits, Model
 from finlab.layout.interaction import Interaction, Jet
 from finlab.layout.layout import MAX_FINS, Layout
-from finlab.layout.rules import mapping, number, shown, text, under
-from finlab.layout.servo import SERVO_KEYS, Servo
+from finlab.layout.servo import Servo
 from finlab.whole_file import write_whole
 
 FORMAT = "finlab-layout"
 VERSION = 1
-FRAME = {"convention": "FLU", "origin": "center_of_gravity"}
-"""The only frame there is; a file may leave it out but not contradict it."""
 
-_LIMIT_FIELDS = {
-    "amplitude_rad": "amplitude",
-    "frequency_hz": "frequency",
-    "zero_direction_rad": "zero_direction",
-}
+
+class Frame(Struct, forbid_unknown_fields=True):
+    """The only frame there is: x forward, y left, z up; a file may leave it out but not contradict it."""
+
+    convention: Literal["FLU"] = "FLU"
+    origin: Literal["center_of_gravity"] = "center_of_gravity"
+
+
+FRAME = to_builtins(Frame())
+"""The frame, as a file says it."""
+
+LIMITS, SERVO = form(Limits), form(Servo)
+BODY = form(Body, hull=form(Hull))
+INTERACTION = form(Interaction, jets=list[form(Jet)], velocity=None)  # type: ignore[misc]
+FIN = form(
+    Fin,
+    {"position": "position_m", "mounting_angle": "mounting_angle_deg"},
+    mounting_angle=Annotated[float, Meta(ge=-360.0, le=360.0)],
+    limits=LIMITS,
+    model=Model,
+    servo=SERVO,
+)
+LAYOUT = form(
+    Layout,
+    format=Literal["finlab-layout"],
+    version=Literal[1],
+    fins=Annotated[list[FIN], Meta(min_length=1, max_length=MAX_FINS)],
+    body=BODY,
+    interaction=INTERACTION,
+    frame=Frame | None,
+)
+"""A layout file."""
 
 
 def parse_layout(data: Any, source: str = "layout", folder: Path | None = None) -> Layout:
@@ -44,7 +76,69 @@ def parse_layout(data: Any, source: str = "layout", folder: Path | None = None) 
         LayoutError: something is missing, unknown or out of range.
     """
     with under(source=source):
-        return _layout(data, Path.cwd() if folder is None else folder)
+        check_version(data, FORMAT, VERSION)
+        file = checked(data, LAYOUT)
+        fins = []
+        for i, fin in enumerate(file.fins):
+            with under(f"fins[{i}]"):
+                fins.append(fin_of(fin, math.radians(fin.mounting_angle), folder))
+        return layout_of(file, fins, folder)
+
+
+def fin_of(part: Any, mounting_angle: float, folder: Path | None) -> Fin:
+    """Returns the fin in a part of a layout or graph file; relative paths start at a folder."""
+    name = part.name
+    with under("limits"):
+        limits = Limits(**given(part.limits)) if part.limits else Limits()
+    model = given(part.model) if part.model else {}
+    if "path" in model:
+        model["path"] = _absolute(model["path"], folder)
+    kind = type(part.model).__struct_config__.tag if part.model else "drag"
+    servo = Servo(**given(part.servo)) if part.servo else Servo()
+    return Fin(name, part.position, mounting_angle, limits, FinModelSpec(kind, tuple(model.items())), servo)
+
+
+def layout_of(part: Any, fins: list[Fin], folder: Path | None) -> Layout:
+    """Returns the layout of fins, with all that a file says beside them."""
+    body = interaction = None
+    if part.body:
+        told = given(part.body)
+        with under("body.hull"):
+            if "hull" in told:
+                hull = given(told["hull"])
+                if "mesh" in hull:
+                    hull["mesh"] = _absolute(hull["mesh"], folder)
+                told["hull"] = Hull(**hull)
+        body = Body(**told)
+    if part.interaction:
+        told = given(part.interaction)
+        jets = []
+        for i, jet in enumerate(told.get("jets", ())):
+            with under(f"interaction.jets[{i}]"):
+                jets.append(Jet(**given(jet)))
+        with under("interaction"):
+            interaction = Interaction(**{**told, "jets": tuple(jets)})
+    return Layout(part.name, tuple(fins), part.description or "", body, interaction)
+
+
+@contextmanager
+def under(key: str = "", source: str = "") -> Iterator[None]:
+    """Puts `key` before the keys of layout errors raised inside, and `source`, their file, before that."""
+    try:
+        yield
+    except LayoutError as error:
+        raise error.under(key, source) from None
+
+
+def check_version(data: Any, form: str, version: int) -> None:
+    """Refuses files of another format or version, in which unknown keys are not the news."""
+    if not isinstance(data, Mapping):
+        raise LayoutError(f"expected keys and values, got {shown(data)}")
+    if data.get("format", form) != form:
+        raise LayoutError(f"expected {form}, got {shown(data['format'])}", "format")
+    found = data.get("version", version)
+    if type(found) is not int or found != version:
+        raise LayoutError(f"this finlab reads version {version}, got {shown(found)}", "version")
 
 
 def layout_to_dict(layout: Layout) -> dict[str, Any]:
@@ -69,115 +163,26 @@ def save_layout(layout: Layout, path: str | os.PathLike[str]) -> None:
         LayoutError: the file cannot be written.
     """
     data = layout_to_dict(layout)
-    if Path(path).suffix.lower() == ".json":
-        content = json.dumps(data, indent=2) + "\n"
-    else:
-        from finlab.layout.yaml_file import yaml_text  # a robot's computer writes JSON and may lack PyYAML
-
-        content = yaml_text(data)
-    write_whole(path, content)
+    is_json = Path(path).suffix.lower() == ".json"
+    write_whole(path, json.dumps(data, indent=2) + "\n" if is_json else yaml_text(data))
 
 
-def _layout(data: Any, folder: Path) -> Layout:
-    keys = ("format", "version", "name", "description", "frame", "fins", "body", "interaction")
-    # Format and version first: in a file of another kind or version, unknown keys are not the news.
-    if isinstance(data, dict) and "format" in data and data["format"] != FORMAT:
-        raise LayoutError(f"expected {FORMAT}, got {shown(data['format'])}", "format")
-    if isinstance(data, dict) and "version" in data:
-        version = data["version"]
-        if isinstance(version, bool) or version != VERSION:
-            raise LayoutError(f"this finlab reads version {VERSION}, got {shown(version)}", "version")
-    data = mapping(data, "", keys, required=("format", "version", "name", "fins"))
-    if "frame" in data:
-        frame = mapping(data["frame"], "frame", tuple(FRAME))
-        for key, value in frame.items():
-            if value != FRAME[key]:
-                raise LayoutError(f"expected {FRAME[key]}, got {shown(value)}", f"frame.{key}")
-    fins = data["fins"]
-    if not isinstance(fins, list):
-        raise LayoutError(f"expected a list of fins, got {shown(fins)}", "fins")
-    if not 1 <= len(fins) <= MAX_FINS:
-        raise LayoutError(f"expected 1 to {MAX_FINS} fins, got {len(fins)}", "fins")
-    parsed = []
-    for i, fin in enumerate(fins):
-        with under(f"fins[{i}]"):
-            parsed.append(_fin(fin, folder))
-    with under("body"):
-        body = None if data.get("body") is None else _body(data["body"], folder)
-    with under("interaction"):
-        interaction = None if data.get("interaction") is None else _interaction(data["interaction"])
-    description = "" if data.get("description") is None else data["description"]
-    return Layout(data["name"], tuple(parsed), description, body, interaction)
-
-
-def _fin(data: Any, folder: Path) -> Fin:
-    keys = ("name", "position_m", "mounting_angle_deg", "limits", "model", "servo")
-    data = mapping(data, "", keys, required=("name", "position_m", "mounting_angle_deg"))
-    degrees = number(data["mounting_angle_deg"], "mounting_angle_deg", -360.0, 360.0)
-    with under("limits"):
-        given = mapping({} if data.get("limits") is None else data["limits"], "", tuple(_LIMIT_FIELDS))
-        limits = Limits(**{_LIMIT_FIELDS[key]: value for key, value in given.items()})
-    with under("model"):
-        model = _model({"type": "drag"} if data.get("model") is None else data["model"], folder)
-    with under("servo"):
-        driven = mapping({} if data.get("servo") is None else data["servo"], "", tuple(SERVO_KEYS))
-        servo = Servo(**{SERVO_KEYS[key]: value for key, value in driven.items()})
-    return Fin(data["name"], data["position_m"], math.radians(degrees), limits, model, servo)
-
-
-def _model(data: Any, folder: Path) -> FinModelSpec:
-    if not isinstance(data, dict):
-        raise LayoutError(f"expected keys and values such as {{type: drag}}, got {shown(data)}")
-    if "type" not in data:
-        raise LayoutError("required key is missing", "type")
-    parameters = {text(key, "", 200): value for key, value in data.items() if key != "type"}
-    spec = FinModelSpec(text(data["type"], "type", 200), tuple(parameters.items()))
-    located = tuple((k, _absolute(str(v), folder) if k == "path" else v) for k, v in spec.parameters)
-    return replace(spec, parameters=located)
-
-
-def _body(data: Any, folder: Path) -> Body:
-    data = dict(mapping(data, "", BODY_KEYS))
-    if data.get("hull") is not None:
-        with under("hull"):
-            hull = dict(mapping(data["hull"], "", HULL_KEYS))
-            if hull.get("mesh") is not None:
-                hull["mesh"] = _absolute(text(hull["mesh"], "mesh", 4096), folder)
-            data["hull"] = Hull(**hull)
-    return Body(**data)
-
-
-def _interaction(data: Any) -> Interaction:
-    data = dict(mapping(data, "", ("jets", "half_thrust_n", "narrowness", "inflow")))
-    jets = [] if data.get("jets") is None else data["jets"]
-    if not isinstance(jets, list):
-        raise LayoutError(f"expected a list of jets, got {shown(jets)}", "jets")
-    keys, parsed = ("source", "target", "share"), []
-    for i, jet in enumerate(jets):
-        with under(f"jets[{i}]"):
-            parsed.append(Jet(**mapping(jet, "", keys, required=keys)))
-    return Interaction(**{**data, "jets": tuple(parsed)})
-
-
-def _absolute(path: str, folder: Path) -> str:
-    return os.path.normpath(folder / path)
+def _absolute(path: str, folder: Path | None) -> str:
+    return os.path.normpath((folder or Path.cwd()) / path)
 
 
 def _fin_to_dict(fin: Fin) -> dict[str, Any]:
-    limits = {key: list(getattr(fin.limits, field)) for key, field in _LIMIT_FIELDS.items()}
     data = {
         "name": fin.name,
         "position_m": list(fin.position),
         # Degrees from radians carry a rounding error of 1e-14; twelve digits give back what people wrote.
         "mounting_angle_deg": round(math.degrees(fin.mounting_angle), 12),
-        "limits": limits,
+        "limits": {key: list(getattr(fin.limits, name)) for name, key in Limits.KEYS.items()},
         "model": {"type": fin.model.type, **dict(fin.model.parameters)},
     }
-    own = {key: getattr(fin.servo, field) for key, field in SERVO_KEYS.items()}
-    usual = Servo()
-    if servo := {key: value for key, value in own.items() if value != getattr(usual, SERVO_KEYS[key])}:
-        data["servo"] = servo
-    return data
+    servo, usual = asdict(fin.servo), asdict(Servo())
+    own = {key: servo[name] for name, key in Servo.KEYS.items() if servo[name] != usual[name]}
+    return data | ({"servo": own} if own else {})
 
 
 def _plain(value: Any) -> Any:

@@ -3,10 +3,14 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Union
+
+from msgspec import Meta, Struct, defstruct
 
 from finlab.errors import LayoutError
+from finlab.files.schema import checked
 from finlab.layout.angles import FULL_TURN_TOLERANCE, TURN
-from finlab.layout.rules import MAX_NAME_LENGTH, interval, number, numbers, text
+from finlab.layout.checked import Checked, Name, given
 from finlab.layout.servo import Servo
 
 
@@ -20,21 +24,19 @@ class Parameter:
     """What it is, in a few words."""
     unit: str = ""
     """Its unit; empty where it has none."""
-    low: float = 0.0
-    """Least value; must be exceeded if `positive`."""
-    high: float = 1e6
+    low: float = 0.001
+    """Least value that a robot's fin may have."""
+    high: float = 10.0
     """Greatest value."""
-    positive: bool = True
-    """Whether it must be above zero."""
 
 
-_DENSITY = Parameter(1000.0, "density of the water", "kg/m^3")
+_DENSITY = Parameter(1000.0, "density of the water", "kg/m^3", 500.0, 2000.0)
 
 FIN_MODELS: Mapping[str, Mapping[str, Parameter]] = {
     "drag": {
         "density": _DENSITY,
-        "drag_coefficient": Parameter(0.15, "drag coefficient of the blade"),
-        "area": Parameter(0.02, "area of the blade", "m^2"),
+        "drag_coefficient": Parameter(0.15, "drag coefficient of the blade", "", 0.01),
+        "area": Parameter(0.02, "area of the blade", "m^2", 1e-5),
         "lever": Parameter(0.1, "distance of the blade's centre from the shaft", "m"),
     },
     "lighthill": {
@@ -43,13 +45,13 @@ FIN_MODELS: Mapping[str, Mapping[str, Parameter]] = {
         "width": Parameter(0.10, "width of the trailing edge", "m"),
     },
     "soft": {
-        "k": Parameter(3.6, "thrust at A f = 1 rad Hz, before it saturates", "N"),
+        "k": Parameter(3.6, "thrust at A f = 1 rad Hz, before it saturates", "N", 1e-4, 1e5),
         "p": Parameter(1.0, "exponent with which thrust grows with A f", low=0.5, high=4.0),
-        "x0": Parameter(1.3, "A f from which thrust saturates and falls", "rad Hz"),
-        "q": Parameter(5.0, "exponent of that fall", high=20.0),
-        "e": Parameter(0.0, "share by which thrust differs with direction", high=0.99, positive=False),
-        "phi_e": Parameter(0.0, "zero direction of the largest thrust", "rad", -10.0, 10.0, positive=False),
-        "d": Parameter(0.0, "angle from zero direction to thrust", "rad", -1.5, 1.5, positive=False),
+        "x0": Parameter(1.3, "A f from which thrust saturates and falls", "rad Hz", 0.01, 100.0),
+        "q": Parameter(5.0, "exponent of that fall", low=0.1, high=20.0),
+        "e": Parameter(0.0, "share by which thrust differs with direction", low=0.0, high=0.99),
+        "phi_e": Parameter(0.0, "zero direction of the largest thrust", "rad", -10.0, 10.0),
+        "d": Parameter(0.0, "angle from zero direction to thrust", "rad", -1.5, 1.5),
     },
     # Its one parameter, `path`, is the text that names a CSV file of forces; it has no default.
     "table": {},
@@ -64,6 +66,21 @@ SCALES_THRUST: Mapping[str, tuple[str, float]] = {
 """The parameter by which a model's thrust is made larger or smaller, and its exponent."""
 
 
+def _form(name: str, parameters: Mapping[str, Parameter]) -> type[Struct]:
+    """The part of a file that gives the parameters of a model."""
+    path = Annotated[str, Meta(min_length=1, max_length=4096, description="a CSV file of forces")]
+    keys: list[Any] = [("path", path)] if name == "table" else []
+    for key, rule in parameters.items():
+        about = f"{rule.meaning}{rule.unit and f' [{rule.unit}]'}; {rule.default:g} when left out"
+        kind = Annotated[float, Meta(ge=rule.low, le=rule.high, description=about)]
+        keys.append((key, kind | None, None))
+    return defstruct(f"{name.title()}Model", keys, tag=name, tag_field="type", forbid_unknown_fields=True)
+
+
+Model: Any = Union[tuple(_form(name, parameters) for name, parameters in FIN_MODELS.items())]  # noqa: UP007
+"""A fin model in a file: keys and values, among them its `type`."""
+
+
 @dataclass(frozen=True)
 class FinModelSpec:
     """Name and parameters of a fin model, as a layout file gives them. Checked on construction."""
@@ -74,22 +91,8 @@ class FinModelSpec:
     """Parameters that differ from the model's defaults, as (name, value), sorted by name."""
 
     def __post_init__(self) -> None:
-        if self.type not in FIN_MODELS:
-            known = ", ".join(FIN_MODELS)
-            raise LayoutError(f"unknown fin model {self.type!r:.60}, expected one of {known}", "type")
-        known_names = ["path"] if self.type == "table" else list(FIN_MODELS[self.type])
-        checked: list[tuple[str, float | str]] = []
-        for name, value in sorted(self.parameters):
-            if name not in known_names:
-                raise LayoutError(f"unknown key, {self.type} takes {', '.join(known_names)}", name)
-            if name == "path":
-                checked.append((name, text(value, name, 4096)))
-            else:
-                rule = FIN_MODELS[self.type][name]
-                checked.append((name, number(value, name, rule.low, rule.high, rule.positive)))
-        if self.type == "table" and not checked:
-            raise LayoutError("required key is missing; name the CSV file of forces", "path")
-        object.__setattr__(self, "parameters", tuple(checked))
+        model: Any = checked({**dict(self.parameters), "type": self.type}, Model)
+        object.__setattr__(self, "parameters", tuple(sorted(given(model).items())))
 
     @classmethod
     def from_values(cls, values: Mapping[str, float | str]) -> "FinModelSpec":
@@ -109,7 +112,8 @@ class FinModelSpec:
         if self.type not in SCALES_THRUST:
             raise LayoutError("the thrust of a table cannot be scaled; name another CSV file", "type")
         name, exponent = SCALES_THRUST[self.type]
-        value = float(self.values()[name]) * share**exponent
+        rule = FIN_MODELS[self.type][name]
+        value = min(max(float(self.values()[name]) * share**exponent, rule.low), rule.high)
         return FinModelSpec(self.type, tuple({**dict(self.parameters), name: value}.items()))
 
     def values(self) -> dict[str, float | str]:
@@ -126,31 +130,53 @@ MAX_POSITION = 10.0
 """Largest coordinate of a fin [m]."""
 
 
+Amplitude = Annotated[float, Meta(ge=0.0, le=MAX_AMPLITUDE)]
+Frequency = Annotated[float, Meta(ge=0.0, le=MAX_FREQUENCY)]
+Direction = Annotated[float, Meta(ge=-TURN, le=TURN)]
+Coordinate = Annotated[float, Meta(ge=-MAX_POSITION, le=MAX_POSITION)]
+MountingAngle = Annotated[float, Meta(ge=-TURN - 1e-9, le=TURN + 1e-9)]
+LEAST = {"amplitude": 1e-4, "frequency": 1e-3}
+"""Least amplitude [rad] and frequency [Hz] that is not 0."""
+LEAST_WIDTH = 1e-6
+"""Least width of a range [rad, Hz] that is not 0."""
+
+
 @dataclass(frozen=True)
-class Limits:
+class Limits(Checked):
     """What one fin may be commanded. The defaults are the nominal limits. Checked on construction."""
 
-    amplitude: tuple[float, float] = (0.05, 0.6)
-    """Half amplitude [rad], (minimum, maximum); the maximum is above 0."""
-    frequency: tuple[float, float] = (0.1, 2.1)
-    """Frequency [Hz], (minimum, maximum); the maximum is above 0."""
-    zero_direction: tuple[float, float] = (-math.pi, math.pi)
+    KEYS: ClassVar[Mapping[str, str]] = {
+        "amplitude": "amplitude_rad",
+        "frequency": "frequency_hz",
+        "zero_direction": "zero_direction_rad",
+    }
+
+    amplitude: tuple[Amplitude, Amplitude] = (0.05, 0.6)
+    """Half amplitude [rad], (minimum, maximum)."""
+    frequency: tuple[Frequency, Frequency] = (0.1, 2.1)
+    """Frequency [Hz], (minimum, maximum)."""
+    zero_direction: tuple[Direction, Direction] = (-math.pi, math.pi)
     """Zero direction [rad], (minimum, maximum), at most one turn apart; a full turn means any direction."""
 
     def __post_init__(self) -> None:
-        amplitude = interval(self.amplitude, "amplitude_rad", 0.0, MAX_AMPLITUDE)
-        frequency = interval(self.frequency, "frequency_hz", 0.0, MAX_FREQUENCY)
-        zero_direction = interval(self.zero_direction, "zero_direction_rad", -2 * math.pi, 2 * math.pi)
-        # The energy proxy divides by these two maxima.
-        for key, (_, most) in (("amplitude_rad", amplitude), ("frequency_hz", frequency)):
-            if most <= 0.0:
-                raise LayoutError("the maximum must be above 0; leave the fin out if it never moves", key)
-        width = zero_direction[1] - zero_direction[0]
+        super().__post_init__()
+        for name, key in self.KEYS.items():
+            low, high = getattr(self, name)
+            if low > high:
+                raise LayoutError(f"minimum {low:g} is above maximum {high:g}; swap them", key)
+            if name != "zero_direction" and (high < LEAST[name] or 0.0 < low < LEAST[name]):
+                raise LayoutError(
+                    f"the maximum must be at least {LEAST[name]:g}, the minimum 0 or as much, got {low:g} "
+                    f"and {high:g}; leave the fin out if it never moves",
+                    key,
+                )
+            if 0.0 < high - low < LEAST_WIDTH:
+                raise LayoutError(
+                    f"must span 0 or at least {LEAST_WIDTH:g}, got {high - low:g}; write one value twice", key
+                )
+        width = self.zero_direction[1] - self.zero_direction[0]
         if width > TURN + FULL_TURN_TOLERANCE:
             raise LayoutError(f"must span at most one turn (6.2832), got {width:.4f}", "zero_direction_rad")
-        object.__setattr__(self, "amplitude", amplitude)
-        object.__setattr__(self, "frequency", frequency)
-        object.__setattr__(self, "zero_direction", zero_direction)
 
     @property
     def lower(self) -> tuple[float, float, float]:
@@ -164,14 +190,16 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Fin:
+class Fin(Checked):
     """One fin on the hull. Checked on construction."""
 
-    name: str
+    KEYS: ClassVar[Mapping[str, str]] = {"position": "position_m"}
+
+    name: Name
     """Unique within its layout; `--failed NAME` and the app refer to it."""
-    position: tuple[float, float, float]
+    position: tuple[Coordinate, Coordinate, Coordinate]
     """Where the fin's force acts, body frame (x forward, y left, z up from the centre of gravity) [m]."""
-    mounting_angle: float
+    mounting_angle: MountingAngle
     """Azimuth of the shaft in the body xy plane, from +x, counter-clockwise [rad]."""
     limits: Limits = Limits()
     """What the fin may be commanded."""
@@ -179,14 +207,3 @@ class Fin:
     """Which law gives its force."""
     servo: Servo = Servo()
     """How fast it comes to what is commanded."""
-
-    def __post_init__(self) -> None:
-        x, y, z = numbers(self.position, "position_m", 3, -MAX_POSITION, MAX_POSITION)
-        object.__setattr__(self, "name", text(self.name, "name", MAX_NAME_LENGTH))
-        object.__setattr__(self, "position", (x, y, z))
-        angle = number(self.mounting_angle, "mounting_angle")
-        if abs(angle) > 2 * math.pi + 1e-9:
-            raise LayoutError(
-                f"must lie within one turn either way, got {math.degrees(angle):g} deg", "mounting_angle_deg"
-            )
-        object.__setattr__(self, "mounting_angle", angle)

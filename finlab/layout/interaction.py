@@ -11,61 +11,60 @@ tip. `finlab.physics.coupling` computes it.
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import Annotated
+
+from msgspec import Meta
 
 from finlab.errors import LayoutError
-from finlab.layout.rules import MAX_NAME_LENGTH, number, numbers, text
+from finlab.layout.checked import Checked, Name
 
 MAX_SHARE = 2.0
-"""Largest coefficient of a share."""
+Share = Annotated[float, Meta(ge=-MAX_SHARE, le=MAX_SHARE)]
+"""A coefficient of a share of thrust."""
+Two = Meta(min_length=2, max_length=2)
+Six = Meta(min_length=6, max_length=6)
 
 
 @dataclass(frozen=True)
-class Jet:
+class Jet(Checked):
     """What the jet of one fin takes from another. Checked on construction."""
 
-    source: str
+    source: Name
     """Name of the fin that throws the water."""
-    target: str
+    target: Name
     """Name of the fin that the water meets."""
-    share: tuple[float, ...]
+    share: Annotated[tuple[Share, ...], Two]
     """Share of the target's thrust that a wide and a narrow jet (a, b) take where it lies in their middle."""
 
     def __post_init__(self) -> None:
-        text(self.source, "source", MAX_NAME_LENGTH)
-        text(self.target, "target", MAX_NAME_LENGTH)
+        super().__post_init__()
         if self.source == self.target:
             raise LayoutError(f"{self.source!r} does not lie in its own jet; name two fins", "target")
-        object.__setattr__(self, "share", numbers(self.share, "share", 2, -MAX_SHARE, MAX_SHARE))
 
 
 @dataclass(frozen=True)
-class Interaction:
+class Interaction(Checked):
     """All that a robot's fins take from each other. Checked on construction."""
 
     jets: tuple[Jet, ...] = ()
     """What jets take; pairs that are not named take nothing."""
-    half_thrust_n: float = 0.5
+    half_thrust_n: Annotated[float, Meta(ge=1e-6, le=1e4)] = 0.5
     """Thrust T_0 [N] at which a jet takes half of what a very strong one takes."""
-    narrowness: float = 2.0
+    narrowness: Annotated[float, Meta(ge=0.0, le=100.0)] = 2.0
     """How narrow the wide jet is, k: 2 falls to 1 / e at 60 degrees, 4 at 41. The narrow one has four times
     as much."""
-    inflow: tuple[float, ...] = (0.0, 0.0)
+    inflow: Annotated[tuple[Share, ...], Two] = (0.0, 0.0)
     """Coefficients p and q of what speed through the water takes."""
-    velocity: tuple[float, ...] = (0.0,) * 6
+    velocity: Annotated[tuple[Annotated[float, Meta(ge=-100.0, le=100.0)], ...], Six] = (0.0,) * 6
     """The robot's velocity relative to the water [m/s, rad/s], body frame; of now, and in no file."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         object.__setattr__(self, "jets", tuple(self.jets))
         pairs = [(jet.source, jet.target) for jet in self.jets]
         for i, pair in enumerate(pairs):
             if pair in pairs[:i]:
                 raise LayoutError(f"the jet of {pair[0]!r} on {pair[1]!r} is given twice", f"jets[{i}]")
-        object.__setattr__(
-            self, "half_thrust_n", number(self.half_thrust_n, "half_thrust_n", high=1e4, positive=True)
-        )
-        object.__setattr__(self, "narrowness", number(self.narrowness, "narrowness", 0.0, 100.0))
-        object.__setattr__(self, "inflow", numbers(self.inflow, "inflow", 2, -MAX_SHARE, MAX_SHARE))
-        object.__setattr__(self, "velocity", numbers(self.velocity, "velocity", 6, -100.0, 100.0))
 
     def renamed(self, old: str, new: str) -> "Interaction":
         """The same with another name for one fin."""

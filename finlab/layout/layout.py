@@ -3,31 +3,34 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike
 
 from finlab.arrays import Array
 from finlab.errors import LayoutError
 from finlab.layout.body import Body
+from finlab.layout.checked import Checked, Name
 from finlab.layout.fin import Fin
 from finlab.layout.interaction import Interaction
-from finlab.layout.rules import MAX_DESCRIPTION_LENGTH, MAX_NAME_LENGTH, text
 
 MAX_FINS = 16
 """Most fins a layout may have."""
+MAX_DESCRIPTION_LENGTH = 4000
+"""Most characters of a description."""
 
 
 @dataclass(frozen=True)
-class Layout:
+class Layout(Checked):
     """The fins of one robot. Immutable and comparable; every change returns a new layout."""
 
-    name: str
+    name: Name
     """What the layout is called."""
     fins: tuple[Fin, ...]
     """The fins, 1 to 16, with unique names. Commands and arrays follow this order."""
-    description: str = ""
+    description: Annotated[str, Meta(max_length=MAX_DESCRIPTION_LENGTH)] = ""
     """What there is to know about it, for people."""
     body: Body | None = None
     """Hull, mass and hydrodynamics, where known."""
@@ -35,8 +38,7 @@ class Layout:
     """What the fins take from each other and from speed, where a swim has shown it."""
 
     def __post_init__(self) -> None:
-        text(self.name, "name", MAX_NAME_LENGTH)
-        text(self.description, "description", MAX_DESCRIPTION_LENGTH, allow_empty=True, one_line=False)
+        super().__post_init__()
         object.__setattr__(self, "fins", tuple(self.fins))
         if not 1 <= len(self.fins) <= MAX_FINS:
             raise LayoutError(f"expected 1 to {MAX_FINS} fins, got {len(self.fins)}", "fins")

@@ -2,30 +2,28 @@
 
 import hashlib
 import json
-import math
 import os
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from finlab.assets import shipped_layouts
 from finlab.bundle_files import GRAPH, TABLES, Files, is_bundle, read_bundle_files
 from finlab.errors import LayoutError
-from finlab.layout.file import FORMAT, VERSION, parse_layout
+from finlab.files.guarded import decoded, read_text
+from finlab.files.plain_values import parse_json, parse_yaml
+from finlab.files.schema import checked
+from finlab.layout.file import check_version, fin_of, layout_of, parse_layout, under
+from finlab.layout.graph_form import Graph
 from finlab.layout.layout import Layout
-from finlab.layout.reading import decode_text, parse_json, read_text
-from finlab.layout.rules import mapping, number, shown, under
 
 SUFFIX = ".graph.json"
 """How the name of a graph file ends."""
 GRAPH_FORMAT = "finlab-graph"
 GRAPH_VERSION = 2
-ABOUT = ("name", "description", "body", "interaction")
-"""What the part `layout` of a graph file holds: keys of a layout file."""
-UNITS = {"length": "m", "angle": "rad", "frequency": "Hz", "force": "N", "torque": "N m"}
-_PARTS = ("frame", "units", "layout", "graph", "normalization", "checkpoint", "self_test")
-KEYS = ("format", "version", "checksum", *_PARTS)
+MAX_BYTES = 1_000_000
+"""Largest layout file that is read [bytes]; a real one has a few thousand."""
+A_LAYOUT = "a layout file (.yaml or .json)"
 
 
 class GraphText(NamedTuple):
@@ -42,10 +40,10 @@ class GraphText(NamedTuple):
 
 
 class GraphDocument(NamedTuple):
-    """What a layout graph file says, checked as far as its layout goes."""
+    """What a layout graph file says."""
 
-    values: Mapping[str, Any]
-    """Everything in it, with the keys that it must have."""
+    values: Graph
+    """Everything in it."""
     layout: Layout
     """The layout, failed fins included, the shafts' angles exactly as they were."""
     failed: tuple[str, ...]
@@ -68,14 +66,9 @@ def load_layout(layout: str | os.PathLike[str]) -> Layout:
     source = str(layout)
     if holds_graph(file):
         return parse_graph_document(read_graph_text(file)).layout
-    content = read_text(file, source)
-    if file.suffix.lower() == ".json":
-        data = parse_json(content, source)
-    else:
-        from finlab.layout.yaml_file import parse_yaml  # a robot's computer reads JSON and may lack PyYAML
-
-        data = parse_yaml(content, source)
-    return parse_layout(data, source=source, folder=file.resolve().parent)
+    content = read_text(file, MAX_BYTES, A_LAYOUT, LayoutError)
+    parse = parse_json if file.suffix.lower() == ".json" else parse_yaml
+    return parse_layout(parse(content, source, LayoutError), source=source, folder=file.resolve().parent)
 
 
 def layout_path(layout: str | os.PathLike[str]) -> Path:
@@ -116,7 +109,7 @@ def read_graph_text(path: Path) -> GraphText:
     """
     source = str(path)
     if not is_bundle(path):
-        return GraphText(read_text(path, source), source, path.resolve().parent)
+        return GraphText(read_text(path, MAX_BYTES, A_LAYOUT, LayoutError), source, path.resolve().parent)
     return bundle_graph_text(read_bundle_files(path), source)
 
 
@@ -124,7 +117,7 @@ def bundle_graph_text(files: Files, source: str) -> GraphText:
     """The graph file among the files of a bundle, a folder or archive at the path `source`."""
     place, folder = f"{source}/{GRAPH}", Path(os.path.abspath(source))
     tables = frozenset(str(folder / name) for name in files if name.startswith(TABLES))
-    return GraphText(decode_text(files[GRAPH], place), place, folder, tables)
+    return GraphText(decoded(files[GRAPH], place, A_LAYOUT, LayoutError), place, folder, tables)
 
 
 def parse_graph_document(found: GraphText) -> GraphDocument:
@@ -133,21 +126,22 @@ def parse_graph_document(found: GraphText) -> GraphDocument:
     Raises:
         LayoutError: it is of another format or version, was changed after it was written, or holds no layout.
     """
-    data = parse_json(found.content, found.source)
+    data = parse_json(found.content, found.source, LayoutError)
     with under(source=found.source):
-        # Format and version first: in a file of another kind or version, unknown keys are not the news.
-        if not isinstance(data, dict) or data.get("format") != GRAPH_FORMAT:
-            got = shown(data.get("format")) if isinstance(data, dict) else shown(data)
-            raise LayoutError(f"expected {GRAPH_FORMAT}, got {got}", "format")
-        if type(data.get("version")) is not int or data["version"] != GRAPH_VERSION:
-            got = shown(data.get("version"))
-            raise LayoutError(f"this finlab reads version {GRAPH_VERSION}, got {got}", "version")
-        mapping(data, "", KEYS, required=KEYS)
-        if data["checksum"] != checksum_of(data):
+        check_version(data, GRAPH_FORMAT, GRAPH_VERSION)
+        document = checked(data, Graph)
+        if document.checksum != checksum_of(data):
             raise LayoutError("does not fit the contents; the file was changed, export it again", "checksum")
-        if data["units"] != UNITS:
-            raise LayoutError(f"expected {UNITS}, got {shown(data['units'])}", "units")
-        return _document(data, found)
+        fins, nodes = [], document.graph.nodes
+        for i, node in enumerate(nodes):
+            with under(f"graph.nodes[{i}]"):
+                fins.append(fin_of(node, node.mounting_angle, found.folder))
+                path = fins[i].model.values().get("path")
+                if found.tables is not None and path is not None and path not in found.tables:
+                    problem = "names a force table that is not in the bundle; export it again"
+                    raise LayoutError(problem, "model.path")
+        layout = layout_of(document.layout, fins, found.folder)
+    return GraphDocument(document, layout, tuple(node.name for node in nodes if not node.healthy))
 
 
 def checksum_of(document: Mapping[str, Any]) -> str:
@@ -155,33 +149,3 @@ def checksum_of(document: Mapping[str, Any]) -> str:
     rest = {key: value for key, value in document.items() if key != "checksum"}
     canonical = json.dumps(rest, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     return "sha256:" + hashlib.sha256(canonical.encode("utf-8", "surrogatepass")).hexdigest()
-
-
-def _document(data: Mapping[str, Any], found: GraphText) -> GraphDocument:
-    """The layout of a graph file, read by way of the layout file that it would be."""
-    parts = ("directed", "multigraph", "graph", "nodes", "edges")
-    nodes = mapping(data["graph"], "graph", parts, required=parts)["nodes"]
-    if not isinstance(nodes, list):
-        raise LayoutError(f"expected a list of fins, got {shown(nodes)}", "graph.nodes")
-    keys = ("id", "position_m", "mounting_angle_rad", "limits", "model", "healthy")
-    carried = ("position_m", "limits", "model", "servo")
-    angles, fins = [], []
-    for i, node in enumerate(nodes):
-        with under(f"graph.nodes[{i}]"):
-            mapping(node, "", (*keys, "servo"), required=keys)
-            if not isinstance(node["healthy"], bool):
-                raise LayoutError(f"expected true or false, got {shown(node['healthy'])}", "healthy")
-            angles.append(number(node["mounting_angle_rad"], "mounting_angle_rad", -math.tau, math.tau))
-        fin = {"name": node["id"], "mounting_angle_deg": math.degrees(angles[-1])}
-        fins.append(fin | {key: node[key] for key in carried if key in node})
-    about = mapping(data["layout"], "layout", ABOUT, ("name",))
-    head = {"format": FORMAT, "version": VERSION, "frame": data["frame"]}
-    layout = parse_layout({**head, **about, "fins": fins}, found.source, found.folder)
-    for i, parsed in enumerate(layout.fins):
-        path = parsed.model.values().get("path")
-        if found.tables is not None and path is not None and path not in found.tables:
-            key = f"graph.nodes[{i}].model.path"
-            raise LayoutError("names a force table that is not in the bundle; export it again", key)
-    exact = (replace(fin, mounting_angle=angle) for fin, angle in zip(layout.fins, angles, strict=True))
-    failed = tuple(node["id"] for node in nodes if not node["healthy"])
-    return GraphDocument(data, replace(layout, fins=tuple(exact)), failed)

@@ -11,8 +11,6 @@ over.
 import csv
 import math
 import os
-from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +19,8 @@ from numpy.typing import NDArray
 from finlab.arrays import Array
 from finlab.bundle_files import TABLES, archive_around, read_bundle_files
 from finlab.errors import DataError
+from finlab.files.csv_table import CsvTable
+from finlab.files.guarded import read_file
 from finlab.layout.angles import FILE_TURN_TOLERANCE, TURN
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
 from finlab.physics.fin_law import FinLaw
@@ -32,7 +32,7 @@ POWER_COLUMN = "P"
 """Column of the mean power [W], which may be left out."""
 DOUBT = "not to be trusted"
 """How a table's note begins that every answer repeats."""
-MAX_BYTES = 50_000_000
+MAX_BYTES = 25_000_000
 """Largest table that is read [bytes]."""
 
 
@@ -78,34 +78,20 @@ def table_bytes(path: str | os.PathLike[str]) -> bytes:
     Raises:
         DataError: there is no such file, or it is too large.
     """
-    place, archive = Path(path), archive_around(path)
-    content = None
-    try:
-        if archive is not None:
-            content = read_bundle_files(archive).get(TABLES + place.name)
-        elif place.is_file():
-            with place.open("rb") as file:
-                content = file.read(MAX_BYTES + 1)
-    except (OSError, ValueError) as error:
-        raise DataError(f"{path}: cannot be read: {error}") from None
+    archive = archive_around(path)
+    if archive is None:
+        return read_file(path, MAX_BYTES, "a CSV table of fin forces")
+    content = read_bundle_files(archive).get(TABLES + os.path.basename(path))
     if content is None:
         raise DataError(f"{path}: no such file, expected a CSV table of fin forces")
-    if len(content) > MAX_BYTES:
-        raise DataError(f"{path}: is larger than {MAX_BYTES:,} bytes, too large for a force table")
     return content
 
 
 def _read_rows(content: bytes, source: str) -> tuple[Array, NDArray[np.intp], tuple[str, ...]]:
     """Returns the table (rows, 6 or 7) in the order of `COLUMNS`, with the power behind, the line (rows,) of
     the file that each row stands in, and the notes above the header."""
-    try:
-        text = content.decode("utf-8-sig").splitlines()
-        above = next((k for k, line in enumerate(text) if not line.startswith("#")), len(text))
-        lines = list(csv.reader(text[above:]))
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise DataError(f"{source}: cannot be read as CSV text: {error}") from None
-    notes = tuple(line.lstrip("# ").rstrip() for line in text[:above])
-    header = [cell.strip() for cell in lines[0]] if lines else []
+    table = CsvTable(content, source)
+    header = table.header
     missing = [name for name in COLUMNS if name not in header]
     if missing:
         raise DataError(
@@ -114,46 +100,7 @@ def _read_rows(content: bytes, source: str) -> tuple[Array, NDArray[np.intp], tu
     if len(set(header)) < len(header):
         raise DataError(f"{source}: a column name appears twice in the header")
     columns = [*COLUMNS, POWER_COLUMN] if POWER_COLUMN in header else [*COLUMNS]
-    order = [header.index(name) for name in columns]
-    rows, numbers = [], []
-    for line, cells in enumerate(lines[1:], start=above + 2):
-        if not any(cell.strip() for cell in cells):
-            continue
-        rows.append(row_numbers(cells, header, order, f"{source}: line {line}"))
-        numbers.append(line)
-    if not rows:
-        raise DataError(f"{source}: has no rows below its header")
-    return np.array(rows), np.array(numbers), notes
-
-
-def row_numbers(cells: Sequence[str], header: Sequence[str], order: Sequence[int], where: str) -> list[float]:
-    """Returns the cells of a row at some places as finite numbers.
-
-    Raises:
-        DataError: the row is too long or too short, or a cell holds something else; `where` names the row.
-    """
-    if len(cells) != len(header):
-        raise DataError(f"{where} has {len(cells)} values, the header has {len(header)}")
-    try:
-        values = [float(cells[i]) for i in order]
-    except ValueError:
-        values = [math.nan]
-    if all(map(math.isfinite, values)):
-        return values
-    return [_number(cells[i], f"{where}, column {header[i].strip()},") for i in order]  # tells which
-
-
-def _number(cell: str, where: str) -> float:
-    """A cell as a finite number."""
-    if not cell.strip():
-        raise DataError(f"{where} is empty; leave no gaps")
-    try:
-        value = float(cell)
-    except ValueError:
-        raise DataError(f"{where} holds {cell.strip()!r:.40}, which is not a number") from None
-    if not math.isfinite(value):
-        raise DataError(f"{where} holds a value that is not finite ({value}); leave no gaps")
-    return value
+    return *table.numbers([header.index(name) for name in columns]), table.notes
 
 
 def _check_units(rows: Array, source: str) -> None:

@@ -3,15 +3,20 @@
 import json
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from msgspec import Struct
 
 from finlab.arrays import AnyArray
 from finlab.errors import DataError
+from finlab.files.archive import check_shapes, json_of, read_arrays
+from finlab.files.schema import checked
 
 FORMAT = "finlab-swim"
 VERSION = 3
+MAX_BYTES = 200_000_000
+"""Largest log that is read, unpacked [bytes]; an hour has a quarter of it."""
 
 
 class Tick(NamedTuple):
@@ -67,6 +72,31 @@ class Tick(NamedTuple):
     """Time of the allocation [ms]."""
 
 
+FINS, COMMANDS = (None,), (None, 3)
+SHAPES: dict[str, tuple[int | None, ...]] = {
+    "position": (3,), "quaternion": (4,), "motion": (6,), "flow": (3,), "measured": (12,), "reference": (3,),
+    "asked": (6,), "allocated": (6,), "delivered": (6,), "command": COMMANDS, "fin_motion": COMMANDS,
+    "fin_angle": FINS, "fin_force": COMMANDS, "inertial_power": FINS, "torque_power": FINS,
+    "driving_power": FINS, "alive": FINS, "fault_probability": FINS, "strength": FINS, "strength_std": FINS,
+}  # fmt: skip
+"""Shape of a column at each tick, None for the number of fins; the others are numbers."""
+
+
+class About(Struct):
+    """What an NPZ file says of a swim beside its columns, as in `RunLog`."""
+
+    format: Literal["finlab-swim"]
+    version: Literal[3]
+    layout: str
+    fins: tuple[str, ...]
+    method: str
+    controller: str
+    task: str
+    plant: str
+    water: str
+    seed: int
+
+
 @dataclass(frozen=True)
 class RunLog:
     """A whole swim: each column of `Tick` as an array with N rows, and what was swum."""
@@ -118,12 +148,12 @@ def log_of_ticks(ticks: list[Tick], **about: Any) -> RunLog:
 
 def load_log(path: str | Path) -> RunLog:
     """Reads what `RunLog.save` wrote; a `DataError` where the file is missing, or no log of this version."""
-    try:
-        with np.load(Path(path), allow_pickle=False) as file:
-            meta = json.loads(str(file["meta"]))
-            columns = {name: file[name] for name in Tick._fields}
-    except (OSError, ValueError, KeyError) as error:
-        raise DataError(f"{path}: expected a swim log written by finlab simulate: {error}") from None
-    if (meta.pop("format", None), meta.pop("version", None)) != (FORMAT, VERSION):
-        raise DataError(f"{path}: expected a swim log of version {VERSION}")
-    return RunLog(columns=columns, **{**meta, "fins": tuple(meta["fins"])})
+    what = "a swim log written by finlab simulate"
+    columns = read_arrays(path, ("meta", *Tick._fields), MAX_BYTES, what)
+    about = checked(json_of(columns.pop("meta"), f"{path}: meta"), About, DataError, f"{path}: meta")
+    n, fins = columns["time"].size, len(about.fins)
+    shapes = {
+        name: tuple(fins if size is None else size for size in SHAPES.get(name, ())) for name in columns
+    }
+    check_shapes(columns, {name: (n, *shape) for name, shape in shapes.items()}, str(path))
+    return RunLog(columns=columns, **{name: getattr(about, name) for name in about.__struct_fields__[2:]})

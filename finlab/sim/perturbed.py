@@ -7,15 +7,18 @@ Controllers, gains and allocators go on believing the layout; only the simulated
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Annotated
+
+from msgspec import Meta
 
 from finlab.errors import LayoutError
+from finlab.files.schema import checked
 from finlab.layout import Body, Layout
-from finlab.layout.rules import number, numbers
 from finlab.vehicle.body import complete_body
 from finlab.vehicle.vehicle import Vehicle
 
-MOST = 100.0
-"""Largest factor."""
+Factor = Annotated[float, Meta(gt=0.0, le=100.0)]
+Offset = Annotated[float, Meta(ge=-1.0, le=1.0)]
 
 
 def perturbed(
@@ -49,8 +52,8 @@ def perturbed(
     """
     factors = {"damping": damping, "added_mass": added_mass, "inertia": inertia, "buoyancy": buoyancy}
     for name, factor in factors.items():
-        number(factor, name, high=MOST, positive=True)
-    away = numbers(gravity_offset_m, "gravity_offset_m", 3, -1.0, 1.0)
+        checked(factor, Factor, key=name)
+    away = checked(gravity_offset_m, tuple[Offset, Offset, Offset], key="gravity_offset_m")
     body = complete_body(layout)
     center = body.center_of_buoyancy_m or (0.0, 0.0, 0.0)
     changed = replace(
@@ -69,7 +72,7 @@ def perturbed(
         x, y, z = _moved(fin.position, away)
         moved = replace(fin, position=(x, y, z))
         if (share := shares.get(fin.name, 1.0)) != 1.0:
-            moved = replace(moved, model=fin.model.scaled(number(share, fin.name, high=MOST, positive=True)))
+            moved = replace(moved, model=fin.model.scaled(checked(share, Factor, key=fin.name)))
         fins.append(moved)
     return replace(layout, fins=tuple(fins), body=changed)
 

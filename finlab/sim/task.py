@@ -1,7 +1,7 @@
 """What a robot is to do: follow a path over time, shipped or from a file, keep a place, or cruise."""
 
-import csv
 import math
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +12,7 @@ import numpy as np
 from finlab.arrays import Array
 from finlab.control import Setpoint
 from finlab.errors import DataError
+from finlab.files.csv_table import read_table
 
 
 @dataclass(frozen=True)
@@ -233,7 +234,7 @@ def make_trajectory(source: str | Path, duration_s: float | None = None) -> Traj
         if not 2 * RAMP_S <= duration_s <= 3600.0:
             raise DataError(f"duration: expected {2 * RAMP_S:g} to 3600 s, got {duration_s:g}")
         return SHIPPED[name](duration_s)
-    if not Path(source).is_file():
+    if not os.path.lexists(source):
         raise DataError(f"trajectory: expected {', '.join(SHIPPED)} or a CSV file, got {name!r}")
     if duration_s is not None:
         raise DataError(f"duration: {name} brings its own times; leave it out")
@@ -246,20 +247,8 @@ def read_trajectory(path: Path) -> Trajectory:
     Raises:
         DataError: it cannot be read, lacks a column, or holds something that is no number.
     """
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise DataError(f"{path}: is larger than {MAX_BYTES:,} bytes")
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file)
-            names = [name.strip() for name in reader.fieldnames or ()]
-            if missing := [name for name in COLUMNS if name not in names]:
-                raise DataError(f"{path}: column {missing[0]!r} is missing; expected {', '.join(COLUMNS)}")
-            reader.fieldnames = names
-            rows = [[float(row[name]) for name in COLUMNS] for row in reader]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise DataError(f"{path}: cannot be read: {error}") from None
-    except (TypeError, ValueError):
-        line = f"{path}: line {reader.line_num}"
-        raise DataError(f"{line}: expected four numbers for {', '.join(COLUMNS)}") from None
-    table = np.array(rows, dtype=np.float64).reshape(-1, 4)
-    return Trajectory(path.stem, table[:, 0], table[:, 1:])
+    table = read_table(path, MAX_BYTES, "a CSV file of a path")
+    if missing := [name for name in COLUMNS if name not in table.header]:
+        raise DataError(f"{path}: column {missing[0]!r} is missing; expected {', '.join(COLUMNS)}")
+    rows, _ = table.numbers([table.header.index(name) for name in COLUMNS])
+    return Trajectory(path.stem, rows[:, 0], rows[:, 1:])

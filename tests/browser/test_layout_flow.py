@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
+from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
-from finlab.layout.yaml_file import yaml_text
 from finlab.physics import make_law
 from finlab.physics.table_file import write_table
 

@@ -14,8 +14,8 @@ from finlab.deploy.graph import build_graph
 from finlab.deploy.graph_file import graph_bytes
 from finlab.deploy.record import allocation_record
 from finlab.errors import LayoutError
+from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, Layout, layout_to_dict, load_layout
-from finlab.layout.yaml_file import yaml_text
 from finlab.physics import make_law, plant_of
 from finlab.physics.table_file import write_table
 from webapp.markup.snippets import command_line, export_line

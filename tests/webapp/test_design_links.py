@@ -13,9 +13,9 @@ import trimesh
 
 from finlab.assets import shipped_layouts
 from finlab.errors import FinlabError
+from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
-from finlab.layout.reading import MAX_BYTES
-from finlab.layout.yaml_file import yaml_text
+from finlab.layout.load import MAX_BYTES
 from finlab.physics import make_law
 from finlab.physics.table_file import write_table
 from tests.webapp.hands import move_fin

@@ -10,8 +10,8 @@ import pytest
 
 from finlab.bundle_files import LARGEST_BUNDLE
 from finlab.errors import FinlabError
+from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
-from finlab.layout.yaml_file import yaml_text
 from finlab.physics import make_law
 from finlab.physics.table_file import write_table
 from webapp.session.files import is_path, read_together

@@ -13,8 +13,8 @@ import pytest
 import viser
 
 from finlab.errors import DataError, FinlabError, LayoutError
+from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
-from finlab.layout.yaml_file import yaml_text
 from finlab.physics import make_law
 from finlab.physics.table_file import write_table
 from tests.webapp.test_app import app, on_loop, server, until, view

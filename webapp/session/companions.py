@@ -17,13 +17,14 @@ from finlab.bundle_files import (
     LARGEST_BUNDLE,
     LARGEST_TABLE,
     MOST_FILES,
-    UNREADABLE,
     read_bundle_files,
 )
 from finlab.errors import DataError, FinlabError, LayoutError
+from finlab.files.archive import member_names, unpacked
+from finlab.files.guarded import read_file
 from finlab.layout import FinModelSpec, Layout, load_layout
 from finlab.layout.body import MESH_SUFFIXES
-from finlab.layout.reading import MAX_BYTES
+from finlab.layout.load import MAX_BYTES
 from finlab.whole_file import write_whole
 from webapp.scene.meshes.mesh_file import MAX_FACES, read_mesh, simplified, stl_of
 
@@ -55,12 +56,7 @@ def with_hull_inside(layout: Layout) -> tuple[Layout, dict[str, bytes]]:
     if layout.body is None or hull is None or hull.mesh is None:
         return layout, {}
     path = Path(hull.mesh)
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise DataError(
-            f"{path.name}: the hull's file cannot be read: {error.strerror}; import it again"
-        ) from None
+    content = read_file(path, LARGEST_TABLE, "the hull's mesh; import it again")
     name = f"hull{path.suffix.lower()}"
     return replace(layout, body=replace(layout.body, hull=replace(hull, mesh=name))), {name: content}
 
@@ -99,9 +95,8 @@ def read_archive(source: str, content: bytes, folder: Path) -> Opened:
     """
     with tempfile.TemporaryDirectory() as place:
         packed = Path(place) / "upload.zip"
-        packed.write_bytes(content)
         try:
-            file, parts = _unpacked(packed, source, Path(place) / "files")
+            file, parts = _unpacked(packed, content, source, Path(place) / "files")
             return adopted(load_layout(file), parts, folder, source)
         except FinlabError as error:
             text = str(error).replace(str(packed), source).replace(f"{place}/files/", f"{source}/")
@@ -176,38 +171,31 @@ def _keep(path: Path, content: bytes) -> None:
         write_whole(path, content, DataError)
 
 
-def _unpacked(packed: Path, source: str, folder: Path) -> tuple[Path, dict[str, bytes]]:
+def _unpacked(packed: Path, content: bytes, source: str, folder: Path) -> tuple[Path, dict[str, bytes]]:
     """What to load of an archive: its layout's file, or itself where it is a bundle; and its other files, by
     the paths by which that can name them."""
+    names = member_names(content, source, LayoutError)
+    if ABOUT in names:
+        packed.write_bytes(content)
+        return packed, {f"{packed}/{name}": c for name, c in read_bundle_files(packed).items()}
+    layouts = [name for name in names if name.endswith(LAYOUTS)]
+    if len(layouts) != 1 or len(names) > MOST_FILES:
+        raise LayoutError(
+            f"holds {len(names)} files, {len(layouts)} of them layouts; expected a bundle, or one "
+            "layout file with its force tables",
+            source=source,
+        )
+    for name in names:
+        _check_name(name, source)
+    largest = {name: MAX_BYTES if name in layouts else LARGEST_TABLE for name in names}
+    parts = unpacked(content, source, largest, LARGEST_BUNDLE, LayoutError)
+    path = folder / layouts[0]
     try:
-        with zipfile.ZipFile(packed) as archive:
-            entries = [entry for entry in archive.infolist() if not entry.is_dir()]
-            names = [entry.filename for entry in entries]
-            if ABOUT in names:
-                return packed, {f"{packed}/{name}": c for name, c in read_bundle_files(packed).items()}
-            layouts = [name for name in names if name.endswith(LAYOUTS)]
-            if len(layouts) != 1 or len(names) > MOST_FILES:
-                raise LayoutError(
-                    f"holds {len(names)} files, {len(layouts)} of them layouts; expected a bundle, or one "
-                    "layout file with its force tables",
-                    source=source,
-                )
-            parts, left = {}, LARGEST_BUNDLE
-            for entry in entries:
-                _check_name(entry.filename, source)
-                with archive.open(entry) as stream:
-                    most = MAX_BYTES if entry.filename in layouts else LARGEST_TABLE
-                    content = stream.read(min(most, left) + 1)
-                left -= len(content)
-                if len(content) > most or left < 0:
-                    raise LayoutError(f"{entry.filename} in it is too large", source=source)
-                parts[str(folder / entry.filename)] = content
-            path = folder / layouts[0]
-            path.parent.mkdir(parents=True)
-            path.write_bytes(parts.pop(str(path)))
-            return path, parts
-    except UNREADABLE as error:
-        raise LayoutError(f"cannot be read as a zip archive: {error}", source=source) from None
+        path.parent.mkdir(parents=True)
+        path.write_bytes(parts.pop(layouts[0]))
+    except (OSError, ValueError):  # a name that is too long for a path
+        raise LayoutError(f"holds {layouts[0]!r:.60}, which cannot be a file", source=source) from None
+    return path, {str(folder / name): part for name, part in parts.items()}
 
 
 def _check_name(name: str, source: str) -> None:

@@ -12,9 +12,11 @@ import zipfile
 import zlib
 from typing import NamedTuple
 
-from finlab.errors import FinlabError
+from finlab.errors import DataError, FinlabError
+from finlab.files.plain_values import parse_json
+from finlab.files.schema import checked
 from finlab.layout import Layout
-from finlab.layout.reading import MAX_BYTES
+from finlab.layout.load import MAX_BYTES
 from webapp.session.companions import Opened, archive_of
 from webapp.session.files import layout_file, read_layout
 from webapp.session.rounded_tables import LEVELS, accuracy, rounded, written
@@ -96,7 +98,7 @@ def unpacked(text: str) -> Opened:
                 raise zlib.error("cut off")
         if kind == ROUNDED:
             data = _apart(data)
-    except (binascii.Error, ValueError, TypeError, RecursionError, zlib.error):
+    except (binascii.Error, ValueError, zlib.error):
         kind = ""
     if kind not in (PLAIN, ARCHIVE, ROUNDED) or not kind:
         raise FinlabError(NO_DESIGN)
@@ -130,13 +132,14 @@ def _apart(data: bytes) -> bytes:
     """The archive of files that were joined; the line of JSON may say anything.
 
     Raises:
-        ValueError, TypeError: it does not list what is there.
-        DataError: a table is none.
+        ValueError: it does not list what is there.
+        DataError: the same, or a table is none.
     """
     head, _, rest = data.partition(b"\n")
     parts = {}
-    for name, size in json.loads(head):
-        if not isinstance(name, str) or not 0 <= size <= len(rest):
+    listed = checked(parse_json(head.decode(), "link"), list[tuple[str, int]], DataError, "link")
+    for name, size in listed:
+        if not 0 <= size <= len(rest) or name in parts:
             raise ValueError(name)
         part, rest = rest[:size], rest[size:]
         parts[name] = written(part, name[-60:]) if name.endswith(TABLE) else part

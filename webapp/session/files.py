@@ -15,11 +15,11 @@ from finlab.allocation.policy import AXES
 from finlab.assets import shipped_layouts
 from finlab.deploy.bundle import with_tables_inside
 from finlab.errors import DataError, FinlabError, LayoutError
+from finlab.files.guarded import decoded
+from finlab.files.plain_values import parse_json, parse_yaml, yaml_text
 from finlab.layout import Layout, layout_to_dict, load_layout, parse_layout
 from finlab.layout.body import Hull
-from finlab.layout.load import SUFFIX, GraphText, parse_graph_document
-from finlab.layout.reading import MAX_BYTES, decode_text, parse_json
-from finlab.layout.yaml_file import parse_yaml, yaml_text
+from finlab.layout.load import A_LAYOUT, MAX_BYTES, SUFFIX, GraphText, parse_graph_document
 from finlab.physics import plant_of
 from finlab.sim import Trajectory
 from finlab.sim.task import COLUMNS, read_trajectory
@@ -88,11 +88,11 @@ def _read_alone(source: str, content: bytes) -> Layout:
     """The layout in a file that came without others; nothing that it names is looked at."""
     if len(content) > MAX_BYTES:
         raise LayoutError(f"is larger than {MAX_BYTES:,} bytes, a layout has a few thousand", source=source)
-    text = decode_text(content, source)
+    text = decoded(content, source, A_LAYOUT, LayoutError)
     if source.lower().endswith(SUFFIX):
         return parse_graph_document(GraphText(text, source)).layout
     parse = parse_json if source.lower().endswith(".json") else parse_yaml
-    return parse_layout(parse(text, source), source=source)
+    return parse_layout(parse(text, source, LayoutError), source=source)
 
 
 def layout_file(layout: Layout) -> tuple[str, bytes]:

@@ -14,11 +14,14 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.errors import DataError
+from finlab.files.plain_values import parse_json
+from finlab.files.schema import checked
 from finlab.layout.angles import TURN
 from finlab.physics.table_file import COLUMNS, POWER_COLUMN, parse_table
 
 LEVELS = (32_768, 8_192, 2_048)
 """How many steps there may be from zero to the largest value: the finest first."""
+_Head = tuple[tuple[list[float], list[float], list[float]], list[float], bool, list[str]]
 NOTE = "rounded for a link, to "
 """How a table's note begins that came by one."""
 
@@ -62,15 +65,16 @@ def written(content: bytes, source: str) -> bytes:
     """
     head, _, digits = content.partition(b"\n")
     try:
-        axes, steps, periodic, notes = json.loads(head)
+        told = parse_json(head.decode(), source)
+        axes, steps, periodic, notes = checked(told, _Head, DataError, source)
         grid = [np.array(axis, dtype=np.float64) for axis in axes]
         values = _values(digits, tuple(len(axis) for axis in grid), np.array(steps, dtype=np.float64))
         lines = [f"# {' '.join(str(note).split())[:300]}" for note in notes]  # one line each
-    except (ValueError, TypeError, RecursionError):
+    except ValueError:
         raise DataError(
             f"{source}: holds no force table; copy all of the link, or ask for the file"
         ) from None
-    if periodic is True:  # the first direction again, at the end, says that the circle is closed
+    if periodic:  # the first direction again, at the end, says that the circle is closed
         grid[2], values = np.append(grid[2], grid[2][0] + TURN), np.concatenate([values, values[:, :, :1]], 2)
     commands = np.stack(np.meshgrid(*grid, indexing="ij"), axis=-1)
     table: Any = np.concatenate([commands, values], axis=-1).reshape(-1, 3 + values.shape[-1])

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from finlab.errors import FinlabError
+from finlab.files.guarded import read_text
+from finlab.files.plain_values import parse_json
 from finlab.layout import Layout, layout_to_dict, parse_layout
 from webapp.session import Session
 from webapp.session.search_request import restored_request
@@ -54,9 +56,9 @@ class SessionFiles:
         """Bring a fresh session to what is kept under a key; False if there is none or it makes no sense."""
         path = self._path(key)
         try:
-            if path is None or not path.is_file() or path.stat().st_size > MAX_BYTES:
+            if path is None or not path.is_file():
                 return False
-            restore(session, json.loads(path.read_text(encoding="utf-8")))
+            restore(session, parse_json(read_text(path, MAX_BYTES, "a kept session"), path.name))
         except (OSError, ValueError, TypeError, LookupError, AttributeError, FinlabError, RecursionError):
             return False
         return True

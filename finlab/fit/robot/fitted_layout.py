@@ -16,7 +16,7 @@ from finlab.fit.robot.report import summary
 from finlab.fit.robot.robot_fit import RobotFit
 from finlab.layout import Body, Fin, FinModelSpec, Interaction, Jet, Layout, save_layout
 from finlab.layout.interaction import MAX_SHARE
-from finlab.layout.rules import MAX_DESCRIPTION_LENGTH
+from finlab.layout.layout import MAX_DESCRIPTION_LENGTH
 from finlab.physics import make_law
 from finlab.physics.table_file import COLUMNS, POWER_COLUMN
 from finlab.whole_file import write_whole

@@ -7,8 +7,6 @@ sensor's cell may be empty or repeat the last one where there is nothing new; a 
 where it was lost. Other columns are passed over.
 """
 
-import csv
-import json
 import math
 import os
 import re
@@ -16,9 +14,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finlab.arrays import Array
 from finlab.errors import DataError
+from finlab.files.archive import check_shapes, json_of, read_arrays
+from finlab.files.csv_table import read_table
 from finlab.fit.robot.swim import ANGLES, CHANNELS, STEP_S, Swim, between, only_new, replay
 from finlab.layout import Layout
 from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY
@@ -43,30 +44,28 @@ def read_swim(path: str | os.PathLike[str], layout: Layout) -> Swim:
             holds what cannot be; where it is a row or a column, the sentence names it.
     """
     place = Path(path)
-    try:
-        size = place.stat().st_size
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read: {error.strerror}") from None
-    if size > MAX_BYTES:
-        raise DataError(f"{path}: is larger than {MAX_BYTES / 1e6:.0f} MB; cut it into shorter swims")
     return _log(place, layout) if place.suffix.lower() == ".npz" else _csv(place, layout)
 
 
 def _log(path: Path, layout: Layout) -> Swim:
     """A log of `finlab simulate`."""
     names = ("time", "measured", "command", "fin_motion")
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            meta = json.loads(str(file["meta"]))
-            time, measured, command, motion = (np.asarray(file[name], np.float64) for name in names)
-    except (OSError, ValueError, KeyError, EOFError) as error:
-        raise DataError(f"{path}: expected a swim log written by finlab simulate: {error}") from None
-    fins = [str(name) for name in meta.get("fins", ())]
+    arrays = read_arrays(path, ("meta", *names), MAX_BYTES, "a swim log written by finlab simulate")
+    meta = json_of(arrays["meta"], f"{path}: meta")
+    said = meta.get("fins") if isinstance(meta, dict) else None
+    fins = [str(name) for name in said] if isinstance(said, list) else []
     if sorted(fins) != sorted(layout.names):
         raise DataError(
             f"{path}: is of a robot with the fins {', '.join(fins)}, layout {layout.name} has "
             f"{', '.join(layout.names)}"
         )
+    n = arrays["time"].size
+    commands = (n, len(fins), 3)
+    shapes = {"time": (n,), "measured": (n, 12), "command": commands, "fin_motion": commands}
+    check_shapes(arrays, shapes, str(path))
+    time, measured, command, motion = (np.asarray(arrays[name], np.float64) for name in names)
+    if not (np.isfinite(motion).all() and np.isfinite(time).all()):
+        raise DataError(f"{path}: expected finite numbers in time and fin_motion")
     order = [fins.index(name) for name in layout.names]
     if len(time) > 1 and not np.allclose(np.diff(time), STEP_S):
         raise DataError(f"{path}: expected a row every {STEP_S:g} s, as finlab simulate writes them")
@@ -85,28 +84,17 @@ def _check_duration(seconds: float, path: Path) -> None:
 
 def _csv(path: Path, layout: Layout) -> Swim:
     """A CSV file."""
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file)
-            header = next(reader, [])
-            columns = _columns(header, layout, path)
-            rows, lines = [], []
-            for cells in reader:
-                if any(cell.strip() for cell in cells) and not cells[0].startswith("#"):
-                    where = f"{path}: line {reader.line_num}"
-                    if len(cells) != len(header):
-                        raise DataError(f"{where} has {len(cells)} values, the header has {len(header)}")
-                    rows.append([_number(cells, column, where) for column in columns])
-                    lines.append(reader.line_num)
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise DataError(f"{path}: cannot be read as CSV text: {error}") from None
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read: {error.strerror}") from None
-    if not rows:
-        raise DataError(f"{path}: has no rows below its header")
-    values = np.array(rows)
+    table = read_table(path, MAX_BYTES, "a CSV file of a swim", gaps=True)
+    columns = _columns(table.header, layout, path)
+    used = [k for k, column in enumerate(columns) if column.place is not None]
+    read, lines = table.numbers([column.place for column in columns if column.place is not None])
+    values = np.full((len(lines), len(columns)), np.nan)
+    values[:, used] = read * [columns[k].factor for k in used]
+    if np.isnan(values[:, 0]).any():
+        line = lines[int(np.argmax(np.isnan(values[:, 0])))]
+        raise DataError(f"{path}: line {line}, column t, is empty")
     time, measured = values[:, 0], values[:, 1:13]
-    command = values[:, 13:].reshape(len(rows), layout.n_fins, 3)
+    command = values[:, 13:].reshape(len(lines), layout.n_fins, 3)
     _check_time(time, lines, path)
     _check_measured(measured, columns, path)
     _check_commands(command, lines, layout, path)
@@ -151,23 +139,7 @@ def _columns(header: list[str], layout: Layout, path: Path) -> list[_Column]:
     return [found.get(name, _Column(name, None, 1.0)) for name in ("t", *CHANNELS, *commands)]
 
 
-def _number(cells: list[str], column: _Column, where: str) -> float:
-    """A cell as a number, NaN where it is empty or its column is not there."""
-    text = "" if column.place is None else cells[column.place].strip()
-    if not text or text.lower() == "nan":
-        if column.name == "t":
-            raise DataError(f"{where}, column t, is empty")
-        return math.nan
-    try:
-        number = float(text) * column.factor
-    except ValueError:
-        number = math.inf
-    if not math.isfinite(number):
-        raise DataError(f"{where}, column {column.name}, holds {text!r:.40}, expected a number")
-    return number
-
-
-def _check_time(time: Array, lines: list[int], path: Path) -> None:
+def _check_time(time: Array, lines: NDArray[np.intp], path: Path) -> None:
     """Time must rise, without gaps, for long enough."""
     steps = np.diff(time)
     back = np.flatnonzero(steps <= 0.0)
@@ -198,7 +170,7 @@ def _check_measured(measured: Array, columns: list[_Column], path: Path) -> None
             )
 
 
-def _check_commands(command: Array, lines: list[int], layout: Layout, path: Path) -> None:
+def _check_commands(command: Array, lines: NDArray[np.intp], layout: Layout, path: Path) -> None:
     """A fin is commanded by three numbers that it can do, or by none."""
     known = np.isfinite(command)
     half = np.argwhere(known.any(axis=2) & ~known.all(axis=2))

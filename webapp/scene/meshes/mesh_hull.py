@@ -10,6 +10,7 @@ from trimesh.triangles import closest_point
 
 from finlab.arrays import Array
 from finlab.errors import FinlabError
+from finlab.files.guarded import read_file
 from webapp.scene.meshes.mesh import NOTHING, Mesh
 from webapp.scene.meshes.mesh_file import MAX_BYTES, MeshReport, read_mesh, simplified
 
@@ -89,12 +90,7 @@ class MeshHull:
             FinlabError: the file cannot be read or is no sensible hull.
         """
         file = Path(path)
-        try:
-            if not file.is_file() or file.stat().st_size > MAX_BYTES:
-                raise FinlabError(f"{file.name}: expected a mesh file of at most {MAX_BYTES:,} bytes")
-            content = file.read_bytes()
-        except OSError as error:
-            raise FinlabError(f"{file.name}: cannot be read: {error.strerror}") from None
+        content = read_file(file, MAX_BYTES, "a mesh file", FinlabError)
         mesh, report = read_mesh(file.name, content, scale)
         corners = mesh.vertices + np.array(center)
         half = np.ptp(mesh.vertices, axis=0) / 2

@@ -1,0 +1,147 @@
+"""Plain values checked against types, with one sentence for whatever does not fit, and the place of it."""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
+
+import msgspec
+from msgspec import inspect
+
+from finlab.errors import FinlabError, LayoutError
+
+Kind = TypeVar("Kind")
+
+_PLACE = re.compile(r"(?s)(.*) - at `(?:key` in `)?\$(.*)`")
+_STEP = re.compile(r"\.([^.\[\]]+)|\[(\d+)\]|\[(\.\.\.)\]")
+_TYPES = {
+    "float": "a number",
+    "int": "a whole number",
+    "str": "text",
+    "bool": "true or false",
+    "array": "a list",
+    "object": "keys and values",
+    "null": "null",
+}
+_BOUNDS = {">=": "at least", "<=": "at most", ">": "more than", "<": "less than"}
+
+
+def shown(value: Any) -> str:
+    """Returns a short text of a value for a sentence, whatever its size."""
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def checked(
+    values: Any, kind: type[Kind], error: type[FinlabError] = LayoutError, source: str = "", key: str = ""
+) -> Kind:
+    """Returns plain values, such as those of a file, in a type.
+
+    Args:
+        values: mappings, lists, text and numbers; arrays count as lists.
+        kind: a `msgspec.Struct` or any type that msgspec knows, with its limits.
+        error: the kind of error.
+        source: what to call the whole in the sentence; nothing where its reader adds that.
+        key: the place of `values` in it.
+
+    Raises:
+        FinlabError: of the kind `error`; the sentence says where, what was expected, and what was got.
+    """
+    try:
+        values = msgspec.to_builtins(values, enc_hook=_plain)
+        return msgspec.convert(values, kind)
+    except msgspec.ValidationError as problem:
+        said, place = str(problem), ""
+    except (RecursionError, TypeError, ValueError, OverflowError):
+        said, place = "Expected `object`", ""
+    if found := _PLACE.fullmatch(said):
+        said, place = found[1], found[2]
+    sentence, inner = _sentence(said, place, values, kind)
+    place = ".".join(part for part in (place.lstrip("."), inner) if part)
+    if key and place:
+        place = key + ("" if place.startswith("[") else ".") + place
+    raise error.at(source, sentence, place or key)
+
+
+def _plain(value: Any) -> Any:
+    """An array as a list, anything else that no file holds as text."""
+    return value.tolist() if hasattr(value, "tolist") else repr(value)
+
+
+def _sentence(said: str, place: str, values: Any, kind: Any) -> tuple[str, str]:
+    """What is wrong, and the key below `place` that it is about, if any."""
+    value, known = _at(place, values, inspect.type_info(kind))
+    if found := re.fullmatch(r"Object missing required field `(.*)`", said):
+        return "required key is missing", found[1]
+    if found := re.fullmatch(r"(?s)Object contains unknown field `(.*)`", said):
+        name = found[1] if found[1].isprintable() and len(found[1]) <= 40 else shown(found[1])
+        return f"unknown key, expected one of {', '.join(_keys(known))}", name
+    if found := re.fullmatch(r"Expected `(\w+)` of length (>=|<=)? ?(\d+)(?:, got \d+)?", said):
+        unit = "characters" if found[1] == "str" else "values"
+        ends = getattr(known, "min_length", None), getattr(known, "max_length", None)
+        few, many = (int(found[3]), int(found[3])) if None in ends else ends
+        number = f"{few} to {many}" if few < many else f"{many}"
+        return f"expected {_TYPES[found[1]]} of {number} {unit}, got {len(value)}", ""
+    if said.startswith("Expected `str` matching regex"):
+        return f"expected text on one line, without spaces around it, got {shown(value)}", ""
+    least, most = getattr(known, "ge", None), getattr(known, "le", None)
+    if re.fullmatch(r"Expected `\w+` [<>]=? \S+|Number out of range", said) and None not in (least, most):
+        return f"must lie within {least:g} .. {most:g}, got {shown(value)}", ""
+    if found := re.fullmatch(r"Expected `\w+` ([<>]=?) (\S+)", said):
+        return f"expected a number of {_BOUNDS[found[1]]} {float(found[2]):g}, got {shown(value)}", ""
+    if found := re.fullmatch(r"Expected `([\w| ]+)`(, got .*)?", said):
+        wanted = " or ".join(_TYPES.get(name, name) for name in found[1].split(" | ") if name != "null")
+        hint = "; a number is written as in JSON, 0.5 or 1e-3" if wanted == "a number" == _a(value) else ""
+        return f"expected {wanted}, got {shown(value)}{hint}", ""
+    if choices := _choices(known):
+        return f"expected {'one of ' * (len(choices) > 1)}{', '.join(choices)}, got {shown(value)}", ""
+    return f"{said[:1].lower()}{said[1:]}, got {shown(value)}", ""
+
+
+def _a(value: Any) -> str:
+    """Whether text looks like a number."""
+    return "a number" if isinstance(value, str) and re.match(r"[-+.]*\d", value) else ""
+
+
+def _at(place: str, value: Any, known: Any) -> tuple[Any, Any]:
+    """The value at a place, and what msgspec knows of its type; None where that cannot be told."""
+    for name, index, _ in _STEP.findall(place):
+        known = _step_into(_one(known, value), name, index)
+        if name:
+            value = value.get(name) if isinstance(value, Mapping) else None
+        else:
+            fits = isinstance(value, Sequence) and index and int(index) < len(value)
+            value = value[int(index)] if fits else None
+    return value, _one(known, value)
+
+
+def _step_into(known: Any, name: str, index: str) -> Any:
+    if isinstance(known, inspect.StructType):
+        return next((field.type for field in known.fields if field.encode_name == name), None)
+    if isinstance(known, inspect.UnionType) and name == getattr(known.types[0], "tag_field", None):
+        return known
+    if isinstance(known, inspect.TupleType) and index:
+        return known.item_types[int(index)]
+    return getattr(known, "value_type", None) or getattr(known, "item_type", None)
+
+
+def _one(known: Any, value: Any) -> Any:
+    """A type without what describes it, without null, and of several structures the one that is meant."""
+    if isinstance(known, inspect.Metadata):
+        return _one(known.type, value)
+    if isinstance(known, inspect.UnionType):
+        kinds = [_one(kind, value) for kind in known.types if not isinstance(kind, inspect.NoneType)]
+        tag = value.get(getattr(kinds[0], "tag_field", None)) if isinstance(value, Mapping) else None
+        meant = [kind for kind in kinds if tag is not None and getattr(kind, "tag", None) == tag]
+        return meant[0] if meant else kinds[0] if len(kinds) == 1 else inspect.UnionType(tuple(kinds))
+    return known
+
+
+def _keys(known: Any) -> list[str]:
+    return [field.encode_name for field in known.fields] if isinstance(known, inspect.StructType) else []
+
+
+def _choices(known: Any) -> list[str]:
+    """The values that a type leaves to choose from, or the kinds of structure."""
+    if isinstance(known, inspect.LiteralType):
+        return [str(value) for value in known.values]
+    return [str(kind.tag) for kind in known.types] if isinstance(known, inspect.UnionType) else []

@@ -1,0 +1,88 @@
+"""Frozen dataclasses whose annotations say what their fields may be, and the same as parts of a file.
+
+One declaration serves three: construction in code is checked by it, files are read by it, and the published
+JSON Schemas are made of it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import MISSING, fields
+from functools import cache
+from typing import Annotated, Any, ClassVar, get_args, get_type_hints
+
+import msgspec
+from msgspec import Meta
+
+from finlab.errors import LayoutError
+from finlab.files.schema import checked, shown
+
+Name = Annotated[str, Meta(min_length=1, max_length=64, pattern=r"^\S(.*\S)?$")]
+"""A name: one line, without spaces around it."""
+
+
+class Checked:
+    """Base of frozen dataclasses that are checked on construction, by their annotations.
+
+    Raises:
+        LayoutError: a value is none of its type, or out of bounds; the message names the key, as in a file.
+    """
+
+    KEYS: ClassVar[Mapping[str, str]] = {}
+    """Fields -> their keys in a file, where the two differ."""
+
+    def __post_init__(self) -> None:
+        shape = _plain_fields(type(self))
+        given = {key: getattr(self, name) for name, key in shape.keys.items()}
+        values = checked(given, shape.kind)
+        for name, key in shape.keys.items():
+            value = getattr(values, name)
+            lines = _LINES if name == "description" else {}
+            if isinstance(value, str) and not value.translate(lines).isprintable():
+                raise LayoutError(f"must hold printable characters only, got {shown(value)}", key)
+            object.__setattr__(self, name, value)
+
+
+_LINES = {ord("\n"): " ", ord("\t"): " "}
+
+
+class _Shape:
+    """The fields of a dataclass that hold plain values."""
+
+    def __init__(self, cls: type) -> None:
+        hints = get_type_hints(cls, include_extras=True)
+        known = getattr(cls, "KEYS", {})
+        names = [field.name for field in fields(cls) if not _holds_checked(hints[field.name])]
+        self.keys = {name: known.get(name, name) for name in names}
+        self.kind = msgspec.defstruct(cls.__name__, [(name, hints[name]) for name in names], rename=self.keys)
+
+
+_plain_fields = cache(_Shape)
+
+
+def _holds_checked(kind: Any) -> bool:
+    """Whether a type is, or contains, one that is checked on its own."""
+    parts = get_args(kind)
+    return any(map(_holds_checked, parts)) if parts else isinstance(kind, type) and issubclass(kind, Checked)
+
+
+def form(cls: type, keys: Mapping[str, str] | None = None, /, **kinds: Any) -> Any:
+    """Returns the `msgspec.Struct` of the part of a file that a dataclass stands for.
+
+    Args:
+        cls: the dataclass; what has a default there may be left out of the file, or be null.
+        keys: fields -> keys in the file; `cls.KEYS` when None.
+        kinds: types of fields that are different in the file, and of those that are there alone; None for
+            a field that no file has.
+    """
+    hints = {**get_type_hints(cls, include_extras=True), **kinds}
+    optional = [field.name for field in fields(cls) if field.default is not MISSING]
+    told = [(name, kind) for name, kind in hints.items() if kind is not None and name != "KEYS"]
+    parts = [(name, kind | None, None) if name in optional else (name, kind) for name, kind in told]
+    parts.sort(key=len)
+    rename = cls.KEYS if keys is None and issubclass(cls, Checked) else dict(keys or {})
+    about = {"__doc__": (cls.__doc__ or "").split("\n")[0].replace(" Checked on construction.", "")}
+    return msgspec.defstruct(cls.__name__, parts, rename=rename, forbid_unknown_fields=True, namespace=about)
+
+
+def given(part: Any) -> dict[str, Any]:
+    """Returns the fields of a part of a file that are there."""
+    return {name: value for name in part.__struct_fields__ if (value := getattr(part, name)) is not None}

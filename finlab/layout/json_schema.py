@@ -1,0 +1,31 @@
+"""The published JSON Schemas, made of the types that files are read with: `make schemas` writes them."""
+
+import json
+from pathlib import Path
+
+import msgspec
+
+from finlab.layout.file import LAYOUT
+from finlab.layout.graph_form import Graph
+
+PACKAGE = Path(__file__).parents[1]
+
+
+def schemas() -> dict[Path, str]:
+    """Returns the text of each schema by its file."""
+    kinds = {
+        "layout/layout.schema.json": ("finlab-layout-1", LAYOUT),
+        "deploy/graph.schema.json": ("finlab-graph-2", Graph),
+    }
+    texts = {}
+    for name, (title, kind) in kinds.items():
+        head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": f"{title}.schema.json"}
+        texts[PACKAGE / name] = (
+            json.dumps({**head, "title": title, **msgspec.json.schema(kind)}, indent=1) + "\n"
+        )
+    return texts
+
+
+if __name__ == "__main__":
+    for path, text in schemas().items():
+        path.write_text(text, encoding="utf-8")
