@@ -107,7 +107,7 @@ class CsvTable:
         if value is None:
             raise DataError(f"{where} holds {cell!r:.40}, which is not a number")
         if not math.isfinite(value):
-            raise DataError(f"{where} holds a value that is not finite ({value}); leave no gaps")
+            raise DataError(f"{where} holds {cell!r:.40}, which is not finite")
         return value
 
 

@@ -143,12 +143,12 @@ def test_refuses_weights_of_another_format_even_when_signed(folder: Path) -> Non
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [
-        (b"", "not readable as JSON"),
-        (b'{"format": "finlab-checkpoint",', "not readable as JSON"),
-        (b"\xff\xfe\x00", "not readable as JSON"),
+        (b"", "is not valid JSON"),
+        (b'{"format": "finlab-checkpoint",', "is not valid JSON"),
+        (b"\xff\xfe\x00", "is not UTF-8 text"),
         (b"[]", "not a finlab checkpoint (expected format 'finlab-checkpoint')"),
         (b'{"model_type": "bert"}', "not a finlab checkpoint (expected format 'finlab-checkpoint')"),
-        (b'"' + b"x" * 1_000_001 + b'"', "bytes; this is not a checkpoint's configuration"),
+        (b'"' + b"x" * 1_000_001 + b'"', "bytes, too large for a checkpoint's file"),
     ],
     ids=["empty", "cut", "binary", "list", "foreign", "huge"],
 )
@@ -228,7 +228,6 @@ def test_reading_needs_no_torch() -> None:
         lambda config: config["surrogate"].update(hidden=[8]),
         lambda config: config["normalization"].update(std=[1, 1, 1]),
         lambda config: config["normalization"].update(std=[1, 1, 0, 1, 1, 1]),
-        lambda config: config["normalization"].update(mean=[0, 0, 0, 0, 0, float("nan")]),
         lambda config: config.update(network=[]),
     ],
 )

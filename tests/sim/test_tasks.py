@@ -74,8 +74,8 @@ def test_a_file_of_positions(tmp_path: Path) -> None:
         ("t,x,y\n0,0,0\n", "column 'z' is missing"),
         ("t,x,y,z\n0,0,0,0\n", "at least two samples"),
         ("t,x,y,z\n0,0,0,0\n0,1,1,1\n", "times that rise"),
-        ("t,x,y,z\n0,0,0,0\n1,one,1,1\n", "line 3: expected four numbers"),
-        ("t,x,y,z\n0,0,0,0\n1,nan,1,1\n", "finite numbers"),
+        ("t,x,y,z\n0,0,0,0\n1,one,1,1\n", "line 3, column x, holds 'one'"),
+        ("t,x,y,z\n0,0,0,0\n1,nan,1,1\n", "line 3, column x, holds 'nan', which is not finite"),
         ("t,x,y,z\n0,0,0,0\n0.2,1,1,1\n", "at least 1 s"),
     ],
 )

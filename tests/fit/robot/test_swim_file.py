@@ -151,7 +151,7 @@ def test_missing_columns_are_named(
 @pytest.mark.parametrize(
     ("column", "value", "why"),
     [
-        ("w", "wet", "line 70, column w, holds 'wet', expected a number"),
+        ("w", "wet", "line 70, column w, holds 'wet', which is not a number"),
         ("w", "inf", "line 70, column w, holds 'inf'"),
         ("t", "", "line 70, column t, is empty"),
         ("FIN.A", "45", "line 70, column FIN.A, holds 45, expected half amplitudes in rad"),
@@ -169,7 +169,7 @@ def test_cells_that_cannot_be_are_told_with_line_and_column(
 
 
 def test_other_files_are_refused(rows: Rows, pair: Layout, tmp_path: Path) -> None:
-    with pytest.raises(DataError, match=r"none.csv: cannot be read"):
+    with pytest.raises(DataError, match=r"none.csv: no such file"):
         read_swim(tmp_path / "none.csv", pair)
     (tmp_path / "log.npz").write_bytes(b"nothing")
     with pytest.raises(DataError, match="expected a swim log written by finlab simulate"):
