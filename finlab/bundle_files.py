@@ -142,7 +142,7 @@ def _in_folder(path: Path) -> dict[str, bytes]:
 
 def _in_archive(source: str) -> dict[str, bytes]:
     """The files in a bundle's zip archive; nothing is unpacked to the disk."""
-    content = read_file(source, LARGEST_BUNDLE, "a bundle's folder or its zip archive")
+    content = read_file(source, LARGEST_BUNDLE + 100_000, "a bundle's folder or its zip archive")
     names = member_names(content, source)
     about = unpacked(content, source, {ABOUT: LARGEST[ABOUT]}, LARGEST_BUNDLE)
     # The version comes first: files of another one are not the news.

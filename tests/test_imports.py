@@ -206,7 +206,7 @@ def test_front_door_and_layouts_load_no_torch() -> None:
     assert done.stdout.splitlines()[-1] == "[]"
 
 
-def test_allocating_needs_only_numpy() -> None:
+def test_allocating_needs_only_numpy_and_msgspec() -> None:
     """What a robot's computer runs; DEVELOPMENT.md promises it."""
     code = (
         "import sys\n"

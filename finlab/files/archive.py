@@ -82,7 +82,7 @@ def unpacked(
                     with archive.open(entry) as stream:
                         found[entry.filename] = stream.read(room + 1)
                 if entry.file_size > room or len(found[entry.filename]) > room:
-                    too_large = f"{entry.filename[-60:]!r} in it unpacks to more than {room:,} bytes"
+                    too_large = f"{entry.filename[-60:]} in it is larger than {room:,} bytes"
                     break
                 most -= len(found[entry.filename])
     except _DAMAGED as problem:

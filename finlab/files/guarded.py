@@ -1,5 +1,6 @@
 """The one way to open a file: a regular file, within a size, and one sentence where it is not."""
 
+import errno
 import os
 import stat
 from pathlib import Path
@@ -41,7 +42,8 @@ def read_file(
     except IsADirectoryError:
         raise error.at(str(path), f"is a folder, expected {what}") from None
     except (OSError, ValueError) as problem:  # ValueError: a NUL byte in the name
-        reason = getattr(problem, "strerror", None) or problem
+        is_link = getattr(problem, "errno", None) == errno.ELOOP and not follow
+        reason = "it is a link" if is_link else getattr(problem, "strerror", None) or problem
         raise error.at(str(path)[:300], f"cannot be read: {reason}") from None
     if content is None or len(content) > most:
         raise error.at(str(path), f"is larger than {most:,} bytes, too large for {what}")

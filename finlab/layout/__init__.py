@@ -1,4 +1,4 @@
-"""What a robot is: fins, limits and body, as frozen values, files and padded arrays. numpy only."""
+"""What a robot is: fins, limits and body, as frozen values, files and padded arrays. numpy and msgspec."""
 
 from finlab.layout.arrays import LayoutArrays as LayoutArrays
 from finlab.layout.arrays import layout_effectiveness as layout_effectiveness

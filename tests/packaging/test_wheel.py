@@ -19,7 +19,7 @@ from finlab.distribution import EXTRAS, NAME
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-CORE = {"numpy", "scipy", "pyyaml", "safetensors", "threadpoolctl", "tyro", "tqdm"}
+CORE = {"msgspec", "numpy", "scipy", "pyyaml", "safetensors", "threadpoolctl", "tyro", "tqdm"}
 
 
 @pytest.fixture(scope="module")
