@@ -7,7 +7,7 @@ import numpy as np
 
 from finlab.arrays import Array
 from finlab.layout import Fin, FinModelSpec, Layout, Limits
-from finlab.layout.fin import MAX_AMPLITUDE, MAX_FREQUENCY, MAX_POSITION
+from finlab.layout.fin import FIN_MODELS, LEAST, LEAST_WIDTH, MAX_AMPLITUDE, MAX_FREQUENCY, MAX_POSITION
 from finlab.layout.layout import MAX_FINS
 from finlab.physics import Plant
 
@@ -17,7 +17,16 @@ GEOMETRIES = ("box", "far", "origin", "coincident", "collinear", "parallel", "ne
 """How fins stand to each other."""
 RANGES = ("nominal", "fixed", "from zero", "tiny", "large", "narrow")
 """What ranges of amplitude and frequency there are."""
-ARCS = ("full", "fixed", "almost full", "within a turn", "past the seam", "ends at zero", "shifted full")
+ARCS = (
+    "full",
+    "fixed",
+    "narrow",
+    "almost full",
+    "within a turn",
+    "past the seam",
+    "ends at zero",
+    "shifted full",
+)
 """What arcs of zero directions there are."""
 TARGETS = ("reachable", "zero", "huge", "tiny", "unreachable", "one axis")
 """What wrenches are asked for."""
@@ -43,8 +52,8 @@ def hostile_robot(number: int, seed: int, table: str | None = None) -> Layout:
             (float(position[i, 0]), float(position[i, 1]), float(position[i, 2])),
             float(angle[i]),
             Limits(
-                _range(rng, str(rng.choice(ranges)), (0.05, 0.6), MAX_AMPLITUDE),
-                _range(rng, str(rng.choice(ranges)), (0.1, 2.1), MAX_FREQUENCY),
+                _range(rng, str(rng.choice(ranges)), (0.05, 0.6), LEAST["amplitude"], MAX_AMPLITUDE),
+                _range(rng, str(rng.choice(ranges)), (0.1, 2.1), LEAST["frequency"], MAX_FREQUENCY),
                 _arc(rng, str(rng.choice(arcs))),
             ),
             models[int(rng.integers(len(models)))],
@@ -94,7 +103,7 @@ def _places(rng: np.random.Generator, geometry: str, n: int) -> tuple[Array, Arr
 
 
 def _range(
-    rng: np.random.Generator, kind: str, nominal: tuple[float, float], most: float
+    rng: np.random.Generator, kind: str, nominal: tuple[float, float], least: float, most: float
 ) -> tuple[float, float]:
     """Minimum and maximum of an amplitude [rad] or a frequency [Hz]."""
     low, high = nominal
@@ -104,13 +113,18 @@ def _range(
     if kind == "from zero":
         return 0.0, high
     if kind == "tiny":
-        high = 10.0 ** float(rng.uniform(-12.0, -2.0))
-        return float(rng.choice([0.0, 0.5 * high, high])), high
+        high = float(rng.choice([least, least * 10.0 ** rng.uniform(0.0, 2.0)]))
+        return float(rng.choice([0.0, max(least, 0.5 * high), high])), high
     if kind == "large":
         return float(rng.choice([0.0, low, 0.9 * most])), most
     if kind == "narrow":
-        return high * (1.0 - 10.0 ** float(rng.uniform(-14.0, -2.0))), high
+        return high - _width(rng), high
     return nominal
+
+
+def _width(rng: np.random.Generator) -> float:
+    """Width of a narrow range [rad, Hz]."""
+    return 1.01 * LEAST_WIDTH * 10.0 ** float(rng.choice([0.0, rng.uniform(0.0, 4.0)]))
 
 
 def _arc(rng: np.random.Generator, kind: str) -> tuple[float, float]:
@@ -118,19 +132,32 @@ def _arc(rng: np.random.Generator, kind: str) -> tuple[float, float]:
     start = float(rng.uniform(-math.pi, math.pi))
     if kind == "fixed":
         return start, start
+    if kind == "narrow":
+        return start, start + _width(rng)
     if kind == "almost full":
         short = float(rng.choice([1e-3, 1e-4, 1e-5, 2e-6, 1e-6, 1e-7, 1e-9]))
         return -math.pi, math.pi - short
     if kind == "within a turn":
-        return start, start + float(rng.uniform(0.0, 1.0)) * (math.pi - start)
+        return start, start + float(rng.uniform(0.01, 1.0)) * (math.pi - start)
     if kind == "past the seam":
         return float(rng.uniform(1.0, 3.0)), float(rng.uniform(3.2, 2 * math.pi))
     if kind == "ends at zero":
-        return -float(rng.uniform(0.1, 3.0)), float(rng.choice([0.0, 1e-12, 1e-6]))
+        return -float(rng.uniform(0.1, 3.0)), float(rng.choice([0.0, 1e-6]))
     if kind == "shifted full":
         start = float(rng.choice([-2 * math.pi, 0.0, -1.0]))
         return start, start + 2 * math.pi
     return -math.pi, math.pi
+
+
+def _extreme(rng: np.random.Generator, kind: str) -> FinModelSpec:
+    """A fin whose parameters are anywhere within their bounds, many at one of them."""
+    values = []
+    for name, rule in FIN_MODELS[kind].items():
+        drawn = float(rng.uniform(rule.low, rule.high))
+        if rule.low > 0.0:
+            drawn = float(rule.low * (rule.high / rule.low) ** rng.random())
+        values.append((name, float(rng.choice([rule.low, rule.default, drawn, rule.high]))))
+    return FinModelSpec(kind, tuple(values))
 
 
 def _models(rng: np.random.Generator, table: str | None) -> Sequence[FinModelSpec]:
@@ -141,6 +168,7 @@ def _models(rng: np.random.Generator, table: str | None) -> Sequence[FinModelSpe
         FinModelSpec("drag", (("area", 0.04 * large), ("lever", 0.1 * large))),
         FinModelSpec("lighthill", (("length", 0.2 * large), ("width", 0.1 * large))),
         FinModelSpec("soft", (("k", 8.0 * large),)),
+        *(_extreme(rng, kind) for kind in ("drag", "lighthill", "soft")),
     ]
     if table is not None:
         kinds.append(FinModelSpec("table", (("path", table),)))
