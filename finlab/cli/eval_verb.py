@@ -47,6 +47,7 @@ def _not_asked() -> None:
 
 def verb_of(experiment: Experiment) -> Callable[..., None]:
     """A function whose signature says to the parser which options there are."""
+    from finlab.evaluation.progress import begin
     from finlab.evaluation.report.text import to_text
 
     options = experiment.options()
@@ -54,6 +55,7 @@ def verb_of(experiment: Experiment) -> Callable[..., None]:
     def verb(**given: Any) -> None:
         json, picture = given.pop("json"), given.pop("picture", None)
         check_json_file(json)
+        begin(experiment.name)
         chosen = {name: _parsed(name, options[name], value) for name, value in given.items()}
         rows = experiment.rows(**chosen)
         if picture is not None and experiment.draw is not None:

@@ -1,6 +1,9 @@
 """An experiment is one value: the verb, its JSON, its errors and its table follow from it."""
 
+import io
 import json
+import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +12,7 @@ import pytest
 from finlab.cli import main
 from finlab.errors import DataError
 from finlab.evaluation.experiment import EXPERIMENTS, load_experiment
+from finlab.evaluation.experiments import wrench
 from finlab.evaluation.report.text import to_text
 from finlab.evaluation.splits import SPLITS
 
@@ -58,6 +62,22 @@ def test_parts_make_the_whole() -> None:
     apart = [row for part in parts for row in experiment.rows(**part)]
     assert [row["split"] for row in apart] == [row["split"] for row in whole] == list(SPLITS)[:3]
     np.testing.assert_array_equal([r["err_norm_mean"] for r in apart], [r["err_norm_mean"] for r in whole])
+
+
+def test_a_terminal_is_told_before_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    seen: list[str] = []
+    shown = Terminal()
+    experiment = load_experiment("wrench")
+    monkeypatch.setattr(sys, "stderr", shown)
+    monkeypatch.setattr(
+        wrench, "experiment", replace(experiment, run=lambda: seen.append(shown.getvalue()) or [])
+    )
+    assert main(["eval", "wrench", "--json"]) == 0
+    assert seen == ["wrench ...\r"]
 
 
 @pytest.mark.parametrize(
