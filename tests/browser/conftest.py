@@ -1,6 +1,5 @@
 """A real browser for the flows. Without Chromium they are skipped, loudly; on CI that is a failure."""
 
-import contextlib
 import os
 import shutil
 import tempfile
@@ -56,32 +55,24 @@ class Served:
 
 
 @pytest.fixture(scope="session")
-def served() -> Iterator[Served]:
-    """The app."""
-    with serving() as running:
-        yield running
-
-
-@contextlib.contextmanager
-def serving(solver: Any = None) -> Iterator[Served]:
-    """The app with the stand-in allocator, or another solver.
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    """The app with the methods that are shipped; sessions are kept in a folder.
 
     No shadows and still fins, so that software rendering keeps up.
     """
-    from finlab.assets import shipped_layouts
     from finlab.layout import load_layout
-    from tests.webapp.stand_in import load_stand_in
     from webapp.app import App
     from webapp.session import Display
     from webapp.tasks.solver import Solver
     from webapp.viser_internals import start_server, stop_server
 
-    server = start_server()
-    layout = load_layout(shipped_layouts()["ucat"])
-    app = App(server, solver or Solver(load=load_stand_in), layout, Display(shadows=False, frozen=True))
-    yield Served(f"http://127.0.0.1:{server.get_port()}/?fixedDpr=0.3", app, server)
-    app.stop()
-    stop_server(server)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        server = start_server()
+        app = App(server, Solver(), load_layout("ucat"), Display(shadows=False, frozen=True))
+        yield Served(f"http://127.0.0.1:{server.get_port()}/?fixedDpr=0.3", app, server)
+        app.stop()
+        stop_server(server)
 
 
 @pytest.fixture(scope="session")

@@ -189,6 +189,14 @@ class Page:
         box.press("Enter")
         self._pause()
 
+    def write(self, kind: str, text: str, end: str = "Enter") -> None:
+        """Type with real keys into a word that is edited where it stands."""
+        self.page.locator(f"[data-edit={kind}]:visible").first.click()
+        self.page.locator(".fl-editor").wait_for()
+        self.page.keyboard.type(text, delay=10)
+        self.page.keyboard.press(end)
+        self.until(lambda: self.page.locator(".fl-editor").count() == 0)
+
     def choose(self, label: str, entry: str) -> None:
         """Choose from a list."""
         self.row(label).first.click()
@@ -202,18 +210,18 @@ class Page:
             self.press(button)
         chooser.value.set_files(path)
 
+    def download(self, button: str, path: Path) -> Path:
+        """Press a button that sends a file, and keep that."""
+        with self.page.expect_download() as download:
+            self.press(button)
+        download.value.save_as(path)
+        return path
+
     def key(self, keys: str) -> None:
         """Press a key outside any input."""
         self.page.evaluate("document.activeElement && document.activeElement.blur()")
         self.page.keyboard.press(keys)
         self._pause()
-
-    def slide(self, label: str, pixels: float) -> None:
-        """Drag a slider's thumb sideways."""
-        thumb = self.page.locator("label:visible", has_text=label).first.locator(ROW).get_by_role("slider")
-        box = thumb.bounding_box()
-        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-        self.drag((x, y), (x + pixels, y))
 
     def drag(self, start: tuple[float, float], end: tuple[float, float], steps: int = 16) -> None:
         """Drag with the mouse, as slowly as a hand."""

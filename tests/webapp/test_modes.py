@@ -107,7 +107,7 @@ def test_real_candidates_are_drawn_and_listed() -> None:
     assert plot.count("data-press='sample'") == len(answer.samples.energy)
     assert mode_plot(answer, listed, None, 3, 200).count("class='ring'") == 2
     table = mode_table(listed, False, 0)
-    assert table.count("onclick") == len(modes) and "0.0000" not in table and "more are" not in table
+    assert table.count("data-press=") == len(modes) and "0.0000" not in table and "more are" not in table
     assert "2 more are" in mode_table(replace(listed, count=listed.count + 2), False, 0)
     assert "no candidates" in mode_table(NO_MODES, False, 0)
     assert "looking for more" in mode_table(listed, True, 0)
