@@ -1,9 +1,10 @@
 """A page of the app in a real browser, in the words of a user: press, type, drag, read."""
 
+import contextlib
 import re
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -157,7 +158,8 @@ class Page:
     def unfold(self, folder: str, label: str) -> None:
         """Open a folder that holds this label, unless an earlier flow has left it open."""
         if self.page.locator("label:visible", has_text=label).count() == 0:
-            self.tab(folder)
+            self.page.get_by_text(folder, exact=True).locator("visible=true").first.click()
+            self._pause()
 
     def press(self, name: str) -> None:
         """Press a button that is shown."""
@@ -180,6 +182,10 @@ class Page:
             return seen == text
 
         self.until(there, told=lambda: f"{label} shows {seen!r}, not {text!r}; {self.session.state}")
+
+    def shows_last(self, label: str, text: str) -> None:
+        """The same of the last box."""
+        self.until(lambda: self.row(label).last.input_value() == text)
 
     def type(self, label: str, value: str, place: int = -1) -> None:
         """Type into a number box."""
@@ -223,8 +229,9 @@ class Page:
         self.page.keyboard.press(keys)
         self._pause()
 
-    def drag(self, start: tuple[float, float], end: tuple[float, float], steps: int = 16) -> None:
-        """Drag with the mouse, as slowly as a hand."""
+    @contextlib.contextmanager
+    def held(self, start: tuple[float, float], end: tuple[float, float], steps: int = 14) -> Iterator[None]:
+        """Drag with the mouse, as slowly as a hand; it is let go when the context ends."""
         mouse = self.page.mouse
         mouse.move(*start)
         self.page.wait_for_timeout(150)
@@ -233,8 +240,14 @@ class Page:
             mouse.move(*(a + (b - a) * k / steps for a, b in zip(start, end, strict=True)))
             self.page.wait_for_timeout(25)
         self.page.wait_for_timeout(100)
+        yield
         mouse.up()
         self._pause()
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """The same, and let go."""
+        with self.held(start, end):
+            pass
 
     def look_from_above(self) -> None:
         """See the robot from above, where its x and y axes lie flat on the screen."""

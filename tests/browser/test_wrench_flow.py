@@ -1,119 +1,130 @@
-"""Move a slider, fail a fin, choose a candidate: numbers and arrows follow."""
+"""Ask for a wrench, fail and damage fins, choose among answers and methods: numbers and arrows follow."""
 
 from typing import Any
 
+import pytest
 
-def test_slider_moves_numbers_and_arrows(page: Any) -> None:
+from webapp.session.state import COMPARED
+
+
+def test_numbers_and_arrows_follow_the_target(page: Any) -> None:
     before = page.vertices("/robot/wrench/delivered_force")
-    page.slide("Fx [N]", 25)
-    page.until(lambda: page.session.state.target[0] > 2.0)
-    # The last step of the drag may still be on its way.
-    page.until(lambda: float(page.row("Fx [N]").last.input_value()) == page.session.state.target[0])
-    asked = page.session.state.target[0]
-    page.until(lambda: f"{asked:+.2f}" in page.text(".bars"))
-    page.until(lambda: not page.view.busy)
-    assert abs(page.view.shown.wrench[0] - asked) < 0.05
+    page.type("Fx [N]", "2.5")
+    page.until(lambda: page.session.state.target[0] == 2.5 and not page.view.busy)
+    page.until(lambda: "+2.50" in page.text(".bars") and "Exact" in page.text(".fl-status"))
     page.until(lambda: page.vertices("/robot/wrench/delivered_force") != before)
-    page.until(lambda: "Exact" in page.text(".fl-status"))
-    assert page.problems == []
-
-
-def test_unreachable_wrench_is_said_in_words(page: Any) -> None:
-    page.type("Fz [N]", "30")
-    page.until(lambda: "Out of reach" in page.text(".fl-status"))
-    page.until(lambda: "left undone" in page.text(".said"))
-    assert "at the limit" in page.text(".fl-status")
-
-
-def test_failed_fin_leaves_table_arrows_and_graph(page: Any) -> None:
-    force = page.vertices("/robot/fins/0/turn/force")
-    page.press("2")
-    page.until(lambda: page.session.state.failed == ("front_left",))
-    page.until(lambda: "failed" in page.text("table.fins tr.dead"))
-    page.until(lambda: "3 of 4 fins" in page.text(".fl-status"))
-    page.until(lambda: page.vertices("/robot/fins/0/turn/force") != force)
-    hidden = "() => window.__viserMutable.nodeRefFromName['/robot/fins/1/turn/force'].visible === false"
-    page.page.wait_for_function(hidden)
-    page.press("2 ✕")
-    page.until(lambda: page.session.state.failed == ())
-
-
-def test_last_fin_cannot_fail(page: Any) -> None:
-    for number in ("1", "2", "3"):
-        page.press(number)
-        page.until(lambda number=number: len(page.session.state.failed) == int(number))
-    page.press("4")
-    page.until(lambda: any("last fin that works" in note for note in page.notes()))
-    assert len(page.session.state.failed) == 3
-
-
-def test_mode_is_picked_in_plot_and_table(page: Any) -> None:
-    page.tab("Candidates")
-    page.until(lambda: len(page.view.answering.modes.shown) > 1 and not page.view.answering.searching)
-    page.until(lambda: page.page.locator("table.modes tr.pick").count() > 1)
-    best = page.view.answering.best
-    page.page.locator("table.modes tr.pick").nth(1).click()
-    page.until(lambda: page.session.mode == 1)
-    page.until(lambda: page.view.shown is not best)
-    page.until(lambda: page.text("table.modes tr.chosen").startswith("2"))
-    page.page.locator("svg.plot:visible g.pick").last.click()  # the best one is drawn last
-    page.until(lambda: page.session.mode == 0)
-    page.page.locator("svg.plot:visible .samples circle").nth(7).dispatch_event("click")
-    page.until(lambda: page.session.sample == 7)
-    page.until(lambda: "Raw sample 7" in page.text(".step"))
-    assert page.view.shown.command.tolist() == best.samples.command[7].tolist()
-    page.choose("Method", "mdn")
-    page.until(lambda: page.session.state.method == "mdn" and not page.view.busy)
-    page.type("Candidates K", "24")
-    page.until(lambda: page.session.state.n_candidates == 24 and not page.view.busy)
-    assert len(page.view.answering.best.samples.energy) == 24
-
-
-def test_method_that_fails_says_so_and_the_page_goes_on(page: Any) -> None:
-    page.tab("Candidates")
-    page.choose("Method", "ipopt")
-    page.until(lambda: any("out of order" in note for note in page.notes()))
-    page.key("Control+z")
-    page.until(lambda: page.session.state.method == "search")
-    page.until(lambda: "Exact" in page.text(".fl-status"))
-
-
-def test_one_axis_and_the_marks_of_its_reach(page: Any) -> None:
     page.press("Tz")
     page.until(lambda: page.session.state.target[5] > 0 and page.session.state.target[0] == 0.0)
     page.until(lambda: page.view.ranging.findings is not None and not page.view.ranging.busy)
     high = float(page.view.ranging.findings.high[0])
     marks = page.row("Fx [N]").first.locator("xpath=ancestor::div[contains(@class,'Flex-root')][1]")
     page.until(lambda: f"{high:.0f}" in marks.locator(".mantine-Slider-markLabel").last.inner_text())
+    page.type("Fz [N]", "30")
+    page.until(lambda: "Out of reach" in page.text(".fl-status") and "left undone" in page.text(".said"))
+    page.choose("Out of reach", "direction")
+    page.until(
+        lambda: page.session.state.policy == "direction" and "% of what is asked" in page.text(".said")
+    )
+    assert page.problems == []
 
 
-def test_the_stick_steers_and_springs_back(page: Any) -> None:
-    before = page.session.state
-    page.tab("Steer by hand")
-    stick = page.page.locator("svg.pad")
-    stick.scroll_into_view_if_needed()
-    box = stick.bounding_box()
-    x, y = box["x"] + box["width"] / 2, box["y"] + 0.52 * box["height"]
-    mouse = page.page.mouse
-    mouse.move(x, y)
-    mouse.down()
-    for k in range(1, 9):
-        mouse.move(x - 4 * k, y - 5 * k)
-        page.page.wait_for_timeout(70)
-    page.until(lambda: page.session.state.target[0] > 3.0 and page.session.state.target[5] > 0.5)
-    assert page.session.history.undo_name == "Steer"
-    mouse.up()
-    page.until(lambda: page.session.state == before)
-    assert page.session.history.undo_name != "Steer"
-    page.tab("Steer by hand")
+def test_failed_and_damaged_fins(page: Any) -> None:
+    session = page.session
+    force = page.vertices("/robot/fins/0/turn/force")
+    page.press("2")
+    page.until(lambda: session.state.failed == ("front_left",))
+    page.until(lambda: "failed" in page.text("table.fins tr.dead") and "3 of 4" in page.text(".fl-status"))
+    page.until(lambda: page.vertices("/robot/fins/0/turn/force") != force)
+    page.visible("/robot/fins/1/turn/force", False)
+    for number in ("1", "3"):
+        page.press(number)
+        page.until(lambda number=number: session.state.layout.names[int(number) - 1] in session.state.failed)
+    page.press("4")
+    page.until(lambda: any("last fin that works" in note for note in page.notes()))
+    page.unfold("Damage a fin", "Which fin")
+    page.press("All fins")
+    page.until(lambda: session.state.failed == ())
+    page.choose("Which fin", "back_left")
+    page.until(lambda: session.selected == "back_left")
+    page.type("Strength [%]", "50")
+    page.row("Stuck").first.click()
+    page.until(lambda: "weak 50 %, stuck at 0°" in page.text(".damage"))
+    page.until(lambda: not page.view.busy and page.view.shown.command[2, 2] == 0.0)
+    page.press("All fins")
+    page.until(lambda: session.state.health is None)
+    page.page.locator(".damage").wait_for(state="detached")
+
+
+def test_candidates_of_search_and_network(page: Any) -> None:
+    session, answering = page.session, page.view.answering
+    page.tab("Candidates")
+    watts = answering.best.power
+    assert page.page.locator("svg.plot:visible .samples").count() == 0, "search draws nothing"
+    page.choose("Keep least", "effort")
+    page.until(lambda: session.state.objective == "effort" and not page.view.busy)
+    page.until(lambda: "least effort" in page.text(".fl-status") and answering.best.power > watts)
+    rows = page.page.locator("table.modes tr.pick")
+    page.until(lambda: rows.count() > 1 and not answering.searching)
+    best = answering.best
+    rows.nth(1).click()
+    page.until(lambda: session.mode == 1 and page.view.shown is not best)
+    page.until(lambda: page.text("table.modes tr.chosen").startswith("2"))
+    page.page.locator("svg.plot:visible g.pick circle").last.click()  # the best one is drawn last
+    page.until(lambda: session.mode == 0)
+    page.choose("Method", "mdn")
+    page.until(lambda: session.state.method == "mdn" and not page.view.busy)
+    page.until(lambda: "from component" in page.text("table.modes"))
+    page.page.locator("svg.plot:visible .samples circle").nth(7).dispatch_event("click")
+    page.until(lambda: session.sample is not None and "Raw sample" in page.text(".step"))
+    page.type("Candidates K", "24")
+    page.until(lambda: session.state.n_candidates == 24 and not page.view.busy)
+    assert len(answering.best.samples.energy) == 24
+    page.unfold("What the network proposes", "nothing")
+    page.until(lambda: page.page.locator(".discs svg").count() == 4)
+    assert page.problems == []
+
+
+def test_methods_side_by_side(page: Any) -> None:
+    page.press("Commands")
+    page.page.get_by_placeholder("Search commands").wait_for()
+    page.page.keyboard.type("compare the meth", delay=20)
+    page.page.keyboard.press("Enter")
+    page.until(lambda: page.session.drawer == "Comparison" and page.view.comparison.state is not None)
+    page.until(lambda: not page.view.comparison.running)
+    page.until(lambda: page.page.locator("table.methods tr").count() == 1 + len(COMPARED))
+    row = page.page.locator("table.methods tr.pick", has_text="analytic")
+    row.click()
+    page.until(lambda: page.session.overlay == "analytic")
+    page.visible("/robot/overlay")
+    page.until(lambda: "analytic" in page.text("table.methods tr.chosen"))
+    row.press("Enter")
+    page.until(lambda: page.session.overlay is None)
+
+
+def test_the_wrench_is_dragged_in_the_view(page: Any) -> None:
+    page.key("g")
+    page.until(lambda: page.session.display.grips)
+    page.visible("/robot/grip/force")
+    page.look_from_above()
+    before = page.session.state.target
+    page.drag(page.pixel("/robot/grip/force", (0.112, 0, 0)), page.pixel("/robot/grip/force", (0.192, 0, 0)))
+    page.until(lambda: page.session.state.target[0] > before[0] + 0.2)
+    page.until(lambda: page.view.scenery.robot.grips.dragged is None and not page.view.busy)
+    assert page.session.state.target[1:] == pytest.approx(before[1:], abs=0.02)
+    assert page.session.history.undo_name == "Drag the force"
+    page.tab("Design")  # one set of handles at a time
+    page.key("n")
+    fin = page.view.scenery.robot._fins[0]
+    page.until(lambda: page.session.selected is not None and not any(fin._move.active_axes))
+    page.key("g")
+    page.until(lambda: all(fin._move.active_axes))
 
 
 def test_a_sweep_plays_and_stops(page: Any) -> None:
     page.tab("Sweep")
     page.press("Play the sweep")
-    page.until(lambda: page.view.sweep.running)
-    page.until(lambda: page.session.state.target[0] > -4.0)
-    page.until(lambda: page.page.locator(".uplot").count() > 0)
+    page.until(lambda: page.view.sweep.running and page.session.state.target[0] > -4.0)
+    page.until(lambda: page.page.locator(".uplot:visible").count() > 0)
     page.press("Stop the sweep")
     page.until(lambda: not page.view.sweep.running)
     page.until(lambda: page.session.state.target[0] == 1.2 and page.row("Fx [N]").last.input_value() == "1.2")

@@ -1,0 +1,120 @@
+"""Files open, saved, dropped, exported; those of strangers open nothing and run nothing."""
+
+import base64
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import trimesh
+
+import finlab
+from finlab.cli import main
+from finlab.layout import FinModelSpec, layout_to_dict, load_layout
+from finlab.layout.yaml_file import yaml_text
+from finlab.physics import make_law
+from finlab.physics.table_file import write_table
+
+CARRIED = """files => {
+  const carried = new DataTransfer();
+  for (const [name, content] of files)
+    carried.items.add(new File([Uint8Array.from(atob(content), (c) => c.charCodeAt(0))], name));
+  return carried;
+}"""
+EVIL = "<img src=x onerror=window.pwned=1><script>window.pwned=2"
+
+
+def measured(folder: Path) -> tuple[dict[str, Any], bytes]:
+    """A robot whose first fin is a table, and that table."""
+    grid = [[0.05, 0.3, 0.6], [0.1, 1.0, 2.1], [-3.0, -1.5, 0.0, 1.5]]
+    write_table(folder / "soft.csv", make_law(FinModelSpec("soft")), *grid)  # type: ignore[arg-type]
+    values = layout_to_dict(load_layout("ucat")) | {"name": "measured"}
+    values["fins"][0]["model"] = {"type": "table", "path": "tables/soft.csv"}
+    return values, (folder / "soft.csv").read_bytes()
+
+
+def drop(page: Any, place: str, files: dict[str, bytes]) -> None:
+    """Drag files over an element of the page, see what the page says to that, and let them go there."""
+    coded = [[name, base64.b64encode(content).decode()] for name, content in files.items()]
+    carried = page.page.evaluate_handle(CARRIED, coded)
+    target, card = page.page.locator(place).first, page.page.locator(".fl-drop")
+    target.dispatch_event("dragover", {"dataTransfer": carried})
+    card.wait_for()
+    target.dispatch_event("drop", {"dataTransfer": carried})
+    card.wait_for(state="hidden")
+
+
+def test_what_is_dropped_is_opened(page: Any, tmp_path: Path) -> None:
+    state, session = page.session.state, page.session
+    drop(page, ".fl-status", {"notes.docx": b"Dear all"})
+    page.until(lambda: any("'notes.docx' cannot be opened" in text for text in page.notes()))
+    values, table = measured(tmp_path)
+    drop(page, "canvas[data-engine]", {"cell.csv": table})
+    page.until(lambda: any("no fin is selected" in text for text in page.notes()))
+    assert session.state == state
+    drop(page, "canvas[data-engine]", {"robot.yaml": yaml_text(values).encode(), "soft.csv": table})
+    page.until(lambda: session.state.layout.name == "measured")
+    assert session.state.layout.fins[0].model.type == "table"
+    page.tab("Design")
+    drop(page, ".fin-list [data-fin=back_left]", {"cell.csv": table})
+    page.until(lambda: session.state.layout.fins[2].model.type == "table")
+    assert session.selected == "back_left", "the fin on whose row it was dropped"
+    page.tab("Export")
+    drop(page, "body", {"box.STL": trimesh.creation.box((0.4, 0.3, 0.2)).export(file_type="stl")})
+    page.until(lambda: session.history.undo_name == "Import hull" and session.task == "Design")
+    drop(page, "body", {"way.csv": b"t,x,y,z\n0,0,0,0\n10,1,0,0\n"})
+    page.until(lambda: session.task == "Simulate" and page.view.swimming.own_path is not None)
+    assert page.problems == []
+
+
+def test_files_are_saved_and_opened_or_refused(page: Any, tmp_path: Path) -> None:
+    page.tab("Export")
+    text = page.download("Save", tmp_path / "saved.yaml").read_text()
+    (tmp_path / "changed.yaml").write_text(text.replace("front_right", "bow"))
+    page.upload("Open", tmp_path / "changed.yaml")
+    page.until(lambda: page.session.state.layout.names[0] == "bow")
+    (tmp_path / "broken.yaml").write_text(text.replace("version: 1", "version: 99"))
+    page.upload("Open", tmp_path / "broken.yaml")
+    page.until(lambda: any("broken.yaml" in note and "version" in note for note in page.notes()))
+    assert page.session.state.layout.names[0] == "bow", "nothing is lost"
+    values, _ = measured(tmp_path)
+    with zipfile.ZipFile(tmp_path / "robot.zip", "w") as archive:
+        archive.writestr("robot.yaml", yaml_text(values))
+        archive.write(tmp_path / "soft.csv", "tables/soft.csv")
+    page.upload("Open", tmp_path / "robot.zip")
+    page.until(lambda: "measured" in page.text(".fl-robot") and "Exact" in page.text(".fl-status"))
+    names = zipfile.ZipFile(page.download("Save", tmp_path / "home.zip")).namelist()
+    assert names[0] == "measured.yaml" and names[1].startswith("tables/") and len(names) == 2
+
+
+def test_a_strangers_layout_opens_no_file_and_runs_nothing(page: Any, tmp_path: Path) -> None:
+    before = page.session.state
+    values = layout_to_dict(load_layout("ucat")) | {"name": EVIL, "description": EVIL}
+    values["fins"][0] |= {"name": EVIL[:60], "model": {"type": "table", "path": "/etc/passwd"}}
+    (tmp_path / "robot.yaml").write_text(yaml_text(values))
+    page.upload("Open", tmp_path / "robot.yaml")
+    page.until(lambda: any("'passwd', which did not come along" in note for note in page.notes()))
+    assert page.session.state == before and "root:" not in "".join(page.notes())
+    values["fins"][0]["model"] = {"type": "drag"}
+    (tmp_path / "robot.yaml").write_text(yaml_text(values))
+    page.upload("Open", tmp_path / "robot.yaml")
+    page.until(lambda: page.session.state.layout.name == EVIL and not page.view.busy)
+    page.until(lambda: EVIL[:20] in page.text(".fl-robot"))
+    page.key("n")
+    for tab in ("Design", "Simulate", "Export", "Allocate"):
+        page.tab(tab)
+    page.catch_up()
+    assert page.page.evaluate("window.pwned") is None and page.page.locator("img[src=x]").count() == 0
+
+
+def test_what_is_exported(page: Any, tmp_path: Path) -> None:
+    page.tab("Export")
+    page.until(lambda: "finlab allocate ucat --wrench 1.2 0 0 0 0 0.25" in page.text("pre.command"))
+    html = page.download("3D view (HTML)", tmp_path / "robot.html").read_text()
+    assert "__VISER_EMBED_DATA__" in html and len(html) < 3_000_000
+    picture = page.download("Picture (PNG)", tmp_path / "robot.png")
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    bundle = page.download("Export the bundle (ZIP)", tmp_path / "page.zip")
+    assert main(["export", "ucat", "-o", str(tmp_path / "ucat"), "--zip"]) == 0
+    assert bundle.read_bytes() == (tmp_path / "ucat.zip").read_bytes()
+    state = page.session.state
+    assert finlab.load_allocator(bundle).allocate(state.layout, state.target).err_norm < 1e-3
