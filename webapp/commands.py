@@ -106,9 +106,7 @@ def commands(page: Page) -> list[Command]:
             Command("View", f"Camera: {view}", partial(robot.look_from, view), key)
             for view, key in (("3D", "1"), ("Top", "2"), ("Side", "3"), ("Front", "4"))
         ),
-        Command("View", "Parallel lines, or perspective", partial(session.toggle, "parallel"), "5"),
         Command("View", "Freeze or move the fins", partial(session.toggle, "frozen"), "P"),
-        Command("View", "Show or hide the fin graph", partial(session.toggle, "graph")),
         Command("View", "Show or hide the centre of gravity", partial(session.toggle, "center")),
         Command("View", "Dark or light theme", partial(session.toggle, "dark")),
         Command("Help", "Tour: start, or next stop", session.next_stop, "T"),

@@ -27,12 +27,11 @@ from webapp.view import View
 from webapp.viser_internals import start_server, stop_server
 
 BEFORE, OPENED, AFTER = (load_layout(shipped_layouts()[name]) for name in ("A", "B", "ucat"))
-DISPLAY = Display(frozen=True, graph=True, drawn="forces", ghost=False)
+DISPLAY = Display(frozen=True, drawn="forces", ghost=False)
 WORDS = "out of order"
 
 COMPUTED = (
     "webapp.tasks.solver.Solver.solve",
-    "finlab.allocation.allocator.Allocator.insight",
     "webapp.tasks.solver.known_modes",
     "webapp.tasks.analyst.score_card",
     "webapp.tasks.analyst.attainable_set",

@@ -53,14 +53,6 @@ def overlay_row(other: Allocation | None, dark: bool) -> str:
     return _key(_arrow(css(look(dark).overlay), 1.0), f"fins, {escape(other.method)}")
 
 
-def graph_row(shown: bool, weighed: bool, dark: bool) -> str:
-    """The edges of the fin graph; `weighed` by attention, or plain for methods without a network."""
-    if not shown:
-        return ""
-    line = f"<path d='M0 3L44 3.8V6.2L0 7Z' fill='{css(look(dark).line)}'/>"
-    return _key(f"<svg width='44' height='10'>{line}</svg>", "attention" if weighed else "graph")
-
-
 def set_rows(findings: Findings | None) -> str:
     """The bodies of what can be attained, and their scale."""
     if findings is None or findings.now is None:
@@ -101,7 +93,6 @@ def corner(
     allocation: Allocation | None,
     busy: bool,
     error: str | None,
-    instead: str = "",
     least: bool = True,
     in_reach: bool = False,
 ) -> str:
@@ -113,7 +104,6 @@ def corner(
         allocation: what is on the robot.
         busy: whether a newer answer is on its way.
         error: why there is no answer.
-        instead: what is on show instead of an answer, of which nobody expects that it is exact.
         least: whether it is the answer itself, not another way to do the same.
         in_reach: whether any command of the working fins gives what is asked.
     """
@@ -125,14 +115,13 @@ def corner(
         parts.append(f"<span class='aside'><span class='dim'>{state.method}</span></span>")
         parts.append(f"<span class='pill' style='background:{css(DEAD)}'>{WORKING}</span>")
     else:
-        parts += _figures(allocation, instead, least, in_reach)
+        parts += _figures(allocation, least, in_reach)
     return _cards(legend, parts)
 
 
-def _figures(allocation: Allocation, instead: str, least: bool, in_reach: bool) -> list[str]:
+def _figures(allocation: Allocation, least: bool, in_reach: bool) -> list[str]:
     """Error, costs, time and verdict of what is on the robot."""
-    color = DEAD if instead else verdict_of(allocation, in_reach).color
-    verdict = instead or verdict_sentence(allocation, in_reach)
+    color, verdict = verdict_of(allocation, in_reach).color, verdict_sentence(allocation, in_reach)
     pill = "pill long" if len(verdict) > LONG else "pill"
     rest = ", ".join(
         f"{axis} {value:+.2g} {unit}"

@@ -78,19 +78,17 @@ def error_axis(logs: Array) -> Axis:
 def mode_plot(
     answer: Allocation,
     modes: Modes,
-    shown: int | None,
-    sample: int | None,
+    shown: int,
     height: int,
 ) -> str:
     """What the method keeps least, against the error where samples are drawn, else against the other cost.
 
-    Samples are small dots, modes numbered ones; all can be clicked.
+    Samples are small dots, modes numbered ones, which can be clicked.
 
     Args:
         answer: what the dots are of.
         modes: its modes, which give the samples their colours.
-        shown: mode on the robot, None while it is another command.
-        sample: sample on the robot.
+        shown: mode on the robot.
         height: of the plot [px].
     """
     if not modes.shown:
@@ -117,12 +115,12 @@ def mode_plot(
     parts = [_legend(samples is not None), axes(across, up, LEFT, height)]
     if samples is not None:
         dots = [place(point) if close else None for point, close in zip(raw, near, strict=True)]
-        parts.append(_sample_dots(dots, modes, sample))
+        parts.append(_sample_dots(dots, modes))
     parts += _mode_dots([place(point) for point in refined], height - BOTTOM, shown)
     return f"<div class='fl'><svg class='plot' viewBox='0 0 {WIDTH} {height}'>{''.join(parts)}</svg></div>"
 
 
-def _mode_dots(places: list[Point], floor: float, shown: int | None) -> list[str]:
+def _mode_dots(places: list[Point], floor: float, shown: int) -> list[str]:
     """A dot where each mode lies, with its number beside it; the best one on top."""
     parts = []
     labels = _labels(places, floor)
@@ -152,20 +150,16 @@ def _logarithm(error: Array) -> Array:
     return np.asarray(np.log10(np.maximum(error, EXACT)))
 
 
-def _sample_dots(places: list[Point | None], modes: Modes, sample: int | None) -> str:
-    """Raw samples, a ring around the one on the robot, and how many have no place in the plot."""
-    colors = sample_colors(modes, len(places))
+def _sample_dots(places: list[Point | None], modes: Modes) -> str:
+    """Raw samples, and how many have no place in the plot."""
     dots = [
-        f"<circle {press('sample', str(k))} cx='{place[0]:.1f}' cy='{place[1]:.1f}' r='3' "
-        f"fill='{css(color, 0.6)}'/>"
-        for k, (place, color) in enumerate(zip(places, colors, strict=True))
+        f"<circle cx='{place[0]:.1f}' cy='{place[1]:.1f}' r='3' fill='{css(color, 0.6)}'/>"
+        for place, color in zip(places, sample_colors(modes, len(places)), strict=True)
         if place is not None
     ]
     beyond = len(places) - len(dots)
     told = f"<text x='{WIDTH - RIGHT}' y='14' text-anchor='end'>{beyond} dearer →</text>" if beyond else ""
-    chosen_place = places[sample] if sample is not None and sample < len(places) else None
-    ring = "" if chosen_place is None else _ring(*chosen_place, 6.5)
-    return f"<g class='pick samples'>{''.join(dots)}</g>{ring}{told}"
+    return f"<g class='samples'>{''.join(dots)}</g>{told}"
 
 
 def _ring(x: float, y: float, radius: float) -> str:

@@ -8,13 +8,13 @@ from webapp.tasks.mode_names import Modes
 from webapp.theme import css, mode_color
 
 
-def mode_table(modes: Modes, searching: bool, shown: int | None) -> str:
+def mode_table(modes: Modes, searching: bool, shown: int) -> str:
     """Name and origin, error, power, effort and use of the limits of each mode.
 
     Args:
         modes: an answer's modes.
         searching: whether more may be found.
-        shown: which mode moves the fins, None while another command does.
+        shown: which mode moves the fins.
     """
     if not modes.shown:
         return "<div class='fl dim'>This method gives one answer and no candidates.</div>"

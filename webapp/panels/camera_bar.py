@@ -1,4 +1,4 @@
-"""How the view is looked at: the axes as they stand, sides to look from, framing, parallel lines."""
+"""How the view is looked at: the axes as they stand, sides to look from, framing."""
 
 import viser
 
@@ -19,25 +19,14 @@ class CameraBar:
         self._page, self._content = page, gui.add_html("")
 
     def refresh(self) -> None:
-        """Mark what is on."""
-        display = self._page.session.display
+        """Nothing changes."""
         looks = "".join(
             f"<button {press('look', name)} title='{key}'>{name}</button>"
             for key, name in enumerate(CAMERAS, 1)
         )
-        switches = "".join(
-            f"<button {press(word, '')} title='{hint}'{pressed}>{label}</button>"
-            for word, label, hint, pressed in (
-                ("frame", "Frame", "what is selected fills the view (F)", ""),
-                ("parallel", "Parallel", "no perspective (5)", _pressed(display.parallel)),
-            )
-        )
-        rows = f"<div><div>{looks}</div><div>{switches}</div></div>"
+        frame = f"<button {press('frame', '')} title='what is selected fills the view (F)'>Frame</button>"
+        rows = f"<div><div>{looks}</div><div>{frame}</div></div>"
         put(self._content, content=f"<div class='fl fl-camera'>{triad()}{rows}</div>")
-
-
-def _pressed(on: bool) -> str:
-    return f" aria-pressed='{str(on).lower()}'"
 
 
 def triad() -> str:

@@ -26,8 +26,6 @@ NAMED = files("webapp").joinpath("places.js").read_text("utf-8")
 """Script that gives regions and sections their names, for the styles."""
 HABITS = files("webapp").joinpath("habits.js").read_text("utf-8")
 """Script that mends what viser's page does otherwise."""
-EARLY = files("webapp").joinpath("early_keys.js").read_text("utf-8")
-"""Script that keeps keys for the list of commands while it opens."""
 FRAMES = files("webapp").joinpath("frames.js").read_text("utf-8")
 """Script that lets fins flap, and draws only what has changed."""
 NAMES = files("webapp").joinpath("names.js").read_text("utf-8")
@@ -127,7 +125,7 @@ class Frame:
                     for index, place in enumerate(PLACES)
                     if place.region == region
                 ]
-        run_script(gui, HABITS + EARLY + FRAMES + NAMES)
+        run_script(gui, HABITS + FRAMES + NAMES)
 
     @property
     def panels(self) -> tuple[list[Panel], list[Panel]]:
@@ -161,7 +159,6 @@ class Frame:
             "lesson-close": lambda _: session.close_lesson(),
             "look": robot.look_from,
             "frame": lambda _: robot.frame(),
-            "parallel": lambda _: session.toggle("parallel"),
         }
         for kind, act in acts.items():
             self._page.editables.on_press(kind, lambda key, _held, act=act: act(key))

@@ -9,8 +9,6 @@ from webapp.handles import Changes, put
 from webapp.markup.mode_plot import mode_plot
 from webapp.markup.modes import mode_table
 from webapp.markup.picking import marker
-from webapp.markup.proposals import proposal_discs
-from webapp.markup.words import error_digits, three_digits
 from webapp.page import Page
 from webapp.session.state import CANDIDATE_RANGE, GAMMA_RANGE, TEMPERATURE_RANGE, knows_objective
 
@@ -42,8 +40,6 @@ class CandidatesPanel:
         session = page.session
         self._plot, self._plotted = gui.add_html(""), Changes()
         page.editables.on_press("mode", lambda key, _held: session.show_mode(placed(key, self._modes)))
-        page.editables.on_press("sample", lambda key, _held: session.show_sample(placed(key, self._samples)))
-        self._sample = gui.add_html("")
         with gui.add_folder("Draws from the mixture") as self._draws:
             self._settings = {
                 key: page.bind_number(
@@ -58,9 +54,6 @@ class CandidatesPanel:
                     ("gamma", "Effort weight γ", GAMMA_RANGE, 0.005, 4, weight),
                 )
             }
-        self._drawn = Changes()
-        with gui.add_folder("What the network proposes", expand_by_default=False) as self._proposals:
-            self._discs = gui.add_html("")
         gui.add_html(marker("fl-column"))
         self._table = gui.add_html("")
         self._origin = gui.add_html("")
@@ -75,16 +68,9 @@ class CandidatesPanel:
         return len(self._page.answering.modes.shown)
 
     @property
-    def _samples(self) -> int:
-        """How many samples there are."""
-        best = self._page.answering.best
-        return 0 if best is None or best.samples is None else len(best.samples.energy)
-
-    @property
-    def _shown(self) -> int | None:
-        """The mode on the robot; None while a raw sample is."""
-        session = self._page.session
-        return None if session.sample is not None else min(session.mode, max(self._modes - 1, 0))
+    def _shown(self) -> int:
+        """The mode on the robot."""
+        return min(self._page.session.mode, max(self._modes - 1, 0))
 
     def refresh(self) -> None:
         """Write settings and candidates."""
@@ -96,43 +82,16 @@ class CandidatesPanel:
             put(widget, visible=key in drawing)
         answering, shown = page.answering, self._shown
         put(self._table, content=mode_table(answering.modes, answering.searching, shown))
-        put(self._sample, content=_sample_words(page))
-        answer, modes, sample = answering.best, answering.modes, page.session.sample
-        if self._plotted(answer, modes, shown, sample):
-            plot = "" if answer is None else mode_plot(answer, modes, shown, sample, PLOT_PX)
+        answer, modes = answering.best, answering.modes
+        if self._plotted(answer, modes, shown):
+            plot = "" if answer is None else mode_plot(answer, modes, shown, PLOT_PX)
             put(self._plot, content=plot)
-        put(self._proposals, visible=answer is not None and answer.samples is not None)
-        if answer is not None and self._drawn(answer, modes):
-            put(self._discs, content=proposal_discs(answer, modes))
 
 
 def _origin_words(method: str) -> str:
     """Where the answer and its modes come from, and what is kept least where the user has no say in it."""
     words = ORIGINS.get(method, "One answer by optimization over the fins' own laws; no candidates.")
     return words if knows_objective(method) else f"{words} It keeps effort least whatever is chosen."
-
-
-def _sample_words(page: Page) -> str:
-    """Which raw sample is on the robot, and what the fins make of it."""
-    sample, shown = page.session.sample, page.shown
-    if sample is None or shown is None:
-        return ""
-    error, power, effort = error_digits(shown.err_norm), three_digits(shown.power), three_digits(shown.energy)
-    return (
-        f"<div class='fl step'><b>Raw sample {sample}{_component_words(page, sample)}</b>: "
-        f"error {error} σ, power {power} W, effort {effort}</div>"
-    )
-
-
-def _component_words(page: Page, sample: int) -> str:
-    """Of which component a raw sample is, and to which mode that led."""
-    answer, led = page.answering.best, page.answering.modes.of_samples
-    if answer is None or answer.samples is None or led is None or not sample < len(led):
-        return ""
-    source = answer.samples.source[sample]
-    if not source.startswith("component "):
-        return ""
-    return f" of {source}, which led to mode {led[sample] + 1}" if led[sample] >= 0 else f" of {source}"
 
 
 def placed(key: str, count: int) -> int:

@@ -29,7 +29,6 @@ class Corner:
         page, answering = self._page, self._page.answering
         if page.swimming.swimmers:
             return swim_corner(page.swimming, ARROWS_N)
-        instead = "" if page.session.sample is None else "Raw, not refined"
         reply = answering.reply
         return corner(
             page.session.state,
@@ -37,7 +36,6 @@ class Corner:
             page.shown,
             page.busy,
             answering.error,
-            instead,
             page.shown is answering.best,
             reply is not None and reply.in_reach,
         )

@@ -14,8 +14,8 @@ from webapp.scene.fin_node import FinNode, Flapping
 from webapp.scene.gizmos import Grips
 from webapp.scene.meshes.hull import hull_of
 from webapp.scene.meshes.mesh import LONGEST_TURN
-from webapp.scene.overlays import Ghost, Lines, Overlay, moved_fins
-from webapp.scene.stage import AWAY, Stage, aim_camera
+from webapp.scene.overlays import Ghost, Overlay, moved_fins
+from webapp.scene.stage import Stage, aim_camera
 from webapp.scene.wrench_nodes import (
     LENGTH,
     AttainableNodes,
@@ -26,7 +26,6 @@ from webapp.scene.wrench_nodes import (
 from webapp.session.state import State, chosen
 from webapp.tasks.analyst import Findings
 from webapp.tasks.context import Context
-from webapp.tasks.solver import Proposal
 from webapp.theme import ASKED, DELIVERED, HALF_TURN
 from webapp.viser_internals import run_script
 
@@ -49,7 +48,6 @@ class RobotScene:
         self._root = scene.add_frame("/robot", show_axes=False)
         self._stage = Stage(scene, hull_of(session.state.layout))
         self._wrench = WrenchNodes(scene)
-        self._lines = Lines(scene)
         self._ghost = Ghost(scene, "/robot/ghost")
         self._proposed = Ghost(scene, "/robot/proposed", DELIVERED, None)
         self._landing = Ghost(scene, "/robot/landing", ASKED, 0.45)
@@ -69,7 +67,6 @@ class RobotScene:
         """Torque [N m] that half a turn of a ring stands for at the moment."""
         self.cut = False
         """Whether a ring is cut off."""
-        self._parallel = False
         self.look_from("3D")
 
     def show(self, visible: bool) -> None:
@@ -82,15 +79,13 @@ class RobotScene:
         self.aim(np.array(CAMERAS[chosen(view, "view", CAMERAS)]), np.array([0.0, 0.0, 0.03]))
 
     def aim(self, place: Array, target: Array) -> None:
-        """Let the camera see from a place (3,) to another one (3,) [m], with the lens that is wanted."""
-        self._parallel = self._session.display.parallel
-        aim_camera(self._client, place, target, self._parallel)
+        """Let the camera see from a place (3,) to another one (3,) [m]."""
+        aim_camera(self._client, place, target)
 
     @property
     def camera(self) -> tuple[Array, Array]:
-        """Where the camera stands (3,), or would with the usual lens, and what it looks at (3,) [m]."""
-        place, target = np.array(self._client.camera.position), np.array(self._client.camera.look_at)
-        return (target + (place - target) / AWAY if self._parallel else place), target
+        """Where the camera stands (3,), and what it looks at (3,) [m]."""
+        return np.array(self._client.camera.position), np.array(self._client.camera.look_at)
 
     def frame(self) -> None:
         """Bring the selected fin, or the whole robot, into the middle of the view, seen from where it is."""
@@ -109,7 +104,6 @@ class RobotScene:
         other: Allocation | None = None,
         findings: Findings | None = None,
         offered: Layout | None = None,
-        proposal: Proposal | None = None,
     ) -> None:
         """Show the session's layout, and the answer to it if there is one for this very layout.
 
@@ -118,16 +112,13 @@ class RobotScene:
             other: another method's answer, whose forces are shown beside it.
             findings: what the layout can attain, where that is to be shown.
             offered: a better layout, whose fins are shown beside the present ones.
-            proposal: what a network made of the target.
         """
         state, display = self._session.state, self._session.display
         hull = hull_of(state.layout)
-        if display.parallel != self._parallel:
-            self.aim(*self.camera)
         if self.dragged is None:  # a hull that breathes with the fin one drags is hard to aim at
             # Glass within glass is not drawn; inside an attainable set the hull is a net.
-            net, glass = display.drawn != "none", display.graph or display.center
-            self._stage.refresh(hull, display.dark, display.shadows, glass or net, display.center, net)
+            net = display.drawn != "none"
+            self._stage.refresh(hull, display.dark, display.shadows, display.center, net)
         while len(self._fins) < state.layout.n_fins:
             self._fins.append(FinNode(self._client.scene, len(self._fins), self._clicked, self._drag))
         for node in self._fins[state.layout.n_fins :]:
@@ -170,8 +161,6 @@ class RobotScene:
             self.cut = HALF_TURN * most / self.torque > LONGEST_TURN
         self._wrench.refresh(target, given, missing, top, scale, HALF_TURN / self.torque)
         self.grips.refresh(display.grips, target, self._wrench.hub(top), scale)
-        shown = self._session.selected if display.dimensions else None
-        self._lines.refresh(state.layout, state.healthy, shown, display.graph, proposal)
 
     def _landings(self) -> tuple[Fin, ...]:
         """Where the fin in the user's hand would come to stand: its gizmo must not be moved meanwhile."""

@@ -3,7 +3,7 @@
 import numpy as np
 
 from finlab.allocation.allocation import Allocation
-from webapp.markup.corner import graph_row, legend, overlay_row, set_rows
+from webapp.markup.corner import legend, overlay_row, set_rows
 from webapp.scene.robot_scene import RobotScene
 from webapp.scene.swim_scene import SwimScene
 from webapp.session.lessons import Lesson
@@ -44,11 +44,10 @@ class Scenery:
         """Show what has been found for the session's state."""
         self._follow_guide()
         self._apply_theme()
-        found, reply = improver.findings, answering.reply
+        found = improver.findings
         offered = found.layout if found is not None and found.improved else None
-        proposal = None if reply is None else reply.proposal
         other, display = self._overlaid(comparison), self._session.display
-        self.robot.refresh(answering.shown, other, findings, offered, proposal)
+        self.robot.refresh(answering.shown, other, findings, offered)
         self.robot.flap()
         self.swims = bool(self._swimming.swimmers)
         self.robot.show(not self.swims)
@@ -58,7 +57,6 @@ class Scenery:
             self.robot.cut,
             (
                 overlay_row(other, display.dark),
-                graph_row(display.graph, proposal is not None, display.dark),
                 set_rows(findings if display.drawn != "none" else None),
             ),
         )

@@ -17,19 +17,16 @@ BELOW = 0.22
 SKY, DEEP, BRIGHT = (255, 255, 255), (150, 170, 185), 1.9
 """Colours of the light from above and from below, and how strong it is."""
 
-WIDE, LONG = math.radians(75.0), math.radians(5.0)
-"""Angle of the view [rad]: as usual, and so small that parallel lines stay parallel."""
-AWAY = math.tan(WIDE / 2) / math.tan(LONG / 2)
-"""How much further away a camera with the small angle stands to see as much."""
+WIDE = math.radians(75.0)
+"""Angle of the view [rad]."""
 
 
-def aim_camera(client: viser.ClientHandle, place: Array, target: Array, parallel: bool = False) -> None:
-    """Let the camera stand at a place (3,) and look at another one (3,) [m]; with `parallel` it sees as much
-    from far away."""
+def aim_camera(client: viser.ClientHandle, place: Array, target: Array) -> None:
+    """Let the camera stand at a place (3,) and look at another one (3,) [m]."""
     with client.atomic():
-        client.camera.fov = LONG if parallel else WIDE
+        client.camera.fov = WIDE
         client.camera.up_direction = (0.0, 0.0, 1.0)
-        client.camera.position = target + AWAY * (place - target) if parallel else place
+        client.camera.position = place
         client.camera.look_at = target
 
 
@@ -80,9 +77,9 @@ class Stage:
         fade: dict[str, Any] = {"fade_distance": 5.0, "fade_strength": 1.6, "shadow_opacity": 0.22}
         self._grid = add_floor(scene, "/floor", 6.0, 0.1, 0.5, **fade)
 
-    def refresh(self, hull: AnyHull, dark: bool, shadows: bool, glass: bool, center: bool, net: bool) -> None:
+    def refresh(self, hull: AnyHull, dark: bool, shadows: bool, center: bool, net: bool) -> None:
         """Show another hull, theme or quality; a hull of glass, or a mere net, lets one look inside."""
-        opacity = 0.35 if glass else None
+        opacity = 0.35 if center or net else None
         put(self._body.node, opacity=opacity, wireframe=net)
         put(self._bow.node, opacity=opacity, visible=not net)
         put(self._center, visible=center)

@@ -9,11 +9,11 @@ from webapp.handles import put
 from webapp.scene.fin_node import LIMP, FinShapes, Flapping, quaternion
 from webapp.scene.meshes.hull import hull_of
 from webapp.scene.meshes.mesh import NOTHING, Mesh, force_arrow, joined, tube
-from webapp.scene.overlays import NO_LINE
 from webapp.scene.shape import Shape
 from webapp.tasks.moment import PLACE, Moment
 from webapp.theme import ASKED, DELIVERED, LIGHT, Rgb
 
+NO_LINE = np.zeros((1, 2, 3), dtype=np.float32)
 TRAIL_POINTS = 250
 """Most pieces of a trail."""
 ABOVE = 0.1

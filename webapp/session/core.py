@@ -130,8 +130,6 @@ class Core:
         """What 1 means in the next mesh file of a hull: key of `UNITS`."""
         self.mode = 0
         """Which of the answer's modes is shown; 0 is the best one."""
-        self.sample: int | None = None
-        """Which of the answer's raw samples is shown instead of a mode."""
         self.overlay: str | None = None
         """Method whose forces are shown beside those on the robot."""
         self.revision = 0
@@ -170,7 +168,7 @@ class Core:
     def _settled(self) -> None:
         """After any change of the state: a choice of mode is void, a lost fin is not selected."""
         self.revision += 1
-        self.mode, self.sample = 0, None
+        self.mode = 0
         names, before = self.state.layout.names, self._names
         self._names = names
         if len(names) == len(before):  # a fin that is called otherwise now stays selected
@@ -219,7 +217,7 @@ class Core:
         """Everything as at first sight; the way here can be undone."""
         self._commit("Start over", self._first)
         self.saved, self.mesh_unit = self._first.layout, "m"
-        self.selected, self.mode, self.sample = None, 0, None
+        self.selected, self.mode = None, 0
 
     def undo(self) -> str:
         """Take back the last step; returns its name."""

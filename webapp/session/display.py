@@ -29,10 +29,6 @@ class Display:
     """Show the sweep of each fin."""
     labels: bool = True
     """Show the numbers of the fins."""
-    graph: bool = False
-    """Show the graph of the working fins; where a network has answered, edges as wide as its attention."""
-    dimensions: bool = True
-    """Show the selected fin's distance from the centre of gravity."""
     shadows: bool = True
     """Cast shadows; slow without a graphics card."""
     dark: bool = False
@@ -57,8 +53,6 @@ class Display:
     """Attainable forces without torques, torques without forces."""
     center: bool = False
     """Mark the centre of gravity."""
-    parallel: bool = False
-    """Parallel lines stay parallel in the view."""
 
     def with_value(self, key: str, value: Any) -> "Display":
         """One field changed; the page may send anything.

@@ -175,7 +175,7 @@ class Learning(Guiding):
         self._leave()
         self._commit(f"Lesson: {lesson.title}", lesson.state(self.state))
         self.lesson, self.solved = lesson, False
-        self.mode, self.sample, self.selected = 0, None, None
+        self.mode, self.selected = 0, None
         self.desk = Desk(lesson.task)
 
     def next_stop(self) -> None:

@@ -73,11 +73,7 @@ class Looking(Core):
 
     def show_mode(self, index: int) -> None:
         """Show one of the answer's modes on the robot."""
-        self.mode, self.sample = max(0, int(index)), None
-
-    def show_sample(self, index: int | None) -> None:
-        """Show one of the answer's raw samples on the robot, or the chosen mode again."""
-        self.sample = None if index is None else max(0, int(index))
+        self.mode = max(0, int(index))
 
     def set_overlay(self, method: str | None) -> None:
         """Show the forces of a compared method, or of none."""

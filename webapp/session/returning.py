@@ -16,7 +16,7 @@ class Left:
     future: tuple[tuple[str, State], ...]
     display: Display
     chosen: tuple[str, ...]
-    shown: tuple[int, int | None]
+    mode: int
     desk: Desk
 
 
@@ -33,9 +33,9 @@ class Returning(Looking):
     def _leave(self) -> None:
         """Keep the work as it is, unless it was left already."""
         if self._left is None:
-            history, shown = self.history, (self.mode, self.sample)
+            history = self.history
             past, future = tuple(history.past), tuple(history.future)
-            self._left = Left(self.state, past, future, self.display, self._chosen, shown, self.desk)
+            self._left = Left(self.state, past, future, self.display, self._chosen, self.mode, self.desk)
 
     def _come_back(self) -> None:
         """All is as it was left, and what could be undone then can be undone now."""
@@ -45,4 +45,4 @@ class Returning(Looking):
         self.history.resume(left.state, left.past, left.future)
         self._settled()
         self.display, self.desk, self._chosen = left.display, left.desk, left.chosen
-        self.mode, self.sample = left.shown
+        self.mode = left.mode

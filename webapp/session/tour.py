@@ -26,8 +26,6 @@ class Step:
     """Which mode is shown."""
     method: str = "search"
     """Who answers."""
-    graph: bool = False
-    """Whether the fin graph is shown."""
     swims: bool = False
     """Whether the robot swims."""
     drawer: str = "Candidates"
@@ -92,12 +90,11 @@ STEPS = (
     ),
     Step(
         "Another robot, and a network",
-        "Six fins now, and the method is mdn: a network that reads the robot as a graph proposes, and the "
-        "search makes each proposal exact; the drawer shows both. Finish brings your work back.",
+        "Six fins now, and the method is mdn: a network proposes, and the search makes each proposal exact; "
+        "the small dots in the drawer are its draws. Finish brings your work back.",
         "hexa",
         (1.5, 0.5, -1.0, 0.0, 0.0, 0.15),
         method="mdn",
-        graph=True,
     ),
 )
 """The stops in order."""
@@ -134,4 +131,4 @@ class Guiding(Returning):
         self._commit(f"Tour: {step.title}", step.state(self.state))
         self.stop, self.mode, self.selected = stop, step.mode, None
         self.show_drawer(step.drawer)
-        self.display = replace(self.display, graph=step.graph, drawn="none", grips=False)
+        self.display = replace(self.display, drawn="none", grips=False)

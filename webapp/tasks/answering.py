@@ -62,12 +62,10 @@ class Answering:
 
     @property
     def shown(self) -> Allocation | None:
-        """What is on the robot: the answer with the chosen mode's or sample's command."""
-        best, mode, sample = self.best, self._session.mode, self._session.sample
+        """What is on the robot: the answer with the chosen mode's command."""
+        best, mode = self.best, self._session.mode
         if best is None:
             return None
-        if sample is not None and best.samples is not None and sample < len(best.samples.command):
-            return self._variant(best, best.samples.command[sample])
         if 0 < mode < len(self.modes.shown):
             return self._variant(best, self.modes.shown[mode].mode.command)
         return best

@@ -4,7 +4,6 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,22 +12,13 @@ from finlab.allocation.allocator import Allocator
 from finlab.allocation.judging import judge
 from finlab.allocation.methods import load_allocator
 from finlab.allocation.modes import Mode
-from finlab.allocation.solution import Candidates, Insight
+from finlab.allocation.solution import Candidates
 from finlab.forces.reach import axis_ranges
 from finlab.layout import Layout
 from webapp.session.state import State
 from webapp.tasks.mode_names import Modes, known_modes, listed_modes
 
 Load = Callable[..., Allocator]
-
-
-class Proposal(NamedTuple):
-    """What a network makes of a target on the fins that work."""
-
-    fins: tuple[str, ...]
-    """Those fins, n of them."""
-    seen: Insight
-    """Mixture over their forces, and how much they look at each other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +29,6 @@ class Reply:
     """The question."""
     answer: Allocation
     """The answer itself."""
-    proposal: Proposal | None
-    """The network's output for the target, for methods that expose it."""
     modes: Modes
     """Those of its modes that are known anyway: a few."""
     in_reach: bool
@@ -95,12 +83,9 @@ class Solver:
             FinlabError: the method cannot be loaded or cannot answer.
         """
         answer, failed = judged(self.solve(state)), state.failed
-        healthy = answer.layout.without(failed) if failed else answer.layout
-        insight = self.allocator(state).insight(healthy, state.target)
         modes = listed_modes(known_modes(answer), answer.samples)
-        proposal = None if insight is None else Proposal(healthy.names, insight)
         in_reach = answer.reachable or is_within(answer.layout, state.target, failed)
-        return Reply(state, answer, proposal, modes, in_reach)
+        return Reply(state, answer, modes, in_reach)
 
     def modes(self, reply: Reply) -> Modes:
         """All distinct ways to do what an answer does: a search of its own, tens of milliseconds."""
