@@ -9,8 +9,8 @@ import trimesh
 
 import finlab
 from finlab.cli import main
+from finlab.files.plain_values import yaml_text
 from finlab.layout import FinModelSpec, layout_to_dict, load_layout
-from finlab.layout.yaml_file import yaml_text
 from finlab.physics import make_law
 from finlab.physics.table_file import write_table
 
