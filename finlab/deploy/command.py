@@ -1,4 +1,4 @@
-"""`finlab-runtime check|allocate|serve|speed BUNDLE`: the command that runs on the robot."""
+"""`finlab-runtime check|allocate|serve BUNDLE`: the command that runs on the robot."""
 
 import argparse
 import json
@@ -88,22 +88,6 @@ def allocate(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def speed(arguments: argparse.Namespace) -> int:
-    """Print times and memory of single answers, one after the other."""
-    from finlab.deploy.graph import random_targets
-    from finlab.deploy.self_check import answer_times, peak_memory
-
-    robot = _robot(arguments)
-    robot.allocate([0.0] * 6)
-    ready = time.perf_counter() - arguments.started
-    p50, p99 = answer_times(robot.allocate, random_targets(robot.layout, max(arguments.targets, 1)))
-    print(
-        f"{robot.allocator.name}, {robot.layout.n_fins} fins: p50 {p50:.2f} ms, p99 {p99:.2f} ms, "
-        f"ready after {ready:.2f} s, peak memory {peak_memory():.0f} MB"
-    )
-    return 0
-
-
 def serve(arguments: argparse.Namespace) -> int:
     """Answer requests until they end or a signal asks to stop."""
     from finlab.deploy.stopping import StopSignals
@@ -164,7 +148,7 @@ def _parser() -> argparse.ArgumentParser:
         example="finlab-runtime check my_robot",
     )
     parser.add_argument("--version", action="version", version=f"finlab-runtime {__version__}")
-    verbs = parser.add_subparsers(required=True, metavar="check|allocate|serve|speed")
+    verbs = parser.add_subparsers(required=True, metavar="check|allocate|serve")
 
     def verb(run: Callable[[argparse.Namespace], int], text: str, example: str) -> argparse.ArgumentParser:
         made: argparse.ArgumentParser = verbs.add_parser(
@@ -185,12 +169,6 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--policy", choices=POLICIES, default="closest", help="what to do out of reach")
     one.add_argument("--seed", type=int, default=0, help="seed of the candidates")
     one.add_argument("--json", action="store_true", help="print one JSON object")
-    rate = verb(
-        speed,
-        "How fast this computer answers, how soon, and how much memory it takes.",
-        "finlab-runtime speed my_robot --targets 300",
-    )
-    rate.add_argument("--targets", type=int, default=2000, metavar="N", help="number of single answers")
     loop = verb(
         serve,
         "Read targets as JSON lines, write commands as JSON lines.",

@@ -1,19 +1,16 @@
-"""`finlab-runtime check` and `speed`: does this computer answer as the desk did, truly, and how fast?
+"""`finlab-runtime check`: does this computer answer as the desk did, and truly?
 
 To be run on the robot before first use. Are the fins' laws and tables the same here, are the compiled fins
 what compiling gives here, do the fins' own models confirm this computer's answers, and are these as good as
 the stored ones.
 """
 
-import resource
-import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 
 from finlab.allocation.judging import REACHED
-from finlab.arrays import Array
 from finlab.deploy.graph import SELF_TEST_TOLERANCE
 from finlab.deploy.robot import Robot
 from finlab.errors import DataError
@@ -89,25 +86,3 @@ def compiled_off(robot: Robot) -> float:
 def worst(values: Iterable[float]) -> float:
     """The largest value, not below 0; NaN if any value is NaN."""
     return float(np.max([0.0, *values]))
-
-
-N_WARM = 100
-"""Answers before the clock starts."""
-
-
-def answer_times(allocate: Callable[[Array], object], targets: Array) -> tuple[float, float]:
-    """Median and 99th percentile [ms] of single answers to targets (N, 6), one after the other."""
-    for target in targets[:N_WARM]:
-        allocate(target)
-    times = []
-    for target in targets:
-        start = time.perf_counter()
-        allocate(target)
-        times.append(time.perf_counter() - start)
-    p50, p99 = np.percentile(times, [50, 99]) * 1e3
-    return float(p50), float(p99)
-
-
-def peak_memory() -> float:
-    """Largest resident size of this process so far [MB]."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

@@ -16,7 +16,6 @@ import pytest
 import safetensors.numpy
 
 import finlab
-from finlab import bundle_files
 from finlab.allocation import Allocator
 from finlab.bundle_files import (
     ABOUT,
@@ -165,17 +164,6 @@ def test_settings_no_robot_should_try_are_refused(
         parse_robot(resealed({**bundle.files, ABOUT: json.dumps(document).encode()}))
 
 
-def test_same_input_same_bytes(bundle: Bundle, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    again = make_bundle(finlab.load_layout("A"), finlab.load_allocator())
-    assert again.zip_bytes() == bundle.zip_bytes()
-    assert main(["export", "A", "-o", str(tmp_path / "robot"), "--zip"]) == 0
-    assert (tmp_path / "robot.zip").read_bytes() == bundle.zip_bytes()
-    assert main(["export", "A", "-o", str(tmp_path / "robot")]) == 0
-    assert "finlab-runtime check robot" in capsys.readouterr().out
-    for name, content in bundle.files.items():
-        assert (tmp_path / "robot" / name).read_bytes() == content
-
-
 def test_checksums_are_those_of_sha256sum(bundle: Bundle) -> None:
     for line in bundle.files[CHECKSUMS].decode().splitlines():
         digest, name = line.split("  ")
@@ -187,40 +175,6 @@ def test_readme_runs_it_in_five_lines(bundle: Bundle) -> None:
     lines = text.split("```\n")[1].strip().splitlines()
     assert len(lines) == 5 and any("finlab-runtime check" in line for line in lines)
     assert "front_right" in text and finlab.__version__ in text
-
-
-def test_the_readme_names_the_networks_where_there_are_any(bundle: Bundle, with_networks: Bundle) -> None:
-    first = [
-        files.files[README].decode().split("\n\n")[1].replace("\n", " ") for files in (bundle, with_networks)
-    ]
-    assert first[0].startswith(f"Made by finlab {finlab.__version__} for method `search`. Target wrench in")
-    name = parse_robot(with_networks.files).graph.checkpoint
-    assert f"for method `mdn` with checkpoint `{name}`. Target wrench in" in first[1]
-
-
-def test_the_readme_has_a_row_for_each_fin(shipped_allocator: Allocator) -> None:
-    layout = finlab.load_layout("restricted")
-    lost = layout.names[1]
-    text = make_bundle(layout, shipped_allocator, (lost,)).files[README].decode()
-    rows = [line.split(" | ") for line in text.splitlines() if line.startswith("| ") and ".." in line]
-    assert [row[0].removeprefix("| ") for row in rows] == list(layout.names)
-    for fin, row in zip(layout.fins, rows, strict=True):
-        assert [float(x) for x in row[1].split(", ")] == pytest.approx(fin.position, rel=1e-5)
-        assert float(row[2]) == pytest.approx(fin.mounting_angle, abs=1e-4)
-        ends = [[float(end) for end in cell.split("..")] for cell in row[3:6]]
-        assert np.array(ends) == pytest.approx(np.array([fin.limits.lower, fin.limits.upper]).T, rel=1e-3)
-        assert row[6] == ("no |" if fin.name == lost else "yes |")
-    assert f"failed=['{lost}'])" in text
-
-
-def test_what_an_earlier_bundle_had_more_is_gone(
-    bundle: Bundle, with_networks: Bundle, measured_bundle: Bundle, tmp_path: Path
-) -> None:
-    for files in (with_networks, measured_bundle, bundle):
-        files.write(tmp_path)
-        assert read_bundle_files(tmp_path) == dict(files.files)
-        present = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file()}
-        assert present == set(files.files)
 
 
 def test_archive_is_plain(bundle: Bundle) -> None:
@@ -240,13 +194,6 @@ def test_a_changed_file_is_named(measured_bundle: Bundle, with_networks: Bundle)
             named = name if name != CHECKSUMS else ""
             with pytest.raises(FinlabError, match=f"{named}.* does not fit SHA256SUMS"):
                 parse_robot({**files, name: bytes(content)})
-
-
-def test_forged_weights_are_refused_although_their_checksum_fits(with_networks: Bundle) -> None:
-    content = bytearray(with_networks.files[WEIGHTS])
-    content[-1] ^= 1
-    with pytest.raises(FinlabError, match="its SHA-256 is not the one in config.json"):
-        parse_robot(resealed({**with_networks.files, WEIGHTS: bytes(content)}))
 
 
 def test_parts_of_two_exports_are_refused(bundle: Bundle, with_networks: Bundle) -> None:
@@ -306,15 +253,6 @@ def test_compiled_fins_that_no_search_could_live_with_are_refused(
         parse_robot(compiled(change, dict(bundle.files)))
 
 
-def test_compiled_fins_of_too_many_fins_are_refused(bundle: Bundle) -> None:
-    def multiply(arrays: dict[str, np.ndarray]) -> None:
-        for name, array in list(arrays.items()):
-            arrays |= {f"{k:064x}{name[64:]}": array for k in range(17)}
-
-    with pytest.raises(DataError, match="expected at most 16 fins, got 18"):
-        parse_robot(compiled(multiply, dict(bundle.files)))
-
-
 def test_force_tables_travel_and_answer_from_folder_and_archive(
     measured: Layout, measured_bundle: Bundle, shipped_allocator: Allocator, force_table: Path, tmp_path: Path
 ) -> None:
@@ -357,12 +295,6 @@ def test_a_force_table_outside_the_bundle_is_refused(
             read(place)
 
 
-def test_a_missing_force_table_is_told(measured_bundle: Bundle, force_table: Path) -> None:
-    left = {name: content for name, content in measured_bundle.files.items() if not name.startswith(TABLES)}
-    with pytest.raises(FinlabError, match="names a force table that is not in the bundle"):
-        parse_robot(resealed(left))
-
-
 def test_force_tables_have_their_limits(
     measured: Layout, shipped_allocator: Allocator, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -373,22 +305,6 @@ def test_force_tables_have_their_limits(
     robot = replace(measured, fins=(replace(measured.fins[0], model=gone), *measured.fins[1:]))
     with pytest.raises(DataError, match=r"gone\.csv: no such file"):
         make_bundle(robot, shipped_allocator)
-
-
-def test_all_files_together_have_a_limit(
-    measured_bundle: Bundle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    measured_bundle.write(tmp_path / "x")
-    measured_bundle.write_zip(tmp_path / "x.zip")
-    size = sum(map(len, measured_bundle.files.values()))
-    for most, good in ((size, True), (size - 1, False)):
-        monkeypatch.setattr(bundle_files, "LARGEST_BUNDLE", most)
-        for place in (tmp_path / "x", tmp_path / "x.zip"):
-            if good:
-                assert read_bundle_files(place) == dict(measured_bundle.files)
-            else:
-                with pytest.raises(DataError, match="is larger than .* bytes"):
-                    read_bundle_files(place)
 
 
 def archive_of(path: Path, **files: bytes) -> Path:

@@ -36,7 +36,6 @@ def test_nothing_heavy_is_loaded(folder: Path) -> None:
         "from finlab.deploy.command import main\n"
         f"assert main(['check', {str(folder)!r}]) == 0\n"
         f"assert main(['allocate', {str(folder / 'layout.graph.json')!r}, *{WRENCH!r}]) == 0\n"
-        f"assert main(['speed', {str(folder)!r}, '--targets', '3']) == 0\n"
         "import os; assert os.environ['OPENBLAS_NUM_THREADS'] == '1'\n"
     )
     environment = {name: value for name, value in os.environ.items() if not name.endswith("NUM_THREADS")}
@@ -45,7 +44,6 @@ def test_nothing_heavy_is_loaded(folder: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert "this computer answers as the one that made the bundle" in done.stdout
-    assert "search, 4 fins: p50" in done.stdout
 
 
 def test_allocate_prints_a_table_or_one_object(folder: Path, capsys: Any) -> None:
@@ -118,7 +116,7 @@ def test_check_prints_each_finding(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ([], "the following arguments are required: check|allocate|serve|speed"),
+        ([], "the following arguments are required: check|allocate|serve"),
         (["fly", "bundle"], "invalid choice: 'fly'"),
         (["check"], "the following arguments are required: BUNDLE"),
         (["allocate", "bundle", "--wrench", "1"], "--wrench: expected 6 arguments"),
@@ -135,7 +133,7 @@ def test_a_wrong_call_ends_with_usage_and_2(arguments: list[str], message: str, 
 
 def test_every_page_of_help_has_an_example_and_fits(capsys: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "400")
-    for verb in ([], ["check"], ["allocate"], ["serve"], ["speed"]):
+    for verb in ([], ["check"], ["allocate"], ["serve"]):
         assert main([*verb, "--help"]) == 0
         page = capsys.readouterr().out
         assert "\nexample:\n" in page and max(map(len, page.splitlines())) <= 100

@@ -19,9 +19,13 @@ from finlab.layout import load_layout
 from finlab.layout.load import GraphText, checksum_of
 
 WEIGHTS, CONFIG = "checkpoint/model.safetensors", "checkpoint/config.json"
-LAYOUTS, GRAPHS, BUNDLES, ARCHIVES, ANSWERS = 3000, 3000, 3200, 500, 300
 WRENCH = [1, 0, 0.5, 0, 0, 0.1]
 ODD = (b"\xff", b"\0", b"9" * 30, b"1e999", b"NaN", b"[", b"{", b'"', b"\n- ", b"&a *a", b"-1", b"null", b"")
+
+
+def counts(most: int) -> pytest.MarkDecorator:
+    """Runs of a tenth of the files each day, and of all where every case is asked for."""
+    return pytest.mark.parametrize("count", [most // 10, pytest.param(most, marks=pytest.mark.exhaustive)])
 
 
 @pytest.fixture(scope="module")
@@ -59,21 +63,23 @@ def survive(read: Callable[[], object]) -> int:
     return 1
 
 
-def test_layout_files(tmp_path: Path) -> None:
+@counts(3000)
+def test_layout_files(count: int, tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     texts = [path.read_bytes() for path in shipped_layouts().values()]
     path = tmp_path / "x.yaml"
     good = 0
-    for i in range(LAYOUTS):
+    for i in range(count):
         path.write_bytes(mutated(rng, texts[i % len(texts)]))
         good += survive(lambda: load_layout(path))
-    assert 0 < good < LAYOUTS
+    assert 0 < good < count
 
 
-def test_graph_files(small: Bundle) -> None:
+@counts(3000)
+def test_graph_files(count: int, small: Bundle) -> None:
     rng = np.random.default_rng(1)
     good = 0
-    for i in range(GRAPHS):
+    for i in range(count):
         text = mutated(rng, small.files[GRAPH]).decode("utf-8", "replace")
         if i % 2:  # a forger mends the checksum
             try:
@@ -83,14 +89,15 @@ def test_graph_files(small: Bundle) -> None:
             except (ValueError, TypeError, RecursionError):
                 pass
         good += survive(lambda text=text: parse_graph(GraphText(text)))  # type: ignore[misc]
-    assert 0 < good < GRAPHS
+    assert 0 < good < count
 
 
-def test_bundles(small: Bundle) -> None:
+@counts(3200)
+def test_bundles(count: int, small: Bundle) -> None:
     rng = np.random.default_rng(2)
     good = 0
     names = sorted(small.files)
-    for i in range(BUNDLES):
+    for i in range(count):
         name = (WEIGHTS, CONFIG, ABOUT, COMPILED, names[i % len(names)])[i % 5]
         files = {**small.files, name: mutated(rng, small.files[name])}
         if i % 3 and name == WEIGHTS:  # a forger mends this checksum too
@@ -109,17 +116,18 @@ def test_bundles(small: Bundle) -> None:
             parse_robot(files)
 
         good += survive(run)
-    assert 0 < good < BUNDLES
+    assert 0 < good < count
 
 
-def test_archives(small: Bundle, tmp_path: Path) -> None:
+@counts(500)
+def test_archives(count: int, small: Bundle, tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     path, content = tmp_path / "x.zip", small.zip_bytes()
     good = 0
-    for _ in range(ARCHIVES):
+    for _ in range(count):
         path.write_bytes(mutated(rng, content))
         good += survive(lambda: load_robot(path))
-    assert 0 < good < ARCHIVES
+    assert 0 < good < count
 
 
 def _flipped(rng: np.random.Generator, content: bytes) -> bytes:
@@ -132,14 +140,15 @@ def _flipped(rng: np.random.Generator, content: bytes) -> bytes:
     return content[:start] + numbers.tobytes()
 
 
-def test_answers_of_what_was_forged(measured_bundle: Bundle, tmp_path: Path) -> None:
+@counts(300)
+def test_answers_of_what_was_forged(count: int, measured_bundle: Bundle, tmp_path: Path) -> None:
     """Compiled fins, tables and settings whose checksums fit: an answer within the limits that the plant
     judges, or an error of ours."""
     rng = np.random.default_rng(4)
     path = tmp_path / "x.zip"
     table = next(name for name in measured_bundle.files if name.startswith(TABLES))
     good = 0
-    for i in range(ANSWERS):
+    for i in range(count):
         name = (COMPILED, table, ABOUT)[i % 3]
         change = _flipped if name == COMPILED else mutated
         files = {**measured_bundle.files, name: change(rng, measured_bundle.files[name])}
@@ -154,4 +163,4 @@ def test_answers_of_what_was_forged(measured_bundle: Bundle, tmp_path: Path) -> 
             assert found.judged_by == "plant" and np.isfinite([found.err_norm, found.power]).all()
 
         good += survive(answer)
-    assert 0 < good < ANSWERS
+    assert 0 < good < count

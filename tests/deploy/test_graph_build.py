@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 
 import jsonschema
-import numpy as np
 import pytest
 
 import finlab
@@ -13,11 +12,9 @@ from finlab.assets import shipped_layouts
 from finlab.cli import main
 from finlab.deploy.graph import N_SELF_TEST, build_graph
 from finlab.deploy.graph_file import graph_bytes, read_graph, write_graph
-from finlab.errors import FinlabError
 from finlab.inference.checkpoint import read_checkpoint
 from finlab.layout import Layout, save_layout
 from finlab.layout.load import checksum_of
-from finlab.physics import Plant
 
 SCHEMA = json.loads((Path(__file__).parents[2] / "finlab/deploy/graph.schema.json").read_text())
 WRENCH = ["--wrench", "0.5", "0", "0.5", "0", "0", "0"]
@@ -40,28 +37,10 @@ def test_graph_of_an_allocator(failed: tuple[str, ...], allocator: Allocator, un
     assert graph.method == allocator.name and len(graph.self_test) == N_SELF_TEST
 
 
-def test_self_test_holds_by_the_fins_own_models(allocator: Allocator) -> None:
-    layout = finlab.load_layout("mixed")
-    graph = build_graph(layout, allocator)
-    for case in graph.self_test:
-        wrench = Plant(layout).wrench(case.command)
-        assert graph.normalization.error(wrench, np.array(case.delivered_wrench)) < 1e-7
-        own = allocator.allocate(layout, case.wrench)
-        np.testing.assert_allclose(np.array(case.command, np.float64), own.command, rtol=1e-8)
-    assert len({case.wrench for case in graph.self_test}) == N_SELF_TEST
-
-
 def test_same_input_same_bytes(allocator: Allocator, untrained_mdn: Path) -> None:
     layout = finlab.load_layout(shipped_layouts()["ucat"])
     again = finlab.load_allocator(allocator.name, checkpoint=untrained_mdn)
     assert graph_bytes(build_graph(layout, allocator)) == graph_bytes(build_graph(layout, again))
-
-
-def test_any_method_has_a_graph(untrained_mdn: Path) -> None:
-    layout = finlab.load_layout("A")
-    graph = build_graph(layout, finlab.load_allocator("analytic", checkpoint=untrained_mdn))
-    assert graph.method == "analytic" and graph.checkpoint is None
-    jsonschema.validate(json.loads(graph_bytes(graph)), SCHEMA)
 
 
 def test_force_tables_are_found_beside_the_graph_file(
@@ -96,40 +75,6 @@ def test_an_exported_graph_file_takes_its_tables_along(
     assert "cannot be written: No such file or directory" in capsys.readouterr().err
 
 
-def test_unknown_failed_fin_is_refused(allocator: Allocator) -> None:
-    with pytest.raises(FinlabError, match="no fin 'nobody'"):
-        build_graph(finlab.load_layout(shipped_layouts()["A"]), allocator, ("nobody",))
-
-
-def test_exported_file_stands_in_for_its_layout(
-    untrained_mdn: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    checkpoint = ["--checkpoint", str(untrained_mdn)]
-    path = str(tmp_path / "A.graph.json")
-    assert main(["export", "A", "-o", path, "--failed", "back_left", *checkpoint]) == 0
-    capsys.readouterr()
-    answers = []
-    for argv in ([path], ["A", "--failed", "back_left"]):
-        assert main(["allocate", *argv, *WRENCH, "--json", *checkpoint]) == 0
-        answers.append(json.loads(capsys.readouterr().out))
-    assert answers[0]["failed"] == ["back_left"]
-    assert answers[0]["command"] == answers[1]["command"]
-    assert main(["layout", "check", path]) == 0
-
-
 def test_export_refuses_another_file_name(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", "A", "-o", "A.json"]) == 2
     assert capsys.readouterr().err.startswith("finlab: error: A.json: expected a file name that ends in")
-
-
-def test_edited_export_is_refused(
-    untrained_mdn: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "A.graph.json"
-    assert main(["export", "A", "-o", str(path), "--checkpoint", str(untrained_mdn)]) == 0
-    path.write_text(path.read_text().replace("0.25753", "0.35753", 1))
-    capsys.readouterr()
-    assert main(["allocate", str(path), *WRENCH]) == 2
-    assert capsys.readouterr().err == (
-        f"finlab: error: {path}: checksum: does not fit the contents; the file was changed, export it again\n"
-    )

@@ -10,6 +10,15 @@ from webapp.markup.snippets import command_line, export_line, python_lines
 from webapp.page import Page
 from webapp.session import files
 
+PURPOSES = {
+    "Bundle": "for the robot, with all that it needs: <code>finlab-runtime check FILE</code>",
+    "Graph file": "for the robot, too, which compiles the fins as it starts, and for all verbs of finlab",
+    "Candidates": "all answers to this question, for a spreadsheet",
+    "Picture": "what is seen now, for a paper",
+    "3D view": "moves by itself in any browser, without a server",
+}
+"""What each file is for."""
+
 
 class FilesTab:
     """Buttons for files, and the same question as a command."""
@@ -27,8 +36,9 @@ class FilesTab:
             "Picture (PNG)": page.exports.picture,
             "3D view (HTML)": lambda: page.exports.html(page.shown),
         }
-        hint = "The layout graph alone, and what is seen; the HTML page moves by itself and needs no server."
-        page.add_buttons("Single files", parts, hint=hint)
+        page.add_buttons("Single files", parts, hint="The layout graph alone, and what is seen.")
+        lines = (f"<div class='said'><b>{name}</b> {text}</div>" for name, text in PURPOSES.items())
+        gui.add_html(f"<div class='fl dim'>{''.join(lines)}</div>")
         self._command = gui.add_html("")
 
     def _send_candidates(self) -> None:
