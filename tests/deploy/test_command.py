@@ -97,7 +97,7 @@ def test_a_layout_file_is_refused_with_the_way_out(
         told = capsys.readouterr().err
         assert told.startswith(f"finlab-runtime: error: {tmp_path / name}: ") and told.count("\n") == 1
     assert main(["check", "nowhere"]) == 2
-    assert capsys.readouterr().err.startswith("finlab-runtime: error: nowhere: cannot be read")
+    assert capsys.readouterr().err.startswith("finlab-runtime: error: nowhere: no such file")
 
 
 @pytest.mark.parametrize(("value", "code"), [(0.5, 0), (1.0, 0), (1.5, 1), (float("nan"), 1)])
